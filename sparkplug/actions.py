@@ -1,0 +1,67 @@
+"""What a session asks of its transport, and the message of a host application's STATE."""
+
+import json
+from typing import NamedTuple
+
+from sparkplug.errors import PayloadError
+
+
+class Publish(NamedTuple):
+    """Publish `payload` on `topic`."""
+
+    topic: str
+    payload: bytes
+    qos: int = 0
+    retain: bool = False
+
+
+class Subscribe(NamedTuple):
+    """Subscribe to `topic_filter`."""
+
+    topic_filter: str
+    qos: int = 1
+
+
+class Connect(NamedTuple):
+    """Open a connection with a clean session (3.1.1) or a clean start and no session expiry (5.0), and this will."""
+
+    will: Publish
+
+
+class Disconnect(NamedTuple):
+    """Close the connection. `with_will` is reason 0x04 of MQTT 5; it is ignored with 3.1.1."""
+
+    with_will: bool = False
+
+
+class WalkToNextServer(NamedTuple):
+    """Close the connection and go on to the next broker of the list (5.4, primary host offline)."""
+
+
+Action = Publish | Subscribe | Disconnect | WalkToNextServer
+
+
+class HostState(NamedTuple):
+    """Whether a host application is online, since when (ms since 1970, UTC)."""
+
+    online: bool
+    timestamp_ms: int
+
+    def encode(self) -> bytes:
+        """The JSON of a STATE message.
+
+        >>> HostState(True, 1668114759262).encode()
+        b'{"online":true,"timestamp":1668114759262}'
+        """
+        return json.dumps({"online": self.online, "timestamp": self.timestamp_ms}, separators=(",", ":")).encode()
+
+    @classmethod
+    def decode(cls, payload: bytes) -> "HostState":
+        """Read a STATE message; raises PayloadError where it is none (2.2 sent the words ONLINE and OFFLINE)."""
+        try:
+            state = json.loads(payload)
+        except ValueError as error:
+            raise PayloadError(f"STATE {payload[:40]!r} is not JSON: {error}") from error
+        if not isinstance(state, dict) or type(state.get("online")) is not bool or type(state.get("timestamp")) is not int:
+            raise PayloadError(f"STATE {payload[:80]!r} needs a boolean 'online' and a whole number 'timestamp'")
+        return cls(state["online"], state["timestamp"])

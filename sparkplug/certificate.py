@@ -1,0 +1,159 @@
+"""What a birth certificate declares: a table of metrics with their aliases, types and present values."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from sparkplug.codec import write_properties, write_value
+from sparkplug.datatype import DataType
+from sparkplug.errors import MetricValueError, SparkplugError, UnknownMetricError
+from sparkplug.metric import Change, MetricSpec, quality_properties
+from sparkplug.quality import QUALITY_PROPERTY, Quality
+from sparkplug.values import Metric, PropertySet, PropertyValue, Template, Value
+from sparkplug.wire_value import WRITE
+
+GOOD_AGAIN: PropertySet = {QUALITY_PROPERTY: PropertyValue(DataType.INT32, int(Quality.GOOD))}
+
+
+@dataclass(slots=True)
+class _Slot:
+    """One declared metric and its present value."""
+
+    spec: MetricSpec
+    alias: int
+    properties: PropertySet
+    value: Value = None
+    timestamp_ms: int = 0
+    quality: Quality = Quality.GOOD
+    reason: str | None = None
+
+
+class Certificate:
+    """The metrics of one edge node or device; `alias_of` gives each name its alias, the same one each time."""
+
+    def __init__(self, owner: str, specs: Iterable[MetricSpec], alias_of: Callable[[str], int], now_ms: int) -> None:
+        self._owner = owner
+        self._slots: dict[str, _Slot] = {}
+        for spec in specs:
+            if spec.name in self._slots:
+                raise SparkplugError(f"{owner} declares the metric {spec.name!r} twice")
+            slot = _Slot(spec, alias_of(spec.name), spec.property_set(), spec.value, now_ms)
+            self._slots[spec.name] = slot
+            self._check(slot, spec.value)
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._slots
+
+    @property
+    def specs(self) -> tuple[MetricSpec, ...]:
+        """The declared metrics, in order."""
+        return tuple(slot.spec for slot in self._slots.values())
+
+    def keep_values(self, older: "Certificate") -> None:
+        """Take over the present values of the metrics that `older` declares with the same type."""
+        for name, slot in self._slots.items():
+            past = older._slots.get(name)
+            if past is not None and past.spec.datatype is slot.spec.datatype:
+                slot.value, slot.timestamp_ms, slot.quality, slot.reason = (
+                    past.value,
+                    past.timestamp_ms,
+                    past.quality,
+                    past.reason,
+                )
+
+    def name_of(self, alias: int) -> MetricSpec | None:
+        """The metric with this alias."""
+        return next((slot.spec for slot in self._slots.values() if slot.alias == alias), None)
+
+    def spec(self, name: str) -> MetricSpec | None:
+        """The metric with this name."""
+        slot = self._slots.get(name)
+        return None if slot is None else slot.spec
+
+    def check(self, changes: Iterable[Change]) -> None:
+        """Raise UnknownMetricError or MetricValueError where a change does not fit the declaration."""
+        for change in changes:
+            self._check(self._slot(change.name), change.value)
+
+    def note(self, changes: Iterable[Change]) -> None:
+        """Keep the new values for the next birth; history does not change the present."""
+        for change in changes:
+            if not change.is_historical:
+                slot = self._slots[change.name]
+                _, slot.value, slot.timestamp_ms, slot.quality, slot.reason, _ = change
+
+    def birth(self) -> tuple[Metric, ...]:
+        """The metrics of a birth: name, alias, type, properties and the present value of each."""
+        return tuple(
+            Metric(
+                name=slot.spec.name,
+                value=slot.value,
+                datatype=slot.spec.datatype,
+                timestamp_ms=slot.timestamp_ms,
+                alias=slot.alias,
+                is_transient=slot.spec.is_transient,
+                properties={**slot.properties, **quality_properties(slot.quality, slot.reason)},
+                metadata=slot.spec.metadata,
+            )
+            for slot in self._slots.values()
+        )
+
+    def write_data(self, message: Any, changes: Sequence[Change]) -> None:
+        """Add the changes, oldest first, to a protobuf payload: alias, time and value, no name and no type (6.4.5, 6.4.7).
+
+        A quality is told where it is not good, and once when it is good again.
+        """
+        metrics = message.metrics
+        for change in changes if len(changes) == 1 else sorted(changes, key=_time):
+            slot = self._slot(change.name)
+            out = metrics.add(alias=slot.alias, timestamp=change.timestamp_ms)
+            if change.value is None:
+                out.is_null = True
+            else:
+                self._write(out, slot, change.value)
+            if change.quality is not Quality.GOOD or change.reason is not None:
+                write_properties(out.properties, quality_properties(change.quality, change.reason))
+            elif slot.quality is not Quality.GOOD:
+                write_properties(out.properties, GOOD_AGAIN)
+            if change.is_historical:
+                out.is_historical = True
+            if slot.spec.is_transient:
+                out.is_transient = True
+
+    def _slot(self, name: str) -> _Slot:
+        slot = self._slots.get(name)
+        if slot is None:
+            known = ", ".join(list(self._slots)[:8])
+            raise UnknownMetricError(f"{self._owner} has no metric {name!r}; its birth declares {known} …")
+        return slot
+
+    def _write(self, out: Any, slot: _Slot, value: Value) -> None:
+        try:
+            write_value(out, slot.spec.datatype, value)
+        except MetricValueError as error:
+            raise MetricValueError(f"{self._owner}: metric {slot.spec.name!r}: {error}") from error
+
+    def _check(self, slot: _Slot, value: Value) -> None:
+        """Raise MetricValueError, naming owner and metric, where the declared type cannot carry `value`."""
+        if value is None:
+            return
+        datatype = slot.spec.datatype
+        try:
+            if datatype in WRITE:
+                WRITE[datatype](value)
+            elif datatype is DataType.TEMPLATE and isinstance(value, Template) and value.is_definition:
+                raise MetricValueError("a template definition belongs into the templates of the node, not into a metric")
+        except MetricValueError as error:
+            raise MetricValueError(f"{self._owner}: metric {slot.spec.name!r}: {error}") from error
+
+
+def _time(change: Change) -> int:
+    return change.timestamp_ms
+
+
+Definitions = Mapping[str, Template]
+
+
+def definition_metrics(definitions: Definitions, now_ms: int) -> tuple[Metric, ...]:
+    """The template definitions of an NBIRTH, the only message that may carry them (6.4.15)."""
+    return tuple(Metric(name, template, DataType.TEMPLATE, now_ms) for name, template in definitions.items())

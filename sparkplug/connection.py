@@ -1,0 +1,318 @@
+"""The thin transport: paho-mqtt, driven by one thread of ours.
+
+Only that thread touches paho. Other threads put actions into a bounded outbox and wake it. Each connection is a new paho
+client, so that nothing of an earlier session is ever sent again.
+"""
+
+import logging
+import select
+import socket
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import paho.mqtt.client as paho
+from paho.mqtt.enums import CallbackAPIVersion, MQTTErrorCode, MQTTProtocolVersion
+from paho.mqtt.packettypes import PacketTypes
+from paho.mqtt.properties import Properties
+from paho.mqtt.reasoncodes import ReasonCode
+
+from sparkplug.actions import Action, Connect, Disconnect, Publish, Subscribe
+from sparkplug.broker import BrokerAddress
+
+OUTBOX_MAX = 20_000
+KEEPALIVE_S = 15
+CONNECT_TIMEOUT_S = 5.0
+BACKOFF_S_MIN = 0.2
+BACKOFF_S_MAX = 15.0
+TICK_S = 0.1
+_READ_BYTES = 64 * 1024
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class Listener:
+    """Who is told what happens; every call comes from the connection's thread."""
+
+    connecting: Callable[[int], Connect]  # the number of the broker in the list
+    connected: Callable[[], None]
+    message: Callable[[str, bytes], None]
+    lost: Callable[[], None]
+    tick: Callable[[], None]
+
+
+class _BufferedSocket:
+    """Reads ahead: paho asks for one byte, then for some, then for the rest, and each would be a system call."""
+
+    def __init__(self, sock: Any) -> None:
+        self._sock = sock
+        self._buffer = b""
+        self._start = 0
+
+    def recv(self, size: int) -> bytes:
+        available = len(self._buffer) - self._start
+        if not available:
+            self._buffer, self._start = self._sock.recv(_READ_BYTES), 0
+            available = len(self._buffer)
+        end = self._start + min(size, available)
+        data: bytes = self._buffer[self._start : end]
+        self._start = end
+        return data
+
+    def pending(self) -> int:
+        """Bytes that can be read without waiting; TLS keeps some of its own, which `select` does not see."""
+        inner = getattr(self._sock, "pending", None)
+        return len(self._buffer) - self._start + (inner() if inner is not None else 0)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._sock, name)
+
+
+class _Client(paho.Client):
+    """A paho client that reads ahead. `_create_socket` is paho's own seam for wrapped sockets (its websockets use it)."""
+
+    def _create_socket(self) -> Any:
+        sock: Any = super()._create_socket()
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        return _BufferedSocket(sock)
+
+
+class MqttConnection:
+    """Keeps one connection to one of `brokers` alive until it is closed."""
+
+    def __init__(
+        self,
+        brokers: Sequence[BrokerAddress],
+        client_id: str,
+        listener: Listener,
+        *,
+        mqtt_version: int = 4,
+        chance: Random | None = None,
+    ) -> None:
+        if mqtt_version not in (4, 5):
+            raise ValueError(f"MQTT version {mqtt_version} is neither 4 (3.1.1) nor 5")
+        if not brokers:
+            raise ValueError("a connection needs at least one broker")
+        self.last_error = ""
+        self.connects = 0
+        self._brokers = tuple(brokers)
+        self._client_id = client_id
+        self._listener = listener
+        self._version = MQTTProtocolVersion.MQTTv5 if mqtt_version == 5 else MQTTProtocolVersion.MQTTv311
+        self._chance = chance or Random()  # noqa: S311 — spreads reconnects, keeps no secret
+        self._server = 0
+        self._client: _Client | None = None
+        self._accepted = False
+        self._outbox: deque[Action] = deque()
+        self._stopping = threading.Event()
+        self._asleep = False
+        self._wake_reader, self._wake_writer = socket.socketpair()
+        self._wake_reader.setblocking(False)
+        self._wake_writer.setblocking(False)
+        self._thread = threading.Thread(target=self._run, name=f"mqtt {client_id}", daemon=True)
+
+    # What other threads may call.
+
+    def start(self) -> None:
+        """Begin to connect; returns at once."""
+        self._thread.start()
+
+    def send(self, actions: Sequence[Action]) -> None:
+        """Send these in order. They are dropped with the connection if it ends first."""
+        self._outbox.extend(actions)
+        if self._asleep:
+            self._wake()
+
+    @property
+    def full(self) -> bool:
+        """Whether the outbox holds so much that no more should be put into it: the broker takes less than we give."""
+        return len(self._outbox) >= OUTBOX_MAX
+
+    @property
+    def backlog(self) -> int:
+        """How many actions wait to be sent."""
+        return len(self._outbox)
+
+    def close(self, farewell: Sequence[Action], timeout_s: float) -> None:
+        """Send the last messages, which end with a Disconnect, and stop."""
+        self._outbox.extend(farewell)
+        self._stopping.set()
+        self._wake()
+        if self._thread.is_alive():
+            self._thread.join(timeout_s)
+        if not self._thread.is_alive():
+            self._wake_reader.close()
+            self._wake_writer.close()
+
+    # The thread.
+
+    def _run(self) -> None:
+        pause_s = BACKOFF_S_MIN
+        while not self._stopping.is_set():
+            before = self.connects
+            try:
+                self._serve(self._brokers[self._server])
+            except (OSError, ValueError) as error:
+                self._note(str(error))
+            except Exception as error:
+                # A bug in a listener must not silence the node for good: say it and connect anew.
+                _log.exception("%s: the session failed", self._client_id)
+                self._note(repr(error))
+            pause_s = BACKOFF_S_MIN if self.connects > before else min(2 * pause_s, BACKOFF_S_MAX)
+            self._stopping.wait(pause_s * self._chance.uniform(0.8, 1.2))
+
+    def _serve(self, broker: BrokerAddress) -> None:
+        """One connection, from CONNECT to its end."""
+        self._outbox.clear()
+        connect = self._listener.connecting(self._server)
+        client = self._new_client(broker, connect)
+        self._client, self._accepted = client, False
+        try:
+            self._open(client, broker)
+            while self._step(client):
+                pass
+        finally:
+            self._client = None
+            self._listener.lost()
+            if client.socket() is not None:
+                client.on_disconnect = None
+                self._abort(client)
+
+    def _new_client(self, broker: BrokerAddress, connect: Connect) -> _Client:
+        clean = None if self._version == MQTTProtocolVersion.MQTTv5 else True
+        client = _Client(CallbackAPIVersion.VERSION2, self._client_id, clean_session=clean, protocol=self._version)
+        client.connect_timeout = CONNECT_TIMEOUT_S
+        client.will_set(connect.will.topic, connect.will.payload, connect.will.qos, connect.will.retain)
+        client.on_connect = self._on_connect
+        client.on_message = self._on_message
+        client.on_disconnect = self._on_disconnect
+        if broker.username is not None:
+            client.username_pw_set(broker.username, broker.password)
+        if broker.tls:
+            ca_file, certificate, key = broker.ca_file, broker.certificate_file, broker.key_file
+            client.tls_set(_text(ca_file), _text(certificate), _text(key))
+        return client
+
+    def _open(self, client: _Client, broker: BrokerAddress) -> None:
+        try:
+            if self._version == MQTTProtocolVersion.MQTTv5:
+                properties: Any = Properties(PacketTypes.CONNECT)  # type: ignore[no-untyped-call]
+                properties.SessionExpiryInterval = 0
+                client.connect(broker.host, broker.port, KEEPALIVE_S, clean_start=True, properties=properties)
+            else:
+                client.connect(broker.host, broker.port, KEEPALIVE_S)
+        except OSError as error:
+            raise OSError(f"no connection to {broker.url}: {error}") from error
+
+    def _step(self, client: _Client) -> bool:
+        """Wait for something to do and do it; False when the connection is over."""
+        self._drain(client)
+        sock: Any = client.socket()
+        if sock is None:
+            return False
+        pending = sock.pending()
+        self._asleep = not pending and not self._outbox
+        try:
+            # Whatever was put into the outbox before `_asleep` was set is seen here; what comes later wakes us.
+            wait_s = 0.0 if pending or (self._outbox and not client.want_write()) else TICK_S
+            readable, _, _ = select.select([sock, self._wake_reader], [sock] if client.want_write() else [], [], wait_s)
+        finally:
+            self._asleep = False
+        if self._wake_reader in readable:
+            self._quiet()
+        if (pending or sock in readable) and not self._read(client, sock):
+            return False
+        if client.want_write():
+            client.loop_write()
+        client.loop_misc()
+        self._listener.tick()
+        return client.socket() is not None and not (self._stopping.is_set() and not self._outbox and not client.want_write())
+
+    def _read(self, client: _Client, sock: Any) -> bool:
+        """Handle all packets that have come."""
+        while True:
+            if client.loop_read() != MQTTErrorCode.MQTT_ERR_SUCCESS or client.socket() is None:
+                return False
+            if not sock.pending():
+                return True
+
+    def _drain(self, client: _Client) -> None:
+        """Hand actions to paho as long as the socket takes them."""
+        if not self._accepted:
+            return
+        while self._outbox and not client.want_write() and client.socket() is not None:
+            self._do(client, self._outbox.popleft())
+
+    def _do(self, client: _Client, action: Action) -> None:
+        if isinstance(action, Publish):
+            client.publish(action.topic, action.payload, action.qos, action.retain)
+        elif isinstance(action, Subscribe):
+            client.subscribe(action.topic_filter, action.qos)
+        else:
+            self._disconnect(client, with_will=isinstance(action, Disconnect) and action.with_will)
+            if not isinstance(action, Disconnect):
+                self._server = (self._server + 1) % len(self._brokers)
+
+    def _disconnect(self, client: _Client, *, with_will: bool) -> None:
+        self._outbox.clear()
+        if self._version == MQTTProtocolVersion.MQTTv5 and with_will:
+            client.disconnect(reasoncode=ReasonCode(PacketTypes.DISCONNECT, identifier=4))
+        else:
+            client.disconnect()
+        # A broker that takes nothing more must not keep us here: then the connection just ends, and the will is sent.
+        deadline_s = time.monotonic() + CONNECT_TIMEOUT_S
+        sock: Any = client.socket()
+        while client.want_write() and client.socket() is not None and time.monotonic() < deadline_s:
+            select.select([], [sock], [], TICK_S)
+            client.loop_write()
+
+    @staticmethod
+    def _abort(client: _Client) -> None:
+        """Close without DISCONNECT, so that the broker sends the will."""
+        sock: Any = client.socket()
+        sock.close()
+
+    def _on_connect(self, _client: Any, _userdata: Any, _flags: Any, reason: Any, _properties: Any) -> None:
+        if reason.is_failure:
+            self._note(f"{self._brokers[self._server].url} refused the connection: {reason}")
+            return
+        self.connects += 1
+        self.last_error = ""
+        self._accepted = True
+        self._listener.connected()
+
+    def _on_message(self, _client: Any, _userdata: Any, message: paho.MQTTMessage) -> None:
+        self._listener.message(message.topic, bytes(message.payload))
+
+    def _on_disconnect(self, _client: Any, _userdata: Any, _flags: Any, reason: Any, _properties: Any) -> None:
+        if reason.is_failure and not self.last_error:
+            self._note(f"the connection to {self._brokers[self._server].url} ended: {reason}")
+
+    def _note(self, error: str) -> None:
+        if error != self.last_error:
+            _log.warning("%s: %s", self._client_id, error)
+        self.last_error = error
+
+    def _wake(self) -> None:
+        with suppress(OSError):  # the pipe is full or closed: the thread is awake or gone
+            self._wake_writer.send(b"w")
+
+    def _quiet(self) -> None:
+        with suppress(BlockingIOError):
+            while self._wake_reader.recv(4096):
+                pass
+
+
+def _text(path: Path | None) -> str | None:
+    return None if path is None else str(path)
+
+
+def now_ms() -> int:
+    """Milliseconds since 1970, UTC: the clock of Sparkplug time stamps."""
+    return time.time_ns() // 1_000_000

@@ -1,0 +1,123 @@
+"""An edge node on a real broker: the session and the connection put together."""
+
+import threading
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+
+from sparkplug.actions import Action, Connect
+from sparkplug.bdseq import BdSeq
+from sparkplug.broker import BrokerAddress
+from sparkplug.connection import Listener, MqttConnection, now_ms
+from sparkplug.edge_session import Command, EdgeNodeSession, Phase
+from sparkplug.metric import Change, MetricSpec, NodeId
+from sparkplug.values import Template
+
+
+class EdgeNode:
+    """Publishes the metrics of one edge node and its devices; every method may be called from any thread.
+
+    `brokers` is one address, or a list that is walked while the primary host is offline. `session_file` keeps bdSeq over
+    restarts. `on_command` is called from the connection's thread for each value that a host wants written.
+    """
+
+    def __init__(
+        self,
+        brokers: BrokerAddress | Sequence[BrokerAddress],
+        node: NodeId,
+        metrics: Sequence[MetricSpec] = (),
+        *,
+        session_file: Path | None = None,
+        primary_host: str | None = None,
+        templates: Mapping[str, Template] | None = None,
+        mqtt_version: int = 4,
+        on_command: Callable[[Command], None] | None = None,
+    ) -> None:
+        self._bd_seq = BdSeq(session_file)
+        self._session = EdgeNodeSession(node, metrics, now_ms=now_ms(), primary_host=primary_host, templates=templates)
+        self._lock = threading.Lock()
+        self._on_command = on_command
+        self.refused = 0
+        listener = Listener(self._connecting, self._connected, self._message, self._lost, self._tick)
+        addresses = (brokers,) if isinstance(brokers, BrokerAddress) else tuple(brokers)
+        self._connection = MqttConnection(addresses, f"{node.group}-{node.node}", listener, mqtt_version=mqtt_version)
+
+    def start(self) -> None:
+        """Begin to connect; returns at once."""
+        self._connection.start()
+
+    def stop(self, timeout_s: float = 5.0) -> None:
+        """Publish the node's death, disconnect and stop."""
+        with self._lock:
+            farewell = self._session.close(now_ms())
+        self._connection.close(farewell, timeout_s)
+
+    @property
+    def online(self) -> bool:
+        """Whether the node is born: connected, and the primary host, if one is needed, is online."""
+        return self._session.phase is Phase.BORN
+
+    @property
+    def reconnects(self) -> int:
+        """How often the connection was made again."""
+        return max(self._connection.connects - 1, 0)
+
+    @property
+    def last_error(self) -> str:
+        """Why there is no connection; empty while there is one."""
+        return self._connection.last_error
+
+    @property
+    def backlog(self) -> int:
+        """How many messages wait for the broker to take them."""
+        return self._connection.backlog
+
+    def declare_device(self, device: str, metrics: Iterable[MetricSpec]) -> None:
+        """Add a device (its birth is sent now if the node is born), or give one other metrics."""
+        with self._lock:
+            self._connection.send(self._session.declare_device(device, metrics, now_ms()))
+
+    def remove_device(self, device: str) -> None:
+        """Publish the death of a device and forget it."""
+        with self._lock:
+            self._connection.send(self._session.remove_device(device, now_ms()))
+
+    def publish(self, device: str | None, changes: Sequence[Change]) -> bool:
+        """Send changes of a device (None: of the node) in one message, and keep them for the next birth.
+
+        False where they were not sent, because the node is offline or the broker takes less than it is given; then the next
+        birth carries the values. Raises UnknownMetricError or MetricValueError for what the birth does not declare.
+        """
+        with self._lock:
+            if self._connection.full:
+                # Nothing is sent, so no sequence number is used and no host sees a hole; the caller counts the loss.
+                self._session.note(device, changes)
+                self.refused += 1
+                return False
+            actions = self._session.publish(device, changes, now_ms())
+            self._connection.send(actions)
+        return bool(actions)
+
+    def _connecting(self, server: int) -> Connect:
+        with self._lock:
+            return self._session.connecting(self._bd_seq.next(), now_ms(), server)
+
+    def _connected(self) -> None:
+        with self._lock:
+            self._connection.send(self._session.connected(now_ms()))
+
+    def _lost(self) -> None:
+        with self._lock:
+            self._session.lost()
+
+    def _message(self, topic: str, payload: bytes) -> None:
+        with self._lock:
+            actions: list[Action] = self._session.message(topic, payload, now_ms())
+            self._connection.send(actions)
+            commands, self._session.commands = self._session.commands, []
+        if self._on_command is not None:
+            for command in commands:
+                self._on_command(command)
+
+    def _tick(self) -> None:
+        with self._lock:
+            self._connection.send(self._session.tick(now_ms()))

@@ -1,0 +1,100 @@
+"""Topics and the ids in them (Sparkplug 3.0.0, chapter 4).
+
+>>> Topic.parse("spBv1.0/cnc/DDATA/edge-okuma/okuma")
+Topic(verb=<Verb.DDATA: 'DDATA'>, node=NodeId(group='cnc', node='edge-okuma'), device='okuma')
+>>> str(Topic(Verb.NBIRTH, NodeId("cnc", "edge-okuma")))
+'spBv1.0/cnc/NBIRTH/edge-okuma'
+"""
+
+from enum import StrEnum
+from functools import lru_cache
+from typing import NamedTuple
+
+from sparkplug.errors import TopicError
+
+NAMESPACE = "spBv1.0"
+_FORBIDDEN = ("+", "/", "#")
+
+
+class Verb(StrEnum):
+    """The message types; STATE stands apart, since its topic has another shape."""
+
+    NBIRTH = "NBIRTH"
+    NDEATH = "NDEATH"
+    NDATA = "NDATA"
+    NCMD = "NCMD"
+    DBIRTH = "DBIRTH"
+    DDEATH = "DDEATH"
+    DDATA = "DDATA"
+    DCMD = "DCMD"
+
+    @property
+    def of_device(self) -> bool:
+        """Whether the topic names a device."""
+        return self.value.startswith("D")
+
+    @property
+    def counted(self) -> bool:
+        """Whether the message carries a sequence number: all but NDEATH and commands (6.4.2)."""
+        return self not in (Verb.NDEATH, Verb.NCMD, Verb.DCMD)
+
+
+class NodeId(NamedTuple):
+    """The edge node descriptor: group and node id, unique on a broker."""
+
+    group: str
+    node: str
+
+    def __str__(self) -> str:
+        return f"{self.group}/{self.node}"
+
+
+class Topic(NamedTuple):
+    """The topic of a message of an edge node or a device."""
+
+    verb: Verb
+    node: NodeId
+    device: str | None = None
+
+    def __str__(self) -> str:
+        base = f"{NAMESPACE}/{self.node.group}/{self.verb.value}/{self.node.node}"
+        return base if self.device is None else f"{base}/{self.device}"
+
+    @staticmethod
+    @lru_cache(maxsize=4096)
+    def parse(text: str) -> "Topic":
+        """Split a topic; raises TopicError where it is none of an edge node or device."""
+        parts = text.split("/")
+        if parts[0] != NAMESPACE:
+            raise TopicError(f"topic {text!r} does not begin with {NAMESPACE}/")
+        if not 4 <= len(parts) <= 5:
+            raise TopicError(f"topic {text!r} has {len(parts)} levels; 4 name a node, 5 a device")
+        try:
+            verb = Verb(parts[2])
+        except ValueError:
+            raise TopicError(f"topic {text!r}: {parts[2]!r} is no message type of Sparkplug 3.0.0") from None
+        if verb.of_device != (len(parts) == 5):
+            raise TopicError(f"topic {text!r}: {verb.value} {'needs' if verb.of_device else 'has no'} device id")
+        device = check_id(parts[4], "device id") if len(parts) == 5 else None
+        return Topic(verb, NodeId(check_id(parts[1], "group id"), check_id(parts[3], "edge node id")), device)
+
+
+def check_id(text: str, what: str) -> str:
+    """Hand back `text` where it may stand in a topic; raises TopicError (any UTF-8 but +, / and #)."""
+    if not text:
+        raise TopicError(f"{what} is empty; give it at least one character")
+    for character in _FORBIDDEN:
+        if character in text:
+            raise TopicError(f"{what} {text!r} holds {character!r}; '+', '/' and '#' cannot stand in a topic")
+    if "\0" in text:
+        raise TopicError(f"{what} {text!r} holds a zero byte, which MQTT forbids in a topic")
+    return text
+
+
+def state_topic(host_id: str) -> str:
+    """The topic on which a host application says whether it is online (4.1 and 5.6; 2.2 had `STATE/<id>`).
+
+    >>> state_topic("scada")
+    'spBv1.0/STATE/scada'
+    """
+    return f"{NAMESPACE}/STATE/{check_id(host_id, 'host id')}"

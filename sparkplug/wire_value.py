@@ -1,0 +1,94 @@
+"""Scalar and array values to protobuf fields and back, one pair of functions for each datatype.
+
+Whole numbers are range-checked going out and sign-corrected coming in: a negative number travels as two's complement in an
+unsigned field, some peers widen it to 32 or 64 bits and some do not, so what comes in is cut to the declared width first.
+
+>>> to_field(DataType.INT8, -23)
+4294967273
+>>> from_field(DataType.INT8, 4294967273), from_field(DataType.INT8, 0xE9)
+(-23, -23)
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+from sparkplug import arrays
+from sparkplug.datatype import ARRAYS, BINARIES, SIGNED_BITS, TEXTS, UNSIGNED_BITS, DataType
+from sparkplug.errors import MetricValueError
+
+
+def _integer_out(datatype: DataType, bits: int, *, signed: bool) -> Callable[[Any], int]:
+    low, high = (-(1 << bits - 1), (1 << bits - 1) - 1) if signed else (0, (1 << bits) - 1)
+    mask = (1 << max(bits, 32)) - 1
+
+    def out(value: Any) -> int:
+        if type(value) is not int or not low <= value <= high:
+            raise MetricValueError(f"{value!r} is not a {datatype.name} ({low} to {high})")
+        return value & mask
+
+    return out
+
+
+def _integer_in(bits: int, *, signed: bool) -> Callable[[Any], int]:
+    mask, sign = (1 << bits) - 1, 1 << bits - 1
+
+    def into(value: Any) -> int:
+        cut: int = value & mask
+        return (cut ^ sign) - sign if signed else cut
+
+    return into
+
+
+def _exact(datatype: DataType, types: tuple[type, ...], cast: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    def out(value: Any) -> Any:
+        if not isinstance(value, types) or (isinstance(value, bool) and bool not in types):
+            raise MetricValueError(f"{value!r:.80} is not a {datatype.name}")
+        return cast(value)
+
+    return out
+
+
+def _array_out(datatype: DataType) -> Callable[[Any], bytes]:
+    def out(value: Any) -> bytes:
+        if not isinstance(value, tuple):
+            raise MetricValueError(f"{value!r:.80} is not a {datatype.name}; give a tuple")
+        return arrays.pack(datatype, value)
+
+    return out
+
+
+def _array_in(datatype: DataType) -> Callable[[Any], tuple[Any, ...]]:
+    return lambda data: arrays.unpack(datatype, data)
+
+
+def _same(value: Any) -> Any:
+    return value
+
+
+WRITE: dict[DataType, Callable[[Any], Any]] = {
+    **{t: _integer_out(t, bits, signed=True) for t, bits in SIGNED_BITS.items()},
+    **{t: _integer_out(t, bits, signed=False) for t, bits in UNSIGNED_BITS.items()},
+    **{t: _exact(t, (float, int), float) for t in (DataType.FLOAT, DataType.DOUBLE)},
+    DataType.BOOLEAN: _exact(DataType.BOOLEAN, (bool,), bool),
+    **{t: _exact(t, (str,), str) for t in TEXTS},
+    **{t: _exact(t, (bytes,), bytes) for t in BINARIES},
+    **{t: _array_out(t) for t in ARRAYS},
+}
+READ: dict[DataType, Callable[[Any], Any]] = {
+    **{t: _integer_in(bits, signed=True) for t, bits in SIGNED_BITS.items()},
+    **{t: _integer_in(bits, signed=False) for t, bits in UNSIGNED_BITS.items()},
+    **dict.fromkeys((DataType.FLOAT, DataType.DOUBLE), float),
+    DataType.BOOLEAN: bool,
+    **dict.fromkeys(TEXTS | BINARIES, _same),
+    **{t: _array_in(t) for t in ARRAYS},
+}
+
+
+def to_field(datatype: DataType, value: Any) -> Any:
+    """The protobuf value of `value`; raises MetricValueError where the type cannot carry it."""
+    return WRITE[datatype](value)
+
+
+def from_field(datatype: DataType, value: Any) -> Any:
+    """The Python value of a protobuf field; raises PayloadError where an array's bytes do not fit."""
+    return READ[datatype](value)
