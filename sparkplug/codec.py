@@ -115,12 +115,13 @@ def write_metric(out: Any, metric: Metric) -> None:
 
 def write_value(out: Any, datatype: DataType, value: Any) -> None:
     """Set the value of a protobuf metric, parameter, property or cell."""
-    if datatype is DataType.DATASET:
+    write = WRITE.get(datatype)
+    if write is not None:
+        setattr(out, FIELD[datatype], write(value))
+    elif datatype is DataType.DATASET:
         _write_dataset(out.dataset_value, value)
     elif datatype is DataType.TEMPLATE:
         _write_template(out.template_value, value)
-    elif datatype in WRITE:
-        setattr(out, FIELD[datatype], WRITE[datatype](value))
     else:
         raise MetricValueError(f"{datatype.name} cannot be the type of this value")
 

@@ -1,6 +1,6 @@
 """The thin transport: paho-mqtt, driven by one thread of ours.
 
-Only that thread touches paho. Other threads put actions into a bounded outbox and wake it. Each connection is a new paho
+Other threads put actions into a bounded outbox; one lock keeps paho to one thread at a time. Each connection is a new paho
 client, so that nothing of an earlier session is ever sent again.
 """
 
@@ -112,6 +112,9 @@ class MqttConnection:
         self._outbox: deque[Action] = deque()
         self._stopping = threading.Event()
         self._asleep = False
+        self._ticked_s = 0.0
+        # Held by whoever calls paho: this connection's thread but for its waits, or a sender during one.
+        self._touching = threading.RLock()
         self._wake_reader, self._wake_writer = socket.socketpair()
         self._wake_reader.setblocking(False)
         self._wake_writer.setblocking(False)
@@ -124,9 +127,23 @@ class MqttConnection:
         self._thread.start()
 
     def send(self, actions: Sequence[Action]) -> None:
-        """Send these in order. They are dropped with the connection if it ends first."""
+        """Send these in order. They are dropped with the connection if it ends first.
+
+        Where the connection's thread just waits, the caller writes to the socket itself: that saves waking a thread for each
+        message. Where it does not, it finds them in the outbox before it waits again.
+        """
+        if not actions:
+            return
         self._outbox.extend(actions)
-        if self._asleep:
+        if not self._touching.acquire(blocking=False):
+            return
+        try:
+            client = self._client
+            if client is not None and threading.current_thread() is not self._thread:
+                self._drain(client)
+        finally:
+            self._touching.release()
+        if self._outbox and self._asleep:
             self._wake()
 
     @property
@@ -212,27 +229,32 @@ class MqttConnection:
 
     def _step(self, client: _Client) -> bool:
         """Wait for something to do and do it; False when the connection is over."""
-        self._drain(client)
         sock: Any = client.socket()
         if sock is None:
             return False
-        pending = sock.pending()
-        self._asleep = not pending and not self._outbox
+        self._asleep = True
         try:
             # Whatever was put into the outbox before `_asleep` was set is seen here; what comes later wakes us.
-            wait_s = 0.0 if pending or (self._outbox and not client.want_write()) else TICK_S
+            wait_s = 0.0 if sock.pending() or (self._outbox and self._accepted and not client.want_write()) else TICK_S
             readable, _, _ = select.select([sock, self._wake_reader], [sock] if client.want_write() else [], [], wait_s)
+        except ValueError:
+            return False  # another thread's write has found the connection broken and closed it
         finally:
             self._asleep = False
-        if self._wake_reader in readable:
-            self._quiet()
-        if (pending or sock in readable) and not self._read(client, sock):
-            return False
-        if client.want_write():
-            client.loop_write()
-        client.loop_misc()
-        self._listener.tick()
-        return client.socket() is not None and not (self._stopping.is_set() and not self._outbox and not client.want_write())
+        with self._touching:
+            if self._wake_reader in readable:
+                self._quiet()
+            if (sock.pending() or sock in readable) and not self._read(client, sock):
+                return False
+            if client.want_write():
+                client.loop_write()
+            self._drain(client)
+            now_s = time.monotonic()
+            if now_s - self._ticked_s >= TICK_S:
+                self._ticked_s = now_s
+                client.loop_misc()
+                self._listener.tick()
+            return client.socket() is not None and not (self._stopping.is_set() and not self._outbox and not client.want_write())
 
     def _read(self, client: _Client, sock: Any) -> bool:
         """Handle all packets that have come."""

@@ -17,7 +17,7 @@ from sparkplug.datatype import DataType
 from sparkplug.edge_session import BD_SEQ, REBIRTH
 from sparkplug.errors import PayloadError, TopicError, UnknownMetricError
 from sparkplug.metric import Change, NodeId, Reading
-from sparkplug.node_picture import NodePicture, Owner
+from sparkplug.node_picture import NodePicture, Owner, tells_quality
 from sparkplug.rebirth import RebirthRequests
 from sparkplug.sequence import Delivery, Numbered, SequenceWindow, Verdict
 from sparkplug.topics import Topic, Verb, state_topic
@@ -226,7 +226,9 @@ class HostSession:
         if stamp and stamp < watched.picture.own.birth_ms and now_ms - watched.received_ms < LATE_MS_MAX:
             self.counts["late"] += 1  # left over from before the birth; its number may look right all the same
             return []
-        delivery = watched.window.take(Numbered(message.seq, stamp, (topic, message)), now_ms)
+        if watched.window.is_next(message.seq, stamp):
+            return self._in_order(watched, (topic, message, tells_quality(payload)), now_ms)
+        delivery = watched.window.take(Numbered(message.seq, stamp, (topic, message, tells_quality(payload))), now_ms)
         return self._deliver(watched, delivery, now_ms)
 
     def _node_birth(self, watched: _Watched, message: Any, now_ms: int) -> list[HostEvent]:
@@ -280,14 +282,14 @@ class HostSession:
             self.counts["sloppy_sequence"] += 1
         events = self._hole(watched, delivery.lost, now_ms, ask=True)
         for numbered in delivery.messages:
-            topic, message = numbered.message
             try:
-                events += self._in_order(watched, topic, message, now_ms)
+                events += self._in_order(watched, numbered.message, now_ms)
             except PayloadError:
                 self.counts["malformed"] += 1
         return events
 
-    def _in_order(self, watched: _Watched, topic: Topic, message: Any, now_ms: int) -> list[HostEvent]:
+    def _in_order(self, watched: _Watched, received: tuple[Topic, Any, bool], now_ms: int) -> list[HostEvent]:
+        topic, message, may_tell_quality = received
         picture, device = watched.picture, topic.device
         stamp = message.timestamp or now_ms
         if topic.verb is Verb.DBIRTH and device is not None:
@@ -309,7 +311,7 @@ class HostSession:
             return [
                 HostEvent(EventKind.DEATH, picture.node, device, stamp, known.wither(stamp, "device offline"), "device offline")
             ]
-        data, complete = picture.read_data(known, message, stamp)
+        data, complete = picture.read_data(known, message, stamp, may_tell_quality=may_tell_quality)
         if not complete:
             self.counts["unknown_metrics"] += 1
             self._requests.want(picture.node, now_ms)

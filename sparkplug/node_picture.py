@@ -13,6 +13,8 @@ from sparkplug.values import PropertySet, Template
 from sparkplug.wire_value import READ
 
 METRICS_MAX = 100_000
+_QUALITY_BYTES = QUALITY_PROPERTY.encode()
+_REASON_BYTES = REASON_PROPERTY.encode()
 _HOST_BUILT = frozenset({"bdSeq", "Node Control/Rebirth"})
 _PLAIN_FIELDS = frozenset({DataType.DOUBLE, DataType.BOOLEAN, DataType.STRING, DataType.TEXT, DataType.UUID})
 
@@ -22,7 +24,7 @@ class Binding(NamedTuple):
 
     name: str
     datatype: DataType
-    field: str
+    field: str  # of the protobuf metric
     read: Callable[[Any], Any] | None  # None where the protobuf value is the Python value
     unit: str | None
 
@@ -105,15 +107,18 @@ class NodePicture:
         yield None, self.own
         yield from self.devices.items()
 
-    def read_data(self, owner: Owner, message: Any, timestamp_ms: int) -> tuple[list[Reading], bool]:
+    def read_data(
+        self, owner: Owner, message: Any, timestamp_ms: int, *, may_tell_quality: bool = True
+    ) -> tuple[list[Reading], bool]:
         """The readings of a data message, and whether all of its metrics were known.
 
         This is the hot path of every processor: the birth has fixed name, field and type of each alias, so that a metric is
-        read with a handful of look-ups. What is not plain (nulls, history, properties, odd fields) takes the longer way.
+        read with a handful of look-ups. A value that is not the field's default is certainly there and no null; everything
+        else takes the longer way. `may_tell_quality` False says that the bytes do not even hold the property's name.
         """
         readings: list[Reading] = []
         complete = True
-        aliases, latest = self.aliases, owner.readings
+        aliases, latest, new = self.aliases, owner.readings, tuple.__new__
         for metric in message.metrics:
             known = aliases.get(metric.alias)
             if known is None or known[0] is not owner:
@@ -124,21 +129,25 @@ class NodePicture:
             else:
                 binding = known[1]
             name, datatype, field_name, read, unit = binding
-            if field_name and metric.HasField(field_name) and not metric.is_null:
-                value = getattr(metric, field_name)
-                if read is not None:
-                    value = read(value)
-            else:
+            value = getattr(metric, field_name) if field_name else None
+            if not value or metric.is_null:
                 value = read_value(metric, datatype)
-            if metric.HasField("properties"):
+            elif read is not None:
+                value = read(value)
+            quality, reason = Quality.GOOD, None
+            if may_tell_quality and metric.HasField("properties"):
                 quality, reason = quality_of(read_properties(metric.properties))
-            else:
-                quality, reason = Quality.GOOD, None
-            reading = Reading(name, value, metric.timestamp or timestamp_ms, quality, unit, reason, metric.is_historical)
+            historical = metric.is_historical
+            reading = new(Reading, (name, value, metric.timestamp or timestamp_ms, quality, unit, reason, historical))
             readings.append(reading)
-            if not reading.is_historical:
+            if not historical:
                 latest[name] = reading
         return readings, complete
+
+
+def tells_quality(payload: bytes) -> bool:
+    """Whether a payload can hold a quality or its reason at all: their names would stand in its bytes."""
+    return _QUALITY_BYTES in payload or _REASON_BYTES in payload
 
 
 def quality_of(properties: PropertySet) -> tuple[Quality, str | None]:

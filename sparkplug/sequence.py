@@ -56,6 +56,14 @@ class SequenceWindow:
         self._waiting_since_ms = None
         return lost
 
+    def is_next(self, seq: int, timestamp_ms: int) -> bool:
+        """Whether a message is simply the next one and nothing is held: then it is noted, and needs no `take`."""
+        if seq != self._expected or self._held:
+            return False
+        self._expected = (seq + 1) % 256
+        self._newest_ms = max(self._newest_ms, timestamp_ms)
+        return True
+
     def take(self, numbered: Numbered, now_ms: int) -> Delivery:
         """Take a message; what is in order comes back at once."""
         ahead = (numbered.seq - self._expected) % 256

@@ -1,0 +1,5 @@
+"""`python -m cnctwin`."""
+
+from cnctwin.cli import main
+
+main()

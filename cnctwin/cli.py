@@ -1,0 +1,178 @@
+"""The command `cnctwin`.
+
+Exit codes: 0 = done, 1 = the answer is bad news, 2 = wrong input. Errors are one line on stderr that names the culprit, the value
+and the way out.
+"""
+
+import json
+import logging
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+
+from cnctwin import demo as demo_command
+from cnctwin.errors import BrokerStartError, ProgramError
+from cnctwin.given_broker import address, broker_or_own
+from cnctwin.replay_command import replay
+from cnctwin.stopping import stopped_by_signals
+from edge.errors import EdgeError
+from processors.errors import ProcessorError
+from sparkplug.errors import SparkplugError
+
+app = typer.Typer(
+    no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, help="A digital twin of CNC machines."
+)
+edge_app = typer.Typer(no_args_is_help=True, help="Turn what a control says into Sparkplug B metrics.")
+control_app = typer.Typer(no_args_is_help=True, help="Stand in for a control, to develop and test without a machine.")
+app.add_typer(edge_app, name="edge")
+app.add_typer(control_app, name="simulate-control")
+
+Broker = Annotated[str | None, typer.Option(help="mqtt[s]://[user@]host[:port]; else $CNCTWIN_BROKER", show_default=False)]
+Group = Annotated[str, typer.Option(help="Sparkplug group: the plant")]
+AsJson = Annotated[bool, typer.Option("--json", help="For a program to read")]
+
+
+@app.command()
+def demo(
+    recording: Annotated[Path | None, typer.Option(help="SHDR log or time|key|value text; else our own small one")] = None,
+    devices: Annotated[Path | None, typer.Option(help="The Devices.xml that belongs to it")] = None,
+    speed: Annotated[float, typer.Option(help="How many times faster than recorded")] = 1.0,
+    seconds: Annotated[float | None, typer.Option(help="Stop by itself after so long; else at Ctrl-C")] = None,
+    port: Annotated[int | None, typer.Option(help="The private broker's port; else 1883 or a free one", min=1, max=65535)] = None,
+    machine: Annotated[str | None, typer.Option(help="The device's name; else that of the device model")] = None,
+    no_open: Annotated[bool, typer.Option("--no-open", help="Do not open a browser (there is no page yet)")] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Show a machine, its edge, a real broker and the twin, and account for everything that went through."""
+    del no_open  # Accepted already now, so that scripts need not change when the page exists.
+    options = demo_command.DemoOptions(recording, devices, speed, seconds, port, machine, as_json)
+    with stopped_by_signals() as stop:
+        code = demo_command.run(options, stop)
+    raise typer.Exit(code)
+
+
+@app.command()
+def watch(
+    machine: Annotated[str | None, typer.Argument(help="Only this machine")] = None,
+    broker: Broker = None,
+    group: Group = "cnc",
+) -> None:
+    """Live view in the terminal: each machine with the twin beside it, and the ledger of each stage."""
+    from cnctwin.watch import watch as look
+
+    with stopped_by_signals() as stop, broker_or_own(address(broker)) as where:
+        look(where, group, machine, stop)
+
+
+@app.command()
+def doctor(
+    broker: Broker = None,
+    group: Group = "cnc",
+    seconds: Annotated[float, typer.Option(help="How long to listen", min=1.0, max=600.0)] = 4.0,
+    as_json: AsJson = False,
+) -> None:
+    """Is everything connected, in order and accounted for: received = emitted + dropped + buffered?"""
+    from cnctwin.doctor import examine
+    from cnctwin.terminal import ledger_table
+    from sparkplug.broker import BrokerAddress
+
+    report = examine(address(broker) or BrokerAddress(), group, seconds)
+    if as_json:
+        _print_json(report.as_json())
+    else:
+        console = Console()
+        for finding in report.findings:
+            mark = "[green]good[/]" if finding.good else "[bold red]bad [/]"
+            console.print(mark, end=" ")
+            console.print(finding.text, markup=False, highlight=False, soft_wrap=True)
+        if report.ledgers:
+            console.print(ledger_table(report.ledgers))
+    raise typer.Exit(0 if report.good else 1)
+
+
+@app.command()
+def process(
+    names: Annotated[list[str], typer.Argument(help="thermal, cutting_force, mirror, …")],
+    config: Annotated[Path | None, typer.Option(help="TOML with a table for each processor")] = None,
+    broker: Broker = None,
+    group: Group = "cnc",
+    state_dir: Annotated[Path | None, typer.Option(help="Keeps the birth/death numbers over restarts")] = None,
+) -> None:
+    """Run processors until SIGTERM or Ctrl-C."""
+    from processors.runtime import configured, run
+
+    configured(names, config)
+    with stopped_by_signals() as stop, broker_or_own(address(broker)) as where:
+        run(names, where, config, stop, group=group, session_dir=state_dir)
+
+
+@edge_app.command("run")
+def edge_run(config: Annotated[Path, typer.Argument(help="The TOML file of one machine")], broker: Broker = None) -> None:
+    """Run an edge until SIGTERM or Ctrl-C."""
+    from cnctwin.edge_commands import run
+
+    with stopped_by_signals() as stop:
+        run(config, address(broker), stop)
+
+
+@edge_app.command("check")
+def edge_check(config: Annotated[Path, typer.Argument(help="The TOML file of one machine")], as_json: AsJson = False) -> None:
+    """Check a configuration against its control and show what would be published, without a broker."""
+    from cnctwin.edge_commands import table
+    from edge.check import check
+
+    rows = check(config)
+    if as_json:
+        _print_json([row._asdict() for row in rows])
+    else:
+        Console().print(table(rows))
+
+
+@edge_app.command("discover")
+def edge_discover(
+    url: Annotated[str, typer.Argument(help="The address of an MTConnect agent, http://host:port")],
+    device: Annotated[str, typer.Option(help="Which of several devices; else the first")] = "",
+) -> None:
+    """Draft a configuration from a control's own description."""
+    from edge.check import discover
+
+    sys.stdout.write(discover(url, device=device))
+
+
+@control_app.command("mtconnect")
+def simulate_mtconnect(
+    recording: Annotated[Path, typer.Argument(help="SHDR log or time|key|value text")],
+    devices: Annotated[Path | None, typer.Option(help="Its Devices.xml; else a device model is drafted from its keys")] = None,
+    device: Annotated[str | None, typer.Option(help="Which device of the model the recording belongs to")] = None,
+    speed: Annotated[float, typer.Option(help="How many times faster than recorded")] = 1.0,
+    port: Annotated[int, typer.Option(help="HTTP port on loopback; 0 = any", min=0, max=65535)] = 0,
+    style: Annotated[str, typer.Option(help="The generation of the agent: 2.3 or 1.4")] = "2.3",
+    loop: Annotated[bool, typer.Option("--loop", help="Begin again at the end")] = False,
+    state_file: Annotated[Path | None, typer.Option(help="Keep address and ledger in this JSON file", hidden=True)] = None,
+) -> None:
+    """Serve a recording as a real MTConnect agent serves its machine."""
+    with stopped_by_signals() as stop:
+        replay(recording, devices, stop, device=device, speed=speed, port=port, style=style, loop=loop, state_file=state_file)
+
+
+def _print_json(value: Any) -> None:
+    sys.stdout.write(json.dumps(value, default=str) + "\n")
+
+
+def main() -> None:
+    """Run the command; every expected error is one line on stderr."""
+    logging.basicConfig(level=logging.WARNING, format="%(asctime)s %(levelname)s %(message)s")
+    try:
+        app(standalone_mode=True)
+    except BrokerStartError as error:
+        _fail(error, 1)
+    except (ProgramError, EdgeError, ProcessorError, SparkplugError) as error:
+        _fail(error, 2)
+
+
+def _fail(error: Exception, code: int) -> None:
+    print(f"cnctwin: {error}", file=sys.stderr)
+    raise SystemExit(code)

@@ -1,0 +1,80 @@
+"""`cnctwin doctor`: is everything connected, in order and accounted for?"""
+
+import time
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from cnctwin.plant import StageLedger, health, ledgers, machines
+from cnctwin.watch import viewer
+from sparkplug.broker import BrokerAddress
+from sparkplug.host import HostApplication
+from sparkplug.quality import Quality
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing that was looked at."""
+
+    good: bool
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """All findings, and the ledgers behind them."""
+
+    findings: tuple[Finding, ...]
+    ledgers: tuple[StageLedger, ...]
+
+    @property
+    def good(self) -> bool:
+        """Whether every finding is good."""
+        return all(finding.good for finding in self.findings)
+
+    def as_json(self) -> dict[str, Any]:
+        """For a program to read."""
+        stages = [{**asdict(ledger), "balances": ledger.balances} for ledger in self.ledgers]
+        return {"good": self.good, "findings": [asdict(finding) for finding in self.findings], "ledgers": stages}
+
+
+def examine(broker: BrokerAddress, group: str, seconds: float) -> Report:
+    """Listen to a broker for a while and report; asks nodes for their births where it has to."""
+    host = viewer(broker, group)
+    host.start()
+    try:
+        deadline_s = time.monotonic() + seconds
+        while time.monotonic() < deadline_s:
+            host.poll(0.1)
+        return diagnose(host, broker.url)
+    finally:
+        host.stop()
+
+
+def diagnose(host: HostApplication, url: str) -> Report:
+    """What a host application that has listened for a while can say."""
+    if not host.online:
+        return Report((Finding(False, host.last_error or f"no connection to {url}"),), ())
+    findings = [Finding(True, f"{url} answers")]
+    stages = ledgers(host)
+    for node in host.nodes():
+        picture = host.picture(node)
+        online = picture is not None and picture.online
+        findings.append(Finding(online, f"{node} is {'online' if online else 'offline, or gives no birth'}"))
+    if not host.nodes():
+        findings.append(Finding(False, "no edge node was heard of; start one with `cnctwin edge run CONFIG`"))
+    for machine in machines(host):
+        bad = [name for name, reading in machine.measured.items() if reading.quality is not Quality.GOOD]
+        state = "its control is connected" if machine.online else "its control is not connected; its values are stale"
+        findings.append(Finding(machine.online, f"{machine.name}: {state}; {len(machine.measured)} signals, {len(bad)} not good"))
+    for ledger in stages:
+        sums = f"{ledger.received} = {ledger.emitted} emitted + {ledger.dropped} dropped + {ledger.buffered} buffered"
+        findings.append(Finding(ledger.balances, f"{ledger.node}: {sums}" if ledger.balances else f"{ledger.node}: not {sums}"))
+    for node_id, metrics in health(host).items():
+        for name in ("holes", "dead_letters"):
+            count = metrics[name].value if name in metrics else 0
+            if count:
+                findings.append(Finding(True, f"{node_id}: {count} {name.replace('_', ' ')} so far, counted"))
+    counts = host.counts
+    order = f"{counts.get('lost', 0)} messages lost, {counts.get('malformed', 0)} malformed while listening"
+    findings.append(Finding(not counts.get("lost") and not counts.get("malformed"), order))
+    return Report(tuple(findings), tuple(stages))
