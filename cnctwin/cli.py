@@ -7,6 +7,7 @@ and the way out.
 import json
 import logging
 import sys
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -126,7 +127,7 @@ def edge_check(config: Annotated[Path, typer.Argument(help="The TOML file of one
 
     rows = check(config)
     if as_json:
-        _print_json([row._asdict() for row in rows])
+        _print_json([asdict(row) for row in rows])
     else:
         Console().print(table(rows))
 
@@ -151,11 +152,23 @@ def simulate_mtconnect(
     port: Annotated[int, typer.Option(help="HTTP port on loopback; 0 = any", min=0, max=65535)] = 0,
     style: Annotated[str, typer.Option(help="The generation of the agent: 2.3 or 1.4")] = "2.3",
     loop: Annotated[bool, typer.Option("--loop", help="Begin again at the end")] = False,
+    wait: Annotated[bool, typer.Option("--wait", help="Begin when the first client asks for samples")] = False,
     state_file: Annotated[Path | None, typer.Option(help="Keep address and ledger in this JSON file", hidden=True)] = None,
 ) -> None:
     """Serve a recording as a real MTConnect agent serves its machine."""
     with stopped_by_signals() as stop:
-        replay(recording, devices, stop, device=device, speed=speed, port=port, style=style, loop=loop, state_file=state_file)
+        replay(
+            recording,
+            devices,
+            stop,
+            device=device,
+            speed=speed,
+            port=port,
+            style=style,
+            loop=loop,
+            wait=wait,
+            state_file=state_file,
+        )
 
 
 def _print_json(value: Any) -> None:

@@ -127,7 +127,7 @@ class Demo:
         """Start the broker and the agent, then what depends on them."""
         agent = ["simulate-control", "mtconnect", str(self.recording), "--speed", f"{self.options.speed:g}"]
         agent += ["--devices", str(self.devices)] if self.devices else []
-        agent += ["--state-file", str(self._agent_state)]
+        agent += ["--wait", "--state-file", str(self._agent_state)]
         self._begin("agent", agent if self.options.recording else [*agent, "--loop"])
         url = self._agent_url()
         edge = self._folder / "edge.toml"
@@ -203,6 +203,8 @@ class Demo:
 def run(options: DemoOptions, stop: Event) -> int:
     """Run the demo until its time is over or `stop` is set; the exit code is 1 where the ledger does not balance."""
     console = Console(stderr=options.json)
+    if not console.is_terminal:
+        console.width = 120
     with TemporaryDirectory(prefix="cnctwin-") as folder, ExitStack() as stack:
         demo = Demo(options, Path(folder))
         stack.callback(demo.stop)

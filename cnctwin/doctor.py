@@ -72,7 +72,7 @@ def diagnose(host: HostApplication, url: str) -> Report:
     for node_id, metrics in health(host).items():
         for name in ("holes", "dead_letters"):
             count = metrics[name].value if name in metrics else 0
-            if count:
+            if isinstance(count, int) and count:
                 findings.append(Finding(True, f"{node_id}: {count} {name.replace('_', ' ')} so far, counted"))
     counts = host.counts
     order = f"{counts.get('lost', 0)} messages lost, {counts.get('malformed', 0)} malformed while listening"

@@ -3,7 +3,6 @@
 import tomllib
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import replace
 from pathlib import Path
 from threading import Event, Thread
 
@@ -25,7 +24,7 @@ def run(config_path: Path, given: BrokerAddress | None, stop: Event) -> dict[str
     if given is None and _names_broker(config_path):
         given = broker_address(config.broker, config.path)
     with broker_or_own(given) as broker:
-        runtime = edge_runtime(replace(config, broker=config.broker.model_copy(update={"url": broker.url})))
+        runtime = edge_runtime(config, broker)
         Thread(target=_pass_on, args=(stop, runtime.stop), daemon=True).start()
         runtime.run()
         return runtime.ledger.snapshot()

@@ -5,6 +5,7 @@ from pathlib import Path
 from threading import Event
 
 from cnctwin.errors import ProgramError, UsageError
+from cnctwin.mtconnect_agent.errors import ReplayError
 from cnctwin.mtconnect_agent.replay_agent import ReplayAgent
 
 STATE_S = 0.5
@@ -20,6 +21,7 @@ def replay(
     port: int = 0,
     style: str = "2.3",
     loop: bool = False,
+    wait: bool = False,
     state_file: Path | None = None,
 ) -> None:
     """Serve until stopped; says where, and keeps `state_file` up to date for a program that started us."""
@@ -27,9 +29,11 @@ def replay(
         if path is not None and not path.is_file():
             raise UsageError(f"{path}: no such file; give the recording, and its device model with --devices")
     try:
-        agent = ReplayAgent(recording, devices, speed=speed, device=device, port=port, style=style, loop=loop)
+        agent = ReplayAgent(
+            recording, devices, speed=speed, device=device, port=port, style=style, loop=loop, wait_for_client=wait
+        )
         agent.start()
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, ReplayError) as error:
         raise ProgramError(f"{recording}: cannot be replayed: {error}") from error
     try:
         print(f"{agent.url} serves {recording.name} as {agent.device_name}; Ctrl-C ends it", flush=True)

@@ -59,10 +59,10 @@ def line(machines: Sequence[MachineView], ledgers: Sequence[StageLedger]) -> str
 def ledger_table(ledgers: Sequence[StageLedger]) -> Table:
     """The ledger of each stage: received = emitted + dropped + buffered."""
     table = Table(title="received = emitted + dropped + buffered", title_justify="left", expand=False)
-    table.add_column("stage")
+    table.add_column("stage", no_wrap=True)
     for name in ("received", "emitted", "dropped", "buffered"):
-        table.add_column(name, justify="right")
-    table.add_column("balances")
+        table.add_column(name, justify="right", no_wrap=True)
+    table.add_column("balances", no_wrap=True)
     table.add_column("dropped because")
     for ledger in ledgers:
         table.add_row(

@@ -41,7 +41,7 @@ def pack(datatype: DataType, values: tuple[Any, ...]) -> bytes:
         if datatype is DataType.STRING_ARRAY:
             return _pack_strings(values)
         return struct.pack(f"<{len(values)}{_CODES[datatype]}", *values)
-    except (struct.error, OverflowError, TypeError, AttributeError) as error:
+    except (struct.error, OverflowError, TypeError, AttributeError, UnicodeEncodeError) as error:
         raise MetricValueError(f"{values!r:.80} does not fit {datatype.name}: {error}") from error
 
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from urllib.parse import unquote, urlsplit
+from urllib.parse import quote, unquote, urlsplit
 
 from sparkplug.errors import BrokerAddressError
 
@@ -51,5 +51,6 @@ class BrokerAddress:
     @property
     def url(self) -> str:
         """The address without its secret."""
-        user = "" if self.username is None else f"{self.username}@"
-        return f"mqtt{'s' if self.tls else ''}://{user}{self.host}:{self.port}"
+        user = "" if self.username is None else f"{quote(self.username, safe='')}@"
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return f"mqtt{'s' if self.tls else ''}://{user}{host}:{self.port}"

@@ -9,6 +9,7 @@ from sparkplug.datatype import DataType
 from sparkplug.errors import MetricValueError, SparkplugError, UnknownMetricError
 from sparkplug.metric import Change, MetricSpec, quality_properties
 from sparkplug.quality import QUALITY_PROPERTY, Quality
+from sparkplug.schema import PayloadMessage
 from sparkplug.values import Metric, PropertySet, PropertyValue, Template, Value
 from sparkplug.wire_value import WRITE
 
@@ -37,7 +38,7 @@ class Certificate:
         for spec in specs:
             if spec.name in self._slots:
                 raise SparkplugError(f"{owner} declares the metric {spec.name!r} twice")
-            slot = _Slot(spec, alias_of(spec.name), spec.property_set(), spec.value, now_ms)
+            slot = _Slot(spec, alias_of(spec.name), spec.property_set(), *spec.first(now_ms)[1:5])
             self._slots[spec.name] = slot
             self._check(slot, spec.value)
 
@@ -143,7 +144,9 @@ class Certificate:
                 WRITE[datatype](value)
             elif datatype is DataType.TEMPLATE and isinstance(value, Template) and value.is_definition:
                 raise MetricValueError("a template definition belongs into the templates of the node, not into a metric")
-        except MetricValueError as error:
+            else:
+                write_value(PayloadMessage().metrics.add(), datatype, value)  # else only the next birth would fail, and every one
+        except (MetricValueError, ValueError) as error:
             raise MetricValueError(f"{self._owner}: metric {slot.spec.name!r}: {error}") from error
 
 

@@ -46,16 +46,22 @@ TypeOf = Callable[[str | None, int | None], DataType | None]
 def encode(payload: Payload) -> bytes:
     """The bytes of a payload; raises PayloadError, naming the metric, where a rule or a range is broken."""
     message = PayloadMessage()
-    if payload.timestamp_ms is not None:
-        message.timestamp = payload.timestamp_ms
     for metric in payload.metrics:
-        write_metric(message.metrics.add(), metric)
-    if payload.seq is not None:
-        message.seq = payload.seq
-    if payload.uuid is not None:
-        message.uuid = payload.uuid
-    if payload.body is not None:
-        message.body = payload.body
+        try:
+            write_metric(message.metrics.add(), metric)
+        except ValueError as error:
+            raise PayloadError(f"metric {metric.name or metric.alias!r}: name, alias, time or metadata: {error}") from error
+    try:
+        if payload.timestamp_ms is not None:
+            message.timestamp = payload.timestamp_ms
+        if payload.seq is not None:
+            message.seq = payload.seq
+        if payload.uuid is not None:
+            message.uuid = payload.uuid
+        if payload.body is not None:
+            message.body = payload.body
+    except ValueError as error:
+        raise PayloadError(f"payload of {payload.timestamp_ms} ms, seq {payload.seq}: {error}") from error
     data: bytes = message.SerializeToString()
     return data
 
@@ -117,7 +123,10 @@ def write_value(out: Any, datatype: DataType, value: Any) -> None:
     """Set the value of a protobuf metric, parameter, property or cell."""
     write = WRITE.get(datatype)
     if write is not None:
-        setattr(out, FIELD[datatype], write(value))
+        try:
+            setattr(out, FIELD[datatype], write(value))
+        except AttributeError as error:  # properties, parameters and cells have fields for basic types only
+            raise MetricValueError(f"{datatype.name} cannot be the type of this value") from error
     elif datatype is DataType.DATASET:
         _write_dataset(out.dataset_value, value)
     elif datatype is DataType.TEMPLATE:
@@ -164,8 +173,10 @@ def write_properties(out: Any, properties: PropertySet) -> None:
         if value is None:
             field.is_null = True
         elif datatype is DataType.PROPERTY_SET and isinstance(value, dict):
+            field.propertyset_value.SetInParent()  # an empty set is a value, too
             write_properties(field.propertyset_value, value)
         elif datatype is DataType.PROPERTY_SET_LIST and isinstance(value, tuple):
+            field.propertysets_value.SetInParent()
             for item in value:
                 write_properties(field.propertysets_value.propertyset.add(), item)  # type: ignore[arg-type]
         else:
@@ -209,6 +220,8 @@ def read_value(field: Any, datatype: DataType | None, depth: int = 0) -> Value:
         return None
     value = getattr(field, which)
     if datatype is None or datatype is DataType.UNKNOWN:
+        if which not in _GUESS:
+            raise PayloadError(f"a value without a datatype came in the field {which}")
         datatype = _GUESS[which]
     if which == "dataset_value":
         return _read_dataset(value)

@@ -28,7 +28,9 @@ from sparkplug.broker import BrokerAddress
 
 OUTBOX_MAX = 20_000
 KEEPALIVE_S = 15
+UNACKNOWLEDGED_MAX = 65_535  # all packet ids
 CONNECT_TIMEOUT_S = 5.0
+LINGER_S_MAX = 0.5
 BACKOFF_S_MIN = 0.2
 BACKOFF_S_MAX = 15.0
 TICK_S = 0.1
@@ -69,6 +71,23 @@ class _BufferedSocket:
         """Bytes that can be read without waiting; TLS keeps some of its own, which `select` does not see."""
         inner = getattr(self._sock, "pending", None)
         return len(self._buffer) - self._start + (inner() if inner is not None else 0)
+
+    def close(self) -> None:
+        """Say that nothing more comes and take what is still on its way, then close.
+
+        A close with unread data is a reset, and a reset can destroy a death and a DISCONNECT before the broker has read them.
+        """
+        deadline_s = time.monotonic() + LINGER_S_MAX
+        with suppress(OSError):
+            self._sock.shutdown(socket.SHUT_WR)
+            self._sock.settimeout(LINGER_S_MAX)
+            while self._sock.recv(_READ_BYTES) and time.monotonic() < deadline_s:
+                pass
+        self._sock.close()
+
+    def abort(self) -> None:
+        """Close at once."""
+        self._sock.close()
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._sock, name)
@@ -205,6 +224,8 @@ class MqttConnection:
         clean = None if self._version == MQTTProtocolVersion.MQTTv5 else True
         client = _Client(CallbackAPIVersion.VERSION2, self._client_id, clean_session=clean, protocol=self._version)
         client.connect_timeout = CONNECT_TIMEOUT_S
+        # paho would hold back what exceeds 20 unacknowledged messages, and lose it, a death among them, at DISCONNECT.
+        client.max_inflight_messages_set(UNACKNOWLEDGED_MAX)
         client.will_set(connect.will.topic, connect.will.payload, connect.will.qos, connect.will.retain)
         client.on_connect = self._on_connect
         client.on_message = self._on_message
@@ -298,7 +319,7 @@ class MqttConnection:
     def _abort(client: _Client) -> None:
         """Close without DISCONNECT, so that the broker sends the will."""
         sock: Any = client.socket()
-        sock.close()
+        sock.abort()
 
     def _on_connect(self, _client: Any, _userdata: Any, _flags: Any, reason: Any, _properties: Any) -> None:
         if reason.is_failure:

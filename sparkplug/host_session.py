@@ -4,9 +4,9 @@ The transport tells it what happened, with the time; it keeps a picture of every
 for the application and, in `actions`, what is to be sent. A value is good only while its node is online.
 """
 
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from random import Random
 from typing import Any, NamedTuple
@@ -26,6 +26,8 @@ from sparkplug.values import Metric, Payload
 NODES_MAX = 10_000
 LATE_MS_MAX = 10_000
 DEVICE_BIRTH_MS_MAX = 2000
+DOUBTS_MAX = 3
+DOUBT_MS = 600_000
 
 
 class EventKind(Enum):
@@ -63,6 +65,7 @@ class _Watched:
     window: SequenceWindow
     received_ms: int = 0  # when its last birth or death came, by the host's clock
     awaiting: set[str] | None = None  # devices that were known before the last NBIRTH and have not been born since
+    doubts_ms: deque[int] = field(default_factory=lambda: deque(maxlen=DOUBTS_MAX))  # when its numbers were last doubted
 
 
 def _anyone(_: NodeId) -> bool:
@@ -235,14 +238,18 @@ class HostSession:
         picture, stamp = watched.picture, message.timestamp
         bd_seq = _bd_seq(message)
         recent = now_ms - watched.received_ms < LATE_MS_MAX
-        if recent and stamp and bd_seq == picture.bd_seq and stamp <= picture.own.birth_ms:
+        repeated = bd_seq == picture.bd_seq and stamp == picture.own.birth_ms
+        if recent and stamp and (repeated or stamp < picture.own.birth_ms):
+            # Also while the node is offline: the copy of an older birth would bring a dead node back for good.
             self.counts["late"] += 1
             return []
-        if recent and picture.online and stamp and stamp < picture.own.birth_ms:
-            self.counts["late"] += 1
-            return []
+        try:
+            readings = picture.own.bear(message, stamp or now_ms, picture.aliases)
+        except PayloadError as error:
+            # What follows it would be read by the birth before it: better to know nothing until there is one that can be read.
+            self.counts["malformed"] += 1
+            return self._wither(watched, now_ms, f"birth certificate unreadable: {error}") if picture.online else []
         lost = watched.window.begin(message.seq, stamp)
-        readings = picture.own.bear(message, stamp or now_ms, picture.aliases)
         picture.bd_seq, watched.received_ms = bd_seq, now_ms
         picture.aliases = {alias: known for alias, known in picture.aliases.items() if known[0] is picture.own}
         for owner in picture.devices.values():
@@ -280,6 +287,7 @@ class HostSession:
             self.counts["late"] += 1
         elif delivery.verdict is Verdict.SLOPPY:
             self.counts["sloppy_sequence"] += 1
+            self._doubt(watched, now_ms)
         events = self._hole(watched, delivery.lost, now_ms, ask=True)
         for numbered in delivery.messages:
             try:
@@ -294,7 +302,11 @@ class HostSession:
         stamp = message.timestamp or now_ms
         if topic.verb is Verb.DBIRTH and device is not None:
             owner = picture.devices.setdefault(device, Owner())
-            readings = owner.bear(message, stamp, picture.aliases)
+            try:
+                readings = owner.bear(message, stamp, picture.aliases)
+            except PayloadError as error:
+                self.counts["malformed"] += 1
+                return _death(picture.node, device, owner, stamp, f"birth certificate unreadable: {error}")
             if watched.awaiting:
                 watched.awaiting.discard(device)
             self.counts["births"] += 1
@@ -308,15 +320,23 @@ class HostSession:
             self.counts["deaths"] += 1
             if watched.awaiting and device is not None:
                 watched.awaiting.discard(device)
-            return [
-                HostEvent(EventKind.DEATH, picture.node, device, stamp, known.wither(stamp, "device offline"), "device offline")
-            ]
+            return _death(picture.node, device, known, stamp, "device offline")
         data, complete = picture.read_data(known, message, stamp, may_tell_quality=may_tell_quality)
         if not complete:
             self.counts["unknown_metrics"] += 1
             self._requests.want(picture.node, now_ms)
         self.counts["data"] += 1
         return [HostEvent(EventKind.DATA, picture.node, device, stamp, tuple(data))]
+
+    def _doubt(self, watched: _Watched, now_ms: int) -> None:
+        """A peer that counts sloppily is let be; but its numbers may also have begun again with a birth that was lost.
+
+        The birth is asked for, at most `DOUBTS_MAX` times in `DOUBT_MS`, so that a sloppy peer is not made to repeat it for ever.
+        """
+        doubts_ms = watched.doubts_ms
+        if len(doubts_ms) < DOUBTS_MAX or now_ms - doubts_ms[0] >= DOUBT_MS:
+            doubts_ms.append(now_ms)
+            self._requests.want(watched.picture.node, now_ms)
 
     def _hole(self, watched: _Watched, lost: int, now_ms: int, *, ask: bool) -> list[HostEvent]:
         if not lost:
@@ -327,6 +347,10 @@ class HostSession:
         if ask:
             self._requests.want(node, now_ms)
         return [HostEvent(EventKind.HOLE, node, None, now_ms, detail=f"{lost} messages of {node} are lost")]
+
+
+def _death(node: NodeId, device: str | None, owner: Owner, stamp: int, reason: str) -> list[HostEvent]:
+    return [HostEvent(EventKind.DEATH, node, device, stamp, owner.wither(stamp, reason), reason)] if owner.online else []
 
 
 def _name(node: NodeId, device: str | None) -> str:

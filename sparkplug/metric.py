@@ -22,7 +22,8 @@ _PROPERTY_TYPES = ((bool, DataType.BOOLEAN), (int, DataType.INT64), (float, Data
 class MetricSpec:
     """One metric of a birth certificate: name, type, and what a reader should know of it.
 
-    `low` and `high` are the limits of the engineering range in `unit`. `value` is what the first birth carries (None = null).
+    `low` and `high` are the limits of the engineering range in `unit`. `value` is what the first birth carries, as of
+    `timestamp_ms` (None: of the declaration); without a value it is a null that says so.
     """
 
     name: str
@@ -32,12 +33,26 @@ class MetricSpec:
     high: float | None = None
     properties: Mapping[str, str | float | int | bool] = field(default_factory=dict)
     value: Value = None
+    timestamp_ms: int | None = None
+    quality: Quality = Quality.GOOD
+    reason: str | None = None
     is_transient: bool = False
     metadata: MetaData | None = None
 
     def __post_init__(self) -> None:
         if not self.name:
             raise TopicError("a metric needs a name")
+
+    def first(self, now_ms: int) -> "Change":
+        """What is true before anything was published.
+
+        >>> MetricSpec("spindle_rpm", DataType.DOUBLE).first(0).reason
+        'not known yet'
+        """
+        stamp_ms = now_ms if self.timestamp_ms is None else self.timestamp_ms
+        if self.value is None and self.quality is Quality.GOOD:
+            return Change(self.name, None, stamp_ms, Quality.BAD, self.reason or "not known yet")
+        return Change(self.name, self.value, stamp_ms, self.quality, self.reason)
 
     def property_set(self) -> PropertySet:
         """The properties that the birth certificate states."""

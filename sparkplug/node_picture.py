@@ -24,7 +24,7 @@ class Binding(NamedTuple):
 
     name: str
     datatype: DataType
-    field: str  # of the protobuf metric
+    field: str  # of the protobuf metric; empty where only `read_value` can tell (datasets, templates, no datatype)
     read: Callable[[Any], Any] | None  # None where the protobuf value is the Python value
     unit: str | None
 
@@ -60,7 +60,7 @@ class Owner:
             binding = Binding(
                 metric.name,
                 datatype,
-                FIELD.get(datatype, ""),
+                FIELD[datatype] if datatype in READ else "",
                 None if datatype in _PLAIN_FIELDS else READ.get(datatype),
                 str(unit.value) if unit is not None and unit.value is not None else None,
             )
@@ -110,7 +110,7 @@ class NodePicture:
     def read_data(
         self, owner: Owner, message: Any, timestamp_ms: int, *, may_tell_quality: bool = True
     ) -> tuple[list[Reading], bool]:
-        """The readings of a data message, and whether all of its metrics were known.
+        """The readings of a data message, and whether all of its metrics were known and of their type.
 
         This is the hot path of every processor: the birth has fixed name, field and type of each alias, so that a metric is
         read with a handful of look-ups. A value that is not the field's default is certainly there and no null; everything
@@ -120,7 +120,8 @@ class NodePicture:
         complete = True
         aliases, latest, new = self.aliases, owner.readings, tuple.__new__
         for metric in message.metrics:
-            known = aliases.get(metric.alias)
+            alias = metric.alias
+            known = aliases.get(alias) if alias or metric.HasField("alias") else None  # 0 is an alias, too, if it is there
             if known is None or known[0] is not owner:
                 binding = owner.bindings.get(metric.name) if metric.name else None
                 if binding is None:
@@ -129,14 +130,18 @@ class NodePicture:
             else:
                 binding = known[1]
             name, datatype, field_name, read, unit = binding
-            value = getattr(metric, field_name) if field_name else None
-            if not value or metric.is_null:
-                value = read_value(metric, datatype)
-            elif read is not None:
-                value = read(value)
             quality, reason = Quality.GOOD, None
-            if may_tell_quality and metric.HasField("properties"):
-                quality, reason = quality_of(read_properties(metric.properties))
+            try:
+                value = getattr(metric, field_name) if field_name else None
+                if not value or metric.is_null:
+                    value = read_value(metric, datatype)
+                elif read is not None:
+                    value = read(value)
+                if may_tell_quality and metric.HasField("properties"):
+                    quality, reason = quality_of(read_properties(metric.properties))
+            except PayloadError:
+                complete = False  # the metric is not, or no longer, what its birth declared
+                continue
             historical = metric.is_historical
             reading = new(Reading, (name, value, metric.timestamp or timestamp_ms, quality, unit, reason, historical))
             readings.append(reading)

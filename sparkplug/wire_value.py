@@ -9,12 +9,15 @@ unsigned field, some peers widen it to 32 or 64 bits and some do not, so what co
 (-23, -23)
 """
 
+import struct
 from collections.abc import Callable
 from typing import Any
 
 from sparkplug import arrays
 from sparkplug.datatype import ARRAYS, BINARIES, SIGNED_BITS, TEXTS, UNSIGNED_BITS, DataType
 from sparkplug.errors import MetricValueError
+
+_FLOAT = struct.Struct("<f")
 
 
 def _integer_out(datatype: DataType, bits: int, *, signed: bool) -> Callable[[Any], int]:
@@ -43,9 +46,26 @@ def _exact(datatype: DataType, types: tuple[type, ...], cast: Callable[[Any], An
     def out(value: Any) -> Any:
         if not isinstance(value, types) or (isinstance(value, bool) and bool not in types):
             raise MetricValueError(f"{value!r:.80} is not a {datatype.name}")
-        return cast(value)
+        try:
+            return cast(value)
+        except (OverflowError, UnicodeEncodeError) as error:
+            raise MetricValueError(f"{value!r:.80} is not a {datatype.name}: {error}") from error
 
     return out
+
+
+def _single(value: float) -> float:
+    """A number that fits 32 bits; protobuf would silently make it infinite."""
+    number = float(value)
+    _FLOAT.pack(number)
+    return number
+
+
+def _text(value: str) -> str:
+    """A text that UTF-8 can write (a lone surrogate it cannot)."""
+    if not value.isascii():
+        value.encode()
+    return value
 
 
 def _array_out(datatype: DataType) -> Callable[[Any], bytes]:
@@ -68,9 +88,10 @@ def _same(value: Any) -> Any:
 WRITE: dict[DataType, Callable[[Any], Any]] = {
     **{t: _integer_out(t, bits, signed=True) for t, bits in SIGNED_BITS.items()},
     **{t: _integer_out(t, bits, signed=False) for t, bits in UNSIGNED_BITS.items()},
-    **{t: _exact(t, (float, int), float) for t in (DataType.FLOAT, DataType.DOUBLE)},
+    DataType.FLOAT: _exact(DataType.FLOAT, (float, int), _single),
+    DataType.DOUBLE: _exact(DataType.DOUBLE, (float, int), float),
     DataType.BOOLEAN: _exact(DataType.BOOLEAN, (bool,), bool),
-    **{t: _exact(t, (str,), str) for t in TEXTS},
+    **{t: _exact(t, (str,), _text) for t in TEXTS},
     **{t: _exact(t, (bytes,), bytes) for t in BINARIES},
     **{t: _array_out(t) for t in ARRAYS},
 }

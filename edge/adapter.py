@@ -1,0 +1,80 @@
+"""What an edge adapter is, and how adapters are found.
+
+An adapter is one file of this package that ends in `ADAPTER = Adapter(...)`. `parse` is a pure function from a cursor and the
+bytes of one frame to the next cursor and what the frame gave; all I/O is in the connection that `connect` opens. A cursor is a
+frozen value of plain fields, so it can be compared, kept as JSON and played back.
+"""
+
+import importlib
+import pkgutil
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any, Protocol
+
+from pydantic import BaseModel
+
+import edge
+from edge.config import EdgeConfig
+from edge.sample import SampleSet
+
+
+class Connection(Protocol):
+    """The thin side of an adapter. It ends when it is closed, and it blocks for no longer than its own timeouts."""
+
+    reconnects: int
+    last_error: str
+
+    def frames(self) -> Iterator[bytes]:
+        """Raw frames, reconnecting by itself, until `close`."""
+
+    def follow(self, cursor: Any) -> None:
+        """Told after each frame where the parser stands; what is asked for next depends on it."""
+
+    def silent_s(self) -> float:
+        """Seconds since the control was last heard."""
+
+    def close(self) -> None:
+        """End `frames`, from any thread."""
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One signal as `check` shows it: where it comes from, in which unit, and its value now."""
+
+    signal: str
+    source: str
+    unit: str
+    native_unit: str
+    value: str | int | float | bool | None
+    reason: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class Adapter:
+    """One kind of control.
+
+    `describe` says what would be published, asking the control but no broker; `draft` writes a configuration for the control at
+    an address (and the device of that name, where it serves several).
+    """
+
+    name: str
+    config_model: type[BaseModel]
+    start: Callable[[EdgeConfig[Any]], Any]
+    parse: Callable[[EdgeConfig[Any], Any, bytes], tuple[Any, SampleSet]]
+    connect: Callable[[EdgeConfig[Any]], Connection]
+    describe: Callable[[EdgeConfig[Any]], list[Row]]
+    draft: Callable[[str, str], str]
+    sample_config: Path
+
+
+@cache
+def adapters() -> dict[str, Adapter]:
+    """All adapters of this package by name."""
+    found: dict[str, Adapter] = {}
+    for module in pkgutil.iter_modules(edge.__path__):
+        adapter = getattr(importlib.import_module(f"edge.{module.name}"), "ADAPTER", None)
+        if isinstance(adapter, Adapter):
+            found[adapter.name] = adapter
+    return found

@@ -1,0 +1,29 @@
+"""What the birth certificate of a machine declares: its signals with unit, limits and where they come from."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+
+from edge.sample import EdgeSample, Offer
+from edge.signals import DERIVED, Kind, signal
+from sparkplug.datatype import DataType
+from sparkplug.metric import MetricSpec
+
+DATATYPES = {Kind.NUMBER: DataType.DOUBLE, Kind.INTEGER: DataType.INT64, Kind.TEXT: DataType.STRING, Kind.FLAG: DataType.BOOLEAN}
+
+
+def device_metrics(offers: Iterable[Offer], last: Mapping[str, EdgeSample]) -> list[MetricSpec]:
+    """The metrics of the machine, with the values that are known already."""
+    by_name = {offer.signal: offer for offer in offers}
+    by_name |= {name: Offer(name, "edge") for name in ("tool_number", *DERIVED) if name not in by_name}
+    return [_metric(offer, last.get(name)) for name, offer in by_name.items()]
+
+
+def _metric(offer: Offer, last: EdgeSample | None) -> MetricSpec:
+    known = signal(offer.signal)
+    low = known.low if offer.low is None else offer.low
+    high = known.high if offer.high is None else offer.high
+    properties = {"source": offer.source} | ({"nativeUnit": offer.native_unit} if offer.native_unit else {})
+    spec = MetricSpec(offer.signal, DATATYPES[known.kind], known.unit or None, low, high, properties)
+    if last is None:
+        return spec
+    return replace(spec, value=last.value, timestamp_ms=last.timestamp_ms, quality=last.quality, reason=last.reason)

@@ -1,0 +1,125 @@
+"""The configuration of one edge: one machine, one control, one broker (TOML, one file a machine).
+
+Checked before any I/O. Secrets do not stand in the file: it names the environment variable that holds them.
+"""
+
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Generic, TypeVar
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+
+from edge.errors import ConfigError
+from edge.signals import DERIVED, Kind, signal
+from edge.units import conversion
+
+BLOCK_PATTERN = r"(?<![A-Z_])M0*6(?![\d.])|\bTOOL CALL \d"
+
+
+class Section(BaseModel):
+    """A table of the file: nothing that it does not know, nothing that changes later."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+def _pattern(text: str) -> str:
+    try:
+        re.compile(text)
+    except re.error as error:
+        raise ValueError(f"is no regular expression: {error}") from error
+    return text
+
+
+class MachineSection(Section):
+    """`name` is the Sparkplug device. After `lost_after_s` without the control the device is declared dead."""
+
+    name: str = Field(default="machine", pattern=r"^[^/+#]+$")
+    adapter: str = "mtconnect"
+    lost_after_s: float = Field(default=30.0, gt=0)
+
+
+class BrokerSection(Section):
+    """Where to publish. Empty `node` means `edge-<machine>`; empty `session_file` keeps bdSeq in memory only."""
+
+    url: str = "mqtt://127.0.0.1:1883"
+    group: str = "cnc"
+    node: str = ""
+    session_file: str = ""
+    primary_host: str = ""
+    username: str = ""
+    password_env: str = ""
+
+
+class SignalSection(Section):
+    """How one canonical signal is fed. `native_unit` is what the values really are, whatever the control declares."""
+
+    data_item: str = ""
+    native_unit: str = ""
+    scale: float = Field(default=1.0, allow_inf_nan=False)
+    deadband: float = Field(default=0.0, ge=0, allow_inf_nan=False)
+    low: float | None = None
+    high: float | None = None
+    publish: bool = True
+
+
+class ReportSection(Section):
+    """Report by exception: an unchanged value is sent again after `interval_s_max` (0 = never)."""
+
+    interval_s_max: float = Field(default=0.0, ge=0)
+
+
+class ToolChangeSection(Section):
+    """The state machine of `edge.tool_change`."""
+
+    debounce_s: float = Field(default=2.0, ge=0, le=60)  # how long a number must stand before the change is over
+    blank_s: float = Field(default=1.0, ge=0, le=60)  # how long it must be empty to be a change without other evidence
+    change_s_max: float = Field(default=60.0, gt=0)  # after this a change that shows no end is given up
+    block_pattern: Annotated[str, AfterValidator(_pattern)] = BLOCK_PATTERN
+    zero_is_no_tool: bool = True
+
+
+SourceT = TypeVar("SourceT", bound=BaseModel)
+
+
+@dataclass(frozen=True, slots=True)
+class EdgeConfig(Generic[SourceT]):
+    """One edge. `source` is the table that the adapter reads; `path` is for messages only."""
+
+    source: SourceT
+    machine: MachineSection = field(default_factory=MachineSection)
+    broker: BrokerSection = field(default_factory=BrokerSection)
+    signals: dict[str, SignalSection] = field(default_factory=dict)
+    report: ReportSection = field(default_factory=ReportSection)
+    tool_change: ToolChangeSection = field(default_factory=ToolChangeSection)
+    path: Path = Path("edge.toml")
+
+    def __post_init__(self) -> None:
+        for name, section in self.signals.items():
+            try:
+                self._check(name, section)
+            except ConfigError as error:
+                raise ConfigError(f"{self.path}: [signals.{name}]: {error}") from error
+
+    def _check(self, name: str, section: SignalSection) -> None:
+        known = signal(name)
+        if name in DERIVED:
+            raise ConfigError("is derived by the edge and cannot be mapped; remove the table")
+        if section.native_unit:
+            conversion(section.native_unit, known.unit)
+        if known.kind is not Kind.NUMBER and (section.deadband or section.scale != 1.0):
+            raise ConfigError("scale and deadband need a number; remove them")
+
+    @property
+    def node(self) -> str:
+        """The id of the edge node."""
+        return self.broker.node or f"edge-{self.machine.name}"
+
+
+def one_line(path: Path, table: str, error: ValidationError) -> str:
+    """The first complaint of pydantic as file, key, value and what is wrong."""
+    first = error.errors(include_url=False)[0]
+    key = ".".join(str(part) for part in (*filter(None, [table]), *first["loc"]))
+    if first["type"] == "extra_forbidden":
+        return f"{path}: {key}: no such key; remove it, or see the sample configuration beside the adapter for the right name"
+    return f"{path}: {key} = {first['input']!r}: {first['msg'].removeprefix('Value error, ')}"

@@ -1,0 +1,53 @@
+"""A configuration file, read and checked."""
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from pydantic import TypeAdapter, ValidationError
+
+from edge.adapter import adapters
+from edge.config import BrokerSection, EdgeConfig, MachineSection, ReportSection, SignalSection, ToolChangeSection, one_line
+from edge.errors import ConfigError
+
+_SECTIONS: dict[str, TypeAdapter[Any]] = {
+    "machine": TypeAdapter(MachineSection),
+    "broker": TypeAdapter(BrokerSection),
+    "signals": TypeAdapter(dict[str, SignalSection]),
+    "report": TypeAdapter(ReportSection),
+    "tool_change": TypeAdapter(ToolChangeSection),
+}
+
+
+def load(path: Path) -> EdgeConfig[Any]:
+    """The edge that this file describes, or a ConfigError of one line."""
+    try:
+        return parse(path.read_text(encoding="utf-8"), path)
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise ConfigError(f"{path}: is not UTF-8 at byte {error.start}; save it as UTF-8") from error
+
+
+def parse(text: str, path: Path) -> EdgeConfig[Any]:
+    """The edge that this text describes; `path` is for messages."""
+    try:
+        tables = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigError(f"{path}: is no TOML: {error}") from error
+    sections = {name: _section(path, name, kind, tables.pop(name, {})) for name, kind in _SECTIONS.items()}
+    chosen: str = sections["machine"].adapter
+    adapter = adapters().get(chosen)
+    if adapter is None:
+        raise ConfigError(f"{path}: machine.adapter = {chosen!r}: no such adapter; there are {', '.join(sorted(adapters()))}")
+    source = _section(path, chosen, TypeAdapter(adapter.config_model), tables.pop(chosen, {}))
+    if tables:
+        raise ConfigError(f"{path}: [{next(iter(tables))}]: no such table; there are {', '.join(_SECTIONS)} and {chosen}")
+    return EdgeConfig(source=source, path=path, **sections)
+
+
+def _section(path: Path, name: str, kind: TypeAdapter[Any], raw: object) -> Any:
+    try:
+        return kind.validate_python(raw)
+    except ValidationError as error:
+        raise ConfigError(one_line(path, name, error)) from error

@@ -1,0 +1,63 @@
+"""The ledger of one edge: received = emitted + dropped(reason) + buffered, in observations.
+
+`queued` is counted by the thread that reads, the rest by the thread that publishes; so at any moment at which the latter is
+between two documents the equation must hold, and `difference` says by how much it does not.
+"""
+
+import threading
+from collections.abc import Mapping
+
+from edge.sample import Drop
+from sparkplug.datatype import DataType
+from sparkplug.metric import Change, MetricSpec
+
+
+class Ledger:
+    """Counters, and the metrics that show them. All of them go into one message."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._received = 0
+        self._queued = 0
+        self._emitted = 0
+        self._dropped = dict.fromkeys(Drop, 0)
+        self._held = 0
+
+    def queue(self, observations: int) -> None:
+        """Observations have been read and wait to be looked at."""
+        with self._lock:
+            self._received += observations
+            self._queued += observations
+
+    def settle(self, *, taken: int, emitted: int, dropped: Mapping[Drop, int], held: int) -> None:
+        """`taken` observations have left the queue; `held` now wait in the tool change's state machine."""
+        with self._lock:
+            self._queued -= taken
+            self._emitted += emitted
+            for reason, number in dropped.items():
+                self._dropped[reason] += number
+            self._held = held
+
+    def snapshot(self) -> dict[str, int]:
+        """All counters by metric name."""
+        with self._lock:
+            counters = {
+                "ledger/received": self._received,
+                "ledger/emitted": self._emitted,
+                "ledger/buffered": self._queued + self._held,
+                "ledger/dropped": sum(self._dropped.values()),
+            }
+            return counters | {f"ledger/dropped/{reason}": number for reason, number in self._dropped.items()}
+
+    @staticmethod
+    def difference(counters: Mapping[str, int]) -> int:
+        """What is missing in a snapshot; anything but 0 is a bug of ours."""
+        return counters["ledger/received"] - counters["ledger/emitted"] - counters["ledger/dropped"] - counters["ledger/buffered"]
+
+    def metrics(self) -> list[MetricSpec]:
+        """For the birth certificate."""
+        return [MetricSpec(name, DataType.INT64, "observations", value=0) for name in self.snapshot()]
+
+    def changes(self, now_ms: int) -> list[Change]:
+        """One consistent snapshot."""
+        return [Change(name, number, now_ms) for name, number in self.snapshot().items()]

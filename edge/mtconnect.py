@@ -1,0 +1,25 @@
+"""The edge for MTConnect agents, 1.2 to 2.x.
+
+`mtconnect_cursor` parses the documents and decides what to ask for next, `mtconnect_connection` asks, `mapping` and
+`mtconnect_names.toml` say which data item is which signal.
+"""
+
+from pathlib import Path
+
+from edge.adapter import Adapter
+from edge.mtconnect_check import describe
+from edge.mtconnect_config import MtconnectConfig
+from edge.mtconnect_connection import MtconnectConnection
+from edge.mtconnect_cursor import parse, start
+from edge.mtconnect_draft import draft
+
+ADAPTER = Adapter(
+    name="mtconnect",
+    config_model=MtconnectConfig,
+    start=start,
+    parse=parse,
+    connect=MtconnectConnection,
+    describe=describe,
+    draft=draft,
+    sample_config=Path(__file__).with_name("mtconnect.toml"),
+)

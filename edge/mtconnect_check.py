@@ -1,0 +1,46 @@
+"""What an edge for MTConnect would publish: one probe, one current, the same parser as in operation, no broker."""
+
+from edge.adapter import Row
+from edge.errors import ConfigError, ConnectionLostError, DocumentError
+from edge.mapping import assign
+from edge.mtconnect_connection import fetch
+from edge.mtconnect_cursor import Config, Phase, choose_device, next_request, parse, start
+from edge.mtconnect_documents import DevicesDocument, parse_document
+from edge.sample import EdgeSample, Offer
+from edge.signals import signal
+
+
+def describe(config: Config) -> list[Row]:
+    """What would be published for the control that the configuration names."""
+    cursor = start(config)
+    offers: tuple[Offer, ...] = ()
+    last: dict[str, EdgeSample] = {}
+    while cursor.phase is not Phase.SAMPLE:
+        raw = fetch(config, next_request(config, cursor))
+        if cursor.phase is Phase.PROBE:
+            _check_names(config, raw)
+        cursor, frame = parse(config, cursor, raw)
+        if frame.error is not None:
+            raise ConnectionLostError(f"{config.path}: {config.source.url}: {frame.error}")
+        offers = offers if frame.offers is None else frame.offers
+        last |= {sample.signal: sample for sample in frame.samples}
+    return [_row(config, offer, last.get(offer.signal)) for offer in offers]
+
+
+def _check_names(config: Config, raw: bytes) -> None:
+    """A device, spindle or data item that is not there is a mistake of the configuration, not of the connection."""
+    try:
+        document = parse_document(raw)
+        if isinstance(document, DevicesDocument):
+            assign(choose_device(document.devices, config.source.device), config.signals, config.source.spindle)
+    except ConfigError as error:
+        raise ConfigError(f"{config.path}: {error}") from error
+    except DocumentError as error:
+        raise ConnectionLostError(f"{config.source.url}/probe: {error}; is this the address of an MTConnect agent?") from error
+
+
+def _row(config: Config, offer: Offer, sample: EdgeSample | None) -> Row:
+    section = config.signals.get(offer.signal)
+    native = (section.native_unit if section else "") or offer.native_unit
+    value, reason = (None, "not reported yet") if sample is None else (sample.value, sample.reason)
+    return Row(offer.signal, offer.source, signal(offer.signal).unit, native, value, reason)

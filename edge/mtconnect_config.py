@@ -1,0 +1,29 @@
+"""The table [mtconnect] of an edge's configuration."""
+
+from typing import Annotated
+
+from pydantic import AfterValidator, Field
+
+from edge.config import Section
+
+
+def _http(url: str) -> str:
+    if not url.startswith(("http://", "https://")):
+        raise ValueError("is no http:// or https:// address")
+    return url.rstrip("/")
+
+
+class MtconnectConfig(Section):
+    """The agent and how it is asked. Empty `device`: the only one; empty `spindle`: see `edge.mapping`."""
+
+    url: Annotated[str, AfterValidator(_http)] = "http://127.0.0.1:5000"
+    device: str = ""
+    spindle: str = ""
+    count: int = Field(default=1000, ge=1, le=100_000)
+    interval_ms: int = Field(default=100, ge=1, le=60_000)
+    heartbeat_ms: int = Field(default=2000, ge=100, le=60_000)
+    poll_ms: int = Field(default=500, ge=10, le=600_000)  # where the agent does not stream
+    timeout_s: float = Field(default=10.0, gt=0, le=300)
+    username: str = ""
+    password_env: str = ""
+    ca_file: str = ""

@@ -1,0 +1,193 @@
+"""The connection to an agent: thin I/O on httpx, which asks for what `edge.mtconnect_cursor.next_request` says.
+
+Where the agent streams (multipart, either kind) one request lasts until something goes wrong; where it answers with a single
+document the same request is polled. The agent's heartbeat is the liveness timer: no whole part within three heartbeats, and the
+connection is made again. After a failure it waits, longer each time, with jitter, so that a plant's edges do not come back in
+step. No call blocks for longer than the configured timeout, and `close` wakes a blocked read.
+"""
+
+import os
+import random
+import socket
+import ssl
+import threading
+import time
+from collections.abc import Callable, Iterator
+
+import httpx
+
+from edge.errors import ConfigError, ConnectionLostError
+from edge.mtconnect_cursor import Config, Cursor, Phase, Request, next_request
+from edge.mtconnect_xml import DOCUMENT_BYTES_MAX
+from edge.multipart import MultipartParser
+
+BACKOFF_S = 0.25
+BACKOFF_S_MAX = 30.0
+HEARTBEATS_MAX = 3
+_ERROR_ROOT = b"MTConnectError"
+
+
+class MtconnectConnection:
+    """Raw documents of one agent, in order, reconnecting by itself."""
+
+    def __init__(
+        self, config: Config, *, clock: Callable[[], float] = time.monotonic, chance: random.Random | None = None
+    ) -> None:
+        self._config = config
+        self._clock = clock
+        self._chance = chance or random.Random()  # noqa: S311  jitter, not a secret
+        self._cursor = Cursor()
+        self._closed = threading.Event()
+        self._socket: socket.socket | None = None
+        self._streams = True
+        self._heard_s = clock()
+        self._failures = 0
+        self.reconnects = 0
+        self.last_error = ""
+
+    def follow(self, cursor: Cursor) -> None:
+        """Where the parser stands now."""
+        self._cursor = cursor
+
+    def silent_s(self) -> float:
+        """Seconds since the agent sent a document."""
+        return self._clock() - self._heard_s
+
+    def close(self) -> None:
+        """End `frames`; a read that is blocked in another thread is woken."""
+        self._closed.set()
+        open_socket = self._socket
+        if open_socket is not None:
+            try:
+                open_socket.shutdown(socket.SHUT_RDWR)
+            except OSError:
+                return  # closed already
+
+    def frames(self) -> Iterator[bytes]:
+        """Documents until `close`. The caller tells `follow` after each of them."""
+        with client_of(self._config) as client:
+            while not self._closed.is_set():
+                asked = self._cursor
+                try:
+                    yield from self._answer(client, next_request(self._config, asked, streams=self._streams))
+                except (httpx.HTTPError, httpx.InvalidURL, httpx.StreamError, ConnectionLostError, OSError) as error:
+                    if not self._closed.is_set():
+                        self._lost(error)
+                    continue
+                if self._cursor.attempt:
+                    self._wait(self._backoff_s(self._cursor.attempt))
+                elif asked.phase is Phase.SAMPLE and self._cursor == asked:
+                    self._wait(self._config.source.poll_ms / 1000)
+
+    def _lost(self, error: Exception) -> None:
+        self.reconnects += 1
+        self._failures += 1
+        self.last_error = f"{self._config.source.url}: {str(error) or type(error).__name__}"
+        self._wait(self._backoff_s(self._failures))
+
+    def _backoff_s(self, failures: int) -> float:
+        longest = min(BACKOFF_S_MAX, BACKOFF_S * 2.0 ** min(failures, 16))
+        return longest * self._chance.uniform(0.5, 1.0)
+
+    def _wait(self, seconds: float) -> None:
+        self._closed.wait(seconds)
+
+    def _answer(self, client: httpx.Client, request: Request) -> Iterator[bytes]:
+        with client.stream("GET", request.path, params=list(request.parameters)) as response:
+            self._socket = response.extensions["network_stream"].get_extra_info("socket")
+            try:
+                content_type = response.headers.get("content-type", "")
+                if content_type.lower().startswith("multipart/"):
+                    yield from self._parts(response, content_type)
+                    return
+                body = _body(response)
+                if _ERROR_ROOT not in body[:4096]:
+                    if response.status_code >= 400:
+                        raise ConnectionLostError(f"HTTP {response.status_code} {response.reason_phrase} for {request.path}")
+                    if request.path.endswith("/sample"):
+                        self._streams = False
+                yield self._heard(body)
+            finally:
+                self._socket = None
+
+    def _parts(self, response: httpx.Response, content_type: str) -> Iterator[bytes]:
+        parser = MultipartParser(content_type)
+        alive_s = HEARTBEATS_MAX * self._config.source.heartbeat_ms / 1000
+        instance = self._cursor.instance_id
+        for data in response.iter_bytes():
+            for part in parser.feed(data):
+                yield self._heard(part)
+                cursor = self._cursor
+                if self._closed.is_set() or cursor.attempt or cursor.phase is not Phase.SAMPLE or cursor.instance_id != instance:
+                    return
+            if parser.closed:
+                break
+            if self.silent_s() > alive_s:
+                raise ConnectionLostError(f"no document within {alive_s:g} s")
+        if not self._closed.is_set():
+            raise ConnectionLostError("the agent ended the stream")
+
+    def _heard(self, document: bytes) -> bytes:
+        self._heard_s = self._clock()
+        self._failures = 0
+        return document
+
+
+def client_of(config: Config) -> httpx.Client:
+    """An HTTP client for the configured agent. Proxies of the environment are not used: the agent is in the plant."""
+    source = config.source
+    alive_s = max(source.timeout_s, HEARTBEATS_MAX * source.heartbeat_ms / 1000)
+    authentication = httpx.BasicAuth(source.username, _password(config)) if source.username else None
+    verify: ssl.SSLContext | bool = True
+    if source.ca_file:
+        try:
+            verify = ssl.create_default_context(cafile=source.ca_file)
+        except OSError as error:
+            raise ConfigError(f"{config.path}: mtconnect.ca_file = {source.ca_file!r}: cannot be used: {error}") from error
+    return httpx.Client(
+        base_url=source.url,
+        auth=authentication,
+        verify=verify,
+        timeout=httpx.Timeout(source.timeout_s, read=alive_s),
+        trust_env=False,
+        headers={"Accept": "text/xml, application/xml, multipart/*"},
+    )
+
+
+def fetch(config: Config, request: Request) -> bytes:
+    """One document, for `check` and `discover`; ConnectionLostError where the agent has none."""
+    with client_of(config) as client:
+        try:
+            with client.stream("GET", request.path, params=list(request.parameters)) as response:
+                body = _body(response)
+                if response.status_code >= 400 and _ERROR_ROOT not in body[:4096]:
+                    raise ConnectionLostError(
+                        f"{config.source.url}{request.path}: HTTP {response.status_code} {response.reason_phrase}"
+                    )
+                return body
+        except (httpx.HTTPError, httpx.InvalidURL, OSError) as error:
+            raise ConnectionLostError(
+                f"{config.source.url}{request.path}: {error}; is the agent running, and the address right?"
+            ) from error
+
+
+def _body(response: httpx.Response) -> bytes:
+    body = bytearray()
+    for data in response.iter_bytes():
+        body += data
+        if len(body) > DOCUMENT_BYTES_MAX:
+            raise ConnectionLostError(f"document of more than {DOCUMENT_BYTES_MAX} bytes")
+    return bytes(body)
+
+
+def _password(config: Config) -> str:
+    name = config.source.password_env
+    if not name:
+        raise ConfigError(
+            f"{config.path}: mtconnect.username needs mtconnect.password_env: the environment variable that holds the password"
+        )
+    if name not in os.environ:
+        raise ConfigError(
+            f"{config.path}: mtconnect.password_env = {name!r}: no such environment variable; set it to the password"
+        )
+    return os.environ[name]

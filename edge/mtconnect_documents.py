@@ -1,0 +1,155 @@
+"""The documents of an agent, parsed: streams and errors here, the device description in `mtconnect_model`.
+
+Source: MTConnect part 1 (protocol) and part 3 (streams). What real agents do and this file allows for: errors come with HTTP 200
+or 4xx and are told by the root element alone; an element without text is an empty value, not a missing one; the name of a
+condition's element is its level; a data set has entries in place of text; document order is not sequence order.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import NamedTuple
+from xml.etree.ElementTree import Element
+
+from edge.errors import DocumentError
+from edge.mtconnect_model import DeviceModel, devices_of
+from edge.mtconnect_xml import local_name, parse_xml
+
+UNAVAILABLE = "UNAVAILABLE"
+SEQUENCE_MAX = 2**63
+
+
+class Header(NamedTuple):
+    """What each document says of the agent. Sequence numbers are None where the document has none."""
+
+    instance_id: str
+    buffer_size: int | None
+    first_sequence: int | None
+    last_sequence: int | None
+    next_sequence: int | None
+
+
+class Observation(NamedTuple):
+    """One observation. `sequence` and `timestamp_ms` are None where they cannot be read; `value` of an empty element is ""."""
+
+    device_uuid: str
+    device_name: str
+    data_item_id: str
+    name: str
+    element: str
+    is_condition: bool
+    sequence: int | None
+    timestamp_ms: int | None
+    value: str
+    native_code: str
+    has_entries: bool
+
+
+@dataclass(frozen=True, slots=True)
+class DevicesDocument:
+    """The answer to /probe."""
+
+    header: Header
+    devices: tuple[DeviceModel, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class StreamsDocument:
+    """The answer to /current and /sample, in document order."""
+
+    header: Header
+    observations: tuple[Observation, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorDocument:
+    """An answer that is none: code and text of each error."""
+
+    header: Header
+    errors: tuple[tuple[str, str], ...]
+
+    def __str__(self) -> str:
+        return "; ".join(f"{code}: {text}" if text else code for code, text in self.errors) or "an error without a code"
+
+
+Document = DevicesDocument | StreamsDocument | ErrorDocument
+
+
+def parse_document(raw: bytes) -> Document:
+    """The document in these bytes, or DocumentError."""
+    root = parse_xml(raw)
+    kind = local_name(root)
+    header = _header(root)
+    if kind == "MTConnectDevices":
+        return DevicesDocument(header, devices_of(root))
+    if kind == "MTConnectStreams":
+        if header.next_sequence is None:
+            raise DocumentError("streams document without a nextSequence in its header")
+        return StreamsDocument(header, tuple(_observations(root)))
+    if kind == "MTConnectError":
+        errors = tuple((e.get("errorCode", ""), (e.text or "").strip()) for e in root.iter() if e.get("errorCode") is not None)
+        return ErrorDocument(header, errors)
+    raise DocumentError(f"root element {kind!r} is none of MTConnectDevices, MTConnectStreams, MTConnectError")
+
+
+def timestamp_ms(text: str) -> int | None:
+    """Milliseconds since 1970 of an ISO 8601 time with any number of digits, UTC if it has no zone; None where it is no time.
+
+    >>> timestamp_ms("2022-08-08T13:51:34.7167146Z")
+    1659966694716
+    """
+    try:
+        time = datetime.fromisoformat(text)
+    except ValueError:
+        return None
+    if time.tzinfo is None:
+        time = time.replace(tzinfo=UTC)
+    since = time - _EPOCH
+    milliseconds = since.days * 86_400_000 + since.seconds * 1000 + since.microseconds // 1000
+    return milliseconds if milliseconds >= 0 else None
+
+
+_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+
+
+def _header(root: Element) -> Header:
+    element = next((child for child in root if local_name(child) == "Header"), None)
+    if element is None:
+        raise DocumentError("document without a Header")
+    numbers = (element.get(name) for name in ("bufferSize", "firstSequence", "lastSequence", "nextSequence"))
+    return Header(element.get("instanceId", ""), *(_sequence(number) for number in numbers))
+
+
+def _observations(root: Element) -> Iterator[Observation]:
+    streams = next((child for child in root if local_name(child) == "Streams"), None)
+    for device in () if streams is None else streams:
+        uuid, name = device.get("uuid", ""), device.get("name", "")
+        for component in device:
+            for group in component:
+                is_condition = local_name(group) == "Condition"
+                for element in group:
+                    yield _observation(uuid, name, element, is_condition)
+
+
+def _observation(uuid: str, device_name: str, element: Element, is_condition: bool) -> Observation:
+    kind = local_name(element)
+    return Observation(
+        uuid,
+        device_name,
+        element.get("dataItemId", ""),
+        element.get("name", ""),
+        kind,
+        is_condition,
+        _sequence(element.get("sequence")),
+        timestamp_ms(element.get("timestamp", "")),
+        (element.text or "").strip(),
+        element.get("nativeCode", ""),
+        len(element) > 0 or kind.endswith(("DataSet", "Table", "TimeSeries")),
+    )
+
+
+def _sequence(text: str | None) -> int | None:
+    if text is None or not text.isascii() or not text.isdigit() or len(text) > 19:
+        return None
+    number = int(text)
+    return number if number < SEQUENCE_MAX else None

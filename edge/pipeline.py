@@ -1,0 +1,102 @@
+"""From what a frame gave to what is published: the tool change's state machine, then report by exception, then messages.
+
+A message is one row of the machine: the changes of one moment, in the order in which they happened. A consumer that keeps the
+last value of each signal thus sees each state that the machine was in. The state as found on (re)joining is one row, whatever the
+age of its values.
+"""
+
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+from edge import report_by_exception, tool_change
+from edge.config import EdgeConfig, SignalSection
+from edge.sample import Drop, EdgeSample, SampleSet
+
+_DEFAULT = SignalSection()
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """Rows to publish, and what was dropped on the way."""
+
+    rows: tuple[tuple[EdgeSample, ...], ...]
+    dropped: Counter[Drop] = field(default_factory=Counter)
+
+
+class Pipeline:
+    """The two folds of one machine, one after the other."""
+
+    def __init__(self, config: EdgeConfig[Any]) -> None:
+        self._tool_change = config.tool_change
+        self._sections = config.signals
+        self._interval_ms_max = round(config.report.interval_s_max * 1000)
+        self._change = tool_change.State()
+        self._report = report_by_exception.State()
+        self._heard: tuple[int, float] | None = None
+
+    @property
+    def held(self) -> int:
+        """Observations that wait for more evidence."""
+        return self._change.held
+
+    @property
+    def last(self) -> tuple[EdgeSample, ...]:
+        """What was published last, of each signal."""
+        return tuple(self._report.last.values())
+
+    def take(self, frame: SampleSet, arrival_s: float) -> Outcome:
+        """The samples of one frame that arrived at this (monotonic) time."""
+        dropped: Counter[Drop] = Counter({Drop(reason): number for reason, number in frame.dropped.items()})
+        news: list[EdgeSample] = []
+        for sample in frame.samples:
+            done = tool_change.step(self._tool_change, self._change, sample)
+            self._change = done.state
+            dropped[Drop.DEBOUNCED] += done.debounced
+            candidates = done.samples if sample.signal == "tool_number" else (sample, *done.samples)
+            news.extend(self._reported(candidates, dropped))
+        news.extend(self._reported(self._time_passes(frame, arrival_s, dropped), dropped))
+        return Outcome(tuple(rows_of(news)), +dropped)
+
+    def declare(self, samples: Iterable[EdgeSample]) -> Outcome:
+        """Samples that come from no observation."""
+        dropped: Counter[Drop] = Counter()
+        return Outcome(tuple(rows_of(self._reported(samples, dropped))), +dropped)
+
+    def _time_passes(self, frame: SampleSet, arrival_s: float, dropped: Counter[Drop]) -> tuple[EdgeSample, ...]:
+        """A frame without news says that nothing happened until now; only then may the clock go further than the samples."""
+        clock_ms = self._change.clock_ms
+        if frame.samples and clock_ms is not None:
+            self._heard = clock_ms, arrival_s
+        if self._heard is None or frame.samples or frame.backlog or frame.error is not None:
+            return ()
+        heard_ms, heard_s = self._heard
+        done = tool_change.tick(self._tool_change, self._change, heard_ms + round((arrival_s - heard_s) * 1000))
+        self._change = done.state
+        dropped[Drop.DEBOUNCED] += done.debounced
+        return done.samples
+
+    def _reported(self, samples: Iterable[EdgeSample], dropped: Counter[Drop]) -> Iterator[EdgeSample]:
+        for sample in samples:
+            deadband = self._sections.get(sample.signal, _DEFAULT).deadband
+            self._report, drop = self._report.decide(sample, deadband=deadband, interval_ms_max=self._interval_ms_max)
+            if drop is None:
+                yield sample
+            else:
+                dropped[drop] += sample.observations
+
+
+def rows_of(samples: Iterable[EdgeSample]) -> Iterator[tuple[EdgeSample, ...]]:
+    """Cut where the moment changes or a signal comes again."""
+    row: dict[str, EdgeSample] = {}
+    for sample in samples:
+        if row:
+            before = next(reversed(row.values()))
+            same_moment = sample.timestamp_ms == before.timestamp_ms or (sample.is_baseline and before.is_baseline)
+            if not same_moment or sample.signal in row:
+                yield tuple(row.values())
+                row = {}
+        row[sample.signal] = sample
+    if row:
+        yield tuple(row.values())

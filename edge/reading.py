@@ -1,0 +1,74 @@
+"""One native text to one canonical value, with quality and reason.
+
+>>> read(Target("Fact", "feed_mm_min", factor=60.0, low=0, high=300000), "2.5")
+(150.0, <Quality.GOOD: 192>, None)
+>>> read(Target("Sload", "spindle_load_pct", low=0, high=200), "950")
+(None, <Quality.BAD: 0>, 'outside 0 to 200 %: 950')
+"""
+
+import re
+from dataclasses import replace
+
+from edge.mapping import Target
+from edge.sample import EMPTY, UNAVAILABLE
+from edge.signals import Kind, Signal, signal
+from sparkplug.quality import Quality
+
+TEXT_LENGTH_MAX = 8192
+_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?", re.ASCII)
+_FLAGS = {"ON": True, "ACTIVE": True, "OPEN": True, "TRUE": True, "1": True} | {
+    "OFF": False,
+    "INACTIVE": False,
+    "CLOSED": False,
+    "FALSE": False,
+    "0": False,
+}
+_SYNONYMS = {"MDI": "MANUAL_DATA_INPUT", "AUTO": "AUTOMATIC", "MEMORY": "AUTOMATIC", "JOG": "MANUAL", "HANDLE": "MANUAL"}
+_SYNONYMS |= {"IDLE": "READY", "RUNNING": "ACTIVE", "HOLD": "FEED_HOLD"}
+
+Value = str | int | float | bool | None
+Outcome = tuple[Value, Quality, str | None]
+
+
+def read(target: Target, text: str) -> Outcome:
+    """The value that this text stands for. A null always has a reason."""
+    known = signal(target.signal)
+    if text == "UNAVAILABLE":
+        return None, Quality.BAD, UNAVAILABLE
+    if len(text) > TEXT_LENGTH_MAX:
+        return bad(f"text of {len(text)} characters")
+    if known.kind is Kind.TEXT:
+        return _text(known, text)
+    if not text:
+        # A control that shows no tool number says that there is none: that is a good answer. An empty figure is not.
+        return None, Quality.GOOD if target.signal == "tool_number" else Quality.BAD, EMPTY
+    if known.kind is Kind.FLAG:
+        flag = _FLAGS.get(text.upper())
+        return bad(f"neither on nor off: {text[:80]!r}") if flag is None else (flag, Quality.GOOD, None)
+    if not _NUMBER.fullmatch(text):
+        return bad(f"not a number: {text[:80]!r}")
+    return _figure(target, known, float(text))
+
+
+def bad(reason: str) -> Outcome:
+    """A null that cannot be used, and why."""
+    return None, Quality.BAD, reason
+
+
+def _text(known: Signal, text: str) -> Outcome:
+    if not known.words:
+        return text, Quality.GOOD, None
+    word = text.upper()
+    word = _SYNONYMS.get(word, word)
+    return (word, Quality.GOOD, None) if word in known.words else bad(f"no word of the vocabulary: {text[:80]!r}")
+
+
+def _figure(target: Target, known: Signal, native: float) -> Outcome:
+    if abs(native) > 1e300:
+        return bad(f"not a finite number: {native:g}")
+    if known.kind is Kind.INTEGER:
+        whole = native == int(native) and abs(native) < 2**63
+        return (int(native), Quality.GOOD, None) if whole else bad(f"not a whole number: {native:g}")
+    value = native * target.factor + target.offset
+    reason = replace(known, low=target.low, high=target.high).plausible(value)
+    return (value, Quality.GOOD, None) if reason is None else bad(reason)

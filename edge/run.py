@@ -1,0 +1,61 @@
+"""One edge from its configuration file: the broker, the node and the loop put together."""
+
+import os
+import signal
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from edge.adapter import adapters
+from edge.config import BrokerSection, EdgeConfig
+from edge.config_file import load
+from edge.errors import ConfigError
+from edge.health import HEALTH
+from edge.ledger import Ledger
+from edge.runtime import EdgeRuntime
+from sparkplug.broker import BrokerAddress
+from sparkplug.edge_node import EdgeNode
+from sparkplug.errors import SparkplugError
+from sparkplug.metric import NodeId
+
+
+def broker_address(section: BrokerSection, path: Path) -> BrokerAddress:
+    """The broker with the secret that the environment holds."""
+    try:
+        address = BrokerAddress.from_url(section.url)
+    except SparkplugError as error:
+        raise ConfigError(f"{path}: broker.url: {error}") from error
+    if section.username:
+        address = replace(address, username=section.username)
+    if section.password_env:
+        if section.password_env not in os.environ:
+            raise ConfigError(
+                f"{path}: broker.password_env = {section.password_env!r}: no such environment variable; set it to the password"
+            )
+        address = address.with_password(os.environ[section.password_env])
+    return address
+
+
+def edge_runtime(config: EdgeConfig[Any], address: BrokerAddress | None = None) -> EdgeRuntime:
+    """An edge that publishes to the configured broker, or to this one."""
+    broker, ledger = config.broker, Ledger()
+    node = EdgeNode(
+        address or broker_address(broker, config.path),
+        NodeId(broker.group, config.node),
+        [*HEALTH, *ledger.metrics()],
+        session_file=Path(broker.session_file) if broker.session_file else None,
+        primary_host=broker.primary_host or None,
+    )
+    return EdgeRuntime(config, adapters()[config.machine.adapter], node, ledger=ledger)
+
+
+def run(config_path: Path, *, broker_url: str | None = None) -> dict[str, int]:
+    """Run the edge of this file until SIGTERM or SIGINT; the last ledger. `broker_url` takes the place of the configured one."""
+    config = load(config_path)
+    if broker_url is not None:
+        config = replace(config, broker=config.broker.model_copy(update={"url": broker_url}))
+    runtime = edge_runtime(config)
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: runtime.stop.set())
+    runtime.run()
+    return runtime.ledger.snapshot()

@@ -1,0 +1,214 @@
+"""The loop that runs one edge.
+
+    connection thread: agent → documents → parse → bounded queue
+    main thread:       queue → tool change → report by exception → edge node (its own thread) → broker
+
+When the main thread falls behind, the queue fills and the connection thread stops reading: the agent's buffer is then the next to
+fill, and what it drops is a hole that is counted. Nothing is dropped here without a reason in the ledger.
+"""
+
+import queue
+import threading
+import time
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, NamedTuple, Protocol
+
+from edge import tool_change
+from edge.adapter import Adapter, Connection
+from edge.birth import device_metrics
+from edge.config import EdgeConfig
+from edge.health import Health
+from edge.ledger import Ledger
+from edge.pipeline import Outcome, Pipeline
+from edge.sample import UNAVAILABLE, Drop, EdgeSample, Offer, SampleSet
+from sparkplug.metric import Change, MetricSpec
+
+QUEUE_FRAMES_MAX = 256
+REPORT_INTERVAL_S = 1.0
+
+
+class Publisher(Protocol):
+    """What the loop needs of `sparkplug.edge_node.EdgeNode`."""
+
+    def start(self) -> None: ...
+    def stop(self, timeout_s: float = 5.0) -> None: ...
+    def declare_device(self, device: str, metrics: Sequence[MetricSpec]) -> None: ...
+    def remove_device(self, device: str) -> None: ...
+    def publish(self, device: str | None, changes: Sequence[Change]) -> bool: ...
+    @property
+    def online(self) -> bool: ...
+    @property
+    def reconnects(self) -> int: ...
+
+
+class Arrival(NamedTuple):
+    """One parsed frame and the monotonic time at which it came."""
+
+    frame: SampleSet
+    at_s: float
+
+
+class EdgeRuntime:
+    """One edge. `run` returns when `stop` is set."""
+
+    def __init__(
+        self,
+        config: EdgeConfig[Any],
+        adapter: Adapter,
+        node: Publisher,
+        *,
+        ledger: Ledger | None = None,
+        wall_s: Callable[[], float] = time.time,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.config = config
+        self.ledger = ledger or Ledger()
+        self.stop = threading.Event()
+        self._adapter = adapter
+        self._node = node
+        self._connection: Connection = adapter.connect(config)
+        self._wall_s, self._clock = wall_s, clock
+        self._arrivals: queue.Queue[Arrival] = queue.Queue(QUEUE_FRAMES_MAX)
+        self._pipeline = Pipeline(config)
+        self._offers: tuple[Offer, ...] = ()
+        self._is_declared = False
+        self._is_reporting = True  # whether the control gives values, as far as its server knows
+        self._was_available = False
+        self._last_error = ""
+        self._reported_s = clock()
+        self.health = Health()
+        self._crash: BaseException | None = None
+
+    def run(self) -> None:
+        """Read, fold and publish until stopped; then publish the last ledger and the death certificates."""
+        reader = threading.Thread(target=self._read, name=f"{self._adapter.name}-reader", daemon=True)
+        self._node.start()
+        reader.start()
+        due_s = self._clock()
+        try:
+            while not self.stop.is_set():
+                self._once(timeout_s=0.1)
+                if self._clock() >= due_s:
+                    due_s = self._clock() + REPORT_INTERVAL_S
+                    self._report()
+        finally:
+            self.stop.set()
+            self._connection.close()
+            self._finish(reader)
+        if self._crash is not None:
+            raise self._crash
+
+    def _finish(self, reader: threading.Thread) -> None:
+        deadline_s = self._clock() + 5.0
+        while (reader.is_alive() or not self._arrivals.empty()) and self._clock() < deadline_s:
+            self._once(timeout_s=0.05)
+        self._report()
+        self._node.stop()
+
+    def _read(self) -> None:
+        """The connection thread. Whatever ends it that was not asked for ends the edge, loudly."""
+        try:
+            cursor = self._adapter.start(self.config)
+            self._connection.follow(cursor)
+            for raw in self._connection.frames():
+                cursor, frame = self._adapter.parse(self.config, cursor, raw)
+                self._connection.follow(cursor)
+                self.ledger.queue(frame.received)
+                self._arrivals.put(Arrival(frame, self._clock()))
+        except BaseException as error:
+            self._crash = error
+        finally:
+            self.stop.set()
+
+    def _once(self, timeout_s: float) -> None:
+        try:
+            arrival = self._arrivals.get(timeout=timeout_s)
+        except queue.Empty:
+            self._watch()
+            return
+        self._take(arrival)
+        self._watch()
+
+    def _take(self, arrival: Arrival) -> None:
+        frame = arrival.frame
+        self.health.note(frame, self._wall_s())
+        if frame.offers is not None:
+            self._offered(frame.offers)
+        outcome = self._pipeline.take(frame, arrival.at_s)
+        self._judge(frame, arrival.at_s)
+        emitted, dropped = self._publish(outcome)
+        self.ledger.settle(taken=frame.received, emitted=emitted, dropped=dropped, held=self._pipeline.held)
+
+    def _offered(self, offers: tuple[Offer, ...]) -> None:
+        """The control has described itself. Other signals than before need a new birth."""
+        if self._is_declared and offers != self._offers:
+            self._remove()
+        self._offers = offers
+        if not {offer.signal for offer in offers} & {"tool_number", "nc_block"}:
+            self._publish(self._pipeline.declare(tool_change.not_observable(round(self._wall_s() * 1000))))
+
+    def _judge(self, frame: SampleSet, at_s: float) -> None:
+        """Does the control report? Its server says so; where that never did, one signal that is not unavailable is enough."""
+        if frame.available is not None and (frame.available or self._was_available):
+            self._is_reporting = frame.available
+        elif not self._was_available:
+            told = [sample for sample in self._pipeline.last if sample.observations and sample.signal != "alarm"]
+            self._is_reporting = not told or any(sample.reason != UNAVAILABLE for sample in told)
+        self._was_available |= frame.available is True
+        if self._is_reporting and frame.error is None:
+            self._reported_s = at_s
+
+    def _publish(self, outcome: Outcome) -> tuple[int, dict[Drop, int]]:
+        """Send the rows. While the control is lost its device is dead, and what still comes is dropped with that reason."""
+        emitted, dropped = 0, dict(outcome.dropped)
+        if not self._is_declared and self._is_reporting and self._offers:
+            self._declare({sample.signal for row in outcome.rows for sample in row})
+        for row in outcome.rows:
+            observations = sum(sample.observations for sample in row)
+            if not self._is_declared:
+                dropped[Drop.CONTROL_LOST] = dropped.get(Drop.CONTROL_LOST, 0) + observations
+            elif self._send(row):
+                emitted += observations
+            else:
+                dropped[Drop.BROKER_OFFLINE] = dropped.get(Drop.BROKER_OFFLINE, 0) + observations
+        return emitted, dropped
+
+    def _send(self, row: Iterable[EdgeSample]) -> bool:
+        changes = [Change(s.signal, s.value, s.timestamp_ms, s.quality, s.reason) for s in row]
+        return self._node.publish(self.config.machine.name, changes)
+
+    def _declare(self, coming: set[str]) -> None:
+        """The birth, as soon as there is something to say. What no row brings anew follows with its reason and its own time."""
+        last = {sample.signal: sample for sample in self._pipeline.last}
+        if not last:
+            return
+        metrics = device_metrics(self._offers, last)
+        self._node.declare_device(self.config.machine.name, metrics)
+        self._is_declared = True
+        if known := [last[metric.name] for metric in metrics if metric.name in last and metric.name not in coming]:
+            self._send(known)
+
+    def _remove(self) -> None:
+        self._node.remove_device(self.config.machine.name)
+        self._is_declared = False
+
+    def _watch(self) -> None:
+        """Declare the device dead when the control has been lost for long."""
+        if self._is_declared and self._clock() - self._reported_s > self.config.machine.lost_after_s:
+            self._remove()
+
+    def _report(self) -> None:
+        """The ledger in one message, the health in another."""
+        now_ms = round(self._wall_s() * 1000)
+        counters = self.ledger.snapshot()
+        outside: dict[str, int | bool] = {
+            "health/queue_depth": self._arrivals.qsize(),
+            "health/reconnects": self._connection.reconnects,
+            "health/control_online": self._is_declared,
+            "health/broker_reconnects": self._node.reconnects,
+            "health/ledger_difference": Ledger.difference(counters),
+        }
+        if self._connection.last_error != self._last_error:
+            self._last_error = self.health.last_error = self._connection.last_error
+        self._node.publish(None, [Change(name, number, now_ms) for name, number in counters.items()])
+        self._node.publish(None, self.health.changes(now_ms, outside))

@@ -1,0 +1,85 @@
+"""What an adapter hands on: changes of canonical signals, holes, and how each observation fared.
+
+Observations are counted where they are read, so that at each publication received = emitted + dropped(reason) + buffered.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from sparkplug.quality import Quality
+
+UNAVAILABLE = "unavailable"  # the reason of a null that the control does not report
+EMPTY = "empty"  # the reason of a null that the control reports as an empty value
+
+
+class Drop(StrEnum):
+    """Why an observation was not published."""
+
+    UNMAPPED = "unmapped"  # no canonical signal stands for it
+    UNCHANGED = "unchanged"  # it repeats what is published already
+    DEADBAND = "deadband"  # it moved by less than the deadband
+    DUPLICATE = "duplicate"  # it was taken before, by its sequence number
+    DEBOUNCED = "debounced"  # a flap of the tool number that is no change
+    OTHER_DEVICE = "other_device"  # it belongs to another device of the same agent
+    UNPARSABLE = "unparsable"  # it has no sequence number or no time
+    CONTROL_LOST = "control_lost"  # the device is dead because the control reports nothing; this was one of its nulls
+    BROKER_OFFLINE = "broker_offline"  # there was nobody to publish it to; the next birth carries the newest value
+
+
+@dataclass(frozen=True, slots=True)
+class EdgeSample:
+    """One change of one signal; a null has a reason. `observations` is how many it accounts for (0 for a derived value).
+
+    `is_baseline` marks the state as found when the edge (re)joins: true values, but not events that happened now.
+    """
+
+    signal: str
+    value: str | int | float | bool | None
+    timestamp_ms: int
+    quality: Quality = Quality.GOOD
+    reason: str | None = None
+    sequence: int = 0
+    observations: int = 1
+    is_baseline: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Gap:
+    """A hole: observations that the control had and that nobody can get any more. `lost` is the most that it can have been."""
+
+    reason: str
+    first_sequence: int
+    last_sequence: int
+    lost: int
+
+
+@dataclass(frozen=True, slots=True)
+class Offer:
+    """A signal that the control offers, for the birth certificate: where it comes from, and its declared limits."""
+
+    signal: str
+    source: str
+    native_unit: str = ""
+    low: float | None = None
+    high: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class SampleSet:
+    """What one frame gave. `offers` is None where it says nothing about which signals there are."""
+
+    samples: tuple[EdgeSample, ...] = ()
+    gaps: tuple[Gap, ...] = ()
+    received: int = 0
+    dropped: Mapping[str, int] = field(default_factory=dict)
+    offers: tuple[Offer, ...] | None = None
+    error: str | None = None  # why the frame was refused, or what the control answered instead
+    instance: str | None = None  # which life of the control's server this is
+    backlog: int = 0  # observations that the control has and that were not asked for yet
+    newest_ms: int | None = None  # the latest time stamp in the frame
+    available: bool | None = None  # whether the control is connected to its server; None = the frame does not say
+
+    def accounted(self) -> bool:
+        """Whether each observation of the frame is a sample or a counted drop."""
+        return self.received == sum(sample.observations for sample in self.samples) + sum(self.dropped.values())

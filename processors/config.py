@@ -1,0 +1,91 @@
+"""Configuration of a processor: one typed model, with other values for single machines.
+
+A file holds a table for each processor, so that one file can serve several:
+
+    [cutting_force]
+    rated_power_kw = 11.0
+
+    [cutting_force.machines.okuma]
+    tool_diameter_mm = 10.0
+"""
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Generic, Self, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from processors.errors import ConfigurationError
+
+MACHINES = "machines"
+TICKS_MAX = 100_000  # that one jump of event time may bring
+
+
+class ProcessorConfig(BaseModel):
+    """What the engine needs of every processor's configuration. Durations are event time."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    tick_s: float = Field(default=1.0, ge=0.001, le=3600.0, description="a tick at each multiple of this")
+    gap_s_max: float = Field(default=600.0, gt=0.0, le=86_400.0, description="a longer jump forwards is a hole")
+    late_s_max: float = Field(default=5.0, ge=0.0, le=3600.0, description="a longer jump backwards is another clock")
+
+    @model_validator(mode="after")
+    def _ticks_are_bounded(self) -> Self:
+        if self.gap_s_max / self.tick_s > TICKS_MAX:
+            raise ValueError(f"gap_s_max / tick_s is more than {TICKS_MAX}: make tick_s longer or gap_s_max shorter")
+        return self
+
+
+C_co = TypeVar("C_co", bound=ProcessorConfig, covariant=True)
+
+
+class Configuration(Generic[C_co]):
+    """The configuration of one processor: the values for all machines, and for those that have their own."""
+
+    def __init__(self, model: type[C_co], table: Mapping[str, Any] | None = None, *, name: str = "") -> None:
+        """Check `table` at once, every machine of it. Raises ConfigurationError naming key, value and model."""
+        shared = dict(table or {})
+        machines = shared.pop(MACHINES, {})
+        if not isinstance(machines, dict) or not all(isinstance(own, dict) for own in machines.values()):
+            raise ConfigurationError(f"[{name}.{MACHINES}] has to hold one table for each machine")
+        self.default: C_co = _validated(model, shared, name)
+        self._of_machine: dict[str, C_co] = {
+            machine: _validated(model, {**shared, **own}, f"{name}.{MACHINES}.{machine}") for machine, own in machines.items()
+        }
+
+    def of(self, machine: str) -> C_co:
+        """The values that hold for `machine`."""
+        return self._of_machine.get(machine, self.default)
+
+    @property
+    def machines(self) -> tuple[str, ...]:
+        """The machines that have values of their own."""
+        return tuple(self._of_machine)
+
+
+def _validated(model: type[C_co], table: Mapping[str, Any], where: str) -> C_co:
+    try:
+        return model.model_validate(table)
+    except ValidationError as error:
+        first = error.errors()[0]
+        key = ".".join(str(part) for part in first["loc"])
+        known = ", ".join(model.model_fields)
+        raise ConfigurationError(
+            f"[{where}] {key} = {first['input']!r}: {first['msg']} (known: {known})" if key else f"[{where}] {first['msg']}"
+        ) from error
+
+
+def read_tables(path: Path) -> dict[str, dict[str, Any]]:
+    """The tables of a configuration file by processor. Raises ConfigurationError where it is no TOML of tables."""
+    try:
+        document = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ConfigurationError(f"{path}: {error.strerror or error}; give a readable TOML file") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ConfigurationError(f"{path}: {error}") from error
+    for name, table in document.items():
+        if not isinstance(table, dict):
+            raise ConfigurationError(f"{path}: {name} = {table!r} stands outside a table; put it under [<processor>]")
+    return document

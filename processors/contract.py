@@ -1,0 +1,179 @@
+"""What a processor is: a pure fold over the samples of a machine, with everything it reads and emits declared.
+
+    step(config, state, sample) -> (state, outputs)
+
+A file `processors/<name>.py` that ends in `PROCESSOR = Processor(...)` is found by discovery and put through the contract
+suite: same stream, same answer; a restart in the middle changes nothing; nothing crashes it; it emits only what it declares.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, is_dataclass
+from enum import Enum
+from typing import Generic, NamedTuple, TypeVar
+
+from processors.config import ProcessorConfig
+from processors.errors import DeclarationError
+from processors.sample import Sample, SampleKind
+from sparkplug.datatype import DataType
+from sparkplug.metric import MetricSpec
+from sparkplug.quality import Quality
+from sparkplug.values import Value
+
+__all__ = [
+    "TWIN_PREFIX",
+    "Key",
+    "NoState",
+    "Output",
+    "OutputSpec",
+    "PlainOutput",
+    "PlainSpec",
+    "Processor",
+    "Provenance",
+    "Sample",
+    "SampleKind",
+]
+
+TWIN_PREFIX = "twin/"  # of the metrics
+TWIN_NODE_PREFIX = "twin-"  # of the edge nodes that publish them
+
+
+class Key(Enum):
+    """Over what a fold runs. CELL (all machines of a group in one state) is declared, and not built yet."""
+
+    MACHINE = "machine"
+    CELL = "cell"
+
+
+class Provenance(Enum):
+    """Where a figure comes from."""
+
+    MEASURED = "measured"
+    MODELLED = "modelled"
+    INFERRED = "inferred"
+
+
+@dataclass(frozen=True, slots=True)
+class OutputSpec:
+    """One metric that a processor emits.
+
+    deadband: a number that moved by less than this since it was last published is not published again
+    is_alarm: not emitted for history samples: nobody is woken up for yesterday
+    """
+
+    name: str
+    datatype: DataType
+    unit: str | None
+    meaning: str
+    provenance: Provenance
+    deadband: float = 0.0
+    is_alarm: bool = False
+
+    def __post_init__(self) -> None:
+        if not self.name.startswith(TWIN_PREFIX):
+            raise DeclarationError(f"output {self.name!r} has to start with {TWIN_PREFIX!r}")
+        if self.datatype not in PYTHON_TYPES:
+            raise DeclarationError(f"output {self.name!r} is a {self.datatype.name}; use a number, BOOLEAN or a text")
+
+    def metric(self) -> MetricSpec:
+        """The birth certificate's entry: unit, meaning and provenance travel as properties."""
+        properties = {"meaning": self.meaning, "provenance": self.provenance.value}
+        return MetricSpec(self.name, self.datatype, unit=self.unit, properties=properties)
+
+
+_WHOLE = (
+    DataType.INT8, DataType.INT16, DataType.INT32, DataType.INT64,
+    DataType.UINT8, DataType.UINT16, DataType.UINT32, DataType.UINT64,
+)  # fmt: skip
+PYTHON_TYPES: dict[DataType, tuple[type, ...]] = {
+    **dict.fromkeys(_WHOLE, (int,)),
+    DataType.FLOAT: (float, int),
+    DataType.DOUBLE: (float, int),
+    DataType.BOOLEAN: (bool,),
+    DataType.STRING: (str,),
+    DataType.TEXT: (str,),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class PlainSpec:
+    """Plain messages, outside Sparkplug, whose topic starts with `prefix` (which ends in a slash)."""
+
+    prefix: str
+    meaning: str
+
+    def __post_init__(self) -> None:
+        if not self.prefix.endswith("/") or self.prefix.startswith(("spBv1.0/", "$")) or set("+#") & set(self.prefix):
+            raise DeclarationError(f"plain prefix {self.prefix!r}: has to end in '/', outside spBv1.0/ and $, no wildcard")
+
+
+class Output(NamedTuple):
+    """A value for a declared metric, as of the sample's time. `value` None is a null and needs a reason."""
+
+    name: str
+    value: Value
+    quality: Quality = Quality.GOOD
+    reason: str | None = None
+
+    @classmethod
+    def null(cls, name: str, reason: str) -> "Output":
+        """A null that says why. Keep live figures out of `reason`: a changed reason is published again."""
+        return cls(name, None, Quality.BAD, reason)
+
+
+class PlainOutput(NamedTuple):
+    """A plain message on a declared topic; retained, so that whoever comes later reads it too."""
+
+    topic: str
+    payload: bytes
+    retain: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class NoState:
+    """The state of a processor that needs none."""
+
+
+C = TypeVar("C", bound=ProcessorConfig)
+S = TypeVar("S")
+
+
+@dataclass(frozen=True, slots=True)
+class Processor(Generic[C, S]):
+    """The declaration.
+
+    version: of the state's form; a snapshot of another version is not restored
+    inputs: names of the metrics that are read; None = all, those of other processors too
+    state: a frozen dataclass of JSON-able fields; `initial` makes the first one
+    """
+
+    name: str
+    version: int
+    inputs: frozenset[str] | None
+    outputs: tuple[OutputSpec, ...]
+    config: type[C]
+    state: type[S]
+    initial: Callable[[C], S]
+    step: Callable[[C, S, Sample], tuple[S, Sequence[Output | PlainOutput]]]
+    plain: tuple[PlainSpec, ...] = ()
+    key: Key = Key.MACHINE
+
+    def __post_init__(self) -> None:
+        if self.key is not Key.MACHINE:
+            raise DeclarationError(f"processor {self.name!r}: key {self.key.value!r} is not built yet; use Key.MACHINE")
+        if not is_dataclass(self.state) or not self.state.__dataclass_params__.frozen:  # type: ignore[attr-defined]
+            raise DeclarationError(f"processor {self.name!r}: state {self.state.__name__} has to be a frozen dataclass")
+        names = [spec.name for spec in self.outputs]
+        if len(set(names)) < len(names):
+            raise DeclarationError(f"processor {self.name!r}: an output is declared twice: {names}")
+
+    @property
+    def node(self) -> str:
+        """The id of its edge node and of its host application."""
+        return TWIN_NODE_PREFIX + self.name
+
+    def listens_to(self, node: str) -> bool:
+        """Whether it reads what the edge node `node` says: never itself, and other processors only where an input is theirs."""
+        if not node.startswith(TWIN_NODE_PREFIX):
+            return True
+        reads_twins = self.inputs is None or any(name.startswith(TWIN_PREFIX) for name in self.inputs)
+        return reads_twins and node != self.node

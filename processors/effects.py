@@ -1,0 +1,42 @@
+"""What the engine asks of the runtime, in order."""
+
+from typing import NamedTuple
+
+from sparkplug.metric import Change
+
+
+class Publish(NamedTuple):
+    """Send these values of a machine's twin device in one message."""
+
+    machine: str
+    changes: tuple[Change, ...]
+
+
+class PublishPlain(NamedTuple):
+    """Send a plain message, outside Sparkplug."""
+
+    topic: str
+    payload: bytes
+    retain: bool
+
+
+class Declare(NamedTuple):
+    """The machine is online: give birth to its twin device."""
+
+    machine: str
+
+
+class Remove(NamedTuple):
+    """The machine is offline: the twin device dies, so that every value of it turns stale at its readers."""
+
+    machine: str
+
+
+class DeadLetter(NamedTuple):
+    """A sample that the fold could not take, as JSON."""
+
+    machine: str
+    payload: bytes
+
+
+Effect = Publish | PublishPlain | Declare | Remove | DeadLetter

@@ -1,0 +1,94 @@
+"""The twin for clients that don't speak Sparkplug: each signal as a retained JSON object on `cnc/<machine>/<signal>`.
+
+    {"value": 2400.0, "t": "2022-02-10T13:51:02.250Z", "unit": "rev/min", "quality": "good"}
+
+quality is good, stale (its edge is offline; the value is the last one) or bad. A null stays null, with its reason. History is not
+mirrored: a topic holds the present.
+"""
+
+import json
+import math
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from functools import lru_cache
+
+from processors.config import ProcessorConfig
+from processors.contract import NoState, PlainOutput, PlainSpec, Processor, Sample, SampleKind
+from processors.plain_topic import topic_level, topic_path
+from sparkplug.metric import Reading
+from sparkplug.quality import Quality
+
+PREFIX = "cnc/"
+_QUALITY = {Quality.GOOD: "good", Quality.STALE: "stale", Quality.BAD: "bad"}
+_ENCODE = json.JSONEncoder(ensure_ascii=False, allow_nan=False, separators=(",", ":")).encode
+
+
+class Config(ProcessorConfig):
+    """Nothing of its own: it is on or off."""
+
+
+def step(_: Config, state: NoState, sample: Sample) -> tuple[NoState, Sequence[PlainOutput]]:
+    """Publish what changed; at a death, what turned stale."""
+    if sample.is_history or sample.kind in (SampleKind.TICK, SampleKind.HOLE):
+        return state, ()
+    machine, row = sample.machine, sample.row
+    return state, [PlainOutput(_topic(machine, name), mirrored(row[name])) for name in sample.changed]
+
+
+def mirrored(reading: Reading) -> bytes:
+    """One reading as JSON that any parser takes; what JSON cannot say is null with a reason.
+
+    >>> mirrored(Reading("spindle_rpm", 2400.0, 1644501062250, Quality.GOOD, "rev/min", None, False)).decode()
+    '{"value":2400.0,"t":"2022-02-10T13:51:02.250Z","unit":"rev/min","quality":"good"}'
+    """
+    value, reason, quality = reading.value, reading.reason, _QUALITY.get(reading.quality, "bad")
+    if isinstance(value, float):
+        if math.isfinite(value):
+            text = repr(value)  # which is JSON, and quicker
+        else:
+            text, reason, quality = "null", f"not a finite number: {value}", "bad"
+    elif value is None:
+        text = "null"
+    elif isinstance(value, (str, int, tuple)):
+        try:
+            text = _ENCODE(value)
+        except ValueError:
+            text, reason, quality = "null", "an array with a number that is not finite", "bad"
+    else:
+        text, reason = "null", f"a {type(value).__name__} has no plain form; read it by Sparkplug"
+    why = f',"reason":{_ENCODE(reason)}' if reason else ""
+    shown = f'{{"value":{text},"t":{_iso(reading.timestamp_ms)},"unit":{_unit(reading.unit)},"quality":"{quality}"{why}}}'
+    return shown.encode("utf-8", "replace")
+
+
+@lru_cache(maxsize=1000)
+def _unit(unit: str | None) -> str:
+    return _ENCODE(unit)
+
+
+@lru_cache(maxsize=1000)
+def _iso(timestamp_ms: int) -> str:
+    """The time in ISO 8601, UTC, as JSON; null where no calendar reaches it. The signals of a message often share theirs."""
+    try:
+        stamp = datetime.fromtimestamp(timestamp_ms / 1000, UTC).isoformat(timespec="milliseconds")
+    except (OverflowError, ValueError, OSError):
+        return "null"
+    return f'"{stamp.removesuffix("+00:00")}Z"'
+
+
+@lru_cache(maxsize=10_000)
+def _topic(machine: str, signal: str) -> str:
+    return f"{PREFIX}{topic_level(machine)}/{topic_path(signal)}"
+
+
+PROCESSOR = Processor(
+    name="mirror",
+    version=1,
+    inputs=None,
+    outputs=(),
+    plain=(PlainSpec(PREFIX, "the last value of each signal of each machine"),),
+    config=Config,
+    state=NoState,
+    initial=lambda _: NoState(),
+    step=step,
+)

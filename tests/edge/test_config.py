@@ -1,0 +1,90 @@
+"""Configurations: each mistake is one line that says where, what and the way out."""
+
+from pathlib import Path
+
+import pytest
+
+from edge.config import BLOCK_PATTERN, EdgeConfig
+from edge.config_file import load, parse
+from edge.errors import ConfigError
+from edge.mtconnect import ADAPTER
+from edge.mtconnect_config import MtconnectConfig
+from edge.run import broker_address
+
+FILE = Path("vmc.toml")
+
+
+def test_an_empty_file_is_all_defaults() -> None:
+    config = parse("", FILE)
+    assert config == EdgeConfig(source=MtconnectConfig(), path=FILE)
+    assert config.node == "edge-machine"
+
+
+def test_the_values_of_the_sample_are_the_defaults() -> None:
+    sample = load(ADAPTER.sample_config)
+    assert sample == EdgeConfig(source=MtconnectConfig(), path=ADAPTER.sample_config)
+    assert sample.tool_change.block_pattern == BLOCK_PATTERN
+
+
+def test_the_sample_names_every_key() -> None:
+    text = ADAPTER.sample_config.read_text(encoding="utf-8")
+    config = load(ADAPTER.sample_config)
+    for section in (config.machine, config.broker, config.source, config.report, config.tool_change):
+        for key in type(section).model_fields:
+            assert f"\n{key} = " in text
+
+
+def test_the_example_of_a_signal_in_the_sample_is_valid() -> None:
+    text = ADAPTER.sample_config.read_text(encoding="utf-8")
+    example = text[text.index("# [signals") :].replace("\n# ", "\n").removeprefix("# ")
+    section = parse(example, FILE).signals["feed_mm_min"]
+    assert (section.data_item, section.native_unit) == ("Feed_Rate", "INCH/MINUTE")
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("[machine]\nname = 'a/b'", "vmc.toml: machine.name = 'a/b': String should match pattern"),
+        ("[machine]\nnam = 'a'", "vmc.toml: machine.nam: no such key; remove it, or see the sample configuration"),
+        ("[machine]\nadapter = 'focas'", "vmc.toml: machine.adapter = 'focas': no such adapter; there are mtconnect"),
+        ("[machine]\nlost_after_s = 'soon'", "vmc.toml: machine.lost_after_s = 'soon': Input should be a valid number"),
+        ("[mtconnect]\nurl = 'agent:5000'", "vmc.toml: mtconnect.url = 'agent:5000': is no http:// or https:// address"),
+        ("[mtconnect]\ncount = 0", "vmc.toml: mtconnect.count = 0: Input should be greater than or equal to 1"),
+        ("[signals.spindle_speed]", "vmc.toml: [signals.spindle_speed]: signal 'spindle_speed' is no canonical name; known are"),
+        ("[signals.tool_change_active]\ndata_item = 'x'", "vmc.toml: [signals.tool_change_active]: is derived by the edge"),
+        (
+            "[signals.feed_mm_min]\nnative_unit = 'KNOT'",
+            "vmc.toml: [signals.feed_mm_min]: native unit 'KNOT' cannot become mm/min; it may be",
+        ),
+        ("[signals.program]\ndeadband = 1", "vmc.toml: [signals.program]: scale and deadband need a number; remove them"),
+        ("[signals.feed_mm_min]\ndeadband = -1", "vmc.toml: signals.feed_mm_min.deadband = -1: Input should be greater"),
+        ("[signals.feed_mm_min]\nscale = nan", "vmc.toml: signals.feed_mm_min.scale = nan: Input should be a finite number"),
+        ("[tool_change]\nblock_pattern = '('", "vmc.toml: tool_change.block_pattern = '(': is no regular expression: missing )"),
+        ("[opcua]", "vmc.toml: [opcua]: no such table; there are machine, broker, signals, report, tool_change and mtconnect"),
+        ("machine = 3", "vmc.toml: machine = 3: Input should be a valid dictionary"),
+        ("[machine", "vmc.toml: is no TOML: "),
+    ],
+)
+def test_a_mistake_is_one_line_with_the_way_out(text: str, expected: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        parse(text, FILE)
+    assert str(caught.value).startswith(expected)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="cannot be read: No such file"):
+        load(tmp_path / "none.toml")
+    (tmp_path / "latin.toml").write_bytes(b'[machine]\nname = "\xe4"')
+    with pytest.raises(ConfigError, match="is not UTF-8 at byte 18"):
+        load(tmp_path / "latin.toml")
+
+
+def test_secrets_come_from_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
+    section = parse("[broker]\nusername = 'edge'\npassword_env = 'EDGE_SECRET'", FILE).broker
+    with pytest.raises(ConfigError, match=r"broker\.password_env = 'EDGE_SECRET': no such environment variable"):
+        broker_address(section, FILE)
+    monkeypatch.setenv("EDGE_SECRET", "s3cret")
+    address = broker_address(section, FILE)
+    assert (address.username, address.password) == ("edge", "s3cret")
+    assert "s3cret" not in repr(address) + address.url

@@ -1,0 +1,314 @@
+"""The connection against agents: a real HTTP replay agent in both dialects, and small servers that misbehave."""
+
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+
+import pytest
+
+from cnctwin.mtconnect_agent.replay_agent import ReplayAgent
+from edge.config import EdgeConfig
+from edge.errors import ConfigError, ConnectionLostError
+from edge.mtconnect_config import MtconnectConfig
+from edge.mtconnect_connection import MtconnectConnection, client_of, fetch
+from edge.mtconnect_cursor import Config, Phase, Request, parse, start
+from edge.sample import Drop, EdgeSample, Gap, SampleSet
+from tests.edge.agent_documents import DIALECTS, error, probe, streams, value
+from tests.recordings import recording
+
+
+class Reader:
+    """A connection that is read and parsed in a thread; what came is kept."""
+
+    def __init__(self, url: str, **options: object) -> None:
+        self.config: Config = EdgeConfig(
+            source=MtconnectConfig.model_validate({"url": url, "interval_ms": 10, "heartbeat_ms": 200, "poll_ms": 20} | options)
+        )
+        self.connection = MtconnectConnection(self.config)
+        self.frames: list[SampleSet] = []
+        self.cursor = start(self.config)
+        self._thread = threading.Thread(target=self._read, daemon=True)
+
+    def _read(self) -> None:
+        self.connection.follow(self.cursor)
+        for raw in self.connection.frames():
+            self.cursor, frame = parse(self.config, self.cursor, raw)
+            self.connection.follow(self.cursor)
+            assert frame.accounted()
+            self.frames.append(frame)
+
+    def __enter__(self) -> "Reader":
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        begin = time.monotonic()
+        self.connection.close()
+        self._thread.join(5)
+        assert not self._thread.is_alive()
+        assert time.monotonic() - begin < 2, "close must wake a blocked read"
+
+    def wait(self, condition: Callable[[], bool], timeout_s: float = 15.0) -> None:
+        deadline = time.monotonic() + timeout_s
+        while not condition():
+            assert time.monotonic() < deadline, (
+                f"waited for {timeout_s} s; {self.connection.last_error or 'no error'}; {self.cursor.phase}"
+            )
+            time.sleep(0.01)
+
+    @property
+    def samples(self) -> list[EdgeSample]:
+        return [sample for frame in self.frames for sample in frame.samples]
+
+    @property
+    def gaps(self) -> list[Gap]:
+        return [gap for frame in self.frames for gap in frame.gaps]
+
+    @property
+    def received(self) -> int:
+        return sum(frame.received for frame in self.frames)
+
+
+def okuma(version: str, **options: object) -> ReplayAgent:
+    files = recording("mtconnect/okuma.txt"), recording("mtconnect/okuma_devices.xml")
+    return ReplayAgent(*files, device="OKUMA", style=version, **options)  # type: ignore[arg-type]
+
+
+def play(agent: ReplayAgent, lines: int) -> None:
+    for _ in range(lines):
+        agent.step()
+
+
+dialects = pytest.mark.parametrize("version", DIALECTS)
+
+
+@dialects
+def test_a_stream_gives_each_observation_once(version: str) -> None:
+    with okuma(version, speed=0) as agent, Reader(agent.url, device="OKUMA") as reader:
+        reader.wait(lambda: reader.cursor.phase is Phase.SAMPLE)
+        for _ in range(20):
+            play(agent, 20)
+            time.sleep(0.01)
+        newest = agent.agent.buffer.next_sequence
+        reader.wait(lambda: reader.cursor.next_sequence == newest)
+        sequences = [sample.sequence for sample in reader.samples]
+        assert len(sequences) == len(set(sequences)) > 500
+        assert (reader.gaps, reader.connection.reconnects) == ([], 0)
+        assert not any(Drop.DUPLICATE in frame.dropped for frame in reader.frames)
+
+
+@dialects
+def test_heartbeats_keep_a_quiet_stream_alive(version: str) -> None:
+    with okuma(version, speed=0) as agent, Reader(agent.url, device="OKUMA") as reader:
+        reader.wait(lambda: reader.cursor.phase is Phase.SAMPLE)
+        before = len(reader.frames)
+        reader.wait(lambda: len(reader.frames) >= before + 4)
+        assert (reader.connection.reconnects, reader.frames[-1].received) == (0, 0)
+
+
+@dialects
+def test_a_restarted_agent_is_found_again_and_the_hole_is_counted(version: str) -> None:
+    with okuma(version, speed=0) as agent, Reader(agent.url, device="OKUMA") as reader:
+        play(agent, 50)
+        reader.wait(lambda: reader.cursor.phase is Phase.SAMPLE)
+        old = reader.cursor.instance_id
+        agent.restart()
+        reader.wait(lambda: reader.cursor.instance_id != old and reader.cursor.phase is Phase.SAMPLE)
+        play(agent, 50)
+        newest = agent.agent.buffer.next_sequence
+        reader.wait(lambda: reader.cursor.next_sequence == newest)
+        assert [gap.reason.split(":")[0] for gap in reader.gaps] == ["agent restarted"]
+
+
+@dialects
+def test_falling_behind_a_small_buffer_is_one_counted_hole_and_then_goes_on(version: str) -> None:
+    with okuma(version, speed=0, buffer_size=128) as agent, Reader(agent.url, device="OKUMA") as reader:
+        play(agent, 5)
+        reader.wait(
+            lambda: reader.cursor.phase is Phase.SAMPLE and reader.cursor.next_sequence == agent.agent.buffer.next_sequence
+        )
+        received, wanted = reader.received, reader.cursor.next_sequence
+        with agent.agent.changed:  # nobody can be answered while 700 lines come in
+            play(agent, 700)
+            newest = agent.agent.buffer.next_sequence
+        reader.wait(lambda: reader.cursor.next_sequence == newest and reader.cursor.phase is Phase.SAMPLE)
+        (gap,) = reader.gaps
+        assert gap.first_sequence == wanted
+        assert 0 < gap.lost <= newest - wanted
+        play(agent, 10)
+        reader.wait(lambda: reader.cursor.next_sequence == agent.agent.buffer.next_sequence)
+        assert len(reader.gaps) == 1
+        assert reader.received > received
+
+
+@dialects
+def test_a_lost_adapter_makes_all_unavailable_and_comes_back(version: str) -> None:
+    with okuma(version, speed=0) as agent, Reader(agent.url, device="OKUMA") as reader:
+        play(agent, 100)
+        reader.wait(lambda: reader.cursor.next_sequence == agent.agent.buffer.next_sequence)
+        agent.adapter_lost()
+        reader.wait(lambda: any(frame.available is False for frame in reader.frames[-3:]))
+        agent.adapter_back()
+        reader.wait(lambda: any(frame.available for frame in reader.frames[-3:]))
+
+
+# Servers that misbehave.
+
+
+@contextmanager
+def server(*answers: Callable[[socket.socket], None]) -> Iterator[str]:
+    """Answers the n-th connection with the n-th answer, the last one again and again."""
+    listener = socket.create_server(("127.0.0.1", 0))
+    stop = threading.Event()
+    open_sockets: list[socket.socket] = []
+
+    def one(connection: socket.socket, answer: Callable[[socket.socket], None]) -> None:
+        with connection, suppress(OSError):
+            connection.recv(65536)
+            answer(connection)
+
+    def serve() -> None:
+        count = 0
+        while not stop.is_set():
+            try:
+                connection, _ = listener.accept()
+            except OSError:
+                return
+            open_sockets.append(connection)
+            threading.Thread(target=one, args=(connection, answers[min(count, len(answers) - 1)]), daemon=True).start()
+            count += 1
+
+    thread = threading.Thread(target=serve, daemon=True)
+    thread.start()
+    try:
+        yield f"http://127.0.0.1:{listener.getsockname()[1]}"
+    finally:
+        stop.set()
+        with suppress(OSError):
+            listener.shutdown(socket.SHUT_RDWR)
+        listener.close()
+        for connection in open_sockets:
+            with suppress(OSError):
+                connection.shutdown(socket.SHUT_RDWR)
+            connection.close()
+        thread.join(5)
+
+
+def answer(body: bytes, *, status: str = "200 OK", kind: str = "text/xml") -> Callable[[socket.socket], None]:
+    head = f"HTTP/1.1 {status}\r\nContent-Type: {kind}\r\nContent-Length: {len(body)}\r\nConnection: close\r\n\r\n"
+    return lambda connection: connection.sendall(head.encode() + body)
+
+
+def hang(connection: socket.socket) -> None:
+    time.sleep(20)
+
+
+def part(body: bytes) -> bytes:
+    return b"--b\r\nContent-length: %d\r\n\r\n%s\r\n" % (len(body), body)
+
+
+def multipart(*parts: bytes, then: Callable[[socket.socket], None] = hang) -> Callable[[socket.socket], None]:
+    def send(connection: socket.socket) -> None:
+        connection.sendall(
+            b"HTTP/1.1 200 OK\r\nContent-Type: multipart/mixed; boundary=b\r\nConnection: close\r\n\r\n" + b"".join(parts)
+        )
+        then(connection)
+
+    return send
+
+
+BASELINE = answer(streams(10, [value("rpm", 3, "100")]))
+
+
+def test_an_agent_that_does_not_stream_is_polled() -> None:
+    document = streams(12, [value("rpm", 10, "1"), value("rpm", 11, "2")])
+    with server(answer(probe()), BASELINE, answer(document), answer(streams(12))) as url, Reader(url) as reader:
+        reader.wait(lambda: len(reader.frames) > 5)
+        assert [sample.value for sample in reader.samples] == [100.0, 1.0, 2.0]
+        assert (reader.connection.reconnects, reader.gaps) == (0, [])
+
+
+@pytest.mark.parametrize("status", ["200 OK", "400 Bad Request", "404 Not Found"])
+def test_an_error_is_told_by_its_document_and_not_by_the_status(status: str) -> None:
+    refusal = answer(error("OUT_OF_RANGE"), status=status)
+    with (
+        server(answer(probe()), BASELINE, refusal, answer(streams(90, [value("rpm", 80, "7")], first=50))) as url,
+        Reader(url) as reader,
+    ):
+        reader.wait(lambda: reader.gaps != [])
+        assert [sample.value for sample in reader.samples] == [100.0, 7.0]
+        assert reader.gaps[0].lost == 79
+
+
+def test_a_stream_that_ends_or_breaks_is_taken_up_where_it_was() -> None:
+    first = multipart(part(streams(11, [value("rpm", 10, "1")])), then=lambda connection: connection.close())
+    torn = multipart(
+        part(streams(12, [value("rpm", 11, "2")])),
+        part(streams(13, [value("rpm", 12, "3")]))[:200],
+        then=lambda connection: connection.close(),
+    )
+    rest = multipart(part(streams(14, [value("rpm", 12, "3"), value("rpm", 13, "4")])))
+    with server(answer(probe()), BASELINE, first, torn, rest) as url, Reader(url, heartbeat_ms=2000) as reader:
+        reader.wait(lambda: reader.cursor.next_sequence == 14)
+        assert [sample.value for sample in reader.samples] == [100.0, 1.0, 2.0, 3.0, 4.0]
+        assert (reader.connection.reconnects, reader.gaps) == (2, [])
+
+
+def test_a_corrupt_part_is_asked_for_again_and_not_skipped() -> None:
+    corrupt = multipart(part(b"<MTConnectStreams><Header next"), part(streams(13, [value("rpm", 12, "9")])))
+    whole = multipart(part(streams(13, [value("rpm", 10, "1"), value("rpm", 12, "9")])))
+    with server(answer(probe()), BASELINE, corrupt, whole) as url, Reader(url, heartbeat_ms=2000) as reader:
+        reader.wait(lambda: reader.cursor.next_sequence == 13)
+        assert [sample.value for sample in reader.samples] == [100.0, 1.0, 9.0]
+
+
+def test_an_agent_that_hangs_is_given_up_after_three_heartbeats() -> None:
+    alive = multipart(part(streams(11, [value("rpm", 10, "1")])))
+    with server(answer(probe()), BASELINE, hang, alive) as url, Reader(url, heartbeat_ms=100, timeout_s=0.3) as reader:
+        reader.wait(lambda: reader.cursor.next_sequence == 11)
+        assert "timed out" in reader.connection.last_error
+
+
+def test_an_agent_that_drips_without_ever_finishing_a_part_is_given_up() -> None:
+    def drip(connection: socket.socket) -> None:
+        for _ in range(200):
+            connection.sendall(b" ")
+            time.sleep(0.02)
+
+    endless = multipart(b"--b\r\nContent-length: 100000\r\n\r\n", then=drip)
+    with server(answer(probe()), BASELINE, endless) as url, Reader(url, heartbeat_ms=100, timeout_s=0.3) as reader:
+        reader.wait(lambda: "no document within 0.3 s" in reader.connection.last_error)
+
+
+def test_a_refusal_that_is_no_document_is_a_lost_connection() -> None:
+    with server(answer(b"<html>who are you</html>", status="401 Unauthorized", kind="text/html")) as url, Reader(url) as reader:
+        reader.wait(lambda: reader.connection.reconnects > 0)
+        assert reader.connection.last_error == f"{url}: HTTP 401 Unauthorized for /probe"
+
+
+def test_an_agent_that_is_not_there_is_tried_again_later_and_later() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as nobody:
+        url = f"http://127.0.0.1:{nobody.getsockname()[1]}"
+    with Reader(url) as reader:
+        begin = time.monotonic()
+        reader.wait(lambda: reader.connection.reconnects == 2)
+        assert time.monotonic() - begin >= 0.25
+        assert "refused" in reader.connection.last_error
+
+
+def test_a_single_document_that_is_not_there_names_the_way_out() -> None:
+    with pytest.raises(ConnectionLostError, match="is the agent running, and the address right"):
+        fetch(EdgeConfig(source=MtconnectConfig(url="http://127.0.0.1:1")), Request("/probe"))
+
+
+def test_the_password_comes_from_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
+    config = EdgeConfig(source=MtconnectConfig(username="edge", password_env="AGENT_SECRET"))
+    with pytest.raises(ConfigError, match="no such environment variable"):
+        client_of(config)
+    monkeypatch.setenv("AGENT_SECRET", "s3cret")
+    with client_of(config) as client:
+        assert client.auth is not None
+    with pytest.raises(ConfigError, match=r"ca_file = '/none\.pem'"):
+        client_of(EdgeConfig(source=MtconnectConfig(ca_file="/none.pem")))

@@ -1,0 +1,96 @@
+"""One native text, one canonical value."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from edge.errors import ConfigError
+from edge.mapping import Target
+from edge.reading import TEXT_LENGTH_MAX, read
+from edge.signals import SIGNALS, signal
+from edge.units import conversion
+from sparkplug.quality import Quality
+
+GOOD, BAD = Quality.GOOD, Quality.BAD
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "expected"),
+    [
+        ("tool_number", "7.000000", (7, GOOD, None)),
+        ("tool_number", "2201", (2201, GOOD, None)),
+        ("tool_number", "", (None, GOOD, "empty")),
+        ("tool_number", "T12A", (None, BAD, "not a number: 'T12A'")),
+        ("tool_number", "7.5", (None, BAD, "not a whole number: 7.5")),
+        ("nc_line", "99999999999999999999", (None, BAD, "not a whole number: 1e+20")),
+        ("spindle_rpm", "1e3", (1000.0, GOOD, None)),
+        ("spindle_rpm", "-.5", (-0.5, GOOD, None)),
+        ("spindle_rpm", "NaN", (None, BAD, "not a number: 'NaN'")),
+        ("spindle_rpm", "inf", (None, BAD, "not a number: 'inf'")),
+        ("spindle_rpm", "1_000", (None, BAD, "not a number: '1_000'")),
+        ("spindle_rpm", "１２", (None, BAD, "not a number: '１２'")),
+        ("spindle_rpm", "1 2 3", (None, BAD, "not a number: '1 2 3'")),
+        ("spindle_rpm", "1e999", (None, BAD, "not a finite number: inf")),
+        ("spindle_rpm", "60001", (None, BAD, "outside -60000 to 60000 rev/min: 60001")),
+        ("spindle_temp_c", "0", (None, BAD, "outside 1 to 150 °C: 0")),
+        ("exec_state", "active", ("ACTIVE", GOOD, None)),
+        ("exec_state", "DANCING", (None, BAD, "no word of the vocabulary: 'DANCING'")),
+        ("controller_mode", "MDI", ("MANUAL_DATA_INPUT", GOOD, None)),
+        ("coolant_on", "ON", (True, GOOD, None)),
+        ("coolant_on", "INACTIVE", (False, GOOD, None)),
+        ("coolant_on", "perhaps", (None, BAD, "neither on nor off: 'perhaps'")),
+        ("program", "", ("", GOOD, None)),
+        ("program", "x" * (TEXT_LENGTH_MAX + 1), (None, BAD, "text of 8193 characters")),
+        ("program", "UNAVAILABLE", (None, BAD, "unavailable")),
+    ],
+)
+def test_texts_become_values_or_reasons(name: str, text: str, expected: object) -> None:
+    known = signal(name)
+    assert read(Target("x", name, low=known.low, high=known.high), text) == expected
+
+
+@pytest.mark.parametrize(
+    ("native", "canonical", "value", "expected"),
+    [
+        ("INCH/MINUTE", "mm/min", 10, 254),
+        ("MILLIMETER/SECOND", "mm/min", 2, 120),
+        ("FOOT/MINUTE", "mm/min", 1, 304.8),
+        ("INCH", "mm", 2, 50.8),
+        ("RADIAN", "deg", math.pi, 180),
+        ("REV/SECOND", "rev/min", 2, 120),
+        ("DEGREE/SECOND", "rev/min", 360, 60),
+        ("RADIAN/SECOND", "rev/min", 2 * math.pi, 60),
+        ("FAHRENHEIT", "°C", 212, 100),
+        ("KELVIN", "°C", 273.15, 0),
+        ("WATT", "kW", 1500, 1.5),
+        ("RATIO", "%", 0.5, 50),
+        ("METER/SECOND^2", "g", 9.80665, 1),
+        ("mm/min", "mm/min", 3, 3),
+        ("", "mm/min", 3, 3),
+    ],
+)
+def test_units_are_converted(native: str, canonical: str, value: float, expected: float) -> None:
+    assert conversion(native, canonical).apply(value) == pytest.approx(expected)
+
+
+def test_a_unit_that_is_not_known_is_refused_with_those_that_are() -> None:
+    with pytest.raises(ConfigError, match="native unit 'FURLONG' cannot become mm; it may be MILLIMETER, INCH"):
+        conversion("FURLONG", "mm")
+
+
+@given(st.sampled_from(sorted(SIGNALS)), st.text(max_size=40) | st.floats().map(repr))
+def test_any_text_gives_a_value_of_the_right_type_or_a_null_with_a_reason(name: str, text: str) -> None:
+    known = signal(name)
+    value, quality, reason = read(Target("x", name, 60.0, low=known.low, high=known.high), text)
+    if value is None:
+        assert reason
+    else:
+        assert quality is GOOD
+        assert not isinstance(value, float) or math.isfinite(value)
+
+
+def test_a_name_that_is_not_canonical_is_refused() -> None:
+    with pytest.raises(ConfigError, match="'spindle_speed' is no canonical name"):
+        signal("spindle_speed")

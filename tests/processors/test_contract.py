@@ -1,0 +1,139 @@
+"""The contract suite: every processor that discovery finds, the ones of tomorrow included."""
+
+import json
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
+from pydantic import TypeAdapter
+
+from processors.config import Configuration, read_tables
+from processors.contract import TWIN_PREFIX
+from processors.discovery import AnyProcessor, discover, sample_configuration
+from processors.effects import DeadLetter, Effect, Publish, PublishPlain, Remove
+from processors.snapshot import decode_state, encode_state
+from sparkplug.host_session import HostEvent
+from tests.processors.streams import birth, data, death, engine_of, fed, wild_streams
+
+every_processor = pytest.mark.parametrize("processor", discover().values(), ids=discover().keys())
+quickly = settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
+
+
+def _day() -> list[HostEvent]:
+    """A shift in short: warm-up, a cut, a null, a death and a rebirth."""
+    start = birth(0.0, spindle_rpm=0.0, spindle_load_pct=0.0, ambient_temp_c=21.5, spindle_temp_c=24.0, tool_number=1)
+    cuts = [data(1.0 + 0.7 * i, spindle_rpm=4000.0 + 10 * i, spindle_load_pct=20.0 + i % 7) for i in range(120)]
+    unknown = [data(90.0, spindle_load_pct=None), data(95.0, spindle_load_pct=31.0), data(97.0, tool_number=2)]
+    again = [death(100.0), birth(130.0, spindle_rpm=0.0, spindle_load_pct=0.0, ambient_temp_c=21.6, tool_number=2)]
+    return [start, *cuts, *unknown, *again, data(150.3, spindle_rpm=100.0)]
+
+
+def test_the_processors_of_the_first_release_are_found() -> None:
+    assert {"cutting_force", "mirror", "thermal"} <= set(discover())
+
+
+@every_processor
+def test_the_sample_configuration_loads_and_equals_the_defaults(processor: AnyProcessor) -> None:
+    tables = read_tables(sample_configuration(processor))
+    assert list(tables) == [processor.name]
+    configuration = Configuration(processor.config, tables[processor.name])
+    assert configuration.default.model_dump() == processor.config().model_dump()
+
+
+@every_processor
+def test_the_sample_configuration_names_every_field(processor: AnyProcessor) -> None:
+    text = sample_configuration(processor).read_text(encoding="utf-8")
+    assert [field for field in processor.config.model_fields if field not in text] == []
+
+
+@every_processor
+def test_the_same_stream_gives_the_same_answer(processor: AnyProcessor) -> None:
+    assert fed(engine_of(processor), *_day()) == fed(engine_of(processor), *_day())
+
+
+@every_processor
+@given(stream=wild_streams())
+@quickly
+def test_nothing_that_comes_crashes_it(processor: AnyProcessor, stream: list[HostEvent]) -> None:
+    engine = engine_of(processor)
+    effects = fed(engine, *stream)
+    assert [effect for effect in effects if isinstance(effect, DeadLetter)] == []
+    assert engine.ledger.balance == 0
+
+
+@every_processor
+@given(stream=wild_streams())
+@quickly
+def test_it_emits_only_what_it_declares_and_every_null_says_why(processor: AnyProcessor, stream: list[HostEvent]) -> None:
+    names = {spec.name for spec in processor.outputs}
+    for effect in fed(engine_of(processor), *stream):
+        if isinstance(effect, Publish):
+            assert {change.name for change in effect.changes} <= names
+            assert all(change.reason for change in effect.changes if change.value is None)
+        elif isinstance(effect, PublishPlain):
+            assert effect.topic.startswith(tuple(spec.prefix for spec in processor.plain))
+            json.loads(effect.payload, parse_constant=_no_constant)
+    assert all(name.startswith(TWIN_PREFIX) for name in names)
+
+
+def _no_constant(text: str) -> Any:
+    raise AssertionError(f"{text} is not JSON")
+
+
+@every_processor
+@given(stream=wild_streams(), cut=st.integers(0, 30))
+@example(stream=_day(), cut=60)
+@quickly
+def test_a_restart_in_the_middle_changes_nothing(processor: AnyProcessor, stream: list[HostEvent], cut: int) -> None:
+    """The state goes to JSON and back after `cut` events; everything after that is the same, to the last bit."""
+    whole, restarted = engine_of(processor), engine_of(processor)
+    expected = fed(whole, *stream[:cut])
+    assert _same(fed(restarted, *stream[:cut]), expected)
+    adapter: TypeAdapter[Any] = TypeAdapter(processor.state)
+    for machine in restarted._machines.values():
+        for lane in (machine.live, machine.history):
+            if lane is not None:
+                lane.state = decode_state(adapter, json.loads(json.dumps(encode_state(adapter, lane.state))))
+    assert _same(fed(restarted, *stream[cut:]), fed(whole, *stream[cut:]))
+
+
+def _same(left: list[Effect], right: list[Effect]) -> bool:
+    return repr(left) == repr(right)  # NaN equals itself here
+
+
+@every_processor
+def test_a_snapshot_carries_a_machine_over_to_a_new_process(processor: AnyProcessor) -> None:
+    """The edge lives on: the new process is given its birth, with the values that it has by then, and goes on."""
+    first = engine_of(processor, ambient_temp_c=20.0) if processor.name == "thermal" else engine_of(processor)
+    whole = engine_of(processor, ambient_temp_c=20.0) if processor.name == "thermal" else engine_of(processor)
+    values = {"spindle_rpm": 5000.0, "spindle_load_pct": 40.0, "tool_number": 3}
+    opening = [birth(0.0, **values), data(10.4, spindle_load_pct=50.0)]
+    rest = [data(20.2, spindle_rpm=5100.0), data(45.0, spindle_rpm=0.0, spindle_load_pct=0.0), data(90.0, tool_number=4)]
+    fed(first, *opening)
+    fed(whole, *opening, *rest)
+    second = engine_of(processor, ambient_temp_c=20.0) if processor.name == "thermal" else engine_of(processor)
+    assert second.restore(first.snapshot("okuma")) == "okuma"
+    fed(second, birth(10.4, **values | {"spindle_load_pct": 50.0}), *rest)
+    assert json.loads(second.snapshot("okuma")) == json.loads(whole.snapshot("okuma"))
+    assert second.counts.holes == 0
+
+
+@every_processor
+@given(stream=wild_streams())
+@quickly
+def test_every_snapshot_can_be_restored(processor: AnyProcessor, stream: list[HostEvent]) -> None:
+    engine = engine_of(processor)
+    fed(engine, *stream)
+    for machine in engine.take_changed():
+        snapshot = engine.snapshot(machine)
+        again = engine_of(processor)
+        assert again.restore(snapshot) == machine
+        assert again.snapshot(machine) == snapshot
+
+
+@every_processor
+def test_a_dead_machine_has_no_living_twin(processor: AnyProcessor) -> None:
+    effects = fed(engine_of(processor), *_day(), death(160.0))
+    if processor.outputs:
+        assert effects[-1] == Remove("okuma")

@@ -1,0 +1,43 @@
+"""The ledger's law: received = emitted + dropped(reason) + buffered, after every single event."""
+
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from processors.ledger import DropReason, Ledger
+from sparkplug.host_session import EventKind, HostEvent
+from tests.processors.recorder import RECORDER
+from tests.processors.streams import engine_of, wild_streams
+
+
+@given(stream=wild_streams(), silences=st.booleans())
+@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
+def test_every_message_is_accounted_for_after_every_event(stream: list[HostEvent], silences: bool) -> None:
+    engine = engine_of(RECORDER, fail_at=1.0, gap_s_max=60.0)
+    for number, event in enumerate(stream):
+        before = engine.ledger.received
+        engine.feed(event, float(number))
+        if silences:
+            engine.silence(float(100 * number))
+        ledger = engine.ledger
+        assert ledger.balance == 0
+        assert ledger.buffered == sum(
+            len(lane._held)
+            for machine in engine._machines.values()
+            for lane in (machine.live, machine.history)
+            if lane is not None
+        )
+        counted = event.device is not None and event.kind is not EventKind.HOLE and RECORDER.listens_to(event.node.node)
+        assert ledger.received - before in ((1, 2) if counted else (0,))
+
+
+def test_every_reason_is_published_also_at_zero() -> None:
+    metrics = Ledger().metrics()
+    assert {f"ledger/dropped/{reason.value}" for reason in DropReason} <= set(metrics)
+    assert set(metrics.values()) == {0}
+
+
+def test_what_could_not_be_sent_is_no_longer_emitted() -> None:
+    ledger = Ledger()
+    ledger.received = ledger.emitted = 1
+    ledger.unsent()
+    assert (ledger.emitted, ledger.dropped[DropReason.BROKER_OFFLINE], ledger.balance) == (0, 1, 0)

@@ -1,0 +1,228 @@
+"""The loop around the engine, with a host and an edge node that a test holds in its hands."""
+
+import json
+import logging
+from collections import deque
+from collections.abc import Iterable, Sequence
+from threading import Event, Timer
+from typing import Any
+
+import pytest
+
+from processors.config import Configuration
+from processors.discovery import AnyProcessor
+from processors.ledger import DropReason
+from processors.thermal import PROCESSOR as THERMAL
+from processors.worker import Worker
+from sparkplug.host_session import EventKind, HostEvent
+from sparkplug.metric import Change, MetricSpec, NodeId
+from tests.processors.recorder import RECORDER
+from tests.processors.streams import birth, data, death, engine_of, fed
+
+NOWHERE = NodeId("", "")
+
+
+class FakeHost:
+    """A broker that answers at once: retained snapshots first, then the marker, as Mosquitto does."""
+
+    def __init__(self, *live: HostEvent, retained: dict[str, bytes] | None = None, marker: bool = True) -> None:
+        self.dropped = 0
+        self.online = True
+        self.reconnects = 0
+        self.started = self.stopped = False
+        self.retained = retained or {}
+        self.plain: list[tuple[str, bytes, bool]] = []
+        self.subscriptions: list[str] = []
+        self._marker = marker
+        self._events: deque[HostEvent] = deque(live)
+        self._stop_when_empty: Event | None = None
+
+    @property
+    def queue_depth(self) -> int:
+        return len(self._events)
+
+    def start(self) -> None:
+        self.started = True
+
+    def stop(self) -> None:
+        self.stopped = True
+
+    def subscribe_plain(self, topic_filter: str) -> None:
+        assert not self.started, "subscriptions come first"
+        self.subscriptions.append(topic_filter)
+
+    def publish_plain(self, topic: str, payload: bytes, *, qos: int = 0, retain: bool = False) -> bool:
+        if not self.online:
+            return False
+        self.plain.append((topic, payload, retain))
+        if topic.startswith("cnctwin/marker/") and self._marker:
+            snapshots = [HostEvent(EventKind.PLAIN, NOWHERE, None, 0, (), "", *item) for item in self.retained.items()]
+            self._events.extend([*snapshots, HostEvent(EventKind.PLAIN, NOWHERE, None, 0, (), "", topic, payload)])
+        return True
+
+    def poll(self, timeout_s: float) -> list[HostEvent]:
+        events = list(self._events)
+        self._events.clear()
+        if not events and self._stop_when_empty is not None:
+            self._stop_when_empty.set()
+        return events
+
+    def give(self, *events: HostEvent) -> None:
+        self._events.extend(events)
+
+    def until_empty(self) -> Event:
+        """A stop that is set when everything has been taken."""
+        self._stop_when_empty = Event()
+        return self._stop_when_empty
+
+
+class FakeEdge:
+    """An edge node that remembers what it was told."""
+
+    def __init__(self) -> None:
+        self.online = True
+        self.devices: dict[str, tuple[MetricSpec, ...]] = {}
+        self.removed: list[str] = []
+        self.published: list[tuple[str | None, tuple[Change, ...]]] = []
+        self.stopped = False
+
+    def start(self) -> None:
+        pass
+
+    def stop(self, timeout_s: float = 5.0) -> None:
+        self.stopped = True
+
+    def declare_device(self, device: str, metrics: Iterable[MetricSpec]) -> None:
+        self.devices[device] = tuple(metrics)
+
+    def remove_device(self, device: str) -> None:
+        del self.devices[device]
+        self.removed.append(device)
+
+    def publish(self, device: str | None, changes: Sequence[Change]) -> bool:
+        self.published.append((device, tuple(changes)))
+        return self.online
+
+    def ledger(self) -> dict[str, Any]:
+        """The last ledger: one message with all of it."""
+        messages = [{c.name: c.value for c in changes} for device, changes in self.published if device is None]
+        return [message for message in messages if "ledger/received" in message][-1]
+
+
+def worked(processor: AnyProcessor, host: FakeHost, edge: FakeEdge | None = None, **table: Any) -> tuple[Worker, FakeEdge]:
+    """Run a worker until its host has nothing more."""
+    edge = edge or FakeEdge()
+    worker = Worker(processor, Configuration(processor.config, table), host, edge)
+    worker.run(host.until_empty())
+    return worker, edge
+
+
+def snapshots(host: FakeHost) -> dict[str, bytes]:
+    """What is retained when the worker has ended."""
+    return {topic: payload for topic, payload, retain in host.plain if topic.startswith("cnctwin/snapshot/") and retain}
+
+
+def test_it_subscribes_first_and_folds_only_after_the_snapshots_have_come() -> None:
+    before = engine_of(RECORDER)
+    fed(before, birth(0.0, spindle_rpm=1.0))
+    # The live birth is in the queue before the snapshot is: folding it at once would start from nothing.
+    host = FakeHost(birth(0.5, spindle_rpm=2.0), retained={"cnctwin/snapshot/recorder/okuma": before.snapshot("okuma")})
+    worker, edge = worked(RECORDER, host)
+    log = worker.engine._machines["okuma"].live.state.log
+    assert [kind for kind, *_ in log] == ["birth", "hole", "birth", "death"]  # the last one is the goodbye
+    assert host.subscriptions == ["cnctwin/snapshot/recorder/+", "cnctwin/marker/recorder"]
+    assert (host.stopped, edge.stopped) == (True, True)
+
+
+def test_a_broker_that_never_gives_the_marker_back_costs_a_second(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr("processors.worker.RESTORE_S_MAX", 0.01)
+    worker = Worker(RECORDER, Configuration(RECORDER.config), FakeHost(birth(0.0, spindle_rpm=1.0), marker=False), FakeEdge())
+    stop = Event()
+    Timer(0.2, stop.set).start()
+    with caplog.at_level(logging.WARNING):
+        worker.run(stop)
+    assert worker.engine.ledger.emitted == 1
+    assert "what has come by now is all" in caplog.text
+
+
+@pytest.mark.parametrize("payload", [b"{", b'{"machine":"okuma","format":0}'])
+def test_a_snapshot_that_cannot_be_restored_is_one_clear_line(payload: bytes, caplog: pytest.LogCaptureFixture) -> None:
+    host = FakeHost(birth(0.0, spindle_rpm=1.0), retained={"cnctwin/snapshot/recorder/okuma": payload})
+    with caplog.at_level(logging.WARNING):
+        worker, _ = worked(RECORDER, host)
+    (record,) = caplog.records
+    assert "snapshot on cnctwin/snapshot/recorder/okuma is not restored, the state starts fresh" in record.getMessage()
+    assert worker.engine.counts.snapshots_rejected == 1
+    assert worker.engine.ledger.emitted == 1
+
+
+def test_the_state_is_retained_at_the_end_and_carries_over() -> None:
+    first = FakeHost(birth(0.0, spindle_rpm=5000.0, spindle_load_pct=10.0), data(10.0, spindle_rpm=5000.0))
+    one, _ = worked(THERMAL, first)
+    second = FakeHost(retained=snapshots(first))
+    other, _ = worked(THERMAL, second)
+    assert other.engine._machines["okuma"].live.state == one.engine._machines["okuma"].live.state
+
+
+def test_a_twin_device_is_born_with_units_and_dies_with_its_machine() -> None:
+    host = FakeHost(birth(0.0, spindle_rpm=1.0, spindle_load_pct=1.0))
+    _, edge = worked(THERMAL, host)
+    specs = {spec.name: spec for spec in edge.devices["okuma"]}
+    assert specs["twin/spindle_temp_c"].unit == "°C"
+    assert specs["twin/spindle_temp_c"].properties["provenance"] == "modelled"
+    _, edge = worked(THERMAL, FakeHost(birth(0.0, spindle_rpm=1.0, spindle_load_pct=1.0), death(1.0)))
+    assert (edge.devices, edge.removed) == ({}, ["okuma"])
+
+
+def test_the_ledger_is_one_message_and_balances() -> None:
+    host = FakeHost(birth(0.0, spindle_rpm=1.0), data(0.1, spindle_rpm=2.0), data(0.05, spindle_rpm=9.0))
+    host.dropped = 4
+    _, edge = worked(RECORDER, host)
+    ledger = edge.ledger()
+    assert ledger["ledger/received"] == 7
+    assert ledger["ledger/dropped/queue_full"] == 4
+    assert ledger["ledger/dropped/superseded"] == 1
+    assert ledger["ledger/received"] == ledger["ledger/emitted"] + ledger["ledger/dropped"] + ledger["ledger/buffered"]
+    assert ledger["ledger/dropped"] == sum(count for name, count in ledger.items() if name.startswith("ledger/dropped/"))
+
+
+def test_what_cannot_be_sent_is_dropped_with_that_reason() -> None:
+    edge = FakeEdge()
+    edge.online = False
+    worker, _ = worked(RECORDER, FakeHost(birth(0.0, spindle_rpm=1.0)), edge)
+    assert worker.engine.ledger.dropped[DropReason.BROKER_OFFLINE] == 1
+    assert worker.engine.ledger.balance == 0
+
+
+def test_dead_letters_are_published_a_few_at_a_time_and_all_counted(caplog: pytest.LogCaptureFixture) -> None:
+    host = FakeHost(birth(0.0, spindle_rpm=1.0), *(data(0.01 * i, spindle_rpm=13.0) for i in range(1, 40)))
+    worker, _ = worked(RECORDER, host, fail_at=13.0)
+    letters = [json.loads(payload) for topic, payload, retain in host.plain if topic == "cnctwin/deadletter/recorder/okuma"]
+    assert 10 <= len(letters) < 39
+    assert worker.engine.counts.dead_letters == 39
+    assert "dead letter of okuma" in caplog.text
+
+
+def test_after_a_reconnect_every_snapshot_is_given_again() -> None:
+    host = FakeHost(birth(0.0, spindle_rpm=1.0))
+    edge = FakeEdge()
+    worker = Worker(RECORDER, Configuration(RECORDER.config), host, edge)
+    worker.run(host.until_empty())
+    host.plain.clear()
+    worker._save(0.0)
+    assert snapshots(host) == {}
+    host.reconnects = 1
+    worker._save(0.0)
+    assert list(snapshots(host)) == ["cnctwin/snapshot/recorder/okuma"]
+
+
+def test_a_stop_before_the_snapshots_have_come_overwrites_none() -> None:
+    host = FakeHost(birth(0.0, spindle_rpm=1.0), marker=False)
+    worker = Worker(RECORDER, Configuration(RECORDER.config), host, FakeEdge())
+    stop = Event()
+    stop.set()
+    worker.run(stop)
+    assert snapshots(host) == {}
+    assert host.stopped
