@@ -5,6 +5,8 @@ from typing import NamedTuple
 
 from sparkplug.errors import PayloadError
 
+STATE_BYTES_MAX = 1024
+
 
 class Publish(NamedTuple):
     """Publish `payload` on `topic`."""
@@ -23,9 +25,9 @@ class Subscribe(NamedTuple):
 
 
 class Connect(NamedTuple):
-    """Open a connection with a clean session (3.1.1) or a clean start and no session expiry (5.0), and this will."""
+    """Open a connection with a clean session (3.1.1) or a clean start and no session expiry (5.0), and this will (if any)."""
 
-    will: Publish
+    will: Publish | None
 
 
 class Disconnect(NamedTuple):
@@ -58,6 +60,8 @@ class HostState(NamedTuple):
     @classmethod
     def decode(cls, payload: bytes) -> "HostState":
         """Read a STATE message; raises PayloadError where it is none (2.2 sent the words ONLINE and OFFLINE)."""
+        if len(payload) > STATE_BYTES_MAX:
+            raise PayloadError(f"STATE of {len(payload)} bytes is above the limit of {STATE_BYTES_MAX}")
         try:
             state = json.loads(payload)
         except ValueError as error:

@@ -16,14 +16,22 @@ class BdSeq:
 
     def __init__(self, file: Path | None = None) -> None:
         self._file = file
+        self._unused = False
         self._last = -1 if file is None else self._read(file)
 
     def next(self) -> int:
         """The number for the next CONNECT."""
+        if self._unused:
+            self._unused = False
+            return self._last
         self._last = (self._last + 1) % 256
         if self._file is not None:
             self._write(self._file, self._last)
         return self._last
+
+    def give_back(self) -> None:
+        """The last number was not used: no CONNECT went out with it."""
+        self._unused = True
 
     @staticmethod
     def _read(file: Path) -> int:

@@ -1,15 +1,16 @@
 """What a birth certificate declares: a table of metrics with their aliases, types and present values."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from sparkplug.codec import write_properties, write_value
-from sparkplug.datatype import DataType
+from sparkplug.datatype import PROPERTY_ONLY, DataType
 from sparkplug.errors import MetricValueError, SparkplugError, UnknownMetricError
 from sparkplug.metric import Change, MetricSpec, quality_properties
 from sparkplug.quality import QUALITY_PROPERTY, Quality
 from sparkplug.schema import PayloadMessage
+from sparkplug.template_rules import Definitions, check_instance, merged
 from sparkplug.values import Metric, PropertySet, PropertyValue, Template, Value
 from sparkplug.wire_value import WRITE
 
@@ -32,15 +33,27 @@ class _Slot:
 class Certificate:
     """The metrics of one edge node or device; `alias_of` gives each name its alias, the same one each time."""
 
-    def __init__(self, owner: str, specs: Iterable[MetricSpec], alias_of: Callable[[str], int], now_ms: int) -> None:
+    def __init__(
+        self,
+        owner: str,
+        specs: Iterable[MetricSpec],
+        alias_of: Callable[[str], int],
+        now_ms: int,
+        definitions: Definitions | None = None,
+    ) -> None:
         self._owner = owner
+        self._definitions = definitions or {}
         self._slots: dict[str, _Slot] = {}
+        folded: dict[str, str] = {}
         for spec in specs:
-            if spec.name in self._slots:
-                raise SparkplugError(f"{owner} declares the metric {spec.name!r} twice")
+            alike = folded.setdefault(spec.name.casefold(), spec.name)
+            if alike != spec.name or spec.name in self._slots:
+                raise SparkplugError(f"{owner} declares {spec.name!r} beside {alike!r}; names have to differ in more than case")
+            if spec.datatype is DataType.UNKNOWN or spec.datatype in PROPERTY_ONLY:
+                raise SparkplugError(f"{owner}: metric {spec.name!r}: {spec.datatype.name} is no type of a metric")
             slot = _Slot(spec, alias_of(spec.name), spec.property_set(), *spec.first(now_ms)[1:5])
             self._slots[spec.name] = slot
-            self._check(slot, spec.value)
+            self._check(slot, spec.value, whole=True)
 
     def __contains__(self, name: str) -> bool:
         return name in self._slots
@@ -81,10 +94,14 @@ class Certificate:
         for change in _oldest_first(changes):
             if not change.is_historical:
                 slot = self._slots[change.name]
+                past = slot.value
                 _, slot.value, slot.timestamp_ms, slot.quality, slot.reason, _ = change
+                if isinstance(past, Template) and isinstance(slot.value, Template) and past.ref == slot.value.ref:
+                    slot.value = merged(past, slot.value)
 
     def birth(self) -> tuple[Metric, ...]:
-        """The metrics of a birth: name, alias, type, properties and the present value of each."""
+        """The metrics of a birth, oldest first: name, alias, type, properties and the present value of each."""
+        slots = sorted(self._slots.values(), key=lambda slot: slot.timestamp_ms)
         return tuple(
             Metric(
                 name=slot.spec.name,
@@ -96,7 +113,7 @@ class Certificate:
                 properties={**slot.properties, **quality_properties(slot.quality, slot.reason)},
                 metadata=slot.spec.metadata,
             )
-            for slot in self._slots.values()
+            for slot in slots
         )
 
     def write_data(self, message: Any, changes: Sequence[Change]) -> None:
@@ -130,11 +147,13 @@ class Certificate:
 
     def _write(self, out: Any, slot: _Slot, value: Value) -> None:
         try:
+            if isinstance(value, Template):
+                check_instance(value, self._definitions, whole=False)
             write_value(out, slot.spec.datatype, value)
         except MetricValueError as error:
             raise MetricValueError(f"{self._owner}: metric {slot.spec.name!r}: {error}") from error
 
-    def _check(self, slot: _Slot, value: Value) -> None:
+    def _check(self, slot: _Slot, value: Value, *, whole: bool = False) -> None:
         """Raise MetricValueError, naming owner and metric, where the declared type cannot carry `value`."""
         if value is None:
             return
@@ -142,9 +161,9 @@ class Certificate:
         try:
             if datatype in WRITE:
                 WRITE[datatype](value)
-            elif datatype is DataType.TEMPLATE and isinstance(value, Template) and value.is_definition:
-                raise MetricValueError("a template definition belongs into the templates of the node, not into a metric")
             else:
+                if isinstance(value, Template):
+                    check_instance(value, self._definitions, whole=whole)
                 write_value(PayloadMessage().metrics.add(), datatype, value)  # else only the next birth would fail, and every one
         except (MetricValueError, ValueError) as error:
             raise MetricValueError(f"{self._owner}: metric {slot.spec.name!r}: {error}") from error
@@ -162,9 +181,6 @@ def _oldest_first(changes: Sequence[Change]) -> Sequence[Change]:
 
 def _time(change: Change) -> int:
     return change.timestamp_ms
-
-
-Definitions = Mapping[str, Template]
 
 
 def definition_metrics(definitions: Definitions, now_ms: int) -> tuple[Metric, ...]:

@@ -185,7 +185,7 @@ def write_properties(out: Any, properties: PropertySet) -> None:
 
 def read_metric(metric: Any, type_of: TypeOf | None = None, depth: int = 0) -> Metric:
     """The frozen value of a protobuf metric."""
-    name = metric.name if metric.HasField("name") else None
+    name = READ[DataType.STRING](metric.name) if metric.HasField("name") else None
     alias = metric.alias if metric.HasField("alias") else None
     datatype = datatype_of(metric.datatype) if metric.HasField("datatype") else None
     known = datatype or (type_of(name, alias) if type_of is not None else None)

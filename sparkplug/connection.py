@@ -33,6 +33,7 @@ CONNECT_TIMEOUT_S = 5.0
 LINGER_S_MAX = 0.5
 BACKOFF_S_MIN = 0.2
 BACKOFF_S_MAX = 15.0
+STABLE_S = 5.0
 TICK_S = 0.1
 _READ_BYTES = 64 * 1024
 _log = logging.getLogger(__name__)
@@ -43,6 +44,7 @@ class Listener:
     """Who is told what happens; every call comes from the connection's thread."""
 
     connecting: Callable[[int], Connect]  # the number of the broker in the list
+    unsent: Callable[[], None]  # the broker was not reached: that CONNECT was never sent
     connected: Callable[[], None]
     message: Callable[[str, bytes], None]
     lost: Callable[[], None]
@@ -191,7 +193,7 @@ class MqttConnection:
     def _run(self) -> None:
         pause_s = BACKOFF_S_MIN
         while not self._stopping.is_set():
-            before = self.connects
+            began_s = time.monotonic()
             try:
                 self._serve(self._brokers[self._server])
             except (OSError, ValueError) as error:
@@ -200,7 +202,8 @@ class MqttConnection:
                 # A bug in a listener must not silence the node for good: say it and connect anew.
                 _log.exception("%s: the session failed", self._client_id)
                 self._note(repr(error))
-            pause_s = BACKOFF_S_MIN if self.connects > before else min(2 * pause_s, BACKOFF_S_MAX)
+            # Only a connection that lasted was a good one: two nodes with one id throw each other out again and again.
+            pause_s = BACKOFF_S_MIN if time.monotonic() - began_s > STABLE_S else min(2 * pause_s, BACKOFF_S_MAX)
             self._stopping.wait(pause_s * self._chance.uniform(0.8, 1.2))
 
     def _serve(self, broker: BrokerAddress) -> None:
@@ -226,7 +229,8 @@ class MqttConnection:
         client.connect_timeout = CONNECT_TIMEOUT_S
         # paho would hold back what exceeds 20 unacknowledged messages, and lose it, a death among them, at DISCONNECT.
         client.max_inflight_messages_set(UNACKNOWLEDGED_MAX)
-        client.will_set(connect.will.topic, connect.will.payload, connect.will.qos, connect.will.retain)
+        if connect.will is not None:
+            client.will_set(*connect.will)
         client.on_connect = self._on_connect
         client.on_message = self._on_message
         client.on_disconnect = self._on_disconnect
@@ -246,6 +250,7 @@ class MqttConnection:
             else:
                 client.connect(broker.host, broker.port, KEEPALIVE_S)
         except OSError as error:
+            self._listener.unsent()
             raise OSError(f"no connection to {broker.url}: {error}") from error
 
     def _step(self, client: _Client) -> bool:
@@ -298,7 +303,7 @@ class MqttConnection:
         elif isinstance(action, Subscribe):
             client.subscribe(action.topic_filter, action.qos)
         else:
-            self._disconnect(client, with_will=isinstance(action, Disconnect) and action.with_will)
+            self._disconnect(client, with_will=not isinstance(action, Disconnect) or action.with_will)
             if not isinstance(action, Disconnect):
                 self._server = (self._server + 1) % len(self._brokers)
 

@@ -37,9 +37,9 @@ class EdgeNode:
         self._lock = threading.Lock()
         self._on_command = on_command
         self.refused = 0
-        listener = Listener(self._connecting, self._connected, self._message, self._lost, self._tick)
+        listener = Listener(self._connecting, self._bd_seq.give_back, self._connected, self._message, self._lost, self._tick)
         addresses = (brokers,) if isinstance(brokers, BrokerAddress) else tuple(brokers)
-        self._connection = MqttConnection(addresses, f"{node.group}-{node.node}", listener, mqtt_version=mqtt_version)
+        self._connection = MqttConnection(addresses, f"{node.group}/{node.node}", listener, mqtt_version=mqtt_version)
 
     def start(self) -> None:
         """Begin to connect; returns at once."""

@@ -63,6 +63,8 @@ class EdgeNodeSession:
         rebirth_interval_ms_min: int = REBIRTH_INTERVAL_MS_MIN,
     ) -> None:
         self.node = NodeId(check_id(node.group, "group id"), check_id(node.node, "edge node id"))
+        if node.group == "STATE":
+            raise TopicError("group id 'STATE' is taken by the topic of host applications; choose another one")
         self.phase = Phase.OFFLINE
         self.bd_seq: int | None = None
         self.commands: list[Command] = []
@@ -70,7 +72,7 @@ class EdgeNodeSession:
         self.malformed = 0
         self._aliases: dict[tuple[str | None, str], int] = {}
         self._templates = dict(templates or {})
-        self._certificate = Certificate(f"edge node {node}", metrics, partial(self._alias, None), now_ms)
+        self._certificate = Certificate(f"edge node {node}", metrics, partial(self._alias, None), now_ms, self._templates)
         self._devices: dict[str, Certificate] = {}
         self._primary_topic = None if primary_host is None else state_topic(primary_host)
         self._primary_online = False
@@ -136,7 +138,11 @@ class EdgeNodeSession:
     def declare_device(self, device: str, metrics: Iterable[MetricSpec], now_ms: int) -> list[Action]:
         """Add a device, or declare other metrics of one; values of metrics that stay are kept."""
         check_id(device, "device id")
-        certificate = Certificate(f"device {device} of {self.node}", metrics, partial(self._alias, device), now_ms)
+        alike = next((other for other in self._devices if other != device and other.casefold() == device.casefold()), None)
+        if alike is not None:
+            raise SparkplugError(f"edge node {self.node} has the device {alike!r}; {device!r} has to differ in more than case")
+        owner = f"device {device} of {self.node}"
+        certificate = Certificate(owner, metrics, partial(self._alias, device), now_ms, self._templates)
         older = self._devices.get(device)
         if older is not None:
             certificate.keep_values(older)
@@ -156,8 +162,8 @@ class EdgeNodeSession:
 
     def publish(self, device: str | None, changes: Sequence[Change], now_ms: int) -> list[Action]:
         """Note the changes and, where the node is born, send them in one message."""
-        if self.phase is not Phase.BORN or not changes:
-            self.note(device, changes)
+        if self.phase is not Phase.BORN or self._rebirth.is_due or not changes:
+            self.note(device, changes)  # between a request for a rebirth and the rebirth no data goes out
             return []
         certificate = self._certificate_of(device)
         verb = Verb.NDATA if device is None else Verb.DDATA
@@ -213,7 +219,7 @@ class EdgeNodeSession:
             Metric(BD_SEQ, self.bd_seq, DataType.INT64, now_ms),
             Metric(REBIRTH, False, DataType.BOOLEAN, now_ms),
         )
-        metrics = control + definition_metrics(self._templates, now_ms) + self._certificate.birth()
+        metrics = self._certificate.birth() + definition_metrics(self._templates, now_ms) + control
         node = Publish(str(Topic(Verb.NBIRTH, self.node)), encode(Payload(now_ms, metrics, seq=0)))
         return [node, *(self._device_birth(device, now_ms) for device in self._devices)]
 
@@ -228,8 +234,7 @@ class EdgeNodeSession:
         self._primary_online = state.online
         if state.online:
             return self._birth(now_ms) if self.phase is Phase.WAITING else []
-        death: list[Action] = [self._death(now_ms)] if self.phase is Phase.BORN else []
-        return [*death, WalkToNextServer()]
+        return [self._death(now_ms), WalkToNextServer()]
 
     def _command(self, device: str | None, payload: bytes, now_ms: int) -> list[Action]:
         if device is not None and device not in self._devices:

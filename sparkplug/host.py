@@ -64,7 +64,7 @@ class HostApplication:
         self._inbox: deque[tuple[str | _Mark, bytes]] = deque()
         self._filled = threading.Event()
         self._ticked_s = 0.0
-        listener = Listener(self._connecting, self._connected, self._message, self._lost, lambda: None)
+        listener = Listener(self._connecting, lambda: None, self._connected, self._message, self._lost, lambda: None)
         self._connection = MqttConnection((broker,), f"host-{host_id}", listener, mqtt_version=mqtt_version)
 
     def start(self) -> None:

@@ -103,7 +103,7 @@ class HostSession:
     def connecting(self, now_ms: int) -> Connect:
         """A connection is about to be opened; its will says when this host was last seen."""
         self._connect_ms = now_ms
-        return Connect(will=self._state(online=False, timestamp_ms=now_ms))
+        return Connect(will=self._state(online=False, timestamp_ms=now_ms) if self._publish_state else None)
 
     def connected(self, now_ms: int) -> list[HostEvent]:
         """The broker has accepted the connection: subscribe, then say that this host is online, then ask who is there."""
@@ -118,8 +118,9 @@ class HostSession:
         return []
 
     def lost(self, now_ms: int) -> list[HostEvent]:
-        """The connection is gone: nothing that is known is good any more."""
+        """The connection is gone: nothing that is known is good any more, and nothing of it is sent on the next one."""
         self.online = False
+        self.actions.clear()
         events: list[HostEvent] = []
         for watched in self._nodes.values():
             watched.window.flush()

@@ -16,7 +16,7 @@ METRICS_MAX = 100_000
 _QUALITY_BYTES = QUALITY_PROPERTY.encode()
 _REASON_BYTES = REASON_PROPERTY.encode()
 _HOST_BUILT = frozenset({"bdSeq", "Node Control/Rebirth"})
-_PLAIN_FIELDS = frozenset({DataType.DOUBLE, DataType.BOOLEAN, DataType.STRING, DataType.TEXT, DataType.UUID})
+_PLAIN_FIELDS = frozenset({DataType.DOUBLE, DataType.BOOLEAN})
 
 
 class Binding(NamedTuple):

@@ -12,26 +12,47 @@ from sparkplug.topics import NodeId
 
 @dataclass(slots=True)
 class RebirthAnswer:
-    """The edge's side: at most one rebirth a window of `interval_ms_min`; requests inside it are answered at its end."""
+    """The edge's side: a few rebirths at once, then one each `interval_ms_min`; what exceeds that is answered together, later.
+
+    The few are for hosts that start together; while an answer is due no data may go out, so it had better be rare.
+    """
 
     interval_ms_min: int
-    _last_ms: int | None = None
+    at_once_max: int = 4
+    _left: float = -1.0
+    _last_ms: int = 0
     _due_ms: int | None = None
+
+    @property
+    def is_due(self) -> bool:
+        """Whether a request waits for its answer."""
+        return self._due_ms is not None
 
     def request(self, now_ms: int) -> bool:
         """Note a request; True where the birth is to be sent now."""
-        if self._last_ms is None or now_ms - self._last_ms >= self.interval_ms_min or now_ms < self._last_ms:
-            self._last_ms, self._due_ms = now_ms, None
+        self._refill(now_ms)
+        if self._left >= 1.0:
+            self._left -= 1.0
             return True
-        self._due_ms = self._last_ms + self.interval_ms_min
+        if self._due_ms is None:
+            self._due_ms = now_ms + round((1.0 - self._left) * self.interval_ms_min)
         return False
 
     def due(self, now_ms: int) -> bool:
         """True once when a request that had to wait is to be answered."""
         if self._due_ms is None or now_ms < self._due_ms:
             return False
-        self._last_ms, self._due_ms = now_ms, None
+        self._refill(now_ms)
+        self._left, self._due_ms = max(self._left - 1.0, 0.0), None
         return True
+
+    def _refill(self, now_ms: int) -> None:
+        if self._left < 0.0:
+            self._left = float(self.at_once_max)
+        else:
+            gained = max(now_ms - self._last_ms, 0) / self.interval_ms_min
+            self._left = min(self._left + gained, float(self.at_once_max))
+        self._last_ms = now_ms
 
 
 @dataclass(slots=True)

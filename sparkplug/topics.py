@@ -86,6 +86,10 @@ def check_id(text: str, what: str) -> str:
     for character in _FORBIDDEN:
         if character in text:
             raise TopicError(f"{what} {text!r} holds {character!r}; '+', '/' and '#' cannot stand in a topic")
+    try:
+        text.encode()
+    except UnicodeEncodeError as error:
+        raise TopicError(f"{what} {text!r} cannot be written as UTF-8: {error}") from error
     if "\0" in text:
         raise TopicError(f"{what} {text!r} holds a zero byte, which MQTT forbids in a topic")
     return text

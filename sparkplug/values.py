@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from sparkplug.datatype import ARRAYS, BINARIES, PROPERTY_ONLY, DataType
+from sparkplug.datatype import DataType
 from sparkplug.errors import PayloadError
 
 
@@ -73,11 +73,7 @@ class Template:
         if not self.is_definition and not self.ref:
             raise PayloadError("template instance names no definition; give the definition's metric name as ref")
         for parameter in self.parameters:
-            not_basic = parameter.datatype in BINARIES | ARRAYS | PROPERTY_ONLY | {
-                DataType.DATASET,
-                DataType.TEMPLATE,
-            }
-            if not parameter.name or not_basic or parameter.datatype is DataType.UNKNOWN:
+            if not parameter.name or not DataType.INT8 <= parameter.datatype <= DataType.TEXT:
                 raise PayloadError(
                     f"template parameter {parameter.name!r} of type {parameter.datatype.name}: needs a name and a basic type"
                 )

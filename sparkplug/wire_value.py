@@ -15,7 +15,7 @@ from typing import Any
 
 from sparkplug import arrays
 from sparkplug.datatype import ARRAYS, BINARIES, SIGNED_BITS, TEXTS, UNSIGNED_BITS, DataType
-from sparkplug.errors import MetricValueError
+from sparkplug.errors import MetricValueError, PayloadError
 
 _FLOAT = struct.Struct("<f")
 
@@ -81,6 +81,12 @@ def _array_in(datatype: DataType) -> Callable[[Any], tuple[Any, ...]]:
     return lambda data: arrays.unpack(datatype, data)
 
 
+def _text_in(value: Any) -> Any:
+    if not isinstance(value, str):  # what protobuf makes of bytes that are not UTF-8
+        raise PayloadError(f"{value!r:.40} is no UTF-8 text")
+    return value
+
+
 def _same(value: Any) -> Any:
     return value
 
@@ -100,7 +106,8 @@ READ: dict[DataType, Callable[[Any], Any]] = {
     **{t: _integer_in(bits, signed=False) for t, bits in UNSIGNED_BITS.items()},
     **dict.fromkeys((DataType.FLOAT, DataType.DOUBLE), float),
     DataType.BOOLEAN: bool,
-    **dict.fromkeys(TEXTS | BINARIES, _same),
+    **dict.fromkeys(TEXTS, _text_in),
+    **dict.fromkeys(BINARIES, _same),
     **{t: _array_in(t) for t in ARRAYS},
 }
 

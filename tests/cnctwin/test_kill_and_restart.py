@@ -74,7 +74,7 @@ def check_sessions(proxy: Proxy) -> None:
         packet = recorded.packet
         if recorded.direction != "up":
             continue
-        if isinstance(packet, Connect) and packet.client_id.startswith("cnc-"):
+        if isinstance(packet, Connect) and packet.client_id.startswith("cnc/"):
             assert packet.will is not None and packet.clean
             client_of[recorded.connection] = packet.client_id
             will = actions.Publish(packet.will.topic, packet.will.payload, packet.will.qos, packet.will.retain)
@@ -106,5 +106,5 @@ def check_farewells(plant: Plant) -> None:
     ended = lambda: all(isinstance(packets[-1], Disconnect) for packets in last_packets(plant.proxy).values())  # noqa: E731
     plant.wait(ended, "every client to disconnect", seconds=5.0)
     for client, (farewell, _) in last_packets(plant.proxy).items():
-        expected = "/NDEATH/" if client.startswith("cnc-") else "/STATE/"
+        expected = "/NDEATH/" if client.startswith("cnc/") else "/STATE/"
         assert expected in farewell.topic, client

@@ -6,6 +6,8 @@ its events is kept apart as what a follower of those events would believe.
 
 from __future__ import annotations
 
+import json
+from collections import Counter
 from dataclasses import dataclass, field
 from random import Random
 from typing import Any, NamedTuple
@@ -24,6 +26,7 @@ HOST_ID = "scada"
 STATE_TOPIC = f"spBv1.0/STATE/{HOST_ID}"
 REBIRTH_TOPIC_PART = "/NCMD/"
 REBIRTH_INTERVAL_MS = 5000
+RESTART_MS = 50
 QUIET_MS = 75_000  # longer than the host's longest pause between two requests for a rebirth
 
 
@@ -60,6 +63,7 @@ class Edge:
     will: Publish | None = None
     subscriptions: set[str] = field(default_factory=set)
     inbox: list[tuple[str, bytes]] = field(default_factory=list)
+    state_ms: int = 0
     truth: dict[str | None, Table] = field(default_factory=dict)
     specs: dict[str | None, tuple[MetricSpec, ...]] = field(default_factory=dict)
 
@@ -82,6 +86,9 @@ class World:
         self.retained_state: bytes | None = None
         self.followed: dict[tuple[NodeId, str | None], dict[str, Reading]] = {}
         self.births_lost = False
+        self.step_ms = 1
+        self.published: Counter[tuple[Any, ...]] = Counter()
+        self.taken: Counter[tuple[Any, ...]] = Counter()
         self.asked_ms: dict[NodeId, int] = {}
         self.edges: list[Edge] = []
         metrics = (MetricSpec("beat", DataType.INT64, value=0), MetricSpec("lag", DataType.DOUBLE, unit="ms"))
@@ -122,8 +129,9 @@ class World:
         """The node's process is killed and started again; it knows nothing but, perhaps, its last bdSeq."""
         if edge.connected:
             self.cut_edge(edge)
+        self._pass(RESTART_MS)
         edge.session = EdgeNodeSession(edge.node, edge.metrics, now_ms=self.now_ms, primary_host=edge.primary_host)
-        edge.truth, edge.specs = {}, {}
+        edge.truth, edge.specs, edge.state_ms = {}, {}, 0
         self._declare_truth(edge, None, edge.metrics, keep=False)
         if not remembers_bd_seq:
             edge.bd_seq = None
@@ -131,15 +139,16 @@ class World:
 
     def publish(self, edge: Edge, device: str | None, changes: list[Change]) -> None:
         """The application has new values."""
-        self._pass(1)
+        self._pass(self.step_ms)
         self._do_edge(edge, edge.session.publish(device, changes, self.now_ms))
+        self.published.update((edge.node, device, c.name, repr(c.value), c.timestamp_ms) for c in changes)
         for change in sorted(changes, key=lambda c: c.timestamp_ms):
             if not change.is_historical:
                 edge.truth[device][change.name] = Known(change.value, change.timestamp_ms, change.quality)
 
     def declare(self, edge: Edge, device: str, specs: tuple[MetricSpec, ...]) -> None:
         """The application declares a device, perhaps another time."""
-        self._pass(1)
+        self._pass(self.step_ms)
         keep = device in edge.truth
         actions = edge.session.declare_device(device, specs, self.now_ms)
         self._declare_truth(edge, device, specs, keep=keep)
@@ -147,7 +156,7 @@ class World:
 
     def remove(self, edge: Edge, device: str) -> None:
         """The device is gone."""
-        self._pass(1)
+        self._pass(self.step_ms)
         del edge.truth[device], edge.specs[device]
         self._do_edge(edge, edge.session.remove_device(device, self.now_ms))
 
@@ -157,9 +166,14 @@ class World:
             edge.inbox.append((topic, payload))
 
     def deliver_to_edge(self, edge: Edge) -> None:
-        """The node reads the next message that waits for it."""
+        """The node reads the next message that waits for it; a STATE older than one it knows says nothing to it."""
         topic, payload = edge.inbox.pop(0)
-        self._do_edge(edge, edge.session.message(topic, payload, self.now_ms))
+        actions = edge.session.message(topic, payload, self.now_ms)
+        if topic == STATE_TOPIC:
+            stamp_ms = json.loads(payload)["timestamp"]
+            assert stamp_ms >= edge.state_ms or not actions, f"{edge.node} believes a STATE that is out of date"
+            edge.state_ms = max(stamp_ms, edge.state_ms)
+        self._do_edge(edge, actions)
 
     # The host's side.
 
@@ -313,13 +327,25 @@ class World:
         edge.session.lost()
 
     def _hand_over(self, flying: Flying) -> None:
+        before = self.host.picture(flying.node)
+        was_online, bd_seq = (False, None) if before is None else (before.online, before.bd_seq)
         self._follow(self.host.message(flying.publish.topic, flying.publish.payload, self.now_ms))
+        if flying.verb == "NDEATH" and was_online:
+            assert before is not None
+            assert before.online == (flying.bd_seq != bd_seq), "an NDEATH ends its own session and no other"
 
     def _follow(self, events: list[HostEvent]) -> None:
         for event in events:
             table = self.followed.setdefault((event.node, event.device), {})
+            if event.kind is EventKind.DATA:
+                for reading in event.readings:
+                    what = (event.node, event.device, reading.name, repr(reading.value), reading.timestamp_ms)
+                    self.taken[what] += 1
+                    assert self.taken[what] <= self.published[what], f"{what} is told twice in one life"
             if event.kind is EventKind.BIRTH:
                 table.clear()
+            if event.kind is EventKind.BIRTH and event.device is None:  # a copy of what came before its birth looks new after it
+                self.taken = Counter({what: count for what, count in self.taken.items() if what[0] != event.node})
             table.update({r.name: r for r in event.readings if not r.is_historical})
         actions, self.host.actions = self.host.actions, []
         self._do_host(actions)

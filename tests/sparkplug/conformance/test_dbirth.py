@@ -123,7 +123,6 @@ def test_ddata_is_sent_for_changes_of_the_device_only(edge: EdgeLife) -> None:
     assert (sent.verb, sent.topic.device, len(sent.payload.metrics)) == (Verb.DDATA, "okuma", 1)
 
 
-@pytest.mark.xfail(strict=True, reason="a birth lists its metrics as they were declared, whatever the times of their values")
 @pytest.mark.tck("tck-id-operational-behavior-data-publish-dbirth-order")
 def test_the_values_of_a_birth_stand_in_the_order_of_their_times(edge: EdgeLife) -> None:
     edge.publish("okuma", change("tool_number", 1, edge.now_ms))

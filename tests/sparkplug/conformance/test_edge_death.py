@@ -70,7 +70,6 @@ def test_a_node_that_was_not_born_yet_publishes_its_death_too_before_it_disconne
     assert isinstance(disconnect, Disconnect)
 
 
-@pytest.mark.xfail(strict=True, reason="a node that waits for its primary host walks to the next broker without an NDEATH")
 @pytest.mark.tck("tck-id-payloads-ndeath-will-message-publisher-disconnect-mqtt311")
 def test_a_node_that_walks_on_before_its_birth_publishes_its_death() -> None:
     edge = EdgeLife(EdgeNodeSession(NODE, NODE_METRICS, primary_host="scada"))

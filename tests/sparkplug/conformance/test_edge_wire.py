@@ -236,7 +236,6 @@ def test_a_cut_connection_makes_the_broker_publish_the_death_with_the_bdseq_of_t
         host.stop()
 
 
-@pytest.mark.xfail(strict=True, reason="an attempt that finds no broker uses up a bdSeq although no CONNECT was sent")
 @pytest.mark.tck(
     "tck-id-topics-nbirth-bdseq-increment",
     "tck-id-message-flow-edge-node-birth-publish-will-message-payload-bdSeq",
@@ -279,9 +278,6 @@ def test_a_message_that_the_network_cut_in_two_is_followed_by_a_whole_new_birth(
     assert tool.int_value == 7
 
 
-@pytest.mark.xfail(
-    strict=True, reason="group a-b, node c and group a, node b-c share one MQTT client id and throw each other out"
-)
 def test_different_nodes_and_hosts_have_different_client_ids(proxy: Proxy) -> None:
     clients: list[EdgeNode | HostApplication] = [
         EdgeNode(BrokerAddress(port=proxy.port), NodeId("a-b", "c")),
@@ -343,7 +339,6 @@ def test_a_node_walks_to_the_broker_where_its_primary_host_is_and_is_never_on_tw
     assert spans_s[1][1] < spans_s[2][0]
 
 
-@pytest.mark.xfail(strict=True, reason="a walk to the next broker disconnects with reason 0x00")
 @pytest.mark.tck("tck-id-payloads-ndeath-will-message-publisher-disconnect-mqtt50")
 def test_with_mqtt_5_the_disconnect_of_a_walk_asks_for_the_will_too(brokers: Brokers) -> None:
     _walk(brokers, version=5)
@@ -351,7 +346,6 @@ def test_with_mqtt_5_the_disconnect_of_a_walk_asks_for_the_will_too(brokers: Bro
     assert [d.reason for d in (*one.packets("up", Disconnect), *two.packets("up", Disconnect))] == [4, 4, 4]
 
 
-@pytest.mark.xfail(strict=True, reason="a walk before the birth disconnects without an NDEATH")
 @pytest.mark.tck("tck-id-payloads-ndeath-will-message-publisher-disconnect-mqtt311")
 def test_with_mqtt_311_a_death_goes_before_the_disconnect_of_every_walk(brokers: Brokers) -> None:
     _walk(brokers, version=4)

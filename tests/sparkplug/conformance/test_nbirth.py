@@ -102,7 +102,6 @@ def test_ndata_is_sent_for_changes_of_the_node_only(edge: EdgeLife) -> None:
     assert len(edge.of(Verb.NDATA)) == before + 1
 
 
-@pytest.mark.xfail(strict=True, reason="a birth lists its metrics as they were declared, whatever the times of their values")
 @pytest.mark.tck("tck-id-operational-behavior-data-publish-nbirth-order")
 def test_the_values_of_a_birth_stand_in_the_order_of_their_times(edge: EdgeLife) -> None:
     edge.publish(None, change("health/agent", "up", edge.now_ms))

@@ -72,7 +72,7 @@ def test_another_host_does_not_stand_in_for_the_primary_one(waiting: EdgeLife, t
     ],
 )
 def test_only_a_boolean_true_is_online(waiting: EdgeLife, payload: bytes) -> None:
-    assert waiting.receive(STATE_TOPIC, payload) == []
+    assert not [sent for sent in waiting.receive(STATE_TOPIC, payload) if sent.verb is not Verb.NDEATH]
     assert waiting.session.phase is Phase.WAITING
 
 
@@ -119,7 +119,7 @@ def test_an_offline_that_is_older_than_the_last_online_is_ignored(waiting: EdgeL
 
 @pytest.mark.tck("tck-id-operational-behavior-primary-application-state-with-multiple-servers-walk")
 def test_a_node_that_finds_its_primary_host_offline_walks_to_the_next_broker(waiting: EdgeLife) -> None:
-    assert _says(waiting, False, 1000) == []
+    assert [sent.verb for sent in _says(waiting, False, 1000)] == [Verb.NDEATH]
     assert waiting.endings() == [WalkToNextServer()]
 
 

@@ -37,7 +37,6 @@ def test_the_first_message_of_a_host_on_each_connection_is_its_birth(host: HostL
         host.actions.clear()
 
 
-@pytest.mark.xfail(strict=True, reason="what was still to be sent when a connection broke goes out first on the next one")
 @pytest.mark.tck("tck-id-principles-birth-certificates-order", "tck-id-message-flow-phid-sparkplug-subscription")
 def test_what_a_host_could_not_send_any_more_does_not_go_before_its_next_birth(host: HostLife) -> None:
     host.connect()
