@@ -3,8 +3,8 @@
 
     .venv/bin/python benchmarks/sample_path.py [--messages N] [--json]
 
-All figures are CPU time of the processor's process per message (all threads), from one run on one machine: read the ratios, not the
-microseconds. The same bytes go through each variant: 20 metrics with alias, time stamp and double in; mean, minimum, maximum and
+All figures are CPU time of the processor's process per message (all threads), from one run on one machine: read the ratios, not
+the microseconds. The same bytes go through each variant: 20 metrics with alias, time stamp and double in; mean, minimum, maximum and
 spread out.
 
 * floor: parse, read 20 values, compute, build and serialise 4 values, in a loop, with no transport and no checks. What any Python
@@ -128,7 +128,7 @@ def load(port: int, births: list[Publish], data: list[Publish], rate_hz: float, 
         time.sleep(0.5)
 
 
-def under_load(
+def under_load(  # noqa: PLR0917
     port: int, count: int, rate_hz: float, ready: Callable[[], bool], reset: Callable[[], None], done: Callable[[], bool]
 ) -> float:
     """CPU time of this process per message while another one sends, µs."""

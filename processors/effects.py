@@ -21,9 +21,10 @@ class PublishPlain(NamedTuple):
 
 
 class Declare(NamedTuple):
-    """The machine is online: give birth to its twin device."""
+    """The machine is online: give birth to its twin device, with what is known of it already."""
 
     machine: str
+    latest: tuple[Change, ...] = ()
 
 
 class Remove(NamedTuple):

@@ -12,7 +12,7 @@ from typing import Any
 
 from processors.config import Configuration, ProcessorConfig
 from processors.contract import Processor
-from processors.effects import Declare, Effect, Publish, PublishPlain, Remove
+from processors.effects import Declare, Effect, PublishPlain, Remove
 from processors.errors import SnapshotError
 from processors.lane import Counts, Lane
 from processors.ledger import DropReason, Ledger
@@ -191,7 +191,7 @@ class Engine:
             name = event.device or ""
             machine = self._machines[name] = _Machine(name, self._lane(name))
         if not machine.online and self._processor.outputs:
-            effects += (Declare(machine.name), Publish(machine.name, machine.live.emission.known(event.timestamp_ms)))
+            effects.append(Declare(machine.name, machine.live.emission.known(event.timestamp_ms)))
         machine.online.add(event.node)
         machine.live.birth(event.readings, self._taken(machine, event), wall_s, effects)
 

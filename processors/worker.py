@@ -9,6 +9,7 @@ import logging
 import time
 from collections import deque
 from collections.abc import Sequence
+from dataclasses import replace
 from threading import Event
 
 from processors.config import Configuration, ProcessorConfig
@@ -49,6 +50,7 @@ class Worker:
         self._declared: set[str] = set()
         self._waiting: deque[HostEvent] = deque()
         self._unsaved: dict[str, float] = {}  # machine: since when
+        self._saved: set[str] = set()
         self._letters_left = DEAD_LETTERS_A_REPORT_MAX
         self._reported_s = self._saved_s = 0.0
         self._is_restored = False
@@ -93,7 +95,8 @@ class Worker:
             self._letters_left = DEAD_LETTERS_A_REPORT_MAX
             self._note_changed(now_s)
             self._report(now_s)
-        if now_s - self._saved_s >= SNAPSHOT_S:
+        if now_s - self._saved_s >= SNAPSHOT_S or not self._saved.issuperset(self.engine.machines):
+            # A machine that was never saved is saved at once: what its estimate was started from would be lost for good.
             self._saved_s = now_s
             self._save(now_s)
 
@@ -198,7 +201,7 @@ class Worker:
             elif isinstance(effect, PublishPlain):
                 sent = self._host.publish_plain(effect.topic, effect.payload, retain=effect.retain) and sent
             elif isinstance(effect, Declare):
-                self._edge.declare_device(effect.machine, self._specs)
+                self._edge.declare_device(effect.machine, [_with_latest(spec, effect.latest) for spec in self._specs])
                 self._declared.add(effect.machine)
             elif isinstance(effect, Remove):
                 if effect.machine in self._declared:
@@ -239,6 +242,7 @@ class Worker:
                 continue
             if self._host.publish_plain(self._snapshot_prefix + topic_level(machine), payload, qos=1, retain=True):
                 del self._unsaved[machine]
+                self._saved.add(machine)
 
     def _report(self, now_s: float) -> None:
         ledger, counts, host = self.engine.ledger, self.engine.counts, self._host
@@ -262,3 +266,11 @@ class Worker:
             "reconnects": host.reconnects,
         }
         self._edge.publish(None, [Change(f"health/{name}", value, at_ms) for name, value in health.items()])
+
+
+def _with_latest(spec: MetricSpec, latest: Sequence[Change]) -> MetricSpec:
+    """The declaration with the value that was published last, so that the birth carries it, as of its own time."""
+    for name, value, timestamp_ms, quality, reason, _ in latest:
+        if name == spec.name:
+            return replace(spec, value=value, timestamp_ms=timestamp_ms, quality=quality, reason=reason)
+    return spec

@@ -252,6 +252,7 @@ class HostSession:
             return self._wither(watched, now_ms, f"birth certificate unreadable: {error}") if picture.online else []
         lost = watched.window.begin(message.seq, stamp)
         picture.bd_seq, watched.received_ms = bd_seq, now_ms
+        self.counts["sloppy_births"] += _is_sloppy(message)
         picture.aliases = {alias: known for alias, known in picture.aliases.items() if known[0] is picture.own}
         for owner in picture.devices.values():
             owner.bindings = {}  # their aliases may mean something else now; DBIRTHs follow
@@ -352,6 +353,13 @@ class HostSession:
 
 def _death(node: NodeId, device: str | None, owner: Owner, stamp: int, reason: str) -> list[HostEvent]:
     return [HostEvent(EventKind.DEATH, node, device, stamp, owner.wither(stamp, reason), reason)] if owner.online else []
+
+
+def _is_sloppy(message: Any) -> bool:
+    """Whether an NBIRTH leaves out what the specification demands and we can do without: said, and accepted."""
+    types = {metric.name: metric.datatype for metric in message.metrics}
+    well_formed = types.get(BD_SEQ) == DataType.INT64 and types.get(REBIRTH) == DataType.BOOLEAN
+    return not well_formed or not all(metric.timestamp for metric in message.metrics)
 
 
 def _name(node: NodeId, device: str | None) -> str:

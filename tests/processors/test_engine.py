@@ -242,20 +242,20 @@ def test_what_was_missed_while_the_processor_was_down_is_one_counted_hole() -> N
 
 def test_the_twin_device_is_born_before_its_first_value_and_dies_with_the_machine() -> None:
     effects = fed(engine_of(RECORDER), birth(0.0, spindle_rpm=1.0), death(0.1), birth(0.2, spindle_rpm=1.0))
-    # After each birth, the last known values are told at once: the device is a new one.
+    # The birth tells the last known values: the device is a new one.
     kinds = [type(effect) for effect in effects]
-    assert kinds == [Declare, Publish, Publish, Publish, Remove, Declare, Publish, Publish]
-    first, second = effects[1], effects[6]
-    assert isinstance(first, Publish)
-    assert isinstance(second, Publish)
-    assert {(change.value, change.reason) for change in first.changes} == {(None, "nothing computed yet")}
-    assert [change.value for change in second.changes] == [2, True, 1.0]  # as of the death
+    assert kinds == [Declare, Publish, Publish, Remove, Declare, Publish]
+    first, second = effects[0], effects[4]
+    assert isinstance(first, Declare)
+    assert isinstance(second, Declare)
+    assert {(change.value, change.reason) for change in first.latest} == {(None, "nothing computed yet")}
+    assert [change.value for change in second.latest] == [2, True, 1.0]  # as of the death
 
 
 def test_a_number_is_published_again_only_when_it_left_the_deadband() -> None:
     engine = engine_of(RECORDER)
     effects = fed(engine, birth(0.0, spindle_rpm=10.0), *(data(0.1 * i, spindle_rpm=10.0 + i) for i in range(1, 8)))
-    assert [value for _, name, value, _ in published(effects) if name == "twin/level"] == [None, 10.0, 15.0]
+    assert [value for _, name, value, _ in published(effects) if name == "twin/level"] == [10.0, 15.0]
 
 
 def test_an_answer_that_is_not_finite_is_a_null_that_says_so() -> None:

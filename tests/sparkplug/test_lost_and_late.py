@@ -13,7 +13,8 @@ from sparkplug.node_picture import NodePicture
 from sparkplug.quality import Quality
 from sparkplug.schema import PayloadMessage
 from sparkplug.values import Metric, Payload
-from tests.sparkplug.world import Edge, World
+from tests.sparkplug.simulated_edge import Edge
+from tests.sparkplug.world import World
 
 SPEC = (MetricSpec("load", DataType.DOUBLE),)
 

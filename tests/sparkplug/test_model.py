@@ -12,7 +12,8 @@ from sparkplug.edge_session import REBIRTH
 from sparkplug.metric import Change, MetricSpec
 from sparkplug.quality import Quality
 from sparkplug.values import Metric, Payload
-from tests.sparkplug.world import Edge, World
+from tests.sparkplug.simulated_edge import Edge
+from tests.sparkplug.world import World
 
 # Half the numbers of a full count: more lost in a row could be mistaken for a repetition (see test_sequence).
 LOST_MAX = 120
