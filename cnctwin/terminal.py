@@ -12,7 +12,7 @@ from cnctwin.plant import TWIN_PREFIX, MachineView, StageLedger, text
 from sparkplug.metric import Reading
 from sparkplug.quality import Quality
 
-# Most telling first; what is not in the list follows in the order of the birth certificate.
+# Most telling first; what is not in the list follows by name.
 FIRST = (
     "exec_state",
     "program",
@@ -78,7 +78,7 @@ def _machine(machine: MachineView) -> Panel:
     table = Table(show_edge=False, expand=True)
     for title, ratio in (("measured", 3), ("", 4), ("time (UTC)", 2), ("twin", 4), ("", 4)):
         table.add_column(title, ratio=ratio, no_wrap=True, overflow="ellipsis")
-    order = [name for name in FIRST if name in machine.measured] + [name for name in machine.measured if name not in FIRST]
+    order = [name for name in FIRST if name in machine.measured] + sorted(machine.measured.keys() - set(FIRST))
     twin = list(machine.twin.values())
     for row in range(max(len(order), len(twin))):
         reading = machine.measured[order[row]] if row < len(order) else None
