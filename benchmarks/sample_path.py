@@ -11,7 +11,8 @@ and spread out.
   program on protobuf must spend.
 * plain loop: what a good engineer writes in an afternoon: paho's own network loop, protobuf in its callback, publish. It knows no
   births, order, quality, state or restarts.
-* ours: HostApplication, processor runtime (engine, fold, report by exception, ledger), EdgeNode.
+* ours: HostApplication, processor runtime (engine, fold, report by exception, ledger), EdgeNode. All three listen to the one
+  source only; in a plant a processor also receives, and throws away, what other processors publish in its group.
 """
 
 import argparse
@@ -162,7 +163,7 @@ def _wait(condition: Callable[[], bool], complaint: str, seconds: float = 120.0)
 def ours(port: int, count: int, rate_hz: float) -> float:
     """The processor as it runs in production."""
     broker = BrokerAddress(port=port)
-    host = HostApplication(broker, PROBE.node, (f"spBv1.0/{SOURCE.group}/#",), wanted=lambda node: node == SOURCE)
+    host = HostApplication(broker, PROBE.node, (f"spBv1.0/{SOURCE.group}/+/{SOURCE.node}/#",))
     edge = EdgeNode(broker, NodeId("cnc", PROBE.node), node_metrics())
     worker = Worker(PROBE, Configuration(ProcessorConfig, {}), host, edge)
     stop = threading.Event()

@@ -123,17 +123,20 @@ class Certificate:
         """
         metrics = message.metrics
         for change in _oldest_first(changes):
-            slot = self._slot(change.name)
-            out = metrics.add(alias=slot.alias, timestamp=change.timestamp_ms)
-            if change.value is None:
+            name, value, timestamp_ms, quality, reason, is_historical = change
+            slot = self._slots.get(name) or self._slot(name)
+            out = metrics.add()
+            out.alias = slot.alias
+            out.timestamp = timestamp_ms
+            if value is None:
                 out.is_null = True
             else:
-                self._write(out, slot, change.value)
-            if change.quality is not Quality.GOOD or change.reason is not None:
-                write_properties(out.properties, quality_properties(change.quality, change.reason))
+                self._write(out, slot, value)
+            if quality is not Quality.GOOD or reason is not None:
+                write_properties(out.properties, quality_properties(quality, reason))
             elif slot.quality is not Quality.GOOD:
                 write_properties(out.properties, GOOD_AGAIN)
-            if change.is_historical:
+            if is_historical:
                 out.is_historical = True
             if slot.spec.is_transient:
                 out.is_transient = True

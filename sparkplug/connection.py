@@ -35,6 +35,7 @@ BACKOFF_S_MIN = 0.2
 BACKOFF_S_MAX = 15.0
 STABLE_S = 5.0
 TICK_S = 0.1
+DRIVEN_S = 0.05
 _READ_BYTES = 64 * 1024
 _log = logging.getLogger(__name__)
 
@@ -134,6 +135,9 @@ class MqttConnection:
         self._stopping = threading.Event()
         self._asleep = False
         self._ticked_s = 0.0
+        self._ended = self._driving = False
+        self._driven_s = 0.0
+        self._idle = threading.Event()
         # Held by whoever calls paho: this connection's thread but for its waits, or a sender during one.
         self._touching = threading.RLock()
         self._wake_reader, self._wake_writer = socket.socketpair()
@@ -167,6 +171,29 @@ class MqttConnection:
         if self._outbox and self._asleep:
             self._wake()
 
+    def drive(self, timeout_s: float) -> bool:
+        """Wait for packets in the caller's thread and handle them; False where there is no connection to drive.
+
+        A thread that would only wait for messages may as well fetch them: that saves waking two threads for each. The
+        connection's own thread keeps out of the way meanwhile, and takes over when nobody has driven for DRIVEN_S.
+        """
+        client = self._client
+        if client is None or not self._accepted or self._ended:
+            return False
+        self._driving = True
+        try:
+            if not self._step(client, timeout_s):
+                self._ended = True
+                self._idle.set()
+        except OSError as error:
+            self._note(str(error))
+            self._ended = True
+            self._idle.set()
+        finally:
+            self._driven_s = time.monotonic()
+            self._driving = False
+        return True
+
     @property
     def full(self) -> bool:
         """Whether the outbox holds so much that no more should be put into it: the broker takes less than we give."""
@@ -181,6 +208,7 @@ class MqttConnection:
         """Send the last messages, which end with a Disconnect, and stop."""
         self._outbox.extend(farewell)
         self._stopping.set()
+        self._idle.set()
         self._wake()
         if self._thread.is_alive():
             self._thread.join(timeout_s)
@@ -211,13 +239,19 @@ class MqttConnection:
         self._outbox.clear()
         connect = self._listener.connecting(self._server)
         client = self._new_client(broker, connect)
+        self._ended = False
         self._client, self._accepted = client, False
         try:
             self._open(client, broker)
-            while self._step(client):
-                pass
+            while not self._ended:
+                if self._driving or time.monotonic() - self._driven_s < DRIVEN_S:
+                    self._idle.wait(DRIVEN_S)
+                elif not self._step(client, TICK_S):
+                    break
         finally:
             self._client = None
+            if not self._stopping.is_set():
+                self._idle.clear()
             self._listener.lost()
             if client.socket() is not None:
                 client.on_disconnect = None
@@ -253,7 +287,7 @@ class MqttConnection:
             self._listener.unsent()
             raise OSError(f"no connection to {broker.url}: {error}") from error
 
-    def _step(self, client: _Client) -> bool:
+    def _step(self, client: _Client, wait_s_max: float) -> bool:
         """Wait for something to do and do it; False when the connection is over."""
         sock: Any = client.socket()
         if sock is None:
@@ -261,7 +295,7 @@ class MqttConnection:
         self._asleep = True
         try:
             # Whatever was put into the outbox before `_asleep` was set is seen here; what comes later wakes us.
-            wait_s = 0.0 if sock.pending() or (self._outbox and self._accepted and not client.want_write()) else TICK_S
+            wait_s = 0.0 if sock.pending() or (self._outbox and self._accepted and not client.want_write()) else wait_s_max
             readable, _, _ = select.select([sock, self._wake_reader], [sock] if client.want_write() else [], [], wait_s)
         except ValueError:
             return False  # another thread's write has found the connection broken and closed it

@@ -9,7 +9,7 @@ The transport tells it what happened (`connecting`, `connected`, `message`, `los
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from functools import partial
+from functools import lru_cache, partial
 
 from sparkplug.actions import Action, Connect, Disconnect, HostState, Publish, Subscribe, WalkToNextServer
 from sparkplug.certificate import Certificate, definition_metrics
@@ -166,12 +166,12 @@ class EdgeNodeSession:
             self.note(device, changes)  # between a request for a rebirth and the rebirth no data goes out
             return []
         certificate = self._certificate_of(device)
-        verb = Verb.NDATA if device is None else Verb.DDATA
-        message = PayloadMessage(timestamp=self._stamp(now_ms))
+        message = PayloadMessage()
+        message.timestamp = self._stamp(now_ms)
         certificate.write_data(message, changes)
         certificate.note(changes)
         message.seq = self._next_seq()
-        return [Publish(str(Topic(verb, self.node, device)), message.SerializeToString())]
+        return [Publish(_data_topic(self.node, device), message.SerializeToString())]
 
     def note(self, device: str | None, changes: Sequence[Change]) -> None:
         """Keep the changes for the next birth without sending them."""
@@ -262,3 +262,8 @@ class EdgeNodeSession:
         if rebirth and self.phase is Phase.BORN and self._rebirth.request(now_ms):
             return self._birth(now_ms)
         return []
+
+
+@lru_cache(maxsize=4096)
+def _data_topic(node: NodeId, device: str | None) -> str:
+    return str(Topic(Verb.NDATA if device is None else Verb.DDATA, node, device))

@@ -1,7 +1,8 @@
 """A host application on a real broker: the session and the connection put together.
 
-The connection's thread only fills a bounded inbox; decoding, ordering and everything after that happen in the thread that
-calls `poll`. What does not fit is dropped and counted, data first: a birth or a death is worth more than a value.
+Whoever reads the socket only fills a bounded inbox; decoding, ordering and everything after that happen in the thread that
+calls `poll`. While that thread waits it reads the socket itself; while it computes, the connection's own thread does. What does
+not fit is dropped and counted, data first: a birth or a death is worth more than a value.
 """
 
 import threading
@@ -122,7 +123,9 @@ class HostApplication:
                 self._session.actions = []
             if events or now_s >= deadline_s:
                 return events
-            self._filled.wait(min(deadline_s - now_s, TICK_S))
+            wait_s = min(deadline_s - now_s, TICK_S)
+            if not self._connection.drive(wait_s):
+                self._filled.wait(wait_s)
 
     def publish_plain(self, topic: str, payload: bytes, *, qos: int = 0, retain: bool = False) -> bool:
         """Publish outside the Sparkplug namespace; False where the broker is gone or takes less than it is given."""
