@@ -1,12 +1,16 @@
 """Where a broker is and how to get in."""
 
+import re
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from urllib.parse import quote, unquote, urlsplit
+from urllib.parse import parse_qsl, quote, unquote, urlencode, urlsplit
 
 from sparkplug.errors import BrokerAddressError
 
 _PORTS = {"mqtt": 1883, "mqtts": 8883}
+_VERSIONS = {"3.1.1": 4, "5": 5}
+_OPTIONS = frozenset({"version"})
+_FILES = ("ca_file", "certificate_file", "key_file")
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,24 +29,38 @@ class BrokerAddress:
     ca_file: Path | None = None
     certificate_file: Path | None = None
     key_file: Path | None = None
+    mqtt_version: int = 4  # 4 is MQTT 3.1.1, 5 is MQTT 5
 
     @classmethod
     def from_url(cls, text: str) -> "BrokerAddress":
-        """Read `mqtt://[user@]host[:port]` or `mqtts://…`; raises BrokerAddressError.
+        """Read `mqtt://[user@]host[:port][?option=value&…]` or `mqtts://…`; raises BrokerAddressError.
 
-        A password is refused here, since an address is shown and logged; give it with `with_password`.
+        Options: `version` (3.1.1 or 5), and for TLS `ca_file`, `certificate_file`, `key_file` (without: the system's
+        authorities, no client certificate). A password is refused here, since an address is shown and logged; give it with
+        `with_password`.
         """
+        shown = re.sub(r"(//[^/@]*?:)[^/]*@", r"\1…@", text)
         try:
             parts = urlsplit(text)
             port = parts.port
+            options = dict(parse_qsl(parts.query, keep_blank_values=True, strict_parsing=bool(parts.query)))
         except ValueError as error:
-            raise BrokerAddressError(f"broker address {text!r}: {error}") from error
-        if parts.scheme not in _PORTS or not parts.hostname or parts.path.strip("/") or parts.query:
-            raise BrokerAddressError(f"broker address {text!r} is not mqtt://[user@]host[:port] or mqtts://[user@]host[:port]")
+            reason = str(error).replace(text, shown)
+            raise BrokerAddressError(f"broker address {shown!r}: {reason}") from None
         if parts.password is not None:
             raise BrokerAddressError("a broker address must hold no password; put it into an environment variable or a file")
+        if parts.scheme not in _PORTS or not parts.hostname or parts.path.strip("/") or parts.fragment:
+            raise BrokerAddressError(f"broker address {shown!r} is not mqtt://[user@]host[:port] or mqtts://[user@]host[:port]")
+        tls = parts.scheme == "mqtts"
+        unknown = options.keys() - (_OPTIONS.union(_FILES) if tls else _OPTIONS)
+        if unknown or options.get("version", "5") not in _VERSIONS:
+            allowed = "version=3.1.1 or version=5" + (", ca_file, certificate_file, key_file" if tls else "; files need mqtts://")
+            raise BrokerAddressError(f"broker address {shown!r}: what stands behind the ? is not of {allowed}")
+        ca_file, certificate_file, key_file = (Path(options[name]) if name in options else None for name in _FILES)
         username = None if parts.username is None else unquote(parts.username)
-        return cls(parts.hostname, port or _PORTS[parts.scheme], parts.scheme == "mqtts", username)
+        version = _VERSIONS[options.get("version", "3.1.1")]
+        host, port = parts.hostname, port or _PORTS[parts.scheme]
+        return cls(host, port, tls, username, None, ca_file, certificate_file, key_file, version)
 
     def with_password(self, password: str | None) -> "BrokerAddress":
         """The same address with a password."""
@@ -53,4 +71,8 @@ class BrokerAddress:
         """The address without its secret."""
         user = "" if self.username is None else f"{quote(self.username, safe='')}@"
         host = f"[{self.host}]" if ":" in self.host else self.host
-        return f"mqtt{'s' if self.tls else ''}://{user}{host}:{self.port}"
+        options = {name: str(path) for name in _FILES if (path := getattr(self, name)) is not None}
+        if self.mqtt_version == 5:
+            options["version"] = "5"
+        query = f"?{urlencode(options, safe='/')}" if options else ""
+        return f"mqtt{'s' if self.tls else ''}://{user}{host}:{self.port}{query}"

@@ -7,6 +7,7 @@ client, so that nothing of an earlier session is ever sent again.
 import logging
 import select
 import socket
+import ssl
 import threading
 import time
 from collections import deque
@@ -98,6 +99,18 @@ class _BufferedSocket:
 
 class _Client(paho.Client):
     """A paho client that reads ahead. `_create_socket` is paho's own seam for wrapped sockets (its websockets use it)."""
+
+    def _ssl_wrap_socket(self, tcp_sock: Any) -> Any:
+        """As paho's, but a handshake that fails leaves no open socket behind, and one that hangs ends with CONNECT_TIMEOUT_S."""
+        context: ssl.SSLContext = self._ssl_context  # type: ignore[assignment]
+        wrapped = context.wrap_socket(tcp_sock, server_hostname=self._host, do_handshake_on_connect=False)
+        wrapped.settimeout(CONNECT_TIMEOUT_S)
+        try:
+            wrapped.do_handshake()
+        except BaseException:
+            wrapped.close()
+            raise
+        return wrapped
 
     def _create_socket(self) -> Any:
         sock: Any = super()._create_socket()

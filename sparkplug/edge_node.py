@@ -17,7 +17,8 @@ class EdgeNode:
     """Publishes the metrics of one edge node and its devices; every method may be called from any thread.
 
     `brokers` is one address, or a list that is walked while the primary host is offline. `session_file` keeps bdSeq over
-    restarts. `on_command` is called from the connection's thread for each value that a host wants written.
+    restarts. `mqtt_version` (4 or 5) goes before that of the first address. `on_command` is called from the connection's
+    thread for each value that a host wants written.
     """
 
     def __init__(
@@ -29,7 +30,7 @@ class EdgeNode:
         session_file: Path | None = None,
         primary_host: str | None = None,
         templates: Mapping[str, Template] | None = None,
-        mqtt_version: int = 4,
+        mqtt_version: int | None = None,
         on_command: Callable[[Command], None] | None = None,
     ) -> None:
         self._bd_seq = BdSeq(session_file)
@@ -39,7 +40,9 @@ class EdgeNode:
         self.refused = 0
         listener = Listener(self._connecting, self._bd_seq.give_back, self._connected, self._message, self._lost, self._tick)
         addresses = (brokers,) if isinstance(brokers, BrokerAddress) else tuple(brokers)
-        self._connection = MqttConnection(addresses, f"{node.group}/{node.node}", listener, mqtt_version=mqtt_version)
+        self._connection = MqttConnection(
+            addresses, f"{node.group}/{node.node}", listener, mqtt_version=mqtt_version or addresses[0].mqtt_version
+        )
 
     def start(self) -> None:
         """Begin to connect; returns at once."""

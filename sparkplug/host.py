@@ -46,7 +46,7 @@ class HostApplication:
         reorder_timeout_ms: int = 2000,
         rebirth_interval_ms_min: int = 5000,
         queue_max: int = 100_000,
-        mqtt_version: int = 4,
+        mqtt_version: int | None = None,
         publish_state: bool = True,
         wanted: Callable[[NodeId], bool] = lambda _: True,
     ) -> None:
@@ -66,7 +66,9 @@ class HostApplication:
         self._filled = threading.Event()
         self._ticked_s = 0.0
         listener = Listener(self._connecting, lambda: None, self._connected, self._message, self._lost, lambda: None)
-        self._connection = MqttConnection((broker,), f"host-{host_id}", listener, mqtt_version=mqtt_version)
+        self._connection = MqttConnection(
+            (broker,), f"host-{host_id}", listener, mqtt_version=mqtt_version or broker.mqtt_version
+        )
 
     def start(self) -> None:
         """Begin to connect; returns at once."""

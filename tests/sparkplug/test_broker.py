@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -19,6 +21,18 @@ from sparkplug.errors import BrokerAddressError
         ("MQTT://Plant.example", BrokerAddress("plant.example", 1883)),
         ("mqtt://edge%201@plant.example", BrokerAddress("plant.example", 1883, username="edge 1")),
         ("mqtt://[::1]:1884", BrokerAddress("::1", 1884)),
+        ("mqtt://plant.example?version=5", BrokerAddress("plant.example", 1883, mqtt_version=5)),
+        (
+            "mqtts://plant.example?ca_file=/etc/ca.pem&certificate_file=c.pem&key_file=k.pem",
+            BrokerAddress(
+                "plant.example",
+                8883,
+                tls=True,
+                ca_file=Path("/etc/ca.pem"),
+                certificate_file=Path("c.pem"),
+                key_file=Path("k.pem"),
+            ),
+        ),
     ],
 )
 def test_an_address_is_read(text: str, address: BrokerAddress) -> None:
@@ -33,7 +47,12 @@ def test_an_address_is_read(text: str, address: BrokerAddress) -> None:
         ("http://127.0.0.1", "is not mqtt://"),
         ("mqtt://", "is not mqtt://"),
         ("mqtt://host/path", "is not mqtt://"),
-        ("mqtt://host?x=1", "is not mqtt://"),
+        ("mqtt://host?x=1", "version=3.1.1"),
+        ("mqtt://host?version=6", "version=3.1.1"),
+        ("mqtt://host?ca_file=/etc/ca.pem", "need mqtts://"),
+        ("mqtt://user:secret@host/path", "must hold no password"),
+        ("mqtt://user:secret@host:port", "mqtt://user:…@host"),
+        ("http://user:secret@host", "must hold no password"),
         ("mqtt://host:port", "port"),
         ("mqtt://host:99999", "[Pp]ort"),
         ("mqtt://user:secret@host", "must hold no password"),
