@@ -7,7 +7,6 @@ client, so that nothing of an earlier session is ever sent again.
 import logging
 import select
 import socket
-import ssl
 import threading
 import time
 from collections import deque
@@ -26,18 +25,16 @@ from paho.mqtt.reasoncodes import ReasonCode
 
 from sparkplug.actions import Action, Connect, Disconnect, Publish, Subscribe
 from sparkplug.broker import BrokerAddress
+from sparkplug.paho_client import CONNECT_TIMEOUT_S, ReadingAheadClient
 
 OUTBOX_MAX = 20_000
 KEEPALIVE_S = 15
 UNACKNOWLEDGED_MAX = 65_535  # all packet ids
-CONNECT_TIMEOUT_S = 5.0
-LINGER_S_MAX = 0.5
 BACKOFF_S_MIN = 0.2
 BACKOFF_S_MAX = 15.0
 STABLE_S = 5.0
 TICK_S = 0.1
 DRIVEN_S = 0.05
-_READ_BYTES = 64 * 1024
 _log = logging.getLogger(__name__)
 
 
@@ -51,71 +48,6 @@ class Listener:
     message: Callable[[str, bytes], None]
     lost: Callable[[], None]
     tick: Callable[[], None]
-
-
-class _BufferedSocket:
-    """Reads ahead: paho asks for one byte, then for some, then for the rest, and each would be a system call."""
-
-    def __init__(self, sock: Any) -> None:
-        self._sock = sock
-        self._buffer = b""
-        self._start = 0
-
-    def recv(self, size: int) -> bytes:
-        available = len(self._buffer) - self._start
-        if not available:
-            self._buffer, self._start = self._sock.recv(_READ_BYTES), 0
-            available = len(self._buffer)
-        end = self._start + min(size, available)
-        data: bytes = self._buffer[self._start : end]
-        self._start = end
-        return data
-
-    def pending(self) -> int:
-        """Bytes that can be read without waiting; TLS keeps some of its own, which `select` does not see."""
-        inner = getattr(self._sock, "pending", None)
-        return len(self._buffer) - self._start + (inner() if inner is not None else 0)
-
-    def close(self) -> None:
-        """Say that nothing more comes and take what is still on its way, then close.
-
-        A close with unread data is a reset, and a reset can destroy a death and a DISCONNECT before the broker has read them.
-        """
-        deadline_s = time.monotonic() + LINGER_S_MAX
-        with suppress(OSError):
-            self._sock.shutdown(socket.SHUT_WR)
-            self._sock.settimeout(LINGER_S_MAX)
-            while self._sock.recv(_READ_BYTES) and time.monotonic() < deadline_s:
-                pass
-        self._sock.close()
-
-    def abort(self) -> None:
-        """Close at once."""
-        self._sock.close()
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._sock, name)
-
-
-class _Client(paho.Client):
-    """A paho client that reads ahead. `_create_socket` is paho's own seam for wrapped sockets (its websockets use it)."""
-
-    def _ssl_wrap_socket(self, tcp_sock: Any) -> Any:
-        """As paho's, but a handshake that fails leaves no open socket behind, and one that hangs ends with CONNECT_TIMEOUT_S."""
-        context: ssl.SSLContext = self._ssl_context  # type: ignore[assignment]
-        wrapped = context.wrap_socket(tcp_sock, server_hostname=self._host, do_handshake_on_connect=False)
-        wrapped.settimeout(CONNECT_TIMEOUT_S)
-        try:
-            wrapped.do_handshake()
-        except BaseException:
-            wrapped.close()
-            raise
-        return wrapped
-
-    def _create_socket(self) -> Any:
-        sock: Any = super()._create_socket()
-        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        return _BufferedSocket(sock)
 
 
 class MqttConnection:
@@ -142,7 +74,7 @@ class MqttConnection:
         self._version = MQTTProtocolVersion.MQTTv5 if mqtt_version == 5 else MQTTProtocolVersion.MQTTv311
         self._chance = chance or Random()  # noqa: S311 — spreads reconnects, keeps no secret
         self._server = 0
-        self._client: _Client | None = None
+        self._client: ReadingAheadClient | None = None
         self._accepted = False
         self._outbox: deque[Action] = deque()
         self._stopping = threading.Event()
@@ -196,16 +128,23 @@ class MqttConnection:
         self._driving = True
         try:
             if not self._step(client, timeout_s):
-                self._ended = True
-                self._idle.set()
-        except OSError as error:
-            self._note(str(error))
-            self._ended = True
-            self._idle.set()
+                self._end(client)
+        except Exception as error:
+            # As in `_run`: the caller only waited for messages, and is not to fall with the connection.
+            if not isinstance(error, OSError):
+                _log.exception("%s: the session failed", self._client_id)
+            self._note(str(error) or repr(error))
+            self._end(client)
         finally:
             self._driven_s = time.monotonic()
             self._driving = False
         return True
+
+    def _end(self, client: _Client) -> None:
+        """A driver saw the end of this connection. The own thread may have seen it before, and have begun the next one."""
+        if self._client is client:
+            self._ended = True
+            self._idle.set()
 
     @property
     def full(self) -> bool:
@@ -252,6 +191,8 @@ class MqttConnection:
         self._outbox.clear()
         connect = self._listener.connecting(self._server)
         client = self._new_client(broker, connect)
+        if not self._stopping.is_set():
+            self._idle.clear()
         self._ended = False
         self._client, self._accepted = client, False
         try:
@@ -263,16 +204,14 @@ class MqttConnection:
                     break
         finally:
             self._client = None
-            if not self._stopping.is_set():
-                self._idle.clear()
             self._listener.lost()
             if client.socket() is not None:
                 client.on_disconnect = None
                 self._abort(client)
 
-    def _new_client(self, broker: BrokerAddress, connect: Connect) -> _Client:
+    def _new_client(self, broker: BrokerAddress, connect: Connect) -> ReadingAheadClient:
         clean = None if self._version == MQTTProtocolVersion.MQTTv5 else True
-        client = _Client(CallbackAPIVersion.VERSION2, self._client_id, clean_session=clean, protocol=self._version)
+        client = ReadingAheadClient(CallbackAPIVersion.VERSION2, self._client_id, clean_session=clean, protocol=self._version)
         client.connect_timeout = CONNECT_TIMEOUT_S
         # paho would hold back what exceeds 20 unacknowledged messages, and lose it, a death among them, at DISCONNECT.
         client.max_inflight_messages_set(UNACKNOWLEDGED_MAX)
@@ -288,7 +227,7 @@ class MqttConnection:
             client.tls_set(_text(ca_file), _text(certificate), _text(key))
         return client
 
-    def _open(self, client: _Client, broker: BrokerAddress) -> None:
+    def _open(self, client: ReadingAheadClient, broker: BrokerAddress) -> None:
         try:
             if self._version == MQTTProtocolVersion.MQTTv5:
                 properties: Any = Properties(PacketTypes.CONNECT)  # type: ignore[no-untyped-call]
@@ -300,7 +239,7 @@ class MqttConnection:
             self._listener.unsent()
             raise OSError(f"no connection to {broker.url}: {error}") from error
 
-    def _step(self, client: _Client, wait_s_max: float) -> bool:
+    def _step(self, client: ReadingAheadClient, wait_s_max: float) -> bool:
         """Wait for something to do and do it; False when the connection is over."""
         sock: Any = client.socket()
         if sock is None:
@@ -329,7 +268,7 @@ class MqttConnection:
                 self._listener.tick()
             return client.socket() is not None and not (self._stopping.is_set() and not self._outbox and not client.want_write())
 
-    def _read(self, client: _Client, sock: Any) -> bool:
+    def _read(self, client: ReadingAheadClient, sock: Any) -> bool:
         """Handle all packets that have come."""
         while True:
             if client.loop_read() != MQTTErrorCode.MQTT_ERR_SUCCESS or client.socket() is None:
@@ -337,14 +276,14 @@ class MqttConnection:
             if not sock.pending():
                 return True
 
-    def _drain(self, client: _Client) -> None:
+    def _drain(self, client: ReadingAheadClient) -> None:
         """Hand actions to paho as long as the socket takes them."""
         if not self._accepted:
             return
         while self._outbox and not client.want_write() and client.socket() is not None:
             self._do(client, self._outbox.popleft())
 
-    def _do(self, client: _Client, action: Action) -> None:
+    def _do(self, client: ReadingAheadClient, action: Action) -> None:
         if isinstance(action, Publish):
             client.publish(action.topic, action.payload, action.qos, action.retain)
         elif isinstance(action, Subscribe):
@@ -354,7 +293,7 @@ class MqttConnection:
             if not isinstance(action, Disconnect):
                 self._server = (self._server + 1) % len(self._brokers)
 
-    def _disconnect(self, client: _Client, *, with_will: bool) -> None:
+    def _disconnect(self, client: ReadingAheadClient, *, with_will: bool) -> None:
         self._outbox.clear()
         if self._version == MQTTProtocolVersion.MQTTv5 and with_will:
             client.disconnect(reasoncode=ReasonCode(PacketTypes.DISCONNECT, identifier=4))
@@ -368,7 +307,7 @@ class MqttConnection:
             client.loop_write()
 
     @staticmethod
-    def _abort(client: _Client) -> None:
+    def _abort(client: ReadingAheadClient) -> None:
         """Close without DISCONNECT, so that the broker sends the will."""
         sock: Any = client.socket()
         sock.abort()

@@ -1,0 +1,81 @@
+"""paho's client with a socket that reads ahead and closes in order, and a TLS handshake that cleans up after itself.
+
+The two methods that are overridden are paho's own seams: its websockets wrap the socket in `_create_socket` too.
+"""
+
+import socket
+import ssl
+import time
+from contextlib import suppress
+from typing import Any
+
+import paho.mqtt.client as paho
+
+CONNECT_TIMEOUT_S = 5.0
+LINGER_S_MAX = 0.5
+_READ_BYTES = 64 * 1024
+
+
+class BufferedSocket:
+    """Reads ahead: paho asks for one byte, then for some, then for the rest, and each would be a system call."""
+
+    def __init__(self, sock: Any) -> None:
+        self._sock = sock
+        self._buffer = b""
+        self._start = 0
+
+    def recv(self, size: int) -> bytes:
+        available = len(self._buffer) - self._start
+        if not available:
+            self._buffer, self._start = self._sock.recv(_READ_BYTES), 0
+            available = len(self._buffer)
+        end = self._start + min(size, available)
+        data: bytes = self._buffer[self._start : end]
+        self._start = end
+        return data
+
+    def pending(self) -> int:
+        """Bytes that can be read without waiting; TLS keeps some of its own, which `select` does not see."""
+        inner = getattr(self._sock, "pending", None)
+        return len(self._buffer) - self._start + (inner() if inner is not None else 0)
+
+    def close(self) -> None:
+        """Say that nothing more comes and take what is still on its way, then close.
+
+        A close with unread data is a reset, and a reset can destroy a death and a DISCONNECT before the broker has read them.
+        """
+        deadline_s = time.monotonic() + LINGER_S_MAX
+        with suppress(OSError):
+            self._sock.shutdown(socket.SHUT_WR)
+            self._sock.settimeout(LINGER_S_MAX)
+            while self._sock.recv(_READ_BYTES) and time.monotonic() < deadline_s:
+                pass
+        self._sock.close()
+
+    def abort(self) -> None:
+        """Close at once."""
+        self._sock.close()
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._sock, name)
+
+
+class ReadingAheadClient(paho.Client):
+    """A paho client on such a socket."""
+
+    def _ssl_wrap_socket(self, tcp_sock: Any) -> Any:
+        """As paho's, but a handshake that fails leaves no open socket behind, and one that hangs ends with CONNECT_TIMEOUT_S."""
+        context: ssl.SSLContext = self._ssl_context  # type: ignore[assignment]
+        wrapped = context.wrap_socket(tcp_sock, server_hostname=self._host, do_handshake_on_connect=False)
+        wrapped.settimeout(CONNECT_TIMEOUT_S)
+        try:
+            wrapped.do_handshake()
+        except BaseException:
+            wrapped.close()
+            raise
+        return wrapped
+
+    def _create_socket(self) -> Any:
+        sock: Any = super()._create_socket()
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        return BufferedSocket(sock)
