@@ -17,6 +17,7 @@ from pydantic import BaseModel
 
 import edge
 from edge.config import EdgeConfig
+from edge.place import Place
 from edge.sample import SampleSet
 
 
@@ -55,6 +56,7 @@ class Row:
 class Adapter:
     """One kind of control.
 
+    `place` says up to where a cursor has taken everything (None: not begun); `resume` is `start` from such a place.
     `describe` says what would be published, asking the control but no broker; `draft` writes a configuration for the control at
     an address (and the device of that name, where it serves several).
     """
@@ -62,6 +64,8 @@ class Adapter:
     name: str
     config_model: type[BaseModel]
     start: Callable[[EdgeConfig[Any]], Any]
+    place: Callable[[Any], Place | None]
+    resume: Callable[[EdgeConfig[Any], Place], Any]
     parse: Callable[[EdgeConfig[Any], Any, bytes], tuple[Any, SampleSet]]
     connect: Callable[[EdgeConfig[Any]], Connection]
     describe: Callable[[EdgeConfig[Any]], list[Row]]

@@ -40,7 +40,8 @@ class MachineSection(Section):
 
 
 class BrokerSection(Section):
-    """Where to publish. Empty `node` means `edge-<machine>`; empty `session_file` keeps bdSeq in memory only."""
+    """Where to publish. Empty `node` means `edge-<machine>`; empty `session_file` keeps bdSeq, and
+    the place in the control's stream, in memory only."""
 
     url: str = "mqtt://127.0.0.1:1883"
     group: str = "cnc"

@@ -17,6 +17,8 @@ HEALTH = (
     MetricSpec("health/last_error", DataType.STRING, value=""),
     MetricSpec("health/control_online", DataType.BOOLEAN, value=False),
     MetricSpec("health/broker_reconnects", DataType.INT64, value=0),
+    # They count as emitted, and went down with a connection to the broker before they were on the wire; a birth followed.
+    MetricSpec("health/unsent_messages", DataType.INT64, "messages", value=0),
     MetricSpec("health/ledger_difference", DataType.INT64, "observations", value=0),
 )
 

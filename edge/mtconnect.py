@@ -10,13 +10,15 @@ from edge.adapter import Adapter
 from edge.mtconnect_check import describe
 from edge.mtconnect_config import MtconnectConfig
 from edge.mtconnect_connection import MtconnectConnection
-from edge.mtconnect_cursor import parse, start
+from edge.mtconnect_cursor import parse, place, resume, start
 from edge.mtconnect_draft import draft
 
 ADAPTER = Adapter(
     name="mtconnect",
     config_model=MtconnectConfig,
     start=start,
+    place=place,
+    resume=resume,
     parse=parse,
     connect=MtconnectConnection,
     describe=describe,

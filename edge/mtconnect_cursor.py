@@ -13,6 +13,9 @@ another instance, the next document asked for is /current. If the same instance 
 nothing is lost. Otherwise the values of /current that we have not seen are taken as the new baseline, the rest of the range is
 counted as lost, and sampling resumes at its nextSequence. On an agent with several devices the range holds theirs too, so the
 count is an upper bound.
+
+An edge that was killed and started again knows its place (`resume`) but none of the values. What /current shows from before
+that place is then its baseline, and sampling resumes at the place; what the agent has dropped of it is a hole like any other.
 """
 
 from collections import Counter
@@ -36,11 +39,13 @@ from edge.mtconnect_documents import (
     parse_document,
 )
 from edge.mtconnect_model import DeviceModel
+from edge.place import Place
 from edge.reading import read
 from edge.sample import UNAVAILABLE, Drop, EdgeSample, Gap, Offer, SampleSet
 from sparkplug.quality import Quality
 
 ATTEMPTS_BEFORE_PROBE = 3
+EDGE_RESTARTED = "edge restarted"  # the hole of an edge that knows where it was, but not what it had taken
 Config = EdgeConfig[MtconnectConfig]
 
 
@@ -81,6 +86,17 @@ class Request(NamedTuple):
 def start(_config: Config) -> Cursor:
     """The cursor of an edge that has heard nothing yet."""
     return Cursor()
+
+
+def place(cursor: Cursor) -> Place | None:
+    """Up to where everything is taken; None while nothing is."""
+    taken = cursor.phase is Phase.SAMPLE and cursor.next_sequence > 0
+    return Place(cursor.instance_id, cursor.next_sequence) if taken else None
+
+
+def resume(_config: Config, kept: Place) -> Cursor:
+    """The cursor of an edge that was here before."""
+    return Cursor(instance_id=kept.instance, next_sequence=kept.next_sequence, hole=EDGE_RESTARTED)
 
 
 def next_request(config: Config, cursor: Cursor, *, streams: bool = True) -> Request:
@@ -201,6 +217,9 @@ def _baseline(cursor: Cursor, document: StreamsDocument, next_sequence: int) -> 
     ready = replace(cursor, phase=Phase.SAMPLE, hole="")
     if not cursor.hole and not wanted:
         return _take(ready, document, floor=0, next_sequence=next_sequence, is_baseline=True)
+    restarted = cursor.hole == EDGE_RESTARTED
+    if restarted and first <= wanted <= next_sequence:
+        return _rejoin(ready, document)
     if wanted and first <= wanted <= next_sequence:
         # Still there: resume where we were. All that this document shows comes again in the samples, or has come before.
         count = len(document.observations)
@@ -210,11 +229,22 @@ def _baseline(cursor: Cursor, document: StreamsDocument, next_sequence: int) -> 
     if wanted > next_sequence:
         why, wanted = f"sequence numbers went back from {wanted} to {next_sequence}", 0
         ready = replace(ready, next_sequence=0)
-    after, samples = _take(ready, document, floor=wanted, next_sequence=next_sequence, is_baseline=True)
+    floor = 0 if restarted else wanted  # a restarted edge has the values from before the hole to learn, too
+    after, samples = _take(ready, document, floor=floor, next_sequence=next_sequence, is_baseline=True)
     after, samples = _alarms_anew(after, samples, document)
     low = max(wanted, 1)
     found = {o.sequence for o in document.observations if o.sequence is not None and o.sequence >= low}
     return after, replace(samples, gaps=(Gap(why, low, next_sequence - 1, max(0, next_sequence - low - len(found))),))
+
+
+def _rejoin(ready: Cursor, document: StreamsDocument) -> tuple[Cursor, SampleSet]:
+    """The restarted edge finds its place: what was taken before is the baseline, and what came since comes again as samples."""
+    before = tuple(o for o in document.observations if o.sequence is None or o.sequence < ready.next_sequence)
+    older = replace(document, observations=before)
+    after, samples = _take(ready, older, floor=0, next_sequence=ready.next_sequence, is_baseline=True)
+    again = len(document.observations) - len(before)
+    dropped = dict(samples.dropped) | ({Drop.DUPLICATE: samples.dropped.get(Drop.DUPLICATE, 0) + again} if again else {})
+    return after, replace(samples, received=samples.received + again, dropped=dropped)
 
 
 def _alarms_anew(cursor: Cursor, samples: SampleSet, document: StreamsDocument) -> tuple[Cursor, SampleSet]:

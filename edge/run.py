@@ -46,7 +46,8 @@ def edge_runtime(config: EdgeConfig[Any], address: BrokerAddress | None = None) 
         session_file=Path(broker.session_file) if broker.session_file else None,
         primary_host=broker.primary_host or None,
     )
-    return EdgeRuntime(config, adapters()[config.machine.adapter], node, ledger=ledger)
+    place_file = Path(broker.session_file + ".place") if broker.session_file else None
+    return EdgeRuntime(config, adapters()[config.machine.adapter], node, ledger=ledger, place_file=place_file)
 
 
 def run(config_path: Path, *, broker_url: str | None = None) -> dict[str, int]:

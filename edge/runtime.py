@@ -11,6 +11,7 @@ import queue
 import threading
 import time
 from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 from edge import tool_change
@@ -20,6 +21,7 @@ from edge.config import EdgeConfig
 from edge.health import Health
 from edge.ledger import Ledger
 from edge.pipeline import Outcome, Pipeline
+from edge.place import Place, PlaceFile
 from edge.sample import UNAVAILABLE, Drop, EdgeSample, Offer, SampleSet
 from sparkplug.metric import Change, MetricSpec
 
@@ -39,13 +41,16 @@ class Publisher(Protocol):
     def online(self) -> bool: ...
     @property
     def reconnects(self) -> int: ...
+    @property
+    def unsent(self) -> int: ...
 
 
 class Arrival(NamedTuple):
-    """One parsed frame and the monotonic time at which it came."""
+    """One parsed frame, the monotonic time at which it came, and where in the control's stream it ends."""
 
     frame: SampleSet
     at_s: float
+    place: Place | None = None
 
 
 class EdgeRuntime:
@@ -58,6 +63,7 @@ class EdgeRuntime:
         node: Publisher,
         *,
         ledger: Ledger | None = None,
+        place_file: Path | None = None,
         wall_s: Callable[[], float] = time.time,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
@@ -67,6 +73,7 @@ class EdgeRuntime:
         self._adapter = adapter
         self._node = node
         self._connection: Connection = adapter.connect(config)
+        self._places = PlaceFile(place_file)
         self._wall_s, self._clock = wall_s, clock
         self._arrivals: queue.Queue[Arrival] = queue.Queue(QUEUE_FRAMES_MAX)
         self._pipeline = Pipeline(config)
@@ -108,13 +115,14 @@ class EdgeRuntime:
     def _read(self) -> None:
         """The connection thread. Whatever ends it that was not asked for ends the edge, loudly."""
         try:
-            cursor = self._adapter.start(self.config)
+            place = self._places.read()
+            cursor = self._adapter.start(self.config) if place is None else self._adapter.resume(self.config, place)
             self._connection.follow(cursor)
             for raw in self._connection.frames():
                 cursor, frame = self._adapter.parse(self.config, cursor, raw)
                 self._connection.follow(cursor)
                 self.ledger.queue(frame.received)
-                self._arrivals.put(Arrival(frame, self._clock()))
+                self._arrivals.put(Arrival(frame, self._clock(), self._adapter.place(cursor)))
         except BaseException as error:
             self._crash = error
         finally:
@@ -138,6 +146,7 @@ class EdgeRuntime:
         self._judge(frame, arrival.at_s)
         emitted, dropped = self._publish(outcome)
         self.ledger.settle(taken=frame.received, emitted=emitted, dropped=dropped, held=self._pipeline.held)
+        self._places.keep(arrival.place)
 
     def _offered(self, offers: tuple[Offer, ...]) -> None:
         """The control has described itself. Other signals than before need a new birth."""
@@ -206,6 +215,7 @@ class EdgeRuntime:
             "health/reconnects": self._connection.reconnects,
             "health/control_online": self._is_declared,
             "health/broker_reconnects": self._node.reconnects,
+            "health/unsent_messages": self._node.unsent,
             "health/ledger_difference": Ledger.difference(counters),
         }
         if self._connection.last_error != self._last_error:

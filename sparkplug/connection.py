@@ -68,6 +68,7 @@ class MqttConnection:
             raise ValueError("a connection needs at least one broker")
         self.last_error = ""
         self.connects = 0
+        self.unsent = 0  # messages that were given to us for a connection that ended before it took them
         self._brokers = tuple(brokers)
         self._client_id = client_id
         self._listener = listener
@@ -140,7 +141,7 @@ class MqttConnection:
             self._driving = False
         return True
 
-    def _end(self, client: _Client) -> None:
+    def _end(self, client: ReadingAheadClient) -> None:
         """A driver saw the end of this connection. The own thread may have seen it before, and have begun the next one."""
         if self._client is client:
             self._ended = True
@@ -188,7 +189,8 @@ class MqttConnection:
 
     def _serve(self, broker: BrokerAddress) -> None:
         """One connection, from CONNECT to its end."""
-        self._outbox.clear()
+        while self._outbox:
+            self.unsent += isinstance(self._outbox.popleft(), Publish)
         connect = self._listener.connecting(self._server)
         client = self._new_client(broker, connect)
         if not self._stopping.is_set():

@@ -70,6 +70,14 @@ class EdgeNode:
         return self._connection.last_error
 
     @property
+    def unsent(self) -> int:
+        """How many messages that `publish` took were dropped with a connection that ended before it took them.
+
+        What was already in the socket of such a connection is not known: at QoS 0 nobody confirms it.
+        """
+        return self._connection.unsent
+
+    @property
     def backlog(self) -> int:
         """How many messages wait for the broker to take them."""
         return self._connection.backlog

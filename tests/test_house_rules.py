@@ -2,6 +2,7 @@
 
 import ast
 import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -18,10 +19,17 @@ SOURCES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob
 
 
 def tracked() -> list[Path]:
-    """The files of the project; everything but what git ignores."""
+    """The files of the project; everything but what git ignores. Without git or its records, what lies in no hidden folder."""
     command = ["git", "ls-files", "--cached", "--others", "--exclude-standard"]
-    listed = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False).stdout.split("\n")
-    return [ROOT / name for name in listed if name and (ROOT / name).is_file()]
+    if shutil.which("git"):
+        listed = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False).stdout.split("\n")
+        if files := [ROOT / name for name in listed if name and (ROOT / name).is_file()]:
+            return files
+    made = {"__pycache__", "node_modules", "dist"}
+    names = [(path, set(path.relative_to(ROOT).parent.parts)) for path in ROOT.rglob("*") if path.is_file()]
+    return [
+        path for path, folders in names if not folders & made and not any(folder.startswith(".") for folder in folders - {".ci"})
+    ]
 
 
 def functions(tree: ast.AST) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef]:
@@ -73,7 +81,9 @@ def test_the_lock_pins_by_hash_and_names_no_address() -> None:
 def test_nothing_names_a_machine_or_a_registry() -> None:
     own_root = str(ROOT.parent)
     registries = re.compile(r"https?://[\w.-]*(pypi|pythonhosted|npmjs|crates\.io|proxy\.golang|repo1?\.maven)[\w.-]*")
-    for path in tracked():
+    files = tracked()
+    assert ROOT / "README.md" in files
+    for path in files:
         try:
             text = path.read_text()
         except UnicodeDecodeError:

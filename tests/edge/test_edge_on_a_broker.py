@@ -126,6 +126,8 @@ def test_a_whole_recording_comes_out_with_eleven_tool_changes_and_a_ledger_that_
     with okuma() as agent, Onlooker(address) as onlooker:
         config = config_for(agent, mosquitto, tmp_path / "session")
         with running(config) as runtime:
+            # What comes before the edge is born is in the births, not in the changes that are counted here.
+            wait(lambda: onlooker.count("ledger/received") >= 0, "the birth of the edge")
             agent.step(2)
             wait(lambda: "tool_number" in onlooker.machine, "the birth of the machine")
             while not agent.finished:

@@ -4,6 +4,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -24,7 +25,7 @@ class Notebook:
 
     def __init__(self) -> None:
         self.online = True
-        self.reconnects = 0
+        self.reconnects = self.unsent = 0
         self.births: list[dict[str, MetricSpec]] = []
         self.deaths: list[str] = []
         self.stopped = False
@@ -95,12 +96,15 @@ class Script:
 
 
 def played(
-    *frames: bytes | float | Callable[[], None], notebook: Notebook | None = None, lost_after_s: float = 30.0
+    *frames: bytes | float | Callable[[], None],
+    notebook: Notebook | None = None,
+    lost_after_s: float = 30.0,
+    place_file: Path | None = None,
 ) -> tuple[Notebook, EdgeRuntime]:
     """The notebook after these frames and a clean stop."""
     script, notebook = Script(*frames), notebook or Notebook()
     config = replace(CONFIG, machine=MachineSection(name="vmc", lost_after_s=lost_after_s))
-    runtime = EdgeRuntime(config, replace(ADAPTER, connect=lambda _: script), notebook)
+    runtime = EdgeRuntime(config, replace(ADAPTER, connect=lambda _: script), notebook, place_file=place_file)
     thread = threading.Thread(target=runtime.run)
     thread.start()
     assert script.done.wait(10)
@@ -223,3 +227,21 @@ def test_an_error_of_ours_ends_the_edge_loudly() -> None:
     with pytest.raises(RuntimeError, match="a bug"):
         EdgeRuntime(CONFIG, replace(ADAPTER, connect=lambda _: script), notebook).run()
     assert notebook.stopped
+
+
+def test_an_edge_that_is_started_again_goes_on_where_it_was(tmp_path: Path) -> None:
+    place_file = tmp_path / "session.json.place"
+    baseline = streams(10, [value("rpm", 3, "100"), value("load", 4, "5")])
+    played(probe(), baseline, streams(12, [value("rpm", 11, "200")]), place_file=place_file)
+    notebook, runtime = played(
+        probe(),
+        streams(16, [value("load", 4, "5"), value("rpm", 15, "400")]),
+        streams(16, [value("rpm", 13, "300"), value("rpm", 15, "400")]),
+        place_file=place_file,
+    )
+    assert notebook.told("spindle_load_pct")[-1:] == [5.0]
+    assert notebook.told("spindle_rpm")[-2:] == [300.0, 400.0], "what came while the edge was away is not lost"
+    assert runtime.health.holes == 0
+    notebook, runtime = played(probe(), streams(90, [value("rpm", 80, "500")], first=40), place_file=place_file)
+    assert runtime.health.holes == 1
+    assert (runtime.health.lost_observations, Ledger.difference(runtime.ledger.snapshot())) == (73, 0)

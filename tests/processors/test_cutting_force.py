@@ -48,6 +48,8 @@ def test_the_tool_number_picks_the_diameter() -> None:
         ({"spindle_rpm": 3000.0}, "spindle_load_pct is not offered"),
         ({"spindle_rpm": float("nan"), "spindle_load_pct": 5.0}, "spindle_rpm is nan"),
         ({"spindle_rpm": "fast", "spindle_load_pct": 5.0}, "spindle_rpm is not a number"),
+        ({"spindle_rpm": 1e308, "spindle_load_pct": 5.0}, "spindle_rpm or spindle_load_pct is beyond any spindle"),
+        ({"spindle_rpm": 3000.0, "spindle_load_pct": 1e6}, "spindle_rpm or spindle_load_pct is beyond any spindle"),
         ({"spindle_rpm": 3000.0, "spindle_load_pct": -5.0}, "spindle load is negative: the spindle brakes"),
     ],
 )
