@@ -9,15 +9,17 @@ import logging
 import sys
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NoReturn
 
 import typer
 from rich.console import Console
+from typer.exceptions import TyperException
 
 from cnctwin import demo as demo_command
 from cnctwin.errors import BrokerStartError, ProgramError
 from cnctwin.given_broker import address, broker_or_own
 from cnctwin.replay_command import replay
+from cnctwin.state_dir import state_dir as folder_for_state
 from cnctwin.stopping import stopped_by_signals
 from edge.errors import EdgeError
 from processors.errors import ProcessorError
@@ -84,7 +86,7 @@ def doctor(
     if as_json:
         _print_json(report.as_json())
     else:
-        console = Console()
+        console = _console()
         for finding in report.findings:
             mark = "[green]good[/]" if finding.good else "[bold red]bad [/]"
             console.print(mark, end=" ")
@@ -100,14 +102,16 @@ def process(
     config: Annotated[Path | None, typer.Option(help="TOML with a table for each processor")] = None,
     broker: Broker = None,
     group: Group = "cnc",
-    state_dir: Annotated[Path | None, typer.Option(help="Keeps the birth/death numbers over restarts")] = None,
+    state_dir: Annotated[
+        Path | None, typer.Option(help="Keeps birth/death numbers; else $CNCTWIN_STATE_DIR or ~/.local/state/cnctwin")
+    ] = None,
 ) -> None:
     """Run processors until SIGTERM or Ctrl-C."""
     from processors.runtime import configured, run
 
     configured(names, config)
     with stopped_by_signals() as stop, broker_or_own(address(broker)) as where:
-        run(names, where, config, stop, group=group, session_dir=state_dir)
+        run(names, where, config, stop, group=group, session_dir=folder_for_state(state_dir))
 
 
 @edge_app.command("run")
@@ -129,7 +133,7 @@ def edge_check(config: Annotated[Path, typer.Argument(help="The TOML file of one
     if as_json:
         _print_json([asdict(row) for row in rows])
     else:
-        Console().print(table(rows))
+        _console().print(table(rows))
 
 
 @edge_app.command("discover")
@@ -171,6 +175,14 @@ def simulate_mtconnect(
         )
 
 
+def _console() -> Console:
+    """Standard output; into a file or a pipe it is as wide as the tables need."""
+    console = Console()
+    if not console.is_terminal:
+        console.width = 120
+    return console
+
+
 def _print_json(value: Any) -> None:
     sys.stdout.write(json.dumps(value, default=str) + "\n")
 
@@ -179,13 +191,25 @@ def main() -> None:
     """Run the command; every expected error is one line on stderr."""
     logging.basicConfig(level=logging.WARNING, format="%(asctime)s %(levelname)s %(message)s")
     try:
-        app(standalone_mode=True)
+        # Standalone, typer would report a wrong option in a box of several lines.
+        code = app(standalone_mode=False)
+    except TyperException as error:
+        _explain(error)
     except BrokerStartError as error:
         _fail(error, 1)
     except (ProgramError, EdgeError, ProcessorError, SparkplugError) as error:
         _fail(error, 2)
+    raise SystemExit(code)
 
 
-def _fail(error: Exception, code: int) -> None:
+def _explain(error: TyperException) -> NoReturn:
+    message = error.format_message()
+    if not message:  # A command without arguments: its help has been shown already.
+        raise SystemExit(2)
+    context = getattr(error, "ctx", None)
+    _fail(f"{message.rstrip('.')}; see {'cnctwin' if context is None else context.command_path} --help", 2)
+
+
+def _fail(error: object, code: int) -> NoReturn:
     print(f"cnctwin: {error}", file=sys.stderr)
     raise SystemExit(code)

@@ -14,6 +14,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from threading import Event
 from typing import Any
+from urllib.parse import urlsplit
 from xml.etree import ElementTree
 
 from rich.console import Console
@@ -24,7 +25,9 @@ from cnctwin.plant import StageLedger, ledgers, machines, text
 from cnctwin.private_broker import PrivateBroker
 from cnctwin.terminal import ledger_table
 from cnctwin.watch import show, viewer
+from sparkplug.errors import TopicError
 from sparkplug.host import EventKind, HostApplication, HostEvent
+from sparkplug.topics import check_id
 
 RECORDINGS = Path(__file__).parent / "recordings"
 PROCESSORS = ("thermal", "cutting_force", "mirror")
@@ -115,9 +118,13 @@ class Demo:
         for path in (self.recording, self.devices):
             if path is not None and not path.is_file():
                 raise UsageError(f"{path}: no such file; give a recording with --recording and its device model with --devices")
+        if options.devices and not options.recording:
+            raise UsageError(f"--devices {options.devices} describes no recording; name the one it belongs to with --recording")
+        if options.seconds is not None and not options.seconds > 0:
+            raise UsageError(f"--seconds {options.seconds:g} is not above 0; leave it out to run until Ctrl-C")
         if not options.speed > 0:
             raise UsageError(f"--speed {options.speed:g} is not above 0; 1 is the recorded pace, 20 twenty times as fast")
-        self.machine = options.machine or machine_name(self.devices)
+        self.machine = _checked(options.machine or machine_name(self.devices))
         self.broker = PrivateBroker(folder / "broker", options.port)
         self._folder = folder
         self._agent_state = folder / "agent.json"
@@ -130,6 +137,10 @@ class Demo:
         agent += ["--wait", "--state-file", str(self._agent_state)]
         self._begin("agent", agent if self.options.recording else [*agent, "--loop"])
         url = self._agent_url()
+        if not self.options.machine:  # the model may hold a whole shop; the agent knows which machine the recording is of
+            self.machine = _checked(str(self._state().get("device") or self.machine).lower())
+        # Killed and started again, the agent has to be where the edge looks for it.
+        self.children[0].command = [*self.children[0].command, "--port", str(urlsplit(url).port)]
         edge = self._folder / "edge.toml"
         edge.write_text(self._edge_toml(url))
         settings = self._folder / "processors.toml"
@@ -140,7 +151,7 @@ class Demo:
         self._begin("edge", ["edge", "run", str(edge)])
 
     def watch(self) -> None:
-        """Start again what has died. The agent is left alone once its recording has ended."""
+        """Start again what has died."""
         self.broker.watch()
         for child in self.children:
             child.watch()
@@ -212,8 +223,8 @@ def run(options: DemoOptions, stop: Event) -> int:
         host = viewer(demo.broker.address, GROUP)
         host.start()
         stack.callback(host.stop)
-        changes = ToolChanges(demo.machine)
         demo.start()
+        changes = ToolChanges(demo.machine)
         console.print(greeting(demo), markup=False, highlight=False, soft_wrap=True)
         started_s = time.monotonic()
         ends_s = None if options.seconds is None else started_s + options.seconds
@@ -264,6 +275,14 @@ def machine_name(devices: Path | None) -> str:
         if element.tag.rpartition("}")[2] == "Device":
             return (element.get("name") or element.get("uuid") or "machine").lower()
     raise UsageError(f"{devices}: holds no Device; give the answer of an agent to /probe")
+
+
+def _checked(machine: str) -> str:
+    """The name, where it can be a Sparkplug device."""
+    try:
+        return check_id(machine, "machine name")
+    except TopicError as error:
+        raise UsageError(f"{error}; name the machine with --machine") from error
 
 
 def _settle(host: HostApplication, on_events: Callable[[list[HostEvent]], None]) -> None:

@@ -70,6 +70,10 @@ def diagnose(host: HostApplication, url: str) -> Report:
         sums = f"{ledger.received} = {ledger.emitted} emitted + {ledger.dropped} dropped + {ledger.buffered} buffered"
         findings.append(Finding(ledger.balances, f"{ledger.node}: {sums}" if ledger.balances else f"{ledger.node}: not {sums}"))
     for node_id, metrics in health(host).items():
+        connected, why = metrics.get("control_online"), metrics.get("last_error")
+        if connected is not None and connected.value is False:
+            reason = f": {why.value}" if why is not None and isinstance(why.value, str) and why.value else ""
+            findings.append(Finding(False, f"{node_id} has no control{reason}"))
         for name in ("holes", "dead_letters"):
             count = metrics[name].value if name in metrics else 0
             if isinstance(count, int) and count:

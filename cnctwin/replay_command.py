@@ -9,6 +9,7 @@ from cnctwin.mtconnect_agent.errors import ReplayError
 from cnctwin.mtconnect_agent.replay_agent import ReplayAgent
 
 STATE_S = 0.5
+STYLES = ("2.3", "1.4")
 
 
 def replay(
@@ -28,6 +29,8 @@ def replay(
     for path in (recording, devices):
         if path is not None and not path.is_file():
             raise UsageError(f"{path}: no such file; give the recording, and its device model with --devices")
+    if style not in STYLES:
+        raise UsageError(f"--style {style!r} is no generation of the agent; there are {' and '.join(STYLES)}")
     try:
         agent = ReplayAgent(
             recording, devices, speed=speed, device=device, port=port, style=style, loop=loop, wait_for_client=wait

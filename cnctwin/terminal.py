@@ -1,9 +1,13 @@
-"""The terminal view: each machine with the twin beside it, and the ledger of each stage."""
+"""The terminal view: each machine with the twin beside it, and the ledger of each stage.
+
+Whatever comes from the broker is shown as it is: a bracket in a name is a bracket, no markup.
+"""
 
 from collections.abc import Sequence
 from datetime import UTC, datetime
 
 from rich.console import Group, RenderableType
+from rich.markup import escape
 from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
@@ -66,10 +70,10 @@ def ledger_table(ledgers: Sequence[StageLedger]) -> Table:
     table.add_column("dropped because")
     for ledger in ledgers:
         table.add_row(
-            ledger.node + ("" if ledger.online else " (offline)"),
+            Text(ledger.node + ("" if ledger.online else " (offline)")),
             *(f"{n:,}" for n in (ledger.received, ledger.emitted, ledger.dropped, ledger.buffered)),
             Text("yes", style="green") if ledger.balances else Text(f"no, {ledger.missing:+d}", style="bold red"),
-            ", ".join(f"{reason} {n:,}" for reason, n in sorted(ledger.reasons.items(), key=lambda item: -item[1])),
+            Text(", ".join(f"{reason} {n:,}" for reason, n in sorted(ledger.reasons.items(), key=lambda item: -item[1]))),
         )
     return table
 
@@ -84,14 +88,14 @@ def _machine(machine: MachineView) -> Panel:
         reading = machine.measured[order[row]] if row < len(order) else None
         beside = twin[row] if row < len(twin) else None
         table.add_row(
-            order[row] if reading else "",
+            Text(order[row] if reading else ""),
             _cell(reading),
             _clock(reading),
-            beside.name.removeprefix(TWIN_PREFIX) if beside else "",
+            Text(beside.name.removeprefix(TWIN_PREFIX) if beside else ""),
             _cell(beside),
         )
     state = "[green]online[/]" if machine.online else "[red]offline: values are stale[/]"
-    return Panel(table, title=f"[bold]{machine.name}[/] {state}", title_align="left")
+    return Panel(table, title=f"[bold]{escape(machine.name)}[/] {state}", title_align="left")
 
 
 def _cell(reading: Reading | None) -> Text:

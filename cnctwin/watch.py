@@ -35,7 +35,7 @@ def show(
     def seen() -> list[MachineView]:
         return [view for view in machines(host) if machine is None or view.name == machine]
 
-    if not console.is_terminal:
+    if not console.is_terminal or console.is_dumb_terminal:
         told_s = time.monotonic()
         while not stop():
             on_events(host.poll(0.2))

@@ -40,8 +40,8 @@ class MachineSection(Section):
 
 
 class BrokerSection(Section):
-    """Where to publish. Empty `node` means `edge-<machine>`; empty `session_file` keeps bdSeq, and
-    the place in the control's stream, in memory only."""
+    """Where to publish. Empty `node` means `edge-<machine>`; `session_file` keeps bdSeq and,
+    beside it, the place in the control's stream; empty, the program keeps them in its state folder."""
 
     url: str = "mqtt://127.0.0.1:1883"
     group: str = "cnc"

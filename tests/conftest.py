@@ -13,6 +13,14 @@ settings.register_profile("house", deadline=None)
 settings.load_profile("house")
 
 
+@pytest.fixture(scope="session", autouse=True)
+def state_of_its_own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """What commands keep over restarts goes into a folder of this run, not into the user's home."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("CNCTWIN_STATE_DIR", str(tmp_path_factory.mktemp("state")))
+        yield
+
+
 @pytest.fixture(scope="session")
 def mosquitto_program() -> str:
     """The path of Mosquitto; the test is skipped where there is none."""

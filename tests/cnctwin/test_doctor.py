@@ -1,0 +1,122 @@
+"""The doctor says what is not as it should be: no broker, no node, one that died, a ledger that does not add up."""
+
+import json
+import sys
+import threading
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+
+import pytest
+
+from cnctwin.cli import main
+from cnctwin.doctor import Report, examine
+from sparkplug.broker import BrokerAddress
+from sparkplug.datatype import DataType
+from sparkplug.edge_node import EdgeNode
+from sparkplug.metric import Change, MetricSpec, NodeId
+from tests.cnctwin.program import free_port, until
+from tests.wire.mosquitto import Mosquitto
+
+pytestmark = pytest.mark.broker
+HEALTHY = {"received": 10, "emitted": 7, "buffered": 1, "dropped": 2, "dropped/unmapped": 2}
+LISTEN_S = 1.2
+
+
+@contextmanager
+def edge(broker: Mosquitto, ledger: Mapping[str, int], *, holes: int = 0) -> Iterator[EdgeNode]:
+    """An edge that publishes this ledger again and again, as a real one does, and a machine with one signal."""
+    counts = {f"ledger/{name}": count for name, count in ledger.items()} | {"health/holes": holes}
+    metrics = [MetricSpec(name, DataType.INT64, value=count) for name, count in counts.items()]
+    node = EdgeNode(BrokerAddress(*broker.address), NodeId("cnc", "edge-vmc"), metrics)
+    node.declare_device("vmc", [MetricSpec("exec_state", DataType.STRING, value="READY")])
+    node.start()
+    until(lambda: node.online, "the edge to be born")
+    stop = threading.Event()
+
+    def beat() -> None:
+        while not stop.wait(0.1):
+            node.publish(None, [Change("health/holes", holes, time.time_ns() // 1_000_000)])
+
+    heart = threading.Thread(target=beat)
+    heart.start()
+    try:
+        yield node
+    finally:
+        stop.set()
+        heart.join()
+        node.stop()
+
+
+def report(broker: Mosquitto) -> Report:
+    return examine(BrokerAddress(*broker.address), "cnc", LISTEN_S)
+
+
+def bad(seen: Report) -> list[str]:
+    return [finding.text for finding in seen.findings if not finding.good]
+
+
+def call(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> int:
+    monkeypatch.setattr(sys, "argv", ["cnctwin", "doctor", *arguments])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    return int(ended.value.code or 0)
+
+
+def test_a_healthy_plant_has_no_bad_finding_and_counted_holes_are_told(mosquitto: Mosquitto) -> None:
+    with edge(mosquitto, HEALTHY, holes=3):
+        seen = report(mosquitto)
+    assert bad(seen) == []
+    assert seen.good
+    told = " | ".join(finding.text for finding in seen.findings)
+    assert "edge-vmc: 10 = 7 emitted + 2 dropped + 1 buffered" in told
+    assert "vmc: its control is connected; 1 signals, 0 not good" in told
+    assert "3 holes so far, counted" in told
+
+
+@pytest.mark.parametrize("wrong", [{"emitted": 6}, {"dropped/unmapped": 1}])
+def test_a_ledger_that_does_not_add_up_is_bad_news(mosquitto: Mosquitto, wrong: dict[str, int]) -> None:
+    with edge(mosquitto, HEALTHY | wrong):
+        seen = report(mosquitto)
+    assert not seen.good
+    assert len(bad(seen)) == 1
+    assert bad(seen)[0].startswith("edge-vmc: not 10 = ")
+
+
+def test_a_broker_without_a_node_is_bad_news(mosquitto: Mosquitto) -> None:
+    assert bad(report(mosquitto)) == ["no edge node was heard of; start one with `cnctwin edge run CONFIG`"]
+
+
+def test_an_edge_and_a_machine_that_die_meanwhile_are_bad_news(mosquitto: Mosquitto) -> None:
+    with edge(mosquitto, HEALTHY) as node:
+        threading.Timer(LISTEN_S, node.stop).start()
+        seen = examine(BrokerAddress(*mosquitto.address), "cnc", 2 * LISTEN_S)
+    told = " | ".join(bad(seen))
+    assert "edge-vmc is offline" in told
+    assert "vmc: its control is not connected" in told
+
+
+def test_without_a_broker_there_is_one_line_and_exit_code_1(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    port = free_port()
+    assert call(monkeypatch, "--broker", f"mqtt://127.0.0.1:{port}", "--seconds", "1") == 1
+    out = capfd.readouterr().out
+    assert len(out.splitlines()) == 1
+    assert f"mqtt://127.0.0.1:{port}" in out
+
+
+@pytest.mark.parametrize(("emitted", "code"), [(7, 0), (6, 1)])
+def test_a_program_reads_the_whole_report(
+    mosquitto: Mosquitto, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], emitted: int, code: int
+) -> None:
+    url = BrokerAddress(*mosquitto.address).url
+    with edge(mosquitto, HEALTHY | {"emitted": emitted}):
+        assert call(monkeypatch, "--broker", url, "--seconds", "1.2", "--json") == code
+    said = json.loads(capfd.readouterr().out)
+    assert said["good"] is (code == 0)
+    assert {"good", "text"} == set(said["findings"][0])
+    (ledger,) = said["ledgers"]
+    assert ledger["node"] == "edge-vmc"
+    assert ledger["balances"] is (code == 0)
+    assert ledger["reasons"] == {"unmapped": 2}
