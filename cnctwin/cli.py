@@ -82,6 +82,7 @@ def doctor(
     from cnctwin.terminal import ledger_table
     from sparkplug.broker import BrokerAddress
 
+    logging.getLogger("sparkplug").setLevel(logging.ERROR)  # what is wrong with the connection stands in the report
     report = examine(address(broker) or BrokerAddress(), group, seconds)
     if as_json:
         _print_json(report.as_json())

@@ -293,7 +293,8 @@ def _settle(host: HostApplication, on_events: Callable[[list[HostEvent]], None])
     while time.monotonic() < deadline_s:
         on_events(host.poll(0.1))
         now = tuple(ledgers(host))
-        if now != before or any(ledger.buffered for ledger in now):
+        begun = len(now) == 1 + len(PROCESSORS) and all(ledger.received for ledger in now)
+        if not begun or now != before or any(ledger.buffered for ledger in now):
             before, since_s = now, time.monotonic()
         elif time.monotonic() - since_s >= QUIET_S:
             return

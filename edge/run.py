@@ -1,14 +1,12 @@
 """One edge from its configuration file: the broker, the node and the loop put together."""
 
 import os
-import signal
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from edge.adapter import adapters
 from edge.config import BrokerSection, EdgeConfig
-from edge.config_file import load
 from edge.errors import ConfigError
 from edge.health import HEALTH
 from edge.ledger import Ledger
@@ -48,15 +46,3 @@ def edge_runtime(config: EdgeConfig[Any], address: BrokerAddress | None = None) 
     )
     place_file = Path(broker.session_file + ".place") if broker.session_file else None
     return EdgeRuntime(config, adapters()[config.machine.adapter], node, ledger=ledger, place_file=place_file)
-
-
-def run(config_path: Path, *, broker_url: str | None = None) -> dict[str, int]:
-    """Run the edge of this file until SIGTERM or SIGINT; the last ledger. `broker_url` takes the place of the configured one."""
-    config = load(config_path)
-    if broker_url is not None:
-        config = replace(config, broker=config.broker.model_copy(update={"url": broker_url}))
-    runtime = edge_runtime(config)
-    for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: runtime.stop.set())
-    runtime.run()
-    return runtime.ledger.snapshot()

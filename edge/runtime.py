@@ -78,6 +78,7 @@ class EdgeRuntime:
         self._arrivals: queue.Queue[Arrival] = queue.Queue(QUEUE_FRAMES_MAX)
         self._pipeline = Pipeline(config)
         self._offers: tuple[Offer, ...] = ()
+        self._told: dict[str, EdgeSample] = {}  # the latest of each signal, as far as the rows have gone
         self._is_declared = False
         self._is_reporting = True  # whether the control gives values, as far as its server knows
         self._was_available = False
@@ -170,9 +171,11 @@ class EdgeRuntime:
     def _publish(self, outcome: Outcome) -> tuple[int, dict[Drop, int]]:
         """Send the rows. While the control is lost its device is dead, and what still comes is dropped with that reason."""
         emitted, dropped = 0, dict(outcome.dropped)
-        if not self._is_declared and self._is_reporting and self._offers:
-            self._declare({sample.signal for row in outcome.rows for sample in row})
+        self._declare_if_due()
         for row in outcome.rows:
+            # The birth shows the state up to this row and no further: what follows must not be older than what is known.
+            self._told.update((sample.signal, sample) for sample in row)
+            self._declare_if_due()
             observations = sum(sample.observations for sample in row)
             if not self._is_declared:
                 dropped[Drop.CONTROL_LOST] = dropped.get(Drop.CONTROL_LOST, 0) + observations
@@ -186,16 +189,12 @@ class EdgeRuntime:
         changes = [Change(s.signal, s.value, s.timestamp_ms, s.quality, s.reason) for s in row]
         return self._node.publish(self.config.machine.name, changes)
 
-    def _declare(self, coming: set[str]) -> None:
-        """The birth, as soon as there is something to say. What no row brings anew follows with its reason and its own time."""
-        last = {sample.signal: sample for sample in self._pipeline.last}
-        if not last:
+    def _declare_if_due(self) -> None:
+        """The birth, as soon as there is something to say and the control reports."""
+        if self._is_declared or not self._is_reporting or not self._offers or not self._told:
             return
-        metrics = device_metrics(self._offers, last)
-        self._node.declare_device(self.config.machine.name, metrics)
+        self._node.declare_device(self.config.machine.name, device_metrics(self._offers, self._told))
         self._is_declared = True
-        if known := [last[metric.name] for metric in metrics if metric.name in last and metric.name not in coming]:
-            self._send(known)
 
     def _remove(self) -> None:
         self._node.remove_device(self.config.machine.name)

@@ -88,6 +88,9 @@ class Lane:
         if not readings:
             self._ledger.emitted += 1
             return
+        if self._inputs is None:
+            self._show(SampleKind.DATA, readings, effects)
+            return
         at_ms = self._time_of(readings)
         if at_ms is not None and self.clock_ms is not None and at_ms < self.last_ms - self._late_ms:
             self._held.append(readings)
@@ -101,6 +104,10 @@ class Lane:
 
     def birth(self, readings: Sequence[Reading], taken: Sequence[Reading], wall_s: float, effects: list[Effect]) -> None:
         """A birth has come: the values `taken` of it hold, whatever was known before."""
+        if self._inputs is None:
+            self.is_restored = False
+            self._show(SampleKind.BIRTH, taken, effects)
+            return
         self.drop_held()
         at_ms = self._time_of(readings)
         before_ms = self.last_ms if self.clock_ms is not None else None
@@ -115,6 +122,12 @@ class Lane:
         self.ticking = True
         names = tuple(reading.name for reading in taken)
         self._settle(self._fold(SampleKind.BIRTH, self._now_ms(readings), names, effects))
+
+    def _show(self, kind: SampleKind, readings: Sequence[Reading], effects: list[Effect]) -> None:
+        """For a processor that reads everything, from several sources, each with a clock of its own, so that there is no common time.
+        What comes last of a source is what it said last: the session has put its messages in order."""
+        self.row.update((reading.name, reading) for reading in readings)
+        self._settle(self._fold(kind, self._now_ms(readings), tuple(reading.name for reading in readings), effects))
 
     def death(self, names: Sequence[str], at_ms: int, reason: str, effects: list[Effect], *, is_last: bool) -> bool:
         """An edge of the machine went offline, and `names` with it. Whether the fold took it."""

@@ -174,7 +174,7 @@ def test_a_killed_edge_that_is_started_again_changes_nothing_in_the_end_state(mo
             f'[mtconnect]\nurl = "{agent.url}"\ndevice = "OKUMA"\ninterval_ms = 20\n',
             encoding="utf-8",
         )
-        command = [sys.executable, "-c", f"from pathlib import Path; from edge.run import run; run(Path({str(file)!r}))"]
+        command = [sys.executable, "-m", "cnctwin", "edge", "run", str(file)]
         agent.step(2)
         first = subprocess.Popen(command, cwd=PROJECT)
         wait(lambda: "tool_number" in onlooker.machine, "the birth of the machine")

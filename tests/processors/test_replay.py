@@ -89,5 +89,5 @@ def test_the_okuma_recording_goes_through_whole(processor: AnyProcessor) -> None
     effects: list[Effect] = fed(engine, *events)
     assert len(events) > 3000
     assert [effect for effect in effects if isinstance(effect, DeadLetter)] == []
-    assert engine.counts.holes == 3
+    assert engine.counts.holes == (0 if processor.inputs is None else 3)  # who reads everything has no clock of its own
     assert (engine.ledger.emitted, engine.ledger.dropped_total, engine.ledger.buffered) == (len(events), 0, 0)
