@@ -124,8 +124,10 @@ class Lane:
         self._settle(self._fold(SampleKind.BIRTH, self._now_ms(readings), names, effects))
 
     def _show(self, kind: SampleKind, readings: Sequence[Reading], effects: list[Effect]) -> None:
-        """For a processor that reads everything, from several sources, each with a clock of its own, so that there is no common time.
-        What comes last of a source is what it said last: the session has put its messages in order."""
+        """For a processor that reads everything, from several sources, each with a clock of its own: there is no common time.
+
+        What comes last of a source is what it said last: the session has put its messages in order.
+        """
         self.row.update((reading.name, reading) for reading in readings)
         self._settle(self._fold(kind, self._now_ms(readings), tuple(reading.name for reading in readings), effects))
 
