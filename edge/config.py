@@ -123,4 +123,14 @@ def one_line(path: Path, table: str, error: ValidationError) -> str:
     key = ".".join(str(part) for part in (*filter(None, [table]), *first["loc"]))
     if first["type"] == "extra_forbidden":
         return f"{path}: {key}: no such key; remove it, or see the sample configuration beside the adapter for the right name"
-    return f"{path}: {key} = {first['input']!r}: {first['msg'].removeprefix('Value error, ')}"
+    shown = without_secret(repr(first["input"]))
+    return f"{path}: {key} = {shown}: {first['msg'].removeprefix('Value error, ')}"
+
+
+def without_secret(text: str) -> str:
+    """A text with the password of any address in it left out.
+
+    >>> without_secret("http://maintenance:hunter2@agent:5000")
+    'http://maintenance:…@agent:5000'
+    """
+    return re.sub(r"(//[^/@:\s]*):[^/\s]*@", r"\1:…@", text)

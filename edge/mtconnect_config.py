@@ -8,6 +8,8 @@ from edge.config import Section
 
 
 def _http(url: str) -> str:
+    if "@" in url.partition("//")[2].partition("/")[0]:
+        raise ValueError("must hold no user or password, since addresses are logged and published; use username and password_env")
     if not url.startswith(("http://", "https://")):
         raise ValueError("is no http:// or https:// address")
     return url.rstrip("/")

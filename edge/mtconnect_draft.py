@@ -2,7 +2,7 @@
 
 from pydantic import ValidationError
 
-from edge.config import EdgeConfig
+from edge.config import EdgeConfig, without_secret
 from edge.errors import ConfigError, ConnectionLostError
 from edge.mapping import assign
 from edge.mtconnect_config import MtconnectConfig
@@ -20,7 +20,7 @@ def draft(url: str, device: str = "") -> str:
         config = EdgeConfig(source=MtconnectConfig(url=url))
     except ValidationError as error:
         why = error.errors()[0]["msg"].removeprefix("Value error, ")
-        raise ConfigError(f"address {url!r} {why}, such as http://agent:5000") from error
+        raise ConfigError(f"address {without_secret(repr(url))} {why}, such as http://agent:5000") from None
     document = parse_document(fetch(config, Request("/probe")))
     if not isinstance(document, DevicesDocument):
         raise ConnectionLostError(f"{url}/probe: the agent answers {document} in place of its device description")

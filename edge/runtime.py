@@ -7,6 +7,7 @@ When the main thread falls behind, the queue fills and the connection thread sto
 fill, and what it drops is a hole that is counted. Nothing is dropped here without a reason in the ledger.
 """
 
+import logging
 import queue
 import threading
 import time
@@ -25,6 +26,7 @@ from edge.place import Place, PlaceFile
 from edge.sample import UNAVAILABLE, Drop, EdgeSample, Offer, SampleSet
 from sparkplug.metric import Change, MetricSpec
 
+_log = logging.getLogger(__name__)
 QUEUE_FRAMES_MAX = 256
 REPORT_INTERVAL_S = 1.0
 
@@ -82,7 +84,7 @@ class EdgeRuntime:
         self._is_declared = False
         self._is_reporting = True  # whether the control gives values, as far as its server knows
         self._was_available = False
-        self._last_error = ""
+        self._fault = 0, ""
         self._reported_s = clock()
         self.health = Health()
         self._crash: BaseException | None = None
@@ -217,7 +219,10 @@ class EdgeRuntime:
             "health/unsent_messages": self._node.unsent,
             "health/ledger_difference": Ledger.difference(counters),
         }
-        if self._connection.last_error != self._last_error:
-            self._last_error = self.health.last_error = self._connection.last_error
+        fault = self._connection.reconnects, self._connection.last_error
+        if fault != self._fault:
+            if fault[1] != self._fault[1]:
+                _log.warning("%s: %s", self.config.machine.name, fault[1])
+            self._fault, self.health.last_error = fault, fault[1]
         self._node.publish(None, [Change(name, number, now_ms) for name, number in counters.items()])
         self._node.publish(None, self.health.changes(now_ms, outside))

@@ -61,9 +61,13 @@ def configured(
     for table in tables:
         _table_owner(table, config_path)
     processors = [find(name) for name in dict.fromkeys(names)]
-    return [
-        (processor, Configuration(processor.config, tables.get(processor.name), name=processor.name)) for processor in processors
-    ]
+    try:
+        return [
+            (processor, Configuration(processor.config, tables.get(processor.name), name=processor.name))
+            for processor in processors
+        ]
+    except ConfigurationError as error:
+        raise ConfigurationError(f"{config_path}: {error}") from error
 
 
 def _table_owner(table: str, config_path: Path | None) -> AnyProcessor:

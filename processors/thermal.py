@@ -95,7 +95,10 @@ def _with_inputs(config: Config, state: State, sample: Sample) -> State:
     """The state with the inputs of this sample, advanced to it where they differ from those held."""
     heat_w, why_blind = _heat(config.network, sample)
     if heat_w is None:
-        if state.at_s is None or (state.blind_since_s is not None and state.why_blind == why_blind):
+        if state.at_s is None:
+            known = sample.kind in (SampleKind.HOLE, SampleKind.DEATH) or state.why_not == why_blind
+            return state if known else replace(state, why_not=why_blind)
+        if state.blind_since_s is not None and state.why_blind == why_blind:
             return state
         since_s = sample.at_s if state.blind_since_s is None else state.blind_since_s
         return replace(_advanced(config.network, state, sample.at_s), blind_since_s=since_s, why_blind=why_blind)

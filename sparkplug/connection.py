@@ -25,6 +25,7 @@ from paho.mqtt.reasoncodes import ReasonCode
 
 from sparkplug.actions import Action, Connect, Disconnect, Publish, Subscribe
 from sparkplug.broker import BrokerAddress
+from sparkplug.errors import BrokerAddressError
 from sparkplug.paho_client import CONNECT_TIMEOUT_S, ReadingAheadClient
 
 OUTBOX_MAX = 20_000
@@ -66,6 +67,10 @@ class MqttConnection:
             raise ValueError(f"MQTT version {mqtt_version} is neither 4 (3.1.1) nor 5")
         if not brokers:
             raise ValueError("a connection needs at least one broker")
+        for broker in brokers:
+            for path in (broker.ca_file, broker.certificate_file, broker.key_file):
+                if path is not None and not path.is_file():
+                    raise BrokerAddressError(f"broker {broker.url}: there is no file {path}")
         self.last_error = ""
         self.connects = 0
         self.unsent = 0  # messages that were given to us for a connection that ended before it took them

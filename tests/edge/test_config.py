@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from edge.check import discover
 from edge.config import BLOCK_PATTERN, EdgeConfig
 from edge.config_file import load, parse
 from edge.errors import ConfigError
@@ -88,3 +89,14 @@ def test_secrets_come_from_the_environment(monkeypatch: pytest.MonkeyPatch) -> N
     address = broker_address(section, FILE)
     assert (address.username, address.password) == ("edge", "s3cret")
     assert "s3cret" not in repr(address) + address.url
+
+
+def test_an_address_with_a_password_is_refused_without_showing_it(tmp_path: Path) -> None:
+    file = tmp_path / "vmc.toml"
+    file.write_text('[mtconnect]\nurl = "http://u:hunter2@127.0.0.1:5000"\n')
+    with pytest.raises(ConfigError, match="must hold no user or password") as caught:
+        load(file)
+    assert "hunter2" not in str(caught.value)
+    with pytest.raises(ConfigError, match="must hold no user or password") as caught:
+        discover("http://u:hunter2@127.0.0.1:5000")
+    assert "hunter2" not in str(caught.value)
