@@ -37,7 +37,6 @@ class EdgeNode:
         self._session = EdgeNodeSession(node, metrics, now_ms=now_ms(), primary_host=primary_host, templates=templates)
         self._lock = threading.Lock()
         self._on_command = on_command
-        self.refused = 0
         listener = Listener(self._connecting, self._bd_seq.give_back, self._connected, self._message, self._lost, self._tick)
         addresses = (brokers,) if isinstance(brokers, BrokerAddress) else tuple(brokers)
         self._connection = MqttConnection(
@@ -102,7 +101,6 @@ class EdgeNode:
             if self._connection.full:
                 # Nothing is sent, so no sequence number is used and no host sees a hole; the caller counts the loss.
                 self._session.note(device, changes)
-                self.refused += 1
                 return False
             actions = self._session.publish(device, changes, now_ms())
             self._connection.send(actions)

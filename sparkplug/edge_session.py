@@ -75,7 +75,6 @@ class EdgeNodeSession:
         self._certificate = Certificate(f"edge node {node}", metrics, partial(self._alias, None), now_ms, self._templates)
         self._devices: dict[str, Certificate] = {}
         self._primary_topic = None if primary_host is None else state_topic(primary_host)
-        self._primary_online = False
         self._server = 0
         self._state_timestamps_ms: dict[int, int] = {}
         self._rebirth = RebirthAnswer(rebirth_interval_ms_min)
@@ -88,7 +87,7 @@ class EdgeNodeSession:
         """A connection to broker number `server` is about to be opened with this birth/death sequence number."""
         if self.phase is not Phase.OFFLINE:
             raise SparkplugError(f"edge node {self.node} is connected already; one broker at a time")
-        self.bd_seq, self._server, self._primary_online = bd_seq, server, False
+        self.bd_seq, self._server = bd_seq, server
         return Connect(will=self._death(now_ms))
 
     def connected(self, now_ms: int) -> list[Action]:
@@ -105,7 +104,6 @@ class EdgeNodeSession:
     def lost(self) -> None:
         """The connection is gone, whoever ended it."""
         self.phase = Phase.OFFLINE
-        self._primary_online = False
 
     def message(self, topic: str, payload: bytes, now_ms: int) -> list[Action]:
         """A message has come; a malformed one is counted and changes nothing."""
@@ -231,7 +229,6 @@ class EdgeNodeSession:
         if state.timestamp_ms < self._state_timestamps_ms.get(self._server, state.timestamp_ms):
             return []
         self._state_timestamps_ms[self._server] = state.timestamp_ms
-        self._primary_online = state.online
         if state.online:
             return self._birth(now_ms) if self.phase is Phase.WAITING else []
         return [self._death(now_ms), WalkToNextServer()]
