@@ -1,0 +1,44 @@
+"""What can go wrong in the twin, in one tree. Each message names the culprit, its value and the way out.
+
+TwinError
+├── ProgramError      a part program that the control would refuse: line, word, reason
+├── MachineError      a machine.toml that does not describe a machine
+├── RunLogError       a recording that is not a run log
+├── CaseError         a case folder that is not a case
+└── EffectError       an effect that does not exist, or is given what it does not take
+"""
+
+
+class TwinError(ValueError):
+    """Base of all: the input is at fault, and the message says which part of it."""
+
+
+class MachineError(TwinError):
+    """A machine description that cannot be used."""
+
+
+class RunLogError(TwinError):
+    """A recording whose columns or values are not those of a run log."""
+
+
+class CaseError(TwinError):
+    """A case folder that cannot be read."""
+
+
+class EffectError(TwinError):
+    """An effect, or a parameter of one, that does not exist or is out of its bounds."""
+
+
+class ProgramError(TwinError):
+    """A part program that cannot be run.
+
+    line: 1-based, as an editor counts
+    word: the word at fault, as written; empty where a whole block is
+    reason: what is wrong with it and the way out
+    program: name of the text that the line is in; None = the main program
+    """
+
+    def __init__(self, line: int, word: str, reason: str, program: str | None = None) -> None:
+        self.line, self.word, self.reason, self.program = line, word, reason, program
+        where = f"line {line}" if program is None else f"{program}, line {line}"
+        super().__init__(f"{where}: {word + ': ' if word else ''}{reason}")

@@ -1,0 +1,215 @@
+"""`machine.toml`: what the twin is told about a machine (formats, section 4). Typed, frozen, checked before anything runs.
+
+A section that a machine has no data for is None; what needs it says so. Values that a control knows by another name keep that
+name in their description. A machine is written back as the same TOML, so that an identified machine is a file like any other.
+"""
+
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, Self
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from twin.errors import MachineError
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+ByDirection = NotNegative | tuple[NotNegative, NotNegative]
+"""A figure, or [moving in -, moving in +]."""
+
+
+class Section(BaseModel):
+    """A table of the file: nothing but the keys that exist, nothing changed after it was read."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Machine(Section):
+    """[machine]: its name and the period at which position and velocity loop tick."""
+
+    name: str = Field(min_length=1)
+    servo_period_s: Positive = 0.001
+
+
+class Friction(Section):
+    """[axes.a.friction]: F = sgn(v) [F_c + (F_s − F_c) exp(−(v/v_s)²)] + μ v, each constant for both directions or [−, +]."""
+
+    coulomb_n: ByDirection
+    static_n: ByDirection
+    stribeck_velocity_mm_s: Positive | tuple[Positive, Positive]
+    viscous_n_s_per_mm: ByDirection = 0.0
+
+    @model_validator(mode="after")
+    def _static_is_not_below_coulomb(self) -> Self:
+        for side in (0, 1):
+            if by_side(self.static_n, side) < by_side(self.coulomb_n, side):
+                raise ValueError(
+                    f"static_n {self.static_n} is below coulomb_n {self.coulomb_n}; friction at rest is not the smaller one"
+                )
+        return self
+
+
+def by_side(value: float | tuple[float, float], side: int) -> float:
+    """The figure for moving in − (side 0) or in + (side 1)."""
+    return value[side] if isinstance(value, tuple) else value
+
+
+class Axis(Section):
+    """[axes.a]: feed drive and servo loops. The force of a torque command comes from the screw or is stated as such."""
+
+    mass_kg: Positive
+    screw_lead_mm: Positive | None = None
+    torque_constant_nm_per_a: Positive | None = None
+    force_per_command_n: Positive | None = None
+    position_gain_per_s: Positive
+    velocity_gain_a_s_per_mm: Positive
+    velocity_integral_gain_a_per_mm: NotNegative = 0.0
+    torque_limit_a: Positive
+    friction: Friction
+
+    @model_validator(mode="after")
+    def _force_is_known_once(self) -> Self:
+        screw = self.screw_lead_mm is not None and self.torque_constant_nm_per_a is not None
+        if (self.force_per_command_n is None) != screw:
+            raise ValueError("state either force_per_command_n, or screw_lead_mm with torque_constant_nm_per_a")
+        return self
+
+    @property
+    def newton_per_command(self) -> float:
+        """Force of one unit of torque command, N: k_t · 2π / lead, or as stated.
+
+        A torque of 1.2 N·m on a lead of 12 mm: 1.2 · 2π / 0.012 m = 628.3 N.
+        """
+        if self.force_per_command_n is not None:
+            return self.force_per_command_n
+        assert self.torque_constant_nm_per_a is not None and self.screw_lead_mm is not None
+        return self.torque_constant_nm_per_a * 2.0 * 3.141592653589793 / (self.screw_lead_mm / 1000.0)
+
+
+class Tool(Section):
+    """[tool]: an end mill without helix; K_t and K_e = F_r / F_t of the material it cuts."""
+
+    diameter_mm: Positive
+    teeth: Annotated[int, Field(ge=1)]
+    tangential_coefficient_n_per_mm2: Positive
+    radial_ratio: NotNegative
+
+
+class SpindleDrive(Section):
+    """[spindle]: what 100 % load means, which part reaches the tool, what it takes to turn in air."""
+
+    rated_power_kw: Positive
+    efficiency: Annotated[float, Field(gt=0, le=1)]
+    idle_power_kw: NotNegative = 0.0
+
+
+class Thermal(Section):
+    """[thermal]: C dT/dt = alpha · load · rpm² + beta · rpm − (T − T_ambient) / R."""
+
+    alpha_w_per_pct_rpm2: NotNegative
+    beta_w_per_rpm: NotNegative
+    resistance_k_per_w: Positive
+    capacity_j_per_k: Positive
+
+
+class Program(Section):
+    """[program]: how long a program takes. Each default is an ideal control: no limit, no time."""
+
+    rapid_mm_min: Positive
+    acceleration_mm_s2: Positive
+    jerk_mm_s3: Positive | None = None
+    corner_speed_difference_mm_min: NotNegative = 0.0
+    block_time_s: NotNegative = 0.0
+    tool_change_s: NotNegative = 0.0
+    spindle_acceleration_rpm_s: Positive | None = None
+
+
+class Limits(Section):
+    """[limits]: for the optimiser."""
+
+    feed_mm_min: tuple[Positive, Positive]
+    spindle_rpm: tuple[Positive, Positive]
+    force_n: Positive | None = None
+
+
+class Cost(Section):
+    """[cost]: tool life by Taylor, V Tⁿ = C, and what a second costs."""
+
+    currency: str
+    tool_price: NotNegative
+    tool_change_s: NotNegative
+    labour_per_s: NotNegative
+    depreciation_per_s: NotNegative
+    taylor_c_m_per_min: Positive
+    taylor_n: Positive
+
+
+class Stock(Section):
+    """[stock]: the box that is cut from, in machine coordinates."""
+
+    min_mm: tuple[Finite, Finite, Finite]
+    max_mm: tuple[Finite, Finite, Finite]
+
+    @model_validator(mode="after")
+    def _is_a_box(self) -> Self:
+        for axis, low, high in zip("xyz", self.min_mm, self.max_mm, strict=True):
+            if not low < high:
+                raise ValueError(f"min_mm {low} is not below max_mm {high} in {axis}")
+        return self
+
+
+class AddedEffect(Section):
+    """[[effects]]: an effect that was added to this twin, where it acts, and its parameters."""
+
+    effect: str
+    on: str = ""
+    parameters: dict[str, float] = Field(default_factory=dict)
+
+
+class MachineFile(Section):
+    """The whole file."""
+
+    machine: Machine
+    axes: dict[Annotated[str, Field(pattern=r"^[a-z][a-z0-9]?$")], Axis] = Field(default_factory=dict)
+    tool: Tool | None = None
+    spindle: SpindleDrive | None = None
+    thermal: Thermal | None = None
+    program: Program | None = None
+    limits: Limits | None = None
+    cost: Cost | None = None
+    stock: Stock | None = None
+    uncertainty: dict[str, NotNegative] = Field(default_factory=lambda: {"relative": 0.05})
+    noise: dict[str, NotNegative] = Field(default_factory=dict)
+    effects: tuple[AddedEffect, ...] = ()
+
+
+def machine_from_toml(text: str, source: str = "machine.toml") -> MachineFile:
+    """The machine that `text` describes.
+
+    Raises MachineError naming source, key, value and what would be right: the first fault, and how many more there are.
+    """
+    try:
+        return MachineFile.model_validate(tomllib.loads(text))
+    except tomllib.TOMLDecodeError as error:
+        raise MachineError(f"{source}: is not TOML: {error}") from None
+    except ValidationError as error:
+        first, *rest = error.errors(include_url=False)
+        key = ".".join(str(part) for part in first["loc"])
+        more = f" (and {len(rest)} more)" if rest else ""
+        raise MachineError(
+            f"{source}: {key}: {first['msg'].removeprefix('Value error, ')}{_shown(first['input'])}{more}"
+        ) from None
+
+
+def _shown(value: Any) -> str:
+    return f", not {value!r}" if isinstance(value, int | float | str) else ""
+
+
+def read_machine(path: Path) -> MachineFile:
+    """The machine in the file `path`. Raises MachineError where there is none or it does not describe a machine."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise MachineError(f"{path}: cannot be read: {error}") from None
+    return machine_from_toml(text, str(path))
