@@ -1,0 +1,187 @@
+"""Runs axes: the servo loops and mechanics of any number of lanes over a reference.
+
+A lane is one axis of one candidate machine. One lane, three axes or thousands of candidates go through the same kernel text; it
+is made for 4, 8 or 32 lanes side by side, and the last block is filled up with copies of its first lane.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.effects.catalogue import effect_named
+from twin.effects.effect import Effect
+from twin.errors import EffectError
+from twin.generated import compiled, in_python
+from twin.servo.kernel import AxisKernel, axis_kernel, axis_quantities
+from twin.servo.metrics import AxisMetrics
+
+Array = NDArray[np.float64]
+LANES = (4, 8, 32)
+
+
+@dataclass(frozen=True, slots=True)
+class AxisRun:
+    """What the lanes did.
+
+    outputs: name → (lanes, ticks); state: name → (lanes,), to go on from; ticks: how many have been run since the start, so that
+    effects that age go on ageing
+    """
+
+    outputs: Mapping[str, Array]
+    state: Mapping[str, Array]
+    ticks: int
+
+    def following_error_rms_mm(self) -> Array:
+        """Root mean square of the following error, (lanes,), where the run was measured."""
+        return np.sqrt(self.state["following_error_sum_mm2"] / self.ticks)
+
+    def torque_rms_a(self) -> Array:
+        """Root mean square of the torque command, (lanes,), where the run was measured."""
+        return np.sqrt(self.state["torque_sum_a2"] / self.ticks)
+
+
+@dataclass(frozen=True, slots=True)
+class AxisInput:
+    """What goes into the lanes, by tick.
+
+    reference_mm: (columns, ticks); disturbance_n: the same shape, or None; recorded: quantity → (columns, ticks), taken from a
+    recording in place of what the model makes; column: (lanes,) which column a lane follows
+    """
+
+    reference_mm: Array
+    column: NDArray[np.intp]
+    disturbance_n: Array | None = None
+    recorded: Mapping[str, Array] = field(default_factory=dict)
+
+
+def run_axes(
+    constants: Mapping[str, Array],
+    inputs: AxisInput,
+    *,
+    period_s: float = 0.001,
+    steps: int | None = None,
+    effects: Sequence[str] = (),
+    outputs: tuple[str, ...] = ("position_mm", "torque_a"),
+    measured: bool = False,
+    start: Mapping[str, Array | float] | None = None,
+    first_tick: int = 0,
+    reference_run: bool = False,
+) -> AxisRun:
+    """Runs all lanes over all ticks.
+
+    constants: name → (lanes,), of the axes (`twin.servo.constants`) and of the effects (`effect__parameter`)
+    steps: of the mechanics between two ticks; None = as many as the effects say that they need, else one
+    effects: names of those that are in the kernel; lanes that do not have one carry its null values
+    outputs: quantities to keep at every tick; measured: whether to keep sums and peaks (`twin.servo.metrics`)
+    start: the state to start from, by name; what is not given starts at rest on the reference
+    reference_run: in plain Python, slowly, from the same text
+
+    Raises EffectError where a constant is missing, or an effect does not act on an axis.
+    """
+    acting = tuple(effect_named(name) for name in effects)
+    steps = steps or max((effect.steps for effect in acting), default=1)
+    for effect in acting:
+        if not set(effect.changes) & set(axis_quantities()):
+            raise EffectError(
+                f"{effect.name} does not act on the loops or the mechanics of an axis; it acts at the {effect.site} site"
+            )
+    lanes = len(inputs.column)
+    kept: dict[str, list[Array]] = {name: [] for name in outputs}
+    states: list[dict[str, Array]] = []
+    blocks = _blocks(inputs.column)
+    for block in blocks:
+        job = _Block(block, constants, inputs, acting, outputs, measured, start or {}, reference_run)
+        out, state = job.run(first_tick, steps, period_s)
+        for row, name in enumerate(outputs):
+            kept[name].append(out[row, :, : len(block)].T)
+        states.append({name: values[: len(block)] for name, values in state.items()})
+    order = np.argsort(np.concatenate(blocks)) if lanes else np.array([], dtype=np.intp)
+    return AxisRun(
+        {name: np.concatenate(parts)[order] for name, parts in kept.items()},
+        {name: np.concatenate([state[name] for state in states])[order] for name in states[0]} if states else {},
+        first_tick + inputs.reference_mm.shape[1],
+    )
+
+
+def _blocks(column: NDArray[np.intp]) -> list[NDArray[np.intp]]:
+    """Lanes that run side by side: as many as go on one column, what is left over together."""
+    full, left = [], []
+    for value in dict.fromkeys(column.tolist()):
+        lanes = np.flatnonzero(column == value)
+        whole = len(lanes) // LANES[-1] * LANES[-1]
+        full += list(lanes[:whole].reshape(-1, LANES[-1]))
+        left.append(lanes[whole:])
+    rest = np.concatenate(left) if left else np.array([], dtype=np.intp)
+    return [*full, *(rest[i : i + LANES[-1]] for i in range(0, len(rest), LANES[-1]))]
+
+
+@dataclass(frozen=True, slots=True)
+class _Block:
+    """A few lanes side by side."""
+
+    lanes: NDArray[np.intp]
+    constants: Mapping[str, Array]
+    inputs: AxisInput
+    effects: tuple[Effect, ...]
+    outputs: tuple[str, ...]
+    measured: bool
+    start: Mapping[str, Array | float]
+    reference_run: bool
+
+    def run(self, first_tick: int, steps: int, period_s: float) -> tuple[Array, dict[str, Array]]:
+        """Outputs (names, ticks, width) and the states at the end, by name."""
+        width = next(w for w in LANES if w >= len(self.lanes))
+        filled = np.concatenate([self.lanes, np.full(width - len(self.lanes), self.lanes[0])])
+        shared = len(set(self.inputs.column[self.lanes].tolist())) == 1
+        recorded = tuple(self.inputs.recorded)
+        series = [self.inputs.reference_mm]
+        series += [] if self.inputs.disturbance_n is None else [self.inputs.disturbance_n]
+        series += list(self.inputs.recorded.values())
+        kernel = axis_kernel(
+            width,
+            self.effects,
+            recorded,
+            () if shared else ("reference_mm", "disturbance_n", *recorded),
+            self.inputs.disturbance_n is not None,
+            self.outputs,
+            self.measured,
+        )
+        column = self.inputs.column[filled]
+        fed = [np.ascontiguousarray(s[column[0]] if shared else s[column].T.reshape(-1), dtype=np.float64) for s in series]
+        ticks = self.inputs.reference_mm.shape[1]
+        scratch = self._scratch(kernel, filled).reshape(-1)
+        out = np.empty((len(self.outputs), ticks, width))
+        if self.reference_run:
+            flat = [0.0] * out.size
+            cells = scratch.tolist()
+            in_python(kernel.text)["axes"](first_tick, ticks, steps, period_s, cells, *[f.tolist() for f in fed], flat)  # type: ignore[operator]
+            out, scratch = np.array(flat).reshape(out.shape), np.array(cells)
+        else:
+            compiled(kernel.text).axes(first_tick, ticks, steps, period_s, scratch, *fed, out.reshape(-1))
+        rows = scratch.reshape(-1, width)
+        return out, {name: rows[row] for row, name in enumerate(kernel.scratch[: kernel.states])}
+
+    def _scratch(self, kernel: AxisKernel, filled: NDArray[np.intp]) -> Array:
+        """States and constants, (names, width)."""
+        rows = np.zeros((len(kernel.scratch), len(filled)))
+        reference = self.inputs.reference_mm[self.inputs.column[filled], 0]
+        at_rest: dict[str, Array | float] = {"position_mm": reference, "previous_reference_mm": reference}
+        at_rest |= dict.fromkeys(AxisMetrics._fields, 0.0)
+        for effect in self.effects:
+            for name, value in effect.states.items():
+                start = self.start.get(value, at_rest.get(value, 0.0)) if isinstance(value, str) else value
+                at_rest[f"{effect.name}__{name}"] = start
+        for row, name in enumerate(kernel.scratch):
+            if name in self.start:
+                given = np.asarray(self.start[name], dtype=np.float64)
+                rows[row] = given[filled] if given.ndim else given
+            elif row < kernel.states:
+                first = np.asarray(at_rest.get(name, 0.0))
+                rows[row] = first[filled] if first.ndim and len(first) != len(filled) else first
+            elif name in self.constants:
+                rows[row] = np.asarray(self.constants[name])[filled]
+            else:
+                raise EffectError(f"the constant {name} of the axes is missing")
+        return rows
