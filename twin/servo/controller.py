@@ -59,13 +59,14 @@ def control(
     """
     position_mm = at(Site.MECHANICS, position_mm)
     velocity_mm_s = at(Site.MECHANICS, velocity_mm_s)
+    velocity_feedback_mm_s = at(Site.CONTROLLER, velocity_mm_s)
     following_error_mm = reference_mm - position_mm
     position_gain_per_s = at(Site.CONTROLLER, position_gain_per_s)
     velocity_gain_a_s_per_mm = at(Site.CONTROLLER, velocity_gain_a_s_per_mm)
     velocity_integral_gain_a_per_mm = at(Site.CONTROLLER, velocity_integral_gain_a_per_mm)
     torque_limit_a = at(Site.CONTROLLER, torque_limit_a)
     velocity_command_mm_s = at(Site.CONTROLLER, position_gain_per_s * following_error_mm)
-    velocity_error_mm_s = velocity_command_mm_s - velocity_mm_s
+    velocity_error_mm_s = velocity_command_mm_s - velocity_feedback_mm_s
     integral_a = integral_a + velocity_integral_gain_a_per_mm * velocity_error_mm_s * period_s
     integral_a = torque_limit_a if integral_a > torque_limit_a else integral_a
     integral_a = -torque_limit_a if integral_a < -torque_limit_a else integral_a

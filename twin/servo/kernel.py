@@ -13,6 +13,7 @@ from functools import cache
 
 from twin import elementary
 from twin.effects.effect import Effect
+from twin.errors import EffectError
 from twin.servo import controller, friction, mechanics, metrics, table
 from twin.weave import Physics, Woven, function_text, quantities, weave
 
@@ -26,7 +27,6 @@ STATES = frozenset(
     }
 )
 """Names that carry over from one stage or tick to the next; effects bring theirs along."""
-
 
 
 def control_stage(measured: bool) -> tuple[Physics, ...]:
@@ -128,6 +128,9 @@ def axis_kernel(
     there is a disturbance_n; outputs: names to keep at each tick; measured: whether sums and peaks are kept
     (`twin.servo.metrics`)
     """
+    for name in recorded:
+        if name not in axis_quantities():
+            raise EffectError(f"{name!r} is not a quantity that can be replaced; these are: {', '.join(axis_quantities())}")
     at_tick = weave(control_stage(measured), effects, [q for q in recorded if q in quantities(control_stage(measured))])
     between = weave(move_stage(effects), effects, [q for q in recorded if q in quantities(move_stage(effects))])
     kept = set(metrics.AxisMetrics._fields) if measured else set()
@@ -174,7 +177,8 @@ class _Layout:
 
     def kernel(self, control: _Stage, move: _Stage, recorded: tuple[str, ...], outputs: tuple[str, ...]) -> str:
         arguments = ["reference_mm_in", *(["disturbance_n_in"] if self.disturbed else []), *(f"{name}_in" for name in recorded)]
-        here = [name for name in outputs if name in control.sets | control.takes or name in INPUTS]
+        at_tick = control.sets | control.takes | {*INPUTS, "position_mm", "velocity_mm_s"}
+        here = [name for name in outputs if name in at_tick]
         later = [name for name in outputs if name not in here]
         lines = [
             "@njit(cache=True, nogil=True, error_model='numpy')",

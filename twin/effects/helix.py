@@ -1,0 +1,28 @@
+"""The helix of the edge: it enters and leaves the cut bit by bit, tip first.
+
+φ(z) = φ − 2 z tan β / D
+
+at the height z above the tip. The tool is taken as slices; see `twin.process.kernel`.
+"""
+
+from math import tan
+
+from twin.effects.effect import Effect, On, Parameter
+from twin.sites import Site
+
+
+def lag_rad(lag_rad: float, height_mm: float, tool_diameter_mm: float, angle_deg: float) -> float:
+    """Trails the tip the more, the higher up."""
+    return lag_rad + 2.0 * height_mm * tan(angle_deg * 0.017453292519943295) / tool_diameter_mm
+
+
+EFFECT = Effect(
+    name="helix",
+    site=Site.PROCESS_FORCE,
+    on=On.MACHINE,
+    parameters=(Parameter("angle_deg", "°", 0.0, 0.0, 60.0, 30.0, "β, angle of the edge to the axis of the tool"),),
+    changes={"lag_rad": lag_rad},
+    shows_in=("force_x_n", "force_y_n", "x_torque_a", "y_torque_a"),
+    equation="φ(z) = φ − 2 z tan β / D",
+    reference="Altintas, Manufacturing Automation, 2nd ed. 2012, section 2.8",
+)
