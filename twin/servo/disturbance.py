@@ -24,7 +24,7 @@ class Disturbance:
     force_n: float
     correlation_s: float
 
-    def courses(self, count: int, ticks: int, period_s: float, seed: int) -> Floats:
+    def courses(self, count: int, ticks: int, period_s: float, seed: int | list[int]) -> Floats:
         """`count` independent courses, (count, ticks), N; the same seed gives the same courses.
 
         >>> course = Disturbance(2.0, 0.05).courses(4, 50000, 0.001, seed=1)

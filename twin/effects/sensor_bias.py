@@ -1,0 +1,24 @@
+"""A sensor that reads a constant too much: an offset of an amplifier, a zero point.
+
+reading = value + bias
+"""
+
+from twin.effects.effect import Effect, On, Parameter
+from twin.sites import Site
+
+
+def reading(reading: float, bias: float) -> float:
+    """Adds the bias."""
+    return reading + bias
+
+
+EFFECT = Effect(
+    name="sensor_bias",
+    site=Site.SENSOR,
+    on=On.SIGNAL,
+    parameters=(Parameter("bias", "unit of the signal", 0.0, -1e6, 1e6, 1.0, "what it reads too much"),),
+    changes={"reading": reading},
+    shows_in=("{s}",),
+    equation="reading = value + bias",
+    reference="JCGM 200:2012 (VIM) 4.20, instrumental bias",
+)

@@ -1,0 +1,367 @@
+"""The response of a machine to what it is told: the whole chain of sites, for one run.
+
+    reference → controller → drive force → friction → mechanics   (twin.servo, one lane an axis)
+         └→ process force (twin.process) ──┘ └→ spindle (twin.spindle) → thermal (twin.heat) → sensor → clock (twin.sensor)
+
+Depth and angles of the cut, speed of the spindle and the reference are inputs, so the process force needs nothing of the axes,
+and the chain has no loop. Any column can be given from a recording instead: what is downstream of it then runs on the measured
+one, and what is left of a gap lies there.
+
+A machine with a disturbance (`[noise] disturbance_force_n`) is a distribution of courses: its response is their mean and their
+spread, or, with a seed, one of them, with the noise of its sensors on top, as a real machine would record it.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.effects.catalogue import effect_named
+from twin.effects.effect import On
+from twin.errors import EffectError
+from twin.heat.run import Warming, spindle_temperature_c, thermal_constants, thermal_quantities
+from twin.machine import AddedEffect, MachineFile
+from twin.process.kernel import process_quantities
+from twin.process.milling import Milling, milling_force, peak_force, tool_constants
+from twin.sensor.clock import looked_at, resampled, stamped
+from twin.sensor.reading import readings, sensor_quantities
+from twin.servo.constants import axis_constants, effect_constants
+from twin.servo.disturbance import Disturbance
+from twin.servo.kernel import axis_quantities
+from twin.servo.run import AxisInput, run_axes
+from twin.sites import Site
+from twin.spindle.load import spindle_constants, spindle_load_pct, spindle_quantities
+from twin.weave import quantities
+
+Floats = NDArray[np.float64]
+COURSES = 32
+COURSES_SEED = 20
+NOISE_OF = {"pos_mm": "position_mm", "table_mm": "table_mm", "torque_a": "torque_a"}
+SENSOR_NOISE = {
+    "force_x_n": "force_n",
+    "force_y_n": "force_n",
+    "spindle_load_pct": "spindle_load_pct",
+    "spindle_temp_c": "spindle_temp_c",
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RunInput:
+    """What a machine is told, and its surroundings; arrays (n,) over `t_s`.
+
+    reference_mm: axis letter → (n,), evenly sampled at the servo period; none where the run is of slow signals only
+    spindle_rpm, spindle_angle_rad, axial_depth_mm, entry_angle_rad, exit_angle_rad: of the cut; None = nothing is cut
+    coolant_on, ambient_temp_c: of the heat; None = never on, not known
+    start: axis letter → the state of the axis at the first tick (`twin.servo.run`); start_temp_c: of the spindle
+    """
+
+    t_s: Floats
+    reference_mm: Mapping[str, Floats] = field(default_factory=dict)
+    spindle_rpm: Floats | None = None
+    spindle_angle_rad: Floats | None = None
+    axial_depth_mm: Floats | None = None
+    entry_angle_rad: Floats | None = None
+    exit_angle_rad: Floats | None = None
+    coolant_on: Floats | None = None
+    ambient_temp_c: Floats | None = None
+    start: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    start_temp_c: float | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Response:
+    """What the machine does: columns of a run log → (n,), and by how much its courses spread, standard deviation → (n,)."""
+
+    columns: dict[str, Floats]
+    spread: dict[str, Floats]
+
+
+@dataclass(frozen=True, slots=True)
+class _Added:
+    """The effects of a machine by where they act, each name → parameters."""
+
+    effects: tuple[AddedEffect, ...]
+
+    def at(self, known: Mapping[str, str], on: str = "") -> dict[str, Mapping[str, float]]:
+        """Those that change one of the `known` quantities of a stage, put on `on`."""
+        return {e.effect: e.parameters for e in self.effects if e.on == on and set(effect_named(e.effect).changes) & set(known)}
+
+
+def check_effects(machine: MachineFile) -> None:
+    """Raises EffectError where an effect of the machine is unknown, out of bounds, doubled, or put on what there is not."""
+    seen: set[tuple[str, str]] = set()
+    for added in machine.effects:
+        effect = effect_named(added.effect)
+        effect.checked(added.parameters)
+        if (added.effect, added.on) in seen:
+            raise EffectError(f"{added.effect} on {added.on or 'the machine'} is there twice; add its parameters up")
+        seen.add((added.effect, added.on))
+        if effect.on is On.AXIS and added.on not in machine.axes:
+            raise EffectError(f"{added.effect} is put on {added.on!r}, which is no axis; there are {', '.join(machine.axes)}")
+        if effect.on is On.MACHINE and added.on:
+            raise EffectError(f"{added.effect} is put on {added.on!r}; it acts on the machine as a whole, so `on` is empty")
+        if effect.on is On.SIGNAL and not added.on:
+            raise EffectError(f"{added.effect} acts on a signal: say which by `on`")
+
+
+def respond(
+    machine: MachineFile,
+    told: RunInput,
+    *,
+    recorded: Mapping[str, Floats] | None = None,
+    seed: int | None = None,
+    courses: int = COURSES,
+    reference_run: bool = False,
+) -> Response:
+    """The response of `machine` to what it is `told`.
+
+    recorded: columns that are taken from a recording in place of the model's: `{a}_pos_mm` (then its torque is the controller's
+    answer to the measured motion), `{a}_torque_a` (then the motion is the plant's answer to the measured torque), `force_x_n`
+    with `force_y_n`, `spindle_load_pct`
+    seed: None = mean and spread over `courses` of the machine's disturbance; else one course, with the noise of its sensors
+
+    Raises EffectError where the machine's effects do not fit it.
+    """
+    check_effects(machine)
+    recorded = recorded or {}
+    added = _Added(machine.effects)
+    columns: dict[str, Floats] = {}
+    spread: dict[str, Floats] = {}
+    mean_force = _process(machine, told, added, recorded, columns, reference_run)
+    _axes(machine, told, added, recorded, mean_force, columns, spread, (seed, courses, reference_run))
+    _heat(machine, told, added, recorded, columns, reference_run)
+    _sensors(machine, told, added, columns, spread, reference_run)
+    if seed is not None:
+        _noise(machine, columns, np.random.default_rng([seed, 1]))
+    return Response(columns, spread)
+
+
+def period_of(t_s: Floats) -> float:
+    """Spacing of evenly spaced times, s; 1 ms where there is no second one."""
+    return float((t_s[-1] - t_s[0]) / (len(t_s) - 1)) if len(t_s) > 1 else 0.001
+
+
+def milling_of(told: RunInput) -> Milling | None:
+    """The cut of a run; None where it has none."""
+    series = (told.spindle_rpm, told.spindle_angle_rad, told.axial_depth_mm, told.entry_angle_rad, told.exit_angle_rad)
+    rpm, angle, depth, entry, leaving = series
+    if rpm is None or angle is None or depth is None or entry is None or leaving is None:
+        return None
+    if not np.nan_to_num(depth).any() or "x" not in told.reference_mm or "y" not in told.reference_mm:
+        return None
+    period_s = period_of(told.t_s)
+    speed = [np.gradient(told.reference_mm[axis], period_s) for axis in "xy"]
+    return Milling(angle, rpm, speed[0], speed[1], depth, entry, leaving)
+
+
+def _named(prefix: Mapping[str, Mapping[str, float]]) -> dict[str, float]:
+    """Effect parameters under the names that woven text takes."""
+    return {f"{e}__{k}": v for e, given in prefix.items() for k, v in effect_named(e).checked(given).items()}
+
+
+def _process(
+    machine: MachineFile,
+    told: RunInput,
+    added: _Added,
+    recorded: Mapping[str, Floats],
+    columns: dict[str, Floats],
+    reference_run: bool,
+) -> dict[str, Floats]:
+    """Adds forces and load to the columns; the mean force on the tool over each tick, by axis, as a force on the axis."""
+    period_s = period_of(told.t_s)
+    milling = milling_of(told) if machine.tool else None
+    power_w = np.zeros(len(told.t_s))
+    mean: dict[str, Floats] = {}
+    if milling is not None and machine.tool is not None:
+        effects = added.at(process_quantities())
+        constants = tool_constants(machine.tool) | _named(effects)
+        force = milling_force(
+            constants, machine.tool.teeth, milling, period_s=period_s, effects=tuple(effects), reference_run=reference_run
+        )
+        columns |= {"force_x_n": force.force_x_n[0], "force_y_n": force.force_y_n[0]}
+        feed = 60.0 * np.hypot(milling.velocity_x_mm_s, milling.velocity_y_mm_s)
+        cut = (milling.axial_depth_mm, milling.entry_angle_rad, milling.exit_angle_rad)
+        columns["cutting_force_peak_n"] = _peaks(constants, machine.tool.teeth, tuple(effects), (milling.spindle_rpm, feed, *cut))
+        mean = {"x": -force.mean_force_x_n[0], "y": -force.mean_force_y_n[0]}
+        power_w = force.cutting_power_w()[0]
+    for axis in "xy":
+        if f"force_{axis}_n" in recorded:
+            mean[axis] = -np.nan_to_num(recorded[f"force_{axis}_n"])
+    if machine.spindle is not None and told.spindle_rpm is not None and told.reference_mm:
+        effects = added.at(spindle_quantities())
+        load = spindle_load_pct(
+            spindle_constants(machine.spindle) | _named(effects),
+            power_w,
+            told.spindle_rpm,
+            period_s=period_s,
+            effects=tuple(effects),
+            reference_run=reference_run,
+        )
+        columns["spindle_load_pct"] = load[0]
+    return mean
+
+
+def _peaks(constants: Mapping[str, float], teeth: int, effects: tuple[str, ...], cut: tuple[Floats, ...]) -> Floats:
+    """Peak force at each tick, worked out once for ticks that cut alike."""
+    rows = np.round(np.nan_to_num(np.array(cut)).T, 6)
+    different, which = np.unique(rows, axis=0, return_inverse=True)
+    cutting = (different[:, 2] > 0.0) & (different[:, 0] > 0.0)
+    peaks = np.zeros(len(different))
+    if cutting.any():
+        peaks[cutting] = peak_force(constants, teeth, *different[cutting].T, effects=effects)[0]
+    return np.asarray(peaks[which.reshape(-1)])
+
+
+def _axes(
+    machine: MachineFile,
+    told: RunInput,
+    added: _Added,
+    recorded: Mapping[str, Floats],
+    mean_force: Mapping[str, Floats],
+    columns: dict[str, Floats],
+    spread: dict[str, Floats],
+    how: tuple[int | None, int, bool],
+) -> None:
+    """Adds position, table and torque of each axis."""
+    seed, courses, reference_run = how
+    disturbance = disturbance_of(machine)
+    many = courses if disturbance and seed is None else 1
+    period_s = machine.machine.servo_period_s
+    for number, (letter, reference) in enumerate((a, r) for a, r in told.reference_mm.items() if a in machine.axes):
+        base = axis_constants(machine.axes[letter])
+        effects = added.at(axis_quantities(), letter)
+        for name, given in effects.items():
+            base |= effect_constants(effect_named(name), given, base, letter)
+        force = np.tile(mean_force.get(letter, np.zeros(len(reference))), (many, 1))
+        if disturbance:
+            chance = [COURSES_SEED, number] if seed is None else [seed, 2, number]
+            force = force + disturbance.courses(many, len(reference), period_s, chance)
+        given_columns = _replaced(letter, recorded, period_s)
+        run = run_axes(
+            {name: np.full(many, value) for name, value in base.items()},
+            AxisInput(
+                np.tile(_seen_reference(reference, told.t_s, added, letter), (many, 1)),
+                np.arange(many),
+                force if force.any() else None,
+                {name: np.tile(values, (many, 1)) for name, values in given_columns.items()},
+            ),
+            period_s=period_s,
+            effects=tuple(effects),
+            outputs=("position_mm", "torque_a", "table_mm"),
+            start=told.start.get(letter),
+            reference_run=reference_run,
+        )
+        for output, column in (("position_mm", "pos_mm"), ("torque_a", "torque_a"), ("table_mm", "table_mm")):
+            columns[f"{letter}_{column}"] = run.outputs[output].mean(axis=0)
+            if many > 1:
+                spread[f"{letter}_{column}"] = run.outputs[output].std(axis=0)
+
+
+def disturbance_of(machine: MachineFile) -> Disturbance | None:
+    """The disturbance that the machine states under [noise]."""
+    force_n = machine.noise.get("disturbance_force_n", 0.0)
+    return Disturbance(force_n, machine.noise.get("disturbance_correlation_s", 0.05)) if force_n > 0.0 else None
+
+
+def _replaced(letter: str, recorded: Mapping[str, Floats], period_s: float) -> dict[str, Floats]:
+    """Recorded columns of an axis as the quantities that they replace."""
+    replaced: dict[str, Floats] = {}
+    if f"{letter}_pos_mm" in recorded:
+        position = recorded[f"{letter}_pos_mm"]
+        replaced |= {"position_mm": position, "velocity_mm_s": np.gradient(position, period_s)}
+    if f"{letter}_torque_a" in recorded:
+        replaced["torque_a"] = recorded[f"{letter}_torque_a"]
+    return replaced
+
+
+def _seen_reference(reference: Floats, t_s: Floats, added: _Added, letter: str) -> Floats:
+    """The reference that the loop of an axis sees."""
+    effects = added.at(quantities((looked_at,)), letter)
+    if not effects:
+        return reference
+    return resampled(reference, period_of(t_s), _mapped(t_s, effects, "reference_time_s") - t_s[0])
+
+
+def _mapped(t_s: Floats, effects: Mapping[str, Mapping[str, float]], quantity: str) -> Floats:
+    """A time as the effects change it; their functions take arrays as they take numbers."""
+    seen = t_s
+    for name, given in effects.items():
+        effect = effect_named(name)
+        known = effect.checked(given) | {"time_s": t_s}
+        change = effect.changes[quantity]
+        taken = change.__code__.co_varnames[1 : change.__code__.co_argcount]
+        seen = np.asarray(change(seen, *(known[argument] for argument in taken)))
+    return seen
+
+
+def _heat(
+    machine: MachineFile,
+    told: RunInput,
+    added: _Added,
+    recorded: Mapping[str, Floats],
+    columns: dict[str, Floats],
+    reference_run: bool,
+) -> None:
+    """Adds the spindle's temperature where the machine states its heat, and load, speed and surroundings are known."""
+    load = recorded.get("spindle_load_pct", columns.get("spindle_load_pct"))
+    if machine.thermal is None or load is None or told.spindle_rpm is None or told.ambient_temp_c is None:
+        return
+    start_c = (
+        told.start_temp_c if told.start_temp_c is not None else float(told.ambient_temp_c[np.isfinite(told.ambient_temp_c)][0])
+    )
+    effects = added.at(thermal_quantities())
+    columns["spindle_temp_c"] = spindle_temperature_c(
+        thermal_constants(machine.thermal) | _named(effects),
+        Warming(told.t_s, load, told.spindle_rpm, told.ambient_temp_c, told.coolant_on),
+        start_c,
+        effects=tuple(effects),
+        reference_run=reference_run,
+    )[0]
+
+
+def _sensors(
+    machine: MachineFile,
+    told: RunInput,
+    added: _Added,
+    columns: dict[str, Floats],
+    spread: dict[str, Floats],
+    reference_run: bool,
+) -> None:
+    """Turns what is into what is recorded: sensors first, then the clock that stamps them."""
+    since = np.diff(told.t_s, prepend=told.t_s[:1])
+    temperature = columns.get("spindle_temp_c")
+    rise = None if temperature is None else temperature - temperature[0]
+    for name in list(columns):
+        effects = added.at(sensor_quantities(), name)
+        if name.endswith("_table_mm"):
+            effects |= added.at(sensor_quantities(), name.removesuffix("_table_mm"))
+        columns[name] = readings(columns[name], since, effects, rise, reference_run)
+    drifting = added.at(quantities((stamped,)))
+    if drifting and told.reference_mm:
+        at_s = _mapped(told.t_s, drifting, "feedback_time_s") - told.t_s[0]
+        for values in (columns, spread):
+            for name in values:
+                if name.endswith(("_pos_mm", "_table_mm", "_torque_a")):
+                    values[name] = resampled(values[name], period_of(told.t_s), at_s)
+
+
+def _noise(machine: MachineFile, columns: dict[str, Floats], chance: np.random.Generator) -> None:
+    """Adds what the sensors make of it."""
+    for name, values in columns.items():
+        key = SENSOR_NOISE.get(name) or NOISE_OF.get(name.partition("_")[2])
+        sigma = machine.noise.get(key, 0.0) if key else 0.0
+        if sigma > 0.0:
+            columns[name] = values + sigma * chance.standard_normal(len(values))
+
+
+SITES_OF_COLUMNS = {
+    "{a}_torque_a": Site.CONTROLLER,
+    "{a}_pos_mm": Site.MECHANICS,
+    "{a}_table_mm": Site.MECHANICS,
+    "force_x_n": Site.PROCESS_FORCE,
+    "force_y_n": Site.PROCESS_FORCE,
+    "spindle_load_pct": Site.SPINDLE,
+    "spindle_temp_c": Site.THERMAL,
+}
+"""The site at which each recorded column can be replaced and compared."""

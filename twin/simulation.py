@@ -1,0 +1,178 @@
+"""The simulated machine: a part program in, what the machine would record out.
+
+program → canonical moves (twin.gcode) → path, look-ahead, reference (twin.motion) → engagement (twin.engagement) → response
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.engagement import Workpiece, cut
+from twin.errors import MachineError
+from twin.gcode import Coolant, Settings, interpret
+from twin.machine import MachineFile, Program
+from twin.motion.motion import ExecState, Motion
+from twin.motion.path import EventKind, Kind, Path, path_from_moves
+from twin.motion.plan import Plan, plan
+from twin.response import Response, RunInput, respond
+from twin.runlog import RunLog, run_log
+
+Floats = NDArray[np.float64]
+
+IDEAL_TIMES = Program(rapid_mm_min=30000.0, acceleration_mm_s2=2500.0, jerk_mm_s3=60000.0, corner_speed_difference_mm_min=500.0)
+"""What a program is planned with where the machine states no [program]: a middling control."""
+RESOLUTION_MM = 0.25
+ROWS_MAX = 2_000_000
+TICKS_MAX = 40_000_000
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Simulation:
+    """A run of the simulated machine.
+
+    run: what it records, at the servo period; response: with the spread of its courses; plan: with the times of each line
+    notes: what the machine description did not say, and what was taken for it
+    """
+
+    run: RunLog
+    response: Response
+    plan: Plan
+    notes: tuple[str, ...]
+
+    @property
+    def seconds(self) -> float:
+        """Time that the program takes."""
+        return self.plan.total_s
+
+    def following_error_mm(self) -> Mapping[str, Floats]:
+        """Axis → reference minus position, (n,)."""
+        return {
+            a: self.run[f"{a}_ref_mm"] - self.run[f"{a}_pos_mm"] for a in self.run.axes() if f"{a}_pos_mm" in self.run.columns
+        }
+
+
+def simulate(
+    machine: MachineFile,
+    text: str,
+    *,
+    seed: int | None = None,
+    start_temperature_c: float | None = None,
+    ambient_temp_c: float = 22.0,
+    settings: Settings | None = None,
+    name: str = "program",
+) -> Simulation:
+    """Runs a part program on a machine.
+
+    seed: None = the machine's mean course, free of noise; a number = one course as its sensors would record it
+    start_temperature_c: of the spindle; None = ambient
+
+    Raises ProgramError where a control would refuse the program, MachineError where the machine has not got its axes or the run
+    would be longer than 40 million ticks, EffectError where its effects do not fit.
+    """
+    moves = interpret(text, settings)
+    notes: list[str] = []
+    path = path_from_moves(moves)
+    moving = [a for column, a in enumerate(path.axes) if np.ptp(path.start_mm[:, column]) or np.any(path.start_mm != path.end_mm)]
+    missing = [a for a in moving if a not in machine.axes]
+    if machine.axes and missing and any(a in machine.axes for a in path.axes):
+        notes.append(f"no [axes.{missing[0]}]: {', '.join(missing)} follows its reference without error in this run")
+    if machine.program is None:
+        notes.append("no [program]: 30 m/min, 2.5 m/s², 60 m/s³ and corners of 500 mm/min were taken for the control")
+    planned = plan(path, machine.program or IDEAL_TIMES)
+    period_s = machine.machine.servo_period_s
+    if planned.total_s / period_s > TICKS_MAX:
+        raise MachineError(f"{name} takes {planned.total_s:.0f} s, more than {TICKS_MAX} ticks of {period_s} s; split it")
+    motion = planned.sample(period_s)
+    engaged = _engagement(machine, path, motion, notes)
+    angle = np.concatenate([[0.0], np.cumsum(motion.spindle_rpm)[:-1]]) * (2.0 * np.pi / 60.0 * period_s)
+    told = RunInput(
+        t_s=motion.t_s,
+        reference_mm={a: np.ascontiguousarray(motion.reference_mm[:, i]) for i, a in enumerate(path.axes) if a in machine.axes},
+        spindle_rpm=motion.spindle_rpm,
+        spindle_angle_rad=np.mod(angle, 2.0 * np.pi),
+        axial_depth_mm=engaged["axial_depth_mm"],
+        entry_angle_rad=engaged["entry_angle_rad"],
+        exit_angle_rad=engaged["exit_angle_rad"],
+        coolant_on=_coolant(planned, moves, motion),
+        ambient_temp_c=np.full(len(motion), ambient_temp_c),
+        start_temp_c=start_temperature_c,
+    )
+    response = respond(machine, told, seed=seed)
+    return Simulation(_log(motion, told, response, path, name), response, planned, tuple(notes))
+
+
+def _engagement(machine: MachineFile, path: Path, motion: Motion, notes: list[str]) -> dict[str, Floats]:
+    """Depth and angles of the cut at each tick; nothing is cut where the machine states no stock or no tool."""
+    ticks = len(motion)
+    none = {name: np.zeros(ticks) for name in ("axial_depth_mm", "entry_angle_rad", "exit_angle_rad")}
+    if machine.stock is None or machine.tool is None:
+        if (path.kind != Kind.RAPID).any():
+            notes.append(f"no [{'stock' if machine.stock is None else 'tool'}]: the program is run in air")
+        return none
+    if path.axes[:3] != ("x", "y", "z"):
+        return none
+    if len({event.value for event in path.events if event.kind == EventKind.TOOL_CHANGE}) > 1:
+        notes.append(f"the program changes tools; all of them are taken to be the {machine.tool.diameter_mm:g} mm one of [tool]")
+    count = np.maximum(1, np.ceil(path.length_mm / RESOLUTION_MM)).astype(np.int64)
+    if count.sum() > ROWS_MAX:
+        raise MachineError(f"the path is {path.length_mm.sum():.0f} mm long, too long to follow in steps of {RESOLUTION_MM} mm")
+    count[(path.sweep_rad == 0.0) | (path.length_mm == 0.0)] = 1  # a line is cut into rows by the engagement itself
+    segment = np.repeat(np.arange(len(path)), count)
+    first = np.concatenate([[0], np.cumsum(count)])
+    part = (np.arange(first[-1]) - first[segment] + 1) / count[segment]
+    points = np.concatenate([path.start_mm[:1], path.at(segment, part * path.length_mm[segment])])[:, :3]
+    workpiece = Workpiece.of(machine.stock, machine.tool.diameter_mm / 16.0)
+    _, rows = cut(workpiece, points, machine.tool.diameter_mm, RESOLUTION_MM, path.kind[segment] != Kind.RAPID)
+    for hit in rows.collisions[:3]:
+        line = int(path.line[segment[hit.segment]]) + 1
+        notes.append(f"line {line}: rapid into material at " + ", ".join(f"{v:.1f}" for v in hit.position_mm) + " mm")
+    whole = np.where(path.length_mm[motion.segment] > 0.0, motion.s_mm / np.maximum(path.length_mm[motion.segment], 1e-12), 0.0)
+    place = whole * count[motion.segment]
+    chord = np.minimum(place.astype(np.int64), count[motion.segment] - 1)
+    row = rows.row_at(first[motion.segment] + chord, np.clip(place - chord, 0.0, 1.0))
+    cutting = (path.kind[motion.segment] != Kind.RAPID) & (motion.feed_mm_min > 0.0) & (motion.spindle_rpm > 0.0)
+    return {name: np.where(cutting, getattr(rows, name)[row], 0.0) for name in none}
+
+
+def _coolant(planned: Plan, moves: list[Any], motion: Motion) -> Floats:
+    """1 while the coolant runs."""
+    switches = [
+        (start, event.value)
+        for event, start in zip(planned.path.events, planned.event_start_s, strict=True)
+        if event.kind == EventKind.COOLANT
+    ]
+    on = np.zeros(len(motion))
+    for start, value in switches:
+        on[motion.t_s >= start] = float(value > 0)
+    assert switches or not any(isinstance(move, Coolant) for move in moves), "coolant is an event of the path"
+    return on
+
+
+def _log(motion: Motion, told: RunInput, response: Response, path: Path, name: str) -> RunLog:
+    """Everything that a run log can hold of it."""
+    columns: dict[str, NDArray[Any]] = {"t_s": motion.t_s, "line": motion.line.astype(np.float64)}
+    for i, axis in enumerate(path.axes):
+        columns[f"{axis}_ref_mm"] = motion.reference_mm[:, i]
+    assert told.axial_depth_mm is not None
+    assert told.entry_angle_rad is not None
+    assert told.exit_angle_rad is not None
+    idle = told.axial_depth_mm <= 0.0
+    told_columns: dict[str, NDArray[Any] | None] = {
+        "spindle_rpm": motion.spindle_rpm,
+        "spindle_angle_rad": told.spindle_angle_rad,
+        "axial_depth_mm": told.axial_depth_mm,
+        "entry_angle_rad": np.where(idle, np.nan, told.entry_angle_rad),
+        "exit_angle_rad": np.where(idle, np.nan, told.exit_angle_rad),
+        "coolant_on": told.coolant_on,
+        "ambient_temp_c": told.ambient_temp_c,
+        "feed_mm_min": motion.feed_mm_min,
+        "tool_number": np.where(motion.tool_number > 0, motion.tool_number.astype(np.float64), np.nan),
+        "tool_change_active": motion.tool_change_active.astype(np.float64),
+        "exec_state": np.array([state.name for state in ExecState], dtype=object)[motion.exec_state],
+    }
+    columns |= {key: values for key, values in told_columns.items() if values is not None}
+    columns |= response.columns
+    return run_log(columns, name)
