@@ -1,7 +1,8 @@
 """exp and sin written out, so that a loop over lanes stays a loop over vectors.
 
 A call of the C library's exp or sin inside a loop keeps the compiler from working on several lanes at once. These are plain
-arithmetic without a branch and without a division, good to an absolute error of 3e-14 where they are used, and the same bits in Python and in a kernel.
+arithmetic without a branch and without a division, good to an absolute error of 3e-14 where they are used, and the same bits in
+Python and in a kernel.
 """
 
 

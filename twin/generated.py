@@ -6,6 +6,7 @@ numba trusts what it has kept there.
 """
 
 import hashlib
+import importlib.abc
 import importlib.util
 import os
 import sys
@@ -13,15 +14,31 @@ import tempfile
 from functools import cache
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numba
 
 
-def in_python(text: str) -> dict[str, object]:
+class _FromText(importlib.abc.InspectLoader):
+    """Loads a module from its text."""
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+
+    def get_source(self, fullname: str) -> str:
+        return self.text
+
+
+@cache
+def in_python(text: str) -> dict[str, Any]:
     """The names that the generated text defines, run by the interpreter; `njit(…)` in it hands functions through."""
-    scope: dict[str, object] = {"njit": lambda **_options: lambda function: function}
-    exec(compile(text, "<generated>", "exec"), scope)  # noqa: S102 - our own text, woven from our own functions
-    return scope
+    spec = importlib.util.spec_from_loader("generated", _FromText(text))
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    module.__dict__["njit"] = lambda **_options: lambda function: function
+    spec.loader.exec_module(module)
+    return vars(module)
 
 
 @cache

@@ -23,7 +23,8 @@ Floats = NDArray[np.float64]
 class AxisParameter:
     """One parameter of the fit.
 
-    name: of the constant; unit of its estimate; relative: a factor exp(θ), else a plain number; sigma: of its prior
+    name: of the constant, or `effect__parameter`; unit of its estimate; relative: a factor exp(θ), else a plain number
+    sigma: of its prior
     """
 
     name: str
@@ -64,12 +65,22 @@ def axis_parameters(machine: MachineFile, letter: str, *, force_known: bool, fre
     return tuple(p for p in wanted if p.sigma > 0)
 
 
+VELOCITY_DELAY = AxisParameter("velocity_feedback_delay__delay_s", "s", False, 0.0005)
+"""How old the velocity is that the loop is fed. Nominally it is not; where it is, a fit without it takes it for missing mass."""
+
+
+def effects_of(parameters: tuple[AxisParameter, ...]) -> tuple[str, ...]:
+    """The effects whose parameters are among these."""
+    return tuple(dict.fromkeys(p.name.partition("__")[0] for p in parameters if "__" in p.name))
+
+
 def constants_at(base: Mapping[str, float], parameters: tuple[AxisParameter, ...], theta: Floats) -> dict[str, Floats]:
     """The constants of `twin.servo` at each candidate, (candidates,); base: those of the stated axis; theta: (candidates, p)."""
     count = len(theta)
     factor = {p.name: np.exp(theta[:, i]) if p.relative else theta[:, i] for i, p in enumerate(parameters)}
     one, none = np.ones(count), np.zeros(count)
     constants = {name: np.full(count, value) for name, value in base.items()}
+    constants |= {name: value for name, value in factor.items() if "__" in name}
     for name in ("mass_kg", "newton_per_command", *GAINS):
         constants[name] = constants[name] * factor.get(name, one)
     for side, sign in (("minus", -1.0), ("plus", 1.0)):

@@ -46,8 +46,8 @@ class Estimate:
 def clustered_covariance(jacobian: Floats, residuals: Floats, blocks: NDArray[np.intp], prior_precision: Floats) -> Floats:
     """Covariance of a weighted least-squares fit whose residuals are correlated in time, (p, p).
 
-    The sandwich estimator clustered by blocks, H⁻¹ (Σ_b g_b g_bᵀ + P) H⁻¹ with g_b = J_bᵀ r_b and H = JᵀJ + P, which does not take
-    neighbouring samples for independent ones (Liang and Zeger 1986, Biometrika 73(1); Cameron and Miller 2015, J. Human
+    The sandwich estimator clustered by blocks, H⁻¹ (Σ_b g_b g_bᵀ + P) H⁻¹ with g_b = J_bᵀ r_b and H = JᵀJ + P, which does not
+    take neighbouring samples for independent ones (Liang and Zeger 1986, Biometrika 73(1); Cameron and Miller 2015, J. Human
     Resources 50(2)), and is never below what independent residuals would give.
 
     jacobian: (n, p); residuals: (n,), in units of their noise; blocks: (n,) number of the block of each; prior_precision: (p, p)

@@ -1,0 +1,93 @@
+"""How far a twin is from a recording, signal by signal and regime by regime, beside what repeated runs differ by."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.case import Run
+from twin.machine import MachineFile
+from twin.recorded import told_of
+from twin.regimes import Regime, axis_regimes
+from twin.response import respond
+from twin.runlog import AXIS_COLUMN, RunLog
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class GapRow:
+    """One signal in one regime of one run.
+
+    gap: rms of twin minus recording; repeatability: rms of the difference of repeated runs over √2, None where none were repeated
+    in this regime; in the unit of the signal
+    """
+
+    run: str
+    signal: str
+    regime: str
+    samples: int
+    gap: float
+    repeatability: float | None
+
+    @property
+    def ratio(self) -> float | None:
+        """Gap over repeatability."""
+        return self.gap / self.repeatability if self.repeatability else None
+
+
+def measured_signals(log: RunLog) -> tuple[str, ...]:
+    """Columns that a machine answers with, where the run has samples of them."""
+    names = [c for c in log.columns if (m := AXIS_COLUMN.match(c)) and m[2] != "ref_mm"]
+    names += ["force_x_n", "force_y_n", "spindle_load_pct", "spindle_temp_c"]
+    return tuple(name for name in names if log.has(name))
+
+
+def regimes_of(log: RunLog, signal: str) -> tuple[tuple[str, NDArray[np.bool_]], ...]:
+    """Regimes in which a signal is looked at, each with its samples (n,)."""
+    match = AXIS_COLUMN.match(signal)
+    cutting = np.nan_to_num(log.columns.get("axial_depth_mm", np.zeros(len(log)))) > 0.0
+    if match and f"{match[1]}_ref_mm" in log.columns:
+        regimes = axis_regimes(log.t_s, log[f"{match[1]}_ref_mm"])
+        return tuple((regime.title, regimes == regime) for regime in Regime)
+    if signal.startswith(("force", "spindle_load")):
+        return (("cutting", cutting), ("air", ~cutting))
+    return (("warm-up", np.ones(len(log), dtype=bool)),)
+
+
+def gap_table(machine: MachineFile, runs: Iterable[Run], repeats: Iterable[tuple[Run, Run]]) -> tuple[GapRow, ...]:
+    """The gap of `machine` on each run, by signal and regime; repeatability from the repeated runs, pooled over all of them."""
+    floors = _floors(repeats)
+    rows = []
+    for run in runs:
+        log = run.log
+        recorded = {"spindle_load_pct": log["spindle_load_pct"]} if log.has("spindle_load_pct") and not log.axes() else None
+        response = respond(machine, told_of(log, machine), recorded=recorded)
+        for signal in measured_signals(log):
+            if signal not in response.columns or (recorded and signal in recorded):
+                continue
+            error = response.columns[signal] - log[signal]
+            for regime, here in regimes_of(log, signal):
+                there = here & np.isfinite(error)
+                if there.any():
+                    gap = float(np.sqrt(np.mean(error[there] ** 2)))
+                    rows.append(GapRow(run.name, signal, regime, int(there.sum()), gap, floors.get((signal, regime))))
+    return tuple(rows)
+
+
+def _floors(repeats: Iterable[tuple[Run, Run]]) -> dict[tuple[str, str], float]:
+    """(signal, regime) → repeatability."""
+    squares: dict[tuple[str, str], list[Floats]] = {}
+    for one, other in repeats:
+        if len(one.log) != len(other.log):
+            continue
+        for signal in measured_signals(one.log):
+            if not other.log.has(signal):
+                continue
+            difference = one.log[signal] - other.log[signal]
+            for regime, here in regimes_of(one.log, signal):
+                kept = difference[here & np.isfinite(difference)]
+                if len(kept):
+                    squares.setdefault((signal, regime), []).append(kept**2 / 2.0)
+    return {key: float(np.sqrt(np.mean(np.concatenate(parts)))) for key, parts in squares.items()}

@@ -1,0 +1,1 @@
+"""Identification: the constants of a machine from recordings of it, with intervals, and what the recordings cannot say."""

@@ -1,0 +1,203 @@
+"""Identifies a machine from the runs of a case: cutting first, then the axes that the cut pushes, the spindle, the heat.
+
+The order is that of the sites: the cutting force is an input of the axes, its power one of the spindle, the spindle's load one of
+the heat; none needs anything of those after it.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.case import Case, Run, RunKind
+from twin.errors import CaseError
+from twin.gap_table import GapRow, gap_table
+from twin.heat.run import Warming
+from twin.identification.axes import identified_axes
+from twin.identification.batch_fit import Fit
+from twin.identification.cutting_fit import fit_cutting, fit_spindle, with_cutting, with_spindle
+from twin.identification.estimate import INTERVAL_Z, Estimate
+from twin.identification.thermal_fit import NAMES, WarmingRun, fit_thermal, with_thermal
+from twin.machine import MachineFile
+from twin.process.milling import milling_force, tool_constants
+from twin.recorded import noise_of, told_of
+from twin.response import milling_of
+
+Floats = NDArray[np.float64]
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Identification:
+    """What came out.
+
+    machine: with the identified constants and their uncertainty; estimates: of each constant that was fitted
+    unknown: what these recordings cannot determine, a sentence each; notes: what was found on the way
+    gaps: of the machine on the runs to be judged on, or on all where there are none
+    """
+
+    machine: MachineFile
+    estimates: tuple[Estimate, ...]
+    unknown: tuple[str, ...]
+    notes: tuple[str, ...]
+    gaps: tuple[GapRow, ...]
+
+
+def identify(case: Case, *, free_gains: bool = False, progress: Progress = lambda _: None) -> Identification:
+    """Fits the machine of a case to its runs of role `fit` and judges it on those of role `check`.
+
+    free_gains: fit the loop gains too, as the factors S_pp, S_vp, S_vi; else they are taken to be exactly as stated
+
+    Raises CaseError where there is no run to fit; RunLogError where a run cannot be used.
+    """
+    fits = tuple(run for run in case.of(role="fit") if run.entry.kind is not RunKind.PROGRAM)
+    if not fits:
+        raise CaseError(
+            f"{case.name}: no run of role fit records axes, forces, loads or temperatures; there is nothing to identify"
+        )
+    known: list[Estimate] = []
+    unknown: list[str] = []
+    notes: list[str] = []
+    machine = case.machine
+    progress("cutting")
+    machine = _cutting(machine, fits, known, unknown)
+    progress("axes")
+    machine = identified_axes(machine, fits, case.repeats(), free_gains, known, unknown, notes, progress)
+    progress("spindle")
+    machine = _spindle(machine, fits, known, unknown)
+    progress("heat")
+    machine = _heat(machine, fits, known, unknown)
+    uncertainty = dict(machine.uncertainty) | {e.path: _relative(e) for e in known if e.path.count(".") and e.value}
+    machine = machine.model_copy(update={"uncertainty": uncertainty})
+    progress("checking")
+    gaps = gap_table(machine, case.of(role="check") or fits, case.repeats())
+    return Identification(machine, tuple(known), tuple(unknown), tuple(notes), gaps)
+
+
+def _relative(estimate: Estimate) -> float:
+    return float(f"{(estimate.high - estimate.low) / 2.0 / INTERVAL_Z / abs(estimate.value):.3g}")
+
+
+def stated_uncertainty(machine: MachineFile, path: str) -> float:
+    """One standard deviation, relative, of a constant by its path."""
+    return machine.uncertainty.get(path, machine.uncertainty.get("relative", 0.05))
+
+
+def estimate(path: str, value: float, deviation: float, unit: str, stated: float | None, known_by: float) -> Estimate:
+    """An estimate from a standard deviation."""
+    return Estimate(path, value, value - INTERVAL_Z * deviation, value + INTERVAL_Z * deviation, unit, stated, known_by)
+
+
+def _cutting(machine: MachineFile, runs: tuple[Run, ...], known: list[Estimate], unknown: list[str]) -> MachineFile:
+    """K_t and K_e from a dynamometer."""
+    tool = machine.tool
+    cuts = []
+    for run in runs:
+        milling = milling_of(told_of(run.log, machine)) if tool and run.log.has("force_x_n", "force_y_n") else None
+        if milling is not None:
+            cuts.append((milling, run.log.t_s, run.log["force_x_n"], run.log["force_y_n"]))
+            noise = noise_of(machine, run.log, "force_x_n")
+    if tool is None or not cuts:
+        if tool is not None:
+            unknown.append(
+                "tool: K_t and K_e: no run cuts on a dynamometer (force_x_n, force_y_n with depth and angles of the cut)"
+            )
+        return machine
+    relative = stated_uncertainty(machine, "tool.tangential_coefficient_n_per_mm2")
+    found = fit_cutting(tool, cuts, machine.machine.servo_period_s, noise, relative)
+    fitted = with_cutting(tool, found)
+    tangential = fitted.tangential_coefficient_n_per_mm2
+    deviation = np.sqrt(np.diag(found.covariance))
+    # of a quotient b/a, to first order
+    gradient = np.array([-found.theta[1] / found.theta[0] ** 2, 1.0 / found.theta[0]])
+    of_ratio = float(np.sqrt(gradient @ found.covariance @ gradient))
+    path = "tool.tangential_coefficient_n_per_mm2"
+    known.append(estimate(path, tangential, deviation[0], "N/mm²", tool.tangential_coefficient_n_per_mm2, found.known[0]))
+    known.append(estimate("tool.radial_ratio", fitted.radial_ratio, of_ratio, "", tool.radial_ratio, found.known[1]))
+    unknown.append("tool: K_t and the axial depth are one product; the depth of the program is taken to be exact")
+    return machine.model_copy(update={"tool": fitted})
+
+
+def _spindle(machine: MachineFile, runs: tuple[Run, ...], known: list[Estimate], unknown: list[str]) -> MachineFile:
+    """Efficiency and idle power from the load meter of runs that are sampled at the servo period."""
+    spindle = machine.spindle
+    series = []
+    cutting = False
+    for run in runs:
+        if spindle is None or not run.log.axes() or not run.log.has("spindle_load_pct", "spindle_rpm"):
+            continue
+        power = _power_w(machine, run)
+        cutting = cutting or bool(power.any())
+        series.append((run.log.t_s, power, np.nan_to_num(run.log["spindle_rpm"]), run.log["spindle_load_pct"]))
+        noise = noise_of(machine, run.log, "spindle_load_pct")
+    if spindle is None or not series:
+        if spindle is not None:
+            unknown.append(
+                "spindle: efficiency and idle power: no run at the servo period records spindle_load_pct and spindle_rpm"
+            )
+        return machine
+    force_known = any(e.path.startswith("tool.") and e.identifiable for e in known)
+    relative = stated_uncertainty(machine, "spindle.efficiency")
+    found = fit_spindle(spindle, series, machine.machine.servo_period_s, noise, relative, not (force_known and cutting))
+    fitted = with_spindle(spindle, found)
+    deviation = np.sqrt(np.diag(found.covariance))
+    if force_known and cutting:
+        of_efficiency = float(deviation[0] * fitted.efficiency**2)
+        known.append(estimate("spindle.efficiency", fitted.efficiency, of_efficiency, "", spindle.efficiency, found.known[0]))
+    else:
+        unknown.append("spindle.efficiency: without a measured cutting force, it is one product with K_t")
+    known.append(
+        estimate("spindle.idle_power_kw", fitted.idle_power_kw, deviation[1], "kW", spindle.idle_power_kw, found.known[1])
+    )
+    unknown.append("spindle.rated_power_kw: load, efficiency and idle power know it up to one factor; it stays as stated")
+    return machine.model_copy(update={"spindle": fitted})
+
+
+def _power_w(machine: MachineFile, run: Run) -> Floats:
+    """Cutting power of a run by the identified coefficients, W; 0 where nothing is cut."""
+    milling = milling_of(told_of(run.log, machine))
+    if milling is None or machine.tool is None:
+        return np.zeros(len(run.log))
+    force = milling_force(tool_constants(machine.tool), machine.tool.teeth, milling, period_s=machine.machine.servo_period_s)
+    return np.asarray(force.cutting_power_w()[0])
+
+
+def _heat(machine: MachineFile, runs: tuple[Run, ...], known: list[Estimate], unknown: list[str]) -> MachineFile:
+    """α, β and R from warm-up runs; C stays."""
+    thermal = machine.thermal
+    warm = [run.log for run in runs if run.log.has("spindle_temp_c", "spindle_rpm", "ambient_temp_c", "spindle_load_pct")]
+    if thermal is None or not warm:
+        if thermal is not None:
+            unknown.append("thermal: no run records spindle_temp_c with spindle_load_pct, spindle_rpm and ambient_temp_c")
+        return machine
+    recordings = []
+    for log in warm:
+        coolant = log.columns.get("coolant_on")
+        told = Warming(log.t_s, log["spindle_load_pct"], log["spindle_rpm"], log["ambient_temp_c"], coolant)
+        recordings.append(WarmingRun(log.t_s, told, log["spindle_temp_c"]))
+    noise = noise_of(machine, warm[0], "spindle_temp_c")
+    found = fit_thermal(thermal, recordings, noise, stated_uncertainty(machine, "thermal.resistance_k_per_w"))
+    fitted = with_thermal(thermal, found)
+    stated = thermal.model_dump()
+    free = [name for name in NAMES if stated[name] > 0.0]
+    units = {"alpha_w_per_pct_rpm2": "W/(% rpm²)", "beta_w_per_rpm": "W/rpm", "resistance_k_per_w": "K/W"}
+    for i, name in enumerate(free):
+        value = getattr(fitted, name)
+        deviation = value * float(np.sqrt(found.covariance[i, i]))
+        known.append(estimate(f"thermal.{name}", value, deviation, units[name], stated[name], found.known[i]))
+    _say_thermal(found, free, unknown, fitted.resistance_k_per_w * fitted.capacity_j_per_k)
+    return machine.model_copy(update={"thermal": fitted})
+
+
+def _say_thermal(found: Fit, free: list[str], unknown: list[str], constant_s: float) -> None:
+    """What temperatures cannot say."""
+    unknown.append(
+        "thermal: of the four constants, temperatures know three combinations (alpha/C, beta/C and R·C); capacity_j_per_k stays "
+        "as stated, the other three hold with it"
+    )
+    unknown.extend(
+        f"thermal.{name}: these runs do not say; a step of speed and a cool-down of {2.0 * constant_s / 60.0:.0f} min would"
+        for i, name in enumerate(free)
+        if found.known[i] < 0.5
+    )

@@ -1,0 +1,106 @@
+"""Points, tangents and curvature along segments: the compiled part of a path. Formulas: see `path`."""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+LINEAR_AXES = 3
+ARC = 2
+
+
+@njit(cache=True)
+def first_axis(plane: int) -> int:
+    """Index of the first axis of a plane: G17 x, G18 z, G19 y."""
+    return 0 if plane == 17 else (2 if plane == 18 else 1)
+
+
+@njit(cache=True)
+def second_axis(plane: int) -> int:
+    """Index of the second axis of a plane: G17 y, G18 x, G19 z."""
+    return 1 if plane == 17 else (0 if plane == 18 else 2)
+
+
+@njit(cache=True)
+def _polar(point: Floats, centre: Floats, u: int, v: int) -> tuple[float, float]:
+    du, dv = point[u] - centre[u], point[v] - centre[v]
+    return np.hypot(du, dv), np.arctan2(dv, du)
+
+
+@njit(cache=True)
+def points_at(
+    segment: Ints,
+    s_mm: Floats,
+    kind: Ints,
+    start_mm: Floats,
+    end_mm: Floats,
+    centre_mm: Floats,
+    plane: Ints,
+    sweep_rad: Floats,
+    length_mm: Floats,
+) -> Floats:
+    """Points (n, axes) at distances `s_mm` (n,) of segments `segment` (n,); the ends of a segment are met exactly."""
+    axes = start_mm.shape[1]
+    points = np.empty((len(segment), axes))
+    for n in range(len(segment)):
+        k = segment[n]
+        f = s_mm[n] / length_mm[k]
+        if f >= 1.0:
+            points[n] = end_mm[k]
+            continue
+        for a in range(axes):
+            points[n, a] = start_mm[k, a] + (end_mm[k, a] - start_mm[k, a]) * f
+        if kind[k] == ARC and f > 0.0:
+            u, v = first_axis(plane[k]), second_axis(plane[k])
+            r0, angle = _polar(start_mm[k], centre_mm[k], u, v)
+            r1, _ = _polar(end_mm[k], centre_mm[k], u, v)
+            radius = r0 + (r1 - r0) * f
+            points[n, u] = centre_mm[k, u] + radius * np.cos(angle + sweep_rad[k] * f)
+            points[n, v] = centre_mm[k, v] + radius * np.sin(angle + sweep_rad[k] * f)
+    return points
+
+
+@njit(cache=True)
+def tangents_at(
+    segment: Ints,
+    s_mm: Floats,
+    kind: Ints,
+    start_mm: Floats,
+    end_mm: Floats,
+    centre_mm: Floats,
+    plane: Ints,
+    sweep_rad: Floats,
+    length_mm: Floats,
+) -> Floats:
+    """dp/ds (n, axes) at distances `s_mm` (n,) of segments `segment` (n,)."""
+    axes = start_mm.shape[1]
+    tangents = np.empty((len(segment), axes))
+    for n in range(len(segment)):
+        k = segment[n]
+        for a in range(axes):
+            tangents[n, a] = (end_mm[k, a] - start_mm[k, a]) / length_mm[k]
+        if kind[k] == ARC:
+            u, v = first_axis(plane[k]), second_axis(plane[k])
+            r0, angle = _polar(start_mm[k], centre_mm[k], u, v)
+            r1, _ = _polar(end_mm[k], centre_mm[k], u, v)
+            angle += sweep_rad[k] * s_mm[n] / length_mm[k]
+            along = 0.5 * (r0 + r1) * sweep_rad[k] / length_mm[k]
+            tangents[n, u] = -along * np.sin(angle)
+            tangents[n, v] = along * np.cos(angle)
+    return tangents
+
+
+@njit(cache=True)
+def curvature_at(
+    kind: Ints, start_mm: Floats, end_mm: Floats, centre_mm: Floats, plane: Ints, sweep_rad: Floats, length_mm: Floats
+) -> Floats:
+    """Curvature (n,) of each segment, 1/mm: r θ² / L²; a circle of 10 mm has 0.1, a line 0."""
+    curvature = np.zeros(len(kind))
+    for k in range(len(kind)):
+        if kind[k] == ARC:
+            u, v = first_axis(plane[k]), second_axis(plane[k])
+            r0, _ = _polar(start_mm[k], centre_mm[k], u, v)
+            r1, _ = _polar(end_mm[k], centre_mm[k], u, v)
+            curvature[k] = 0.5 * (r0 + r1) * (sweep_rad[k] / length_mm[k]) ** 2
+    return curvature

@@ -1,0 +1,220 @@
+"""The path of a program: its moves as arrays, one row a segment, with what happens between them.
+
+A line of length L from p₀ to p₁ is p(s) = p₀ + (p₁ − p₀) s / L. An arc of sweep θ about a centre c in a plane with first and
+second axis (u, v) is, with the fraction f = s / L, p_u = c_u + r(f) cos(φ₀ + θ f), p_v = c_v + r(f) sin(φ₀ + θ f); the axes
+outside the plane move with f (helix). r(f) goes linearly from the radius of the start to that of the end, which differ by the
+rounding of the program, so that the end is met exactly; L = √((r θ)² + h²) with the mean radius r and the helix height h.
+Planes as ISO 6983 has them: G17 = x, y; G18 = z, x; G19 = y, z. A sweep is positive counter-clockwise seen from the positive
+normal of its plane.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.gcode import canonical
+from twin.motion.geometry import curvature_at, points_at, tangents_at
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+PLANE_AXES = {17: (0, 1), 18: (2, 0), 19: (1, 2)}
+LINEAR_AXES = 3
+SHORTEST_MM = 1e-9
+"""A move shorter than this does not move: the rounding of a block, not a segment."""
+
+
+class Kind(IntEnum):
+    """How a segment is travelled."""
+
+    RAPID = 0
+    LINE = 1
+    ARC = 2
+
+
+class EventKind(IntEnum):
+    """What happens between segments."""
+
+    DWELL = 0
+    TOOL_CHANGE = 1
+    SPINDLE = 2
+    PROGRAM_STOP = 3
+    PROGRAM_END = 4
+    COOLANT = 5
+    ORIENT = 6
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something that is no motion, before segment `segment` (= their number: after the last one).
+
+    value: seconds of a dwell, number of a tool, signed rev/min of the spindle, 1 or 0 of coolant and optional stop
+    """
+
+    segment: int
+    kind: EventKind
+    value: float
+    line: int
+
+
+@dataclass(frozen=True, slots=True)
+class Path:
+    """Segments (rows of arrays, all of one length n) and the events between them. Lengths in mm, feeds in mm/min.
+
+    start_mm, end_mm: (n, axes); centre_mm: (n, axes), of use for arcs only
+    plane: 17, 18, 19; sweep_rad: 0 for what is no arc
+    exact_stop: (n,) the segment ends at rest (G61, G9)
+    line: (n,) source line
+    """
+
+    axes: tuple[str, ...]
+    line: Ints
+    kind: Ints
+    start_mm: Floats
+    end_mm: Floats
+    centre_mm: Floats
+    plane: Ints
+    sweep_rad: Floats
+    length_mm: Floats
+    feed_mm_min: Floats
+    exact_stop: NDArray[np.bool_]
+    events: tuple[Event, ...]
+
+    def __len__(self) -> int:
+        return len(self.line)
+
+    def at(self, segment: Ints, s_mm: Floats) -> Floats:
+        """Points (n, axes) at the distances `s_mm` (n,) from the start of the segments `segment` (n,)."""
+        return points_at(
+            segment, s_mm, self.kind, self.start_mm, self.end_mm, self.centre_mm, self.plane, self.sweep_rad, self.length_mm
+        )
+
+    def tangents(self, segment: Ints, s_mm: Floats) -> Floats:
+        """dp/ds (n, axes): of length 1 in the axes that the feed counts."""
+        return tangents_at(
+            segment, s_mm, self.kind, self.start_mm, self.end_mm, self.centre_mm, self.plane, self.sweep_rad, self.length_mm
+        )
+
+    def curvature_per_mm(self) -> Floats:
+        """Curvature (n,) of each segment, 1/mm: r θ² / L² of an arc (that of the helix), 0 of a line."""
+        return curvature_at(self.kind, self.start_mm, self.end_mm, self.centre_mm, self.plane, self.sweep_rad, self.length_mm)
+
+
+@dataclass
+class _Builder:
+    """The rows as they come."""
+
+    position: tuple[float, ...]
+    tool_change_mm: tuple[float | None, ...]
+
+    def __post_init__(self) -> None:
+        self.rows: list[tuple[float, ...]] = []
+        self.points: list[tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]] = []
+        self.events: list[Event] = []
+        self.exact_stop = False
+
+    def event(self, kind: EventKind, value: float, line: int) -> None:
+        self.events.append(Event(len(self.rows), kind, float(value), line))
+
+    def segment(
+        self,
+        line: int,
+        kind: Kind,
+        end: tuple[float, ...],
+        feed: float,
+        centre: tuple[float, ...] | None = None,
+        plane: int = 17,
+        sweep: float = 0.0,
+    ) -> None:
+        start, self.position = self.position, end
+        length = _length(start, end, centre, plane, sweep)
+        if length < SHORTEST_MM:
+            return
+        self.rows.append((line, kind, plane, sweep, length, feed, self.exact_stop))
+        self.points.append((start, end, centre or start))
+
+
+def _length(
+    start: tuple[float, ...], end: tuple[float, ...], centre: tuple[float, ...] | None, plane: int, sweep: float
+) -> float:
+    """What the feed counts: the way of the linear axes, or that of the rotary ones where nothing else moves."""
+    moved = [b - a for a, b in zip(start, end, strict=True)]
+    if centre is not None:
+        u, v = PLANE_AXES[plane]
+        radius = (_radius(start, centre, u, v) + _radius(end, centre, u, v)) / 2.0
+        height = next(moved[i] for i in range(LINEAR_AXES) if i not in {u, v})
+        return float(np.hypot(radius * sweep, height))
+    linear = float(np.sqrt(sum(d * d for d in moved[:LINEAR_AXES])))
+    return linear if linear >= SHORTEST_MM else float(np.sqrt(sum(d * d for d in moved[LINEAR_AXES:])))
+
+
+def _radius(point: tuple[float, ...], centre: tuple[float, ...], u: int, v: int) -> float:
+    return float(np.hypot(point[u] - centre[u], point[v] - centre[v]))
+
+
+def path_from_moves(
+    moves: Sequence[canonical.Move],
+    start_mm: tuple[float, ...] | None = None,
+    axes: tuple[str, ...] = ("x", "y", "z"),
+    tool_change_mm: tuple[float | None, ...] = (),
+) -> Path:
+    """The path of `moves`, from `start_mm` (default: the origin). Moves that go nowhere leave no segment.
+
+    tool_change_mm: where a tool change takes the axes in rapid first; None = that axis stays, () = all stay.
+
+    >>> path = path_from_moves([canonical.Linear(0, (3.0, 4.0, 0.0), 600.0, None)])
+    >>> float(path.length_mm[0]), path.at(np.array([0]), np.array([2.5])).tolist()
+    (5.0, [[1.5, 2.0, 0.0]])
+    """
+    builder = _Builder(start_mm if start_mm is not None else (0.0,) * len(axes), tool_change_mm)
+    for move in moves:
+        _add(builder, move)
+    rows = np.array(builder.rows, dtype=np.float64).reshape(-1, 7)
+    points = np.array(builder.points, dtype=np.float64).reshape(-1, 3, len(axes))
+    return Path(
+        axes=axes,
+        line=rows[:, 0].astype(np.int64),
+        kind=rows[:, 1].astype(np.int64),
+        start_mm=np.ascontiguousarray(points[:, 0]),
+        end_mm=np.ascontiguousarray(points[:, 1]),
+        centre_mm=np.ascontiguousarray(points[:, 2]),
+        plane=rows[:, 2].astype(np.int64),
+        sweep_rad=rows[:, 3].copy(),
+        length_mm=rows[:, 4].copy(),
+        feed_mm_min=rows[:, 5].copy(),
+        exact_stop=rows[:, 6].astype(np.bool_),
+        events=tuple(builder.events),
+    )
+
+
+def _add(builder: _Builder, move: canonical.Move) -> None:
+    match move:
+        case canonical.Rapid():
+            builder.segment(move.line, Kind.RAPID, move.end_mm, np.inf)
+        case canonical.Linear():
+            builder.segment(move.line, Kind.LINE, move.end_mm, move.feed_mm_min)
+        case canonical.Arc():
+            builder.segment(move.line, Kind.ARC, move.end_mm, move.feed_mm_min, move.centre_mm, move.plane, move.sweep_rad)
+        case canonical.Dwell():
+            builder.event(EventKind.DWELL, move.seconds, move.line)
+        case canonical.ToolChange():
+            if builder.tool_change_mm:
+                there = zip(builder.tool_change_mm, builder.position, strict=True)
+                builder.segment(move.line, Kind.RAPID, tuple(at if to is None else to for to, at in there), np.inf)
+            builder.event(EventKind.TOOL_CHANGE, move.tool, move.line)
+        case canonical.Spindle():
+            builder.event(EventKind.SPINDLE, move.rpm * move.direction, move.line)
+        case canonical.SpindleOrient():
+            builder.event(EventKind.ORIENT, 0.0, move.line)
+        case canonical.Coolant():
+            builder.event(EventKind.COOLANT, move.on, move.line)
+        case canonical.ProgramStop():
+            builder.event(EventKind.PROGRAM_STOP, move.optional, move.line)
+        case canonical.ProgramEnd():
+            builder.event(EventKind.PROGRAM_END, 0.0, move.line)
+        case canonical.ExactStop():
+            builder.exact_stop = move.on
+        case canonical.LookAhead():
+            pass  # The planner looks ahead over the whole program in either state.

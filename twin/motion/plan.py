@@ -1,0 +1,268 @@
+"""The plan of a program: the speed along every segment and the time of every event; sampled, the reference of every tick."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from twin.errors import ProgramError
+from twin.machine import Program
+from twin.motion.limits import Bounds, Limits, bounds
+from twin.motion.look_ahead import stretches_with_times
+from twin.motion.motion import Motion, sampled
+from twin.motion.path import Kind, Path
+from twin.motion.s_curve import along_profile, ramp_time, time_at_distance
+from twin.motion.timeline import timeline
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Override = float | Floats
+"""A ratio (1 = 100 %), for the whole path or one for each segment."""
+
+
+@dataclass(frozen=True, slots=True)
+class Stretches:
+    """Profiles, one row a stretch (m): ramp, cruise and ramp over consecutive segments. mm, mm/s, s.
+
+    first: (m + 1,) first segment of each, then the number of segments
+    offset_mm: (n,) where each segment begins in its stretch
+    wait_s: (m,) standing for the spindle before `start_s`
+    halt_s: (m,) standing at the end until the axes are in position
+    """
+
+    first: Ints
+    length_mm: Floats
+    acceleration_mm_s2: Floats
+    jerk_mm_s3: Floats
+    speed_mm_s: Floats
+    peak_mm_s: Floats
+    seconds: Floats
+    start_s: Floats
+    wait_s: Floats
+    halt_s: Floats
+    offset_mm: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """When and how fast. Rows of `*_segment` arrays belong to segments, of `event_*` to the events of the path.
+
+    start_s, duration_s: (n,) of each segment; entry_mm_s, peak_mm_s, exit_mm_s: (n,) its speeds
+    event_start_s, event_duration_s: (e,)
+    spindle_ramps: (r, 4) begin and end in s, speed before and after in rev/min, negative = M4
+    total_s: until everything has ended
+    """
+
+    path: Path
+    stretches: Stretches
+    start_s: Floats
+    duration_s: Floats
+    entry_mm_s: Floats
+    peak_mm_s: Floats
+    exit_mm_s: Floats
+    event_start_s: Floats
+    event_duration_s: Floats
+    spindle_ramps: Floats
+    spindle_base_rpm: float
+    total_s: float
+
+    def sample(self, period_s: float, average_s: tuple[float, ...] = ()) -> Motion:
+        """The motion at t = 0, T, 2T, … until the first tick at or after the end. See `motion.sampled`."""
+        return sampled(self, period_s, average_s)
+
+    def seconds_by_line(self) -> Floats:
+        """Seconds (highest line + 1,) spent on each source line: its segments, waits and events. Their sum is total_s."""
+        lines = [*self.path.line, *(event.line for event in self.path.events)]
+        seconds = np.zeros(max(lines, default=-1) + 1)
+        np.add.at(seconds, self.path.line, self.duration_s)
+        np.add.at(seconds, self.path.line[self.stretches.first[:-1]], self.stretches.wait_s)
+        np.add.at(seconds, self.path.line[self.stretches.first[1:] - 1], self.stretches.halt_s)
+        np.add.at(seconds, np.array([event.line for event in self.path.events], dtype=np.int64), self.event_duration_s)
+        return seconds
+
+
+def plan(path: Path, times: Program | Limits, feed_override: Override = 1.0, rapid_override: Override = 1.0) -> Plan:
+    """The plan of `path` under the limits `times`. Overrides act on the programmed feed and the rapid rate, on no other limit.
+
+    Raises ProgramError where a cutting move has no feed, MachineError where the limits are for another number of axes.
+
+    1200 mm at 6000 mm/min with 1000 mm/s² take 12 s and another v/a = 0.1 s to start and stop:
+
+    >>> from twin.gcode.canonical import Linear
+    >>> from twin.motion.path import path_from_moves
+    >>> line = path_from_moves([Linear(0, (1200.0, 0.0, 0.0), 6000.0, None)])
+    >>> round(plan(line, Limits(rapid_mm_min=10000.0, acceleration_mm_s2=1000.0)).total_s, 9)
+    12.1
+    """
+    limits = Limits.of(times) if isinstance(times, Program) else times
+    allowed = bounds(path, limits)
+    cap = _caps(path, allowed, path.feed_mm_min, feed_override, rapid_override)
+    first, length, a, j, v, peak, seconds = stretches_with_times(
+        cap, allowed.acceleration_mm_s2, allowed.jerk_mm_s3, allowed.junction_mm_s, path.length_mm
+    )
+    start, wait, event_start, event_seconds, ramps, total = timeline(
+        first,
+        seconds,
+        v[1:],
+        path.kind,
+        *_event_arrays(path),
+        path.line,
+        limits.tool_change_s,
+        limits.spindle_acceleration_rpm_s,
+        _stopping_rpm_s(limits),
+        limits.spindle_base_rpm,
+        limits.rapid_waits_for_spindle,
+        limits.in_position_s,
+    )
+    offset = _offsets(first, path.length_mm)
+    halt = np.where(v[1:] == 0.0, limits.in_position_s, 0.0)
+    made = Stretches(first, length, a, j, v, peak, seconds, start, wait, halt, offset)
+    segment_start, duration, entry, top, leave = _by_segment(first, offset, path.length_mm, length, a, j, v, peak, seconds, start)
+    return Plan(
+        path,
+        made,
+        segment_start,
+        duration,
+        entry,
+        top,
+        leave,
+        event_start,
+        event_seconds,
+        ramps,
+        limits.spindle_base_rpm,
+        float(total),
+    )
+
+
+def _caps(path: Path, allowed: Bounds, feed_mm_min: Floats, feed_override: Override, rapid_override: Override) -> Floats:
+    """Highest speed (…, n) of each segment, mm/s."""
+    rapid = path.kind == Kind.RAPID
+    wanted = np.where(rapid, np.inf, feed_mm_min * feed_override / 60.0)
+    fastest = np.minimum(wanted, allowed.speed_mm_s * np.where(rapid, rapid_override, 1.0))
+    if not np.all(fastest > 0.0):
+        k = int(np.argmin(np.min(np.atleast_2d(fastest), axis=0)))
+        given = f"the feed at segment {k} is {feed_mm_min[..., k]} mm/min and the overrides leave nothing of it"
+        raise ProgramError(int(path.line[k]) + 1, "F", f"{given}; a cutting move needs a feed above 0")
+    return np.ascontiguousarray(fastest)
+
+
+def _stopping_rpm_s(limits: Limits) -> float:
+    down = limits.spindle_deceleration_rpm_s
+    return limits.spindle_acceleration_rpm_s if down is None else down
+
+
+def _event_arrays(path: Path) -> tuple[Ints, Ints, Floats, Ints]:
+    return (
+        np.array([event.segment for event in path.events], dtype=np.int64),
+        np.array([event.kind for event in path.events], dtype=np.int64),
+        np.array([event.value for event in path.events], dtype=np.float64),
+        np.array([event.line for event in path.events], dtype=np.int64),
+    )
+
+
+@njit(cache=True)
+def _offsets(first: Ints, length: Floats) -> Floats:
+    offset = np.zeros(len(length))
+    for i in range(len(first) - 1):
+        for k in range(first[i] + 1, first[i + 1]):
+            offset[k] = offset[k - 1] + length[k - 1]
+    return offset
+
+
+@njit(cache=True)
+def _by_segment(
+    first: Ints,
+    offset: Floats,
+    length: Floats,
+    total: Floats,
+    a: Floats,
+    j: Floats,
+    v: Floats,
+    peak: Floats,
+    seconds: Floats,
+    start: Floats,
+) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+    """Start, duration, entry, peak and exit speed (n) of each segment, read off the profile of its stretch."""
+    n = len(length)
+    begin, duration, entry, top, leave = np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(n)
+    for i in range(len(first) - 1):
+        t, speed = 0.0, v[i]
+        up, down = ramp_time(v[i], peak[i], a[i], j[i]), seconds[i] - ramp_time(peak[i], v[i + 1], a[i], j[i])
+        for k in range(first[i], first[i + 1]):
+            end, end_speed = seconds[i], v[i + 1]
+            if k + 1 < first[i + 1]:
+                end = time_at_distance(offset[k + 1], v[i], peak[i], v[i + 1], total[i], a[i], j[i])
+                _s, end_speed, _a = along_profile(end, v[i], peak[i], v[i + 1], total[i], a[i], j[i])
+            begin[k], duration[k], entry[k], leave[k] = start[i] + t, end - t, speed, end_speed
+            top[k] = peak[i] if t <= down and end >= up else max(speed, end_speed)
+            t, speed = end, end_speed
+    return begin, duration, entry, top, leave
+
+
+def plan_times(path: Path, times: Program | Limits, feed_mm_min: Floats) -> Floats:
+    """Total seconds (candidates,) of the path at each row of `feed_mm_min` (candidates, n): `plan(…).total_s`, nothing else."""
+    limits = Limits.of(times) if isinstance(times, Program) else times
+    allowed = bounds(path, limits)
+    caps = _caps(path, allowed, np.atleast_2d(np.asarray(feed_mm_min, dtype=np.float64)), 1.0, 1.0)
+    return np.asarray(
+        _totals(
+            caps,
+            allowed.acceleration_mm_s2,
+            allowed.jerk_mm_s3,
+            allowed.junction_mm_s,
+            path.length_mm,
+            path.kind,
+            *_event_arrays(path),
+            path.line,
+            limits.tool_change_s,
+            limits.spindle_acceleration_rpm_s,
+            _stopping_rpm_s(limits),
+            limits.spindle_base_rpm,
+            limits.rapid_waits_for_spindle,
+            limits.in_position_s,
+        )
+    )
+
+
+@njit(cache=True)
+def _totals(
+    caps: Floats,
+    acceleration: Floats,
+    jerk: Floats,
+    junction: Floats,
+    length: Floats,
+    kind: Ints,
+    event_segment: Ints,
+    event_kind: Ints,
+    event_value: Floats,
+    event_line: Ints,
+    segment_line: Ints,
+    tool_change_s: float,
+    spindle_rpm_s: float,
+    stopping_rpm_s: float,
+    base_rpm: float,
+    rapid_waits: bool,
+    in_position_s: float,
+) -> Floats:
+    totals = np.empty(len(caps))
+    for c in range(len(caps)):
+        first, _total, _a, _j, v, _peak, seconds = stretches_with_times(caps[c], acceleration, jerk, junction, length)
+        totals[c] = timeline(
+            first,
+            seconds,
+            v[1:],
+            kind,
+            event_segment,
+            event_kind,
+            event_value,
+            event_line,
+            segment_line,
+            tool_change_s,
+            spindle_rpm_s,
+            stopping_rpm_s,
+            base_rpm,
+            rapid_waits,
+            in_position_s,
+        )[-1]
+    return totals

@@ -1,0 +1,119 @@
+"""What a recorded run tells the twin: the inputs of the response, the states it starts from, the noise of its sensors."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.errors import RunLogError
+from twin.machine import Axis, MachineFile
+from twin.response import RunInput, period_of
+from twin.runlog import RunLog
+
+Floats = NDArray[np.float64]
+
+STILL_MIN = 20
+"""Samples of standstill at the start of a run that are worth averaging."""
+
+
+def told_of(log: RunLog, machine: MachineFile) -> RunInput:
+    """What the machine was told in a recorded run.
+
+    Raises RunLogError where an axis of the machine is recorded at another period than the one its loops tick with.
+    """
+    letters = [a for a in machine.axes if f"{a}_ref_mm" in log.columns]
+    period_s = machine.machine.servo_period_s
+    if letters and abs(period_of(log.t_s) - period_s) > 0.01 * period_s:
+        raise RunLogError(
+            f"{log.source}: is sampled every {1000 * period_of(log.t_s):.4g} ms, the servo loops tick every "
+            f"{1000 * period_s:.4g} ms; record at the servo period"
+        )
+
+    def column(name: str) -> Floats | None:
+        return log.columns.get(name) if log.has(name) else None
+
+    return RunInput(
+        t_s=log.t_s,
+        reference_mm={a: log[f"{a}_ref_mm"] for a in letters},
+        spindle_rpm=column("spindle_rpm"),
+        spindle_angle_rad=column("spindle_angle_rad"),
+        axial_depth_mm=column("axial_depth_mm"),
+        entry_angle_rad=column("entry_angle_rad"),
+        exit_angle_rad=column("exit_angle_rad"),
+        coolant_on=column("coolant_on"),
+        ambient_temp_c=column("ambient_temp_c"),
+        start={a: start_of(log, a, machine.axes[a], period_s) for a in letters},
+        start_temp_c=start_temperature_c(log.t_s, log["spindle_temp_c"]) if log.has("spindle_temp_c") else None,
+    )
+
+
+def start_of(log: RunLog, letter: str, axis: Axis, period_s: float) -> Mapping[str, float]:
+    """The state of an axis at the first sample of a run."""
+    has = f"{letter}_pos_mm" in log.columns and f"{letter}_torque_a" in log.columns
+    return start_state(
+        axis,
+        log[f"{letter}_ref_mm"],
+        log[f"{letter}_pos_mm"] if has else log[f"{letter}_ref_mm"],
+        log[f"{letter}_torque_a"] if has else np.zeros(len(log)),
+        period_s,
+    )
+
+
+def start_state(axis: Axis, reference_mm: Floats, position_mm: Floats, torque_a: Floats, period_s: float) -> Mapping[str, float]:
+    """The state at the first of (n,) samples: the mean of a standstill there, else a parabola through the first ones."""
+    moving = np.flatnonzero(np.diff(reference_mm) != 0)
+    still = int(moving[0]) if len(moving) else len(reference_mm)
+    if still >= STILL_MIN or len(reference_mm) < 12:
+        position, velocity, step = float(np.nanmean(position_mm[: max(still, 1)])), 0.0, 0.0
+        torque = float(np.nanmean(torque_a[: min(max(still, 1), 50)]))
+    else:
+        first = np.arange(12) * period_s
+        _, velocity, position = (float(v) for v in np.polyfit(first, position_mm[:12], 2))
+        torque = float(np.polyfit(first, torque_a[:12], 1)[1])
+        step = float(reference_mm[1] - reference_mm[0])
+    error = axis.position_gain_per_s * (float(reference_mm[0]) - position) - velocity
+    integral = torque - axis.velocity_gain_a_s_per_mm * error - axis.velocity_integral_gain_a_per_mm * error * period_s
+    return {
+        "position_mm": position,
+        "velocity_mm_s": velocity,
+        "integral_a": integral if axis.velocity_integral_gain_a_per_mm > 0 else 0.0,
+        "previous_reference_mm": float(reference_mm[0]) - step,
+        "previous_reference_velocity_mm_s": step / period_s,
+    }
+
+
+def start_temperature_c(t_s: Floats, temperature_c: Floats) -> float:
+    """Temperature at the first sample: from a line through the first minute's, which beats the noise of one."""
+    there = np.flatnonzero(np.isfinite(temperature_c))
+    first = there[t_s[there] <= t_s[there[0]] + 60.0]
+    if len(first) < 5:
+        return float(temperature_c[there[0]])
+    return float(np.polyfit(t_s[first] - t_s[0], temperature_c[first], 1)[1])
+
+
+def white_noise(values: Floats) -> float:
+    """Standard deviation of the white part of a smooth signal: from its second differences, robustly.
+
+    >>> noisy = np.random.default_rng(1).standard_normal(20000) + np.linspace(0.0, 100.0, 20000)
+    >>> bool(abs(white_noise(noisy) - 1.0) < 0.05)
+    True
+    """
+    second = np.diff(values[np.isfinite(values)], 2)
+    if not len(second):
+        return 0.0
+    return float(np.median(np.abs(second - np.median(second))) * 1.482602218505602 / np.sqrt(6.0))
+
+
+NOISE_KEYS = {
+    **{"pos_mm": "position_mm", "table_mm": "table_mm", "torque_a": "torque_a", "force_x_n": "force_n", "force_y_n": "force_n"},
+    **{"spindle_load_pct": "spindle_load_pct", "spindle_temp_c": "spindle_temp_c"},
+}
+
+
+def noise_of(machine: MachineFile, log: RunLog, column: str) -> float:
+    """Noise of the sensor of a column: as the machine states it, else from the recording, never quite 0."""
+    key = NOISE_KEYS.get(column) or NOISE_KEYS.get(column.partition("_")[2], column)
+    stated = machine.noise.get(key)
+    found = stated if stated is not None else white_noise(log[column])
+    scale = float(np.nanmax(np.abs(log[column]))) if len(log) else 1.0
+    return max(found, 1e-9 * max(scale, 1.0))

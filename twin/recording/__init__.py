@@ -1,0 +1,1 @@
+"""Recordings of real machines as runs: what a control told while it worked, read into plain columns."""
