@@ -8,7 +8,9 @@ import json
 import logging
 import sys
 from dataclasses import asdict
+from enum import StrEnum
 from pathlib import Path
+from types import ModuleType
 from typing import Annotated, Any, NoReturn
 
 import typer
@@ -16,7 +18,7 @@ from rich.console import Console
 from typer.exceptions import TyperException
 
 from cnctwin import demo as demo_command
-from cnctwin.errors import BrokerStartError, ProgramError
+from cnctwin.errors import BrokerStartError, ProgramError, UsageError
 from cnctwin.given_broker import address, broker_or_own
 from cnctwin.replay_command import replay
 from cnctwin.state_dir import state_dir as folder_for_state
@@ -24,6 +26,7 @@ from cnctwin.stopping import stopped_by_signals
 from edge.errors import EdgeError
 from processors.errors import ProcessorError
 from sparkplug.errors import SparkplugError
+from twin.errors import TwinError
 
 app = typer.Typer(
     no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, help="A digital twin of CNC machines."
@@ -32,6 +35,14 @@ edge_app = typer.Typer(no_args_is_help=True, help="Turn what a control says into
 control_app = typer.Typer(no_args_is_help=True, help="Stand in for a control, to develop and test without a machine.")
 app.add_typer(edge_app, name="edge")
 app.add_typer(control_app, name="simulate-control")
+
+
+class Method(StrEnum):
+    """How `identify` searches."""
+
+    LSQ = "least-squares"
+    GA = "ga"
+
 
 Broker = Annotated[str | None, typer.Option(help="mqtt[s]://[user@]host[:port]; else $CNCTWIN_BROKER", show_default=False)]
 Group = Annotated[str, typer.Option(help="Sparkplug group: the plant")]
@@ -115,6 +126,45 @@ def process(
         run(names, where, config, stop, group=group, session_dir=folder_for_state(state_dir))
 
 
+@app.command()
+def simulate(
+    program: Annotated[Path, typer.Argument(help="The part program")],
+    machine: Annotated[Path, typer.Option(help="machine.toml of the machine to run it on")],
+    out: Annotated[Path | None, typer.Option(help="Write the run log there, .parquet or .csv")] = None,
+    seed: Annotated[int | None, typer.Option(help="One noisy course of the machine instead of its mean course")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Run a part program on the twin as on a machine: time, peak force, following error, and a run log."""
+    _twin().simulate(program, machine, out, seed=seed, as_json=as_json, console=_console())
+
+
+@app.command()
+def identify(
+    case: Annotated[Path, typer.Argument(help="The folder with case.toml, machine.toml and the recorded runs")],
+    out: Annotated[Path | None, typer.Option(help="Write the identified machine.toml there")] = None,
+    method: Annotated[
+        Method, typer.Option(help="least-squares, or the reference paper's genetic algorithm beside it")
+    ] = Method.LSQ,
+    free_gains: Annotated[bool, typer.Option("--free-gains", help="Fit S_pp, S_vp, S_vi; else gains are as stated")] = False,
+    seed: Annotated[int, typer.Option(help="Of the genetic algorithm")] = 1,
+    as_json: AsJson = False,
+) -> None:
+    """Fit the twin's constants to recordings, with confidence intervals, and say which cannot be known from them."""
+    if method is Method.GA:
+        _twin().compare_methods(case, seed, as_json, _console())
+    else:
+        _twin().identify(case, out, free_gains=free_gains, as_json=as_json, console=_console())
+
+
+@app.command("import")
+def import_(
+    recording: Annotated[Path, typer.Argument(help="A recording in the time|key|value text of the NIST test bed")],
+    out: Annotated[Path, typer.Option(help="The run log, .parquet or .csv; numbered where there are several runs")],
+) -> None:
+    """Turn a recording into run logs, one for each program execution in it, with its pauses."""
+    _twin().import_recording(recording, out, _console())
+
+
 @edge_app.command("run")
 def edge_run(config: Annotated[Path, typer.Argument(help="The TOML file of one machine")], broker: Broker = None) -> None:
     """Run an edge until SIGTERM or Ctrl-C."""
@@ -176,6 +226,15 @@ def simulate_mtconnect(
         )
 
 
+def _twin() -> ModuleType:
+    """The commands of the twin, which need what the extra brings: arrays, kernels, Parquet."""
+    try:
+        from cnctwin import twin_commands
+    except ModuleNotFoundError as missing:
+        raise UsageError(f"the twin needs the package {missing.name}; pip install 'cnctwin[twin]' brings it") from None
+    return twin_commands
+
+
 def _console() -> Console:
     """Standard output; into a file or a pipe it is as wide as the tables need."""
     console = Console()
@@ -198,7 +257,7 @@ def main() -> None:
         _explain(error)
     except BrokerStartError as error:
         _fail(error, 1)
-    except (ProgramError, EdgeError, ProcessorError, SparkplugError) as error:
+    except (ProgramError, EdgeError, ProcessorError, SparkplugError, TwinError) as error:
         _fail(error, 2)
     raise SystemExit(code)
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from twin.case import Run
 from twin.machine import MachineFile
-from twin.recorded import told_of
+from twin.recorded import noise_of, told_of
 from twin.regimes import Regime, axis_regimes
 from twin.response import respond
 from twin.runlog import AXIS_COLUMN, RunLog
@@ -21,7 +21,8 @@ class GapRow:
     """One signal in one regime of one run.
 
     gap: rms of twin minus recording; repeatability: rms of the difference of repeated runs over √2, None where none were repeated
-    in this regime; in the unit of the signal
+    in this regime; expected: what the twin itself predicts, noise of the sensor and spread of its courses; in the unit of the
+    signal. Two runs with a few stops in them can agree by luck, so the repeatability of a pair may be below what is expected.
     """
 
     run: str
@@ -30,6 +31,7 @@ class GapRow:
     samples: int
     gap: float
     repeatability: float | None
+    expected: float
 
     @property
     def ratio(self) -> float | None:
@@ -72,7 +74,9 @@ def gap_table(machine: MachineFile, runs: Iterable[Run], repeats: Iterable[tuple
                 there = here & np.isfinite(error)
                 if there.any():
                     gap = float(np.sqrt(np.mean(error[there] ** 2)))
-                    rows.append(GapRow(run.name, signal, regime, int(there.sum()), gap, floors.get((signal, regime))))
+                    spread = response.spread[signal][there] if signal in response.spread else np.zeros(1)
+                    expected = float(np.sqrt(noise_of(machine, log, signal) ** 2 + np.mean(spread**2)))
+                    rows.append(GapRow(run.name, signal, regime, int(there.sum()), gap, floors.get((signal, regime)), expected))
     return tuple(rows)
 
 

@@ -21,7 +21,7 @@ def told_of(log: RunLog, machine: MachineFile) -> RunInput:
 
     Raises RunLogError where an axis of the machine is recorded at another period than the one its loops tick with.
     """
-    letters = [a for a in machine.axes if f"{a}_ref_mm" in log.columns]
+    letters = [a for a in log.axes() if f"{a}_ref_mm" in log.columns]
     period_s = machine.machine.servo_period_s
     if letters and abs(period_of(log.t_s) - period_s) > 0.01 * period_s:
         raise RunLogError(
@@ -42,7 +42,7 @@ def told_of(log: RunLog, machine: MachineFile) -> RunInput:
         exit_angle_rad=column("exit_angle_rad"),
         coolant_on=column("coolant_on"),
         ambient_temp_c=column("ambient_temp_c"),
-        start={a: start_of(log, a, machine.axes[a], period_s) for a in letters},
+        start={a: start_of(log, a, machine.axes[a], period_s) for a in letters if a in machine.axes},
         start_temp_c=start_temperature_c(log.t_s, log["spindle_temp_c"]) if log.has("spindle_temp_c") else None,
     )
 
@@ -83,9 +83,9 @@ def start_state(axis: Axis, reference_mm: Floats, position_mm: Floats, torque_a:
 
 
 def start_temperature_c(t_s: Floats, temperature_c: Floats) -> float:
-    """Temperature at the first sample: from a line through the first minute's, which beats the noise of one."""
+    """Temperature at the first sample: by a line through those of the first minute, or of the first hundredth of a short run."""
     there = np.flatnonzero(np.isfinite(temperature_c))
-    first = there[t_s[there] <= t_s[there[0]] + 60.0]
+    first = there[t_s[there] <= t_s[there[0]] + min(60.0, 0.01 * float(t_s[-1] - t_s[0]))]
     if len(first) < 5:
         return float(temperature_c[there[0]])
     return float(np.polyfit(t_s[first] - t_s[0], temperature_c[first], 1)[1])

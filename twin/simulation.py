@@ -75,10 +75,11 @@ def simulate(
     moves = interpret(text, settings)
     notes: list[str] = []
     path = path_from_moves(moves)
-    moving = [a for column, a in enumerate(path.axes) if np.ptp(path.start_mm[:, column]) or np.any(path.start_mm != path.end_mm)]
+    moving = [a for column, a in enumerate(path.axes) if np.any(path.start_mm[:, column] != path.end_mm[:, column])]
     missing = [a for a in moving if a not in machine.axes]
-    if machine.axes and missing and any(a in machine.axes for a in path.axes):
-        notes.append(f"no [axes.{missing[0]}]: {', '.join(missing)} follows its reference without error in this run")
+    if missing:
+        follow = "follow their references" if len(missing) > 1 else "follows its reference"
+        notes.append(f"no [axes.{missing[0]}]: {' and '.join(missing)} {follow} without error in this run")
     if machine.program is None:
         notes.append("no [program]: 30 m/min, 2.5 m/s², 60 m/s³ and corners of 500 mm/min were taken for the control")
     planned = plan(path, machine.program or IDEAL_TIMES)
@@ -90,7 +91,7 @@ def simulate(
     angle = np.concatenate([[0.0], np.cumsum(motion.spindle_rpm)[:-1]]) * (2.0 * np.pi / 60.0 * period_s)
     told = RunInput(
         t_s=motion.t_s,
-        reference_mm={a: np.ascontiguousarray(motion.reference_mm[:, i]) for i, a in enumerate(path.axes) if a in machine.axes},
+        reference_mm={a: np.ascontiguousarray(motion.reference_mm[:, i]) for i, a in enumerate(path.axes)},
         spindle_rpm=motion.spindle_rpm,
         spindle_angle_rad=np.mod(angle, 2.0 * np.pi),
         axial_depth_mm=engaged["axial_depth_mm"],

@@ -2,7 +2,7 @@
 
 φ(z) = φ − 2 z tan β / D
 
-at the height z above the tip. The tool is taken as slices; see `twin.process.kernel`.
+at the height z above the tip. How forces along the edge are added up exactly is said in `twin.process.kernel`.
 """
 
 from math import tan
@@ -11,9 +11,9 @@ from twin.effects.effect import Effect, On, Parameter
 from twin.sites import Site
 
 
-def lag_rad(lag_rad: float, height_mm: float, tool_diameter_mm: float, angle_deg: float) -> float:
-    """Trails the tip the more, the higher up."""
-    return lag_rad + 2.0 * height_mm * tan(angle_deg * 0.017453292519943295) / tool_diameter_mm
+def lag_rad(lag_rad: float, axial_depth_mm: float, tool_diameter_mm: float, angle_deg: float) -> float:
+    """The lag of the edge where it leaves the work at the top."""
+    return lag_rad + 2.0 * axial_depth_mm * tan(angle_deg * 0.017453292519943295) / tool_diameter_mm
 
 
 EFFECT = Effect(

@@ -101,16 +101,17 @@ def _force_on(machine: MachineFile, run: Run, letter: str) -> Floats | None:
 
 def _with_or_without_delay(model: AxisModel, notes: list[str], letter: str) -> AxisFit:
     """The fit with the nominal loop, or with an old velocity in it where that takes much of the residual away."""
-    nominal = fit_axis(model)
-    delayed = fit_axis(AxisModel(model.axis, (*model.parameters, VELOCITY_DELAY), model.recordings, model.period_s))
+    later = AxisModel(model.axis, (*model.parameters, VELOCITY_DELAY), model.recordings, model.period_s)
+    nominal, delayed = fit_axis(model), fit_axis(later)
     delay = float(delayed.theta[-1])
     deviation = float(np.sqrt(delayed.found.covariance[-1, -1]))
-    if abs(delay) < DELAY_SIGMAS * deviation or delayed.found.rms > (1.0 - DELAY_GAIN_MIN) * nominal.found.rms:
+    left = [float(np.linalg.norm(m.left_over(f.theta))) for m, f in ((model, nominal), (later, delayed))]
+    part = 1.0 - left[1] / left[0]
+    if abs(delay) < DELAY_SIGMAS * deviation or part < DELAY_GAIN_MIN:
         return nominal
-    part = 1.0 - delayed.found.rms / nominal.found.rms
     notes.append(
-        f"axes.{letter}: the velocity in the loop is {1000 * delay:.3f} ± {1000 * INTERVAL_Z * deviation:.3f} ms old; with that in "
-        f"it the residual is {100 * part:.0f} % smaller, so the twin has velocity_feedback_delay on {letter}"
+        f"axes.{letter}: the velocity in the loop is {1000 * delay:.3f} ± {1000 * INTERVAL_Z * deviation:.3f} ms old; with that "
+        f"in it the residual is {100 * part:.0f} % smaller, so the twin has velocity_feedback_delay on {letter}"
     )
     return delayed
 
@@ -184,8 +185,8 @@ def _with_disturbance(
         return machine
     force, correlation = found.disturbance.force_n, found.disturbance.correlation_s
     notes.append(
-        f"a disturbance of {force:.2g} N with a correlation time of {1000 * correlation:.2g} ms explains how these runs differ and "
-        "where the axes come to rest; the twin is the mean over its courses"
+        f"a disturbance of {force:.2g} N with a correlation time of {1000 * correlation:.2g} ms explains how these runs differ "
+        "and where the axes come to rest; the twin is the mean over its courses"
     )
     noise = dict(machine.noise) | {"disturbance_force_n": force, "disturbance_correlation_s": correlation}
     return machine.model_copy(update={"noise": noise})

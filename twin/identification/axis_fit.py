@@ -21,6 +21,8 @@ from twin.servo.run import AxisInput, AxisRun, run_axes
 
 Floats = NDArray[np.float64]
 BLOCK_S = 1.0
+MISFIT = 2.0
+"""Residuals of twice the noise are more than noise."""
 SIGNALS = ("position_mm", "torque_a")
 
 
@@ -39,11 +41,12 @@ class AxisRecording:
     disturbance_n: Floats | None
     sigma: Floats
 
-    def cut(self, where: slice) -> "AxisRecording":
-        """A stretch of it."""
+    def cut(self, where: slice, widened: Floats | None = None) -> "AxisRecording":
+        """A stretch of it; `widened`: (2,) factors on the noise."""
+        sigma = self.sigma[:, where] if widened is None else self.sigma[:, where] * widened[:, None]
         disturbance = None if self.disturbance_n is None else self.disturbance_n[where]
         series = (self.t_s[where], self.reference_mm[where], self.position_mm[where], self.torque_a[where])
-        return AxisRecording(*series, disturbance, self.sigma[:, where])
+        return AxisRecording(*series, disturbance, sigma)
 
     def regimes(self) -> NDArray[np.int8]:
         """Regime of each sample."""
@@ -110,6 +113,15 @@ class AxisModel:
                 parts.append(np.nan_to_num((run.outputs[name] - measured) / recording.sigma[row]))
         return np.concatenate(parts, axis=1)
 
+    def left_over(self, theta: Floats) -> Floats:
+        """Root mean square of the residuals of position and of torque, (2,), in units of their noise."""
+        squares, samples = np.zeros(2), 0
+        for recording, run in zip(self.recordings, self.simulate(theta[None, :]), strict=True):
+            for row, (name, measured) in enumerate(zip(SIGNALS, (recording.position_mm, recording.torque_a), strict=True)):
+                squares[row] += np.nansum(((run.outputs[name][0] - measured) / recording.sigma[row]) ** 2)
+            samples += len(recording.t_s)
+        return np.sqrt(squares / samples)
+
     def blocks(self) -> NDArray[np.intp]:
         """Number of the time block that each residual belongs to; position and torque of a moment share one."""
         parts, first = [], 0
@@ -134,10 +146,20 @@ class AxisFit:
 
 
 def fit_axis(model: AxisModel) -> AxisFit:
-    """Fits all parameters of an axis together. A poor fit shows in its residuals."""
+    """Fits all parameters of an axis together. A poor fit shows in its residuals.
+
+    Where more is left than noise, the structure is not quite that of the axis, and what is left is the noise of a second fit:
+    weighted by sensors that see nanometres, the residuals would decide by which of them happen to be smallest.
+    """
     sigma = np.array([p.sigma for p in model.parameters])
     limit = np.array([1.5 if p.relative else min(0.9, 10.0 * p.sigma) for p in model.parameters])
-    return AxisFit(model, fit(model.residuals, sigma, limit, model.blocks()))
+    first = fit(model.residuals, sigma, limit, model.blocks())
+    left = model.left_over(first.theta)
+    if float(left.max()) < MISFIT:
+        return AxisFit(model, first)
+    widened = [r.cut(slice(None), widened=np.maximum(left, 1.0)) for r in model.recordings]
+    model = AxisModel(model.axis, model.parameters, tuple(widened), model.period_s)
+    return AxisFit(model, fit(model.residuals, sigma, limit, model.blocks(), first.theta))
 
 
 def noise_by_regime(regimes: NDArray[np.int8], noise: float, differences: Sequence[Floats]) -> Floats:

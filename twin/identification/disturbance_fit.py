@@ -21,8 +21,8 @@ Floats = NDArray[np.float64]
 
 COURSES = 32
 SEED = 20
-FORCES_N = (0.3, 0.6, 1.0, 1.5, 2.2, 3.3)
-CORRELATIONS_S = (0.005, 0.02, 0.06, 0.2)
+FORCES_N = (0.4, 0.9, 1.8, 3.5)
+CORRELATIONS_S = (0.008, 0.035, 0.15)
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +65,7 @@ def fit_disturbance(axes: Sequence[Axis]) -> DisturbanceFit:
     none = _score(axes, None)
     scored = [(_score(axes, candidate), candidate) for candidate in grid]
     likeliest = max(scored, key=lambda pair: pair[0])[1]
-    around = [(f, c) for f in (0.75, 1.0, 1.33) for c in (0.6, 1.0, 1.7) if (f, c) != (1.0, 1.0)]
+    around = [(f, c) for f in (0.7, 1.0, 1.4) for c in (0.5, 1.0, 2.0) if (f, c) != (1.0, 1.0)]
     finer = [Disturbance(likeliest.force_n * f, likeliest.correlation_s * c) for f, c in around]
     best, likeliest = max(scored + [(_score(axes, candidate), candidate) for candidate in finer], key=lambda pair: pair[0])
     return DisturbanceFit(likeliest, best - none) if best > none else DisturbanceFit(None, 0.0)

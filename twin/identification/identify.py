@@ -68,7 +68,8 @@ def identify(case: Case, *, free_gains: bool = False, progress: Progress = lambd
     machine = _spindle(machine, fits, known, unknown)
     progress("heat")
     machine = _heat(machine, fits, known, unknown)
-    uncertainty = dict(machine.uncertainty) | {e.path: _relative(e) for e in known if e.path.count(".") and e.value}
+    of_constants = [e for e in known if not e.path.endswith(("_asymmetry", "_delay"))]
+    uncertainty = dict(machine.uncertainty) | {e.path: _relative(e) for e in of_constants}
     machine = machine.model_copy(update={"uncertainty": uncertainty})
     progress("checking")
     gaps = gap_table(machine, case.of(role="check") or fits, case.repeats())

@@ -1,0 +1,1 @@
+"""The spindle's temperature over a run (formats, section 4)."""

@@ -1,0 +1,182 @@
+"""Spindle temperature over a run: exact steps from sample to sample, however irregular, inputs held in between.
+
+A sample that an input has not got is the last one that it had, so signals of several rates fit together.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from twin.effects.catalogue import effect_named
+from twin.effects.effect import Effect
+from twin.errors import EffectError, TwinError
+from twin.generated import compiled, in_python
+from twin.heat import network
+from twin.machine import Thermal
+from twin.weave import quantities, weave
+
+Array = NDArray[np.float64]
+PHYSICS = (network.heat, network.step)
+INPUTS = ("spindle_load_pct", "spindle_rpm", "ambient_c", "coolant_on")
+FED = {*INPUTS, "temperature_c", "duration_s", "time_s"}
+
+
+@cache
+def thermal_quantities() -> dict[str, str]:
+    """The quantities of the spindle's heat that an effect can change, with their sites."""
+    return quantities(PHYSICS)
+
+
+def thermal_constants(thermal: Thermal) -> dict[str, float]:
+    """Name → value, for the physics of `twin.heat`.
+
+    >>> thermal = Thermal(alpha_w_per_pct_rpm2=0.0, beta_w_per_rpm=0.02, resistance_k_per_w=0.2, capacity_j_per_k=5000.0)
+    >>> thermal_constants(thermal)["heat_capacity_j_per_k"]
+    5000.0
+    """
+    return {
+        "alpha_w_per_pct_rpm2": thermal.alpha_w_per_pct_rpm2,
+        "beta_w_per_rpm": thermal.beta_w_per_rpm,
+        "resistance_k_per_w": thermal.resistance_k_per_w,
+        "heat_capacity_j_per_k": thermal.capacity_j_per_k,
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class Warming:
+    """What the temperature depends on, each (samples,); NaN = no sample, the last one holds.
+
+    t_s: increasing; spindle_load_pct and spindle_rpm; ambient_c: the surroundings; coolant_on: 0 or 1, None = it never is
+    """
+
+    t_s: ArrayLike
+    spindle_load_pct: ArrayLike
+    spindle_rpm: ArrayLike
+    ambient_c: ArrayLike
+    coolant_on: ArrayLike | None = None
+
+
+def spindle_temperature_c(
+    constants: Mapping[str, ArrayLike],
+    warming: Warming,
+    start_c: ArrayLike,
+    *,
+    effects: Sequence[str] = (),
+    reference_run: bool = False,
+) -> Array:
+    """Temperature at each sample, (lanes, samples), °C, from `start_c` at the first one.
+
+    constants: name → a number or (lanes,), of the machine (`thermal_constants`) and of the effects (`effect__parameter`)
+    start_c: a number, or (lanes,); of a recording, see `first_measured_c`
+    effects: names of those that are in the kernel; reference_run: in plain Python, slowly, from the same text
+
+    100 W into 5,000 J/K behind 0.2 K/W for one time constant of 1,000 s, in two steps:
+
+    >>> thermal = Thermal(alpha_w_per_pct_rpm2=0.0, beta_w_per_rpm=0.02, resistance_k_per_w=0.2, capacity_j_per_k=5000.0)
+    >>> warming = Warming([0.0, 100.0, 1000.0], 0.0, 5000.0, 20.0)
+    >>> spindle_temperature_c(thermal_constants(thermal), warming, 20.0).round(3).tolist()
+    [[20.0, 21.903, 32.642]]
+
+    Raises TwinError where times do not increase, an input has no sample at all or does not fit; EffectError where a constant is
+    missing or an effect does not act on the spindle's heat.
+    """
+    acting = tuple(effect_named(name) for name in effects)
+    for effect in acting:
+        if not set(effect.changes) & set(thermal_quantities()):
+            raise EffectError(f"{effect.name} does not act on the spindle's heat; it acts at the {effect.site} site")
+    text, names = _kernel(acting)
+    for name in names:
+        if name not in constants:
+            raise EffectError(f"the constant {name} of the spindle's heat is missing")
+    times, inputs = _held_inputs(warming)
+    columns = [np.asarray(column, dtype=np.float64).reshape(-1) for column in (start_c, *(constants[name] for name in names))]
+    try:
+        start, *rest = np.broadcast_arrays(*columns)
+    except ValueError:
+        sizes = ", ".join(f"{name} {len(column)}" for name, column in zip(("start_c", *names), columns, strict=True))
+        raise TwinError(f"{sizes} do not fit each other; each has one value, or one for each lane") from None
+    rows = np.array(rest).T.reshape(len(start), len(names))
+    out = np.empty((len(start), len(times)))
+    warm: Any = in_python(text)["warm"] if reference_run else compiled(text).warm
+    for lane in range(len(start)):
+        if reference_run:
+            shown = [0.0] * len(times)
+            warm(rows[lane].tolist(), float(start[lane]), times.tolist(), *[x.tolist() for x in inputs], shown)
+            out[lane] = shown
+        else:
+            warm(np.ascontiguousarray(rows[lane]), float(start[lane]), times, *inputs, out[lane])
+    return out
+
+
+def first_measured_c(spindle_temp_c: ArrayLike) -> float:
+    """The first temperature that a recording has.
+
+    >>> first_measured_c([float("nan"), 23.4, 23.5])
+    23.4
+
+    Raises TwinError where it has none.
+    """
+    values = np.asarray(spindle_temp_c, dtype=np.float64)
+    known = values[np.isfinite(values)]
+    if not known.size:
+        raise TwinError("spindle_temp_c has no sample to start from; give the temperature at the start")
+    return float(known[0])
+
+
+def held(values: ArrayLike, samples: int, name: str) -> Array:
+    """The last known value at each sample; before the first one, that one.
+
+    >>> held([float("nan"), 1.0, float("nan"), 2.0], 4, "coolant_on").tolist()
+    [1.0, 1.0, 1.0, 2.0]
+
+    Raises TwinError where there is no value, or another number of samples.
+    """
+    array = np.asarray(values, dtype=np.float64)
+    if array.shape not in ((), (samples,)):
+        raise TwinError(f"{name} has the shape {array.shape}; it has to be one value, or one for each of {samples} samples")
+    array = np.broadcast_to(array, (samples,))
+    known = np.flatnonzero(np.isfinite(array))
+    if samples and not known.size:
+        raise TwinError(f"{name} has no sample in the whole run")
+    last = np.searchsorted(known, np.arange(samples), side="right") - 1
+    return np.ascontiguousarray(array[known[np.maximum(last, 0)]]) if samples else array.copy()
+
+
+def _held_inputs(warming: Warming) -> tuple[Array, list[Array]]:
+    times = np.ascontiguousarray(warming.t_s, dtype=np.float64)
+    if times.ndim != 1 or not np.all(np.diff(times) > 0.0):
+        where = f"; it does not after sample {int(np.argmin(np.diff(times) > 0.0))}" if times.ndim == 1 else ""
+        raise TwinError(f"t_s has to increase from sample to sample{where}")
+    coolant: ArrayLike = 0.0 if warming.coolant_on is None else warming.coolant_on
+    given = (warming.spindle_load_pct, warming.spindle_rpm, warming.ambient_c, coolant)
+    return times, [held(values, len(times), name) for name, values in zip(INPUTS, given, strict=True)]
+
+
+@cache
+def _kernel(effects: tuple[Effect, ...]) -> tuple[str, tuple[str, ...]]:
+    """The text that defines `warm`, and the constants that it takes, in order."""
+    woven = weave(PHYSICS, effects)
+    states = {f"{effect.name}__{name}": value for effect in effects for name, value in effect.states.items()}
+    states = {name: value for name, value in states.items() if name in woven.takes}
+    names = tuple(name for name in woven.takes if name not in FED | set(states))
+    arguments = ", ".join(f"{name}_in" for name in INPUTS)
+    start = [f"given__{name} = constants[{row}]" for row, name in enumerate(names)]
+    start += ["temperature_c = start_c", *(f"{name} = {value}" for name, value in states.items())]
+    tick = ["shown_c[sample] = temperature_c", "if sample + 1 < len(t_s):"]
+    body = ["time_s = t_s[sample]", "duration_s = t_s[sample + 1] - time_s"]
+    body += [f"{name} = {name}_in[sample]" for name in INPUTS] + [f"{name} = given__{name}" for name in names]
+    body += [*woven.body.splitlines(), "temperature_c = temperature_next_c"]
+    lines = [
+        "@njit(cache=True, nogil=True, error_model='numpy')",
+        f"def warm(constants, start_c, t_s, {arguments}, shown_c):",
+        *(f"    {line}" for line in start),
+        "    for sample in range(len(t_s)):",
+        *(f"        {line}" for line in tick),
+        *(f"            {line}" for line in body),
+    ]
+    functions = [f"@njit(error_model='numpy')\n{text}" for text in woven.functions]
+    return "\n\n\n".join(["from math import exp, sqrt", *functions, "\n".join(lines)]) + "\n", names
