@@ -1,14 +1,8 @@
-"""Generated text becomes a module: in Python as it is, or compiled and kept, so that a kernel is compiled once on a machine.
-
-Compiled kernels live in `$CNCTWIN_KERNELS`, else `$XDG_CACHE_HOME/cnctwin/kernels`, else `~/.cache/cnctwin/kernels`, one module
-for each text, named by its hash; where that folder cannot be written, in a folder of this process. The folder is its owner's:
-numba trusts what it has kept there.
-"""
+"""Generated text becomes a module: in Python as it is, or compiled and kept under a name that is the hash of the text."""
 
 import hashlib
 import importlib.abc
 import importlib.util
-import os
 import sys
 import tempfile
 from functools import cache
@@ -17,6 +11,8 @@ from types import ModuleType
 from typing import Any
 
 import numba
+
+from twin.kernel_folder import KERNELS_MAX, keep_newest, kernel_folder
 
 
 class _FromText(importlib.abc.InspectLoader):
@@ -46,8 +42,9 @@ def compiled(text: str) -> ModuleType:
     """The module of the generated text, its functions compiled when they are first called, and kept for the next process."""
     text = f"# numba {numba.__version__}\nfrom numba import njit\n\n{text}"
     name = f"kernel_{hashlib.sha256(text.encode()).hexdigest()[:24]}"
-    path = _folder() / f"{name}.py"
+    path = kernel_folder() / f"{name}.py"
     if not path.exists() or path.read_text(encoding="utf-8") != text:
+        keep_newest(list(kernel_folder().glob("kernel_*.py")), KERNELS_MAX)
         _write_whole(path, text)
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None and spec.loader is not None
@@ -62,16 +59,3 @@ def _write_whole(path: Path, text: str) -> None:
     with tempfile.NamedTemporaryFile("w", dir=path.parent, suffix=".part", delete=False, encoding="utf-8") as part:
         part.write(text)
     Path(part.name).replace(path)
-
-
-@cache
-def _folder() -> Path:
-    cache_home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    folder = Path(os.environ.get("CNCTWIN_KERNELS") or Path(cache_home) / "cnctwin" / "kernels")
-    try:
-        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-        if folder.stat().st_uid == os.getuid() and os.access(folder, os.W_OK):
-            return folder
-    except OSError:
-        pass
-    return Path(tempfile.mkdtemp(prefix="cnctwin-kernels-"))

@@ -113,7 +113,7 @@ def read_run(path: Path) -> RunLog:
 
 def _csv_columns(path: Path) -> dict[str, NDArray[np.object_]]:
     with path.open(newline="", encoding="utf-8") as file:
-        header, *rows = csv.reader(file)
+        header, *rows = list(csv.reader(file)) or [[]]
     for number, row in enumerate(rows, start=2):
         if len(row) != len(header):
             raise RunLogError(f"{path}: line {number} has {len(row)} fields, the header has {len(header)}")

@@ -13,9 +13,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from twin.compiling import kernel
 from twin.engagement.sweep import (
     LENGTH,
     RADIUS,
@@ -62,7 +62,7 @@ class Cells(NamedTuple):
     used: NDArray[np.int64]
 
 
-@njit(cache=True)
+@kernel
 def height_at(cells: Cells, x: float, y: float, enough: float) -> float:
     """Height of the material at (x, y), exact where above `enough`, else some value ≤ that; its bottom outside the stock."""
     if x <= cells.low_x or x >= cells.high_x or y <= cells.low_y or y >= cells.high_y:
@@ -78,7 +78,7 @@ def height_at(cells: Cells, x: float, y: float, enough: float) -> float:
     return max(height, cells.low_z)
 
 
-@njit(cache=True)
+@kernel
 def span(cells: Cells, k: int, start: float) -> tuple[int, int, int, int]:
     """The cells (first and past last in x, in y) that sweep `k` can reach from the position `start` on."""
     sweep = cells.sweeps[k]
@@ -93,7 +93,7 @@ def span(cells: Cells, k: int, start: float) -> tuple[int, int, int, int]:
     return max(first_i, 0), min(last_i + 1, nx), max(first_j, 0), min(last_j + 1, ny)
 
 
-@njit(cache=True)
+@kernel
 def remove(cells: Cells, k: int, start: float) -> None:
     """Take away what sweep `k` removes from the position `start` on. The pool must have room for an entry in each cell."""
     first_i, last_i, first_j, last_j = span(cells, k, start)
@@ -120,7 +120,7 @@ def remove(cells: Cells, k: int, start: float) -> None:
                 _enter(cells, k, i, j)
 
 
-@njit(cache=True)
+@kernel
 def _drop_what_is_above(cells: Cells, i: int, j: int, floor: float) -> None:
     """Sweeps that cut nothing below the floor any more leave the list of the cell."""
     x, y = cells.x + i * cells.side, cells.y + j * cells.side
@@ -134,7 +134,7 @@ def _drop_what_is_above(cells: Cells, i: int, j: int, floor: float) -> None:
         entry = following
 
 
-@njit(cache=True)
+@kernel
 def _unlink(cells: Cells, i: int, j: int, before: int, entry: int) -> None:
     if before == NONE:
         cells.head[i, j] = cells.link[entry]
@@ -144,7 +144,7 @@ def _unlink(cells: Cells, i: int, j: int, before: int, entry: int) -> None:
     cells.used[FREE] = entry
 
 
-@njit(cache=True)
+@kernel
 def _enter(cells: Cells, k: int, i: int, j: int) -> None:
     """Put sweep `k` at the head of the list, unless it is there already.
 

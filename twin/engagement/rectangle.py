@@ -23,12 +23,12 @@ outermost angles with the depth of the same power:
 
 import math
 
-from numba import njit
+from twin.compiling import kernel
 
 BISECTIONS = 40
 
 
-@njit(cache=True)
+@kernel
 def rectangle(power: float, across: float, along: float) -> tuple[float, float, float]:
     """Depth, entry and exit angle with the moments m₀ = power > 0, m_s = across and m_c = along.
 
@@ -54,7 +54,7 @@ def rectangle(power: float, across: float, along: float) -> tuple[float, float, 
     return depth, max(0.0, middle - half), min(math.pi, middle + half)
 
 
-@njit(cache=True)
+@kernel
 def _sine(cosine: float, half: float) -> float:
     """m_s / m₀ of the rectangle with the given m_c / m₀ and half width."""
     if half < 1e-9:

@@ -9,8 +9,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from twin.compiling import kernel
 from twin.engagement.cells import Cells, height_at
 from twin.engagement.rectangle import rectangle
 from twin.engagement.sweep import Floats
@@ -41,7 +41,7 @@ class Contact(NamedTuple):
     uniform: bool
 
 
-@njit(cache=True)
+@kernel
 def _depth(cells: Cells, place: Floats, sine: float, cosine: float) -> float:
     """Depth of the material at the rim point of that sine and cosine; place: x, y, heading x, heading y, radius, lowest z."""
     x = place[0] + place[4] * (sine * place[2] - cosine * place[3])
@@ -50,7 +50,7 @@ def _depth(cells: Cells, place: Floats, sine: float, cosine: float) -> float:
     return depth if depth >= DEPTH_MIN_MM else 0.0
 
 
-@njit(cache=True)
+@kernel
 def _depths(cells: Cells, place: Floats) -> Floats:
     """`_depth` at each step of the rim, written out: a call for each costs four times as much."""
     depths = np.empty(STEPS + 1)
@@ -62,7 +62,7 @@ def _depths(cells: Cells, place: Floats) -> Floats:
     return depths
 
 
-@njit(cache=True)
+@kernel
 def _edge(cells: Cells, place: Floats, low: float, high: float, before: float, after: float) -> float:
     """The angle between low and high at which the depth goes from `before` to `after`."""
     middle = (before + after) / 2.0
@@ -75,7 +75,7 @@ def _edge(cells: Cells, place: Floats, low: float, high: float, before: float, a
     return (low + high) / 2.0
 
 
-@njit(cache=True)
+@kernel
 def _add(moments: Floats, depth: float, start: float, end: float, radius: float) -> None:
     """Add the piece of rim from start to end to (∫ a sin, ∫ a sin², ∫ a sin cos, smallest, largest depth)."""
     sine_a, cosine_a, sine_b, cosine_b = math.sin(start), math.cos(start), math.sin(end), math.cos(end)
@@ -86,7 +86,7 @@ def _add(moments: Floats, depth: float, start: float, end: float, radius: float)
         moments[3], moments[4] = min(moments[3], depth), max(moments[4], depth)
 
 
-@njit(cache=True)
+@kernel
 def contact(cells: Cells, x: float, y: float, heading_x: float, heading_y: float, radius: float, tip: float) -> Contact:
     """What the front rim of a tool at (x, y), its end face at the z `tip`, meets on the way along a unit vector."""
     place = np.array([x, y, heading_x, heading_y, radius, max(tip, cells.low_z)])

@@ -10,8 +10,9 @@ A sweep is a row of 8 numbers, so that one row is one cache line.
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from twin.compiling import kernel
 
 Floats = NDArray[np.float64]
 
@@ -24,7 +25,7 @@ WITHIN_MM = 1e-9
 """A sweep that another one contains but for this is contained."""
 
 
-@njit(cache=True)
+@kernel
 def lowest_at(sweeps: Floats, k: int, x: float, y: float) -> float:
     """The z to which sweep `k` cuts at (x, y); inf where it does not reach."""
     dx, dy = x - sweeps[k, X], y - sweeps[k, Y]
@@ -42,7 +43,7 @@ def lowest_at(sweeps: Floats, k: int, x: float, y: float) -> float:
     return float(sweeps[k, Z] + slope * deepest)
 
 
-@njit(cache=True)
+@kernel
 def lowest_between(sweeps: Floats, k: int, low: float, high: float) -> float:
     """The lowest z of sweep `k` between the positions low and high along it."""
     slope, length = sweeps[k, SLOPE], sweeps[k, LENGTH]
@@ -50,7 +51,7 @@ def lowest_between(sweeps: Floats, k: int, low: float, high: float) -> float:
     return float(sweeps[k, Z] + slope * deepest)
 
 
-@njit(cache=True)
+@kernel
 def highest_in_square(sweeps: Floats, k: int, x: float, y: float, side: float) -> float:
     """The highest z that sweep `k` leaves in the square with its lower left corner at (x, y); inf where it does not cover it.
 
@@ -64,7 +65,7 @@ def highest_in_square(sweeps: Floats, k: int, x: float, y: float, side: float) -
     return highest
 
 
-@njit(cache=True)
+@kernel
 def lowest_in_square(sweeps: Floats, k: int, x: float, y: float, side: float) -> float:
     """A bound: sweep `k` cuts no lower than this in the square with its lower left corner at (x, y)."""
     if sweeps[k, SLOPE] == 0.0:
@@ -75,7 +76,7 @@ def lowest_in_square(sweeps: Floats, k: int, x: float, y: float, side: float) ->
     return lowest_between(sweeps, k, along - reach, along + reach)
 
 
-@njit(cache=True)
+@kernel
 def contains(sweeps: Floats, new: int, old: int) -> bool:
     """True if sweep `new` leaves nothing of what sweep `old` removed: wherever that cut, this cuts as low or lower."""
     spare = sweeps[new, RADIUS] - sweeps[old, RADIUS] + WITHIN_MM

@@ -3,9 +3,9 @@
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from twin.compiling import kernel
 from twin.engagement.cells import ENTRIES, NONE, SWEEPS, Cells, height_at, remove, span
 from twin.engagement.rim import contact
 from twin.engagement.sweep import LENGTH, RADIUS, SLOPE, UX, UY, Floats, X, Y, Z
@@ -26,7 +26,7 @@ DEPTH, ENTRY, EXIT, SECTION, DEEPEST, ARCS, UNIFORM, END_FACE, AXIAL_VOLUME = ra
 COLUMNS = 9
 
 
-@njit(cache=True)
+@kernel
 def _end_face(cells: Cells, x: float, y: float, radius: float, high: float, low: float) -> tuple[float, float]:
     """Area under the end face that meets material on the way from z = high down to low, and the volume of that material.
 
@@ -44,7 +44,7 @@ def _end_face(cells: Cells, x: float, y: float, radius: float, high: float, low:
     return face * met, face * height
 
 
-@njit(cache=True)
+@kernel
 def _with_room(cells: Cells, k: int, start: float) -> Cells:
     """The cells, with a pool that has room for what sweep `k` may enter from the position `start` on."""
     first_i, last_i, first_j, last_j = span(cells, k, start)
@@ -59,7 +59,7 @@ def _with_room(cells: Cells, k: int, start: float) -> Cells:
     )  # fmt: skip
 
 
-@njit(cache=True)
+@kernel
 def _new_sweep(cells: Cells, x: float, y: float, z: float, ux: float, uy: float, slope: float, radius: float) -> int:
     """Begin a sweep at a point, with no length yet."""
     k = int(cells.used[SWEEPS])
@@ -78,7 +78,7 @@ def _new_sweep(cells: Cells, x: float, y: float, z: float, ux: float, uy: float,
     return k
 
 
-@njit(cache=True)
+@kernel
 def _goes_on(cells: Cells, k: int, end: Floats) -> bool:
     """True if the segment to `end` continues sweep `k` on the same straight line."""
     sweep = cells.sweeps[k]
@@ -88,7 +88,7 @@ def _goes_on(cells: Cells, k: int, end: Floats) -> bool:
     return bool(along > sweep[LENGTH] and abs(dx * sweep[UY] - dy * sweep[UX]) < STRAIGHT_MM and level < STRAIGHT_MM)
 
 
-@njit(cache=True)
+@kernel
 def _upright(cells: Cells, start: Floats, end: Floats, radius: float, rows: Floats) -> Cells:
     """A move along the axis of the tool: going down, the end face cuts; going up, nothing does."""
     if end[2] >= start[2] or end[2] >= cells.high_z:
@@ -106,7 +106,7 @@ def _upright(cells: Cells, start: Floats, end: Floats, radius: float, rows: Floa
     return cells
 
 
-@njit(cache=True)
+@kernel
 def _sideways(cells: Cells, start: Floats, end: Floats, radius: float, rows: Floats, k: int) -> tuple[Cells, int]:
     """A move with a heading, level or ramping, that goes on with sweep `k` if it is straight ahead. Returns its sweep."""
     dx, dy, dz = end[0] - start[0], end[1] - start[1], end[2] - start[2]
@@ -138,7 +138,7 @@ def _sideways(cells: Cells, start: Floats, end: Floats, radius: float, rows: Flo
     return cells, k
 
 
-@njit(cache=True)
+@kernel
 def travel(cells: Cells, points: Floats, first_row: NDArray[np.int64], radius: float, rows: Floats) -> tuple[Cells, bool]:
     """Take the tool along the points (n, 3) and fill `rows`; segment i owns the rows first_row[i] to first_row[i + 1].
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numba import njit
 
+from twin.compiling import kernel
 from twin.engagement.cells import NONE, Cells, height_at
 from twin.engagement.errors import EngagementError
 from twin.engagement.sweep import COLUMNS, Floats
@@ -107,7 +107,7 @@ class Workpiece:
         return (firsts[0], firsts[1]), (counts[0], counts[1])
 
 
-@njit(cache=True)
+@kernel
 def _heights(cells: Cells, points: Floats) -> Floats:
     heights = np.empty(len(points))
     for k in range(len(points)):
@@ -115,7 +115,7 @@ def _heights(cells: Cells, points: Floats) -> Floats:
     return heights
 
 
-@njit(cache=True)
+@kernel
 def _removed(cells: Cells, samples: int) -> float:
     """The volume that has been taken away, cell by cell, each as far as it lies in the stock."""
     total = 0.0

@@ -87,6 +87,7 @@ def stated_uncertainty(machine: MachineFile, path: str) -> float:
 
 def estimate(path: str, value: float, deviation: float, unit: str, stated: float | None, known_by: float) -> Estimate:
     """An estimate from a standard deviation."""
+    value, deviation, known_by = float(value), float(deviation), float(known_by)
     return Estimate(path, value, value - INTERVAL_Z * deviation, value + INTERVAL_Z * deviation, unit, stated, known_by)
 
 

@@ -1,8 +1,9 @@
 """Points, tangents and curvature along segments: the compiled part of a path. Formulas: see `path`."""
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from twin.compiling import kernel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -10,25 +11,25 @@ LINEAR_AXES = 3
 ARC = 2
 
 
-@njit(cache=True)
+@kernel
 def first_axis(plane: int) -> int:
     """Index of the first axis of a plane: G17 x, G18 z, G19 y."""
     return 0 if plane == 17 else (2 if plane == 18 else 1)
 
 
-@njit(cache=True)
+@kernel
 def second_axis(plane: int) -> int:
     """Index of the second axis of a plane: G17 y, G18 x, G19 z."""
     return 1 if plane == 17 else (0 if plane == 18 else 2)
 
 
-@njit(cache=True)
+@kernel
 def _polar(point: Floats, centre: Floats, u: int, v: int) -> tuple[float, float]:
     du, dv = point[u] - centre[u], point[v] - centre[v]
     return np.hypot(du, dv), np.arctan2(dv, du)
 
 
-@njit(cache=True)
+@kernel
 def points_at(
     segment: Ints,
     s_mm: Floats,
@@ -61,7 +62,7 @@ def points_at(
     return points
 
 
-@njit(cache=True)
+@kernel
 def tangents_at(
     segment: Ints,
     s_mm: Floats,
@@ -91,7 +92,7 @@ def tangents_at(
     return tangents
 
 
-@njit(cache=True)
+@kernel
 def curvature_at(
     kind: Ints, start_mm: Floats, end_mm: Floats, centre_mm: Floats, plane: Ints, sweep_rad: Floats, length_mm: Floats
 ) -> Floats:

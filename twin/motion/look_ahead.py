@@ -9,9 +9,9 @@ the fastest is nearly reached.
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from twin.compiling import kernel
 from twin.motion.s_curve import along_profile, peak_speed, profile_time, reachable_speed, time_at_distance
 
 Floats = NDArray[np.float64]
@@ -22,7 +22,7 @@ JOININGS_MAX = 12
 HAIR = 1e-9
 
 
-@njit(cache=True)
+@kernel
 def stretches(
     cap: Floats, acceleration: Floats, jerk: Floats, junction: Floats, length: Floats, joined: Flags
 ) -> tuple[Ints, Floats, Floats, Floats]:
@@ -46,7 +46,7 @@ def stretches(
     return first[: m + 1].copy(), total[:m].copy(), least_a[:m].copy(), least_j[:m].copy()
 
 
-@njit(cache=True)
+@kernel
 def end_speeds(cap: Floats, junction: Floats, first: Ints, length: Floats, a: Floats, j: Floats) -> Floats:
     """Speeds (m + 1) at the ends of the stretches, mm/s: the forward and the backward pass."""
     m = len(length)
@@ -64,7 +64,7 @@ def end_speeds(cap: Floats, junction: Floats, first: Ints, length: Floats, a: Fl
     return v
 
 
-@njit(cache=True)
+@kernel
 def peaks_and_times(cap: Floats, first: Ints, length: Floats, a: Floats, j: Floats, v: Floats) -> tuple[Floats, Floats]:
     """Peak speed (m) and seconds (m) of each stretch."""
     m = len(length)
@@ -75,7 +75,7 @@ def peaks_and_times(cap: Floats, first: Ints, length: Floats, a: Floats, j: Floa
     return peak, seconds
 
 
-@njit(cache=True)
+@kernel
 def _part_where_too_fast(
     joined: Flags, junction: Floats, lengths: Floats, first: Ints, total: Floats, a: Floats, j: Floats, v: Floats, peak: Floats
 ) -> int:
@@ -94,7 +94,7 @@ def _part_where_too_fast(
     return parted
 
 
-@njit(cache=True)
+@kernel
 def stretches_with_times(
     cap: Floats, acceleration: Floats, jerk: Floats, junction: Floats, length: Floats
 ) -> tuple[Ints, Floats, Floats, Floats, Floats, Floats, Floats]:

@@ -12,9 +12,9 @@ from enum import IntEnum
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from twin.compiling import kernel
 from twin.motion.path import EventKind
 from twin.motion.s_curve import along_profile
 from twin.motion.timeline import effort
@@ -113,7 +113,7 @@ def sampled(plan: "Plan", period_s: float, average_s: tuple[float, ...] = ()) ->
     )
 
 
-@njit(cache=True)
+@kernel
 def _places(
     t: Floats,
     first: Ints,
@@ -146,7 +146,7 @@ def _places(
     return segment, s, speed
 
 
-@njit(cache=True)
+@kernel
 def moving_average(values: Floats, window: int) -> Floats:
     """Mean (n, axes) of each value and the `window` − 1 before it; before the first one it stood there.
 

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from twin.compiling import kernel
 from twin.errors import ProgramError
 from twin.machine import Program
 from twin.motion.limits import Bounds, Limits, bounds
@@ -161,7 +161,7 @@ def _event_arrays(path: Path) -> tuple[Ints, Ints, Floats, Ints]:
     )
 
 
-@njit(cache=True)
+@kernel
 def _offsets(first: Ints, length: Floats) -> Floats:
     offset = np.zeros(len(length))
     for i in range(len(first) - 1):
@@ -170,7 +170,7 @@ def _offsets(first: Ints, length: Floats) -> Floats:
     return offset
 
 
-@njit(cache=True)
+@kernel
 def _by_segment(
     first: Ints,
     offset: Floats,
@@ -225,7 +225,7 @@ def plan_times(path: Path, times: Program | Limits, feed_mm_min: Floats) -> Floa
     )
 
 
-@njit(cache=True)
+@kernel
 def _totals(
     caps: Floats,
     acceleration: Floats,

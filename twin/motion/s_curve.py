@@ -11,13 +11,13 @@ the trapezoid: the same formulas with a / j = 0. Speeds mm/s, distances mm, time
 
 import math
 
-from numba import njit
+from twin.compiling import kernel
 
 ITERATIONS_MAX = 100
 """Of the safeguarded Newton steps; four to eight are used, and each that fails to help halves the bracket."""
 
 
-@njit(cache=True)
+@kernel
 def ramp_time(v0: float, v1: float, a: float, j: float) -> float:
     """Seconds of the fastest change of speed from `v0` to `v1`.
 
@@ -29,13 +29,13 @@ def ramp_time(v0: float, v1: float, a: float, j: float) -> float:
     return 2.0 * math.sqrt(d / j)
 
 
-@njit(cache=True)
+@kernel
 def ramp_distance(v0: float, v1: float, a: float, j: float) -> float:
     """Distance of that change: mean speed times its time."""
     return 0.5 * (v0 + v1) * ramp_time(v0, v1, a, j)
 
 
-@njit(cache=True)
+@kernel
 def reachable_speed(v0: float, distance: float, a: float, j: float) -> float:
     """The highest speed that a ramp from `v0` reaches within `distance`, ending with acceleration 0.
 
@@ -56,7 +56,7 @@ def reachable_speed(v0: float, distance: float, a: float, j: float) -> float:
     return v0 + x * x
 
 
-@njit(cache=True)
+@kernel
 def _ramp_slope(v: float, peak: float, a: float, j: float) -> float:
     """d(ramp_distance(v, peak)) / d(peak), for peak ≥ v."""
     d = peak - v
@@ -68,7 +68,7 @@ def _ramp_slope(v: float, peak: float, a: float, j: float) -> float:
     return root + 0.5 * (v + peak) / (j * root)
 
 
-@njit(cache=True)
+@kernel
 def peak_speed(v0: float, v1: float, cap: float, distance: float, a: float, j: float) -> float:
     """Peak speed of the fastest profile v0 → v1 over `distance` at no more than `cap`.
 
@@ -101,7 +101,7 @@ def peak_speed(v0: float, v1: float, cap: float, distance: float, a: float, j: f
     return peak
 
 
-@njit(cache=True)
+@kernel
 def profile_time(v0: float, peak: float, v1: float, distance: float, a: float, j: float) -> float:
     """Seconds of ramp, cruise and ramp over `distance`."""
     cruise = distance - ramp_distance(v0, peak, a, j) - ramp_distance(peak, v1, a, j)
@@ -109,7 +109,7 @@ def profile_time(v0: float, peak: float, v1: float, distance: float, a: float, j
     return time + cruise / peak if peak > 0.0 and cruise > 0.0 else time
 
 
-@njit(cache=True)
+@kernel
 def _along_ramp(t: float, v0: float, v1: float, a: float, j: float) -> tuple[float, float, float]:
     """Distance, speed and acceleration after `t` seconds of a ramp v0 → v1."""
     d = abs(v1 - v0)
@@ -131,7 +131,7 @@ def _along_ramp(t: float, v0: float, v1: float, a: float, j: float) -> tuple[flo
     return sr + u * (vr + sign * 0.5 * top * u), vr + sign * top * u, sign * top
 
 
-@njit(cache=True)
+@kernel
 def along_profile(t: float, v0: float, peak: float, v1: float, distance: float, a: float, j: float) -> tuple[float, float, float]:
     """Distance, speed and acceleration after `t` seconds of the profile v0 → peak → v1 over `distance`."""
     up, down = ramp_time(v0, peak, a, j), ramp_time(peak, v1, a, j)
@@ -146,7 +146,7 @@ def along_profile(t: float, v0: float, peak: float, v1: float, distance: float, 
     return distance - ramp_distance(peak, v1, a, j) + s, v, acceleration
 
 
-@njit(cache=True)
+@kernel
 def time_at_distance(s: float, v0: float, peak: float, v1: float, distance: float, a: float, j: float) -> float:
     """Seconds after which the profile has covered `s`: the inverse of `along_profile`, by Newton's method inside a bracket."""
     low, high = 0.0, profile_time(v0, peak, v1, distance, a, j)

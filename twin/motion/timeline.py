@@ -9,8 +9,9 @@ A dwell and a tool change take their time, and so does every halt: the control w
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from twin.compiling import kernel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -18,7 +19,7 @@ DWELL, TOOL_CHANGE, SPINDLE, PROGRAM_STOP, ORIENT = 0, 1, 2, 3, 6
 RAPID = 0
 
 
-@njit(cache=True)
+@kernel
 def effort(rpm: float, base_rpm: float) -> float:
     """τ(ω): what a ramp goes through evenly. With ω_b = 2000, 4000 rev/min cost 2000 + (16 − 4) 10⁶ / 4000 = 5000."""
     size = abs(rpm)
@@ -27,7 +28,7 @@ def effort(rpm: float, base_rpm: float) -> float:
     return size if rpm >= 0.0 else -size
 
 
-@njit(cache=True)
+@kernel
 def timeline(
     first: Ints,
     seconds: Floats,

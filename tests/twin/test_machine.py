@@ -1,0 +1,86 @@
+"""machine.toml: what describes a machine, and what does not."""
+
+from pathlib import Path
+
+import pytest
+
+from tests.twin.axes import AXIS
+from twin.case import read_case
+from twin.errors import CaseError, MachineError
+from twin.machine import machine_from_toml, machine_to_toml, read_machine
+
+HEAD = "[machine]\nname = 'a'\n"
+WHOLE = (
+    HEAD
+    + AXIS.format(letter="x", mass=320.0, lead=12.0, gain=0.3)
+    + """
+[tool]
+diameter_mm = 20.0
+teeth = 4
+tangential_coefficient_n_per_mm2 = 900.0
+radial_ratio = 0.4
+[uncertainty]
+relative = 0.03
+"axes.x.mass_kg" = 0.1
+[noise]
+position_mm = 0.0003
+[[effects]]
+effect = "gravity"
+on = "z"
+parameters = { force_n = -310.0 }
+"""
+)
+
+
+def test_writing_and_reading_gives_the_same_machine() -> None:
+    machine = machine_from_toml(WHOLE)
+    assert machine_from_toml(machine_to_toml(machine)) == machine
+
+
+def test_the_force_of_an_ampere_comes_from_the_screw_or_is_stated() -> None:
+    axis = machine_from_toml(WHOLE).axes["x"]
+    assert axis.newton_per_command == pytest.approx(1.2 * 2 * 3.141592653589793 / 0.012)
+    stated = WHOLE.replace("screw_lead_mm = 12.0\ntorque_constant_nm_per_a = 1.2", "force_per_command_n = 35.15")
+    assert machine_from_toml(stated).axes["x"].newton_per_command == 35.15
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("", "machine: Field required"),
+        ("[machine", "is not TOML"),
+        (HEAD + "[spindle]\nrated_power_kw = -1.0\nefficiency = 0.9", "spindle.rated_power_kw: .* not -1"),
+        (HEAD + "[spindle]\nrated_power_kw = 1.0\nefficiency = 90.0", "spindle.efficiency: .* not 90"),
+        (WHOLE.replace("mass_kg = 320.0", "mass_kg = nan"), "axes.x.mass_kg"),
+        (WHOLE.replace("mass_kg = 320.0", "weight_kg = 320.0"), "axes.x"),
+        (WHOLE.replace("static_n = 520.0", "static_n = 100.0"), "static_n 100.0 is below coulomb_n 380.0"),
+        (WHOLE.replace("screw_lead_mm = 12.0\n", ""), "state either force_per_command_n, or screw_lead_mm"),
+        (HEAD + "[stock]\nmin_mm = [0, 0, 5]\nmax_mm = [1, 1, 5]", "is not below max_mm 5.0 in z"),
+    ],
+)
+def test_a_wrong_description_gets_one_line_with_key_and_value(text: str, complaint: str) -> None:
+    with pytest.raises(MachineError, match=complaint) as error:
+        machine_from_toml(text, "vmc.toml")
+    assert str(error.value).startswith("vmc.toml: ")
+    assert "\n" not in str(error.value).removeprefix("vmc.toml: ").strip() or "TOML" in str(error.value)
+
+
+def test_a_missing_file_is_named() -> None:
+    with pytest.raises(MachineError, match=r"nowhere\.toml: cannot be read"):
+        read_machine(Path("nowhere.toml"))
+
+
+def test_a_case_whose_run_is_missing_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "machine.toml").write_text(WHOLE)
+    case = "[case]\nname = 'c'\nmachine = 'machine.toml'\n[[runs]]\nfile = 'runs/a.parquet'\nkind = 'air'\nrole = 'fit'\n"
+    (tmp_path / "case.toml").write_text(case)
+    with pytest.raises(CaseError, match=r"runs/a\.parquet is not there"):
+        read_case(tmp_path)
+    (tmp_path / "case.toml").write_text(case.replace("'air'", "'water'"))
+    with pytest.raises(CaseError, match=r"runs\.0\.kind"):
+        read_case(tmp_path)
+
+
+def test_a_folder_without_a_case_says_what_a_case_is(tmp_path: Path) -> None:
+    with pytest.raises(CaseError, match=r"a case is a folder with a case\.toml"):
+        read_case(tmp_path)
