@@ -25,5 +25,5 @@ EFFECT = Effect(
     changes={"velocity_feedback_mm_s": velocity_feedback_mm_s},
     shows_in=("{a}_torque_a", "{a}_pos_mm"),
     equation="v_feedback = v − delay (v − v_previous)/T",
-    reference="Janot, Gautier, Brunot 2019, EMPS benchmark: velocity by differences of the encoder",
+    reference="Brown, Schneider, Mulligan 1992, IEEE Trans. Industrial Electronics 39(1), velocity from encoder positions",
 )
