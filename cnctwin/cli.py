@@ -51,9 +51,9 @@ AsJson = Annotated[bool, typer.Option("--json", help="For a program to read")]
 
 @app.command()
 def demo(
-    recording: Annotated[Path | None, typer.Option(help="SHDR log or time|key|value text; else our own small one")] = None,
+    recording: Annotated[Path | None, typer.Option(help="SHDR log or time|key|value text; else the simulated machine")] = None,
     devices: Annotated[Path | None, typer.Option(help="The Devices.xml that belongs to it")] = None,
-    speed: Annotated[float, typer.Option(help="How many times faster than recorded")] = 1.0,
+    speed: Annotated[float, typer.Option(help="How many times faster than real time, or than recorded")] = 1.0,
     seconds: Annotated[float | None, typer.Option(help="Stop by itself after so long; else at Ctrl-C")] = None,
     port: Annotated[int | None, typer.Option(help="The private broker's port; else 1883 or a free one", min=1, max=65535)] = None,
     machine: Annotated[str | None, typer.Option(help="The device's name; else that of the device model")] = None,
@@ -224,6 +224,19 @@ def simulate_mtconnect(
             wait=wait,
             state_file=state_file,
         )
+
+
+@control_app.command("machine")
+def simulate_machine(
+    speed: Annotated[float, typer.Option(help="How many times faster than real time")] = 1.0,
+    port: Annotated[int, typer.Option(help="HTTP port on loopback; 0 = any", min=0, max=65535)] = 0,
+    state_file: Annotated[Path | None, typer.Option(help="Keep address and ledger in this JSON file", hidden=True)] = None,
+) -> None:
+    """Serve the simulated machine, which cuts one part after the other, as an MTConnect agent."""
+    from cnctwin.machine_command import simulate_machine as serve
+
+    with stopped_by_signals() as stop:
+        serve(stop, speed=speed, port=port, state_file=state_file)
 
 
 def _twin() -> ModuleType:

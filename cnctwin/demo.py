@@ -23,22 +23,21 @@ from cnctwin.child import Child
 from cnctwin.errors import ProgramError, UsageError
 from cnctwin.plant import StageLedger, ledgers, machines, text
 from cnctwin.private_broker import PrivateBroker
+from cnctwin.simulated_machine import description
 from cnctwin.terminal import ledger_table
 from cnctwin.watch import show, viewer
 from sparkplug.errors import TopicError
 from sparkplug.host import EventKind, HostApplication, HostEvent
 from sparkplug.topics import check_id
 
-RECORDINGS = Path(__file__).parent / "recordings"
 PROCESSORS = ("thermal", "cutting_force", "mirror")
 GROUP = "cnc"
 QUIET_S = 1.5
 SETTLE_S_MAX = 12.0
 AGENT_START_S_MAX = 15.0
 
-# The twin of the shipped machine is 20 % off on purpose, so that there is something to see.
 _PROCESSORS_TOML = """\
-# What the twin assumes in the demo. None of it is fitted to the machine that is shown.
+# What the twin assumes of a recorded machine in the demo. None of it is fitted to the machine that is shown.
 [thermal]
 alpha_w_per_pct_rpm2 = 2.2e-8
 beta_w_per_rpm = 1.6e-2
@@ -49,17 +48,12 @@ ambient_temp_c = 22.0
 [cutting_force]
 rated_power_kw = 11.0
 tool_diameter_mm = 12.0
-
-[cutting_force.machines.vmc.tool_diameters_mm]
-1 = 50.0
-4 = 12.0
-7 = 8.0
 """
 
 
 @dataclass(frozen=True, slots=True)
 class DemoOptions:
-    """What a user may choose. `seconds` None runs until Ctrl-C; `port` is the private broker's; `recording` None is our own."""
+    """What a user may choose. `seconds` None runs until Ctrl-C; `port` is the private broker's; `recording` None simulates."""
 
     recording: Path | None = None
     devices: Path | None = None
@@ -72,13 +66,14 @@ class DemoOptions:
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """What went through."""
+    """What went through. `recording_ended` is None for the simulated machine, `parts` for a recording."""
 
     machine: str
     tool_changes: int
     last_tool: str
     seconds: float
-    recording_ended: bool
+    recording_ended: bool | None
+    parts: int | None
     restarts: dict[str, int]
     ledgers: tuple[StageLedger, ...]
 
@@ -113,18 +108,18 @@ class Demo:
 
     def __init__(self, options: DemoOptions, folder: Path) -> None:
         self.options = options
-        self.recording = options.recording or RECORDINGS / "vmc.txt"
-        self.devices = options.devices if options.recording else RECORDINGS / "vmc_devices.xml"
-        for path in (self.recording, self.devices):
+        for path in (options.recording, options.devices):
             if path is not None and not path.is_file():
                 raise UsageError(f"{path}: no such file; give a recording with --recording and its device model with --devices")
         if options.devices and not options.recording:
             raise UsageError(f"--devices {options.devices} describes no recording; name the one it belongs to with --recording")
         if options.seconds is not None and not options.seconds > 0:
             raise UsageError(f"--seconds {options.seconds:g} is not above 0; leave it out to run until Ctrl-C")
-        if not options.speed > 0:
+        if options.recording is None:
+            description.check(options.speed)
+        elif not options.speed > 0:
             raise UsageError(f"--speed {options.speed:g} is not above 0; 1 is the recorded pace, 20 twenty times as fast")
-        self.machine = _checked(options.machine or machine_name(self.devices))
+        self.machine = _checked(options.machine or machine_name(options.devices if options.recording else description.DEVICES))
         self.broker = PrivateBroker(folder / "broker", options.port)
         self._folder = folder
         self._agent_state = folder / "agent.json"
@@ -132,10 +127,7 @@ class Demo:
 
     def start(self) -> None:
         """Start the broker and the agent, then what depends on them."""
-        agent = ["simulate-control", "mtconnect", str(self.recording), "--speed", f"{self.options.speed:g}"]
-        agent += ["--devices", str(self.devices)] if self.devices else []
-        agent += ["--wait", "--state-file", str(self._agent_state)]
-        self._begin("agent", agent if self.options.recording else [*agent, "--loop"])
+        self._begin("agent", [*self._agent(), "--speed", f"{self.options.speed:g}", "--state-file", str(self._agent_state)])
         url = self._agent_url()
         if not self.options.machine:  # the model may hold a whole shop; the agent knows which machine the recording is of
             self.machine = _checked(str(self._state().get("device") or self.machine).lower())
@@ -144,7 +136,7 @@ class Demo:
         edge = self._folder / "edge.toml"
         edge.write_text(self._edge_toml(url))
         settings = self._folder / "processors.toml"
-        settings.write_text(_PROCESSORS_TOML)
+        settings.write_text(_PROCESSORS_TOML if self.options.recording else description.PROCESSORS.read_text())
         broker = ["--broker", self.broker.address.url]
         state = ["--state-dir", str(self._folder)]
         self._begin("processors", ["process", *PROCESSORS, "--config", str(settings), *broker, *state])
@@ -167,9 +159,19 @@ class Demo:
         self.broker.stop()
 
     @property
-    def recording_ended(self) -> bool:
-        """Whether the agent has played the whole recording."""
-        return bool(self._state().get("finished"))
+    def recording_ended(self) -> bool | None:
+        """Whether the agent has played the whole recording; None where there is none."""
+        return bool(self._state().get("finished")) if self.options.recording else None
+
+    @property
+    def parts(self) -> int | None:
+        """How many parts the simulated machine has made since it was switched on."""
+        return None if self.options.recording else int(self._state().get("parts", 0))
+
+    @property
+    def notice(self) -> str:
+        """What the simulated machine has to say of itself, where it is not as it should be."""
+        return str(self._state().get("notice", ""))
 
     @property
     def agent_ledger(self) -> dict[str, Any]:
@@ -180,6 +182,13 @@ class Demo:
         """How often each part was started again."""
         parts = [self.broker.child, *self.children]
         return {child.name: child.restarts for child in parts if child.restarts}
+
+    def _agent(self) -> list[str]:
+        """The command that stands in for the control."""
+        if self.options.recording is None:
+            return ["simulate-control", "machine"]
+        devices = ["--devices", str(self.options.devices)] if self.options.devices else []
+        return ["simulate-control", "mtconnect", str(self.options.recording), *devices, "--wait"]
 
     def _begin(self, name: str, arguments: list[str]) -> None:
         child = Child(name, [sys.executable, "-m", "cnctwin", *arguments], self._folder / f"{name}.log")
@@ -192,7 +201,8 @@ class Demo:
             if url := self._state().get("url"):
                 return str(url)
             time.sleep(0.05)
-        raise ProgramError(f"the replay of {self.recording} does not start: {self.children[0].last_words()}")
+        what = f"replay of {self.options.recording}" if self.options.recording else "simulated machine"
+        raise ProgramError(f"the {what} does not start: {self.children[0].last_words()}")
 
     def _state(self) -> dict[str, Any]:
         try:
@@ -229,8 +239,13 @@ def run(options: DemoOptions, stop: Event) -> int:
         started_s = time.monotonic()
         ends_s = None if options.seconds is None else started_s + options.seconds
 
+        told: set[str] = set()
+
         def over() -> bool:
             demo.watch()
+            if not console.is_terminal and (notice := demo.notice) not in told | {""}:
+                told.add(notice)
+                console.print(f"{demo.machine}: {notice}", markup=False, highlight=False, soft_wrap=True)
             return stop.is_set() or (ends_s is not None and time.monotonic() >= ends_s)
 
         show(host, console, over, note=lambda: _note(demo, ends_s), on_events=changes.see)
@@ -243,6 +258,7 @@ def run(options: DemoOptions, stop: Event) -> int:
             last_tool=_last_tool(host, demo.machine),
             seconds=round(time.monotonic() - started_s, 1),
             recording_ended=ended,
+            parts=demo.parts,
             restarts=demo.restarts(),
             ledgers=tuple(ledgers(host)),
         )
@@ -254,8 +270,14 @@ def greeting(demo: Demo) -> str:
     """What a user needs to know at the start."""
     port = demo.broker.port
     at = "" if port == 1883 else f" -p {port}"
+    speed = demo.options.speed
+    if demo.options.recording:
+        what = f"{demo.options.recording.name} at {speed:g} times its pace"
+    else:
+        pace = "in real time" if speed == 1 else f"at {speed:g} times real time"
+        what = f"simulated {pace}; it runs {description.PROGRAM.name}, one part after the other"
     return (
-        f"{demo.machine}: {demo.recording.name} at {demo.options.speed:g} times its pace\n"
+        f"{demo.machine}: {what}\n"
         f"broker:    {demo.broker.address.url} (private, loopback only)\n"
         f"read it:   mosquitto_sub{at} -t 'cnc/#' -v          plain JSON, any MQTT client\n"
         f"           mosquitto_sub{at} -t 'spBv1.0/#' -F '%t'  the Sparkplug B messages behind it\n"
@@ -302,13 +324,14 @@ def _settle(host: HostApplication, on_events: Callable[[list[HostEvent]], None])
 
 def _last_tool(host: HostApplication, machine: str) -> str:
     reading = next((m.measured.get("tool_number") for m in machines(host) if m.name == machine), None)
-    return text(reading) if reading is not None else "–"
+    return "none" if reading is None or reading.value is None else text(reading)
 
 
 def _note(demo: Demo, ends_s: float | None) -> str:
     left = "Ctrl-C ends the demo" if ends_s is None else f"{max(ends_s - time.monotonic(), 0):.0f} s left, Ctrl-C ends it earlier"
     ended = " · the recording has ended" if demo.recording_ended else ""
-    return f"{left}{ended} · mosquitto_sub -p {demo.broker.port} -t 'cnc/#' -v"
+    notice = f" · {demo.notice}" if demo.notice else ""
+    return f"{left}{ended}{notice} · mosquitto_sub -p {demo.broker.port} -t 'cnc/#' -v"
 
 
 def _tell(summary: Summary, demo: Demo, console: Console, *, as_json: bool) -> None:
@@ -317,7 +340,10 @@ def _tell(summary: Summary, demo: Demo, console: Console, *, as_json: bool) -> N
         whole = {**asdict(summary), "ledgers": ledger, "balances": summary.balances, "agent": demo.agent_ledger}
         sys.stdout.write(json.dumps(whole) + "\n")
         return
-    state = "the recording was played to its end" if summary.recording_ended else "the recording was not played to its end"
+    if summary.parts is not None:
+        state = f"{summary.parts} part{'' if summary.parts == 1 else 's'} made"
+    else:
+        state = f"the recording was {'' if summary.recording_ended else 'not '}played to its end"
     console.print(
         f"{summary.machine}: {summary.seconds:g} s, {state}; {summary.tool_changes} tool changes, tool {summary.last_tool} last",
         markup=False,

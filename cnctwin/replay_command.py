@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 from threading import Event
+from typing import Any
 
 from cnctwin.errors import ProgramError, UsageError
 from cnctwin.mtconnect_agent.errors import ReplayError
@@ -41,19 +42,22 @@ def replay(
     try:
         print(f"{agent.url} serves {recording.name} as {agent.device_name}; Ctrl-C ends it", flush=True)
         while not stop.wait(STATE_S if state_file is not None else None):
-            _keep(state_file, agent)
-        _keep(state_file, agent)
+            keep(state_file, _state(agent))
+        keep(state_file, _state(agent))
     finally:
         agent.stop()
     counts = agent.ledger.as_dict()
     print(", ".join(f"{name} {count}" for name, count in counts.items()), flush=True)
 
 
-def _keep(state_file: Path | None, agent: ReplayAgent) -> None:
-    """Replace the state file as a whole, so that a reader never sees half of it."""
+def _state(agent: ReplayAgent) -> dict[str, Any]:
+    return {"url": agent.url, "device": agent.device_name, "finished": agent.finished, "ledger": agent.ledger.as_dict()}
+
+
+def keep(state_file: Path | None, state: dict[str, Any]) -> None:
+    """Replace the state file, where there is to be one, as a whole, so that a reader never sees half of it."""
     if state_file is None:
         return
-    state = {"url": agent.url, "device": agent.device_name, "finished": agent.finished, "ledger": agent.ledger.as_dict()}
     fresh = state_file.with_name(state_file.name + ".new")
     fresh.write_text(json.dumps(state))
     fresh.replace(state_file)

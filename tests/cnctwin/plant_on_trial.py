@@ -12,9 +12,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from cnctwin.demo import RECORDINGS
 from cnctwin.mtconnect_agent.replay_agent import ReplayAgent
 from cnctwin.plant import StageLedger, ledgers
+from cnctwin.simulated_machine.description import DEVICES, SPARE_PART
 from sparkplug.broker import BrokerAddress
 from sparkplug.host import EventKind, HostApplication
 from tests.wire.mosquitto import Mosquitto
@@ -38,7 +38,7 @@ class Plant:
         # Saving at each change would slow this broker to ten messages a second.
         self.mosquitto = self._stack.enter_context(Mosquitto(persistent=True, extra=("autosave_on_changes false",)))
         self.proxy = self._stack.enter_context(Proxy(upstream=self.mosquitto.address))
-        self.agent = ReplayAgent(RECORDINGS / "vmc.txt", RECORDINGS / "vmc_devices.xml", speed=0)
+        self.agent = ReplayAgent(SPARE_PART, DEVICES, speed=0)
         self.agent.start()
         self._stack.callback(self.agent.stop)
         self.viewer = HostApplication(BrokerAddress(*self.mosquitto.address), "trial", ("spBv1.0/cnc/#",), publish_state=False)

@@ -12,16 +12,17 @@ from typing import Any
 import pytest
 
 from cnctwin.cli import main
-from cnctwin.demo import RECORDINGS
 from cnctwin.edge_commands import run
 from cnctwin.mtconnect_agent.replay_agent import ReplayAgent
 from cnctwin.replay_command import replay
+from cnctwin.simulated_machine.description import DEVICES
+from cnctwin.simulated_machine.description import SPARE_PART as RECORDING
 from sparkplug.broker import BrokerAddress
 from sparkplug.host import HostApplication
 from tests.cnctwin.program import free_port, until
 from tests.wire.mosquitto import Mosquitto
 
-RECORDING, DEVICES = RECORDINGS / "vmc.txt", RECORDINGS / "vmc_devices.xml"
+LINES = len(RECORDING.read_text(encoding="utf-8").splitlines())
 
 
 @contextmanager
@@ -75,9 +76,9 @@ def test_the_replay_serves_the_recording_and_keeps_its_state_for_whoever_started
         with urllib.request.urlopen(state()["url"] + "/probe", timeout=5) as answer:
             assert b"MTConnectDevices" in answer.read()
     first, last = capfd.readouterr().out.splitlines()
-    assert first == f"{state()['url']} serves vmc.txt as VMC; Ctrl-C ends it"
-    assert last.startswith("lines 416, ")
-    assert state()["ledger"]["lines"] == 416
+    assert first == f"{state()['url']} serves {RECORDING.name} as VMC; Ctrl-C ends it"
+    assert last.startswith(f"lines {LINES}, ")
+    assert state()["ledger"]["lines"] == LINES
     assert list(tmp_path.iterdir()) == [file], "no half-written file stays"
 
 

@@ -13,10 +13,11 @@ from typing import Any
 import pytest
 
 from cnctwin import demo as demo_module
-from cnctwin.demo import RECORDINGS, Demo, DemoOptions, Summary, ToolChanges, greeting, machine_name, run
+from cnctwin.demo import Demo, DemoOptions, Summary, ToolChanges, greeting, machine_name, run
 from cnctwin.errors import UsageError
 from cnctwin.plant import StageLedger, ledgers
 from cnctwin.private_broker import answers
+from cnctwin.simulated_machine.description import DEVICES, SPARE_PART
 from sparkplug.broker import BrokerAddress
 from sparkplug.host import EventKind, HostApplication, HostEvent
 from sparkplug.metric import NodeId, Reading
@@ -24,9 +25,9 @@ from sparkplug.quality import Quality
 from tests.cnctwin.program import Program, children, free_port, is_alive, until
 
 pytestmark = [pytest.mark.broker, pytest.mark.usefixtures("mosquitto_program")]
-OWN = ["--recording", str(RECORDINGS / "vmc.txt"), "--devices", str(RECORDINGS / "vmc_devices.xml")]
-LINES_OF_OUR_RECORDING = 416
-SECONDS = 13.0  # enough for it at twelve times its pace, with time to start
+OWN = ["--recording", str(SPARE_PART), "--devices", str(DEVICES)]
+LINES_OF_OUR_RECORDING = len(SPARE_PART.read_text(encoding="utf-8").splitlines())
+SECONDS = 13.0  # enough for it at fifteen times its pace, with time to start
 STAGES = ["edge-vmc", "twin-cutting_force", "twin-mirror", "twin-thermal"]
 PARTS = ["edge", "mosquitto", "process", "simulate-control"]
 
@@ -35,7 +36,7 @@ PARTS = ["edge", "mosquitto", "process", "simulate-control"]
 def playing(tmp_path_factory: pytest.TempPathFactory, mosquitto_program: str) -> Iterator[tuple[Program, int]]:
     """Our own recording, played to its end while the other tests go on."""
     port = free_port()
-    arguments = ["demo", *OWN, "--speed", "12", "--seconds", f"{SECONDS}", "--port", str(port), "--json", "--no-open"]
+    arguments = ["demo", *OWN, "--speed", "15", "--seconds", f"{SECONDS}", "--port", str(port), "--json", "--no-open"]
     with Program(tmp_path_factory.mktemp("whole"), *arguments) as program:
         yield program, port
 
@@ -119,7 +120,7 @@ def stage(node: str, received: int = 10, emitted: int = 10) -> StageLedger:
     return StageLedger(node, True, received, emitted, 0, 0, {})
 
 
-SUMMARY = Summary("vmc", 3, "7", 8.0, True, {}, tuple(stage(node) for node in STAGES))
+SUMMARY = Summary("vmc", 5, "5", 8.0, True, None, {}, tuple(stage(node) for node in STAGES))
 NO_GOOD = {
     "a ledger that does not balance": (stage(STAGES[0], emitted=9), *SUMMARY.ledgers[1:]),
     "a stage without a ledger": SUMMARY.ledgers[1:],
@@ -200,7 +201,7 @@ def test_the_summary_tells_what_the_machine_did(whole: dict[str, Any]) -> None:
     assert whole["machine"] == "vmc"
     assert whole["recording_ended"] is True
     assert whole["agent"]["lines"] == LINES_OF_OUR_RECORDING
-    assert (whole["tool_changes"], whole["last_tool"]) == (3, "7")
+    assert (whole["tool_changes"], whole["last_tool"]) == (5, "5")
     assert whole["restarts"] == {}
     assert SECONDS <= whole["seconds"] < SECONDS + demo_module.SETTLE_S_MAX
 

@@ -19,7 +19,7 @@ pytestmark = [pytest.mark.broker, pytest.mark.node]
 
 def recorded_demo(port: int) -> tuple[list[tuple[str, bytes]], str]:
     """All messages of a short demo, and what it said at the end."""
-    command = [sys.executable, "-m", "cnctwin", "demo", "--port", str(port), "--speed", "20", "--seconds", "7", "--no-open"]
+    command = [sys.executable, "-m", "cnctwin", "demo", "--port", str(port), "--speed", "20", "--seconds", "16", "--no-open"]
     messages: list[tuple[str, bytes]] = []
     client = paho.Client(CallbackAPIVersion.VERSION2, "recorder")
     client.on_message = lambda _c, _u, message: messages.append((message.topic, bytes(message.payload)))
@@ -43,7 +43,8 @@ def recorded_demo(port: int) -> tuple[list[tuple[str, bytes]], str]:
 def test_sparkplug_payload_decodes_every_message_of_the_demo(mosquitto_program: str) -> None:
     installed_peers()
     messages, said = recorded_demo(free_port())
-    assert re.search(r"[3-6] tool changes", said), said  # three a round of the recording
+    changes = re.search(r"(\d+) tool changes", said)
+    assert changes is not None and int(changes[1]) >= 4, said  # five a part, which takes five seconds at this speed
     verbs: Counter[str] = Counter()
     with NodeProcess("decode.mjs") as peer:
         for topic, payload in messages:

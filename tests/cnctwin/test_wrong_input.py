@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from cnctwin.cli import main
-from cnctwin.demo import RECORDINGS
+from cnctwin.simulated_machine.description import SPARE_PART
 
 NO_TOML = "[machine\n"
 NO_SUCH_KEY = '[machine]\nname = "vmc"\ncolour = "blue"\n'
@@ -23,6 +23,7 @@ CASES = {
     "demo --devices FILE": ("--recording", ""),
     "demo --speed 0": ("--speed 0", ""),
     "demo --speed nan": ("--speed nan", ""),
+    "demo --speed 1000": ("--speed 1000", ""),
     "demo --speed fast": ("--speed", ""),
     "demo --seconds 0": ("--seconds 0", ""),
     "demo --port 70000": ("--port", ""),
@@ -45,6 +46,8 @@ CASES = {
     "simulate-control mtconnect FILE": ("cannot be replayed", "no recording\n"),
     "simulate-control mtconnect RECORDING --style 9": ("'9'", ""),
     "simulate-control mtconnect RECORDING --speed -1": ("-1", ""),
+    "simulate-control machine --speed 0": ("--speed 0", ""),
+    "simulate-control machine --speed inf": ("--speed inf", ""),
     "nonsense": ("nonsense", ""),
 }
 
@@ -65,7 +68,7 @@ def test_wrong_input_is_one_line_and_exit_code_2(
     named, content = CASES[line]
     file = tmp_path / "given.toml"
     file.write_text(content)
-    words = line.replace("FILE", str(file)).replace("RECORDING", str(RECORDINGS / "vmc.txt")).split()
+    words = line.replace("FILE", str(file)).replace("RECORDING", str(SPARE_PART)).split()
     assert call(monkeypatch, *words) == 2
     out, err = capfd.readouterr()
     assert out == ""
@@ -95,7 +98,7 @@ def test_a_real_process_says_it_without_a_traceback() -> None:
 
 
 @pytest.mark.parametrize(
-    "words", [["--help"], ["demo", "--help"], ["edge", "--help"], ["simulate-control", "mtconnect", "--help"]]
+    "words", [["--help"], ["demo", "--help"], ["edge", "--help"], ["simulate-control", "mtconnect", "--help"], ["simulate-control", "machine", "--help"]]
 )
 def test_every_command_explains_itself(
     words: list[str], monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]

@@ -59,6 +59,7 @@ def identified_axes(
             value = float(found.theta[[p.name for p in parameters].index(VELOCITY_DELAY.name)])
             effects.append(AddedEffect(effect=name, on=letter, parameters={"delay_s": value}))
         known += _estimates(machine, letter, found)
+        notes += _scale_factors(letter, found)
         unknown += _unknown(letter, found, forced)
         fits[letter] = (found, recordings, noise)
     machine = machine.model_copy(update={"axes": axes, "effects": tuple(effects)})
@@ -139,6 +140,16 @@ def _estimates(machine: MachineFile, letter: str, found: AxisFit) -> list[Estima
             low, high = theta - INTERVAL_Z * deviation, theta + INTERVAL_Z * deviation
             estimates.append(Estimate(path, theta, low, high, p.unit, 0.0, float(found.found.known[i])))
     return estimates
+
+
+def _scale_factors(letter: str, found: AxisFit) -> list[str]:
+    """Fitted gains as the factors S_pp, S_vp, S_vi on the stated ones."""
+    factors = []
+    for i, p in enumerate(found.model.parameters):
+        if p.name in GAINS:
+            factor, deviation = float(np.exp(found.theta[i])), float(np.sqrt(found.found.covariance[i, i]))
+            factors.append(f"{GAINS[p.name]} = {factor:.4f} ± {INTERVAL_Z * deviation * factor:.4f}")
+    return [f"axes.{letter}: {', '.join(factors)}"] if factors else []
 
 
 def _mean(value: float | tuple[float, float]) -> float:

@@ -156,7 +156,7 @@ class _Block:
         if self.reference_run:
             flat = [0.0] * out.size
             cells = scratch.tolist()
-            in_python(kernel.text)["axes"](first_tick, ticks, steps, period_s, cells, *[f.tolist() for f in fed], flat)  # type: ignore[operator]
+            in_python(kernel.text)["axes"](first_tick, ticks, steps, period_s, cells, *[f.tolist() for f in fed], flat)
             out, scratch = np.array(flat).reshape(out.shape), np.array(cells)
         else:
             compiled(kernel.text).axes(first_tick, ticks, steps, period_s, scratch, *fed, out.reshape(-1))
