@@ -173,8 +173,8 @@ def main() -> None:
     print(f"  {'rapid_mm_min':32} {best.limits.rapid_mm_min:9.0f}  read off the recorded speeds")
     print(f"  {'spindle_base_rpm':32} {ramp.base_rpm:9.0f}  ± {ramp.base_deviation_rpm:.0f} from run-ups in the cover recordings")
     for e in best.estimates:
-        note = "" if e.determined else "  not determined by these runs"
-        print(f"  {e.name:32} {e.value:9.3f}  [{e.low:.3f}, {e.high:.3f}]{note}")
+        note = "" if e.identifiable else "  not determined by these runs"
+        print(f"  {e.path:32} {e.value:9.3f}  [{e.low:.3f}, {e.high:.3f}]{note}")
     print()
     sections_table(best, learned + held)
 

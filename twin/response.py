@@ -29,7 +29,7 @@ from twin.sensor.reading import readings, sensor_quantities
 from twin.servo.constants import axis_constants, effect_constants
 from twin.servo.disturbance import Disturbance
 from twin.servo.kernel import axis_quantities
-from twin.servo.run import AxisInput, run_axes
+from twin.servo.run import AxisInput, AxisRun, run_axes
 from twin.sites import Site
 from twin.spindle.load import spindle_constants, spindle_load_pct, spindle_quantities
 from twin.weave import quantities
@@ -124,17 +124,13 @@ def respond(
     Raises EffectError where the machine's effects do not fit it.
     """
     check_effects(machine)
-    recorded = recorded or {}
-    added = _Added(machine.effects)
-    columns: dict[str, Floats] = {}
-    spread: dict[str, Floats] = {}
-    mean_force = _process(machine, told, added, recorded, columns, reference_run)
-    _axes(machine, told, added, recorded, mean_force, columns, spread, (seed, courses, reference_run))
-    _heat(machine, told, added, recorded, columns, reference_run)
-    _sensors(machine, told, added, columns, spread, reference_run)
+    chain = _Chain(machine, told, _Added(machine.effects), recorded or {}, reference_run)
+    chain.axes(chain.process(), seed, courses)
+    chain.heat()
+    chain.sensors()
     if seed is not None:
-        _noise(machine, columns, np.random.default_rng([seed, 1]))
-    return Response(columns, spread)
+        _noise(machine, chain.columns, np.random.default_rng([seed, 1]))
+    return Response(chain.columns, chain.spread)
 
 
 def period_of(t_s: Floats) -> float:
@@ -160,46 +156,125 @@ def _named(prefix: Mapping[str, Mapping[str, float]]) -> dict[str, float]:
     return {f"{e}__{k}": v for e, given in prefix.items() for k, v in effect_named(e).checked(given).items()}
 
 
-def _process(
-    machine: MachineFile,
-    told: RunInput,
-    added: _Added,
-    recorded: Mapping[str, Floats],
-    columns: dict[str, Floats],
-    reference_run: bool,
-) -> dict[str, Floats]:
-    """Adds forces and load to the columns; the mean force on the tool over each tick, by axis, as a force on the axis."""
-    period_s = period_of(told.t_s)
-    milling = milling_of(told) if machine.tool else None
-    power_w = np.zeros(len(told.t_s))
-    mean: dict[str, Floats] = {}
-    if milling is not None and machine.tool is not None:
-        effects = added.at(process_quantities())
-        constants = tool_constants(machine.tool) | _named(effects)
-        force = milling_force(
-            constants, machine.tool.teeth, milling, period_s=period_s, effects=tuple(effects), reference_run=reference_run
-        )
-        columns |= {"force_x_n": force.force_x_n[0], "force_y_n": force.force_y_n[0]}
-        feed = 60.0 * np.hypot(milling.velocity_x_mm_s, milling.velocity_y_mm_s)
-        cut = (milling.axial_depth_mm, milling.entry_angle_rad, milling.exit_angle_rad)
-        columns["cutting_force_peak_n"] = _peaks(constants, machine.tool.teeth, tuple(effects), (milling.spindle_rpm, feed, *cut))
-        mean = {"x": -force.mean_force_x_n[0], "y": -force.mean_force_y_n[0]}
-        power_w = force.cutting_power_w()[0]
-    for axis in "xy":
-        if f"force_{axis}_n" in recorded:
-            mean[axis] = -np.nan_to_num(recorded[f"force_{axis}_n"])
-    if machine.spindle is not None and told.spindle_rpm is not None and told.reference_mm:
-        effects = added.at(spindle_quantities())
-        load = spindle_load_pct(
-            spindle_constants(machine.spindle) | _named(effects),
-            power_w,
-            told.spindle_rpm,
+@dataclass(frozen=True, slots=True, eq=False)
+class _Chain:
+    """The sites of one run, in order; each adds its columns."""
+
+    machine: MachineFile
+    told: RunInput
+    added: _Added
+    recorded: Mapping[str, Floats]
+    reference_run: bool
+    columns: dict[str, Floats] = field(default_factory=dict)
+    spread: dict[str, Floats] = field(default_factory=dict)
+
+    def process(self) -> dict[str, Floats]:
+        """Adds forces and load; the mean force of each tick that resists an axis, by its letter."""
+        machine, told = self.machine, self.told
+        period_s = period_of(told.t_s)
+        milling = milling_of(told) if machine.tool else None
+        power_w = np.zeros(len(told.t_s))
+        mean: dict[str, Floats] = {}
+        if milling is not None and machine.tool is not None:
+            effects = self.added.at(process_quantities())
+            constants = tool_constants(machine.tool) | _named(effects)
+            named = tuple(effects)
+            force = milling_force(
+                constants, machine.tool.teeth, milling, period_s=period_s, effects=named, reference_run=self.reference_run
+            )
+            self.columns["force_x_n"], self.columns["force_y_n"] = force.force_x_n[0], force.force_y_n[0]
+            feed = 60.0 * np.hypot(milling.velocity_x_mm_s, milling.velocity_y_mm_s)
+            cut = (milling.axial_depth_mm, milling.entry_angle_rad, milling.exit_angle_rad)
+            self.columns["cutting_force_peak_n"] = _peaks(constants, machine.tool.teeth, named, (milling.spindle_rpm, feed, *cut))
+            mean = {"x": -force.mean_force_x_n[0], "y": -force.mean_force_y_n[0]}
+            power_w = force.cutting_power_w()[0]
+        for axis in "xy":
+            if f"force_{axis}_n" in self.recorded:
+                mean[axis] = -np.nan_to_num(self.recorded[f"force_{axis}_n"])
+        if machine.spindle is not None and told.spindle_rpm is not None and told.reference_mm:
+            effects = self.added.at(spindle_quantities())
+            self.columns["spindle_load_pct"] = spindle_load_pct(
+                spindle_constants(machine.spindle) | _named(effects),
+                power_w,
+                told.spindle_rpm,
+                period_s=period_s,
+                effects=tuple(effects),
+                reference_run=self.reference_run,
+            )[0]
+        return mean
+
+    def axes(self, mean_force: Mapping[str, Floats], seed: int | None, courses: int) -> None:
+        """Adds position, table and torque of each axis that the machine has."""
+        disturbance = disturbance_of(self.machine)
+        many = courses if disturbance and seed is None else 1
+        for number, (letter, reference) in enumerate((a, r) for a, r in self.told.reference_mm.items() if a in self.machine.axes):
+            force = np.tile(mean_force.get(letter, np.zeros(len(reference))), (many, 1))
+            if disturbance:
+                chance = [COURSES_SEED, number] if seed is None else [seed, 2, number]
+                force = force + disturbance.courses(many, len(reference), self.machine.machine.servo_period_s, chance)
+            run = self.axis(letter, reference, force, many)
+            for output, column in (("position_mm", "pos_mm"), ("torque_a", "torque_a"), ("table_mm", "table_mm")):
+                self.columns[f"{letter}_{column}"] = run.outputs[output].mean(axis=0)
+                if many > 1:
+                    self.spread[f"{letter}_{column}"] = run.outputs[output].std(axis=0)
+
+    def axis(self, letter: str, reference: Floats, force: Floats, many: int) -> AxisRun:
+        """One axis over all its courses."""
+        period_s = self.machine.machine.servo_period_s
+        base = axis_constants(self.machine.axes[letter])
+        effects = self.added.at(axis_quantities(), letter)
+        for name, given in effects.items():
+            base |= effect_constants(effect_named(name), given, base, letter)
+        replaced = _replaced(letter, self.recorded, period_s)
+        return run_axes(
+            {name: np.full(many, value) for name, value in base.items()},
+            AxisInput(
+                np.tile(_seen_reference(reference, self.told.t_s, self.added, letter), (many, 1)),
+                np.arange(many),
+                force if force.any() else None,
+                {name: np.tile(values, (many, 1)) for name, values in replaced.items()},
+            ),
             period_s=period_s,
             effects=tuple(effects),
-            reference_run=reference_run,
+            outputs=("position_mm", "torque_a", "table_mm"),
+            start=self.told.start.get(letter),
+            reference_run=self.reference_run,
         )
-        columns["spindle_load_pct"] = load[0]
-    return mean
+
+    def heat(self) -> None:
+        """Adds the spindle's temperature where the machine states its heat, and load, speed and surroundings are known."""
+        thermal, told = self.machine.thermal, self.told
+        load = self.recorded.get("spindle_load_pct", self.columns.get("spindle_load_pct"))
+        if thermal is None or load is None or told.spindle_rpm is None or told.ambient_temp_c is None:
+            return
+        ambient_c = float(told.ambient_temp_c[np.isfinite(told.ambient_temp_c)][0])
+        effects = self.added.at(thermal_quantities())
+        self.columns["spindle_temp_c"] = spindle_temperature_c(
+            thermal_constants(thermal) | _named(effects),
+            Warming(told.t_s, load, told.spindle_rpm, told.ambient_temp_c, told.coolant_on),
+            ambient_c if told.start_temp_c is None else told.start_temp_c,
+            effects=tuple(effects),
+            reference_run=self.reference_run,
+        )[0]
+
+    def sensors(self) -> None:
+        """Turns what is into what is recorded: sensors first, then the clock that stamps them."""
+        t_s = self.told.t_s
+        since = np.diff(t_s, prepend=t_s[:1])
+        temperature = self.columns.get("spindle_temp_c")
+        rise = None if temperature is None else temperature - temperature[0]
+        for name in list(self.columns):
+            effects = self.added.at(sensor_quantities(), name)
+            if name.endswith("_table_mm"):
+                effects |= self.added.at(sensor_quantities(), name.removesuffix("_table_mm"))
+            self.columns[name] = readings(self.columns[name], since, effects, rise, self.reference_run)
+        drifting = self.added.at(quantities((stamped,)))
+        if drifting and self.told.reference_mm:
+            at_s = _mapped(t_s, drifting, "feedback_time_s") - t_s[0]
+            for values in (self.columns, self.spread):
+                for name in values:
+                    if name.endswith(("_pos_mm", "_table_mm", "_torque_a")):
+                        values[name] = resampled(values[name], period_of(t_s), at_s)
 
 
 def _peaks(constants: Mapping[str, float], teeth: int, effects: tuple[str, ...], cut: tuple[Floats, ...]) -> Floats:
@@ -211,51 +286,6 @@ def _peaks(constants: Mapping[str, float], teeth: int, effects: tuple[str, ...],
     if cutting.any():
         peaks[cutting] = peak_force(constants, teeth, *different[cutting].T, effects=effects)[0]
     return np.asarray(peaks[which.reshape(-1)])
-
-
-def _axes(
-    machine: MachineFile,
-    told: RunInput,
-    added: _Added,
-    recorded: Mapping[str, Floats],
-    mean_force: Mapping[str, Floats],
-    columns: dict[str, Floats],
-    spread: dict[str, Floats],
-    how: tuple[int | None, int, bool],
-) -> None:
-    """Adds position, table and torque of each axis."""
-    seed, courses, reference_run = how
-    disturbance = disturbance_of(machine)
-    many = courses if disturbance and seed is None else 1
-    period_s = machine.machine.servo_period_s
-    for number, (letter, reference) in enumerate((a, r) for a, r in told.reference_mm.items() if a in machine.axes):
-        base = axis_constants(machine.axes[letter])
-        effects = added.at(axis_quantities(), letter)
-        for name, given in effects.items():
-            base |= effect_constants(effect_named(name), given, base, letter)
-        force = np.tile(mean_force.get(letter, np.zeros(len(reference))), (many, 1))
-        if disturbance:
-            chance = [COURSES_SEED, number] if seed is None else [seed, 2, number]
-            force = force + disturbance.courses(many, len(reference), period_s, chance)
-        given_columns = _replaced(letter, recorded, period_s)
-        run = run_axes(
-            {name: np.full(many, value) for name, value in base.items()},
-            AxisInput(
-                np.tile(_seen_reference(reference, told.t_s, added, letter), (many, 1)),
-                np.arange(many),
-                force if force.any() else None,
-                {name: np.tile(values, (many, 1)) for name, values in given_columns.items()},
-            ),
-            period_s=period_s,
-            effects=tuple(effects),
-            outputs=("position_mm", "torque_a", "table_mm"),
-            start=told.start.get(letter),
-            reference_run=reference_run,
-        )
-        for output, column in (("position_mm", "pos_mm"), ("torque_a", "torque_a"), ("table_mm", "table_mm")):
-            columns[f"{letter}_{column}"] = run.outputs[output].mean(axis=0)
-            if many > 1:
-                spread[f"{letter}_{column}"] = run.outputs[output].std(axis=0)
 
 
 def disturbance_of(machine: MachineFile) -> Disturbance | None:
@@ -293,57 +323,6 @@ def _mapped(t_s: Floats, effects: Mapping[str, Mapping[str, float]], quantity: s
         taken = change.__code__.co_varnames[1 : change.__code__.co_argcount]
         seen = np.asarray(change(seen, *(known[argument] for argument in taken)))
     return seen
-
-
-def _heat(
-    machine: MachineFile,
-    told: RunInput,
-    added: _Added,
-    recorded: Mapping[str, Floats],
-    columns: dict[str, Floats],
-    reference_run: bool,
-) -> None:
-    """Adds the spindle's temperature where the machine states its heat, and load, speed and surroundings are known."""
-    load = recorded.get("spindle_load_pct", columns.get("spindle_load_pct"))
-    if machine.thermal is None or load is None or told.spindle_rpm is None or told.ambient_temp_c is None:
-        return
-    start_c = (
-        told.start_temp_c if told.start_temp_c is not None else float(told.ambient_temp_c[np.isfinite(told.ambient_temp_c)][0])
-    )
-    effects = added.at(thermal_quantities())
-    columns["spindle_temp_c"] = spindle_temperature_c(
-        thermal_constants(machine.thermal) | _named(effects),
-        Warming(told.t_s, load, told.spindle_rpm, told.ambient_temp_c, told.coolant_on),
-        start_c,
-        effects=tuple(effects),
-        reference_run=reference_run,
-    )[0]
-
-
-def _sensors(
-    machine: MachineFile,
-    told: RunInput,
-    added: _Added,
-    columns: dict[str, Floats],
-    spread: dict[str, Floats],
-    reference_run: bool,
-) -> None:
-    """Turns what is into what is recorded: sensors first, then the clock that stamps them."""
-    since = np.diff(told.t_s, prepend=told.t_s[:1])
-    temperature = columns.get("spindle_temp_c")
-    rise = None if temperature is None else temperature - temperature[0]
-    for name in list(columns):
-        effects = added.at(sensor_quantities(), name)
-        if name.endswith("_table_mm"):
-            effects |= added.at(sensor_quantities(), name.removesuffix("_table_mm"))
-        columns[name] = readings(columns[name], since, effects, rise, reference_run)
-    drifting = added.at(quantities((stamped,)))
-    if drifting and told.reference_mm:
-        at_s = _mapped(told.t_s, drifting, "feedback_time_s") - told.t_s[0]
-        for values in (columns, spread):
-            for name in values:
-                if name.endswith(("_pos_mm", "_table_mm", "_torque_a")):
-                    values[name] = resampled(values[name], period_of(told.t_s), at_s)
 
 
 def _noise(machine: MachineFile, columns: dict[str, Floats], chance: np.random.Generator) -> None:

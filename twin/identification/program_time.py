@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from twin.errors import RunLogError
+from twin.identification.estimate import Estimate
 from twin.identification.program_recording import NOMINAL, RecordedProgram, SetUp, line_starts, rapid_rate_mm_min
 from twin.motion.limits import Limits
 from twin.motion.plan import Plan, plan
@@ -56,17 +57,6 @@ PARAMETERS = tuple(
 """What is fitted unless told otherwise: the others gained nothing on the recordings at hand (docs/program-time.md)."""
 SPINDLE_BASE_RPM = 3000.0
 """Spindle motors give constant power from a quarter or so of their top speed on. Assumed where `spindle_ramp` has no run-ups."""
-
-
-@dataclass(frozen=True, slots=True)
-class Estimate:
-    """A fitted parameter with its 95 % interval. determined: whether these recordings tell it."""
-
-    name: str
-    value: float
-    low: float
-    high: float
-    determined: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,7 +187,7 @@ def _estimates(parameters: Sequence[str], free: Floats, jacobian: Floats, square
 def _estimate(name: str, free: float, deviation: float) -> Estimate:
     reach = min(1.96 * deviation, 50.0)
     low, value, high = (_value(name, free + side * reach) for side in (-1.0, 0.0, 1.0))
-    return Estimate(name, value, low, high, deviation < DETERMINED)
+    return Estimate(name, value, low, high, "", None, 1.0 if deviation < DETERMINED else 0.0)
 
 
 def compare(program: RecordedProgram, planned: Plan) -> Comparison:

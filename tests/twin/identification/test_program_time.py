@@ -79,9 +79,9 @@ def found(made: list[RecordedProgram]) -> ProgramTimes:
 def test_the_constants_of_a_known_machine_are_found_again(found: ProgramTimes) -> None:
     truth = {name: getattr(TRUE, name) for name in KNOWN[:-1]} | {"reference_z": 350.0}
     for estimate in found.estimates:
-        assert estimate.determined
-        assert estimate.value == pytest.approx(truth[estimate.name], rel=0.15)
-    inside = [estimate.low <= truth[estimate.name] <= estimate.high for estimate in found.estimates]
+        assert estimate.identifiable
+        assert estimate.value == pytest.approx(truth[estimate.path], rel=0.15)
+    inside = [estimate.low <= truth[estimate.path] <= estimate.high for estimate in found.estimates]
     assert sum(inside) >= 3
 
 
@@ -101,7 +101,7 @@ def test_the_rapid_rate_is_read_off_the_long_rapids(made: list[RecordedProgram])
 
 def test_what_no_run_tells_is_said_to_be_undetermined(made: list[RecordedProgram]) -> None:
     model = identify_program_times(made[:1], ("tool_change_s", "spindle_deceleration_rpm_s"), ideal_limits(made))
-    assert {e.name for e in model.estimates if not e.determined} == {"spindle_deceleration_rpm_s"}
+    assert {e.path for e in model.estimates if not e.identifiable} == {"spindle_deceleration_rpm_s"}
 
 
 def test_the_base_speed_of_a_spindle_is_read_off_its_run_ups_to_several_speeds() -> None:
