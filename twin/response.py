@@ -30,7 +30,6 @@ from twin.servo.constants import axis_constants, effect_constants
 from twin.servo.disturbance import Disturbance
 from twin.servo.kernel import axis_quantities
 from twin.servo.run import AxisInput, AxisRun, run_axes
-from twin.sites import Site
 from twin.spindle.load import spindle_constants, spindle_load_pct, spindle_quantities
 from twin.weave import quantities
 
@@ -332,15 +331,3 @@ def _noise(machine: MachineFile, columns: dict[str, Floats], chance: np.random.G
         sigma = machine.noise.get(key, 0.0) if key else 0.0
         if sigma > 0.0:
             columns[name] = values + sigma * chance.standard_normal(len(values))
-
-
-SITES_OF_COLUMNS = {
-    "{a}_torque_a": Site.CONTROLLER,
-    "{a}_pos_mm": Site.MECHANICS,
-    "{a}_table_mm": Site.MECHANICS,
-    "force_x_n": Site.PROCESS_FORCE,
-    "force_y_n": Site.PROCESS_FORCE,
-    "spindle_load_pct": Site.SPINDLE,
-    "spindle_temp_c": Site.THERMAL,
-}
-"""The site at which each recorded column can be replaced and compared."""

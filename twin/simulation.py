@@ -26,7 +26,7 @@ IDEAL_TIMES = Program(rapid_mm_min=30000.0, acceleration_mm_s2=2500.0, jerk_mm_s
 """What a program is planned with where the machine states no [program]: a middling control."""
 RESOLUTION_MM = 0.25
 ROWS_MAX = 2_000_000
-TICKS_MAX = 40_000_000
+TICKS_MAX = 8_000_000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,7 +70,7 @@ def simulate(
     start_temperature_c: of the spindle; None = ambient
 
     Raises ProgramError where a control would refuse the program, MachineError where the machine has not got its axes or the run
-    would be longer than 40 million ticks, EffectError where its effects do not fit.
+    would be longer than 8 million ticks, EffectError where its effects do not fit.
     """
     moves = interpret(text, settings)
     notes: list[str] = []

@@ -71,7 +71,7 @@ def spindle_temperature_c(
     """Temperature at each sample, (lanes, samples), °C, from `start_c` at the first one.
 
     constants: name → a number or (lanes,), of the machine (`thermal_constants`) and of the effects (`effect__parameter`)
-    start_c: a number, or (lanes,); of a recording, see `first_measured_c`
+    start_c: a number, or (lanes,)
     effects: names of those that are in the kernel; reference_run: in plain Python, slowly, from the same text
 
     100 W into 5,000 J/K behind 0.2 K/W for one time constant of 1,000 s, in two steps:
@@ -110,21 +110,6 @@ def spindle_temperature_c(
         else:
             warm(np.ascontiguousarray(rows[lane]), float(start[lane]), times, *inputs, out[lane])
     return out
-
-
-def first_measured_c(spindle_temp_c: ArrayLike) -> float:
-    """The first temperature that a recording has.
-
-    >>> first_measured_c([float("nan"), 23.4, 23.5])
-    23.4
-
-    Raises TwinError where it has none.
-    """
-    values = np.asarray(spindle_temp_c, dtype=np.float64)
-    known = values[np.isfinite(values)]
-    if not known.size:
-        raise TwinError("spindle_temp_c has no sample to start from; give the temperature at the start")
-    return float(known[0])
 
 
 def held(values: ArrayLike, samples: int, name: str) -> Array:

@@ -14,9 +14,7 @@ from twin.machine import Axis, Friction
 from twin.servo.constants import axis_constants
 from twin.servo.run import AxisInput, run_axes
 
-FRICTION = Friction(
-    coulomb_n=(360.0, 400.0), static_n=(500.0, 540.0), stribeck_velocity_mm_s=6.0, viscous_n_s_per_mm=(2.2, 2.6)
-)
+FRICTION = Friction(coulomb_n=(360.0, 400.0), static_n=(500.0, 540.0), stribeck_velocity_mm_s=6.0, viscous_n_s_per_mm=(2.2, 2.6))
 AXIS = Axis(
     mass_kg=320.0,
     screw_lead_mm=12.0,
