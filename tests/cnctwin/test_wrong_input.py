@@ -98,7 +98,14 @@ def test_a_real_process_says_it_without_a_traceback() -> None:
 
 
 @pytest.mark.parametrize(
-    "words", [["--help"], ["demo", "--help"], ["edge", "--help"], ["simulate-control", "mtconnect", "--help"], ["simulate-control", "machine", "--help"]]
+    "words",
+    [
+        ["--help"],
+        ["demo", "--help"],
+        ["edge", "--help"],
+        ["simulate-control", "mtconnect", "--help"],
+        ["simulate-control", "machine", "--help"],
+    ],
 )
 def test_every_command_explains_itself(
     words: list[str], monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]

@@ -117,7 +117,8 @@ def test_it_explains_the_warm_up_of_a_recorded_machine_to_the_noise_of_the_senso
 
     def rms(effects: dict[str, float]) -> tuple[float, dict[str, float]]:
         names = (*NOMINAL, *effects)
-        first = np.array([*(constants[name] for name in NOMINAL), *effects.values(), *(float(m[np.isfinite(m)][0]) for m in measured)])
+        starts = [float(m[np.isfinite(m)][0]) for m in measured]
+        first = np.array([*(constants[name] for name in NOMINAL), *effects.values(), *starts])
 
         def residual(values: np.ndarray) -> np.ndarray:
             told = constants | dict(zip(names, values.tolist(), strict=False))
