@@ -277,14 +277,17 @@ class _Chain:
 
 
 def _peaks(constants: Mapping[str, float], teeth: int, effects: tuple[str, ...], cut: tuple[Floats, ...]) -> Floats:
-    """Peak force at each tick, worked out once for ticks that cut alike."""
-    rows = np.round(np.nan_to_num(np.array(cut)).T, 6)
-    different, which = np.unique(rows, axis=0, return_inverse=True)
-    cutting = (different[:, 2] > 0.0) & (different[:, 0] > 0.0)
-    peaks = np.zeros(len(different))
+    """Peak force at each tick, worked out once for neighbouring ticks that cut alike to seven digits."""
+    rows = np.nan_to_num(np.array(cut))
+    places = 6 - np.floor(np.log10(np.maximum(np.abs(rows).max(axis=1, keepdims=True), 1e-30)))
+    rows = np.round(rows * 10.0**places) / 10.0**places
+    new = np.concatenate([[True], (rows[:, 1:] != rows[:, :-1]).any(axis=0)])
+    different = rows[:, new]
+    cutting = (different[2] > 0.0) & (different[0] > 0.0)
+    peaks = np.zeros(different.shape[1])
     if cutting.any():
-        peaks[cutting] = peak_force(constants, teeth, *different[cutting].T, effects=effects)[0]
-    return np.asarray(peaks[which.reshape(-1)])
+        peaks[cutting] = peak_force(constants, teeth, *different[:, cutting], effects=effects)[0]
+    return np.asarray(peaks[np.cumsum(new) - 1])
 
 
 def disturbance_of(machine: MachineFile) -> Disturbance | None:

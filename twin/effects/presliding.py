@@ -21,7 +21,6 @@ EFFECT = Effect(
     parameters=(Parameter("stiffness_n_per_mm", "N/mm", RIGID, 500.0, 1e6, 2e4, "of the contact before it slides"),),
     changes={"bristle_compliance_mm_per_n": bristle_compliance_mm_per_n},
     shows_in=("{a}_torque_a", "{a}_pos_mm"),
-    steps=2,
     equation="dz/dt = v − stiffness |v| z / F(v), F = stiffness z",
     reference="Canudas de Wit, Olsson, Åström, Lischinsky 1995, IEEE Trans. Automatic Control 40(3), eq. 1 to 4",
 )

@@ -10,8 +10,8 @@ With a compliance, the contact is a bristle before it slides (Dahl 1968; the for
 
     dz/dt = v (1 − z sgn(v) / (c F)),   F_friction = z / c
 
-z and v are solved together by the implicit midpoint rule, the speed in the bracket by one fixed-point step:
-F_friction = (z + h v̄ / 2) / (c + h |v̄| / 2F). The nominal contact is rigid.
+z and v are solved together by the implicit midpoint rule, F_friction = (z + h v̄ / 2) / (c + h |v̄| / 2F), with F and |v̄| at the
+mean speed v̄ by two fixed-point steps. The nominal contact is rigid.
 """
 
 from typing import NamedTuple
@@ -137,22 +137,35 @@ def bend(
     speed_mm_s: float,
     friction_n: float,
     viscous_n: float,
+    viscous_n_s_per_mm: float,
+    slope_n_s_per_mm: float,
 ) -> BristleMotion:
     """Ends a step, bent where the contact has a compliance, and else on the rigid contact, unchanged.
 
-    >>> bend(0.0, 0.0, 0.0, 0.0005, 1.0, 0.001, 100.0, 1100.0, 1.0, 0.0, 1000.0, 0.0)
+    >>> bend(0.0, 0.0, 0.0, 0.0005, 1.0, 0.001, 100.0, 1100.0, 1.0, 0.0, 1000.0, 0.0, 0.0, 0.0)
     BristleMotion(position_mm=0.0005, velocity_mm_s=1.0, bristle_mm=0.0)
     """
     bristle_compliance_mm_per_n = at(Site.FRICTION, 0.0)
     compliant = bristle_compliance_mm_per_n > 0.0
     dry_n = friction_n - viscous_n if compliant else 1.0
+    dry_slope_n_s_per_mm = slope_n_s_per_mm - viscous_n_s_per_mm
     half_impulse = 500.0 * step_s / moving_mass_kg
-    push_n = force_n - direction * viscous_n
+    wear = 0.5 * half_impulse * step_s
 
+    push_n = force_n - direction * viscous_n
     give = bristle_compliance_mm_per_n + 0.5 * step_s * speed_mm_s / dry_n if compliant else 1.0
-    mean_mm_s = (velocity_mm_s + half_impulse * (push_n - bristle_mm / give)) / (1.0 + 0.5 * half_impulse * step_s / give)
-    give = bristle_compliance_mm_per_n + 0.5 * step_s * abs(mean_mm_s) / dry_n if compliant else 1.0
-    mean_mm_s = (velocity_mm_s + half_impulse * (push_n - bristle_mm / give)) / (1.0 + 0.5 * half_impulse * step_s / give)
+    mean_mm_s = (velocity_mm_s * give + half_impulse * (push_n * give - bristle_mm)) / (give + wear)
+
+    push_n = force_n - viscous_n_s_per_mm * mean_mm_s
+    mean_dry_n = dry_n + dry_slope_n_s_per_mm * (abs(mean_mm_s) - speed_mm_s)
+    give = bristle_compliance_mm_per_n + 0.5 * step_s * abs(mean_mm_s) / mean_dry_n if compliant else 1.0
+    mean_mm_s = (velocity_mm_s * give + half_impulse * (push_n * give - bristle_mm)) / (give + wear)
+
+    push_n = force_n - viscous_n_s_per_mm * mean_mm_s
+    mean_dry_n = dry_n + dry_slope_n_s_per_mm * (abs(mean_mm_s) - speed_mm_s)
+    give = bristle_compliance_mm_per_n + 0.5 * step_s * abs(mean_mm_s) / mean_dry_n if compliant else 1.0
+    mean_mm_s = (velocity_mm_s * give + half_impulse * (push_n * give - bristle_mm)) / (give + wear)
+    give = bristle_compliance_mm_per_n + 0.5 * step_s * abs(mean_mm_s) / mean_dry_n if compliant else 1.0
     bristle_mm = bristle_compliance_mm_per_n * (2.0 * bristle_mm + step_s * mean_mm_s) / give - bristle_mm
 
     position_mm = position_mm + step_s * mean_mm_s if compliant else position_next_mm

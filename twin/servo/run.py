@@ -88,21 +88,25 @@ def run_axes(
                 f"{effect.name} does not act on the loops or the mechanics of an axis; it acts at the {effect.site} site"
             )
     lanes = len(inputs.column)
-    kept: dict[str, list[Array]] = {name: [] for name in outputs}
     states: list[dict[str, Array]] = []
     blocks = _blocks(inputs.column)
+    room = _width(lanes) if len(blocks) == 1 else lanes
+    whole = np.empty((len(outputs), room, inputs.reference_mm.shape[1]))
     for block in blocks:
         job = _Block(block, constants, inputs, acting, outputs, measured, start or {}, reference_run)
-        out, state = job.run(first_tick, steps, period_s)
-        for row, name in enumerate(outputs):
-            kept[name].append(out[row, :, : len(block)].T)
+        state = job.run(first_tick, steps, period_s, whole)
         states.append({name: values[: len(block)] for name, values in state.items()})
     order = np.argsort(np.concatenate(blocks)) if lanes else np.array([], dtype=np.intp)
     return AxisRun(
-        {name: np.concatenate(parts)[order] for name, parts in kept.items()},
+        dict(zip(outputs, whole[:, :lanes], strict=True)),
         {name: np.concatenate([state[name] for state in states])[order] for name in states[0]} if states else {},
         first_tick + inputs.reference_mm.shape[1],
     )
+
+
+def _width(lanes: int) -> int:
+    """Of the kernel that takes so many lanes."""
+    return next(width for width in LANES if width >= lanes)
 
 
 def _blocks(column: NDArray[np.intp]) -> list[NDArray[np.intp]]:
@@ -130,9 +134,9 @@ class _Block:
     start: Mapping[str, Array | float]
     reference_run: bool
 
-    def run(self, first_tick: int, steps: int, period_s: float) -> tuple[Array, dict[str, Array]]:
-        """Outputs (names, ticks, width) and the states at the end, by name."""
-        width = next(w for w in LANES if w >= len(self.lanes))
+    def run(self, first_tick: int, steps: int, period_s: float, whole: Array) -> dict[str, Array]:
+        """Fills the block's lanes of `whole`, (outputs, lanes, ticks), and the room after them; the states at the end, by name."""
+        width = _width(len(self.lanes))
         filled = np.concatenate([self.lanes, np.full(width - len(self.lanes), self.lanes[0])])
         shared = len(set(self.inputs.column[self.lanes].tolist())) == 1
         recorded = tuple(self.inputs.recorded)
@@ -150,22 +154,27 @@ class _Block:
         )
         column = self.inputs.column[filled]
         fed = [np.ascontiguousarray(s[column[0]] if shared else s[column].T.reshape(-1), dtype=np.float64) for s in series]
-        ticks = self.inputs.reference_mm.shape[1]
+        ticks = whole.shape[2]
         scratch = self._scratch(kernel, filled).reshape(-1)
-        out = np.empty((len(self.outputs), ticks, width))
+        straight = bool((np.diff(self.lanes) == 1).all())
+        in_place = straight and (len(self.lanes) == width or whole.shape[1] == width)
+        out = whole if in_place else np.empty((len(self.outputs), width, ticks))
+        where = (out.shape[1], int(self.lanes[0]) if in_place else 0)
         if self.reference_run:
-            flat = [0.0] * out.size
-            cells = scratch.tolist()
-            in_python(kernel.text)["axes"](first_tick, ticks, steps, period_s, cells, *[f.tolist() for f in fed], flat)
-            out, scratch = np.array(flat).reshape(out.shape), np.array(cells)
+            cells, flat = scratch.tolist(), out.reshape(-1).tolist()
+            in_python(kernel.text)["axes"](first_tick, ticks, steps, period_s, cells, *[f.tolist() for f in fed], *where, flat)
+            out[...] = np.array(flat).reshape(out.shape)
+            scratch = np.array(cells)
         else:
-            compiled(kernel.text).axes(first_tick, ticks, steps, period_s, scratch, *fed, out.reshape(-1))
+            compiled(kernel.text).axes(first_tick, ticks, steps, period_s, scratch, *fed, *where, out.reshape(-1))
+        if not in_place:
+            whole[:, self.lanes] = out[:, : len(self.lanes)]
         rows = scratch.reshape(-1, width)
-        return out, {name: rows[row] for row, name in enumerate(kernel.scratch[: kernel.states])}
+        return {name: rows[row] for row, name in enumerate(kernel.scratch[: kernel.states])}
 
     def _scratch(self, kernel: AxisKernel, filled: NDArray[np.intp]) -> Array:
         """States and constants, (names, width)."""
-        rows = np.zeros((len(kernel.scratch), len(filled)))
+        rows = np.zeros((kernel.rows, len(filled)))
         reference = self.inputs.reference_mm[self.inputs.column[filled], 0]
         at_rest: dict[str, Array | float] = {"position_mm": reference, "previous_reference_mm": reference}
         at_rest |= dict.fromkeys(AxisMetrics._fields, 0.0)
