@@ -135,7 +135,7 @@ class _Block:
     reference_run: bool
 
     def run(self, first_tick: int, steps: int, period_s: float, whole: Array) -> dict[str, Array]:
-        """Fills the block's lanes of `whole`, (outputs, lanes, ticks), and the room after them; the states at the end, by name."""
+        """Fills the block's lanes of `whole`, (outputs, lanes, ticks), and the room after them; the states at the end."""
         width = _width(len(self.lanes))
         filled = np.concatenate([self.lanes, np.full(width - len(self.lanes), self.lanes[0])])
         shared = len(set(self.inputs.column[self.lanes].tolist())) == 1
