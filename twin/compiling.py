@@ -1,7 +1,8 @@
 """`kernel`: compiles a function when it is first called, and keeps it for the next process.
 
 numba's own cache looks at the file of a function, not at those of the functions that it calls, so after a change in one file it
-would go on running the old code of another. Here what is kept belongs to one state of all sources of `twin`.
+would go on running the old code of another. Here what is kept belongs to one state of all packages that have such functions;
+they call nothing outside.
 """
 
 import hashlib
@@ -21,8 +22,11 @@ Function = TypeVar("Function", bound=Callable[..., object])
 @cache
 def _kept_in() -> str:
     digest = hashlib.sha256(numba.__version__.encode())
-    for source in sorted(Path(__file__).parent.rglob("*.py")):
-        digest.update(source.read_bytes())
+    sources = {source: source.read_bytes() for source in sorted(Path(__file__).parent.rglob("*.py"))}
+    packages = {source.parent for source, text in sources.items() if b"from twin.compiling import" in text}
+    for source, text in sources.items():
+        if source.parent in packages:
+            digest.update(text)
     folder = kernel_folder() / f"twin-{digest.hexdigest()[:16]}"
     if not folder.exists():
         keep_newest(list(kernel_folder().glob("twin-*")), VERSIONS_MAX - 1)
