@@ -131,7 +131,7 @@ def simulate(
     program: Annotated[Path, typer.Argument(help="The part program")],
     machine: Annotated[Path, typer.Option(help="machine.toml of the machine to run it on")],
     out: Annotated[Path | None, typer.Option(help="Write the run log there, .parquet or .csv")] = None,
-    seed: Annotated[int | None, typer.Option(help="One noisy course of the machine instead of its mean course")] = None,
+    seed: Annotated[int | None, typer.Option(help="One noisy course of the machine instead of its mean course", min=0)] = None,
     as_json: AsJson = False,
 ) -> None:
     """Run a part program on the twin as on a machine: time, peak force, following error, and a run log."""
@@ -146,14 +146,14 @@ def identify(
         Method, typer.Option(help="least-squares, or the reference paper's genetic algorithm beside it")
     ] = Method.LSQ,
     free_gains: Annotated[bool, typer.Option("--free-gains", help="Fit S_pp, S_vp, S_vi; else gains are as stated")] = False,
-    seed: Annotated[int, typer.Option(help="Of the genetic algorithm")] = 1,
+    seed: Annotated[int, typer.Option(help="Of the genetic algorithm", min=0)] = 1,
     as_json: AsJson = False,
 ) -> None:
     """Fit the twin's constants to recordings, with confidence intervals, and say which cannot be known from them."""
     if method is Method.GA:
         _twin().compare_methods(case, seed, as_json, _console())
     else:
-        _twin().identify(case, out, free_gains=free_gains, as_json=as_json, console=_console())
+        raise typer.Exit(_twin().identify(case, out, free_gains=free_gains, as_json=as_json, console=_console()))
 
 
 @app.command("import")

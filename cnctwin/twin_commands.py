@@ -7,7 +7,7 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from rich.console import Console
@@ -16,13 +16,15 @@ from rich.table import Table
 
 from cnctwin.errors import UsageError
 from twin.case import read_case
-from twin.errors import ProgramError
+from twin.errors import EffectError, ProgramError
 from twin.gap_table import GapRow
 from twin.identification import identify as identification
+from twin.identification import paper
 from twin.identification.identify import Identification
 from twin.machine import machine_to_toml, read_machine
 from twin.recording.observations import read_observations
 from twin.recording.program_run import program_runs
+from twin.response import check_effects
 from twin.runlog import run_log, write_run
 from twin.simulation import Simulation
 from twin.simulation import simulate as simulated
@@ -40,9 +42,20 @@ def read_text(path: Path) -> str:
         return raw.decode("latin-1")
 
 
+def check_suffix(out: Path | None) -> None:
+    """Raises UsageError where a run log would be written into a file of another kind."""
+    if out is not None and out.suffix not in (".parquet", ".csv"):
+        raise UsageError(f"{out}: a run log is written as .parquet or .csv, by the ending of its name")
+
+
 def simulate(program: Path, machine: Path, out: Path | None, *, seed: int | None, as_json: bool, console: Console) -> None:
     """Run a program on a machine, write what it records, and print time, peak force and following error."""
     described = read_machine(machine)
+    try:
+        check_effects(described)
+    except EffectError as error:
+        raise UsageError(f"{machine}: {error}") from None
+    check_suffix(out)
     text = read_text(program)
     with _working("simulating") as say:
         say("simulating")
@@ -103,18 +116,26 @@ def simulation_table(program: str, machine: str, summary: dict[str, Any]) -> Tab
     return table
 
 
-def identify(case: Path, out: Path | None, *, free_gains: bool, as_json: bool, console: Console) -> None:
-    """Fit the machine of a case to its recordings, write it, and say what is known and what is not."""
+def identify(case: Path, out: Path | None, *, free_gains: bool, as_json: bool, console: Console) -> int:
+    """Fit the machine of a case to its recordings, write it, and say what is known and what is not.
+
+    The exit code: 1 where nothing could be identified, or the identified machine does not fit what was recorded.
+    """
     question = read_case(case)
     with _working("identifying") as say:
         found = identification.identify(question, free_gains=free_gains, progress=lambda what: say(f"identifying: {what}"))
+    code = 0 if found.estimates and not found.misfits else 1
     if out is not None:
         _write(lambda: out.write_text(machine_to_toml(found.machine), encoding="utf-8"), out)
     if as_json:
         sys.stdout.write(json.dumps(identification_json(found) | {"out": None if out is None else str(out)}) + "\n")
-        return
+        return code
     console.print(estimates_table(found))
-    for title, sentences in (("found", found.notes), ("not to be known from these recordings", found.unknown)):
+    for title, sentences in (
+        ("does not fit", found.misfits),
+        ("found", found.notes),
+        ("not to be known from these recordings", found.unknown),
+    ):
         if sentences:
             console.print(f"\n[bold]{title}[/]")
         for sentence in sentences:
@@ -123,12 +144,14 @@ def identify(case: Path, out: Path | None, *, free_gains: bool, as_json: bool, c
     console.print(gap_table(found.gaps))
     if out is not None:
         console.print(f"the identified machine is in {out}", markup=False, highlight=False, soft_wrap=True)
+    return code
 
 
 def identification_json(found: Identification) -> dict[str, Any]:
     """Everything, for a program to read."""
     return {
         "estimates": [asdict(e) | {"identifiable": e.identifiable} for e in found.estimates],
+        "misfits": found.misfits,
         "unknown": found.unknown,
         "notes": found.notes,
         "gaps": [asdict(row) | {"ratio": row.ratio} for row in found.gaps],
@@ -139,7 +162,8 @@ def estimates_table(found: Identification) -> Table:
     """Each constant with its interval beside what was stated."""
     table = Table(title=f"{len(found.estimates)} constants of {found.machine.machine.name}", title_justify="left")
     for column in ("constant", "stated", "identified", "95 % interval", "unit", "known by"):
-        table.add_column(column, justify="right" if column in ("stated", "identified", "95 % interval") else "left")
+        justify: Literal["left", "right"] = "right" if column in ("stated", "identified", "95 % interval") else "left"
+        table.add_column(column, justify=justify, overflow="fold", min_width=26 if column == "constant" else None)
     for e in found.estimates:
         interval = f"{e.low:.5g} … {e.high:.5g}"
         source = "the recordings" if e.identifiable else "what was stated"
@@ -148,7 +172,7 @@ def estimates_table(found: Identification) -> Table:
 
 
 def gap_table(rows: tuple[GapRow, ...]) -> Table:
-    """Twin against recording by signal and regime, the worst first in each run."""
+    """Twin against recording by run, signal and regime."""
     table = Table(title="twin minus recording, rms, on the runs to be judged on", title_justify="left")
     for column in ("run", "signal", "regime", "gap", "repeatability", "ratio", "expected"):
         table.add_column(column, justify="left" if column in ("run", "signal", "regime") else "right")
@@ -162,6 +186,7 @@ def gap_table(rows: tuple[GapRow, ...]) -> Table:
 
 def import_recording(recording: Path, out: Path, console: Console) -> None:
     """Turn a recording in the `time|key|value` text into run logs, one for each program execution in it."""
+    check_suffix(out)
     observations = read_observations(read_text(recording), str(recording))
     runs = program_runs(observations)
     if not runs:
@@ -176,6 +201,8 @@ def import_recording(recording: Path, out: Path, console: Console) -> None:
         pauses = ", ".join(f"{p.end_s - p.start_s:.0f} s ({p.reason})" for p in run.pauses) or "none"
         table.add_row(str(path), f"{log.t_s[-1]:.0f} s", f"{run.active_s:.0f} s", run.ending.value, pauses)
     console.print(table)
+    taken = f"{len(observations.rows)} observations taken, {observations.dropped} lines dropped: cut off, or without a value"
+    console.print(taken, markup=False, highlight=False, soft_wrap=True)
 
 
 def _write(write: Callable[[], object], path: Path) -> None:
@@ -219,19 +246,20 @@ def _working(first: str) -> _Working:
 
 def compare_methods(case: Path, seed: int, as_json: bool, console: Console) -> None:
     """The reference paper's genetic algorithm with its stated settings, beside least squares, on the same recordings."""
-    from twin.identification import paper  # noqa: PLC0415
-
     with _working("searching") as say:
         say("searching with the genetic algorithm")
         found = paper.identify_paper(read_case(case), seed, clock=time.perf_counter)
     rows = [asdict(row) for row in found.rows]
     if as_json:
-        sys.stdout.write(json.dumps({"seed": seed, "rows": rows}) + "\n")
+        sys.stdout.write(json.dumps({"seed": seed, "rows": rows, "notes": found.notes}) + "\n")
         return
     table = Table(title="the reference paper's search beside least squares, on the same recordings", title_justify="left")
     for column in ("what", "method", "objective", "evaluations", "seconds", "values"):
         table.add_column(column, justify="right" if column in ("objective", "evaluations", "seconds") else "left")
     for row in found.rows:
         values = ", ".join(f"{name} {value:.5g}" for name, value in row.values.items())
-        table.add_row(row.what, row.method, f"{row.objective:.5g}", str(row.evaluations), f"{row.seconds:.3g}", values)
+        objective = f"{row.objective:.5g} {row.unit}"
+        table.add_row(row.what, row.method, objective, str(row.evaluations), f"{row.seconds:.3g}", values)
     console.print(table)
+    for note in found.notes:
+        console.print(f"note: {note}", markup=False, highlight=False, soft_wrap=True)

@@ -209,12 +209,14 @@ def machine_from_toml(text: str, source: str = "machine.toml") -> MachineFile:
     except tomllib.TOMLDecodeError as error:
         raise MachineError(f"{source}: is not TOML: {error}") from None
     except ValidationError as error:
-        first, *rest = error.errors(include_url=False)
+        # a key that is not known comes first: the one that is missing is most likely the same, misspelt
+        first, *rest = sorted(error.errors(include_url=False), key=lambda fault: fault["type"] != "extra_forbidden")
         key = ".".join(str(part) for part in first["loc"])
         more = f" (and {len(rest)} more)" if rest else ""
-        raise MachineError(
-            f"{source}: {key}: {first['msg'].removeprefix('Value error, ')}{_shown(first['input'])}{more}"
-        ) from None
+        if first["type"] == "extra_forbidden":
+            raise MachineError(f"{source}: {key} is not known; docs/machine.md lists what is{more}") from None
+        said = first["msg"].removeprefix("Value error, ")
+        raise MachineError(f"{source}: {key}: {said}{_shown(first['input'])}{more}") from None
 
 
 def _shown(value: Any) -> str:

@@ -48,7 +48,7 @@ def axis_regimes(t_s: NDArray[np.float64], reference_mm: NDArray[np.float64]) ->
         return np.zeros(n, dtype=np.int8)
     period_s = float(np.median(np.diff(t_s)))
     velocity = np.gradient(reference_mm, period_s)
-    window = max(1, round(0.005 / period_s))
+    window = min(max(1, round(0.005 / period_s)), n)
     smooth = np.convolve(velocity, np.ones(window) / window, mode="same")
     acceleration = np.gradient(smooth, period_s)
     regimes = np.where(velocity > 0, Regime.CONSTANT_PLUS, Regime.CONSTANT_MINUS).astype(np.int8)

@@ -11,6 +11,7 @@ A machine with a disturbance (`[noise] disturbance_force_n`) is a distribution o
 spread, or, with a seed, one of them, with the noise of its sensors on top, as a real machine would record it.
 """
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -34,6 +35,7 @@ from twin.spindle.load import spindle_constants, spindle_load_pct, spindle_quant
 from twin.weave import quantities
 
 Floats = NDArray[np.float64]
+SIGNAL = re.compile(r"^([a-z][a-z0-9]?_(pos_mm|table_mm|torque_a)|force_[xy]_n|spindle_load_pct|spindle_temp_c)$")
 COURSES = 32
 COURSES_SEED = 20
 NOISE_OF = {"pos_mm": "position_mm", "table_mm": "table_mm", "torque_a": "torque_a"}
@@ -96,12 +98,18 @@ def check_effects(machine: MachineFile) -> None:
         if (added.effect, added.on) in seen:
             raise EffectError(f"{added.effect} on {added.on or 'the machine'} is there twice; add its parameters up")
         seen.add((added.effect, added.on))
+        if effect.on is On.AXIS and not added.on:
+            raise EffectError(f"{added.effect} acts on an axis: say which by `on`")
         if effect.on is On.AXIS and added.on not in machine.axes:
             raise EffectError(f"{added.effect} is put on {added.on!r}, which is no axis; there are {', '.join(machine.axes)}")
         if effect.on is On.MACHINE and added.on:
             raise EffectError(f"{added.effect} is put on {added.on!r}; it acts on the machine as a whole, so `on` is empty")
         if effect.on is On.SIGNAL and not added.on:
             raise EffectError(f"{added.effect} acts on a signal: say which by `on`")
+        if effect.on is On.SIGNAL and not SIGNAL.match(added.on):
+            raise EffectError(
+                f"{added.effect} is put on {added.on!r}, which is no column that a machine answers with (x_pos_mm, …)"
+            )
 
 
 def respond(

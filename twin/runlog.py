@@ -80,6 +80,8 @@ def run_log(columns: Mapping[str, NDArray[np.generic]], source: str = "run") -> 
         elif name in COLUMNS or AXIS_COLUMN.match(name):
             numbers[name] = _numbers(name, values, source)
     t_s = numbers.pop("t_s")
+    if not len(t_s):
+        raise RunLogError(f"{source}: has no rows")
     if not np.isfinite(t_s).all():
         raise RunLogError(f"{source}: t_s is not a number in row {int(np.flatnonzero(~np.isfinite(t_s))[0]) + 1}")
     back = np.flatnonzero(np.diff(t_s) <= 0)

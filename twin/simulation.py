@@ -102,7 +102,22 @@ def simulate(
         start_temp_c=start_temperature_c,
     )
     response = respond(machine, told, seed=seed)
+    notes += _saturated(machine, response)
     return Simulation(_log(motion, told, response, path, name), response, planned, tuple(notes))
+
+
+def _saturated(machine: MachineFile, response: Response) -> list[str]:
+    """Axes that are at their torque limit for more than a hundredth of the run."""
+    said = []
+    for letter, axis in machine.axes.items():
+        torque = response.columns.get(f"{letter}_torque_a")
+        part = 0.0 if torque is None else float(np.mean(np.abs(torque) > 0.98 * axis.torque_limit_a))
+        if part > 0.01:
+            said.append(
+                f"{letter} is at its torque limit of {axis.torque_limit_a:g} A for {100 * part:.0f} % of the run: a control "
+                f"would stop it; check mass, lead, gains and limit of axes.{letter}, and the acceleration in [program]"
+            )
+    return said
 
 
 def _engagement(machine: MachineFile, path: Path, motion: Motion, notes: list[str]) -> dict[str, Floats]:
@@ -113,7 +128,7 @@ def _engagement(machine: MachineFile, path: Path, motion: Motion, notes: list[st
         if (path.kind != Kind.RAPID).any():
             notes.append(f"no [{'stock' if machine.stock is None else 'tool'}]: the program is run in air")
         return none
-    if path.axes[:3] != ("x", "y", "z"):
+    if path.axes[:3] != ("x", "y", "z") or not len(path):
         return none
     if len({event.value for event in path.events if event.kind == EventKind.TOOL_CHANGE}) > 1:
         notes.append(f"the program changes tools; all of them are taken to be the {machine.tool.diameter_mm:g} mm one of [tool]")
@@ -134,7 +149,15 @@ def _engagement(machine: MachineFile, path: Path, motion: Motion, notes: list[st
     place = whole * count[motion.segment]
     chord = np.minimum(place.astype(np.int64), count[motion.segment] - 1)
     row = rows.row_at(first[motion.segment] + chord, np.clip(place - chord, 0.0, 1.0))
-    cutting = (path.kind[motion.segment] != Kind.RAPID) & (motion.feed_mm_min > 0.0) & (motion.spindle_rpm > 0.0)
+    feeding = (path.kind[motion.segment] != Kind.RAPID) & (motion.feed_mm_min > 0.0)
+    cutting = feeding & (motion.spindle_rpm > 0.0) & (motion.spindle_direction > 0)
+    in_material = feeding & (rows.axial_depth_mm[row] > 0.0)
+    for wrong, why in (
+        (in_material & (motion.spindle_rpm == 0.0), "feeds into material with the spindle at rest"),
+        (in_material & (motion.spindle_direction < 0), "M4: a right-hand tool does not cut; no force is computed"),
+    ):
+        if wrong.any():
+            notes.append(f"line {int(motion.line[int(np.argmax(wrong))]) + 1}: {why}")
     return {name: np.where(cutting, getattr(rows, name)[row], 0.0) for name in none}
 
 

@@ -19,6 +19,8 @@ from tests.wire.proxy import Proxy
 pytestmark = pytest.mark.broker
 LINES_BEFORE, LINES_MISSED = 180, 12
 LINES_ALL = len(SPARE_PART.read_text(encoding="utf-8").splitlines())
+# State is saved every two seconds of ours, whatever the speed of the machine's clock: eighteen of its seconds pass here in one.
+SAVED_WITHIN_S = 2.5
 # A restarted processor has not seen the heat of the moments in between, which it counts as a hole; and a figure is published
 # only when it has moved by 0.05 K, in whichever direction.
 MODELLED_WITHIN = dict.fromkeys(("spindle_temp_c", "spindle_temp_rise_k", "spindle_temp_residual_k"), 0.11)
@@ -28,6 +30,7 @@ def run(folder: Path, killed: str | None) -> tuple[dict[str, Any], Plant]:
     with Plant(folder) as plant:
         plant.play(LINES_BEFORE)
         if killed is not None:
+            plant.look(SAVED_WITHIN_S)
             plant.kill(killed)
             plant.play(LINES_MISSED)
             plant.restart(killed)

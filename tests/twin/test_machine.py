@@ -8,6 +8,7 @@ from tests.twin.axes import AXIS
 from twin.case import read_case
 from twin.errors import CaseError, MachineError
 from twin.machine import machine_from_toml, machine_to_toml, read_machine
+from twin.response import check_effects
 
 HEAD = "[machine]\nname = 'a'\n"
 WHOLE = (
@@ -52,7 +53,7 @@ def test_the_force_of_an_ampere_comes_from_the_screw_or_is_stated() -> None:
         (HEAD + "[spindle]\nrated_power_kw = -1.0\nefficiency = 0.9", "spindle.rated_power_kw: .* not -1"),
         (HEAD + "[spindle]\nrated_power_kw = 1.0\nefficiency = 90.0", "spindle.efficiency: .* not 90"),
         (WHOLE.replace("mass_kg = 320.0", "mass_kg = nan"), "axes.x.mass_kg"),
-        (WHOLE.replace("mass_kg = 320.0", "weight_kg = 320.0"), "axes.x"),
+        (WHOLE.replace("mass_kg = 320.0", "weight_kg = 320.0"), "axes.x.weight_kg is not known"),
         (WHOLE.replace("static_n = 520.0", "static_n = 100.0"), "static_n 100.0 is below coulomb_n 380.0"),
         (WHOLE.replace("screw_lead_mm = 12.0\n", ""), "state either force_per_command_n, or screw_lead_mm"),
         (HEAD + "[stock]\nmin_mm = [0, 0, 5]\nmax_mm = [1, 1, 5]", "is not below max_mm 5.0 in z"),
@@ -63,6 +64,13 @@ def test_a_wrong_description_gets_one_line_with_key_and_value(text: str, complai
         machine_from_toml(text, "vmc.toml")
     assert str(error.value).startswith("vmc.toml: ")
     assert "\n" not in str(error.value).removeprefix("vmc.toml: ").strip() or "TOML" in str(error.value)
+
+
+def test_the_example_of_the_page_is_a_machine() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "machine.md").read_text(encoding="utf-8")
+    machine = machine_from_toml(page.split("```toml\n")[1].split("```")[0])
+    check_effects(machine)
+    assert set(type(machine).model_fields) == machine.model_fields_set, "a section is missing in the example"
 
 
 def test_a_missing_file_is_named() -> None:

@@ -159,6 +159,30 @@ def test_a_rapid_through_the_stock_is_said_with_its_line() -> None:
     assert any(note.startswith("line 2: rapid into material") for note in notes), notes
 
 
+@pytest.mark.parametrize(
+    ("program", "said"),
+    [
+        ("G0 X-5 Y15\nG1 Z-1 F500\nG1 X35\nM30\n", "line 3: feeds into material with the spindle at rest"),
+        ("S8000 M4\nG0 X-5 Y15\nG1 Z-1 F500\nG1 X35\nM30\n", "line 4: M4: a right-hand tool does not cut"),
+    ],
+)
+def test_a_cut_that_is_none_is_said_with_its_line(program: str, said: str) -> None:
+    done = simulate(MACHINE, program)
+    assert any(note.startswith(said) for note in done.notes), done.notes
+    assert not np.nan_to_num(done.run["axial_depth_mm"]).any()
+
+
+def test_an_axis_at_its_torque_limit_is_said() -> None:
+    weak = MACHINE.axes["x"].model_copy(update={"torque_limit_a": 0.7})
+    done = simulate(MACHINE.model_copy(update={"axes": MACHINE.axes | {"x": weak}}), SLOT)
+    assert any(note.startswith("x is at its torque limit of 0.7 A") for note in done.notes), done.notes
+
+
+@pytest.mark.parametrize("program", ["", "M30\n", "G4 P1000\nM30\n"])
+def test_a_program_without_motion_runs_too(program: str) -> None:
+    assert simulate(MACHINE, program).seconds == pytest.approx(1.0 if "G4" in program else 0.0)
+
+
 def test_a_program_without_end_of_memory_is_refused() -> None:
     with pytest.raises(MachineError, match="split it"):
         simulate(MACHINE, "G4 P99999999\n" * 40 + "G1 X1 F1\nM30\n")
@@ -172,6 +196,8 @@ def added(effect: str, on: str = "", **parameters: float) -> MachineFile:
     ("machine", "complaint"),
     [
         (added("gravity", "w", force_n=10.0), "no axis"),
+        (added("gravity", force_n=10.0), "acts on an axis: say which by `on`"),
+        (added("sensor_bias", "colour", bias=1.0), "no column that a machine answers with"),
         (added("gravity", "z", force_n=1e9), "has to be from"),
         (added("gravity", "z", weight=1.0), "no parameter 'weight'"),
         (added("edge_force", "x", tangential_n_per_mm=5.0), "`on` is empty"),

@@ -48,7 +48,11 @@ def identified_axes(
         recordings, noise = _recordings(machine, runs, repeats, letter)
         moving = tuple(stretch for recording in recordings for stretch in stretches(recording))
         if not moving:
-            unknown.append(f"axes.{letter}: no run records reference, position and torque of it while it moves")
+            there = ", ".join(dict.fromkeys(a for run in runs for a in run.log.axes())) or "none"
+            unknown.append(
+                f"axes.{letter}: no run has {letter}_ref_mm, {letter}_pos_mm and {letter}_torque_a while it moves; "
+                f"axes in the runs: {there}"
+            )
             continue
         forced = any(r.disturbance_n is not None and r.disturbance_n.any() for r in recordings)
         parameters = axis_parameters(machine, letter, force_known=forced, free_gains=free_gains)
@@ -108,7 +112,7 @@ def _with_or_without_delay(model: AxisModel, notes: list[str], letter: str) -> A
     deviation = float(np.sqrt(delayed.found.covariance[-1, -1]))
     left = [float(np.linalg.norm(m.left_over(f.theta))) for m, f in ((model, nominal), (later, delayed))]
     part = 1.0 - left[1] / left[0]
-    if abs(delay) < DELAY_SIGMAS * deviation or part < DELAY_GAIN_MIN:
+    if delay < DELAY_SIGMAS * deviation or part < DELAY_GAIN_MIN:  # a velocity from the future is another fault's disguise
         return nominal
     notes.append(
         f"axes.{letter}: the velocity in the loop is {1000 * delay:.3f} ± {1000 * INTERVAL_Z * deviation:.3f} ms old; with that "

@@ -55,6 +55,8 @@ class AxisRecording:
 
 REST_BEFORE_S = 0.1
 REST_AFTER_S = 0.2
+MOVING_MIN = 50
+"""Samples of motion below which there is nothing to fit."""
 
 
 def stretches(recording: AxisRecording) -> tuple[AxisRecording, ...]:
@@ -65,10 +67,12 @@ def stretches(recording: AxisRecording) -> tuple[AxisRecording, ...]:
     torque that was measured (multiple shooting: Bock 1981; for servo axes, Janot, Gautier, Brunot 2019 start each lap anew).
     """
     still = np.concatenate([[True], np.diff(recording.reference_mm) == 0])
+    if len(still) < MOVING_MIN:
+        return ()
     period_s = float(np.median(np.diff(recording.t_s)))
     before, after = round(REST_BEFORE_S / period_s), round(REST_AFTER_S / period_s)
     moving = np.flatnonzero(~still)
-    if not len(moving):
+    if len(moving) < MOVING_MIN:
         return ()
     breaks = np.flatnonzero(np.diff(moving) > before + after)
     firsts, lasts = moving[np.concatenate([[0], breaks + 1])], moving[np.concatenate([breaks, [len(moving) - 1]])]

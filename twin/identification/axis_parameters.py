@@ -51,7 +51,12 @@ def axis_parameters(machine: MachineFile, letter: str, *, force_known: bool, fre
     force_key = "force_per_command_n" if axis.force_per_command_n is not None else "torque_constant_nm_per_a"
     wanted = [
         AxisParameter("mass_kg", "kg", True, sigma("mass_kg")),
-        AxisParameter("newton_per_command", "N per unit of torque", True, sigma(force_key) if force_known else 0.0),
+        AxisParameter(
+            "newton_per_command",
+            "N·m/A" if axis.force_per_command_n is None else "N",
+            True,
+            sigma(force_key) if force_known else 0.0,
+        ),
         AxisParameter("coulomb_n", "N", True, sigma("friction.coulomb_n")),
         AxisParameter("static_n", "N", True, sigma("friction.static_n")),
         AxisParameter("stribeck_velocity_mm_s", "mm/s", True, sigma("friction.stribeck_velocity_mm_s")),

@@ -65,7 +65,8 @@ def fit(residuals: Residuals, sigma: Floats, limit: Floats, blocks: NDArray[np.i
     weight = (1.0 + (found.fun[data] / OUTLIER) ** 2) ** -0.25
     slope = jacobian(found.x)[data] * weight[:, None]
     covariance = clustered_covariance(slope, found.fun[data] * weight, blocks, np.diag(1.0 / sigma**2))
-    known = 1.0 - np.clip(np.diag(covariance) / sigma**2, 0.0, 1.0)
+    information = slope.T @ slope + np.diag(1.0 / sigma**2)
+    known = 1.0 - np.clip(np.diag(np.linalg.pinv(information, hermitian=True)) / sigma**2, 0.0, 1.0)
     return Fit(found.x, covariance, known, float(np.sqrt(np.mean(found.fun[data] ** 2))), evaluations)
 
 

@@ -33,6 +33,7 @@ class Identification:
     """What came out.
 
     machine: with the identified constants and their uncertainty; estimates: of each constant that was fitted
+    misfits: signals that the machine does not follow even so, a sentence each
     unknown: what these recordings cannot determine, a sentence each; notes: what was found on the way
     gaps: of the machine on the runs to be judged on, or on all where there are none
     """
@@ -42,6 +43,11 @@ class Identification:
     unknown: tuple[str, ...]
     notes: tuple[str, ...]
     gaps: tuple[GapRow, ...]
+    misfits: tuple[str, ...]
+
+
+MISFIT_PART = 0.4
+"""A twin that misses this part of what a signal does is none: the signal has another sign or unit, or the machine is another."""
 
 
 def identify(case: Case, *, free_gains: bool = False, progress: Progress = lambda _: None) -> Identification:
@@ -72,8 +78,29 @@ def identify(case: Case, *, free_gains: bool = False, progress: Progress = lambd
     uncertainty = dict(machine.uncertainty) | {e.path: _relative(e) for e in of_constants}
     machine = machine.model_copy(update={"uncertainty": uncertainty})
     progress("checking")
-    gaps = gap_table(machine, case.of(role="check") or fits, case.repeats())
-    return Identification(machine, tuple(known), tuple(unknown), tuple(notes), gaps)
+    judged = case.of(role="check") or fits
+    gaps = gap_table(machine, judged, case.repeats())
+    return Identification(machine, tuple(known), tuple(unknown), tuple(notes), gaps, _misfits(judged, gaps))
+
+
+def _misfits(runs: tuple[Run, ...], gaps: tuple[GapRow, ...]) -> tuple[str, ...]:
+    """What the twin does not follow. A position is measured by its following error, anything else by itself."""
+    said = []
+    for run in runs:
+        for signal in dict.fromkeys(row.signal for row in gaps if row.run == run.name):
+            rows = [row for row in gaps if row.run == run.name and row.signal == signal]
+            samples = sum(row.samples for row in rows)
+            gap = float(np.sqrt(sum(row.gap**2 * row.samples for row in rows) / samples))
+            values = run.log[signal]
+            reference = run.log.columns.get(f"{signal.partition('_')[0]}_ref_mm") if signal.endswith("_mm") else None
+            does = values - np.nanmean(values) if reference is None else values - reference
+            size = float(np.sqrt(np.nanmean(does**2)))
+            if gap > MISFIT_PART * size and gap > 10.0 * max(row.expected for row in rows):
+                said.append(
+                    f"{run.name}: {signal} is missed by {gap:.3g} rms, {100 * gap / max(size, 1e-12):.0f} % of what it does; "
+                    "look at its sign and unit, and whether this is the machine that machine.toml describes"
+                )
+    return tuple(said)
 
 
 def _relative(estimate: Estimate) -> float:

@@ -97,6 +97,28 @@ def test_the_identified_machine_is_a_file_like_any_other(known_machine: Identifi
     assert known_machine.machine.uncertainty["axes.x.mass_kg"] < 0.01
 
 
+def test_a_sign_that_is_wrong_is_said_to_fit_nothing() -> None:
+    real = MACHINE.model_copy(update={"axes": {"x": MACHINE.axes["x"]}, "stock": None})
+    log = simulate(real, PROGRAM, seed=1).run
+    turned = RunLog(log.t_s, dict(log.columns) | {"x_torque_a": -log["x_torque_a"]}, log.text)
+    runs = tuple(RecordedRun(role, RunKind.AIR, role, turned) for role in ("fit", "check"))
+    found = identify(Case("turned", stated(mass=1.0, coulomb=1.0, viscous=1.0), runs))
+    assert any("x_torque_a is missed" in sentence for sentence in found.misfits), found.misfits
+    assert not found.machine.effects, "a velocity from the future is no finding"
+
+
+def test_a_known_machine_has_no_misfit(known_machine: Identification) -> None:
+    assert not known_machine.misfits
+
+
+@pytest.mark.parametrize("rows", [1, 3, 30])
+def test_a_run_too_short_to_say_anything_says_nothing(rows: int) -> None:
+    log = simulate(MACHINE.model_copy(update={"stock": None}), "G1 X1 F100\nM30\n", seed=1).run
+    short = RunLog(log.t_s[:rows], {name: values[:rows] for name, values in log.columns.items()}, {})
+    found = identify(Case("short", MACHINE, (RecordedRun("fit", RunKind.AIR, "fit", short),)))
+    assert not [e for e in found.estimates if e.path.startswith("axes")]
+
+
 def test_a_case_with_nothing_to_fit_is_refused() -> None:
     log = simulate(MACHINE.model_copy(update={"stock": None}), "G1 X1 F100\nM30\n", seed=1).run
     with pytest.raises(CaseError, match="no run of role fit"):
