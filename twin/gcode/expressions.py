@@ -239,7 +239,8 @@ class Reader:
 
     def primary(self) -> Expression:
         if self.at >= len(self.tokens):
-            raise RefusedError("", "the block ends inside an expression")
+            last = self.tokens[-1].text if self.tokens else ""
+            raise RefusedError(last, "the block ends inside an expression: a number, # variable, [ or function has to follow")
         token = self.tokens[self.at]
         if token.kind == NUMBER:
             self.at += 1

@@ -46,6 +46,12 @@ def number(text: str, word: str) -> float:
     return value
 
 
+def _around(written: str, place: int) -> str:
+    """What stands around a place, from space to space, as far as it helps."""
+    before = written[:place].rpartition(" ")[2][-16:]
+    return before + written[place:].partition(" ")[0][:16]
+
+
 def tokenise(line: str, written: str) -> list[Token]:
     """Tokens of `line`, which is `written` in capitals, without its comments.
 
@@ -72,5 +78,7 @@ def tokenise(line: str, written: str) -> list[Token]:
             if text[0] == "(" and text[-1] != ")":
                 raise RefusedError(text[:20], "this comment has no end; write )")
         else:
-            raise RefusedError(text, "this character has no meaning in a program; a comment stands in ( )")
+            around = _around(written, match.start(7))
+            o_for_0 = "; the letter O is no 0" if "O" in around.upper() else ""
+            raise RefusedError(around, f"the character {text} has no meaning there; a comment stands in ( ){o_for_0}")
     return tokens

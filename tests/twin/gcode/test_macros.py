@@ -215,7 +215,7 @@ def test_system_variables_show_the_control(before: str, expression: str, expecte
         ("#50=1", 1, "#50", "cannot be set"),
         ("#1=#3011", 1, "#3011", "Settings.variables"),
         ("#3000=12 (TOOL BROKEN)", 1, "#3000", "alarm 12"),
-        ("#1=[1+", 1, "", "ends inside"),
+        ("#1=[1+", 1, "+", "ends inside"),
         ("#1=[1 2]", 1, "2", "']'"),
         ("#1=1 #2=2", 1, "#", "block of its own"),
         ("IF[1EQ1]", 1, "IF", "GOTO or THEN"),
@@ -234,7 +234,7 @@ def test_system_variables_show_the_control(before: str, expression: str, expecte
         ("G0X1\nM99", 2, "", "no end"),
         ("M98P7\nM30\nO7\nM98P7\nM99", 4, "P7", "deeper"),
         ("X" + "[" * 40 + "1" + "]" * 40, 1, "[", "deeper"),
-        ("#<name>=1", 1, "<", "no meaning"),
+        ("#<name>=1", 1, "#<name>=1", "no meaning"),
     ],
 )
 def test_a_wrong_macro_is_named(text: str, line: int, word: str, reason: str) -> None:

@@ -204,7 +204,8 @@ def test_rotary_axes_follow_in_degrees_whatever_the_unit() -> None:
     ("text", "line", "word", "reason"),
     [
         ("G0 X1\nG1 X2", 2, "", "no feed"),
-        ("G1 X1 F10 Q\n", 1, "", "ends inside"),
+        ("G1 X1 F10 Q\n", 1, "Q", "ends inside"),
+        ("G1 X1O. F10\n", 1, "X1O.", "the letter O is no 0"),
         ("g0 x1 g77", 1, "g77", "not known"),
         ("G0 X1 X2", 1, "X2", "twice"),
         ("G0 A1", 1, "A1", "no axis A"),
