@@ -64,7 +64,6 @@ class Effect:
     states: name → its value at the start, a number or the name of a quantity
     shows_in: columns of the run log that show it, `{a}` for the axis letter, `{s}` for the signal that it is put on
     needs: quantities beyond the nominal ones that the machine must state (`screw_lead_mm`)
-    steps: of the mechanics between two ticks that it takes, so that halving the step moves nothing by 0.1 µm
     equation, reference: what it computes, and where that comes from
     """
 
@@ -78,7 +77,6 @@ class Effect:
     reference: str
     states: Mapping[str, float | str] = field(default_factory=dict)
     needs: tuple[str, ...] = ()
-    steps: int = 1
 
     def is_null(self, values: Mapping[str, float]) -> bool:
         """Whether these parameters make it nothing."""
