@@ -3,8 +3,8 @@
 import json
 import sys
 import time
-from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Literal
@@ -57,8 +57,7 @@ def simulate(program: Path, machine: Path, out: Path | None, *, seed: int | None
         raise UsageError(f"{machine}: {error}") from None
     check_suffix(out)
     text = read_text(program)
-    with _working("simulating") as say:
-        say("simulating")
+    with _working("simulating"):
         try:
             done = simulated(described, text, seed=seed, name=program.name)
         except ProgramError as error:
@@ -212,42 +211,22 @@ def _write(write: Callable[[], object], path: Path) -> None:
         raise UsageError(f"{path}: cannot be written: {error.strerror or error}") from None
 
 
-class _Said:
+@contextmanager
+def _working(first: str) -> Iterator[Callable[[str], None]]:
     """Says on stderr what is being done, where that is a terminal."""
-
-    def __init__(self, progress: Progress | None, first: str) -> None:
-        self._progress = progress
-        self._task = progress.add_task(first, total=None) if progress else None
-
-    def __call__(self, what: str) -> None:
-        if self._progress is not None and self._task is not None:
-            self._progress.update(self._task, description=what)
-
-
-class _Working(AbstractContextManager[_Said]):
-    def __init__(self, first: str) -> None:
-        console = Console(stderr=True)
-        columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-        self._first = first
-        self._progress = Progress(*columns, console=console, transient=True) if console.is_terminal else None
-        self._context: AbstractContextManager[object] = self._progress or nullcontext()
-
-    def __enter__(self) -> _Said:
-        self._context.__enter__()
-        return _Said(self._progress, self._first)
-
-    def __exit__(self, *error: object) -> None:
-        self._context.__exit__(*error)  # type: ignore[arg-type]
-
-
-def _working(first: str) -> _Working:
-    return _Working(first)
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield lambda _: None
+        return
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True) as progress:
+        task = progress.add_task(first, total=None)
+        yield lambda what: progress.update(task, description=what)
 
 
 def compare_methods(case: Path, seed: int, as_json: bool, console: Console) -> None:
     """The reference paper's genetic algorithm with its stated settings, beside least squares, on the same recordings."""
-    with _working("searching") as say:
-        say("searching with the genetic algorithm")
+    with _working("searching with the genetic algorithm"):
         found = paper.identify_paper(read_case(case), seed, clock=time.perf_counter)
     rows = [asdict(row) for row in found.rows]
     if as_json:

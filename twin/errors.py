@@ -5,6 +5,7 @@ TwinError
 ├── MachineError      a machine.toml that does not describe a machine
 ├── RunLogError       a recording that is not a run log
 ├── CaseError         a case folder that is not a case
+├── EngagementError   a path, tool, stock or limit with which the engagement cannot be computed
 └── EffectError       an effect that does not exist, or is given what it does not take
 """
 
@@ -23,6 +24,10 @@ class RunLogError(TwinError):
 
 class CaseError(TwinError):
     """A case folder that cannot be read."""
+
+
+class EngagementError(TwinError):
+    """A path, tool, stock or limit with which the engagement cannot be computed."""
 
 
 class EffectError(TwinError):

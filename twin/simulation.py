@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from twin.engagement import Workpiece, cut
 from twin.errors import MachineError
-from twin.gcode import Coolant, Settings, interpret
+from twin.gcode import Settings, interpret
 from twin.machine import MachineFile, Program
 from twin.motion.motion import ExecState, Motion
 from twin.motion.path import EventKind, Kind, Path, path_from_moves
@@ -72,9 +72,8 @@ def simulate(
     Raises ProgramError where a control would refuse the program, MachineError where the machine has not got its axes or the run
     would be longer than 8 million ticks, EffectError where its effects do not fit.
     """
-    moves = interpret(text, settings)
     notes: list[str] = []
-    path = path_from_moves(moves)
+    path = path_from_moves(interpret(text, settings))
     moving = [a for column, a in enumerate(path.axes) if np.any(path.start_mm[:, column] != path.end_mm[:, column])]
     missing = [a for a in moving if a not in machine.axes]
     if missing:
@@ -97,7 +96,7 @@ def simulate(
         axial_depth_mm=engaged["axial_depth_mm"],
         entry_angle_rad=engaged["entry_angle_rad"],
         exit_angle_rad=engaged["exit_angle_rad"],
-        coolant_on=_coolant(planned, moves, motion),
+        coolant_on=_coolant(planned, motion),
         ambient_temp_c=np.full(len(motion), ambient_temp_c),
         start_temp_c=start_temperature_c,
     )
@@ -161,7 +160,7 @@ def _engagement(machine: MachineFile, path: Path, motion: Motion, notes: list[st
     return {name: np.where(cutting, getattr(rows, name)[row], 0.0) for name in none}
 
 
-def _coolant(planned: Plan, moves: list[Any], motion: Motion) -> Floats:
+def _coolant(planned: Plan, motion: Motion) -> Floats:
     """1 while the coolant runs."""
     switches = [
         (start, event.value)
@@ -171,7 +170,6 @@ def _coolant(planned: Plan, moves: list[Any], motion: Motion) -> Floats:
     on = np.zeros(len(motion))
     for start, value in switches:
         on[motion.t_s >= start] = float(value > 0)
-    assert switches or not any(isinstance(move, Coolant) for move in moves), "coolant is an event of the path"
     return on
 
 

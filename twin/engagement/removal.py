@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from twin.engagement.engaged import Collision, Engagement
-from twin.engagement.errors import EngagementError
 from twin.engagement.sweep import Floats
 from twin.engagement.travel import (
     ARCS,
@@ -23,6 +22,7 @@ from twin.engagement.travel import (
     travel,
 )
 from twin.engagement.workpiece import CELLS_MAX, Workpiece
+from twin.errors import EngagementError
 from twin.machine import Stock
 
 ROWS_MAX = 20_000_000

@@ -8,8 +8,8 @@ import numpy as np
 
 from twin.compiling import kernel
 from twin.engagement.cells import NONE, Cells, height_at
-from twin.engagement.errors import EngagementError
 from twin.engagement.sweep import COLUMNS, Floats
+from twin.errors import EngagementError
 from twin.machine import Stock
 
 CELLS_MAX = 8_000_000
