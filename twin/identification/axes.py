@@ -15,13 +15,12 @@ from twin.identification.axis_parameters import (
     effects_of,
     identified_axis,
 )
+from twin.identification.cutting_fit import force_of
 from twin.identification.disturbance_fit import fit_disturbance
 from twin.identification.estimate import INTERVAL_Z, Estimate
 from twin.machine import AddedEffect, MachineFile
-from twin.process.milling import milling_force, tool_constants
-from twin.recorded import noise_of, told_of
+from twin.recorded import noise_of
 from twin.regimes import axis_regimes
-from twin.response import milling_of
 
 Floats = NDArray[np.float64]
 DELAY_GAIN_MIN = 0.05
@@ -95,12 +94,9 @@ def _recordings(
 
 def _force_on(machine: MachineFile, run: Run, letter: str) -> Floats | None:
     """The cutting force on an axis, by the coefficients identified before, as a force that resists motion in +."""
-    if letter not in ("x", "y") or machine.tool is None:
+    force = force_of(machine, run.log) if letter in ("x", "y") else None
+    if force is None:
         return None
-    milling = milling_of(told_of(run.log, machine))
-    if milling is None:
-        return None
-    force = milling_force(tool_constants(machine.tool), machine.tool.teeth, milling, period_s=machine.machine.servo_period_s)
     return -np.asarray((force.mean_force_x_n if letter == "x" else force.mean_force_y_n)[0])
 
 

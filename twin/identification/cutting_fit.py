@@ -14,8 +14,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from twin.identification.batch_fit import Fit, time_blocks
 from twin.identification.estimate import clustered_covariance
-from twin.machine import SpindleDrive, Tool
-from twin.process.milling import Milling, milling_force, tool_constants
+from twin.machine import MachineFile, SpindleDrive, Tool
+from twin.process.milling import Milling, MillingForce, milling_force, tool_constants
+from twin.recorded import told_of
+from twin.response import milling_of
+from twin.runlog import RunLog
 from twin.spindle.load import spindle_constants, spindle_load_pct
 
 Floats = NDArray[np.float64]
@@ -56,6 +59,14 @@ def fit_cutting(
     mean = np.array([stated, stated * tool.radial_ratio])
     prior = (mean, np.array([relative * mean[0], max(1.4 * relative * mean[1], 1e-3 * mean[0])]))
     return linear_fit(np.concatenate(rows), np.concatenate(measured), noise_n, prior, np.concatenate(blocks))
+
+
+def force_of(machine: MachineFile, log: RunLog) -> MillingForce | None:
+    """The cutting force of a recorded run by the machine's coefficients; None where nothing is cut."""
+    milling = milling_of(told_of(log, machine)) if machine.tool else None
+    if milling is None or machine.tool is None:
+        return None
+    return milling_force(tool_constants(machine.tool), machine.tool.teeth, milling, period_s=machine.machine.servo_period_s)
 
 
 def with_cutting(tool: Tool, fitted: Fit) -> Tool:

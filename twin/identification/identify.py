@@ -16,11 +16,10 @@ from twin.gap_table import GapRow, gap_table
 from twin.heat.run import Warming
 from twin.identification.axes import identified_axes
 from twin.identification.batch_fit import Fit
-from twin.identification.cutting_fit import fit_cutting, fit_spindle, with_cutting, with_spindle
+from twin.identification.cutting_fit import fit_cutting, fit_spindle, force_of, with_cutting, with_spindle
 from twin.identification.estimate import INTERVAL_Z, Estimate
 from twin.identification.thermal_fit import NAMES, WarmingRun, fit_thermal, with_thermal
 from twin.machine import MachineFile
-from twin.process.milling import milling_force, tool_constants
 from twin.recorded import noise_of, told_of
 from twin.response import milling_of
 
@@ -156,8 +155,9 @@ def _spindle(machine: MachineFile, runs: tuple[Run, ...], known: list[Estimate],
     for run in runs:
         if spindle is None or not run.log.axes() or not run.log.has("spindle_load_pct", "spindle_rpm"):
             continue
-        power = _power_w(machine, run)
-        cutting = cutting or bool(power.any())
+        force = force_of(machine, run.log)
+        power = np.zeros(len(run.log)) if force is None else force.cutting_power_w()[0]
+        cutting = cutting or force is not None
         series.append((run.log.t_s, power, np.nan_to_num(run.log["spindle_rpm"]), run.log["spindle_load_pct"]))
         noise = noise_of(machine, run.log, "spindle_load_pct")
     if spindle is None or not series:
@@ -181,15 +181,6 @@ def _spindle(machine: MachineFile, runs: tuple[Run, ...], known: list[Estimate],
     )
     unknown.append("spindle.rated_power_kw: load, efficiency and idle power know it up to one factor; it stays as stated")
     return machine.model_copy(update={"spindle": fitted})
-
-
-def _power_w(machine: MachineFile, run: Run) -> Floats:
-    """Cutting power of a run by the identified coefficients, W; 0 where nothing is cut."""
-    milling = milling_of(told_of(run.log, machine))
-    if milling is None or machine.tool is None:
-        return np.zeros(len(run.log))
-    force = milling_force(tool_constants(machine.tool), machine.tool.teeth, milling, period_s=machine.machine.servo_period_s)
-    return np.asarray(force.cutting_power_w()[0])
 
 
 def _heat(machine: MachineFile, runs: tuple[Run, ...], known: list[Estimate], unknown: list[str]) -> MachineFile:
