@@ -61,6 +61,27 @@ class Cell:
 
 
 @dataclass(frozen=True, slots=True)
+class Pattern:
+    """How the gap of a signal goes with something: `over` position, lead phase, spindle phase, time, section, or a contrast.
+
+    share: of the signal's gap energy that its means over the bins make up (of a contrast: that the difference makes up)
+    effect_size: largest departure of a bin from the signal's mean, over the floor; significance, discovered: as of a Cell
+    at, mean: the bins' middles and means of twin minus recording, in `at_unit` and the unit of the signal; empty for a contrast
+    """
+
+    signal: str
+    over: str
+    share: float
+    effect_size: float
+    significance: float
+    discovered: bool
+    sentence: str
+    at_unit: str = ""
+    at: tuple[float, ...] = ()
+    mean: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Interval:
     """A figure with its 90 % interval."""
 
@@ -146,6 +167,7 @@ class Diagnosis:
     sentence: str
     where: tuple[Cell, ...]
     where_after: tuple[Cell, ...]
+    patterns: tuple[Pattern, ...]
     causes: tuple[Cause, ...]
     gap: GapNumbers
     candidates: tuple[Candidate, ...]
