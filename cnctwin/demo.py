@@ -30,7 +30,7 @@ from sparkplug.errors import TopicError
 from sparkplug.host import EventKind, HostApplication, HostEvent
 from sparkplug.topics import check_id
 
-PROCESSORS = ("thermal", "cutting_force", "mirror")
+PROCESSORS = ("thermal", "cutting_force", "gap", "mirror")
 GROUP = "cnc"
 QUIET_S = 1.5
 SETTLE_S_MAX = 12.0
@@ -48,6 +48,10 @@ ambient_temp_c = 22.0
 [cutting_force]
 rated_power_kw = 11.0
 tool_diameter_mm = 12.0
+
+[gap.floors]
+spindle_temp_c = 0.3
+spindle_load_pct = 0.5
 """
 
 

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.case import Run
+from twin.gap.labels import regime_labels
 from twin.machine import MachineFile
 from twin.recorded import noise_of, told_of
-from twin.regimes import Regime, axis_regimes
 from twin.response import respond
 from twin.runlog import AXIS_COLUMN, RunLog
 
@@ -46,21 +46,15 @@ def measured_signals(log: RunLog) -> tuple[str, ...]:
     return tuple(name for name in names if log.has(name))
 
 
-def regimes_of(log: RunLog, signal: str) -> tuple[tuple[str, NDArray[np.bool_]], ...]:
-    """Regimes in which a signal is looked at, each with its samples (n,)."""
-    match = AXIS_COLUMN.match(signal)
-    cutting = np.nan_to_num(log.columns.get("axial_depth_mm", np.zeros(len(log)))) > 0.0
-    if match and f"{match[1]}_ref_mm" in log.columns:
-        regimes = axis_regimes(log.t_s, log[f"{match[1]}_ref_mm"])
-        return tuple((regime.title, regimes == regime) for regime in Regime)
-    if signal.startswith(("force", "spindle_load")):
-        return (("cutting", cutting), ("air", ~cutting))
-    return (("warm-up", np.ones(len(log), dtype=bool)),)
+def regimes_of(log: RunLog, signal: str, machine: MachineFile) -> tuple[tuple[str, NDArray[np.bool_]], ...]:
+    """Regimes in which a signal is looked at (`twin.gap.labels`), each with its samples (n,)."""
+    names, label = regime_labels(log, signal, machine)
+    return tuple((name, label == number) for number, name in enumerate(names))
 
 
 def gap_table(machine: MachineFile, runs: Iterable[Run], repeats: Iterable[tuple[Run, Run]]) -> tuple[GapRow, ...]:
     """The gap of `machine` on each run, by signal and regime; repeatability from the repeated runs, pooled over all of them."""
-    floors = _floors(repeats)
+    floors = _floors(machine, repeats)
     rows = []
     for run in runs:
         log = run.log
@@ -70,7 +64,7 @@ def gap_table(machine: MachineFile, runs: Iterable[Run], repeats: Iterable[tuple
             if signal not in response.columns or (recorded and signal in recorded):
                 continue
             error = response.columns[signal] - log[signal]
-            for regime, here in regimes_of(log, signal):
+            for regime, here in regimes_of(log, signal, machine):
                 there = here & np.isfinite(error)
                 if there.any():
                     gap = float(np.sqrt(np.mean(error[there] ** 2)))
@@ -80,7 +74,7 @@ def gap_table(machine: MachineFile, runs: Iterable[Run], repeats: Iterable[tuple
     return tuple(rows)
 
 
-def _floors(repeats: Iterable[tuple[Run, Run]]) -> dict[tuple[str, str], float]:
+def _floors(machine: MachineFile, repeats: Iterable[tuple[Run, Run]]) -> dict[tuple[str, str], float]:
     """(signal, regime) → repeatability."""
     squares: dict[tuple[str, str], list[Floats]] = {}
     for one, other in repeats:
@@ -90,7 +84,7 @@ def _floors(repeats: Iterable[tuple[Run, Run]]) -> dict[tuple[str, str], float]:
             if not other.log.has(signal):
                 continue
             difference = one.log[signal] - other.log[signal]
-            for regime, here in regimes_of(one.log, signal):
+            for regime, here in regimes_of(one.log, signal, machine):
                 kept = difference[here & np.isfinite(difference)]
                 if len(kept):
                     squares.setdefault((signal, regime), []).append(kept**2 / 2.0)

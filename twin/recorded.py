@@ -14,6 +14,8 @@ Floats = NDArray[np.float64]
 
 STILL_MIN = 20
 """Samples of standstill at the start of a run that are worth averaging."""
+SETTLED = 50
+"""Samples in which an axis that stands moves by less than its sensor sees."""
 
 
 def told_of(log: RunLog, machine: MachineFile) -> RunInput:
@@ -50,11 +52,14 @@ def told_of(log: RunLog, machine: MachineFile) -> RunInput:
 def start_of(log: RunLog, letter: str, axis: Axis, period_s: float) -> Mapping[str, float]:
     """The state of an axis at the first sample of a run."""
     has = f"{letter}_pos_mm" in log.columns and f"{letter}_torque_a" in log.columns
+    cutting = np.flatnonzero(np.nan_to_num(log.columns.get("axial_depth_mm", np.zeros(1))) > 0.0)
+    # a waiting axis is pushed as soon as another one cuts
+    pushed = int(cutting[0]) if len(cutting) and letter in "xy" and cutting[0] >= STILL_MIN else len(log)
     return start_state(
         axis,
-        log[f"{letter}_ref_mm"],
-        log[f"{letter}_pos_mm"] if has else log[f"{letter}_ref_mm"],
-        log[f"{letter}_torque_a"] if has else np.zeros(len(log)),
+        log[f"{letter}_ref_mm"][:pushed],
+        (log[f"{letter}_pos_mm"] if has else log[f"{letter}_ref_mm"])[:pushed],
+        log[f"{letter}_torque_a"][:pushed] if has else np.zeros(pushed),
         period_s,
     )
 
@@ -64,7 +69,7 @@ def start_state(axis: Axis, reference_mm: Floats, position_mm: Floats, torque_a:
     moving = np.flatnonzero(np.diff(reference_mm) != 0)
     still = int(moving[0]) if len(moving) else len(reference_mm)
     if still >= STILL_MIN or len(reference_mm) < 12:
-        position, velocity, step = float(np.nanmean(position_mm[: max(still, 1)])), 0.0, 0.0
+        position, velocity, step = _standing_mm(position_mm[: max(still, 1)]), 0.0, 0.0
         torque = float(np.nanmean(torque_a[: min(max(still, 1), 50)]))
     else:
         first = np.arange(12) * period_s
@@ -80,6 +85,13 @@ def start_state(axis: Axis, reference_mm: Floats, position_mm: Floats, torque_a:
         "previous_reference_mm": float(reference_mm[0]) - step,
         "previous_reference_velocity_mm_s": step / period_s,
     }
+
+
+def _standing_mm(position_mm: Floats) -> float:
+    """Where an axis stands whose reference stands: the mean, or that of the first samples where it gave way later on."""
+    first, whole = float(np.nanmean(position_mm[:SETTLED])), float(np.nanmean(position_mm))
+    certain = white_noise(position_mm) / np.sqrt(min(SETTLED, len(position_mm)))
+    return first if abs(first - whole) > 5.0 * certain > 0.0 else whole
 
 
 def start_temperature_c(t_s: Floats, temperature_c: Floats) -> float:

@@ -68,3 +68,22 @@ def axis_regimes(t_s: NDArray[np.float64], reference_mm: NDArray[np.float64]) ->
         regimes[start : turn + round(AFTER_REVERSAL_S / period_s)] = Regime.REVERSAL
     regimes[rest & (regimes != Regime.REVERSAL)] = Regime.REST
     return regimes
+
+
+REST_BEFORE_S = 0.1
+REST_AFTER_S = 0.2
+MOVING_MIN = 50
+"""Samples of motion below which there is nothing to look at."""
+
+
+def motion_stretches(t_s: NDArray[np.float64], reference_mm: NDArray[np.float64]) -> tuple[slice, ...]:
+    """The stretches of motion, each with a little of the rest before and after it; the whole where the axis never rests."""
+    still = np.concatenate([[True], np.diff(reference_mm) == 0])
+    moving = np.flatnonzero(~still)
+    if len(moving) < MOVING_MIN:
+        return ()
+    period_s = float(np.median(np.diff(t_s)))
+    before, after = round(REST_BEFORE_S / period_s), round(REST_AFTER_S / period_s)
+    breaks = np.flatnonzero(np.diff(moving) > before + after)
+    firsts, lasts = moving[np.concatenate([[0], breaks + 1])], moving[np.concatenate([breaks, [len(moving) - 1]])]
+    return tuple(slice(max(0, int(f) - before), int(last) + after) for f, last in zip(firsts, lasts, strict=True))

@@ -14,16 +14,19 @@ from twin.engagement import Workpiece, cut
 from twin.errors import MachineError
 from twin.gcode import Settings, interpret
 from twin.machine import MachineFile, Program
+from twin.motion.control import RAPID_MM_MIN, control_of, effects_tell
 from twin.motion.motion import ExecState, Motion
 from twin.motion.path import EventKind, Kind, Path, path_from_moves
-from twin.motion.plan import Plan, plan
+from twin.motion.plan import Plan
 from twin.response import Response, RunInput, respond
 from twin.runlog import RunLog, run_log
 
 Floats = NDArray[np.float64]
 
-IDEAL_TIMES = Program(rapid_mm_min=30000.0, acceleration_mm_s2=2500.0, jerk_mm_s3=60000.0, corner_speed_difference_mm_min=500.0)
-"""What a program is planned with where the machine states no [program]: a middling control."""
+IDEAL_TIMES = Program(
+    rapid_mm_min=RAPID_MM_MIN, acceleration_mm_s2=2500.0, jerk_mm_s3=60000.0, corner_speed_difference_mm_min=500.0
+)
+"""What a program is planned with where neither [program] nor an effect of the machine tells of its control: a middling one."""
 RESOLUTION_MM = 0.25
 ROWS_MAX = 2_000_000
 TICKS_MAX = 8_000_000
@@ -79,9 +82,7 @@ def simulate(
     if missing:
         follow = "follow their references" if len(missing) > 1 else "follows its reference"
         notes.append(f"no [axes.{missing[0]}]: {' and '.join(missing)} {follow} without error in this run")
-    if machine.program is None:
-        notes.append("no [program]: 30 m/min, 2.5 m/s², 60 m/s³ and corners of 500 mm/min were taken for the control")
-    planned = plan(path, machine.program or IDEAL_TIMES)
+    planned = _planned(machine, path, notes)
     period_s = machine.machine.servo_period_s
     if planned.total_s / period_s > TICKS_MAX:
         raise MachineError(f"{name} takes {planned.total_s:.0f} s, more than {TICKS_MAX} ticks of {period_s} s; split it")
@@ -103,6 +104,15 @@ def simulate(
     response = respond(machine, told, seed=seed)
     notes += _saturated(machine, response)
     return Simulation(_log(motion, told, response, path, name), response, planned, tuple(notes))
+
+
+def _planned(machine: MachineFile, path: Path, notes: list[str]) -> Plan:
+    """The plan of the control that the machine states, as its effects change it."""
+    if machine.program is None and not effects_tell(machine):
+        notes.append("no [program]: 30 m/min, 2.5 m/s², 60 m/s³ and corners of 500 mm/min were taken for the control")
+    elif machine.program is None:
+        notes.append("no [program]: rapids at 30 m/min, length over feed, and what the effects of the machine add to it")
+    return control_of(machine, IDEAL_TIMES).plan(path)
 
 
 def _saturated(machine: MachineFile, response: Response) -> list[str]:

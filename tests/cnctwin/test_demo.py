@@ -28,7 +28,7 @@ pytestmark = [pytest.mark.broker, pytest.mark.usefixtures("mosquitto_program")]
 OWN = ["--recording", str(SPARE_PART), "--devices", str(DEVICES)]
 LINES_OF_OUR_RECORDING = len(SPARE_PART.read_text(encoding="utf-8").splitlines())
 SECONDS = 13.0  # enough for it at fifteen times its pace, with time to start
-STAGES = ["edge-vmc", "twin-cutting_force", "twin-mirror", "twin-thermal"]
+STAGES = ["edge-vmc", "twin-cutting_force", "twin-gap", "twin-mirror", "twin-thermal"]
 PARTS = ["edge", "mosquitto", "process", "simulate-control"]
 
 

@@ -15,7 +15,7 @@ from twin.identification.axis_parameters import AxisParameter, constants_at, eff
 from twin.identification.batch_fit import Fit, fit, time_blocks
 from twin.machine import Axis
 from twin.recorded import start_state
-from twin.regimes import axis_regimes
+from twin.regimes import axis_regimes, motion_stretches
 from twin.servo.constants import axis_constants
 from twin.servo.run import AxisInput, AxisRun, run_axes
 
@@ -53,12 +53,6 @@ class AxisRecording:
         return axis_regimes(self.t_s, self.reference_mm)
 
 
-REST_BEFORE_S = 0.1
-REST_AFTER_S = 0.2
-MOVING_MIN = 50
-"""Samples of motion below which there is nothing to fit."""
-
-
 def stretches(recording: AxisRecording) -> tuple[AxisRecording, ...]:
     """The stretches of motion, each with a little of the rest before and after it; the whole where the axis never rests.
 
@@ -66,18 +60,7 @@ def stretches(recording: AxisRecording) -> tuple[AxisRecording, ...]:
     after a long rest is chance. Fitted through, that chance would be taken for friction; each stretch therefore starts from the
     torque that was measured (multiple shooting: Bock 1981; for servo axes, Janot, Gautier, Brunot 2019 start each lap anew).
     """
-    still = np.concatenate([[True], np.diff(recording.reference_mm) == 0])
-    if len(still) < MOVING_MIN:
-        return ()
-    period_s = float(np.median(np.diff(recording.t_s)))
-    before, after = round(REST_BEFORE_S / period_s), round(REST_AFTER_S / period_s)
-    moving = np.flatnonzero(~still)
-    if len(moving) < MOVING_MIN:
-        return ()
-    breaks = np.flatnonzero(np.diff(moving) > before + after)
-    firsts, lasts = moving[np.concatenate([[0], breaks + 1])], moving[np.concatenate([breaks, [len(moving) - 1]])]
-    cuts = [slice(max(0, first - before), last + after) for first, last in zip(firsts, lasts, strict=True)]
-    return tuple(recording.cut(where) for where in cuts)
+    return tuple(recording.cut(where) for where in motion_stretches(recording.t_s, recording.reference_mm))
 
 
 def start_of(recording: AxisRecording, axis: Axis, period_s: float) -> Mapping[str, float]:

@@ -196,10 +196,20 @@ def _tools(plan: "Plan", t: Floats) -> tuple[Ints, NDArray[np.bool_]]:
     return number, changing
 
 
+def _with_waits(plan: "Plan") -> Floats:
+    """When the block of each segment (n,) begins: with its wait for the spindle, after all that happens before."""
+    begun, wait = plan.start_s.copy(), plan.stretches.wait_s
+    at = plan.stretches.first[:-1][wait > 0.0]
+    event = np.searchsorted([event.segment for event in plan.path.events], at, side="right") - 1
+    ended = plan.event_start_s[event] + plan.event_duration_s[event]
+    begun[at] = np.maximum(begun[at] - wait[wait > 0.0], ended)
+    return begun
+
+
 def _lines(plan: "Plan", t: Floats, segment: Ints) -> Ints:
-    """The source line (n,) of what happens at each time: of the latest event or segment begun."""
+    """The source line (n,) of what happens at each time: of the latest event or segment begun, waits included."""
     path = plan.path
-    begun = np.concatenate([plan.start_s, plan.event_start_s])
+    begun = np.concatenate([_with_waits(plan), plan.event_start_s])
     line = np.concatenate([path.line, np.array([event.line for event in path.events], dtype=np.int64)])
     rank = np.concatenate([np.arange(len(path)) * 2.0 + 1.0, np.array([event.segment * 2.0 for event in path.events])])
     if not len(begun):

@@ -73,13 +73,11 @@ class Plan:
 
     def seconds_by_line(self) -> Floats:
         """Seconds (highest line + 1,) spent on each source line: its segments, waits and events. Their sum is total_s."""
-        lines = [*self.path.line, *(event.line for event in self.path.events)]
-        seconds = np.zeros(max(lines, default=-1) + 1)
-        np.add.at(seconds, self.path.line, self.duration_s)
-        np.add.at(seconds, self.path.line[self.stretches.first[:-1]], self.stretches.wait_s)
-        np.add.at(seconds, self.path.line[self.stretches.first[1:] - 1], self.stretches.halt_s)
-        np.add.at(seconds, np.array([event.line for event in self.path.events], dtype=np.int64), self.event_duration_s)
-        return seconds
+        line, first = self.path.line, self.stretches.first
+        events = np.array([event.line for event in self.path.events], dtype=np.int64)
+        lines = np.concatenate([line, line[first[:-1]], line[first[1:] - 1], events])
+        each = np.concatenate([self.duration_s, self.stretches.wait_s, self.stretches.halt_s, self.event_duration_s])
+        return np.asarray(np.bincount(lines, each), dtype=np.float64)
 
 
 def plan(path: Path, times: Program | Limits, feed_override: Override = 1.0, rapid_override: Override = 1.0) -> Plan:

@@ -10,12 +10,32 @@ from tests.twin.axes import constants, reference, with_effect
 from twin.effects.catalogue import catalogue, effect_named
 from twin.effects.effect import Effect, On
 from twin.errors import EffectError
+from twin.gcode import interpret
+from twin.machine import Program
+from twin.motion.control import LENGTH_OVER_FEED, QUANTITIES, changed
+from twin.motion.limits import Limits
+from twin.motion.path import path_from_moves
+from twin.motion.plan import Plan
 from twin.servo.kernel import axis_quantities
 from twin.servo.run import AxisInput, AxisRun, run_axes
+from twin.sites import Site
 
 EFFECTS = list(catalogue().values())
 ON_AXES = [effect for effect in EFFECTS if set(effect.changes) & set(axis_quantities())]
+ON_PROGRAMS = [effect for effect in EFFECTS if set(effect.changes) & set(QUANTITIES)]
 REFERENCE = reference(1500)
+PATH = path_from_moves(
+    interpret(
+        "T1 M6\nS6000 M3\nG0 X20 Y5\nG1 Z-1 F3000\n"
+        + "\n".join(f"G1 X{20 + k} Y{5 + k % 2}" for k in range(1, 20))
+        + "\n"
+        + "\n".join(f"G1 X{39 + 0.2 * k:.1f}" for k in range(1, 51))
+        + "\nG2 X59 Y16 I5 J5 F2000\nG1 X200 F6000\nG0 Z20\nT2 M6\nG0 X0\nM30\n"
+    )
+)
+STATED = Limits.of(
+    Program(rapid_mm_min=30000.0, acceleration_mm_s2=4000.0, jerk_mm_s3=90000.0, corner_speed_difference_mm_min=900.0)
+)
 OUTPUTS = ("position_mm", "torque_a", "table_mm")
 
 
@@ -30,6 +50,24 @@ def run_with(values: dict[str, dict[str, float]]) -> AxisRun:
 def difference(one: AxisRun, other: AxisRun) -> float:
     """The largest over all outputs."""
     return max(float(np.abs(one.outputs[name] - other.outputs[name]).max()) for name in OUTPUTS)
+
+
+def plan_with(values: dict[str, dict[str, float]], limits: Limits) -> Plan:
+    """The plan of a program with corners, arcs, rapids and tool changes, on a control with these effects."""
+    return changed(limits, values).plan(PATH)
+
+
+def seconds_between(one: Plan, other: Plan) -> float:
+    return float(np.abs(one.seconds_by_line() - other.seconds_by_line()).max())
+
+
+def between(effect: Effect, part: float) -> dict[str, float]:
+    """Parameters `part` of the way from null to typical."""
+    values = effect.typical_values()
+    for p in effect.parameters:
+        if p.null is not None:
+            values[p.name] = p.typical / part if math.isinf(p.null) else p.null + part * (p.typical - p.null)
+    return {p.name: min(max(values[p.name], p.low), p.high) for p in effect.parameters}
 
 
 def named(effect: Effect) -> str:
@@ -78,16 +116,49 @@ def test_at_a_typical_value_it_shows(effect: Effect) -> None:
 
 @pytest.mark.parametrize("effect", ON_AXES, ids=named)
 def test_it_is_continuous_at_its_null_value(effect: Effect) -> None:
-    def at(part: float) -> dict[str, float]:
-        values = effect.typical_values()
-        for p in effect.parameters:
-            if p.null is not None:
-                values[p.name] = p.typical / part if math.isinf(p.null) else p.null + part * (p.typical - p.null)
-        return {p.name: min(max(values[p.name], p.low), p.high) for p in effect.parameters}
-
     bare = run_with({})
-    sizes = [difference(bare, run_with({effect.name: at(part)})) for part in (1.0, 0.1, 0.01)]
+    sizes = [difference(bare, run_with({effect.name: between(effect, part)})) for part in (1.0, 0.1, 0.01)]
     assert sizes[2] < 0.35 * sizes[0] + 1e-6, sizes
+
+
+@pytest.mark.parametrize("limits", [LENGTH_OVER_FEED, STATED], ids=["length over feed", "a stated control"])
+@pytest.mark.parametrize("effect", ON_PROGRAMS, ids=named)
+def test_at_its_null_value_a_program_is_planned_as_without_it_bit_for_bit(effect: Effect, limits: Limits) -> None:
+    bare, null = plan_with({}, limits), plan_with({effect.name: effect.null_values()}, limits)
+    assert bare.total_s == null.total_s
+    for one, other in ((bare.start_s, null.start_s), (bare.peak_mm_s, null.peak_mm_s), (bare.event_start_s, null.event_start_s)):
+        np.testing.assert_array_equal(one, other)
+    np.testing.assert_array_equal(bare.sample(0.01).spindle_rpm, null.sample(0.01).spindle_rpm)
+
+
+@pytest.mark.parametrize("limits", [LENGTH_OVER_FEED, STATED], ids=["length over feed", "a stated control"])
+@pytest.mark.parametrize("effect", ON_PROGRAMS, ids=named)
+def test_at_a_typical_value_a_program_takes_another_time_and_at_its_null_value_continuously_none(
+    effect: Effect, limits: Limits
+) -> None:
+    bare = plan_with({}, limits)
+    parts = [plan_with({effect.name: between(effect, part)}, limits) for part in (1.0, 0.1, 0.01)]
+    sizes = [seconds_between(bare, one) for one in parts]
+    assert sizes[0] > 0.005
+    assert sizes[2] < 0.35 * sizes[0] + 1e-6, sizes
+
+
+def test_effects_on_programs_compose_without_knowing_of_each_other() -> None:
+    typical = {effect.name: effect.typical_values() for effect in ON_PROGRAMS}
+    together = plan_with(typical, LENGTH_OVER_FEED)
+    for effect in ON_PROGRAMS:
+        without = plan_with({name: values for name, values in typical.items() if name != effect.name}, LENGTH_OVER_FEED)
+        nulled = plan_with(typical | {effect.name: effect.null_values()}, LENGTH_OVER_FEED)
+        assert seconds_between(without, nulled) == 0.0, f"{effect.name} is not nothing beside the others"
+        assert seconds_between(together, nulled) > 0.0
+
+
+def test_no_effect_acts_on_programs_and_on_something_else() -> None:
+    for effect in ON_PROGRAMS:
+        assert effect.site is Site.PROGRAM
+        assert set(effect.changes) <= set(QUANTITIES)
+        assert effect not in ON_AXES
+    assert {effect.name for effect in EFFECTS if effect.site is Site.PROGRAM} == {effect.name for effect in ON_PROGRAMS}
 
 
 def test_effects_compose_without_knowing_of_each_other() -> None:

@@ -1,0 +1,67 @@
+"""The answer to a question: the effects of its machine, their parameters, and their sizes over the floor."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from cnctwin.blind_check.question import Sort
+
+
+@dataclass(frozen=True, slots=True)
+class Answered:
+    """An effect. stated: its parameters under the catalogue's names; exact: those that mean there what they mean here."""
+
+    effect: str
+    on: str
+    named: bool
+    stated: Mapping[str, float]
+    exact: tuple[str, ...]
+    size_over_floor: Mapping[str, float]
+
+    @property
+    def size(self) -> float:
+        """Of its largest signal."""
+        return max(self.size_over_floor.values(), default=0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """All effects of a machine; size_over_floor: of all of them together."""
+
+    name: str
+    sort: Sort
+    effects: tuple[Answered, ...]
+    size_over_floor: Mapping[str, float]
+
+    @property
+    def size(self) -> float:
+        """Of the largest signal of the smallest effect: what has to be seen for a right answer; 0 where it is healthy."""
+        return min((effect.size for effect in self.effects), default=0.0)
+
+
+def answers_json(answers: Sequence[Answer]) -> str:
+    """All answers by the name of their case; the same text for the same answers."""
+    table = {answer.name: {key: value for key, value in _plain(asdict(answer)).items() if key != "name"} for answer in answers}
+    return json.dumps(table, indent=1, sort_keys=True) + "\n"
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {str(key): _plain(v) for key, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(v) for v in value]
+    return float(f"{value:.9g}") if isinstance(value, float) else value
+
+
+def answers_from_json(text: str) -> tuple[Answer, ...]:
+    """Back again."""
+    return tuple(
+        Answer(
+            name,
+            Sort(entry["sort"]),
+            tuple(Answered(**{**effect, "exact": tuple(effect["exact"])}) for effect in entry["effects"]),
+            entry["size_over_floor"],
+        )
+        for name, entry in json.loads(text).items()
+    )

@@ -1,0 +1,137 @@
+"""A question of the blind check: which runs of a reference machine, and which effects it has. Drawn by seed."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from cnctwin.reference_machine.effect import Effect
+from cnctwin.reference_machine.named_effects import NAMED
+from cnctwin.reference_machine.unnamed_effects import UNNAMED
+
+Chance = np.random.Generator
+SIZES = (0.7, 30.0)
+"""Smallest and largest size of an effect over the floor; drawn evenly over its logarithm."""
+KINDS = ("air", "cut", "warmup")
+
+
+class Sort(StrEnum):
+    """How many effects a machine has, and whether they are in the catalogue."""
+
+    SINGLE = "single"
+    PAIR = "pair"
+    TRIPLE = "triple"
+    HEALTHY = "healthy"
+    OUTSIDE = "outside"
+
+
+SHARES = {Sort.SINGLE: 0.35, Sort.PAIR: 0.2, Sort.TRIPLE: 0.05, Sort.HEALTHY: 0.2, Sort.OUTSIDE: 0.2}
+COUNT = {Sort.SINGLE: 1, Sort.PAIR: 2, Sort.TRIPLE: 3, Sort.HEALTHY: 0, Sort.OUTSIDE: 1}
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """An effect by name, what it is on, and how large its largest signal shall be over the floor."""
+
+    effect: str
+    on: str
+    target: float
+    named: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Question:
+    """seed: of machine, programs, chances; kinds: of runs; warm: the spindle turns in air, its temperature is recorded."""
+
+    name: str
+    sort: Sort
+    seed: int
+    kinds: tuple[str, ...]
+    asked: tuple[Asked, ...]
+    warm: bool = False
+
+
+def effect_on(asked: Asked) -> Effect:
+    """The effect of the reference machine that is asked for."""
+    table = NAMED if asked.named else UNNAMED
+    found: list[Effect] = [effect for effect in table if effect.name == asked.effect and asked.on in effect.places]
+    assert found, f"there is no {asked.effect} on {asked.on!r}"
+    return found[0]
+
+
+def names(*, named: bool) -> tuple[str, ...]:
+    """The effects there are, each once."""
+    return tuple(dict.fromkeys(effect.name for effect in (NAMED if named else UNNAMED)))
+
+
+def draw(count: int, seed: int, sort: Sort | None = None, effect: str | None = None) -> tuple[Question, ...]:
+    """`count` questions in the shares of the protocol, each effect as often as any; of one sort, with one effect, where given."""
+    chance = np.random.default_rng([seed, 77])
+    sorts = [sort] * count if sort else _sorts(count, chance)
+    turn = {True: _endless(names(named=True), chance), False: _endless(names(named=False), chance)}
+    questions = []
+    for number, one in enumerate(sorts):
+        first = effect or (next_of(turn[one is not Sort.OUTSIDE]) if COUNT[one] else None)
+        questions.append(_question(f"case_{number + 1:03d}", one, int(chance.integers(2**31)), first))
+    return tuple(questions)
+
+
+def _sorts(count: int, chance: Chance) -> list[Sort]:
+    """Shares as exactly as whole numbers allow, in a drawn order."""
+    edges = np.round(np.cumsum(list(SHARES.values())) * count).astype(int)
+    numbers = np.diff(edges, prepend=0)
+    whole = [sort for sort, number in zip(SHARES, numbers, strict=True) for _ in range(number)]
+    return [whole[i] for i in chance.permutation(len(whole))]
+
+
+@dataclass(slots=True)
+class _Turn:
+    """Deals each name once before any comes again."""
+
+    names: Sequence[str]
+    chance: Chance
+    left: list[str]
+
+
+def _endless(all_names: Sequence[str], chance: Chance) -> _Turn:
+    return _Turn(all_names, chance, [])
+
+
+def next_of(turn: _Turn) -> str:
+    """The next name."""
+    if not turn.left:
+        turn.left = [turn.names[i] for i in turn.chance.permutation(len(turn.names))]
+    return turn.left.pop()
+
+
+def _question(name: str, sort: Sort, seed: int, first: str | None) -> Question:
+    chance = np.random.default_rng([seed, 1])
+    named = sort is not Sort.OUTSIDE
+    table = NAMED if named else UNNAMED
+    if first is None:
+        healthy = KINDS if chance.random() < 0.25 else (str(chance.choice(KINDS)),)
+        return Question(name, sort, seed, healthy, (), warm="air" in healthy and chance.random() < 0.2)
+    chosen = _one_of([effect for effect in table if effect.name == first], chance)
+    kinds = {str(chance.choice(chosen.kinds))} | {kind for kind in KINDS if chance.random() < 0.15}
+    warm = chosen.warm or ("air" in kinds and chance.random() < 0.15)
+    asked = [_asked(chosen, kinds, chance, named)]
+    while len(asked) < COUNT[sort]:
+        other = _one_of([e for e in table if set(e.kinds) & kinds and (warm or not e.warm)], chance)
+        new = _asked(other, kinds, chance, named)
+        if all((new.effect, new.on) != (old.effect, old.on) for old in asked):
+            asked.append(new)
+    return Question(name, sort, seed, tuple(kind for kind in KINDS if kind in kinds), tuple(asked), warm)
+
+
+def _one_of(effects: Sequence[Effect], chance: Chance) -> Effect:
+    """An effect by its name, then one of those that bear it, so that a sensor's do not outnumber the others."""
+    name = str(chance.choice(list(dict.fromkeys(effect.name for effect in effects))))
+    bearing = [effect for effect in effects if effect.name == name]
+    return bearing[int(chance.integers(len(bearing)))]
+
+
+def _asked(effect: Effect, kinds: set[str], chance: Chance, named: bool) -> Asked:
+    places = [on for on in effect.places if not (on == "z" and "air" not in kinds)]
+    target = float(np.exp(chance.uniform(*np.log(SIZES))))
+    return Asked(effect.name, str(chance.choice(places)), target, named)

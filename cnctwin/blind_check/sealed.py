@@ -1,0 +1,51 @@
+"""Seals answers before they are asked for: a salted SHA-256 that is shown first, and opened with salt and answers afterwards."""
+
+import hashlib
+import hmac
+import secrets
+from dataclasses import dataclass
+
+from cnctwin.errors import ProgramError
+
+
+class SealError(ProgramError):
+    """Answers that are not the ones which were sealed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Seal:
+    """What is shown before: SHA-256 of salt and text, in hexadecimal."""
+
+    digest: str
+
+
+@dataclass(frozen=True, slots=True)
+class Sealed:
+    """What is kept until the seal is opened."""
+
+    seal: Seal
+    salt: str
+    text: str
+
+
+def seal(text: str, salt: str | None = None) -> Sealed:
+    """Seals `text` with a salt of 32 bytes, drawn where none is given.
+
+    >>> seal("answers", salt="00").seal.digest[:16]
+    'd9b02dd900bae2be'
+    """
+    drawn = secrets.token_hex(32) if salt is None else salt
+    return Sealed(Seal(_digest(text, drawn)), drawn, text)
+
+
+def opened(shown: Seal, salt: str, text: str) -> str:
+    """The text, where it is the one that was sealed. Raises SealError where it is not."""
+    if not hmac.compare_digest(shown.digest, _digest(text, salt)):
+        raise SealError(
+            f"the answers are not those that were sealed as {shown.digest[:16]}…; they were changed, or belong to another check"
+        )
+    return text
+
+
+def _digest(text: str, salt: str) -> str:
+    return hashlib.sha256(f"{salt}\n{text}".encode()).hexdigest()

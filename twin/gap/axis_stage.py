@@ -1,0 +1,316 @@
+"""An axis: its loops and mechanics from the reference on, beside the recorded position, table and torque.
+
+The axis is simulated stretch by stretch (`twin.regimes.motion_stretches`), each from the torque that was measured before it, as the
+mean over a few courses of the disturbance that the machine has. What the table does is compared against the motor's position, so
+that where the axis came to rest is not counted twice.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.case import Run
+from twin.effects.catalogue import catalogue, effect_named
+from twin.effects.effect import Effect, On
+from twin.gap.diagnosis import Effected
+from twin.gap.floors import Floors
+from twin.gap.free import Free, constant
+from twin.gap.observed_through import Sensing, seen_earlier
+from twin.gap.stage import Model, Observed, observed_of
+from twin.identification.axis_parameters import AxisParameter, constants_at
+from twin.identification.batch_fit import time_blocks
+from twin.machine import Axis, MachineFile
+from twin.recorded import start_state
+from twin.regimes import motion_stretches
+from twin.runlog import RunLog
+from twin.servo.constants import axis_constants, effect_constants
+from twin.servo.disturbance import Disturbance
+from twin.servo.kernel import axis_quantities
+from twin.servo.run import AxisInput, run_axes
+
+Floats = NDArray[np.float64]
+BLOCK_S = 0.5
+COURSES = 2
+"""Pairs of courses, each with its opposite."""
+LANES = 32
+OUTPUTS = {"pos_mm": "position_mm", "torque_a": "torque_a", "table_mm": "table_mm"}
+FACTORS = ("mass_kg", "newton_per_command", "coulomb_n", "static_n", "stribeck_velocity_mm_s", "viscous_n_s_per_mm")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AxisRunData:
+    """An axis in one run, or in the mean of repeated ones; (n,) each, as `twin.runlog` has them.
+
+    disturbance_n: known force that resists motion in +, or None; measured: output → values; count: of the runs averaged
+    """
+
+    name: str
+    t_s: Floats
+    reference_mm: Floats
+    measured: Mapping[str, Floats]
+    floor: Mapping[str, Floats]
+    disturbance_n: Floats | None
+    count: int
+    fitted: bool
+
+    def stretches(self) -> tuple[slice, ...]:
+        """Of motion."""
+        return motion_stretches(self.t_s, self.reference_mm)
+
+
+def axis_effects() -> tuple[Effect, ...]:
+    """The effects that are woven into the loops and mechanics of an axis."""
+    return tuple(e for e in catalogue().values() if e.on is On.AXIS and set(e.changes) & set(axis_quantities()))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AxisStage:
+    """One axis of a case."""
+
+    letter: str
+    axis: Axis
+    period_s: float
+    runs: tuple[AxisRunData, ...]
+    constants: tuple[Free, ...]
+    disturbance: Disturbance | None
+    left_out: frozenset[str] = frozenset()
+    standing: tuple[tuple[str, Mapping[str, float]], ...] = ()
+    pairs: int = COURSES
+    observed: tuple[Observed, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "observed", tuple(self._observed(run) for run in self.runs))
+
+    @property
+    def name(self) -> str:
+        """What to call it."""
+        return f"axis {self.letter}"
+
+    @property
+    def averaged(self) -> int:
+        """A loop does little within 4 ms."""
+        return 4
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Columns of the run log that are compared, without the letter."""
+        return tuple(name for name in OUTPUTS if name in self.runs[0].measured)
+
+    @property
+    def candidates(self) -> tuple[Effected, ...]:
+        """Effects of the axis that its signals can show, sensors and clock included."""
+        found = []
+        for effect in catalogue().values():
+            if effect.name in self.left_out or any(effect.name == name for name, _ in self.standing):
+                continue
+            if effect.on is On.AXIS and "temperature_rise_k" not in effect.needs:
+                shown = any(s.replace("{a}", self.letter) == f"{self.letter}_{o}" for s in effect.shows_in for o in self.outputs)
+                known = "screw_lead_mm" not in effect.needs or self.axis.screw_lead_mm is not None
+                found += [Effected(effect.name, self.letter)] if shown and known else []
+            elif effect.on is On.SIGNAL:
+                found += [Effected(effect.name, f"{self.letter}_{output}") for output in self.outputs]
+            elif effect.name == "clock_drift":
+                found.append(Effected(effect.name))
+        return tuple(found)
+
+    def first_guesses(self, candidate: Effected) -> tuple[dict[str, float], ...]:
+        """A limit shows as the largest torque there was."""
+        if candidate.effect == "torque_limit" and "torque_a" in self.outputs:
+            largest = max(float(np.nanmax(np.abs(run.measured["torque_a"]))) for run in self.runs if run.fitted)
+            return tuple({"limit_a": f * largest} for f in (1.0, 0.97, 0.9))
+        return ()
+
+    def _observed(self, run: AxisRunData) -> Observed:
+        parts = []
+        where = np.concatenate([np.arange(len(run.t_s))[s] for s in run.stretches()] or [np.array([], dtype=np.intp)])
+        blocks = time_blocks(run.t_s, BLOCK_S)[where]
+        for output in self.outputs:
+            measured, floor = run.measured[output], run.floor[output]
+            if output == "table_mm" and "pos_mm" in run.measured:
+                measured = measured - run.measured["pos_mm"]
+                noise = np.sqrt(np.min(floor) ** 2 + np.min(run.floor["pos_mm"]) ** 2)
+                floor = np.full(len(floor), noise)
+            known = measured[where]
+            # what is known exactly would decide everything: no sample counts for more than the median one does by four times
+            sigma = floor[where] / np.sqrt(run.count)
+            parts.append((f"{self.letter}_{output}", known, floor[where], sigma, blocks))
+        return observed_of(run.name, parts, run.fitted)
+
+    def predict(self, model: Model, theta: Floats, run: int) -> Floats:
+        """What the axis shows at each row of θ, (lanes, n)."""
+        data = self.runs[run]
+        outputs = self.simulate(model, theta, data)
+        values = model.values(theta)
+        shown = []
+        for output in self.outputs:
+            sensing = Sensing.of(values, f"{self.letter}_{output}")
+            modelled = sensing.readings(outputs[output], self.period_s)
+            shown.append(modelled)
+        at = {output: i for i, output in enumerate(self.outputs)}
+        if "table_mm" in at and "pos_mm" in at:
+            shown[at["table_mm"]] = shown[at["table_mm"]] - shown[at["pos_mm"]]
+        return np.concatenate(shown, axis=1)
+
+    def simulate(self, model: Model, theta: Floats, data: AxisRunData) -> dict[str, Floats]:
+        """The outputs over the stretches one after another, each (lanes, n): what is, before sensors, on the recording's clock."""
+        lanes = len(theta)
+        values = model.values(theta)
+        constants = self._constants(model, theta)
+        courses = self._courses(len(data.t_s))
+        parts: dict[str, list[Floats]] = {output: [] for output in self.outputs}
+        carried: dict[str, Floats] = {}
+        for stretch in data.stretches():
+            start = self._start(values, constants, data, stretch, lanes) | carried
+            reference = _late(data.reference_mm[stretch], data, values, self.letter, lanes)
+            run, many = self._run(constants, reference, data, courses, stretch, start)
+            for output in self.outputs:
+                whole = run.outputs[OUTPUTS[output]]
+                mean = whole.reshape(-1, many, whole.shape[1]).mean(axis=1)[:lanes]
+                parts[output].append(seen_earlier(mean, data.t_s[stretch], values))
+            carried = {k: v.reshape(-1, many)[:lanes, 0] for k, v in run.state.items() if k.startswith("backlash__")}
+        return {output: np.concatenate(p, axis=1) for output, p in parts.items()}
+
+    def _run(self, constants, reference, data, courses, stretch, start):  # type: ignore[no-untyped-def]
+        lanes = len(next(iter(constants.values())))
+        many = len(courses)
+        ticks = len(data.t_s[stretch])
+        fill = -(-lanes * many // LANES) * LANES
+        index = np.minimum(np.arange(fill) // many, lanes - 1)
+        known = np.zeros(ticks) if data.disturbance_n is None else data.disturbance_n[stretch]
+        force = known[None, :] + courses[:, stretch]
+        own = reference.ndim == 2
+        if own:  # each lane sees a reference of its own
+            columns = np.repeat(reference, many, axis=0)
+            force = np.tile(force, (lanes, 1))
+            column = np.minimum(np.arange(fill), lanes * many - 1)
+        else:
+            columns = np.broadcast_to(reference, (many, ticks))
+            column = np.arange(fill) % many
+        run = run_axes(
+            {name: value[index] for name, value in constants.items()},
+            AxisInput(columns, column, force),
+            period_s=self.period_s,
+            effects=tuple(e.name for e in axis_effects()),
+            outputs=("position_mm", "torque_a", "table_mm"),
+            start={name: np.broadcast_to(value, (lanes,))[index] for name, value in start.items()},
+            first_tick=stretch.start,
+        )
+        return run, many
+
+    def _constants(self, model: Model, theta: Floats) -> dict[str, Floats]:
+        base = axis_constants(self.axis)
+        parameters = tuple(AxisParameter(p.name, "", True, p.sigma) for p in model.constants)
+        constants = constants_at(base, parameters, theta[:, : len(parameters)])
+        given: dict[str, Floats] = {}
+        for effect in axis_effects():
+            for key, value in effect.null_values().items():
+                given[f"{effect.name}__{key}"] = np.full(len(theta), value)
+        for name, standing in self.standing:
+            for key, value in effect_constants(effect_named(name), standing, base, self.letter).items():
+                given[key] = np.full(len(theta), value)
+        for effected, values in model.values(theta).items():
+            for key, array in values.items():
+                if f"{effected.effect}__{key}" in given:
+                    given[f"{effected.effect}__{key}"] = array
+        return constants | given
+
+    def _start(
+        self,
+        values: Mapping[Effected, Mapping[str, Floats]],
+        constants: Mapping[str, Floats],
+        data: AxisRunData,
+        where: slice,
+        lanes: int,
+    ) -> dict[str, Floats]:
+        """The state at the first sample of a stretch, as the sensors of each lane would have it."""
+        reference = data.reference_mm[where]
+        position = data.measured.get("pos_mm", data.reference_mm)[where]
+        torque = data.measured["torque_a"][where] if "torque_a" in data.measured else np.zeros(len(reference))
+        state = {k: np.full(lanes, v) for k, v in start_state(self.axis, reference, position, torque, self.period_s).items()}
+        of_position = Sensing.of(values, f"{self.letter}_pos_mm")
+        of_torque = Sensing.of(values, f"{self.letter}_torque_a")
+        state["position_mm"] = of_position.value(state["position_mm"])
+        if self.axis.velocity_integral_gain_a_per_mm > 0.0:
+            state["integral_a"] = of_torque.value(state["integral_a"])
+        held = constants["newton_per_command"] * state["integral_a"] - constants.get("gravity__force_n", 0.0)
+        static = np.where(held > 0.0, constants["static_plus_n"], constants["static_minus_n"])
+        held = np.clip(held, -static, static)
+        state["bristle_mm"] = held / constants["presliding__stiffness_n_per_mm"]
+        return state
+
+    def _courses(self, ticks: int) -> Floats:
+        if self.disturbance is None:
+            return np.zeros((1, ticks))
+        half = self.disturbance.courses(self.pairs, ticks, self.period_s, seed=[11, ord(self.letter[0])])
+        return np.concatenate([half, -half])
+
+    def with_constants_left(self, left_out: frozenset[str]) -> "AxisStage":
+        """The same without some effects in the catalogue."""
+        return replace(self, left_out=left_out)
+
+
+def _late(
+    reference: Floats, data: AxisRunData, values: Mapping[Effected, Mapping[str, Floats]], letter: str, lanes: int
+) -> Floats:
+    """The reference that the loop sees: (n,), or (lanes, n) where it sees it late."""
+    delay = values.get(Effected("command_delay", letter), {}).get("delay_s")
+    if delay is None or not delay.any():
+        return reference
+    ticks = np.arange(len(reference))
+    period_s = float(data.t_s[1] - data.t_s[0])
+    return np.stack([np.interp(ticks - d / period_s, ticks, reference) for d in np.broadcast_to(delay, (lanes,))])
+
+
+def standing_of(machine: MachineFile, letter: str) -> tuple[tuple[str, Mapping[str, float]], ...]:
+    """The effects that the loops and mechanics of an axis of the machine have already."""
+    woven = {e.name for e in axis_effects()}
+    return tuple((e.effect, e.parameters) for e in machine.effects if e.on == letter and e.effect in woven)
+
+
+def axis_constants_free(machine: MachineFile, letter: str) -> tuple[Free, ...]:
+    """The constants of an axis that are uncertain, with their priors from `[uncertainty]`."""
+    stated = machine.uncertainty
+    axis = machine.axes[letter]
+    force = "force_per_command_n" if axis.force_per_command_n is not None else "torque_constant_nm_per_a"
+    keys = dict.fromkeys(FACTORS, "") | {"newton_per_command": force}
+    free = []
+    for name in FACTORS:
+        path = keys[name] or (name if name == "mass_kg" else f"friction.{name}")
+        sigma = stated.get(f"axes.{letter}.{path}", stated.get("relative", 0.05))
+        zero = name == "viscous_n_s_per_mm" and not np.any(axis.friction.viscous_n_s_per_mm)
+        free += [constant(name, sigma)] if sigma > 0.0 and not zero else []
+    return tuple(free)
+
+
+def axis_run_data(
+    group: Sequence[Run], letter: str, floors: Floors, disturbance_n: Floats | None, fitted: bool
+) -> AxisRunData | None:
+    """An axis in a run, or in repeated ones averaged; None where they do not record it."""
+    log = group[0].log
+    reference = log.columns.get(f"{letter}_ref_mm")
+    outputs = [output for output in OUTPUTS if all(run.log.has(f"{letter}_{output}") for run in group)]
+    if reference is None or not outputs or not motion_stretches(log.t_s, reference):
+        return None
+    measured = {o: np.mean([run.log[f"{letter}_{o}"] for run in group], axis=0) for o in outputs}
+    floor = {o: floors.of(log, f"{letter}_{o}") for o in outputs}
+    return AxisRunData(group[0].name, log.t_s, reference, measured, floor, disturbance_n, len(group), fitted)
+
+
+def repeated_groups(runs: Sequence[Run], repeats: Sequence[tuple[Run, Run]]) -> tuple[tuple[Run, ...], ...]:
+    """Runs of one program with the same references, together."""
+    groups: list[list[Run]] = []
+    for run in runs:
+        for group in groups:
+            if any({run, other} == set(pair) for other in group for pair in repeats) and _same_reference(group[0].log, run.log):
+                group.append(run)
+                break
+        else:
+            groups.append([run])
+    return tuple(tuple(group) for group in groups)
+
+
+def _same_reference(one: RunLog, other: RunLog) -> bool:
+    names = [n for n in one.columns if n.endswith("_ref_mm")]
+    return len(one) == len(other) and all(n in other.columns and np.allclose(one[n], other[n], atol=1e-6) for n in names)

@@ -1,0 +1,189 @@
+"""The cut and the spindle's load: forces on the dynamometer and what the meter shows, from the recorded engagement on."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from twin.case import Run
+from twin.effects.catalogue import catalogue
+from twin.effects.effect import Effect, On
+from twin.gap.diagnosis import Effected
+from twin.gap.floors import Floors
+from twin.gap.free import Free, constant
+from twin.gap.observed_through import Sensing
+from twin.gap.stage import Model, Observed, observed_of
+from twin.identification.batch_fit import time_blocks
+from twin.machine import MachineFile
+from twin.process.jump import at_a_jump
+from twin.process.kernel import process_quantities
+from twin.process.milling import Milling, MillingForce, milling_force, tool_constants
+from twin.recorded import told_of
+from twin.response import milling_of
+from twin.runlog import RunLog
+from twin.spindle.load import spindle_constants, spindle_load_pct, spindle_quantities
+
+Floats = NDArray[np.float64]
+BLOCK_S = 0.25
+FORCES = ("force_x_n", "force_y_n")
+LOAD = "spindle_load_pct"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CutRun:
+    """A run that cuts, or at least turns the spindle under its load meter."""
+
+    name: str
+    log: RunLog
+    milling: Milling | None
+    fitted: bool
+
+
+def acting(known: Mapping[str, str]) -> tuple[Effect, ...]:
+    """Effects on the machine that change one of these quantities."""
+    return tuple(e for e in catalogue().values() if e.on is On.MACHINE and set(e.changes) & set(known))
+
+
+@dataclass(frozen=True, eq=False)
+class CutStage:
+    """Process force and spindle of a case."""
+
+    machine: MachineFile
+    runs: tuple[CutRun, ...]
+    floors: Floors
+    left_out: frozenset[str] = frozenset()
+    name: str = "cut and spindle"
+    averaged: int = 1
+    observed: tuple[Observed, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "observed", tuple(self._observed(run) for run in self.runs))
+
+    @cached_property
+    def standing(self) -> dict[str, Mapping[str, float]]:
+        """Effects that the machine has already."""
+        mine = {e.name for e in acting(process_quantities()) + acting(spindle_quantities())}
+        return {e.effect: e.parameters for e in self.machine.effects if e.effect in mine}
+
+    @property
+    def constants(self) -> tuple[Free, ...]:
+        """K_t and K_e where something is cut, efficiency and idle power where a load is shown."""
+        stated = self.machine.uncertainty
+        relative = stated.get("relative", 0.05)
+        cuts = self.machine.tool is not None and any(run.milling for run in self.runs)
+        names = ["tool.tangential_coefficient_n_per_mm2", "tool.radial_ratio"] if cuts else []
+        if self.machine.spindle is not None and any(LOAD in o.signals for o in self.observed):
+            names += ["spindle.efficiency"] if cuts else []
+            names += ["spindle.idle_power_kw"] if self.machine.spindle.idle_power_kw > 0.0 else []
+        free = [constant(name, stated.get(name, relative)) for name in names]
+        return tuple(p for p in free if p.sigma > 0.0)
+
+    @property
+    def candidates(self) -> tuple[Effected, ...]:
+        """Effects that forces and load can show."""
+        signals = {s for o in self.observed for s in o.signals}
+        found = []
+        for effect in acting(process_quantities()) + acting(spindle_quantities()):
+            if effect.name not in self.left_out | set(self.standing) and set(effect.shows_in) & signals:
+                found.append(Effected(effect.name))
+        for effect in catalogue().values():
+            if effect.on is On.SIGNAL and effect.name not in self.left_out:
+                found += [Effected(effect.name, signal) for signal in sorted(signals)]
+        return tuple(dict.fromkeys(found))
+
+    def first_guesses(self, candidate: Effected) -> tuple[dict[str, float], ...]:
+        """A meter that holds its peaks is not linear in how long."""
+        return tuple({"hold_s": s} for s in (0.15, 0.5, 1.5)) if candidate.effect == "load_peak_hold" else ()
+
+    def _observed(self, run: CutRun) -> Observed:
+        log, parts = run.log, []
+        blocks = time_blocks(log.t_s, BLOCK_S)
+        for signal in (*FORCES, LOAD):
+            if not log.has(signal) or (signal in FORCES and run.milling is None):
+                continue
+            if signal == LOAD and self.machine.spindle is None:
+                continue
+            measured = log[signal].copy()
+            if signal in FORCES and run.milling is not None:
+                measured[~self._compared(run.milling)] = np.nan
+            floor = self.floors.of(log, signal)
+            parts.append((signal, measured, floor, floor, blocks))
+        return observed_of(run.name, parts, run.fitted)
+
+    def _compared(self, milling: Milling) -> NDArray[np.bool_]:
+        """Where the tool cuts, but not where a tooth enters or leaves just then: who is a hair early decides there."""
+        assert self.machine.tool is not None
+        cutting = np.nan_to_num(milling.axial_depth_mm) > 0.0
+        return np.asarray(cutting & ~at_a_jump(milling, self.machine.tool.teeth, 2e-4)[0])
+
+    def predict(self, model: Model, theta: Floats, run: int) -> Floats:
+        """Forces and load at each row of θ, (lanes, n)."""
+        data = self.runs[run]
+        lanes, ticks = len(theta), len(data.log)
+        values = model.values(theta)
+        force = self.force(model, theta, data)
+        power_w = np.zeros((lanes, ticks)) if force is None else np.broadcast_to(force.cutting_power_w(), (lanes, ticks))
+        shown = []
+        period_s = self.machine.machine.servo_period_s
+        for signal in self.observed[run].signals:
+            if signal == LOAD:
+                values_of = self._load(model, theta, power_w, data.log["spindle_rpm"], period_s)
+            else:
+                assert force is not None
+                values_of = np.broadcast_to(force.force_x_n if signal == "force_x_n" else force.force_y_n, (lanes, ticks))
+            shown.append(Sensing.of(values, signal).readings(values_of, period_s))
+        return np.concatenate(shown, axis=1)
+
+    def force(self, model: Model, theta: Floats, data: CutRun) -> MillingForce | None:
+        """The cutting force at each row of θ; None where nothing is cut."""
+        if data.milling is None or self.machine.tool is None:
+            return None
+        factors = model.factors(theta)
+        constants: dict[str, ArrayLike] = dict(tool_constants(self.machine.tool))
+        for name in ("tangential_coefficient_n_per_mm2", "radial_ratio"):
+            constants[name] = constants[name] * factors.get(f"tool.{name}", np.ones(len(theta)))
+        effects = acting(process_quantities())
+        constants |= self._effects(model, theta, effects)
+        return milling_force(
+            constants,
+            self.machine.tool.teeth,
+            data.milling,
+            period_s=self.machine.machine.servo_period_s,
+            effects=tuple(e.name for e in effects),
+        )
+
+    def _load(self, model: Model, theta: Floats, power_w: Floats, rpm: Floats, period_s: float) -> Floats:
+        assert self.machine.spindle is not None
+        factors = model.factors(theta)
+        constants: dict[str, ArrayLike] = dict(spindle_constants(self.machine.spindle))
+        for name in ("efficiency", "idle_power_kw"):
+            constants[name] = constants[name] * factors.get(f"spindle.{name}", np.ones(len(theta)))
+        effects = acting(spindle_quantities())
+        constants |= self._effects(model, theta, effects)
+        return spindle_load_pct(constants, power_w, rpm, period_s=period_s, effects=tuple(e.name for e in effects))
+
+    def _effects(self, model: Model, theta: Floats, effects: tuple[Effect, ...]) -> dict[str, Floats]:
+        """Parameters of all these effects, null where the model has them not."""
+        given: dict[str, Floats] = {}
+        for effect in effects:
+            for key, value in effect.null_values().items():
+                given[f"{effect.name}__{key}"] = np.full(len(theta), self.standing.get(effect.name, {}).get(key, value))
+        for effected, values in model.values(theta).items():
+            given |= {f"{effected.effect}__{k}": v for k, v in values.items() if f"{effected.effect}__{k}" in given}
+        return given
+
+
+def cut_runs(machine: MachineFile, runs: tuple[Run, ...]) -> tuple[CutRun, ...]:
+    """The runs in which forces or the spindle's load are recorded at the servo period, over an engagement that is known."""
+    found = []
+    for run in runs:
+        log = run.log
+        if not log.axes() or not (log.has(LOAD, "spindle_rpm") or log.has("force_x_n") or log.has("force_y_n")):
+            continue
+        milling = milling_of(told_of(log, machine)) if machine.tool else None
+        if milling is None and not log.has(LOAD, "spindle_rpm"):
+            continue
+        found.append(CutRun(run.name, log, milling, run.entry.role == "fit"))
+    return tuple(found)

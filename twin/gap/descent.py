@@ -1,0 +1,124 @@
+"""Nonlinear least squares over a simulator that runs many candidates at once: Levenberg and Marquardt with several dampings a step.
+
+    min Σ ρ(r_i(θ)²) + Σ (θ_j / σ_j)²,   ρ(z) = 2 f² (√(1 + z / f²) − 1),   low ≤ θ ≤ high
+
+Each iteration costs two batches: the slopes (one lane for each free number) and one trial for each damping, of which the best is
+kept. The normal equations are small, so nothing tall is ever decomposed. Free numbers at a bound that the step would leave are held
+for that step (projected Newton: Bertsekas 1982, SIAM J. Control and Optimization 20(2)).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.identification.estimate import clustered_covariance
+
+Floats = NDArray[np.float64]
+Residuals = Callable[[Floats], Floats]
+OUTLIER = 3.0
+DAMPINGS = (1e-4, 1e-2, 0.3, 10.0)
+STEP = 2e-4
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Bounds:
+    """Of θ, and the standard deviations of its prior around 0, (p,) each."""
+
+    sigma: Floats
+    low: Floats
+    high: Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Found:
+    """Where the search ended. known: (p,) part of what is known of θ that comes from the data; evaluations: simulated candidates."""
+
+    theta: Floats
+    covariance: Floats
+    known: Floats
+    cost: float
+    evaluations: int
+
+
+def descend(
+    residuals: Residuals, bounds: Bounds, blocks: NDArray[np.intp], start: Floats, *, steps_max: int = 30, tolerance: float = 1e-4
+) -> Found:
+    """From `start` to a minimum.
+
+    residuals: θ (candidates, p) → (candidates, n) in units of their noise; blocks: (n,) time block of each residual
+    tolerance: relative decrease of the cost at which the search ends
+    """
+    theta = np.clip(start, bounds.low, bounds.high)
+    here = residuals(theta[None, :])[0]
+    cost, evaluations = _cost(here, theta, bounds), 1
+    slopes = np.zeros((len(here), len(theta)))
+    stale = True
+    for _ in range(steps_max):
+        slopes = _slopes(residuals, theta, here, bounds)
+        stale = False
+        trials = np.stack([_step(slopes, here, theta, bounds, damping) for damping in DAMPINGS])
+        shown = residuals(trials)
+        evaluations += len(theta) + len(trials)
+        costs = [_cost(r, t, bounds) for r, t in zip(shown, trials, strict=True)]
+        best = int(np.argmin(costs))
+        gain = cost - costs[best]
+        if gain <= 0.0:
+            break
+        theta, here, cost, stale = trials[best], shown[best], costs[best], True
+        if gain < tolerance * (cost + gain):
+            break
+    if stale:
+        slopes = _slopes(residuals, theta, here, bounds)
+        evaluations += len(theta)
+    return _found(theta, here, slopes, bounds, blocks, cost, evaluations)
+
+
+def _cost(residual: Floats, theta: Floats, bounds: Bounds) -> float:
+    robust = 2.0 * OUTLIER**2 * (np.sqrt(1.0 + (residual / OUTLIER) ** 2) - 1.0)
+    return float(robust.sum() + np.sum((theta / bounds.sigma) ** 2))
+
+
+def _slopes(residuals: Residuals, theta: Floats, here: Floats, bounds: Bounds) -> Floats:
+    """(n, p), by differences towards the middle of the bounds."""
+    inward = np.where(theta > 0.5 * (bounds.low + bounds.high), -1.0, 1.0)
+    moves = inward * STEP * np.maximum(1.0, np.abs(theta)) * np.minimum(1.0, 100.0 * bounds.sigma)
+    shown = residuals(theta + np.diag(moves))
+    return np.asarray((shown - here).T / moves)
+
+
+def _step(slopes: Floats, here: Floats, theta: Floats, bounds: Bounds, damping: float) -> Floats:
+    weight = 1.0 / np.sqrt(1.0 + (here / OUTLIER) ** 2)
+    weighted = slopes * weight[:, None]
+    hessian = slopes.T @ weighted + np.diag(1.0 / bounds.sigma**2)
+    gradient = weighted.T @ here + theta / bounds.sigma**2
+    free = ~(((theta <= bounds.low) & (gradient > 0.0)) | ((theta >= bounds.high) & (gradient < 0.0)))
+    for _ in range(len(theta)):
+        index = np.flatnonzero(free)
+        if not len(index):
+            return theta
+        part = hessian[np.ix_(index, index)]
+        move = np.zeros(len(theta))
+        move[index] = -np.linalg.solve(part + damping * np.diag(np.diag(part)), gradient[index])
+        out = free & (((theta + move) < bounds.low) | ((theta + move) > bounds.high))
+        if not out.any():
+            return np.asarray(theta + move)
+        # those that would leave go to their bound, and the others are solved for again beside them
+        held = np.clip(theta + move, bounds.low, bounds.high) - theta
+        gradient = gradient + hessian[:, out] @ held[out]
+        free &= ~out
+        theta = np.where(out, theta + held, theta)
+    return theta
+
+
+def _found(
+    theta: Floats, here: Floats, slopes: Floats, bounds: Bounds, blocks: NDArray[np.intp], cost: float, evaluations: int
+) -> Found:
+    weight = (1.0 + (here / OUTLIER) ** 2) ** -0.25
+    prior = np.diag(1.0 / bounds.sigma**2)
+    weighted = slopes * weight[:, None]
+    covariance = clustered_covariance(weighted, here * weight, blocks, prior)
+    information = weighted.T @ weighted + prior
+    variance = np.diag(np.linalg.pinv(information, hermitian=True))
+    return Found(theta, covariance, 1.0 - np.clip(variance / bounds.sigma**2, 0.0, 1.0), cost, evaluations)

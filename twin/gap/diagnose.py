@@ -1,0 +1,137 @@
+"""Diagnoses the sim-to-real gap of a case: where it lies, what causes it, how far it shrinks, and what can't be told.
+
+floors and disturbance → cut and spindle → axes → heat: constants refitted, effects searched (`twin.gap.search`)
+    → the twin before and after, on runs that were not fitted → where, shares, intervals → verdict → next experiment
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.case import Case, Run
+from twin.errors import CaseError
+from twin.gap.answer import candidates_of, causes_of, not_identifiable_of, not_observable_of, sentence_of
+from twin.gap.diagnosis import Diagnosed, Diagnosis, Effected, GapNumbers, SignalGap, closure_of
+from twin.gap.inspection import inspected
+from twin.gap.intervals import closure_interval
+from twin.gap.null import NULL, Null
+from twin.gap.patterns import patterns
+from twin.gap.plan import Ground, explained_stages, ground_of
+from twin.gap.refitted import with_constants, with_effects
+from twin.gap.score import Squares, gap_of, squares_of, traces_of, unit_of
+from twin.gap.shares import shapley
+from twin.gap.shown import shown_by_run
+from twin.gap.verdict import Judged, judged, overall
+from twin.gap.what_next import what_next
+from twin.gap.where import where
+from twin.machine import MachineFile
+
+Floats = NDArray[np.float64]
+Shown = Mapping[str, Mapping[str, Floats]]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Twins:
+    """The machine as stated, with its constants refitted, and with the causes added; what each shows on the judging runs."""
+
+    stated: MachineFile
+    before: MachineFile
+    after: MachineFile
+    runs: tuple[Run, ...]
+    squares: Mapping[str, Mapping[str, Squares]]
+    shown: Mapping[str, Shown]
+
+
+def diagnose(
+    case: Case,
+    *,
+    without: frozenset[str] = frozenset(),
+    null: Null = NULL,
+    clock: Callable[[], float] = lambda: 0.0,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Diagnosed:
+    """The diagnosis of a case.
+
+    without: effects that are left out of the catalogue; clock: seconds, to say how long it took
+
+    Raises TwinError where there is nothing that could be diagnosed, in one line.
+    """
+    began = clock()
+    progress("reading the runs")
+    checked, notes = inspected(case)
+    ground = ground_of(checked, without)
+    stages = [judged(found, null) for found in explained_stages(ground, progress)]
+    if not stages:
+        raise CaseError(
+            f"{case.name}: no run of role fit moves an axis, cuts or warms up beside its reference; nothing to diagnose"
+        )
+    progress("before and after")
+    twins = _twins(ground, checked, stages)
+    causes = tuple(e for s in stages for e in s.explained.best.effects)
+    shares = shapley(causes, lambda some: _closed(ground, stages, twins, some))
+    traces = traces_of(twins.runs, twins.shown["before"], twins.shown["after"], ground.floors)
+    verdict = overall(stages)
+    numbers = _numbers(twins)
+    progress("what next")
+    logs = {run.name: run.log for run in twins.runs}
+    named = causes_of(stages, shares)
+    diagnosis = Diagnosis(
+        verdict=verdict,
+        sentence=sentence_of(verdict, stages, named, numbers),
+        where=where(traces),
+        where_after=where(traces, after=True),
+        patterns=patterns(traces, logs, ground.machine),
+        causes=named,
+        gap=numbers,
+        candidates=candidates_of(stages, null),
+        not_observable=not_observable_of(checked, stages, without),
+        not_identifiable=not_identifiable_of(stages),
+        next_experiment=what_next(ground, twins.before, twins.after, stages),
+        notes=notes,
+        seconds=round(clock() - began, 1),
+    )
+    return Diagnosed(diagnosis, twins.after, traces)
+
+
+def _twins(ground: Ground, case: Case, stages: Sequence[Judged]) -> _Twins:
+    runs = tuple(r for r in ground.runs if r.entry.role == "check") or ground.runs
+    before, after = ground.machine, ground.machine
+    for stage in stages:
+        before = with_constants(before, stage.explained.stage, stage.explained.base)
+        after = with_constants(after, stage.explained.stage, stage.explained.best)
+        after = with_effects(after, stage.explained.best.values.items())
+    shown = {
+        name: shown_by_run(machine, runs, ground.floors)
+        for name, machine in (("stated", ground.machine), ("before", before), ("after", after))
+    }
+    squares = {name: squares_of(runs, columns, ground.floors) for name, columns in shown.items()}
+    return _Twins(ground.machine, before, after, runs, squares, shown)
+
+
+def _closed(ground: Ground, stages: Sequence[Judged], twins: _Twins, some: frozenset[Effected]) -> float:
+    """What the twin with some of the causes closes of the gap of the one with none."""
+    causes = [e for s in stages for e in s.explained.best.effects]
+    if not some:
+        return 0.0
+    if len(some) == len(causes):
+        squares = twins.squares["after"]
+    else:
+        machine = ground.machine
+        for stage in stages:
+            found = stage.explained.best if any(e in some for e in stage.explained.best.effects) else stage.explained.base
+            machine = with_constants(machine, stage.explained.stage, found)
+            machine = with_effects(machine, [(e, v) for e, v in found.values.items() if e in some])
+        squares = squares_of(twins.runs, shown_by_run(machine, twins.runs, ground.floors), ground.floors)
+    return closure_of(gap_of(twins.squares["before"]), gap_of(squares), 1.0)
+
+
+def _numbers(twins: _Twins) -> GapNumbers:
+    before, after = twins.squares["before"], twins.squares["after"]
+    closure, low, high = closure_interval(before, after)
+    by_signal = {
+        signal: SignalGap(squares.rms(), after[signal].rms(), squares.floor(), unit_of(signal))
+        for signal, squares in before.items()
+    }
+    return GapNumbers(gap_of(twins.squares["stated"]), gap_of(before), gap_of(after), 1.0, closure, low, high, by_signal)

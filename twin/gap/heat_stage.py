@@ -1,0 +1,132 @@
+"""The spindle's heat, driven by the recorded load, speed, coolant and surroundings."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from twin.case import Run
+from twin.effects.catalogue import catalogue
+from twin.effects.effect import Effect, On
+from twin.gap.cut_stage import acting
+from twin.gap.diagnosis import Effected
+from twin.gap.floors import Floors
+from twin.gap.free import Free, constant
+from twin.gap.observed_through import Sensing
+from twin.gap.stage import Model, Observed, observed_of
+from twin.heat.run import Warming, spindle_temperature_c, thermal_constants, thermal_quantities
+from twin.identification.batch_fit import time_blocks
+from twin.machine import MachineFile
+from twin.recorded import start_temperature_c
+from twin.runlog import RunLog
+
+Floats = NDArray[np.float64]
+BLOCK_S = 120.0
+SIGNAL = "spindle_temp_c"
+NAMES = ("alpha_w_per_pct_rpm2", "beta_w_per_rpm", "resistance_k_per_w", "capacity_j_per_k")
+NEEDS = (SIGNAL, "spindle_rpm", "spindle_load_pct", "ambient_temp_c")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HeatRun:
+    """A run that warms up or cools down."""
+
+    name: str
+    log: RunLog
+    warming: Warming
+    fitted: bool
+
+
+@dataclass(frozen=True, eq=False)
+class HeatStage:
+    """The spindle's heat in a case."""
+
+    machine: MachineFile
+    runs: tuple[HeatRun, ...]
+    floors: Floors
+    left_out: frozenset[str] = frozenset()
+    name: str = "spindle heat"
+    averaged: int = 2
+    observed: tuple[Observed, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "observed", tuple(self._observed(run) for run in self.runs))
+
+    @cached_property
+    def effects(self) -> tuple[Effect, ...]:
+        """Those of the heat."""
+        return acting(thermal_quantities())
+
+    @cached_property
+    def standing(self) -> dict[str, Mapping[str, float]]:
+        """Effects that the machine has already."""
+        mine = {e.name for e in self.effects}
+        return {e.effect: e.parameters for e in self.machine.effects if e.effect in mine}
+
+    @property
+    def constants(self) -> tuple[Free, ...]:
+        """Heat by load and by speed, resistance, capacity: only their ratios show, so their priors say the rest."""
+        assert self.machine.thermal is not None
+        stated, thermal = self.machine.uncertainty, self.machine.thermal.model_dump()
+        relative = stated.get("relative", 0.05)
+        free = [constant(f"thermal.{n}", stated.get(f"thermal.{n}", relative)) for n in NAMES if thermal[n] > 0.0]
+        return tuple(p for p in free if p.sigma > 0.0)
+
+    @property
+    def candidates(self) -> tuple[Effected, ...]:
+        """Effects that the temperature can show; coolant only where it was switched."""
+        found = []
+        for effect in self.effects:
+            switched = any(len(set(np.nan_to_num(np.asarray(r.warming.coolant_on)).tolist())) > 1 for r in self.runs if r.fitted)
+            if effect.name not in self.left_out | set(self.standing) and (effect.name != "coolant_cooling" or switched):
+                found.append(Effected(effect.name))
+        sensors = [e for e in catalogue().values() if e.on is On.SIGNAL and e.name not in self.left_out]
+        return tuple(found + [Effected(e.name, SIGNAL) for e in sensors])
+
+    def first_guesses(self, candidate: Effected) -> tuple[dict[str, float], ...]:
+        """A second mass is not linear in its size."""
+        if candidate.effect == "second_thermal_mass":
+            return tuple({"conductance_w_per_k": g, "capacity_j_per_k": c} for g in (1.5, 5.0) for c in (1.5e4, 6e4))
+        return ()
+
+    def _observed(self, run: HeatRun) -> Observed:
+        floor = self.floors.of(run.log, SIGNAL)
+        blocks = time_blocks(run.log.t_s, BLOCK_S)
+        return observed_of(run.name, [(SIGNAL, run.log[SIGNAL], floor, floor, blocks)], run.fitted)
+
+    def predict(self, model: Model, theta: Floats, run: int) -> Floats:
+        """The temperature at each row of θ, (lanes, n)."""
+        assert self.machine.thermal is not None
+        data = self.runs[run]
+        values, factors = model.values(theta), model.factors(theta)
+        constants: dict[str, ArrayLike] = {}
+        for name, value in thermal_constants(self.machine.thermal).items():
+            key = "capacity_j_per_k" if name == "heat_capacity_j_per_k" else name
+            constants[name] = value * factors.get(f"thermal.{key}", np.ones(len(theta)))
+        for effect in self.effects:
+            for key, null in effect.null_values().items():
+                given = self.standing.get(effect.name, {}).get(key, null)
+                constants[f"{effect.name}__{key}"] = np.full(len(theta), given)
+        for effected, found in values.items():
+            constants |= {f"{effected.effect}__{k}": v for k, v in found.items() if f"{effected.effect}__{k}" in constants}
+        sensing = Sensing.of(values, SIGNAL)
+        start = sensing.value(np.full(len(theta), start_temperature_c(data.log.t_s, data.log[SIGNAL])))
+        shown = spindle_temperature_c(constants, data.warming, start, effects=tuple(e.name for e in self.effects))
+        period_s = float(np.median(np.diff(data.log.t_s)))
+        return sensing.readings(np.broadcast_to(shown, (len(theta), shown.shape[1])), period_s)
+
+
+def heat_runs(machine: MachineFile, runs: tuple[Run, ...]) -> tuple[HeatRun, ...]:
+    """The runs in which the spindle's temperature is recorded beside all that drives it."""
+    if machine.thermal is None:
+        return ()
+    found = []
+    for run in runs:
+        log = run.log
+        if log.has(*NEEDS):
+            coolant = log["coolant_on"] if log.has("coolant_on") else np.zeros(len(log))
+            warming = Warming(log.t_s, log["spindle_load_pct"], log["spindle_rpm"], log["ambient_temp_c"], coolant)
+            found.append(HeatRun(run.name, log, warming, run.entry.role == "fit"))
+    return tuple(found)

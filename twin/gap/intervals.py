@@ -1,0 +1,52 @@
+"""Intervals of what is reported: of the causes' parameters, and of how far the gap shrinks."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.effects.catalogue import effect_named
+from twin.gap.diagnosis import Effected, Interval, closure_of
+from twin.gap.fitting import Fitted
+from twin.gap.score import Squares
+
+Floats = NDArray[np.float64]
+Z90 = 1.6448536269514722
+SEED = 4
+DRAWS = 400
+
+
+def parameter_intervals(found: Fitted) -> dict[Effected, dict[str, Interval]]:
+    """The parameters of each effect with their 90 % intervals, from the covariance clustered over time blocks."""
+    intervals: dict[Effected, dict[str, Interval]] = {}
+    free = found.model.free
+    deviation = np.sqrt(np.maximum(np.diag(found.covariance), 0.0))
+    for effected, place in found.model.places():
+        parameters = effect_named(effected.effect).parameters
+        intervals[effected] = {}
+        for p, i in zip(parameters, range(place.start, place.stop), strict=True):
+            theta = found.theta[i]
+            ends = np.clip(theta + Z90 * deviation[i] * np.array([-1.0, 0.0, 1.0]), free[i].low, free[i].high)
+            low, value, high = np.sort(free[i].value(ends)).tolist()
+            intervals[effected][p.name] = Interval(value, low, high, p.unit)
+    return intervals
+
+
+def closure_interval(before: Mapping[str, Squares], after: Mapping[str, Squares]) -> tuple[float, float, float]:
+    """Closure of all signals and its 90 % interval, by a paired bootstrap over time blocks."""
+    draw = np.random.default_rng(SEED)
+    signals = [s for s in before if s in after and before[s].count.sum() > 0]
+    if not signals:
+        return 0.0, 0.0, 0.0
+    drawn = np.zeros((DRAWS + 1, 2))
+    for signal in signals:
+        one, other = before[signal], after[signal]
+        blocks = len(one.count)
+        weight = draw.multinomial(blocks, np.full(blocks, 1.0 / blocks), size=DRAWS).astype(np.float64)
+        weight = np.concatenate([np.ones((1, blocks)), weight])
+        count = np.maximum(weight @ one.count, 1.0)
+        drawn += np.stack([weight @ one.ratio / count, weight @ other.ratio / count], axis=1)
+    gaps = np.sqrt(drawn / len(signals))
+    closures = [closure_of(float(b), float(a), 1.0) for b, a in gaps]
+    low, high = np.quantile(closures[1:], [0.05, 0.95])
+    return closures[0], float(min(low, closures[0])), float(max(high, closures[0]))

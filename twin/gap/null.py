@@ -1,0 +1,37 @@
+"""What healthy machines show: how far a candidate seems to help where there is nothing to find.
+
+Calibrated with the blind check's plant on healthy machines of other programs and other seeds than those it is judged on.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import sqrt
+
+from scipy.special import erfc
+
+from twin.gap.diagnosis import Effected
+from twin.gap.evidence import Advantage
+
+
+@dataclass(frozen=True, slots=True)
+class Null:
+    """closes: decrease of a signal's mean square, in floors², by candidate; sigmas: of its advantage; rms_typical, rms_worst: of
+    what a healthy twin leaves of a signal, in floors"""
+
+    closes: Mapping[str, float] = field(default_factory=dict)
+    closes_any: float = 0.2
+    sigmas: float = 3.0
+    sigmas_spread: float = 1.5
+    rms_typical: float = 1.1
+    rms_worst: float = 1.3
+
+    def exceeded(self, effected: Effected, over: Advantage) -> bool:
+        """Whether a candidate helps more than it does on any healthy machine."""
+        return over.sigmas > self.sigmas and over.closes > self.closes.get(effected.effect, self.closes_any)
+
+    def p_value(self, over: Advantage) -> float:
+        """Of a healthy machine showing so much: one-sided, with the spread that healthy machines have."""
+        return float(0.5 * erfc(over.sigmas / self.sigmas_spread / sqrt(2.0)))
+
+
+NULL = Null()

@@ -1,0 +1,104 @@
+"""The stages of a case, in the order of the sites, and what each needs of those before it."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.case import Case, Run, RunKind
+from twin.gap.axis_stage import AxisRunData, AxisStage, axis_constants_free, axis_run_data, repeated_groups, standing_of
+from twin.gap.cut_stage import CutStage, cut_runs
+from twin.gap.disturbance import disturbance_of_repeats
+from twin.gap.floors import Floors, repeatability
+from twin.gap.heat_stage import HeatStage, heat_runs
+from twin.gap.search import Explained, explain
+from twin.machine import MachineFile
+from twin.runlog import RunLog
+from twin.servo.disturbance import Disturbance
+
+Floats = NDArray[np.float64]
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ground:
+    """What all stages of a case stand on. machine: with the disturbance in its [noise]"""
+
+    machine: MachineFile
+    runs: tuple[Run, ...]
+    repeats: tuple[tuple[Run, Run], ...]
+    floors: Floors
+    disturbance: Disturbance | None
+    left_out: frozenset[str]
+
+
+def ground_of(case: Case, left_out: frozenset[str]) -> Ground:
+    """Floors and disturbance of a case, from its repeated runs."""
+    machine = case.machine
+    runs = tuple(run for run in case.runs if run.entry.kind is not RunKind.PROGRAM)
+    floors = repeatability(runs, case.repeats(), machine)
+    seen: dict[str, tuple[str, RunLog, AxisRunData]] = {}
+    for one, _ in case.repeats():
+        for letter in machine.axes:
+            data = axis_run_data((one,), letter, floors, None, True)
+            if letter not in seen and data is not None:
+                seen[letter] = (letter, one.log, data)
+    disturbance, spread = disturbance_of_repeats(machine, list(seen.values()), floors)
+    if disturbance is not None:
+        noise = {"disturbance_force_n": disturbance.force_n, "disturbance_correlation_s": disturbance.correlation_s}
+        machine = machine.model_copy(update={"noise": dict(machine.noise) | noise})
+    return Ground(machine, runs, case.repeats(), replace(floors, expected=spread), disturbance, left_out)
+
+
+def explained_stages(ground: Ground, progress: Progress) -> Iterator[Explained]:
+    """Each stage explained in turn: cut and spindle, axes, heat."""
+    forces: dict[str, dict[str, Floats]] = {}
+    cuts = cut_runs(ground.machine, ground.runs)
+    if any(run.fitted for run in cuts):
+        stage = CutStage(ground.machine, cuts, ground.floors, ground.left_out)
+        if stage.observed[0].signals:
+            found = explain(stage, progress=progress)
+            yield found
+            forces = _pushes(stage, found)
+    for letter in ground.machine.axes:
+        axis = axis_stage(ground, letter, forces)
+        if axis is not None:
+            yield explain(axis, progress=progress)
+    warmups = heat_runs(ground.machine, tuple(r for r in ground.runs if not r.log.axes()))
+    if any(run.fitted for run in warmups):
+        yield explain(HeatStage(ground.machine, warmups, ground.floors, ground.left_out), progress=progress)
+
+
+def axis_stage(ground: Ground, letter: str, forces: dict[str, dict[str, Floats]]) -> AxisStage | None:
+    """The stage of an axis; None where no run to be fitted moves it."""
+    machine = ground.machine
+    data = []
+    for role in ("fit", "check"):
+        for group in repeated_groups(tuple(r for r in ground.runs if r.entry.role == role), ground.repeats):
+            push = forces.get(group[0].name, {}).get(letter)
+            data.append(axis_run_data(group, letter, ground.floors, push, role == "fit"))
+    known = tuple(d for d in data if d is not None)
+    if not any(d.fitted for d in known):
+        return None
+    standing = standing_of(machine, letter)
+    return AxisStage(
+        letter,
+        machine.axes[letter],
+        machine.machine.servo_period_s,
+        known,
+        axis_constants_free(machine, letter),
+        ground.disturbance,
+        ground.left_out,
+        standing,
+    )
+
+
+def _pushes(stage: CutStage, found: Explained) -> dict[str, dict[str, Floats]]:
+    """run → axis → the force of the cut that resists its motion in +, by what the stage has found."""
+    pushes: dict[str, dict[str, Floats]] = {}
+    for run in stage.runs:
+        force = stage.force(found.best.model, found.best.theta[None, :], run)
+        if force is not None:
+            pushes[run.name] = {"x": -np.asarray(force.mean_force_x_n)[0], "y": -np.asarray(force.mean_force_y_n)[0]}
+    return pushes

@@ -1,0 +1,116 @@
+"""The diagnosis of recorded programs: in which sections they take longer than the twin says, which effects of the control make up
+for it, and how far the gap shrinks on programs that were not fitted.
+
+The twin before is the machine as described; without [program] it knows length over feed only, and the rapid rate is read off the
+recordings. Overrides that a recording tells are inputs. Runs that were not finished, or are not of the program given, are left
+out and said to be so; pauses are taken out.
+"""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from twin.case import Case, RunKind
+from twin.effects.catalogue import catalogue
+from twin.errors import CaseError, RunLogError
+from twin.gap.diagnosis import Diagnosed, NotObservable
+from twin.gap.program_answer import Answer, Asked
+from twin.gap.program_search import search
+from twin.gap.program_trial import Refused, Trial, trial_of
+from twin.identification.program_recording import rapid_rate_mm_min
+from twin.machine import MachineFile, Program
+from twin.motion.control import RAPID_MM_MIN, program_effects
+from twin.motion.limits import Limits
+from twin.motion.path import EventKind, Kind
+from twin.sites import Site
+
+SHORTEST_BLOCK_S = 1.0
+"""Where no cutting block is shorter, no block time can show."""
+KNOB = 0.95
+"""Long rapids below this part of the stated rate are said to be slow."""
+
+
+def diagnose_programs(
+    case: Case,
+    *,
+    without: frozenset[str] = frozenset(),
+    progress: Callable[[str], None] = lambda _: None,
+    seed: int = 4,
+) -> Diagnosed:
+    """The diagnosis of the runs of kind `program` of a case; `seconds` is left at 0 for who has a clock.
+
+    without: effects left out of the catalogue; seed: of the resampling
+
+    Raises CaseError where no run can be compared with its program, naming what is amiss with each.
+    """
+    progress("time: reading programs and runs")
+    asked = _asked(case)
+    absent = _not_observable(asked)
+    gone = set(asked.already) | {one.effect for one in absent} | without
+    candidates = [name for name, effect in catalogue().items() if effect.site is Site.PROGRAM and name not in gone]
+    rng = np.random.default_rng(seed)
+    found = search(asked.learnt, asked.judged, asked.stated, asked.already, candidates, rng, progress)
+    progress("time: where the gap lies")
+    return Answer(asked, found, absent, rng).diagnosed()
+
+
+def _asked(case: Case) -> Asked:
+    """The runs that can be compared, and the limits to start from."""
+    read = [trial_of(run) for run in case.of(RunKind.PROGRAM)]
+    trials = tuple(one for one in read if isinstance(one, Trial))
+    refused = tuple(f"{one.name} {one.why}" for one in read if isinstance(one, Refused))
+    if not trials:
+        raise CaseError(f"{case.name}: no run can be compared with its program: {'; '.join(refused) or 'there is none'}")
+    notes = [*refused, *(f"{trial.name} {remark}" for trial in trials for remark in trial.remarks)]
+    learnt, judged = (tuple(t for t in trials if t.fitted is fitted) for fitted in (True, False))
+    if not judged or not learnt:
+        notes.append(
+            f"no run to {'judge on' if learnt else 'learn from'} could be compared: the gap is judged on what was fitted"
+        )
+        learnt = judged = trials
+    told = sum(trial.overrides_told for trial in trials)
+    if told < len(trials):
+        notes.append(
+            f"overrides are not recorded in {len(trials) - told} of {len(trials)} runs: knobs are taken to stand at 100 %"
+        )
+    stated, said = _stated(case.machine, learnt, trials)
+    return Asked(case.machine, stated, program_effects(case.machine), learnt, judged, (*notes, *said))
+
+
+def _stated(machine: MachineFile, learnt: Sequence[Trial], trials: Sequence[Trial]) -> tuple[Limits, tuple[str, ...]]:
+    """[program], or length over feed with the rapid rate that the runs show."""
+    if machine.program is not None:
+        return Limits.of(machine.program), _knobs(machine.program, trials)
+    try:
+        rate, _ = rapid_rate_mm_min([trial.recorded for trial in learnt])
+        said = f"the machine states no [program]: length over feed, with the rapid rate read off the runs, {rate:.0f} mm/min"
+    except RunLogError:
+        rate = RAPID_MM_MIN
+        said = f"the machine states no [program] and no run has a long rapid: length over feed, rapids at {rate:.0f} mm/min"
+    return Limits(rapid_mm_min=rate, acceleration_mm_s2=np.inf), (said,)
+
+
+def _knobs(program: Program, trials: Sequence[Trial]) -> tuple[str, ...]:
+    """Runs whose long rapids went slower than the stated rate and the recorded override make them."""
+    slow = []
+    for trial in trials:
+        try:
+            ratio = rapid_rate_mm_min([trial.recorded])[0] / program.rapid_mm_min
+        except RunLogError:
+            continue
+        if ratio < KNOB:
+            slow.append(f"{trial.name} {100.0 * ratio:.0f} %")
+    said = "long rapids were slower than the stated rate, as under an override that the recording does not tell"
+    return (f"{said}: {', '.join(slow)}",) if slow else ()
+
+
+def _not_observable(asked: Asked) -> tuple[NotObservable, ...]:
+    """Effects that none of these programs can show."""
+    paths = [trial.recorded.path for trial in (*asked.learnt, *asked.judged)]
+    found = []
+    if not any(event.kind in (EventKind.TOOL_CHANGE, EventKind.SPINDLE) for path in paths for event in path.events):
+        found.append(NotObservable("tool_change_time", "no program changes a tool or starts a spindle"))
+    cutting = [60.0 * p.length_mm[p.kind != Kind.RAPID] / p.feed_mm_min[p.kind != Kind.RAPID] for p in paths]
+    if not len(np.concatenate(cutting)) or np.concatenate(cutting).min() > SHORTEST_BLOCK_S:
+        found.append(NotObservable("block_overhead", f"no cutting block is shorter than {SHORTEST_BLOCK_S:g} s"))
+    return tuple(found)

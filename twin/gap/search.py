@@ -1,0 +1,191 @@
+"""Which effects: added to the machine one by one, refitted with its constants, and judged on runs that were not fitted.
+
+    base → screen all candidates by signature → fit those that survive, thresholds always → take the best that a healthy machine
+    would not show → drop what is no longer needed → again, until nothing more is accepted; pairs where no single one is
+
+A candidate is accepted where it beats its parent on the judging runs by more sigmas, and takes away more of the gap, than it does
+on healthy machines (`twin.gap.null`).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from twin.effects.catalogue import effect_named
+from twin.gap.diagnosis import Effected
+from twin.gap.evidence import Advantage, advantage
+from twin.gap.fitting import Fitted, Guess, fitted, guesses, sensitivities, settled
+from twin.gap.null import NULL, Null
+from twin.gap.stage import Model, Stage
+
+SCREENED_MAX = 9
+CLOSES_LEAST = 0.02
+ALWAYS = frozenset({"torque_limit", "presliding", "load_peak_hold", "second_thermal_mass", "viscous_warmup", "screw_compliance"})
+"""Thresholds, saturations, and what is far from linear: a signature at one size says little about them."""
+ROUNDS_MAX = 4
+STEPS_FIRST, STEPS_MAX = 6, 14
+REFINED = 3
+PAIR_GAP = 3.0
+PAIRS_OF = 6
+SENSING = ("sensor_bias", "sensor_scale", "sensor_lag", "clock_drift")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tried:
+    """A candidate on top of a parent. guess: from the screening; found: None where it was screened out"""
+
+    effected: Effected
+    screened: float
+    found: Fitted | None
+    over: Advantage | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Explained:
+    """What was found in a stage.
+
+    base: the machine with its constants refitted; best: with the accepted effects; tried: in the first round, best first
+    rivals: effect → what cannot be told from it; chain: base, then the hypothesis after each effect that was accepted
+    """
+
+    stage: Stage
+    base: Fitted
+    best: Fitted
+    tried: tuple[Tried, ...]
+    rivals: dict[Effected, tuple[Effected, ...]]
+    evidence: dict[Effected, Advantage]
+
+
+def explain(stage: Stage, *, null: Null = NULL, progress: Callable[[str], None] = lambda _: None) -> Explained:
+    """The effects in a stage."""
+    bare = Model(stage.constants, ())
+    base = settled(stage, fitted(stage, bare, bare.null_theta()))
+    best, first = base, tuple[Tried, ...]()
+    rivals: dict[Effected, tuple[Effected, ...]] = {}
+    evidence: dict[Effected, Advantage] = {}
+    for number in range(ROUNDS_MAX):
+        progress(f"{stage.name}, round {number + 1}")
+        if number and not _gap_left(best, null):
+            break
+        tried = _tried(stage, best, stage.candidates, null)
+        first = first or tried
+        accepted = [t for t in tried if _accepted(t, null)]
+        if not accepted:
+            pair = _pair(stage, best, tried, null) if not number and best.left.gap() > PAIR_GAP else None
+            if pair is None:
+                break
+            best = pair
+            continue
+        chosen, equals = _chosen(accepted)
+        assert chosen.found is not None and chosen.over is not None
+        rivals[chosen.effected], evidence[chosen.effected] = equals, chosen.over
+        best = _pruned(stage, settled(stage, chosen.found, rounds=1), null)
+    evidence |= {e: advantage(_dropped(stage, best, e).left, best.left) for e in best.effects if len(best.effects) > 1}
+    evidence |= {e: advantage(base.left, best.left) for e in best.effects if len(best.effects) == 1}
+    return Explained(stage, base, best, first, {e: r for e, r in rivals.items() if e in best.effects}, evidence)
+
+
+def _gap_left(best: Fitted, null: Null) -> bool:
+    return bool((best.left.rms() > null.rms_typical).any())
+
+
+def _accepted(tried: Tried, null: Null) -> bool:
+    return tried.over is not None and tried.found is not None and null.exceeded(tried.effected, tried.over)
+
+
+def _tried(stage: Stage, parent: Fitted, candidates: tuple[Effected, ...], null: Null) -> tuple[Tried, ...]:
+    """All candidates on top of a parent, best first."""
+    slopes = sensitivities(stage, parent)
+    screened = [guesses(stage, parent, c, slopes) for c in candidates if c not in parent.effects]
+    screened.sort(key=lambda g: -g[0].closes)
+    wanted = [g for g in screened if g[0].closes > CLOSES_LEAST][:SCREENED_MAX]
+    if _gap_left(parent, null):
+        wanted += [g for g in screened if g[0].effected.effect in ALWAYS and g not in wanted]
+    scale = np.maximum(parent.left_fit.rms(), 1.0)
+    fits = {g[0].effected: _best_fit(stage, parent, g, scale) for g in wanted}
+    for effected in sorted(fits, key=lambda e: fits[e].left_fit.excess())[: REFINED if len(fits) > 1 else 0]:
+        closer = np.maximum(fits[effected].left_fit.rms(), 1.0)
+        fits[effected] = fitted(stage, fits[effected].model, fits[effected].theta, scale=closer, steps_max=STEPS_MAX)
+    tried = []
+    for g in screened:
+        found = fits.get(g[0].effected)
+        tried.append(Tried(g[0].effected, g[0].closes, found, None if found is None else advantage(parent.left, found.left)))
+    return tuple(sorted(tried, key=lambda t: -np.inf if t.over is None else t.over.gain, reverse=True))
+
+
+def _best_fit(stage: Stage, parent: Fitted, found: tuple[Guess, ...], scale: np.ndarray) -> Fitted:  # type: ignore[type-arg]
+    """From the best guess, and where the parent's constants were driven to their bounds, from the stated ones as well."""
+    model = parent.model.with_effect(found[0].effected)
+    one = fitted(stage, model, found[0].theta, scale=scale, steps_max=STEPS_FIRST)
+    constants = len(model.constants)
+    bounds = np.array([p.high for p in model.constants])
+    driven = bool((np.abs(parent.theta[:constants]) > 0.95 * bounds).any())
+    if not driven and not (found[0].effected.effect in ALWAYS and len(found) > 1):
+        return one
+    again = (found[1] if len(found) > 1 and not driven else found[0]).theta.copy()
+    if driven:
+        again[:constants] = 0.0
+    other = fitted(stage, model, again, scale=scale, steps_max=STEPS_FIRST)
+    return min((one, other), key=lambda f: f.left_fit.excess())
+
+
+def _chosen(accepted: list[Tried]) -> tuple[Tried, tuple[Effected, ...]]:
+    """The best one, and what cannot be told from it; among equals the simplest, the machine before its sensors."""
+    best = max(accepted, key=lambda t: t.over.gain if t.over else 0.0)
+    assert best.found is not None
+    equals = [t for t in accepted if t.found is not None and (t is best or _equal(t.found, best.found))]
+    chosen = min(equals, key=_plainness)
+    return chosen, tuple(t.effected for t in sorted(equals, key=_plainness) if t is not chosen)
+
+
+def _equal(one: Fitted, best: Fitted) -> bool:
+    over = advantage(one.left, best.left)
+    return over.gain < max(2.0 * over.error, 0.02) and over.gain < 0.25
+
+
+def _plainness(tried: Tried) -> tuple[int, int, float]:
+    effect = effect_named(tried.effected.effect)
+    sensing = effect.name in SENSING or (effect.name == "gravity" and tried.effected.on != "z")
+    return (len(effect.parameters), int(sensing), -(tried.over.gain if tried.over else 0.0))
+
+
+def _pair(stage: Stage, parent: Fitted, tried: tuple[Tried, ...], null: Null) -> Fitted | None:
+    """Two effects that only help together."""
+    front = [t for t in sorted(tried, key=lambda t: -t.screened) if t.found is not None][:PAIRS_OF]
+    scale = np.maximum(parent.left_fit.rms(), 1.0)
+    best: Fitted | None = None
+    for one, other in combinations(front, 2):
+        assert one.found is not None and other.found is not None
+        model = one.found.model.with_effect(other.effected)
+        own = other.found.theta[len(parent.theta) :]
+        found = fitted(stage, model, np.concatenate([one.found.theta, own]), scale=scale, steps_max=STEPS_MAX)
+        if best is None or found.left.excess() < best.left.excess():
+            best = found
+    if best is None:
+        return None
+    over = advantage(parent.left, best.left)
+    return best if all(null.exceeded(e, over) for e in best.effects) else None
+
+
+def _pruned(stage: Stage, best: Fitted, null: Null) -> Fitted:
+    """Without the effects that the others have made needless."""
+    for effected in best.effects[:-1]:
+        without = _dropped(stage, best, effected)
+        if not null.exceeded(effected, advantage(without.left, best.left)):
+            best = without
+    return best
+
+
+def _dropped(stage: Stage, best: Fitted, effected: Effected) -> Fitted:
+    """The hypothesis without one of its effects, refitted."""
+    place = dict(best.model.places())[effected]
+    theta = np.delete(best.theta, np.arange(place.start, place.stop))
+    scale = np.maximum(best.left_fit.rms(), 1.0)
+    return fitted(stage, best.model.without(effected), theta, scale=scale, steps_max=STEPS_MAX)
+
+
+def without(explained: Explained) -> Explained:
+    """The same with nothing accepted."""
+    return replace(explained, best=explained.base, rivals={}, evidence={})

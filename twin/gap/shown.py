@@ -1,0 +1,96 @@
+"""What a twin shows beside a recorded run, for judging it: the stages of the search, with the machine as it is and nothing free.
+
+Each stretch of an axis' motion starts from what was measured before it: while an axis sticks, its integrator creeps on an error
+below the sensor's resolution, so the torque of a long rest is chance, and where there is no motion nothing is compared (NaN).
+"""
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.case import Run
+from twin.effects.catalogue import effect_named
+from twin.gap.axis_stage import AxisStage, axis_run_data, standing_of
+from twin.gap.cut_stage import CutStage, cut_runs
+from twin.gap.diagnosis import Effected
+from twin.gap.floors import Floors
+from twin.gap.free import effect_parameters
+from twin.gap.heat_stage import HeatStage, heat_runs
+from twin.gap.stage import Model
+from twin.machine import MachineFile
+from twin.response import check_effects, disturbance_of
+
+Floats = NDArray[np.float64]
+PAIRS = 16
+
+
+def shown(machine: MachineFile, run: Run, floors: Floors) -> dict[str, Floats]:
+    """Column → (n,) of the twin over a recorded run, NaN where it isn't compared.
+
+    Raises EffectError where the machine's effects do not fit it.
+    """
+    check_effects(machine)
+    columns: dict[str, Floats] = {}
+    pushes: dict[str, Floats] = {}
+    for cut in cut_runs(machine, (run,)):
+        stage = CutStage(machine, (cut,), floors)
+        observed = stage.observed[0]
+        model, theta = _sensing(machine, lambda on: on in observed.signals)
+        predicted = np.where(np.isfinite(observed.measured), stage.predict(model, theta, 0)[0], np.nan)
+        columns |= dict(zip(observed.signals, predicted.reshape(len(observed.signals), -1), strict=True))
+        force = stage.force(model, theta, cut)
+        if force is not None:
+            pushes = {"x": -np.asarray(force.mean_force_x_n)[0], "y": -np.asarray(force.mean_force_y_n)[0]}
+    for letter in machine.axes:
+        columns |= _axis(machine, run, floors, letter, pushes.get(letter))
+    if not run.log.axes():
+        for warming in heat_runs(machine, (run,)):
+            heat = HeatStage(machine, (warming,), floors)
+            model, theta = _sensing(machine, lambda on: on == heat.observed[0].signals[0])
+            columns[heat.observed[0].signals[0]] = heat.predict(model, theta, 0)[0]
+    return columns
+
+
+def _axis(machine: MachineFile, run: Run, floors: Floors, letter: str, push: Floats | None) -> dict[str, Floats]:
+    data = axis_run_data((run,), letter, floors, push, fitted=False)
+    if data is None:
+        return {}
+    standing = standing_of(machine, letter)
+    period_s = machine.machine.servo_period_s
+    stage = AxisStage(
+        letter, machine.axes[letter], period_s, (data,), (), disturbance_of(machine), standing=standing, pairs=PAIRS
+    )
+    fixed = {name for name, _ in standing}
+    model, theta = _sensing(machine, lambda on: on.startswith(f"{letter}_"), letter, fixed)
+    observed = stage.observed[0]
+    predicted = stage.predict(model, theta, 0)[0].reshape(len(observed.signals), -1)
+    where = np.concatenate([np.arange(len(data.t_s))[s] for s in data.stretches()])
+    columns = {}
+    for signal, values in zip(observed.signals, predicted, strict=True):
+        column = np.full(len(data.t_s), np.nan)
+        column[where] = values
+        columns[signal] = column
+    if f"{letter}_table_mm" in columns and f"{letter}_pos_mm" in columns:
+        columns[f"{letter}_table_mm"] += columns[f"{letter}_pos_mm"]
+    return columns
+
+
+def _sensing(
+    machine: MachineFile, is_seen: Callable[[str], bool], letter: str = "", fixed: frozenset[str] | set[str] = frozenset()
+) -> tuple[Model, Floats]:
+    """The effects between what is and what is recorded, as a model with nothing free, and its θ, (1, p)."""
+    effects, theta = [], list[float]()
+    for added in machine.effects:
+        sensor = added.effect.startswith("sensor_") and is_seen(added.on)
+        timing = bool(letter) and (added.effect == "clock_drift" or (added.on == letter and added.effect not in fixed))
+        if sensor or timing:
+            effects.append(Effected(added.effect, added.on))
+            values = effect_named(added.effect).checked(added.parameters)
+            theta += [p.theta_of(values[p.name.partition("__")[2]]) for p in effect_parameters(effect_named(added.effect))]
+    return Model((), tuple(effects)), np.array([theta])
+
+
+def shown_by_run(machine: MachineFile, runs: tuple[Run, ...], floors: Floors) -> Mapping[str, Mapping[str, Floats]]:
+    """run → what the twin shows in it."""
+    return {run.name: shown(machine, run, floors) for run in runs}

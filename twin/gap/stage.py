@@ -1,0 +1,131 @@
+"""A stage of the machine as a hypothesis sees it: what was observed there, and what a candidate machine would show.
+
+Stages are diagnosed in the order of the sites, each with everything before it explained or taken from the recording: the cut with
+the spindle's load, each axis, the spindle's heat. What is wrong in one then isn't blamed on the next.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.effects.catalogue import effect_named
+from twin.gap.diagnosis import Effected
+from twin.gap.free import Free, effect_parameters
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Observed:
+    """What a stage shows in one run, its signals one after another.
+
+    measured: (n,), NaN where there is no sample; floor: (n,) what repeated runs differ by; sigma: (n,) of what is compared, less
+    than the floor where repeated runs were averaged; signal: (n,) index into `signals`; block: (n,) number of the time block
+    """
+
+    name: str
+    signals: tuple[str, ...]
+    measured: Floats
+    floor: Floats
+    sigma: Floats
+    signal: NDArray[np.int8]
+    block: Ints
+    fitted: bool
+
+
+class Stage(Protocol):
+    """One stage of one case."""
+
+    @property
+    def name(self) -> str:
+        """What to call it."""
+
+    @property
+    def observed(self) -> tuple[Observed, ...]:
+        """What is compared, run by run."""
+
+    @property
+    def averaged(self) -> int:
+        """Samples that a fit may take together: what is slow shows as well in their mean, and costs less."""
+
+    @property
+    def constants(self) -> tuple[Free, ...]:
+        """The machine's constants that the stage depends on, as far as they are uncertain."""
+
+    @property
+    def candidates(self) -> tuple[Effected, ...]:
+        """The effects that what is observed here can show."""
+
+    def predict(self, model: "Model", theta: Floats, run: int) -> Floats:
+        """What the machine at each row of θ, (lanes, p), shows in run number `run`, (lanes, n)."""
+
+    def first_guesses(self, candidate: Effected) -> tuple[dict[str, float], ...]:
+        """Sets of values to start an effect's parameters from, where the recordings suggest them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Model:
+    """A hypothesis: the machine with some effects in it, its constants free within their uncertainty."""
+
+    constants: tuple[Free, ...]
+    effects: tuple[Effected, ...]
+
+    @property
+    def free(self) -> tuple[Free, ...]:
+        """All free numbers: the constants, then the parameters of each effect."""
+        return self.constants + tuple(p for e in self.effects for p in effect_parameters(effect_named(e.effect)))
+
+    def places(self) -> tuple[tuple[Effected, slice], ...]:
+        """Where in θ the parameters of each effect are."""
+        at, places = len(self.constants), []
+        for effected in self.effects:
+            count = len(effect_named(effected.effect).parameters)
+            places.append((effected, slice(at, at + count)))
+            at += count
+        return tuple(places)
+
+    def null_theta(self) -> Floats:
+        """θ at which no effect is there."""
+        return np.zeros(len(self.free))
+
+    def values(self, theta: Floats) -> dict[Effected, dict[str, Floats]]:
+        """The parameters of each effect at each row of θ, name → (lanes,)."""
+        free = self.free
+        found: dict[Effected, dict[str, Floats]] = {}
+        for effected, place in self.places():
+            names = [p.name for p in effect_named(effected.effect).parameters]
+            found[effected] = {
+                name: np.atleast_1d(free[i].value(theta[..., i]))
+                for name, i in zip(names, range(place.start, place.stop), strict=True)
+            }
+        return found
+
+    def factors(self, theta: Floats) -> dict[str, Floats]:
+        """The factor on each constant at each row of θ."""
+        return {p.name: np.atleast_1d(p.value(theta[..., i])) for i, p in enumerate(self.constants)}
+
+    def with_effect(self, effected: Effected) -> "Model":
+        """The same with one effect more."""
+        return Model(self.constants, (*self.effects, effected))
+
+    def without(self, effected: Effected) -> "Model":
+        """The same with one effect less."""
+        return Model(self.constants, tuple(e for e in self.effects if e != effected))
+
+
+def observed_of(name: str, parts: Sequence[tuple[str, Floats, Floats, Floats, Ints]], fitted: bool) -> Observed:
+    """From (signal, measured, floor, sigma, block) of each signal."""
+    return Observed(
+        name,
+        tuple(p[0] for p in parts),
+        np.concatenate([p[1] for p in parts]),
+        np.concatenate([p[2] for p in parts]),
+        np.concatenate([p[3] for p in parts]),
+        np.concatenate([np.full(len(p[1]), i, dtype=np.int8) for i, p in enumerate(parts)]),
+        np.concatenate([p[4] for p in parts]),
+        fitted,
+    )

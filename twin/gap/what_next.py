@@ -1,0 +1,43 @@
+"""The next experiment of a diagnosis: between effects that can't be told apart, or for a remainder without a name."""
+
+from collections.abc import Sequence
+
+from twin.gap.diagnosis import Effected, NextExperiment
+from twin.gap.envelope import envelope_of
+from twin.gap.experiment import next_experiment
+from twin.gap.plan import Ground
+from twin.gap.refitted import with_effects
+from twin.gap.verdict import Judged
+from twin.gap_table import measured_signals
+from twin.machine import MachineFile
+
+RIVALS_MAX = 3
+
+
+def what_next(ground: Ground, before: MachineFile, after: MachineFile, stages: Sequence[Judged]) -> NextExperiment | None:
+    """The experiment that would say most; None where nothing is open."""
+    measured = frozenset(s for run in ground.runs for s in measured_signals(run.log))
+    floors = {
+        signal: min(float(ground.floors.of(run.log, signal).min()) for run in ground.runs if run.log.has(signal))
+        for signal in measured
+    }
+    for stage in stages:
+        for effected, rivals in stage.explained.rivals.items():
+            hypotheses = _hypotheses(before, after, stage, effected, rivals[:RIVALS_MAX])
+            if len(hypotheses) > 1:
+                return next_experiment(hypotheses, measured, envelope_of(run.log for run in ground.runs), floors)
+    return None
+
+
+def _hypotheses(
+    before: MachineFile, after: MachineFile, stage: Judged, effected: Effected, rivals: tuple[Effected, ...]
+) -> list[tuple[Effected, MachineFile]]:
+    tried = {t.effected: t.found for t in stage.explained.tried}
+    kept = tuple(e for e in after.effects if (e.effect, e.on) != (effected.effect, effected.on))
+    hypotheses = [(effected, after)]
+    for rival in rivals:
+        found = tried.get(rival)
+        if found is not None and rival in found.values:
+            bare = after.model_copy(update={"effects": kept})
+            hypotheses.append((rival, with_effects(bare, [(rival, found.values[rival])])))
+    return hypotheses

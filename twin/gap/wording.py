@@ -1,0 +1,98 @@
+"""Signals, regimes and figures in the words of the shop floor, for sentences."""
+
+import math
+
+from twin.runlog import AXIS_COLUMN
+
+MINUS = "−"
+COLUMN_WORDS = {"pos_mm": "position", "table_mm": "table position", "torque_a": "torque", "ref_mm": "reference"}
+SIGNAL_WORDS = {
+    "force_x_n": "the cutting force in X",
+    "force_y_n": "the cutting force in Y",
+    "spindle_load_pct": "the spindle load",
+    "spindle_power_kw": "the spindle power",
+    "spindle_temp_c": "the spindle temperature",
+    "feed_mm_min": "the feed",
+    "vibration_rms_g": "the vibration",
+}
+REGIME_WORDS = {
+    "rest": "at standstill",
+    "reversal": "at reversals",
+    "acceleration": "while it accelerates",
+    "constant speed -": f"at constant speed in {MINUS}",
+    "constant speed +": "at constant speed in +",
+    "rapid": "at rapid",
+    "tool change": "during tool changes",
+    "cutting": "while cutting",
+    "air": "in air",
+    "dwell": "during dwells",
+    "spindle ramp": "while the spindle changes speed",
+    "warm-up": "while the spindle turns",
+    "cool-down": "while the spindle stands",
+    "run": "over the run",
+}
+GROUPS = {"pos_mm": "position", "table_mm": "position", "torque_a": "torque"}
+SINGLE_GROUPS = {"force_x_n": "force", "force_y_n": "force", "spindle_load_pct": "load", "spindle_temp_c": "temperature"}
+
+
+def signal_words(signal: str) -> str:
+    """A signal in words.
+
+    >>> signal_words("z_torque_a"), signal_words("spindle_temp_c")
+    ('the Z torque', 'the spindle temperature')
+    """
+    match = AXIS_COLUMN.match(signal)
+    return f"the {match[1].upper()} {COLUMN_WORDS[match[2]]}" if match else SIGNAL_WORDS.get(signal, signal)
+
+
+def regime_words(regime: str) -> str:
+    """A regime in words that go after those of a signal."""
+    return REGIME_WORDS.get(regime, f"in {regime}")
+
+
+def group_of(signal: str) -> str:
+    """Which signals share a gap: positions, torques, forces, load, temperature; any other is alone.
+
+    >>> group_of("x_table_mm"), group_of("force_y_n"), group_of("vibration_rms_g")
+    ('position', 'force', 'vibration_rms_g')
+    """
+    match = AXIS_COLUMN.match(signal)
+    return GROUPS[match[2]] if match and match[2] in GROUPS else SINGLE_GROUPS.get(signal, signal)
+
+
+def figure(value: float, unit: str) -> str:
+    """A value with its unit to two or three digits; small lengths in µm.
+
+    >>> figure(-0.6123, "A"), figure(0.00332, "mm"), figure(1234.5, "N")
+    ('−0.61 A', '3.3 µm', '1230 N')
+    """
+    if unit == "mm" and abs(value) < 0.1:
+        value, unit = 1000.0 * value, "µm"
+    return f"{digits(value)} {unit}".strip()
+
+
+def digits(value: float) -> str:
+    """A number to two digits, three where it is 100 or more."""
+    if value == 0.0 or not math.isfinite(value):
+        return f"{value:.0f}"
+    places = (3 if abs(value) >= 99.5 else 2) - 1 - math.floor(math.log10(abs(value)))
+    rounded = round(value, places)
+    return f"{rounded:.{max(places, 0)}f}".replace("-", MINUS)
+
+
+def times_floor(size: float) -> str:
+    """A size in floors.
+
+    >>> times_floor(12.34), times_floor(1.26)
+    ('12 times what repeats', '1.3 times what repeats')
+    """
+    return f"{digits(size)} times what repeats"
+
+
+def percent(part: float) -> str:
+    """A part in whole percent, small ones as less than one.
+
+    >>> percent(0.412), percent(0.001)
+    ('41 %', 'less than 1 %')
+    """
+    return f"{100.0 * part:.0f} %" if part >= 0.01 else "less than 1 %"
