@@ -32,8 +32,10 @@ app = typer.Typer(
     no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, help="A digital twin of CNC machines."
 )
 edge_app = typer.Typer(no_args_is_help=True, help="Turn what a control says into Sparkplug B metrics.")
+gap_app = typer.Typer(no_args_is_help=True, help="The sim-to-real gap: where it lies, what causes it, how far it shrinks.")
 control_app = typer.Typer(no_args_is_help=True, help="Stand in for a control, to develop and test without a machine.")
 app.add_typer(edge_app, name="edge")
+app.add_typer(gap_app, name="gap")
 app.add_typer(control_app, name="simulate-control")
 
 
@@ -165,6 +167,37 @@ def import_(
     _twin().import_recording(recording, out, _console())
 
 
+@gap_app.command("diagnose")
+def gap_diagnose(
+    case: Annotated[Path, typer.Argument(help="The folder with case.toml, machine.toml and the recorded runs")],
+    out: Annotated[Path, typer.Option(help="The folder for diagnosis.json, report.html and twin.toml")],
+    as_json: AsJson = False,
+) -> None:
+    """Say where the gap lies, what causes it, how far it shrinks. Exit code 1: a gap without a name is left."""
+    raise typer.Exit(_gap().diagnose(case, out, as_json=as_json, console=_console()))
+
+
+@gap_app.command("score")
+def gap_score(
+    twin: Annotated[Path, typer.Argument(help="The twin: a machine.toml, or the twin.toml of a diagnosis")],
+    case: Annotated[Path, typer.Argument(help="The folder with the recorded runs")],
+    as_json: AsJson = False,
+) -> None:
+    """Print the gap of any twin on all runs of a case: rms over what repeats, of all signals and by signal."""
+    _gap().score(twin, case, as_json=as_json, console=_console())
+
+
+@gap_app.command("check")
+def gap_check(
+    cases: Annotated[int, typer.Option(help="Machines to draw", min=1)] = 40,
+    seed: Annotated[int, typer.Option(help="Of the machines; another one, other machines", min=0)] = 1,
+    workers: Annotated[int, typer.Option(help="Processes", min=0)] = 2,
+    as_json: AsJson = False,
+) -> None:
+    """The blind check: an independent plant withholds its effects, answers sealed by hash; accuracy over effect size."""
+    raise typer.Exit(_gap().check(cases, seed, workers=workers, as_json=as_json, console=_console()))
+
+
 @edge_app.command("run")
 def edge_run(config: Annotated[Path, typer.Argument(help="The TOML file of one machine")], broker: Broker = None) -> None:
     """Run an edge until SIGTERM or Ctrl-C."""
@@ -246,6 +279,14 @@ def _twin() -> ModuleType:
     except ModuleNotFoundError as missing:
         raise UsageError(f"the twin needs the package {missing.name}; pip install 'cnctwin[twin]' brings it") from None
     return twin_commands
+
+
+def _gap() -> ModuleType:
+    """The commands of the gap, which need what the twin needs."""
+    _twin()
+    from cnctwin import gap_commands
+
+    return gap_commands
 
 
 def _console() -> Console:

@@ -57,13 +57,13 @@ def simulate(program: Path, machine: Path, out: Path | None, *, seed: int | None
         raise UsageError(f"{machine}: {error}") from None
     check_suffix(out)
     text = read_text(program)
-    with _working("simulating"):
+    with working("simulating"):
         try:
             done = simulated(described, text, seed=seed, name=program.name)
         except ProgramError as error:
             raise UsageError(f"{program}: {error}") from None
         if out is not None:
-            _write(lambda: write_run(done.run, out), out)
+            write(lambda: write_run(done.run, out), out)
     summary = summary_of(done)
     if as_json:
         sys.stdout.write(json.dumps(summary | {"notes": done.notes, "out": None if out is None else str(out)}) + "\n")
@@ -121,11 +121,11 @@ def identify(case: Path, out: Path | None, *, free_gains: bool, as_json: bool, c
     The exit code: 1 where nothing could be identified, or the identified machine does not fit what was recorded.
     """
     question = read_case(case)
-    with _working("identifying") as say:
+    with working("identifying") as say:
         found = identification.identify(question, free_gains=free_gains, progress=lambda what: say(f"identifying: {what}"))
     code = 0 if found.estimates and not found.misfits else 1
     if out is not None:
-        _write(lambda: out.write_text(machine_to_toml(found.machine), encoding="utf-8"), out)
+        write(lambda: out.write_text(machine_to_toml(found.machine), encoding="utf-8"), out)
     if as_json:
         sys.stdout.write(json.dumps(identification_json(found) | {"out": None if out is None else str(out)}) + "\n")
         return code
@@ -196,7 +196,7 @@ def import_recording(recording: Path, out: Path, console: Console) -> None:
     for number, run in enumerate(runs, start=1):
         path = out if len(runs) == 1 else out.with_stem(f"{out.stem}-{number}")
         log = run_log(run.columns, str(recording))
-        _write(lambda log=log, path=path: write_run(log, path), path)  # type: ignore[misc]
+        write(lambda log=log, path=path: write_run(log, path), path)  # type: ignore[misc]
         pauses = ", ".join(f"{p.end_s - p.start_s:.0f} s ({p.reason})" for p in run.pauses) or "none"
         table.add_row(str(path), f"{log.t_s[-1]:.0f} s", f"{run.active_s:.0f} s", run.ending.value, pauses)
     console.print(table)
@@ -204,7 +204,7 @@ def import_recording(recording: Path, out: Path, console: Console) -> None:
     console.print(taken, markup=False, highlight=False, soft_wrap=True)
 
 
-def _write(write: Callable[[], object], path: Path) -> None:
+def write(write: Callable[[], object], path: Path) -> None:
     try:
         write()
     except OSError as error:
@@ -212,7 +212,7 @@ def _write(write: Callable[[], object], path: Path) -> None:
 
 
 @contextmanager
-def _working(first: str) -> Iterator[Callable[[str], None]]:
+def working(first: str) -> Iterator[Callable[[str], None]]:
     """Says on stderr what is being done, where that is a terminal."""
     console = Console(stderr=True)
     if not console.is_terminal:
@@ -226,7 +226,7 @@ def _working(first: str) -> Iterator[Callable[[str], None]]:
 
 def compare_methods(case: Path, seed: int, as_json: bool, console: Console) -> None:
     """The reference paper's genetic algorithm with its stated settings, beside least squares, on the same recordings."""
-    with _working("searching with the genetic algorithm"):
+    with working("searching with the genetic algorithm"):
         found = paper.identify_paper(read_case(case), seed, clock=time.perf_counter)
     rows = [asdict(row) for row in found.rows]
     if as_json:

@@ -1,8 +1,11 @@
 """The result of a blind check as text: the curves over size, the targets, and each effect."""
 
+from dataclasses import fields
 from math import inf, isnan
+from typing import Any
 
 from cnctwin.blind_check.check import CheckResult
+from cnctwin.blind_check.rate import Rate
 from cnctwin.blind_check.scoring import JUDGED_FROM, Scored, Scores
 
 ROWS = (
@@ -37,6 +40,48 @@ def table(result: CheckResult) -> str:
         f"diagnoses that failed: {found.failed}",
     ]
     return "\n".join(lines) + "\n"
+
+
+def check_json(result: CheckResult) -> dict[str, Any]:
+    """The result for a program to read; each share with its hits, count and 95 % interval."""
+    found = result.scored
+
+    def plain(scores: Scores) -> dict[str, Any]:
+        values = {f.name: getattr(scores, f.name) for f in fields(scores)}
+        return {name: _rate(v) if isinstance(v, Rate) else None if isnan(v) else v for name, v in values.items()}
+
+    return {
+        "cases": len(result.cases),
+        "seed": result.seed,
+        "seal": result.seal,
+        "salt": result.salt,
+        "judged_from": JUDGED_FROM,
+        "judged": plain(found.judged),
+        "healthy": _rate(found.healthy),
+        "healthy_wrong": _rate(found.healthy_wrong),
+        "by_size": [{"low": low, "high": None if high == inf else high, **plain(s)} for (low, high), s in found.by_size.items()],
+        "by_effect": {name: {"right": _rate(a), "in_class": _rate(b)} for name, (a, b) in found.by_effect.items()},
+        "failed": _rate(found.failed),
+        "seconds_median": found.seconds_median,
+        "seconds_max": found.seconds_max,
+        "seconds": result.seconds,
+    }
+
+
+def _rate(rate: Rate) -> dict[str, Any]:
+    share = None if isnan(rate.share) else rate.share
+    return {"hits": rate.hits, "count": rate.count, "share": share, "low": rate.low, "high": rate.high}
+
+
+def missed(result: CheckResult) -> tuple[str, ...]:
+    """The targets that this check shows to be missed: a whole 95 % interval on the wrong side."""
+    found = result.scored
+    least = {"single_right": 0.95, "single_in_class": 0.99, "outside_unknown": 0.90, "pair_both": 0.80}
+    most = {"single_wrong": 0.02, "outside_wrong": 0.05}
+    said = [name for name, target in least.items() if (r := getattr(found.judged, name)).count and r.high < target]
+    said += [name for name, target in most.items() if (r := getattr(found.judged, name)).count and r.low > target]
+    said += ["healthy"] if found.healthy.count and found.healthy.high < 0.98 else []
+    return tuple(said)
 
 
 def _targets(found: Scored) -> list[str]:

@@ -1,6 +1,7 @@
 """The parts of the answer that are words: causes, candidates, what can't be observed or identified, the verdict in a sentence."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from math import exp, sqrt
 
 import numpy as np
@@ -21,25 +22,41 @@ from twin.runlog import AXIS_COLUMN
 KNOWN_MIN = 0.5
 
 
+def found_effects(stages: Sequence[Judged]) -> list[tuple[Effected, dict[str, float]]]:
+    """The causes of all stages with their parameters; one that several stages found, with the mean of what they found."""
+    found: dict[Effected, list[dict[str, float]]] = {}
+    for stage in stages:
+        for effected, values in stage.explained.best.values.items():
+            found.setdefault(effected, []).append(values)
+    return [(e, {k: float(np.mean([v[k] for v in values])) for k in values[0]}) for e, values in found.items()]
+
+
 def causes_of(stages: Sequence[Judged], shares: Mapping[Effected, float]) -> tuple[Cause, ...]:
     """What was found, largest share first."""
-    causes = []
+    causes: dict[Effected, Cause] = {}
     for stage in stages:
         found = stage.explained
         intervals = parameter_intervals(found.best)
         for effected in found.best.effects:
-            rivals = found.rivals.get(effected, ())
-            causes.append(
-                Cause(
-                    effected.effect,
-                    effected.on,
-                    _probability(found, effected),
-                    intervals[effected],
-                    rivals,
-                    float(f"{shares.get(effected, 0.0):.4g}"),
-                )
-            )
-    return tuple(sorted(causes, key=lambda c: -c.closure))
+            share = float(f"{shares.get(effected, 0.0):.4g}")
+            rivals = tuple(r for r in found.rivals.get(effected, ()) if r not in causes)
+            one = Cause(effected.effect, effected.on, _probability(found, effected), intervals[effected], rivals, share)
+            causes[effected] = one if effected not in causes else _joined(causes[effected], one)
+    return tuple(sorted(causes.values(), key=lambda c: -c.closure))
+
+
+def _joined(one: Cause, other: Cause) -> Cause:
+    """What two stages found of one effect: the mean, and an interval that holds both."""
+    both = {
+        name: Interval(
+            (one.parameters[name].value + other.parameters[name].value) / 2.0,
+            min(one.parameters[name].low, other.parameters[name].low),
+            max(one.parameters[name].high, other.parameters[name].high),
+            one.parameters[name].unit,
+        )
+        for name in one.parameters
+    }
+    return replace(one, probability=max(one.probability, other.probability), parameters=both, indistinguishable_from=())
 
 
 def _probability(found: Explained, effected: Effected) -> float:
@@ -119,7 +136,7 @@ def not_identifiable_of(stages: Sequence[Judged]) -> tuple[str, ...]:
 def sentence_of(verdict: Verdict, stages: Sequence[Judged], causes: Sequence[Cause], gap: GapNumbers) -> str:
     """The verdict, as one would say it."""
     if verdict is Verdict.HEALTHY:
-        return f"Healthy: with its constants refitted within what is stated, the twin is {gap.before:.2g} × what repeated runs differ by."
+        return f"Healthy: with its constants refitted, the twin is {gap.before:.2g} × what repeated runs differ by."
     unknown = [s for s in stages if s.verdict is Verdict.UNKNOWN]
     if not causes:
         where = ", ".join(s.explained.stage.name for s in unknown)

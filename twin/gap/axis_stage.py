@@ -1,8 +1,8 @@
 """An axis: its loops and mechanics from the reference on, beside the recorded position, table and torque.
 
-The axis is simulated stretch by stretch (`twin.regimes.motion_stretches`), each from the torque that was measured before it, as the
-mean over a few courses of the disturbance that the machine has. What the table does is compared against the motor's position, so
-that where the axis came to rest is not counted twice.
+The axis is simulated stretch by stretch (`twin.regimes.motion_stretches`), each from the torque that was measured before it, as
+the mean over a few courses of the disturbance that the machine has. What the table does is compared against the motor's position,
+so that where the axis came to rest is not counted twice.
 """
 
 from collections.abc import Mapping, Sequence
@@ -28,7 +28,7 @@ from twin.runlog import RunLog
 from twin.servo.constants import axis_constants, effect_constants
 from twin.servo.disturbance import Disturbance
 from twin.servo.kernel import axis_quantities
-from twin.servo.run import AxisInput, run_axes
+from twin.servo.run import AxisInput, AxisRun, run_axes
 
 Floats = NDArray[np.float64]
 BLOCK_S = 0.5
@@ -89,6 +89,11 @@ class AxisStage:
         return f"axis {self.letter}"
 
     @property
+    def healthy_rms(self) -> float:
+        """Where a cut pushes it, single teeth decide where it creeps to a stop, and the twin has their mean only."""
+        return 2.0 if any(run.disturbance_n is not None and run.disturbance_n.any() for run in self.runs) else 1.3
+
+    @property
     def averaged(self) -> int:
         """A loop does little within 4 ms."""
         return 4
@@ -133,7 +138,6 @@ class AxisStage:
                 noise = np.sqrt(np.min(floor) ** 2 + np.min(run.floor["pos_mm"]) ** 2)
                 floor = np.full(len(floor), noise)
             known = measured[where]
-            # what is known exactly would decide everything: no sample counts for more than the median one does by four times
             sigma = floor[where] / np.sqrt(run.count)
             parts.append((f"{self.letter}_{output}", known, floor[where], sigma, blocks))
         return observed_of(run.name, parts, run.fitted)
@@ -154,7 +158,7 @@ class AxisStage:
         return np.concatenate(shown, axis=1)
 
     def simulate(self, model: Model, theta: Floats, data: AxisRunData) -> dict[str, Floats]:
-        """The outputs over the stretches one after another, each (lanes, n): what is, before sensors, on the recording's clock."""
+        """The outputs over the stretches one after another, each (lanes, n): before sensors, on the recording's clock."""
         lanes = len(theta)
         values = model.values(theta)
         constants = self._constants(model, theta)
@@ -172,7 +176,15 @@ class AxisStage:
             carried = {k: v.reshape(-1, many)[:lanes, 0] for k, v in run.state.items() if k.startswith("backlash__")}
         return {output: np.concatenate(p, axis=1) for output, p in parts.items()}
 
-    def _run(self, constants, reference, data, courses, stretch, start):  # type: ignore[no-untyped-def]
+    def _run(
+        self,
+        constants: Mapping[str, Floats],
+        reference: Floats,
+        data: AxisRunData,
+        courses: Floats,
+        stretch: slice,
+        start: Mapping[str, Floats],
+    ) -> tuple[AxisRun, int]:
         lanes = len(next(iter(constants.values())))
         many = len(courses)
         ticks = len(data.t_s[stretch])
@@ -203,6 +215,8 @@ class AxisStage:
         base = axis_constants(self.axis)
         parameters = tuple(AxisParameter(p.name, "", True, p.sigma) for p in model.constants)
         constants = constants_at(base, parameters, theta[:, : len(parameters)])
+        if self.axis.screw_lead_mm is None:  # woven in all the same, and times nothing
+            constants["screw_lead_mm"] = np.ones(len(theta))
         given: dict[str, Floats] = {}
         for effect in axis_effects():
             for key, value in effect.null_values().items():

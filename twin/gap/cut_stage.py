@@ -56,6 +56,7 @@ class CutStage:
     left_out: frozenset[str] = frozenset()
     name: str = "cut and spindle"
     averaged: int = 1
+    healthy_rms: float = 1.3
     observed: tuple[Observed, ...] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -84,10 +85,9 @@ class CutStage:
     def candidates(self) -> tuple[Effected, ...]:
         """Effects that forces and load can show."""
         signals = {s for o in self.observed for s in o.signals}
-        found = []
-        for effect in acting(process_quantities()) + acting(spindle_quantities()):
-            if effect.name not in self.left_out | set(self.standing) and set(effect.shows_in) & signals:
-                found.append(Effected(effect.name))
+        there = self.left_out | set(self.standing)
+        here = acting(process_quantities()) + acting(spindle_quantities())
+        found = [Effected(e.name) for e in here if e.name not in there and set(e.shows_in) & signals]
         for effect in catalogue().values():
             if effect.on is On.SIGNAL and effect.name not in self.left_out:
                 found += [Effected(effect.name, signal) for signal in sorted(signals)]
@@ -141,9 +141,10 @@ class CutStage:
         if data.milling is None or self.machine.tool is None:
             return None
         factors = model.factors(theta)
-        constants: dict[str, ArrayLike] = dict(tool_constants(self.machine.tool))
-        for name in ("tangential_coefficient_n_per_mm2", "radial_ratio"):
-            constants[name] = constants[name] * factors.get(f"tool.{name}", np.ones(len(theta)))
+        one = np.ones(len(theta))
+        constants: dict[str, ArrayLike] = {
+            name: value * factors.get(f"tool.{name}", one) for name, value in tool_constants(self.machine.tool).items()
+        }
         effects = acting(process_quantities())
         constants |= self._effects(model, theta, effects)
         return milling_force(
@@ -157,9 +158,10 @@ class CutStage:
     def _load(self, model: Model, theta: Floats, power_w: Floats, rpm: Floats, period_s: float) -> Floats:
         assert self.machine.spindle is not None
         factors = model.factors(theta)
-        constants: dict[str, ArrayLike] = dict(spindle_constants(self.machine.spindle))
-        for name in ("efficiency", "idle_power_kw"):
-            constants[name] = constants[name] * factors.get(f"spindle.{name}", np.ones(len(theta)))
+        one = np.ones(len(theta))
+        constants: dict[str, ArrayLike] = {
+            name: value * factors.get(f"spindle.{name}", one) for name, value in spindle_constants(self.machine.spindle).items()
+        }
         effects = acting(spindle_quantities())
         constants |= self._effects(model, theta, effects)
         return spindle_load_pct(constants, power_w, rpm, period_s=period_s, effects=tuple(e.name for e in effects))

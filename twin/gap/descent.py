@@ -1,10 +1,10 @@
-"""Nonlinear least squares over a simulator that runs many candidates at once: Levenberg and Marquardt with several dampings a step.
+"""Nonlinear least squares over a simulator that runs many candidates at once: Levenberg–Marquardt, several dampings a step.
 
     min Σ ρ(r_i(θ)²) + Σ (θ_j / σ_j)²,   ρ(z) = 2 f² (√(1 + z / f²) − 1),   low ≤ θ ≤ high
 
 Each iteration costs two batches: the slopes (one lane for each free number) and one trial for each damping, of which the best is
-kept. The normal equations are small, so nothing tall is ever decomposed. Free numbers at a bound that the step would leave are held
-for that step (projected Newton: Bertsekas 1982, SIAM J. Control and Optimization 20(2)).
+kept. The normal equations are small, so nothing tall is ever decomposed. Free numbers at a bound that the step would leave are
+held for that step (projected Newton: Bertsekas 1982, SIAM J. Control and Optimization 20(2)).
 """
 
 from collections.abc import Callable
@@ -33,7 +33,7 @@ class Bounds:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Found:
-    """Where the search ended. known: (p,) part of what is known of θ that comes from the data; evaluations: simulated candidates."""
+    """Where the search ended. known: (p,) part of what is known that comes from the data; evaluations: candidates."""
 
     theta: Floats
     covariance: Floats

@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from twin.case import Case, Run
 from twin.errors import CaseError
-from twin.gap.answer import candidates_of, causes_of, not_identifiable_of, not_observable_of, sentence_of
+from twin.gap.answer import candidates_of, causes_of, found_effects, not_identifiable_of, not_observable_of, sentence_of
 from twin.gap.diagnosis import Diagnosed, Diagnosis, Effected, GapNumbers, SignalGap, closure_of
-from twin.gap.inspection import inspected
+from twin.gap.inspection import inspected, slow_effects
 from twin.gap.intervals import closure_interval
 from twin.gap.null import NULL, Null
 from twin.gap.patterns import patterns
-from twin.gap.plan import Ground, explained_stages, ground_of
+from twin.gap.plan import Ground, SideBySide, explained_stages, ground_of
 from twin.gap.refitted import with_constants, with_effects
 from twin.gap.score import Squares, gap_of, squares_of, traces_of, unit_of
 from twin.gap.shares import shapley
@@ -51,25 +51,27 @@ def diagnose(
     null: Null = NULL,
     clock: Callable[[], float] = lambda: 0.0,
     progress: Callable[[str], None] = lambda _: None,
+    side_by_side: SideBySide = map,
 ) -> Diagnosed:
     """The diagnosis of a case.
 
     without: effects that are left out of the catalogue; clock: seconds, to say how long it took
+    side_by_side: as `map`, for stages that do not wait for each other
 
     Raises TwinError where there is nothing that could be diagnosed, in one line.
     """
     began = clock()
     progress("reading the runs")
     checked, notes = inspected(case)
-    ground = ground_of(checked, without)
-    stages = [judged(found, null) for found in explained_stages(ground, progress)]
+    ground = ground_of(checked, without | slow_effects(checked))
+    stages = [judged(found) for found in explained_stages(ground, progress, side_by_side)]
     if not stages:
         raise CaseError(
             f"{case.name}: no run of role fit moves an axis, cuts or warms up beside its reference; nothing to diagnose"
         )
     progress("before and after")
     twins = _twins(ground, checked, stages)
-    causes = tuple(e for s in stages for e in s.explained.best.effects)
+    causes = tuple(dict.fromkeys(e for s in stages for e in s.explained.best.effects))
     shares = shapley(causes, lambda some: _closed(ground, stages, twins, some))
     traces = traces_of(twins.runs, twins.shown["before"], twins.shown["after"], ground.floors)
     verdict = overall(stages)
@@ -101,7 +103,7 @@ def _twins(ground: Ground, case: Case, stages: Sequence[Judged]) -> _Twins:
     for stage in stages:
         before = with_constants(before, stage.explained.stage, stage.explained.base)
         after = with_constants(after, stage.explained.stage, stage.explained.best)
-        after = with_effects(after, stage.explained.best.values.items())
+    after = with_effects(after, found_effects(stages))
     shown = {
         name: shown_by_run(machine, runs, ground.floors)
         for name, machine in (("stated", ground.machine), ("before", before), ("after", after))
@@ -112,7 +114,7 @@ def _twins(ground: Ground, case: Case, stages: Sequence[Judged]) -> _Twins:
 
 def _closed(ground: Ground, stages: Sequence[Judged], twins: _Twins, some: frozenset[Effected]) -> float:
     """What the twin with some of the causes closes of the gap of the one with none."""
-    causes = [e for s in stages for e in s.explained.best.effects]
+    causes = dict(found_effects(stages))
     if not some:
         return 0.0
     if len(some) == len(causes):
@@ -122,7 +124,7 @@ def _closed(ground: Ground, stages: Sequence[Judged], twins: _Twins, some: froze
         for stage in stages:
             found = stage.explained.best if any(e in some for e in stage.explained.best.effects) else stage.explained.base
             machine = with_constants(machine, stage.explained.stage, found)
-            machine = with_effects(machine, [(e, v) for e, v in found.values.items() if e in some])
+        machine = with_effects(machine, [(e, v) for e, v in causes.items() if e in some])
         squares = squares_of(twins.runs, shown_by_run(machine, twins.runs, ground.floors), ground.floors)
     return closure_of(gap_of(twins.squares["before"]), gap_of(squares), 1.0)
 

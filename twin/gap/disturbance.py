@@ -1,8 +1,8 @@
 """How large and how slow the disturbance of a machine is, from how far its repeated runs differ.
 
 For each candidate (σ, τ) the axes are simulated over many courses; the spread that they have in each regime is compared with what
-the repeated runs differ by there, as a Gaussian log-likelihood over the cells. Differences of repeated runs know nothing of the gap
-itself, so this can come before anything is explained.
+the repeated runs differ by there, as a Gaussian log-likelihood over the cells. Differences of repeated runs know nothing of the
+gap itself, so this can come before anything is explained.
 """
 
 from collections.abc import Mapping, Sequence
@@ -74,6 +74,8 @@ def _variances(
         return {output: np.zeros(ticks) for output in COLUMNS.values()}
     axis, period_s = machine.axes[letter], machine.machine.servo_period_s
     constants = {name: np.full(LANES, value) for name, value in axis_constants(axis).items()}
+    if axis.screw_lead_mm is None:
+        constants["screw_lead_mm"] = np.ones(LANES)
     for effect in axis_effects():
         constants |= {f"{effect.name}__{key}": np.full(LANES, value) for key, value in effect.null_values().items()}
     force = disturbance.courses(LANES, ticks, period_s, [7, number])

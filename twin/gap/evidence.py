@@ -2,8 +2,8 @@
 
     T = Σ_signals ln(rms_A / rms_B),   positive where B follows the machine better
 
-A sum of logarithms lets each signal speak in proportion, whatever its floor, as a likelihood with unknown noise does. Its standard
-error is a delete-one jackknife over time blocks, so neighbouring samples don't count as independent evidence.
+A sum of logarithms lets each signal speak in proportion, whatever its floor, as a likelihood with unknown noise does. Its
+standard error is a delete-one jackknife over time blocks, so neighbouring samples don't count as independent evidence.
 """
 
 from dataclasses import dataclass

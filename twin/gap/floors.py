@@ -74,13 +74,12 @@ def lap_of(log: RunLog) -> int:
     if not np.isfinite(values).all() or size == 0.0:
         return 0
     spectrum = np.fft.rfft(values, 2 * len(values))
-    overlap = np.arange(len(values), 0, -1)
-    likeness = np.fft.irfft(spectrum * np.conj(spectrum))[: len(values)] / overlap / size**2
-    longest = 3 * len(values) // 4
-    peaks = [
-        k for k in range(LAP_SAMPLES_MIN, longest) if likeness[k] > 0.5 and likeness[k] >= max(likeness[k - 1], likeness[k + 1])
-    ]
-    for lag in sorted(peaks, key=lambda k: -likeness[k])[:5]:
-        if all(np.sqrt(np.mean((r[lag:] - r[: len(r) - lag]) ** 2)) < 1e-3 * size for r in references):
-            return lag
+    together = np.fft.irfft(spectrum * np.conj(spectrum))[: len(values)]
+    energy = np.concatenate([[0.0], np.cumsum(values**2)])
+    lags = np.arange(LAP_SAMPLES_MIN, 3 * len(values) // 4)
+    apart = energy[len(values) - lags] + energy[-1] - energy[lags] - 2.0 * together[lags]
+    near = np.flatnonzero(apart / (len(values) - lags) < 1e-6 * size**2)
+    lag = int(lags[near[0]]) if len(near) else 0
+    if lag and all(np.sqrt(np.mean((r[lag:] - r[: len(r) - lag]) ** 2)) < 1e-3 * size for r in references):
+        return lag
     return 0

@@ -79,7 +79,7 @@ class Free:
 
 
 def constant(name: str, sigma: float, limit_sigmas: float = 3.0) -> Free:
-    """A factor on a constant of the machine, known to `sigma`: it may not leave what the machine states by more than that allows."""
+    """A factor on a constant of the machine, known to `sigma`: it may not go far from what the machine states."""
     return Free(name, Form.FACTOR, 1.0, 1.0, sigma, -limit_sigmas * sigma, limit_sigmas * sigma)
 
 

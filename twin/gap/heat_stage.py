@@ -49,6 +49,7 @@ class HeatStage:
     left_out: frozenset[str] = frozenset()
     name: str = "spindle heat"
     averaged: int = 2
+    healthy_rms: float = 1.3
     observed: tuple[Observed, ...] = field(init=False)
 
     def __post_init__(self) -> None:

@@ -1,7 +1,7 @@
 """Looks a case over before anything is computed: what is missing, not evenly sampled, too slow, or contradicts itself.
 
-What can be mended is, and said; what cannot be used is left out, and said. Nothing is filled in: between slow samples the reference
-is only taken where it goes on evenly, and only there are samples compared.
+What can be mended is, and said; what cannot be used is left out, and said. Nothing is filled in: between slow samples the
+reference is only taken where it goes on evenly, and only there are samples compared.
 """
 
 from dataclasses import replace
@@ -99,7 +99,7 @@ def _mended(run: Run, case: Case, notes: list[str]) -> Run:
     slow = recorded_s > SLOW * period_s
     if slow:
         notes.append(
-            f"{run.name}: is sampled every {1000 * recorded_s:.4g} ms and the loops tick every {1000 * period_s:.4g} ms: compared "
+            f"{run.name}: is sampled every {1000 * recorded_s:.4g} ms, the loops tick every {1000 * period_s:.4g} ms: compared "
             "where the reference stands or goes on evenly; what happens within a sample is not seen"
         )
     elif not even:

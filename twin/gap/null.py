@@ -15,7 +15,7 @@ from twin.gap.evidence import Advantage
 
 @dataclass(frozen=True, slots=True)
 class Null:
-    """closes: decrease of a signal's mean square, in floors², by candidate; sigmas: of its advantage; rms_typical, rms_worst: of
+    """closes: decrease of a signal's mean square, in floors², by candidate; sigmas: of its advantage; rms_typical: of
     what a healthy twin leaves of a signal, in floors"""
 
     closes: Mapping[str, float] = field(default_factory=dict)
@@ -23,7 +23,6 @@ class Null:
     sigmas: float = 3.0
     sigmas_spread: float = 1.5
     rms_typical: float = 1.1
-    rms_worst: float = 1.3
 
     def exceeded(self, effected: Effected, over: Advantage) -> bool:
         """Whether a candidate helps more than it does on any healthy machine."""

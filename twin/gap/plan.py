@@ -1,6 +1,6 @@
 """The stages of a case, in the order of the sites, and what each needs of those before it."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,16 +9,22 @@ from numpy.typing import NDArray
 from twin.case import Case, Run, RunKind
 from twin.gap.axis_stage import AxisRunData, AxisStage, axis_constants_free, axis_run_data, repeated_groups, standing_of
 from twin.gap.cut_stage import CutStage, cut_runs
+from twin.gap.diagnosis import Effected
 from twin.gap.disturbance import disturbance_of_repeats
 from twin.gap.floors import Floors, repeatability
 from twin.gap.heat_stage import HeatStage, heat_runs
 from twin.gap.search import Explained, explain
+from twin.gap.stage import Stage
 from twin.machine import MachineFile
 from twin.runlog import RunLog
 from twin.servo.disturbance import Disturbance
 
 Floats = NDArray[np.float64]
 Progress = Callable[[str], None]
+SideBySide = Callable[[Callable[[Stage], Explained], Iterable[Stage]], Iterable[Explained]]
+"""As `map`."""
+CLOCK = Effected("clock_drift")
+MANY = 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,23 +57,41 @@ def ground_of(case: Case, left_out: frozenset[str]) -> Ground:
     return Ground(machine, runs, case.repeats(), replace(floors, expected=spread), disturbance, left_out)
 
 
-def explained_stages(ground: Ground, progress: Progress) -> Iterator[Explained]:
-    """Each stage explained in turn: cut and spindle, axes, heat."""
+def explained_stages(ground: Ground, progress: Progress, side_by_side: SideBySide = map) -> list[Explained]:
+    """Each stage explained: cut and spindle first, since its force pushes the axes; then axes and heat, side by side."""
+    found: list[Explained] = []
     forces: dict[str, dict[str, Floats]] = {}
     cuts = cut_runs(ground.machine, ground.runs)
     if any(run.fitted for run in cuts):
         stage = CutStage(ground.machine, cuts, ground.floors, ground.left_out)
-        if stage.observed[0].signals:
-            found = explain(stage, progress=progress)
-            yield found
-            forces = _pushes(stage, found)
-    for letter in ground.machine.axes:
-        axis = axis_stage(ground, letter, forces)
-        if axis is not None:
-            yield explain(axis, progress=progress)
+        if stage.candidates:
+            found.append(explain(stage, progress=progress))
+            forces = _pushes(stage, found[0])
+    stages: list[Stage] = [s for letter in ground.machine.axes if (s := axis_stage(ground, letter, forces)) is not None]
     warmups = heat_runs(ground.machine, tuple(r for r in ground.runs if not r.log.axes()))
     if any(run.fitted for run in warmups):
-        yield explain(HeatStage(ground.machine, warmups, ground.floors, ground.left_out), progress=progress)
+        stages.append(HeatStage(ground.machine, warmups, ground.floors, ground.left_out))
+    found += side_by_side(lambda stage: explain(stage, progress=progress), stages)
+    return with_one_clock(found, progress)
+
+
+def with_one_clock(found: list[Explained], progress: Progress) -> list[Explained]:
+    """A clock is one for all axes: where some that move show it and others do not, it is not the clock, and they are asked again.
+
+    Where all do, a delay of the command that each of them could have instead would be a coincidence.
+    """
+    axes = [e for e in found if isinstance(e.stage, AxisStage)]
+    showing = [e for e in axes if CLOCK in e.best.effects]
+    if not showing or len(axes) < MANY:
+        return found
+    if len(showing) == len(axes):
+        return found
+    again = {
+        id(e): explain(replace(e.stage, left_out=e.stage.left_out | {CLOCK.effect}), progress=progress)
+        for e in showing
+        if isinstance(e.stage, AxisStage)
+    }
+    return [again.get(id(e), e) for e in found]
 
 
 def axis_stage(ground: Ground, letter: str, forces: dict[str, dict[str, Floats]]) -> AxisStage | None:

@@ -127,10 +127,11 @@ class Model:
 
 @dataclass(frozen=True)
 class Fitted:
-    """A fitted model. spread: (effect, parameter) → one standard deviation of its logarithm."""
+    """A fitted model. spread: (effect, parameter) → one standard deviation of its logarithm; cost: what was minimised, s²."""
 
     model: Model
     spread: Mapping[tuple[str, str], float]
+    cost: float
 
     def intervals(self, name: str) -> dict[str, Interval]:
         """The parameters of an effect with their 90 % intervals."""
@@ -164,7 +165,7 @@ def fit(runs: Sequence[Watched], stated: Limits, names: Sequence[str], already: 
         return np.concatenate([*(run.gaps_s(model(x)) for run in runs), PRIOR_S * x / spread])
 
     if not len(spread):
-        return Fitted(model(np.zeros(0)), {})
+        return Fitted(model(np.zeros(0)), {}, 0.0)
     ends = np.array([_ends(p) for _, p in free] + ([_reference_ends()] if moved else []))
     found = least_squares(
         residuals,
@@ -178,7 +179,8 @@ def fit(runs: Sequence[Watched], stated: Limits, names: Sequence[str], already: 
         bounds=(ends[:, 0], ends[:, 1]),
     )
     deviation = _deviation(np.asarray(found.jac), np.asarray(found.fun), spread)
-    return Fitted(model(found.x), {(e.name, p.name): float(s) for (e, p), s in zip(free, deviation, strict=False)})
+    spreads = {(e.name, p.name): float(s) for (e, p), s in zip(free, deviation, strict=False)}
+    return Fitted(model(found.x), spreads, float(found.cost))
 
 
 def _start(free: Sequence[tuple[Effect, Parameter]], moved: bool, near: Model | None) -> Floats:

@@ -3,7 +3,7 @@
 All single effects and all pairs are tried, then larger sets on top of the best. Each is fitted to the runs to learn from; its
 energy is Σ 2 (√(1 + g²) − 1) over windows of 10 s or more of the runs to be judged on, g the gap of a window in seconds: so an
 operator's hand on a knob counts once, and not squared. An effect is needed in a set where the set without it has at least a tenth
-more reducible energy, and where that is more than a healthy machine would give by chance:
+more reducible energy (and three thousandths of the whole), and where that is more than a healthy machine would give by chance:
 
     healthy: what is left of the set, each window's sign drawn anew, on top of the set without the effect. A linear fit of the
     effect to that, parameters of one side kept to their side, gains some energy on the runs judged on; p is how often it gains as
@@ -34,9 +34,10 @@ SHORT_WINDOW_S = 1.0
 ALL_UP_TO = 2
 """Sets of so many effects are all tried; larger ones add to the best so far, for as long as that needs one more."""
 NEEDED = 0.1
+STARTS = 2
 MATERIAL = 0.003
 """Part of the whole reducible energy below which nothing is named: the fit of a larger effect may be off by as much."""
-NOTHING_LEFT = 2.0
+NOTHING_LEFT = 4.0
 """A set that leaves up to this many times the recorder's own energy needs nothing more."""
 SIGNIFICANT = 0.01
 """Of all candidates together: each is held to its part."""
@@ -100,14 +101,15 @@ def search(
     tried: dict[Names, Tried] = {}
 
     def attempt(names: Names) -> None:
-        """Fit a set, beginning at the best of those with one effect less, which are fitted first."""
+        """Fit a set, beginning at the two best with one effect less: at one of them an effect may hide what the other shows."""
         if names in tried:
             return
         for name in sorted(names):
             attempt(names - {name})
-        smaller = [tried[names - {name}] for name in sorted(names)]
+        smaller = sorted((tried[names - {name}] for name in sorted(names)), key=_total)
         progress(f"time: {' with '.join(sorted(names)) or 'as stated'}")
-        fitted = fit(short, stated, sorted(names), already, min(smaller, key=_total).fitted.model if smaller else None)
+        near: list[Model | None] = [one.fitted.model for one in smaller[:STARTS]] or [None]
+        fitted = min((fit(short, stated, sorted(names), already, model) for model in near), key=lambda one: one.cost)
         tried[names] = Tried(names, fitted, _gaps(on, fitted.model))
 
     for pair in combinations(candidates, min(ALL_UP_TO, len(candidates))):

@@ -1,7 +1,7 @@
 """The gap of any twin on recorded runs: rms of twin minus recording over what repeated runs differ by, by signal and of all.
 
-Regimes of a signal repeat differently well (a torque at constant speed ten times better than at a reversal), so each sample counts by
-its own floor:
+Regimes of a signal repeat differently well (a torque at constant speed ten times better than at a reversal), so each sample
+counts by its own floor:
 
     gap / floor = √(mean (error / floor)²),   floor = √(n / Σ 1 / floor²),   gap = √(Σ (error / floor)² / Σ 1 / floor²)
 """
@@ -65,8 +65,8 @@ def squares_of(runs: Sequence[Run], shown: Mapping[str, Mapping[str, Floats]], f
             block = ((log.t_s - log.t_s[0]) / max(BLOCK_S, span / BLOCKS_MAX)).astype(np.intp)[there]
             if len(block):
                 inverse = 1.0 / floor[there] ** 2
-                sums = [np.bincount(block, weights=w) for w in (error[there] ** 2 * inverse, inverse)]
-                parts.setdefault(signal, []).append((sums[0], sums[1], np.bincount(block).astype(np.float64)))
+                ratio, weight = (np.bincount(block, weights=w).astype(np.float64) for w in (error[there] ** 2 * inverse, inverse))
+                parts.setdefault(signal, []).append((ratio, weight, np.bincount(block).astype(np.float64)))
     return {s: Squares(*(np.concatenate([p[k] for p in found]) for k in range(3))) for s, found in parts.items()}
 
 

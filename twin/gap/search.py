@@ -12,14 +12,17 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from twin.effects.catalogue import effect_named
 from twin.gap.diagnosis import Effected
 from twin.gap.evidence import Advantage, advantage
-from twin.gap.fitting import Fitted, Guess, fitted, guesses, sensitivities, settled
+from twin.gap.fitting import Fitted, fitted, settled
 from twin.gap.null import NULL, Null
+from twin.gap.screening import Guess, guesses, sensitivities
 from twin.gap.stage import Model, Stage
 
+Floats = NDArray[np.float64]
 SCREENED_MAX = 9
 CLOSES_LEAST = 0.02
 ALWAYS = frozenset({"torque_limit", "presliding", "load_peak_hold", "second_thermal_mass", "viscous_warmup", "screw_compliance"})
@@ -115,7 +118,7 @@ def _tried(stage: Stage, parent: Fitted, candidates: tuple[Effected, ...], null:
     return tuple(sorted(tried, key=lambda t: -np.inf if t.over is None else t.over.gain, reverse=True))
 
 
-def _best_fit(stage: Stage, parent: Fitted, found: tuple[Guess, ...], scale: np.ndarray) -> Fitted:  # type: ignore[type-arg]
+def _best_fit(stage: Stage, parent: Fitted, found: tuple[Guess, ...], scale: Floats) -> Fitted:
     """From the best guess, and where the parent's constants were driven to their bounds, from the stated ones as well."""
     model = parent.model.with_effect(found[0].effected)
     one = fitted(stage, model, found[0].theta, scale=scale, steps_max=STEPS_FIRST)

@@ -36,7 +36,7 @@ def shown(machine: MachineFile, run: Run, floors: Floors) -> dict[str, Floats]:
     for cut in cut_runs(machine, (run,)):
         stage = CutStage(machine, (cut,), floors)
         observed = stage.observed[0]
-        model, theta = _sensing(machine, lambda on: on in observed.signals)
+        model, theta = _sensing(machine, set(observed.signals).__contains__)
         predicted = np.where(np.isfinite(observed.measured), stage.predict(model, theta, 0)[0], np.nan)
         columns |= dict(zip(observed.signals, predicted.reshape(len(observed.signals), -1), strict=True))
         force = stage.force(model, theta, cut)
@@ -47,7 +47,7 @@ def shown(machine: MachineFile, run: Run, floors: Floors) -> dict[str, Floats]:
     if not run.log.axes():
         for warming in heat_runs(machine, (run,)):
             heat = HeatStage(machine, (warming,), floors)
-            model, theta = _sensing(machine, lambda on: on == heat.observed[0].signals[0])
+            model, theta = _sensing(machine, set(heat.observed[0].signals).__contains__)
             columns[heat.observed[0].signals[0]] = heat.predict(model, theta, 0)[0]
     return columns
 

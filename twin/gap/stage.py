@@ -53,6 +53,10 @@ class Stage(Protocol):
         """Samples that a fit may take together: what is slow shows as well in their mean, and costs less."""
 
     @property
+    def healthy_rms(self) -> float:
+        """What a healthy machine's twin leaves of a signal at worst, in floors."""
+
+    @property
     def constants(self) -> tuple[Free, ...]:
         """The machine's constants that the stage depends on, as far as they are uncertain."""
 

@@ -1,7 +1,7 @@
 """The verdict: what may be said of what was found.
 
-A stage whose gap was hardly closed has no named cause: an effect that explains a half of a gap is more often the next best shape than
-the truth. What a healthy twin leaves is in `twin.gap.null`.
+A stage whose gap was hardly closed has no named cause: an effect that explains a half of a gap is more often the next best shape
+than the truth. What a healthy twin leaves at worst, each stage knows.
 """
 
 from dataclasses import dataclass
@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from twin.gap.diagnosis import Effected, Verdict
-from twin.gap.null import Null
 from twin.gap.search import Explained, without
 
 NAMED_MIN = 0.6
@@ -25,11 +24,11 @@ class Judged:
     likeness: tuple[Effected, ...]
 
 
-def judged(explained: Explained, null: Null) -> Judged:
+def judged(explained: Explained) -> Judged:
     """The verdict on one stage."""
     before, after = (e.left.rms() for e in (explained.base, explained.best))
-    gap_before = bool((before > null.rms_worst).any())
-    gap_after = bool((after > null.rms_worst).any())
+    worst = explained.stage.healthy_rms
+    gap_before, gap_after = bool((before > worst).any()), bool((after > worst).any())
     if not explained.best.effects:
         return Judged(explained, Verdict.UNKNOWN if gap_before else Verdict.HEALTHY, ())
     if not gap_after:

@@ -1,0 +1,43 @@
+"""The gap of any twin on all runs of a case."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from twin.case import Case
+from twin.errors import CaseError
+from twin.gap.inspection import inspected
+from twin.gap.plan import ground_of
+from twin.gap.score import gap_of, squares_of, unit_of
+from twin.gap.shown import shown_by_run
+from twin.machine import MachineFile
+
+
+@dataclass(frozen=True, slots=True)
+class SignalScore:
+    """Of one signal, in its unit."""
+
+    rms: float
+    floor: float
+    unit: str
+
+
+@dataclass(frozen=True, slots=True)
+class Score:
+    """gap: rms over the floor of all signals."""
+
+    gap: float
+    by_signal: Mapping[str, SignalScore]
+
+
+def score_of(machine: MachineFile, case: Case) -> Score:
+    """The gap of `machine` on the runs of `case`, over the floor that the runs of the case show.
+
+    Raises CaseError where no run records what the machine could be compared in.
+    """
+    checked, _ = inspected(replace(case, machine=machine))
+    ground = ground_of(checked, frozenset())
+    squares = squares_of(ground.runs, shown_by_run(ground.machine, ground.runs, ground.floors), ground.floors)
+    if not squares:
+        raise CaseError(f"{case.name}: no run records a signal that {machine.machine.name} answers with")
+    by_signal = {s: SignalScore(v.rms(), v.floor(), unit_of(s)) for s, v in squares.items()}
+    return Score(gap_of(squares), by_signal)

@@ -1,0 +1,149 @@
+"""Screens candidates by their signatures: what each would change in what is shown, beside what is left to be explained.
+
+    s = f(θ, φ) − f(θ, 0),   score = 1 − ‖r − S a‖² / ‖r‖²,   with what the parent's free numbers can do projected out of r and S
+
+Cheap, and only good for choosing what to fit and where to start: an effect is never judged by its signature.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.effects.catalogue import effect_named
+from twin.gap.diagnosis import Effected
+from twin.gap.fitting import Fitted
+from twin.gap.free import Form, Free, effect_parameters
+from twin.gap.stage import Model, Stage
+
+Floats = NDArray[np.float64]
+STEP_PROBE = 1e-3
+
+
+def sensitivities(stage: Stage, parent: Fitted) -> list[Floats]:
+    """Slopes of what is shown over the free numbers of a hypothesis, in σ, (n, p), for each run that is fitted."""
+    count = len(parent.theta)
+    moves = STEP_PROBE * np.eye(count)
+    both = np.concatenate([parent.theta + moves, parent.theta - moves])
+    found = []
+    for i, observed in enumerate(stage.observed):
+        if observed.fitted:
+            shown = stage.predict(parent.model, both, i) / observed.sigma
+            found.append(np.nan_to_num((shown[:count] - shown[count:]).T / (2.0 * STEP_PROBE)))
+    return found
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Guess:
+    """A start for an effect. closes: part of the residual's energy that it would take away, were it linear."""
+
+    effected: Effected
+    theta: Floats
+    closes: float
+
+
+def guesses(stage: Stage, parent: Fitted, effected: Effected, slopes: list[Floats]) -> tuple[Guess, ...]:
+    """Where to start the parameters of an effect, best first.
+
+    Each linear parameter is tried at the size that machines show, with the sensitivities of the parent projected out; angles by a
+    pair of signatures a quarter of a turn apart; shapes, and what is infinite where there is no effect, over a grid.
+    """
+    free = effect_parameters(effect_named(effected.effect))
+    suggested = stage.first_guesses(effected)
+    linear = [] if suggested else [i for i, p in enumerate(free) if p.form is Form.LINEAR and not p.is_angle]
+    angle = next((i for i, p in enumerate(free) if p.is_angle), None)
+    together = max(len(linear), 1) * (1 if angle is None else 2)
+    shapes = [_theta(free, s) for s in suggested] or _shapes(free)
+    own = np.concatenate([_probes(shape, free, linear, angle) for shape in shapes])
+    offset = len(parent.theta)
+    theta = np.concatenate([np.tile(parent.theta, (len(own), 1)), own], axis=1)
+    bare = np.concatenate([parent.theta, np.zeros(len(free))])[None, :]
+    model = parent.model.with_effect(effected)
+    residual, signature = _signatures(stage, model, np.concatenate([bare, theta]), slopes, parent)
+    low, high = (np.array([getattr(p, key) for p in free]) for key in ("low", "high"))
+    found = []
+    for first in range(0, len(own), together):
+        columns, guess = signature[:, first : first + together], theta[first].copy()
+        amplitude: Floats = np.ones(together)
+        if linear:
+            gram = columns.T @ columns
+            ridge = 1e-9 * np.eye(together) * max(float(np.trace(gram)), 1e-12)
+            amplitude = np.linalg.solve(gram + ridge, columns.T @ residual)
+            _place(guess, amplitude, offset, linear, angle, theta[first : first + together])
+        left = residual - columns @ amplitude
+        guess[offset:] = np.clip(guess[offset:], low, high)
+        found.append(Guess(effected, guess, 1.0 - float(np.sum(left**2) / max(np.sum(residual**2), 1e-12))))
+    return tuple(sorted(found, key=lambda g: -g.closes))
+
+
+def _probes(shape: Floats, free: tuple[Free, ...], linear: list[int], angle: int | None) -> Floats:
+    """θ of the effect for each signature that is needed at one shape, (signatures, parameters)."""
+    probes = []
+    for i in linear or [-1]:
+        for turn in (0.0,) if angle is None else (0.0, np.pi / 2):
+            one = shape.copy()
+            if i >= 0:
+                one[i] = min(1.0, free[i].high)
+            if angle is not None:
+                one[angle] = turn
+            probes.append(one)
+    return np.array(probes)
+
+
+def _place(guess: Floats, amplitude: Floats, offset: int, linear: list[int], angle: int | None, probes: Floats) -> None:
+    if angle is None:
+        for a, i, probe in zip(amplitude, linear, probes, strict=True):
+            guess[offset + i] = a * probe[offset + i]
+        return
+    along, across = amplitude[:2]
+    guess[offset + linear[0]] = np.hypot(along, across) * probes[0][offset + linear[0]]
+    guess[offset + angle] = np.arctan2(across, along)
+
+
+def _signatures(stage: Stage, model: Model, theta: Floats, slopes: list[Floats], parent: Fitted) -> tuple[Floats, Floats]:
+    """Residual (n,) and what each probe changes (n, probes), with what the parent's free numbers can do about it projected out.
+
+    Constants may not go far from what the machine states, so moves of three of their deviations cost as much as the residual.
+    """
+    residuals, signatures, moves = [], [], []
+    for i, slope in zip([i for i, o in enumerate(stage.observed) if o.fitted], slopes, strict=True):
+        observed = stage.observed[i]
+        shown = stage.predict(model, theta, i)
+        residual = np.nan_to_num((observed.measured - shown[0]) / observed.sigma)
+        weight = 1.0 / np.sqrt(1.0 + (residual / 20.0) ** 2)
+        residuals.append(residual * weight)
+        signatures.append(np.nan_to_num((shown[1:] - shown[0]).T / observed.sigma[:, None]) * weight[:, None])
+        moves.append(slope * weight[:, None])
+    residual = np.concatenate(residuals)
+    deviation = np.array([p.sigma for p in parent.model.free])
+    cost = np.linalg.norm(residual) / 3.0 / deviation
+    basis, _ = np.linalg.qr(np.concatenate([*moves, np.diag(cost)]))
+    probes = theta.shape[0] - 1
+    both = np.zeros((len(residual) + len(deviation), 1 + probes))
+    both[: len(residual), 0], both[len(residual) :, 0] = residual, -cost * parent.theta
+    both[: len(residual), 1:] = np.concatenate(signatures)
+    both -= basis @ (basis.T @ both)
+    return both[:, 0], both[:, 1:]
+
+
+def _theta(free: tuple[Free, ...], values: Mapping[str, float]) -> Floats:
+    """θ of an effect's parameters, given by their own names; the rest 0."""
+    names = [p.name.partition("__")[2] for p in free]
+    return np.array([p.theta_of(values[n]) if n in values else 0.0 for n, p in zip(names, free, strict=True)])
+
+
+def _shapes(free: tuple[Free, ...]) -> list[Floats]:
+    """θ of the parameters that have no linear part, over a grid; the rest 0."""
+    grid = [np.zeros(len(free))]
+    for i, p in enumerate(free):
+        if p.form is Form.INVERSE:
+            values = [0.15, 0.5, 1.5]
+        elif p.name.endswith("__order"):
+            values = [p.theta_of(n) for n in (1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 24.0)]
+        elif p.form is Form.FACTOR:
+            values = [v for v in (-1.4, 0.0, 1.4) if p.low <= v <= p.high]
+        else:
+            continue
+        grid = [np.where(np.arange(len(free)) == i, v, g) for g in grid for v in values]
+    return grid
