@@ -24,6 +24,7 @@ COLUMNS = frozenset(
         *("t_s", "line", "spindle_rpm", "spindle_angle_rad", "spindle_load_pct", "spindle_power_kw", "axial_depth_mm"),
         *("entry_angle_rad", "exit_angle_rad", "force_x_n", "force_y_n", "coolant_on", "ambient_temp_c", "spindle_temp_c"),
         *("vibration_rms_g", "feed_mm_min", "tool_number", "tool_change_active", "cutting_force_peak_n"),
+        *("feed_override_pct", "rapid_override_pct", "spindle_override_pct"),
     }
 )
 TEXT_COLUMNS = frozenset({"exec_state"})

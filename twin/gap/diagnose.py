@@ -5,20 +5,22 @@ floors and disturbance → cut and spindle → axes → heat: constants refitted
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.case import Case, Run
+from twin.case import Case, Run, RunKind
 from twin.errors import CaseError
 from twin.gap.answer import candidates_of, causes_of, found_effects, not_identifiable_of, not_observable_of, sentence_of
 from twin.gap.diagnosis import Diagnosed, Diagnosis, Effected, GapNumbers, SignalGap, closure_of
 from twin.gap.inspection import inspected, slow_effects
 from twin.gap.intervals import closure_interval
+from twin.gap.joined import joined
 from twin.gap.null import NULL, Null
 from twin.gap.patterns import patterns
 from twin.gap.plan import Ground, SideBySide, explained_stages, ground_of
+from twin.gap.program_time import diagnose_programs
 from twin.gap.refitted import with_constants, with_effects
 from twin.gap.score import Squares, gap_of, squares_of, traces_of, unit_of
 from twin.gap.shares import shapley
@@ -61,43 +63,55 @@ def diagnose(
     Raises TwinError where there is nothing that could be diagnosed, in one line.
     """
     began = clock()
+    programs = bool(case.of(RunKind.PROGRAM, "fit"))
+    machine = len(case.of(RunKind.PROGRAM)) < len(case.runs)
+    answers = []
+    if machine:
+        answers.append(_motion(case, without, null, progress, side_by_side))
+    if programs or not machine:
+        answers.append(diagnose_programs(case, without=without, progress=progress))
+    found = answers[0] if len(answers) == 1 else joined(*answers)
+    return replace(found, diagnosis=replace(found.diagnosis, seconds=round(clock() - began, 1)))
+
+
+def _motion(
+    case: Case, without: frozenset[str], null: Null, progress: Callable[[str], None], side_by_side: SideBySide
+) -> Diagnosed:
+    """The diagnosis of all runs but those of kind `program`."""
     progress("reading the runs")
     checked, notes = inspected(case)
     ground = ground_of(checked, without | slow_effects(checked))
-    stages = [judged(found) for found in explained_stages(ground, progress, side_by_side)]
+    stages = [judged(found) for found in explained_stages(ground, progress, side_by_side, null)]
     if not stages:
         raise CaseError(
             f"{case.name}: no run of role fit moves an axis, cuts or warms up beside its reference; nothing to diagnose"
         )
     progress("before and after")
-    twins = _twins(ground, checked, stages)
+    twins = _twins(ground, stages)
     causes = tuple(dict.fromkeys(e for s in stages for e in s.explained.best.effects))
     shares = shapley(causes, lambda some: _closed(ground, stages, twins, some))
     traces = traces_of(twins.runs, twins.shown["before"], twins.shown["after"], ground.floors)
-    verdict = overall(stages)
-    numbers = _numbers(twins)
+    numbers, verdict, named = _numbers(twins), overall(stages), causes_of(stages, shares)
     progress("what next")
-    logs = {run.name: run.log for run in twins.runs}
-    named = causes_of(stages, shares)
     diagnosis = Diagnosis(
         verdict=verdict,
         sentence=sentence_of(verdict, stages, named, numbers),
         where=where(traces),
-        where_after=where(traces, after=True),
-        patterns=patterns(traces, logs, ground.machine),
+        where_after=(left := where(traces, after=True)),
+        patterns=patterns(traces, {run.name: run.log for run in twins.runs}, ground.machine),
         causes=named,
         gap=numbers,
         candidates=candidates_of(stages, null),
         not_observable=not_observable_of(checked, stages, without),
         not_identifiable=not_identifiable_of(stages),
-        next_experiment=what_next(ground, twins.before, twins.after, stages),
+        next_experiment=what_next(ground, twins.before, twins.after, stages, left),
         notes=notes,
-        seconds=round(clock() - began, 1),
+        seconds=0.0,
     )
     return Diagnosed(diagnosis, twins.after, traces)
 
 
-def _twins(ground: Ground, case: Case, stages: Sequence[Judged]) -> _Twins:
+def _twins(ground: Ground, stages: Sequence[Judged]) -> _Twins:
     runs = tuple(r for r in ground.runs if r.entry.role == "check") or ground.runs
     before, after = ground.machine, ground.machine
     for stage in stages:

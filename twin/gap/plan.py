@@ -13,6 +13,7 @@ from twin.gap.diagnosis import Effected
 from twin.gap.disturbance import disturbance_of_repeats
 from twin.gap.floors import Floors, repeatability
 from twin.gap.heat_stage import HeatStage, heat_runs
+from twin.gap.null import NULL, Null
 from twin.gap.search import Explained, explain
 from twin.gap.stage import Stage
 from twin.machine import MachineFile
@@ -57,7 +58,7 @@ def ground_of(case: Case, left_out: frozenset[str]) -> Ground:
     return Ground(machine, runs, case.repeats(), replace(floors, expected=spread), disturbance, left_out)
 
 
-def explained_stages(ground: Ground, progress: Progress, side_by_side: SideBySide = map) -> list[Explained]:
+def explained_stages(ground: Ground, progress: Progress, side_by_side: SideBySide = map, null: Null = NULL) -> list[Explained]:
     """Each stage explained: cut and spindle first, since its force pushes the axes; then axes and heat, side by side."""
     found: list[Explained] = []
     forces: dict[str, dict[str, Floats]] = {}
@@ -65,33 +66,33 @@ def explained_stages(ground: Ground, progress: Progress, side_by_side: SideBySid
     if any(run.fitted for run in cuts):
         stage = CutStage(ground.machine, cuts, ground.floors, ground.left_out)
         if stage.candidates:
-            found.append(explain(stage, progress=progress))
+            found.append(explain(stage, null=null, progress=progress))
             forces = _pushes(stage, found[0])
     stages: list[Stage] = [s for letter in ground.machine.axes if (s := axis_stage(ground, letter, forces)) is not None]
     warmups = heat_runs(ground.machine, tuple(r for r in ground.runs if not r.log.axes()))
     if any(run.fitted for run in warmups):
         stages.append(HeatStage(ground.machine, warmups, ground.floors, ground.left_out))
-    found += side_by_side(lambda stage: explain(stage, progress=progress), stages)
-    return with_one_clock(found, progress)
+    found += side_by_side(lambda stage: explain(stage, null=null, progress=progress), stages)
+    return with_one_clock(found, progress, null)
 
 
-def with_one_clock(found: list[Explained], progress: Progress) -> list[Explained]:
+def with_one_clock(found: list[Explained], progress: Progress, null: Null) -> list[Explained]:
     """A clock is one for all axes: where some that move show it and others do not, it is not the clock, and they are asked again.
 
     Where all do, a delay of the command that each of them could have instead would be a coincidence.
     """
     axes = [e for e in found if isinstance(e.stage, AxisStage)]
     showing = [e for e in axes if CLOCK in e.best.effects]
-    if not showing or len(axes) < MANY:
+    if len(axes) < MANY or len(showing) == len(axes):
         return found
-    if len(showing) == len(axes):
-        return found
-    again = {
-        id(e): explain(replace(e.stage, left_out=e.stage.left_out | {CLOCK.effect}), progress=progress)
-        for e in showing
-        if isinstance(e.stage, AxisStage)
-    }
-    return [again.get(id(e), e) for e in found]
+    settled = []
+    for first in found:
+        stage, answer = first.stage, first
+        if first in showing and isinstance(stage, AxisStage):
+            answer = explain(replace(stage, left_out=stage.left_out | {CLOCK.effect}), null=null, progress=progress)
+        rivals = {e: tuple(r for r in others if r != CLOCK) for e, others in answer.rivals.items()}
+        settled.append(replace(answer, rivals=rivals))
+    return settled
 
 
 def axis_stage(ground: Ground, letter: str, forces: dict[str, dict[str, Floats]]) -> AxisStage | None:

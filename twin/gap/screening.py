@@ -69,7 +69,7 @@ def guesses(stage: Stage, parent: Fitted, effected: Effected, slopes: list[Float
         if linear:
             gram = columns.T @ columns
             ridge = 1e-9 * np.eye(together) * max(float(np.trace(gram)), 1e-12)
-            amplitude = np.linalg.solve(gram + ridge, columns.T @ residual)
+            amplitude = np.asarray(np.linalg.solve(gram + ridge, columns.T @ residual), dtype=np.float64)
             _place(guess, amplitude, offset, linear, angle, theta[first : first + together])
         left = residual - columns @ amplitude
         guess[offset:] = np.clip(guess[offset:], low, high)

@@ -2,11 +2,13 @@
 
 from collections.abc import Sequence
 
-from twin.gap.diagnosis import Effected, NextExperiment
+from twin.gap.axis_stage import AxisStage
+from twin.gap.diagnosis import Cell, Effected, NextExperiment, Verdict
 from twin.gap.envelope import envelope_of
 from twin.gap.experiment import next_experiment
 from twin.gap.plan import Ground
 from twin.gap.refitted import with_effects
+from twin.gap.remainder_experiment import remainder_experiment
 from twin.gap.verdict import Judged
 from twin.gap_table import measured_signals
 from twin.machine import MachineFile
@@ -14,8 +16,10 @@ from twin.machine import MachineFile
 RIVALS_MAX = 3
 
 
-def what_next(ground: Ground, before: MachineFile, after: MachineFile, stages: Sequence[Judged]) -> NextExperiment | None:
-    """The experiment that would say most; None where nothing is open."""
+def what_next(
+    ground: Ground, before: MachineFile, after: MachineFile, stages: Sequence[Judged], left: Sequence[Cell]
+) -> NextExperiment | None:
+    """The experiment that would say most; None where nothing is open. left: where the gap lies that is left"""
     measured = frozenset(s for run in ground.runs for s in measured_signals(run.log))
     floors = {
         signal: min(float(ground.floors.of(run.log, signal).min()) for run in ground.runs if run.log.has(signal))
@@ -26,6 +30,14 @@ def what_next(ground: Ground, before: MachineFile, after: MachineFile, stages: S
             hypotheses = _hypotheses(before, after, stage, effected, rivals[:RIVALS_MAX])
             if len(hypotheses) > 1:
                 return next_experiment(hypotheses, measured, envelope_of(run.log for run in ground.runs), floors)
+    for stage in stages:
+        axis = stage.explained.stage
+        if stage.verdict in (Verdict.UNKNOWN, Verdict.PARTLY) and isinstance(axis, AxisStage):
+            envelope = envelope_of(run.log for run in ground.runs)
+            tried = frozenset(e.effect for e in stage.explained.best.effects)
+            found = remainder_experiment(axis.letter, left, after, measured, envelope, floors, without=tried)
+            if found is not None:
+                return found
     return None
 
 
