@@ -15,18 +15,21 @@ from twin.gap.evidence import Advantage
 
 @dataclass(frozen=True, slots=True)
 class Null:
-    """closes: decrease of a signal's mean square, in floors², by candidate; sigmas: of its advantage; rms_typical: of
+    """closes: decrease of a signal's mean square, in floors², by candidate; share_least: of what is above the floor there that a
+    candidate has to take away; sigmas: of its advantage; rms_typical: of
     what a healthy twin leaves of a signal, in floors"""
 
     closes: Mapping[str, float] = field(default_factory=dict)
     closes_any: float = 0.2
+    share_least: float = 0.05
     sigmas: float = 3.0
     sigmas_spread: float = 1.5
     rms_typical: float = 1.1
 
     def exceeded(self, effected: Effected, over: Advantage) -> bool:
         """Whether a candidate helps more than it does on any healthy machine."""
-        return over.sigmas > self.sigmas and over.closes > self.closes.get(effected.effect, self.closes_any)
+        least = self.closes.get(effected.effect, self.closes_any)
+        return over.sigmas > self.sigmas and over.closes > least and over.share > self.share_least
 
     def p_value(self, over: Advantage) -> float:
         """Of a healthy machine showing so much: one-sided, with the spread that healthy machines have."""

@@ -152,10 +152,12 @@ def _equal(one: Fitted, best: Fitted) -> bool:
     return over.gain < max(2.0 * over.error, 0.02) and over.gain < 0.25
 
 
-def _plainness(tried: Tried) -> tuple[int, int, float]:
-    effect = effect_named(tried.effected.effect)
-    sensing = effect.name in SENSING or (effect.name == "gravity" and tried.effected.on != "z")
-    return (len(effect.parameters), int(sensing), -(tried.over.gain if tried.over else 0.0))
+def _plainness(tried: Tried) -> tuple[bool, int, bool, float]:
+    """The machine's own before its sensors, and what a loop acts on last: a drive does not misread its own command."""
+    effect, on = effect_named(tried.effected.effect), tried.effected.on
+    in_the_loop = effect.name.startswith("sensor_") and on.endswith(("_pos_mm", "_torque_a"))
+    sensing = effect.name in SENSING or (effect.name == "gravity" and on != "z")
+    return (in_the_loop, len(effect.parameters), sensing, -(tried.over.gain if tried.over else 0.0))
 
 
 def _pair(stage: Stage, parent: Fitted, tried: tuple[Tried, ...], null: Null) -> Fitted | None:
