@@ -66,6 +66,18 @@ class Run:
         return self.entry.file
 
 
+@dataclass(frozen=True)
+class RunAtHand(Run):
+    """A run whose recording is at hand, in no file or mended."""
+
+    recording: RunLog
+
+    @property
+    def log(self) -> RunLog:
+        """Its recording."""
+        return self.recording
+
+
 @dataclass(frozen=True, slots=True)
 class Case:
     """The question: a machine and runs of it."""

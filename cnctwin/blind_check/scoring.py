@@ -61,7 +61,7 @@ class Judged:
     @property
     def unknown(self) -> bool:
         """It is said that the cause is not known, and none is named."""
-        return self.given.verdict is Verdict.UNKNOWN and not self.given.causes
+        return self.given.verdict is Verdict.UNKNOWN and not self.given.causes and not self.given.failed
 
     def covered(self) -> tuple[bool, ...]:
         """For each parameter of a rightly named single effect that is said to be identifiable: does its 90 % interval hold it?"""

@@ -1,8 +1,10 @@
 """How much of the gap a diagnosed twin closes on runs of its machine that the diagnosis never had.
 
-Before is what the effects change in a run; what is left is the rms of twin minus recording; both over what repeated runs of the
-same machine differ by, which is all that the twin with the true form can reach.
+Before is what the effects change in a run; what is left is twin minus recording where the twin is compared (`twin.gap.shown`);
+both over what repeated runs of the same machine differ by, which is all that the twin with the true form can reach.
 """
+
+from pathlib import Path
 
 import numpy as np
 
@@ -10,11 +12,11 @@ from cnctwin.blind_check.answer import Answer
 from cnctwin.blind_check.case_folder import UNSEEN, machine_of, physics_with, recorded
 from cnctwin.blind_check.question import Question
 from cnctwin.reference_machine.recording import Columns
-from cnctwin.reference_machine.size import rms_by_signal
+from twin.case import Run, RunAtHand, RunEntry
 from twin.gap.diagnosis import closure_of
+from twin.gap.floors import repeatability
+from twin.gap.shown import shown
 from twin.machine import MachineFile
-from twin.recorded import told_of
-from twin.response import respond
 from twin.runlog import run_log
 
 
@@ -24,21 +26,21 @@ def closure_on_unseen(question: Question, answer: Answer, twin: MachineFile) -> 
     physics = physics_with(machine, answer)
     there, left = 0.0, 0.0
     for kind in question.kinds:
-        run = recorded(machine, physics, kind, UNSEEN)
-        again = [recorded(machine, physics, kind, UNSEEN, seed=seed) for seed in (20, 21)]
-        differ = rms_by_signal([run, *again], [again[0], again[1], run])
-        changed = rms_by_signal([run], [recorded(machine, machine.healthy, kind, UNSEEN)])
-        for name, value in _off(twin, run).items():
-            floor = differ[name] / np.sqrt(2.0)
-            there += (changed[name] / floor) ** 2
-            left += (value / floor) ** 2 - 1.0
+        run = _run(kind, recorded(machine, physics, kind, UNSEEN))
+        again = [_run(kind, recorded(machine, physics, kind, UNSEEN, seed=seed)) for seed in (20, 21)]
+        bare = _run(kind, recorded(machine, machine.healthy, kind, UNSEEN)).log
+        floors = repeatability((), ((run, again[0]), (run, again[1]), (again[0], again[1])), twin)
+        for name, values in shown(twin, run, floors).items():
+            compared, floor = np.isfinite(values) & np.isfinite(run.log[name]), floors.of(run.log, name)
+            there += _mean_square((run.log[name] - bare[name])[compared] / floor[compared])
+            left += _mean_square((values - run.log[name])[compared] / floor[compared]) - 1.0
     return closure_of(np.sqrt(1.0 + there), np.sqrt(1.0 + max(left, 0.0)), 1.0) if there > 1.0 else None
 
 
-def _off(twin: MachineFile, run: Columns) -> dict[str, float]:
-    """Signal → rms of twin minus recording."""
-    log = run_log(run)
-    load = {"spindle_load_pct": log["spindle_load_pct"]} if not log.axes() else None
-    columns = respond(twin, told_of(log, twin), recorded=load).columns
-    names = [name for name in columns if log.has(name) and not (load and name in load) and run[name].dtype == np.float32]
-    return {name: float(np.sqrt(np.nanmean((columns[name] - log[name]) ** 2))) for name in names}
+def _run(kind: str, columns: Columns) -> Run:
+    entry = RunEntry.model_validate({"file": kind, "kind": kind, "role": "check"})
+    return RunAtHand(entry, Path(), run_log(columns))
+
+
+def _mean_square(values: np.ndarray) -> float:
+    return float(np.mean(values**2)) if len(values) else 0.0

@@ -17,6 +17,7 @@ from twin.effects.effect import Effect, On
 from twin.gap.diagnosis import Effected
 from twin.gap.floors import Floors
 from twin.gap.free import Free, constant
+from twin.gap.labels import regime_labels
 from twin.gap.observed_through import Sensing, seen_earlier
 from twin.gap.stage import Model, Observed, observed_of
 from twin.identification.axis_parameters import AxisParameter, constants_at
@@ -44,6 +45,7 @@ class AxisRunData:
     """An axis in one run, or in the mean of repeated ones; (n,) each, as `twin.runlog` has them.
 
     disturbance_n: known force that resists motion in +, or None; measured: output → values; count: of the runs averaged
+    regime: number of the regime (`twin.gap.labels`); rise_k: of the spindle's temperature since the start
     """
 
     name: str
@@ -51,6 +53,8 @@ class AxisRunData:
     reference_mm: Floats
     measured: Mapping[str, Floats]
     floor: Mapping[str, Floats]
+    regime: NDArray[np.int8]
+    rise_k: Floats | None
     disturbance_n: Floats | None
     count: int
     fitted: bool
@@ -110,7 +114,8 @@ class AxisStage:
         for effect in catalogue().values():
             if effect.name in self.left_out or any(effect.name == name for name, _ in self.standing):
                 continue
-            if effect.on is On.AXIS and "temperature_rise_k" not in effect.needs:
+            warm = all(run.rise_k is not None for run in self.runs)
+            if effect.on is On.AXIS and ("temperature_rise_k" not in effect.needs or warm):
                 shown = any(s.replace("{a}", self.letter) == f"{self.letter}_{o}" for s in effect.shows_in for o in self.outputs)
                 known = "screw_lead_mm" not in effect.needs or self.axis.screw_lead_mm is not None
                 found += [Effected(effect.name, self.letter)] if shown and known else []
@@ -139,7 +144,7 @@ class AxisStage:
                 floor = np.full(len(floor), noise)
             known = measured[where]
             sigma = floor[where] / np.sqrt(run.count)
-            parts.append((f"{self.letter}_{output}", known, floor[where], sigma, blocks))
+            parts.append((f"{self.letter}_{output}", known, floor[where], sigma, blocks, run.regime[where]))
         return observed_of(run.name, parts, run.fitted)
 
     def predict(self, model: Model, theta: Floats, run: int) -> Floats:
@@ -151,11 +156,19 @@ class AxisStage:
         for output in self.outputs:
             sensing = Sensing.of(values, f"{self.letter}_{output}")
             modelled = sensing.readings(outputs[output], self.period_s)
-            shown.append(modelled)
+            shown.append(modelled + self._growth(values, data) if output == "table_mm" else modelled)
         at = {output: i for i, output in enumerate(self.outputs)}
         if "table_mm" in at and "pos_mm" in at:
             shown[at["table_mm"]] = shown[at["table_mm"]] - shown[at["pos_mm"]]
         return np.concatenate(shown, axis=1)
+
+    def _growth(self, values: Mapping[Effected, Mapping[str, Floats]], data: AxisRunData) -> Floats:
+        """What the table grows by with the recorded temperature at each row of θ, (lanes, n); 0 where the model has it not."""
+        grown = values.get(Effected("thermal_growth", self.letter))
+        if grown is None or data.rise_k is None:
+            return np.zeros((1, 1))
+        rise_k = np.concatenate([data.rise_k[stretch] for stretch in data.stretches()])
+        return np.asarray(0.001 * np.atleast_1d(grown["um_per_k"])[:, None] * rise_k[None, :])
 
     def simulate(self, model: Model, theta: Floats, data: AxisRunData) -> dict[str, Floats]:
         """The outputs over the stretches one after another, each (lanes, n): before sensors, on the recording's clock."""
@@ -309,7 +322,21 @@ def axis_run_data(
         return None
     measured = {o: np.mean([run.log[f"{letter}_{o}"] for run in group], axis=0) for o in outputs}
     floor = {o: floors.of(log, f"{letter}_{o}") for o in outputs}
-    return AxisRunData(group[0].name, log.t_s, reference, measured, floor, disturbance_n, len(group), fitted)
+    regime = regime_labels(log, f"{letter}_ref_mm", floors.machine)[1]
+    return AxisRunData(
+        group[0].name, log.t_s, reference, measured, floor, regime, _rise_k(log), disturbance_n, len(group), fitted
+    )
+
+
+def _rise_k(log: RunLog) -> Floats | None:
+    """Rise of the recorded temperature, held between samples; its own noise is averaged out over a second."""
+    if not log.has("spindle_temp_c"):
+        return None
+    known = np.isfinite(log["spindle_temp_c"])
+    temperature = np.interp(log.t_s, log.t_s[known], log["spindle_temp_c"][known])
+    count = max(1, min(len(temperature) // 4, round(1.0 / max(float(np.median(np.diff(log.t_s))), 1e-6))))
+    smooth = np.convolve(np.pad(temperature, (count // 2, count - 1 - count // 2), mode="edge"), np.ones(count) / count, "valid")
+    return np.asarray(smooth - smooth[0])
 
 
 def repeated_groups(runs: Sequence[Run], repeats: Sequence[tuple[Run, Run]]) -> tuple[tuple[Run, ...], ...]:

@@ -13,6 +13,7 @@ from twin.effects.effect import Effect, On
 from twin.gap.diagnosis import Effected
 from twin.gap.floors import Floors
 from twin.gap.free import Free, constant
+from twin.gap.labels import regime_labels
 from twin.gap.observed_through import Sensing
 from twin.gap.stage import Model, Observed, observed_of
 from twin.identification.batch_fit import time_blocks
@@ -109,7 +110,7 @@ class CutStage:
             if signal in FORCES and run.milling is not None:
                 measured[~self._compared(run.milling)] = np.nan
             floor = self.floors.of(log, signal)
-            parts.append((signal, measured, floor, floor, blocks))
+            parts.append((signal, measured, floor, floor, blocks, regime_labels(log, signal, self.machine)[1]))
         return observed_of(run.name, parts, run.fitted)
 
     def _compared(self, milling: Milling) -> NDArray[np.bool_]:

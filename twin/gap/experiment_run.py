@@ -121,7 +121,11 @@ def _coolant(planned: Plan, t_s: Floats) -> Floats:
 def shown(machine: MachineFile, trial: Trial) -> Columns:
     """What a machine shows in the rows that count, by signal."""
     courses = COURSES if len(trial.told.t_s) < TICKS_MANY else 1
-    response = respond(cut_down(machine, trial.snippet), trial.told, recorded=trial.recorded, courses=courses)
+    less = cut_down(machine, trial.snippet)
+    # a machine is enabled, and its integrators hold what there is to hold, long before a program starts
+    held = {e.on: e.parameters["force_n"] / less.axes[e.on].newton_per_command for e in less.effects if e.effect == "gravity"}
+    told = replace(trial.told, start={axis: {"integral_a": torque} for axis, torque in held.items()})
+    response = respond(less, told, recorded=trial.recorded, courses=courses)
     kept = trial.recorded.keys() | {"cutting_force_peak_n"}
     return {name: values[trial.counts] for name, values in response.columns.items() if name not in kept}
 

@@ -13,6 +13,7 @@ from twin.gap.stage import Model, Observed, Stage
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 TOLERANCE = 1e-4
+REGIMES_MAX = 8
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -20,11 +21,14 @@ class Left:
     """What a fitted hypothesis leaves on the runs that judge it, in floors.
 
     squares: (blocks, signals) sums of the squared residual over floor²; counts: (blocks, signals) samples
+    cells: (signals, regimes) sums of the squared residual over floor²; cell_counts: (signals, regimes) samples
     """
 
     signals: tuple[str, ...]
     squares: Floats
     counts: Floats
+    cells: Floats
+    cell_counts: Floats
 
     def rms(self) -> Floats:
         """By signal, (signals,); 0 where there is no sample."""
@@ -64,20 +68,26 @@ class Fitted:
 
 
 def left_by(stage: Stage, model: Model, theta: Floats, *, fitted: bool) -> Left:
-    """What the hypothesis at θ leaves on the runs that are fitted, or on those that are not."""
+    """What the hypothesis at θ leaves on the runs that are fitted, or on the others; where there are none, on the fitted."""
     signals = tuple(dict.fromkeys(s for o in stage.observed for s in o.signals))
     squares, counts = [], []
+    cells, cell_counts = np.zeros((len(signals), REGIMES_MAX)), np.zeros((len(signals), REGIMES_MAX))
+    judging = any(not o.fitted and np.isfinite(o.measured).any() for o in stage.observed)
     for number, observed in enumerate(stage.observed):
-        if observed.fitted is fitted:
+        if observed.fitted is (fitted or not judging):
             residual = (stage.predict(model, theta[None, :], number)[0] - observed.measured) / observed.floor
             if fitted:  # the mean of repeated runs is quieter than one of them
                 residual = residual * observed.floor / observed.sigma
             one, count = _by_block(observed, residual, signals)
             squares.append(one)
             counts.append(count)
+            known = np.isfinite(residual)
+            where = (np.array([signals.index(s) for s in observed.signals])[observed.signal][known], observed.regime[known])
+            np.add.at(cells, where, residual[known] ** 2)
+            np.add.at(cell_counts, where, 1.0)
     if not squares:
-        return Left(signals, np.zeros((0, len(signals))), np.zeros((0, len(signals))))
-    return Left(signals, np.concatenate(squares), np.concatenate(counts))
+        return Left(signals, np.zeros((0, len(signals))), np.zeros((0, len(signals))), cells, cell_counts)
+    return Left(signals, np.concatenate(squares), np.concatenate(counts), cells, cell_counts)
 
 
 def _by_block(observed: Observed, residual: Floats, signals: tuple[str, ...]) -> tuple[Floats, Floats]:

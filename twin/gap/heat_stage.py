@@ -14,6 +14,7 @@ from twin.gap.cut_stage import acting
 from twin.gap.diagnosis import Effected
 from twin.gap.floors import Floors
 from twin.gap.free import Free, constant
+from twin.gap.labels import regime_labels
 from twin.gap.observed_through import Sensing
 from twin.gap.stage import Model, Observed, observed_of
 from twin.heat.run import Warming, spindle_temperature_c, thermal_constants, thermal_quantities
@@ -95,7 +96,8 @@ class HeatStage:
     def _observed(self, run: HeatRun) -> Observed:
         floor = self.floors.of(run.log, SIGNAL)
         blocks = time_blocks(run.log.t_s, BLOCK_S)
-        return observed_of(run.name, [(SIGNAL, run.log[SIGNAL], floor, floor, blocks)], run.fitted)
+        regime = regime_labels(run.log, SIGNAL, self.machine)[1]
+        return observed_of(run.name, [(SIGNAL, run.log[SIGNAL], floor, floor, blocks, regime)], run.fitted)
 
     def predict(self, model: Model, theta: Floats, run: int) -> Floats:
         """The temperature at each row of θ, (lanes, n)."""

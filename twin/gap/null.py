@@ -20,7 +20,7 @@ class Null:
     what a healthy twin leaves of a signal, in floors"""
 
     closes: Mapping[str, float] = field(default_factory=dict)
-    closes_any: float = 0.2
+    closes_any: float = 0.35
     share_least: float = 0.05
     sigmas: float = 3.0
     sigmas_spread: float = 1.5

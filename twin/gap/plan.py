@@ -9,13 +9,14 @@ from numpy.typing import NDArray
 from twin.case import Case, Run, RunKind
 from twin.gap.axis_stage import AxisRunData, AxisStage, axis_constants_free, axis_run_data, repeated_groups, standing_of
 from twin.gap.cut_stage import CutStage, cut_runs
-from twin.gap.diagnosis import Effected
+from twin.gap.diagnosis import Effected, Verdict
 from twin.gap.disturbance import disturbance_of_repeats
 from twin.gap.floors import Floors, repeatability
 from twin.gap.heat_stage import HeatStage, heat_runs
 from twin.gap.null import NULL, Null
 from twin.gap.search import Explained, explain
 from twin.gap.stage import Stage
+from twin.gap.verdict import judged
 from twin.machine import MachineFile
 from twin.runlog import RunLog
 from twin.servo.disturbance import Disturbance
@@ -120,9 +121,14 @@ def axis_stage(ground: Ground, letter: str, forces: dict[str, dict[str, Floats]]
 
 
 def _pushes(stage: CutStage, found: Explained) -> dict[str, dict[str, Floats]]:
-    """run → axis → the force of the cut that resists its motion in +, by what the stage has found."""
+    """run → axis → the force of the cut that resists its motion in +: by what the stage has found, or where that explains the cut
+    badly, as the dynamometer recorded it, so that what is left lies downstream."""
     pushes: dict[str, dict[str, Floats]] = {}
+    badly = judged(found).verdict in (Verdict.UNKNOWN, Verdict.PARTLY)
     for run in stage.runs:
+        if badly and run.log.has("force_x_n", "force_y_n"):
+            pushes[run.name] = {a: -np.nan_to_num(run.log[f"force_{a}_n"]) for a in "xy"}
+            continue
         force = stage.force(found.best.model, found.best.theta[None, :], run)
         if force is not None:
             pushes[run.name] = {"x": -np.asarray(force.mean_force_x_n)[0], "y": -np.asarray(force.mean_force_y_n)[0]}

@@ -17,6 +17,7 @@ from twin.gap.free import Free, effect_parameters
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
+Regimes = NDArray[np.int8]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -25,6 +26,7 @@ class Observed:
 
     measured: (n,), NaN where there is no sample; floor: (n,) what repeated runs differ by; sigma: (n,) of what is compared, less
     than the floor where repeated runs were averaged; signal: (n,) index into `signals`; block: (n,) number of the time block
+    regime: (n,) number of the regime (`twin.gap.labels`)
     """
 
     name: str
@@ -34,6 +36,7 @@ class Observed:
     sigma: Floats
     signal: NDArray[np.int8]
     block: Ints
+    regime: Regimes
     fitted: bool
 
 
@@ -121,8 +124,8 @@ class Model:
         return Model(self.constants, tuple(e for e in self.effects if e != effected))
 
 
-def observed_of(name: str, parts: Sequence[tuple[str, Floats, Floats, Floats, Ints]], fitted: bool) -> Observed:
-    """From (signal, measured, floor, sigma, block) of each signal."""
+def observed_of(name: str, parts: Sequence[tuple[str, Floats, Floats, Floats, Ints, Regimes]], fitted: bool) -> Observed:
+    """From (signal, measured, floor, sigma, block, regime) of each signal."""
     return Observed(
         name,
         tuple(p[0] for p in parts),
@@ -131,5 +134,6 @@ def observed_of(name: str, parts: Sequence[tuple[str, Floats, Floats, Floats, In
         np.concatenate([p[3] for p in parts]),
         np.concatenate([np.full(len(p[1]), i, dtype=np.int8) for i, p in enumerate(parts)]),
         np.concatenate([p[4] for p in parts]),
+        np.concatenate([p[5] for p in parts]),
         fitted,
     )

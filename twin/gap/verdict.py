@@ -13,6 +13,9 @@ from twin.gap.search import Explained, without
 
 NAMED_MIN = 0.6
 """Part of a stage's gap that its causes have to close to be named."""
+OWN_PART, OWN_MIN = 0.7, 0.84
+"""Where most of what a cause closes lies, it has to close this much: an effect that is only the next best shape of the true one
+leaves a part of it in the same places, where a second gap lies elsewhere."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +36,7 @@ def judged(explained: Explained) -> Judged:
         return Judged(explained, Verdict.UNKNOWN if gap_before else Verdict.HEALTHY, ())
     if not gap_after:
         return Judged(explained, Verdict.EXPLAINED, ())
-    if closed_part(explained) >= NAMED_MIN:
+    if closed_part(explained) >= NAMED_MIN and closed_where_it_acts(explained) >= OWN_MIN:
         return Judged(explained, Verdict.PARTLY, ())
     return Judged(without(explained), Verdict.UNKNOWN, explained.best.effects)
 
@@ -42,6 +45,18 @@ def closed_part(explained: Explained) -> float:
     """Part of the gap above the floor that is closed, by energy over the floor, all signals together."""
     before, after = (np.sum(np.maximum(e.left.rms() ** 2 - 1.0, 0.0)) for e in (explained.base, explained.best))
     return float(1.0 - after / before) if before > 0.0 else 0.0
+
+
+def closed_where_it_acts(explained: Explained) -> float:
+    """Part of the gap that is closed in those cells (signal × regime) in which most of what was closed lay."""
+    count = np.maximum(explained.base.left.cell_counts, 1.0)
+    before, after = (e.left.cells - count * (e.left.cells > 0) for e in (explained.base, explained.best))
+    before, after = np.maximum(before, 0.0).ravel(), np.maximum(after, 0.0).ravel()
+    closed = before - after
+    order = np.argsort(-closed)
+    enough = np.searchsorted(np.cumsum(closed[order]), OWN_PART * closed[closed > 0].sum()) + 1
+    own = order[:enough]
+    return float(1.0 - after[own].sum() / before[own].sum()) if before[own].sum() > 0.0 else 0.0
 
 
 def overall(stages: list[Judged]) -> Verdict:
