@@ -27,8 +27,16 @@ def found_effects(stages: Sequence[Judged]) -> list[tuple[Effected, dict[str, fl
     found: dict[Effected, list[dict[str, float]]] = {}
     for stage in stages:
         for effected, values in stage.explained.best.values.items():
-            found.setdefault(effected, []).append(values)
+            if not _is_nothing(effected, values):
+                found.setdefault(effected, []).append(values)
     return [(e, {k: float(np.mean([v[k] for v in values])) for k in values[0]}) for e, values in found.items()]
+
+
+def _is_nothing(effected: Effected, values: Mapping[str, float]) -> bool:
+    """Whether a fit ended where the effect is not there: at its null value, or stiffer than its file calls finite."""
+    effect = effect_named(effected.effect)
+    stiff = {p.name for p in effect.parameters if p.null is not None and np.isinf(p.null)}
+    return effect.is_null(values) or any(values[p.name] > p.high for p in effect.parameters if p.name in stiff)
 
 
 def causes_of(stages: Sequence[Judged], shares: Mapping[Effected, float]) -> tuple[Cause, ...]:
@@ -37,7 +45,9 @@ def causes_of(stages: Sequence[Judged], shares: Mapping[Effected, float]) -> tup
     for stage in stages:
         found = stage.explained
         intervals = parameter_intervals(found.best)
-        for effected in found.best.effects:
+        for effected, values in found.best.values.items():
+            if _is_nothing(effected, values):
+                continue
             share = float(f"{shares.get(effected, 0.0):.4g}")
             rivals = tuple(r for r in found.rivals.get(effected, ()) if r not in causes)
             one = Cause(effected.effect, effected.on, _probability(found, effected), intervals[effected], rivals, share)
@@ -143,7 +153,7 @@ def sentence_of(verdict: Verdict, stages: Sequence[Judged], causes: Sequence[Cau
         looks = [str(e) for s in unknown for e in s.likeness]
         partly = f"; it partly looks like {', '.join(looks)}, which does not explain it" if looks else ""
         return f"Unknown: a gap of {gap.before:.3g} × the floor in {where} that no effect of the catalogue explains{partly}."
-    parts = [f"{percent(c.closure)} of the gap comes from {_said(c)}" for c in causes]
+    parts = [f"{percent(c.closure)} {'' if i else 'of the gap comes '}from {_said(c)}" for i, c in enumerate(causes)]
     left = max(0.0, 1.0 - gap.closure)
     rest = "" if verdict is Verdict.EXPLAINED else f"; {percent(left)} remains, cause unknown"
     if verdict is Verdict.PARTLY and unknown:
@@ -153,12 +163,18 @@ def sentence_of(verdict: Verdict, stages: Sequence[Judged], causes: Sequence[Cau
 
 
 def _said(cause: Cause) -> str:
-    name, interval = next(iter(cause.parameters.items()))
-    where = f" on {cause.on}" if cause.on else ""
-    also = (
-        f", not to be told from {', '.join(str(e) for e in cause.indistinguishable_from)}" if cause.indistinguishable_from else ""
-    )
-    return f"{effect_named(cause.effect).name}{where} ({name} {_figure(interval)}{also})"
+    interval = next(iter(cause.parameters.values()))
+    rivals = ", ".join(_in_words(e.effect, e.on if e.on != cause.on else "") for e in cause.indistinguishable_from)
+    return f"{_in_words(cause.effect, cause.on)} ({_figure(interval)}{f'; or {rivals}' if rivals else ''})"
+
+
+def _in_words(effect: str, on: str) -> str:
+    """
+    >>> _in_words("direction_friction", "x"), _in_words("sensor_bias", "z_torque_a")
+    ('direction friction on X', 'sensor bias on z_torque_a')
+    """
+    where = on.upper() if len(on) == 1 else on
+    return f"{effect.replace('_', ' ')}{f' on {where}' if on else ''}"
 
 
 def _figure(interval: Interval) -> str:

@@ -36,6 +36,10 @@ BLOCK_S = 0.5
 COURSES = 2
 """Pairs of courses, each with its opposite."""
 LANES = 32
+UNIT = 1.5
+"""Factor from which a sensor may be in another unit: the search starts there then."""
+NEAR = 20
+"""Samples of a stretch of motion within which one has to say where it starts."""
 OUTPUTS = {"pos_mm": "position_mm", "torque_a": "torque_a", "table_mm": "table_mm"}
 FACTORS = ("mass_kg", "newton_per_command", "coulomb_n", "static_n", "stribeck_velocity_mm_s", "viscous_n_s_per_mm")
 
@@ -130,7 +134,21 @@ class AxisStage:
         if candidate.effect == "torque_limit" and "torque_a" in self.outputs:
             largest = max(float(np.nanmax(np.abs(run.measured["torque_a"]))) for run in self.runs if run.fitted)
             return tuple({"limit_a": f * largest} for f in (1.0, 0.97, 0.9))
+        if candidate.effect == "sensor_scale":
+            scale = self._scale(candidate.on.removeprefix(f"{self.letter}_"))
+            return ({"scale": scale},) if np.isfinite(scale) and not 1.0 / UNIT < scale < UNIT else ()
         return ()
+
+    def _scale(self, output: str) -> float:
+        """What is recorded over what the machine as stated would show, started without the sensor; NaN where it does not say."""
+        data = next(run for run in self.runs if run.fitted)
+        blind = replace(data, measured={k: v for k, v in data.measured.items() if k not in (output, "pos_mm", "table_mm")})
+        shown = self.simulate(Model((), ()), np.zeros((1, 0)), blind)[output][0]
+        recorded = np.concatenate([data.measured[output][s] for s in data.stretches()])
+        known = np.isfinite(recorded) & np.isfinite(shown)
+        does, is_read = (v[known] - np.median(v[known]) for v in (shown, recorded))
+        energy = float(does @ does)
+        return float(does @ is_read) / energy if known.any() and energy > 0.0 else float("nan")
 
     def _observed(self, run: AxisRunData) -> Observed:
         parts = []
@@ -178,6 +196,7 @@ class AxisStage:
         courses = self._courses(len(data.t_s))
         parts: dict[str, list[Floats]] = {output: [] for output in self.outputs}
         carried: dict[str, Floats] = {}
+        own = () if "torque_a" in data.measured else ("integral_a",)  # what nobody has measured goes on as the twin left it
         for stretch in data.stretches():
             start = self._start(values, constants, data, stretch, lanes) | carried
             reference = _late(data.reference_mm[stretch], data, values, self.letter, lanes)
@@ -186,7 +205,7 @@ class AxisStage:
                 whole = run.outputs[OUTPUTS[output]]
                 mean = whole.reshape(-1, many, whole.shape[1]).mean(axis=1)[:lanes]
                 parts[output].append(seen_earlier(mean, data.t_s[stretch], values))
-            carried = {k: v.reshape(-1, many)[:lanes, 0] for k, v in run.state.items() if k.startswith("backlash__")}
+            carried = {k: v.reshape(-1, many)[:lanes, 0] for k, v in run.state.items() if k in own or k.startswith("backlash__")}
         return {output: np.concatenate(p, axis=1) for output, p in parts.items()}
 
     def _run(
@@ -253,8 +272,8 @@ class AxisStage:
     ) -> dict[str, Floats]:
         """The state at the first sample of a stretch, as the sensors of each lane would have it."""
         reference = data.reference_mm[where]
-        position = data.measured.get("pos_mm", data.reference_mm)[where]
-        torque = data.measured["torque_a"][where] if "torque_a" in data.measured else np.zeros(len(reference))
+        position = _near_start(data.measured.get("pos_mm", data.measured.get("table_mm", data.reference_mm))[where], reference)
+        torque = _near_start(data.measured.get("torque_a", np.zeros(len(data.t_s)))[where], np.zeros(len(reference)))
         state = {k: np.full(lanes, v) for k, v in start_state(self.axis, reference, position, torque, self.period_s).items()}
         of_position = Sensing.of(values, f"{self.letter}_pos_mm")
         of_torque = Sensing.of(values, f"{self.letter}_torque_a")
@@ -276,6 +295,16 @@ class AxisStage:
     def with_constants_left(self, left_out: frozenset[str]) -> "AxisStage":
         """The same without some effects in the catalogue."""
         return replace(self, left_out=left_out)
+
+
+def _near_start(values: Floats, instead: Floats) -> Floats:
+    """(n,) with what is missing taken from the nearest samples; `instead` where there is none near the start."""
+    known = np.flatnonzero(np.isfinite(values))
+    if len(known) == len(values):
+        return values
+    if not len(known) or known[0] > NEAR:
+        return instead
+    return np.interp(np.arange(len(values)), known, values[known])
 
 
 def _late(

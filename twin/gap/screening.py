@@ -24,13 +24,14 @@ STEP_PROBE = 1e-3
 def sensitivities(stage: Stage, parent: Fitted) -> list[Floats]:
     """Slopes of what is shown over the free numbers of a hypothesis, in σ, (n, p), for each run that is fitted."""
     count = len(parent.theta)
-    moves = STEP_PROBE * np.eye(count)
-    both = np.concatenate([parent.theta + moves, parent.theta - moves])
+    low, high = (np.array([getattr(p, key) for p in parent.model.free]) for key in ("low", "high"))
+    up, down = (np.minimum(parent.theta + STEP_PROBE, high), np.maximum(parent.theta - STEP_PROBE, low))
+    both = np.concatenate([parent.theta + np.diag(end - parent.theta) for end in (up, down)])
     found = []
     for i, observed in enumerate(stage.observed):
         if observed.fitted:
             shown = stage.predict(parent.model, both, i) / observed.sigma
-            found.append(np.nan_to_num((shown[:count] - shown[count:]).T / (2.0 * STEP_PROBE)))
+            found.append(np.nan_to_num((shown[:count] - shown[count:]).T / np.maximum(up - down, 1e-12)))
     return found
 
 

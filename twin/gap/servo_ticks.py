@@ -1,8 +1,8 @@
 """Puts a recording onto the ticks of the servo loops: one with gaps, with stamps that jitter, or slower than the loops.
 
 Nothing is made up: the reference is interpolated so that the loops can be run through, and what the machine answered is NaN
-where there is no sample. Of a slow recording only samples are kept over which the reference goes on evenly: between them it is not
-known.
+where there is no sample. Of a slow recording only samples are kept over which the reference goes on evenly: between them it is
+not known.
 """
 
 import numpy as np
@@ -53,8 +53,8 @@ def on_servo_ticks(run: Run, log: RunLog, period_s: float, notes: list[str]) -> 
     if even or not _missing_any(log, period_s):
         if abs(recorded_s / period_s - 1.0) > ANOTHER_CLOCK:
             notes.append(
-                f"{run.name}: is sampled every {1000 * recorded_s:.5g} ms, the loops tick every {1000 * period_s:.5g} ms: its clock "
-                "is another one, and its samples are taken to be one a tick"
+                f"{run.name}: is sampled every {1000 * recorded_s:.5g} ms, the loops tick every {1000 * period_s:.5g} ms: its "
+                "clock is another one, and its samples are taken to be one a tick"
             )
         elif not even:
             worst = 1000 * float(np.abs(steps - recorded_s).max())
