@@ -18,7 +18,7 @@ EFFECT = Effect(
     name="acceleration_feedforward",
     site=Site.CONTROLLER,
     on=On.AXIS,
-    parameters=(Parameter("gain", "", 0.0, -1.5, 1.5, 0.3, "1 = the torque that accelerates the stated mass"),),
+    parameters=(Parameter("gain", "", 0.0, 0.0, 1.5, 0.3, "1 = the torque that accelerates the stated mass"),),
     changes={"torque_command_a": torque_command_a},
     shows_in=("{a}_torque_a", "{a}_pos_mm"),
     equation="torque += gain M/k d²ref/dt²",

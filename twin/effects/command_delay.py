@@ -16,7 +16,7 @@ EFFECT = Effect(
     name="command_delay",
     site=Site.REFERENCE,
     on=On.AXIS,
-    parameters=(Parameter("delay_s", "s", 0.0, -0.05, 0.05, 0.002, "age of the reference in the loop"),),
+    parameters=(Parameter("delay_s", "s", 0.0, 0.0, 0.05, 0.002, "age of the reference in the loop"),),
     changes={"reference_time_s": reference_time_s},
     shows_in=("{a}_torque_a", "{a}_pos_mm"),
     equation="ref_seen(t) = ref(t − delay)",

@@ -16,7 +16,7 @@ EFFECT = Effect(
     name="velocity_feedforward",
     site=Site.CONTROLLER,
     on=On.AXIS,
-    parameters=(Parameter("gain", "", 0.0, -1.0, 1.2, 0.3, "1 = the whole velocity"),),
+    parameters=(Parameter("gain", "", 0.0, 0.0, 1.2, 0.3, "1 = the whole velocity"),),
     changes={"velocity_command_mm_s": velocity_command_mm_s},
     shows_in=("{a}_torque_a", "{a}_pos_mm"),
     equation="v_cmd = K_p (ref − pos) + gain dref/dt",

@@ -18,7 +18,7 @@ from twin.gap.diagnosis import Effected
 from twin.gap.floors import Floors
 from twin.gap.free import Free, constant
 from twin.gap.labels import regime_labels
-from twin.gap.observed_through import Sensing, seen_earlier
+from twin.gap.observed_through import Sensing, lags_to_try, seen_earlier
 from twin.gap.stage import Model, Observed, observed_of
 from twin.identification.axis_parameters import AxisParameter, constants_at
 from twin.identification.batch_fit import time_blocks
@@ -134,6 +134,8 @@ class AxisStage:
         if candidate.effect == "torque_limit" and "torque_a" in self.outputs:
             largest = max(float(np.nanmax(np.abs(run.measured["torque_a"]))) for run in self.runs if run.fitted)
             return tuple({"limit_a": f * largest} for f in (1.0, 0.97, 0.9))
+        if candidate.effect == "sensor_lag":
+            return lags_to_try(self.period_s)
         if candidate.effect == "sensor_scale":
             scale = self._scale(candidate.on.removeprefix(f"{self.letter}_"))
             return ({"scale": scale},) if np.isfinite(scale) and not 1.0 / UNIT < scale < UNIT else ()

@@ -14,7 +14,7 @@ from twin.gap.diagnosis import Effected
 from twin.gap.floors import Floors
 from twin.gap.free import Free, constant
 from twin.gap.labels import regime_labels
-from twin.gap.observed_through import Sensing
+from twin.gap.observed_through import Sensing, lags_to_try
 from twin.gap.stage import Model, Observed, observed_of
 from twin.identification.batch_fit import time_blocks
 from twin.machine import MachineFile
@@ -95,7 +95,9 @@ class CutStage:
         return tuple(dict.fromkeys(found))
 
     def first_guesses(self, candidate: Effected) -> tuple[dict[str, float], ...]:
-        """A meter that holds its peaks is not linear in how long."""
+        """A meter that holds its peaks is not linear in how long; nor is a slow one."""
+        if candidate.effect == "sensor_lag":
+            return lags_to_try(self.machine.machine.servo_period_s)
         return tuple({"hold_s": s} for s in (0.15, 0.5, 1.5)) if candidate.effect == "load_peak_hold" else ()
 
     def _observed(self, run: CutRun) -> Observed:

@@ -29,6 +29,8 @@ class Form(Enum):
 
 VAGUE = 30.0
 """Standard deviation of the prior of an effect's parameter, in sizes that machines show: it keeps a fit in bounds, no more."""
+FAR = 0.1
+"""That of a parameter with far bounds, in parts of them: a sensor in another unit is a thousand sizes away."""
 SHAPELESS = 1.5
 """That of the logarithm of what has no null."""
 
@@ -98,4 +100,5 @@ def _parameter(effect: Effect, p: Parameter) -> Free:
     if math.isinf(p.null):
         return Free(name, Form.INVERSE, p.typical, p.null, VAGUE, 0.0, p.typical / p.low, p.unit)
     size = abs(p.typical - p.null) or 0.1 * (p.high - p.low)
-    return Free(name, Form.LINEAR, size, p.null, VAGUE, (p.low - p.null) / size, (p.high - p.null) / size, p.unit)
+    low, high = (p.low - p.null) / size, (p.high - p.null) / size
+    return Free(name, Form.LINEAR, size, p.null, max(VAGUE, FAR * max(-low, high)), low, high, p.unit)

@@ -15,7 +15,7 @@ from twin.gap.diagnosis import Effected
 from twin.gap.floors import Floors
 from twin.gap.free import Free, constant
 from twin.gap.labels import regime_labels
-from twin.gap.observed_through import Sensing
+from twin.gap.observed_through import Sensing, lags_to_try
 from twin.gap.stage import Model, Observed, observed_of
 from twin.heat.run import Warming, spindle_temperature_c, thermal_constants, thermal_quantities
 from twin.identification.batch_fit import time_blocks
@@ -88,7 +88,9 @@ class HeatStage:
         return tuple(found + [Effected(e.name, SIGNAL) for e in sensors])
 
     def first_guesses(self, candidate: Effected) -> tuple[dict[str, float], ...]:
-        """A second mass is not linear in its size."""
+        """A second mass is not linear in its size, nor a slow sensor in its time."""
+        if candidate.effect == "sensor_lag":
+            return lags_to_try(float(np.median(np.diff(self.runs[0].log.t_s))))
         if candidate.effect == "second_thermal_mass":
             return tuple({"conductance_w_per_k": g, "capacity_j_per_k": c} for g in (1.5, 5.0) for c in (1.5e4, 6e4))
         return ()

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from twin.case import Case, Run, RunAtHand, RunKind
 from twin.errors import CaseError
 from twin.gap.at_odds import with_known_cut, without_axes_at_odds
+from twin.gap.cut_stage import cut_runs
+from twin.gap.heat_stage import heat_runs
 from twin.gap.servo_ticks import SlowRun, on_servo_ticks
 from twin.gap_table import measured_signals
 from twin.machine import MachineFile
@@ -22,6 +24,9 @@ CONTRADICTION = 0.3
 """Part of what a signal does by which repeated runs may not differ."""
 LENGTH = 0.02
 """Part of its length by which a repeated run may be longer."""
+TEMPERATURE = "spindle_temp_c"
+UNDRIVEN_S = 60.0
+"""Time for which what heats the spindle may be unknown without being mentioned."""
 HEAT = ("spindle_rpm", "spindle_load_pct", "ambient_temp_c")
 NOT_WHEN_SLOW = frozenset(
     {
@@ -41,9 +46,9 @@ def inspected(case: Case) -> tuple[Case, tuple[str, ...]]:
     runs = tuple(run if run.entry.kind is RunKind.PROGRAM else _usable(run, case.machine, notes) for run in case.runs)
     runs = _repeats_that_agree(Case(case.name, case.machine, runs), notes)
     looked = Case(case.name, case.machine, runs)
-    if all(run.entry.kind is not RunKind.PROGRAM and not measured_signals(run.log) for run in runs):
-        why = notes[0] if notes else f"{runs[0].name}: there are {', '.join(runs[0].log.columns) or 'no columns'}"
-        raise CaseError(f"{case.name}: no run records a signal that could be compared; {why}")
+    if not any(run.entry.kind is RunKind.PROGRAM or _comparable(run, case.machine) for run in runs):
+        there = ", ".join(runs[0].log.columns) or "no other columns"
+        raise CaseError(f"{case.name}: no run can be compared with the machine: {(*notes, f'there are {there}')[0]}")
     if not looked.repeats() and any(run.entry.kind in (RunKind.AIR, RunKind.CUT) for run in runs):
         notes.append("no run was repeated: the floor is what laps of a run or its sensors show, and chance counts as gap")
     if not looked.of(role="check"):
@@ -57,13 +62,26 @@ def slow_effects(case: Case) -> frozenset[str]:
     return NOT_WHEN_SLOW if axes and all(isinstance(run, SlowRun) for run in axes) else frozenset()
 
 
+def _comparable(run: Run, machine: MachineFile) -> bool:
+    """Whether the machine can answer in a signal of the run."""
+    log = run.log
+    axes = any(
+        log.has(f"{a}_ref_mm") and any(log.has(f"{a}_{measured}") for measured in ("pos_mm", "table_mm", "torque_a"))
+        for a in machine.axes
+    )
+    return axes or bool(cut_runs(machine, (run,))) or bool(heat_runs(machine, (run,)))
+
+
 def _usable(run: Run, machine: MachineFile, notes: list[str]) -> Run:
     log = _cleaned(run, notes)
     if not log.axes():
-        missing = [name for name in HEAT if not log.has(name)]
-        if log.has("spindle_temp_c") and missing:
-            notes.append(f"{run.name}: the temperature is not compared without {', '.join(missing)}, which drive it")
+        notes += _heat_unknown(run, log, machine)
         return RunAtHand(run.entry, run.folder, log)
+    for letter in log.axes():
+        if letter not in machine.axes:
+            notes.append(f"{run.name}: axis {letter} is not in the machine's file, and is not compared")
+        elif not log.has(f"{letter}_ref_mm"):
+            notes.append(f"{run.name}: {letter}_ref_mm is not recorded, and axis {letter} is not compared")
     log = without_axes_at_odds(run, log, notes)
     if not log.axes():
         return RunAtHand(run.entry, run.folder, log)
@@ -71,6 +89,23 @@ def _usable(run: Run, machine: MachineFile, notes: list[str]) -> Run:
     if isinstance(ticked, SlowRun):
         return ticked
     return replace(ticked, recording=with_known_cut(run, ticked.log, machine, notes))  # type: ignore[call-arg]
+
+
+def _heat_unknown(run: Run, log: RunLog, machine: MachineFile) -> list[str]:
+    """What keeps the temperature from being compared, or makes it doubtful."""
+    missing = ([] if machine.thermal else ["[thermal] in the machine's file"]) + [name for name in HEAT if not log.has(name)]
+    if not log.has(TEMPERATURE):
+        return [f"{run.name}: {TEMPERATURE} is not recorded, nor is an axis"]
+    if missing:
+        return [f"{run.name}: {TEMPERATURE} is not compared without {', '.join(missing)}"]
+    said = []
+    for name in HEAT:
+        there = np.append(log.t_s[np.isfinite(log[name])], log.t_s[-1])
+        longest = int(np.argmax(np.diff(there))) if len(there) > 1 else 0
+        for_s = float(np.diff(there)[longest]) if len(there) > 1 else 0.0
+        if for_s > UNDRIVEN_S and for_s > 10.0 * float(np.median(np.diff(there))):
+            said.append(f"{run.name}: {name} has no value for {for_s:.0f} s from {there[longest]:.0f} s on; the last one is held")
+    return said
 
 
 def _cleaned(run: Run, notes: list[str]) -> RunLog:

@@ -13,6 +13,11 @@ Floats = NDArray[np.float64]
 Values = Mapping[Effected, Mapping[str, Floats]]
 
 
+def lags_to_try(period_s: float) -> tuple[dict[str, float], ...]:
+    """Time constants of a slow sensor to start from: what one of 50 periods does says little of one of a half."""
+    return tuple({"time_constant_s": n * period_s} for n in (0.5, 2.0, 8.0, 40.0))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Sensing:
     """The sensor of one signal: effect → parameter → (lanes,)."""

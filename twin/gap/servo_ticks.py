@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from twin.case import Run, RunAtHand
 from twin.errors import RunLogError
+from twin.response import period_of
 from twin.runlog import AXIS_COLUMN, RunLog
 
 Floats = NDArray[np.float64]
@@ -51,10 +52,11 @@ def on_servo_ticks(run: Run, log: RunLog, period_s: float, notes: list[str]) -> 
     steps = np.diff(log.t_s)
     even = float(np.abs(steps - recorded_s).max()) <= JITTER * period_s
     if even or not _missing_any(log, period_s):
-        if abs(recorded_s / period_s - 1.0) > ANOTHER_CLOCK:
+        if abs(period_of(log.t_s) / period_s - 1.0) > ANOTHER_CLOCK:
+            every_ms = 1000 * period_of(log.t_s)
             notes.append(
-                f"{run.name}: is sampled every {1000 * recorded_s:.5g} ms, the loops tick every {1000 * period_s:.5g} ms: its "
-                "clock is another one, and its samples are taken to be one a tick"
+                f"{run.name}: is sampled every {every_ms:.5g} ms, the loops tick every {1000 * period_s:.5g} ms: its clock is another "
+                "one, and its samples are taken to be one a tick"
             )
         elif not even:
             worst = 1000 * float(np.abs(steps - recorded_s).max())
