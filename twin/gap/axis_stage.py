@@ -276,17 +276,26 @@ class AxisStage:
         reference = data.reference_mm[where]
         position = _near_start(data.measured.get("pos_mm", data.measured.get("table_mm", data.reference_mm))[where], reference)
         torque = _near_start(data.measured.get("torque_a", np.zeros(len(data.t_s)))[where], np.zeros(len(reference)))
-        state = {k: np.full(lanes, v) for k, v in start_state(self.axis, reference, position, torque, self.period_s).items()}
-        of_position = Sensing.of(values, f"{self.letter}_pos_mm")
-        of_torque = Sensing.of(values, f"{self.letter}_torque_a")
-        state["position_mm"] = of_position.value(state["position_mm"])
-        if self.axis.velocity_integral_gain_a_per_mm > 0.0:
-            state["integral_a"] = of_torque.value(state["integral_a"])
+        read = start_state(self.axis, reference, position, torque, self.period_s)
+        state = {k: np.full(lanes, v) for k, v in read.items()} | self._start_of_loops(values, read, float(reference[0]), lanes)
         held = constants["newton_per_command"] * state["integral_a"] - constants.get("gravity__force_n", 0.0)
         static = np.where(held > 0.0, constants["static_plus_n"], constants["static_minus_n"])
         held = np.clip(held, -static, static)
         state["bristle_mm"] = held / constants["presliding__stiffness_n_per_mm"]
         return state
+
+    def _start_of_loops(
+        self, values: Mapping[Effected, Mapping[str, Floats]], read: Mapping[str, float], reference_mm: float, lanes: int
+    ) -> dict[str, Floats]:
+        """Position and integrals of the loops whose position and torque the sensors of each lane read as `read`."""
+        position = Sensing.of(values, f"{self.letter}_pos_mm").value(np.full(lanes, read["position_mm"]))
+        integral = np.full(lanes, read["integral_a"])
+        if self.axis.velocity_integral_gain_a_per_mm > 0.0:
+            gain = self.axis.velocity_gain_a_s_per_mm + self.axis.velocity_integral_gain_a_per_mm * self.period_s
+            part = gain * self.axis.position_gain_per_s  # of the torque that the position loop asks for
+            torque = integral + part * (reference_mm - read["position_mm"])
+            integral = Sensing.of(values, f"{self.letter}_torque_a").value(torque) - part * (reference_mm - position)
+        return {"position_mm": position, "integral_a": integral}
 
     def _courses(self, ticks: int) -> Floats:
         if self.disturbance is None:

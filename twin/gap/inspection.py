@@ -28,6 +28,10 @@ TEMPERATURE = "spindle_temp_c"
 UNDRIVEN_S = 60.0
 """Time for which what heats the spindle may be unknown without being mentioned."""
 HEAT = ("spindle_rpm", "spindle_load_pct", "ambient_temp_c")
+USUAL = (("spindle_rpm", "rev/min", 150.0), ("spindle_load_pct", "%", 1.0))
+"""What the drives of the heat reach in any warm-up."""
+FEW = 100
+"""Samples below which a signal that does not change is nothing to wonder at."""
 NOT_WHEN_SLOW = frozenset(
     {
         *("presliding", "command_delay", "acceleration_feedforward", "payload", "velocity_feedback_delay", "torque_ripple"),
@@ -98,7 +102,11 @@ def _heat_unknown(run: Run, log: RunLog, machine: MachineFile) -> list[str]:
         return [f"{run.name}: {TEMPERATURE} is not recorded, nor is an axis"]
     if missing:
         return [f"{run.name}: {TEMPERATURE} is not compared without {', '.join(missing)}"]
-    said = []
+    said = [
+        f"{run.name}: {name} is at most {np.nanmax(log[name]):.3g} {unit}; is it in another unit?"
+        for name, unit, least in USUAL
+        if 0.0 < np.nanmax(log[name]) < least
+    ]
     for name in HEAT:
         there = np.append(log.t_s[np.isfinite(log[name])], log.t_s[-1])
         longest = int(np.argmax(np.diff(there))) if len(there) > 1 else 0
@@ -124,6 +132,8 @@ def _cleaned(run: Run, notes: list[str]) -> RunLog:
     cleaned = RunLog(log.t_s - log.t_s[0], columns, log.text, log.ignored, log.source)
     for name in measured_signals(cleaned):
         missing = _missing(columns[name])
+        if len(log) > FEW and np.nanmin(columns[name]) == np.nanmax(columns[name]):
+            notes.append(f"{run.name}: {name} is {np.nanmin(columns[name]):.6g} throughout; is it connected?")
         if missing:
             notes.append(f"{run.name}: {name} has no value in {missing} of {len(log)} samples; they are left out")
     return cleaned

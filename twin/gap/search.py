@@ -34,6 +34,10 @@ ALWAYS = frozenset(
 ROUNDS_MAX = 4
 STEPS_FIRST, STEPS_MAX = 6, 14
 REFINED = 3
+SWAPPED_WITH = 3
+SWAP_SIGMAS = 2.0
+THERE = 1e-4
+"""θ below which an effect is not there."""
 PAIR_GAP = 3.0
 PAIRS_OF = 6
 SENSING = ("sensor_bias", "sensor_scale", "sensor_lag", "clock_drift")
@@ -41,7 +45,7 @@ SENSING = ("sensor_bias", "sensor_scale", "sensor_lag", "clock_drift")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tried:
-    """A candidate on top of a parent. guess: from the screening; found: None where it was screened out"""
+    """A candidate on top of a parent. screened: its score there; found, over: None where it was screened out"""
 
     effected: Effected
     screened: float
@@ -54,7 +58,7 @@ class Explained:
     """What was found in a stage.
 
     base: the machine with its constants refitted; best: with the accepted effects; tried: in the first round, best first
-    rivals: effect → what cannot be told from it; chain: base, then the hypothesis after each effect that was accepted
+    rivals: effect → what cannot be told from it; evidence: effect → its advantage over the same without it
     """
 
     stage: Stage
@@ -71,7 +75,6 @@ def explain(stage: Stage, *, null: Null = NULL, progress: Callable[[str], None] 
     base = settled(stage, fitted(stage, bare, bare.null_theta()))
     best, first = base, tuple[Tried, ...]()
     rivals: dict[Effected, tuple[Effected, ...]] = {}
-    evidence: dict[Effected, Advantage] = {}
     for number in range(ROUNDS_MAX):
         progress(f"{stage.name}, round {number + 1}")
         if number and not _gap_left(best, null):
@@ -86,11 +89,13 @@ def explain(stage: Stage, *, null: Null = NULL, progress: Callable[[str], None] 
             best = pair
             continue
         chosen, equals = _chosen(accepted)
-        assert chosen.found is not None and chosen.over is not None
-        rivals[chosen.effected], evidence[chosen.effected] = equals, chosen.over
+        assert chosen.found is not None
+        rivals[chosen.effected] = equals
         best = _pruned(stage, settled(stage, chosen.found, rounds=1), null)
-    evidence |= {e: advantage(_dropped(stage, best, e).left, best.left) for e in best.effects if len(best.effects) > 1}
-    evidence |= {e: advantage(base.left, best.left) for e in best.effects if len(best.effects) == 1}
+        if len(best.effects) > 1:
+            best = _swapped(stage, best, first)
+    several = len(best.effects) > 1
+    evidence = {e: advantage(_dropped(stage, best, e).left if several else base.left, best.left) for e in best.effects}
     return Explained(stage, base, best, first, {e: r for e, r in rivals.items() if e in best.effects}, evidence)
 
 
@@ -99,7 +104,16 @@ def _gap_left(best: Fitted, null: Null) -> bool:
 
 
 def _accepted(tried: Tried, null: Null) -> bool:
-    return tried.over is not None and tried.found is not None and null.exceeded(tried.effected, tried.over)
+    if tried.over is None or tried.found is None or not null.exceeded(tried.effected, tried.over):
+        return False
+    return _is_there(tried.found, tried.effected)
+
+
+def _is_there(found: Fitted, effected: Effected) -> bool:
+    """Whether the fit did not end where the effect is nothing."""
+    place = dict(found.model.places())[effected]
+    sizes = [i for i in range(place.start, place.stop) if not (found.model.free[i].is_shape or found.model.free[i].is_angle)]
+    return bool((np.abs(found.theta[sizes]) > THERE).any())
 
 
 def _tried(stage: Stage, parent: Fitted, candidates: tuple[Effected, ...], null: Null) -> tuple[Tried, ...]:
@@ -176,6 +190,27 @@ def _pair(stage: Stage, parent: Fitted, tried: tuple[Tried, ...], null: Null) ->
         return None
     over = advantage(parent.left, best.left)
     return best if all(null.exceeded(e, over) for e in best.effects) else None
+
+
+def _swapped(stage: Stage, best: Fitted, first: tuple[Tried, ...]) -> Fitted:
+    """With one of its effects replaced by another one that was good alone, where that is better.
+
+    The first that was taken may have been the best single likeness of two.
+    """
+    others = [t for t in first if t.found is not None and t.effected not in best.effects][:SWAPPED_WITH]
+    scale = np.maximum(best.left_fit.rms(), 1.0)
+    for effected in best.effects[:-1]:
+        for other in others:
+            assert other.found is not None
+            model = best.model.without(effected).with_effect(other.effected)
+            place = dict(best.model.places())[effected]
+            kept = np.delete(best.theta, np.arange(place.start, place.stop))
+            own = other.found.theta[len(other.found.model.constants) :]
+            found = fitted(stage, model, np.concatenate([kept, own]), scale=scale, steps_max=STEPS_FIRST)
+            over = advantage(best.left, found.left)
+            if over.sigmas > SWAP_SIGMAS and over.closes > 0.0 and _is_there(found, other.effected):
+                return settled(stage, found, rounds=1)
+    return best
 
 
 def _pruned(stage: Stage, best: Fitted, null: Null) -> Fitted:

@@ -55,8 +55,8 @@ def on_servo_ticks(run: Run, log: RunLog, period_s: float, notes: list[str]) -> 
         if abs(period_of(log.t_s) / period_s - 1.0) > ANOTHER_CLOCK:
             every_ms = 1000 * period_of(log.t_s)
             notes.append(
-                f"{run.name}: is sampled every {every_ms:.5g} ms, the loops tick every {1000 * period_s:.5g} ms: its clock is another "
-                "one, and its samples are taken to be one a tick"
+                f"{run.name}: is sampled every {every_ms:.5g} ms, the loops tick every {1000 * period_s:.5g} ms: its clock is "
+                "another one, and its samples are taken to be one a tick"
             )
         elif not even:
             worst = 1000 * float(np.abs(steps - recorded_s).max())

@@ -13,6 +13,8 @@ from twin.gap.search import Explained, without
 
 NAMED_MIN = 0.6
 """Part of a stage's gap that its causes have to close to be named."""
+REMAINDER_MAX = 25.0
+"""Floors. Beside a remainder of so many a name means little, whatever it closes."""
 OWN_PART, OWN_MIN = 0.7, 0.84
 """Where most of what a cause closes lies, it has to close this much: an effect that is only the next best shape of the true one
 leaves a part of it in the same places, where a second gap lies elsewhere."""
@@ -36,7 +38,8 @@ def judged(explained: Explained) -> Judged:
         return Judged(explained, Verdict.UNKNOWN if gap_before else Verdict.HEALTHY, ())
     if not gap_after:
         return Judged(explained, Verdict.EXPLAINED, ())
-    if closed_part(explained) >= NAMED_MIN and closed_where_it_acts(explained) >= OWN_MIN:
+    near = bool((after < REMAINDER_MAX).all())
+    if near and closed_part(explained) >= NAMED_MIN and closed_where_it_acts(explained) >= OWN_MIN:
         return Judged(explained, Verdict.PARTLY, ())
     return Judged(without(explained), Verdict.UNKNOWN, explained.best.effects)
 
