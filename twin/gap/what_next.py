@@ -49,7 +49,8 @@ def _hypotheses(
     hypotheses = [(effected, after)]
     for rival in rivals:
         found = tried.get(rival)
-        if found is not None and rival in found.values:
+        there = any((e.effect, e.on) == (rival.effect, rival.on) for e in kept)  # found itself, later on
+        if found is not None and rival in found.values and not there:
             bare = after.model_copy(update={"effects": kept})
             hypotheses.append((rival, with_effects(bare, [(rival, found.values[rival])])))
     return hypotheses
