@@ -65,16 +65,21 @@ def start_of(log: RunLog, letter: str, axis: Axis, period_s: float) -> Mapping[s
 
 
 def start_state(axis: Axis, reference_mm: Floats, position_mm: Floats, torque_a: Floats, period_s: float) -> Mapping[str, float]:
-    """The state at the first of (n,) samples: the mean of a standstill there, else a parabola through the first ones."""
+    """The state at the first of (n,) samples: the mean of a standstill there, else a parabola through the first ones.
+
+    Where there are none, the axis is taken to be where it should be.
+    """
     moving = np.flatnonzero(np.diff(reference_mm) != 0)
     still = int(moving[0]) if len(moving) else len(reference_mm)
     if still >= STILL_MIN or len(reference_mm) < 12:
-        position, velocity, step = _standing_mm(position_mm[: max(still, 1)]), 0.0, 0.0
-        torque = float(np.nanmean(torque_a[: min(max(still, 1), 50)]))
+        here = slice(0, max(still, 1))
+        position, velocity, step = _standing_mm(_known(position_mm[here], reference_mm[:1])), 0.0, 0.0
+        torque = float(np.mean(_known(torque_a[here], np.zeros(1))[:SETTLED]))
     else:
         first = np.arange(12) * period_s
-        _, velocity, position = (float(v) for v in np.polyfit(first, position_mm[:12], 2))
-        torque = float(np.polyfit(first, torque_a[:12], 1)[1])
+        lagging = _filled(position_mm[:12], reference_mm[:12])
+        _, velocity, position = (float(v) for v in np.polyfit(first, lagging, 2))
+        torque = float(np.polyfit(first, _filled(torque_a[:12], np.zeros(12)), 1)[1])
         step = float(reference_mm[1] - reference_mm[0])
     error = axis.position_gain_per_s * (float(reference_mm[0]) - position) - velocity
     integral = torque - axis.velocity_gain_a_s_per_mm * error - axis.velocity_integral_gain_a_per_mm * error * period_s
@@ -87,9 +92,21 @@ def start_state(axis: Axis, reference_mm: Floats, position_mm: Floats, torque_a:
     }
 
 
+def _known(values: Floats, instead: Floats) -> Floats:
+    """The samples that there are; `instead` where there are none."""
+    there = np.isfinite(values)
+    return np.asarray(values[there]) if there.any() else instead
+
+
+def _filled(values: Floats, instead: Floats) -> Floats:
+    """(n,) with what is missing taken from its neighbours; `instead` where there are none."""
+    there = np.flatnonzero(np.isfinite(values))
+    return np.interp(np.arange(len(values)), there, values[there]) if len(there) else instead
+
+
 def _standing_mm(position_mm: Floats) -> float:
     """Where an axis stands whose reference stands: the mean, or that of the first samples where it gave way later on."""
-    first, whole = float(np.nanmean(position_mm[:SETTLED])), float(np.nanmean(position_mm))
+    first, whole = float(np.mean(position_mm[:SETTLED])), float(np.mean(position_mm))
     certain = white_noise(position_mm) / np.sqrt(min(SETTLED, len(position_mm)))
     return first if abs(first - whole) > 5.0 * certain > 0.0 else whole
 

@@ -163,9 +163,19 @@ def sentence_of(verdict: Verdict, stages: Sequence[Judged], causes: Sequence[Cau
 
 
 def _said(cause: Cause) -> str:
-    interval = next(iter(cause.parameters.values()))
+    parameters = effect_named(cause.effect).parameters
+    told = max((p for p in parameters if p.null is not None), key=lambda p: _clearness(cause.parameters[p.name], p.null))
+    figure = _figure(cause.parameters[told.name])
+    size = figure if len(parameters) == 1 else f"{told.name} {figure}"
     rivals = ", ".join(_in_words(e.effect, e.on if e.on != cause.on else "") for e in cause.indistinguishable_from)
-    return f"{_in_words(cause.effect, cause.on)} ({_figure(interval)}{f'; or {rivals}' if rivals else ''})"
+    return f"{_in_words(cause.effect, cause.on)} ({size}{f'; or {rivals}' if rivals else ''})"
+
+
+def _clearness(interval: Interval, null: float | None) -> float:
+    """How many half-widths of its interval a figure is away from nothing."""
+    if null is None or not np.isfinite(null):
+        return np.inf
+    return abs(interval.value - null) / max((interval.high - interval.low) / 2.0, 1e-12)
 
 
 def _in_words(effect: str, on: str) -> str:

@@ -16,6 +16,8 @@ from twin.runlog import AXIS_COLUMN, RunLog
 Floats = NDArray[np.float64]
 OFF = 1.5
 """Factor by which a position may be off its reference before it is another unit."""
+SHOWN_S = 0.2
+"""For which a cut still shows in the load."""
 TURN_RAD = 2.0 * np.pi
 ENGAGEMENT = ("spindle_rpm", "spindle_angle_rad", "axial_depth_mm", "entry_angle_rad", "exit_angle_rad")
 
@@ -48,12 +50,12 @@ def _off(slope: float) -> bool:
 
 
 def _slope(reference: Floats, values: Floats) -> float:
-    """Of values over the reference by medians of what goes on within a fifth of a run; NaN where it does not move enough."""
+    """Of values over the reference; NaN where it does not move, or the values do something else."""
     known = np.isfinite(reference) & np.isfinite(values)
     if known.sum() < 100 or np.ptp(reference[known]) < 1e-9:
         return float("nan")
     x, y = reference[known] - np.median(reference[known]), values[known] - np.median(values[known])
-    tight = np.abs(y) <= 20.0 * max(float(np.median(np.abs(y))), 1e-12)  # spikes say nothing of a unit
+    tight = np.abs(y) <= 3.0 * float(np.quantile(np.abs(y), 0.99))  # spikes say nothing of a unit
     moved = float(np.sum(x[tight] ** 2))
     # a sensor that sees nothing of the motion has no unit to speak of
     slope = float(np.sum(x[tight] * y[tight])) / moved if moved > 0.0 else float("nan")
@@ -70,7 +72,7 @@ def with_known_cut(run: Run, log: RunLog, machine: MachineFile, notes: list[str]
     if not cuts or (machine.tool is not None and milling_of(told_of(cleaned, machine)) is not None):
         return cleaned
     depth = cleaned.columns.get("axial_depth_mm")
-    cutting = np.ones(len(log), dtype=bool) if depth is None else np.nan_to_num(depth) > 0.0
+    cutting = np.ones(len(log), dtype=bool) if depth is None else _around(np.nan_to_num(depth) > 0.0, log.t_s)
     needs = [name for name in (*ENGAGEMENT, "x_ref_mm", "y_ref_mm") if not cleaned.has(name)]
     missing = ([] if machine.tool else ["[tool]"]) + needs
     hidden = [name for name in columns if name[:2] in ("x_", "y_") and not name.endswith("_ref_mm")]
@@ -82,6 +84,12 @@ def with_known_cut(run: Run, log: RunLog, machine: MachineFile, notes: list[str]
         )
         columns |= {name: np.where(cutting, np.nan, columns[name]) for name in hidden}
     return RunLog(log.t_s, columns, log.text, log.ignored, log.source)
+
+
+def _around(here: NDArray[np.bool_], t_s: Floats) -> NDArray[np.bool_]:
+    """What is so within SHOWN_S before or after: a meter shows the mean of what was."""
+    width = round(SHOWN_S / max(float(np.median(np.diff(t_s))), 1e-9))
+    return np.asarray(np.convolve(here, np.ones(2 * width + 1), mode="same")[: len(here)] > 0.5)
 
 
 def _engagement_at_odds(run: Run, log: RunLog, notes: list[str]) -> list[str]:

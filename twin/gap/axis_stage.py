@@ -5,27 +5,23 @@ the mean over a few courses of the disturbance that the machine has. What the ta
 so that where the axis came to rest is not counted twice.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.case import Run
 from twin.effects.catalogue import catalogue, effect_named
 from twin.effects.effect import Effect, On
+from twin.gap.axis_run import OUTPUTS, AxisRunData
 from twin.gap.diagnosis import Effected
-from twin.gap.floors import Floors
 from twin.gap.free import Free, constant
-from twin.gap.labels import regime_labels
 from twin.gap.observed_through import Sensing, lags_to_try, seen_earlier
 from twin.gap.stage import Model, Observed, observed_of
 from twin.identification.axis_parameters import AxisParameter, constants_at
 from twin.identification.batch_fit import time_blocks
 from twin.machine import Axis, MachineFile
 from twin.recorded import start_state
-from twin.regimes import motion_stretches
-from twin.runlog import RunLog
 from twin.servo.constants import axis_constants, effect_constants
 from twin.servo.disturbance import Disturbance
 from twin.servo.kernel import axis_quantities
@@ -36,36 +32,9 @@ BLOCK_S = 0.5
 COURSES = 2
 """Pairs of courses, each with its opposite."""
 LANES = 32
-UNIT = 1.5
-"""Factor from which a sensor may be in another unit: the search starts there then."""
-NEAR = 20
-"""Samples of a stretch of motion within which one has to say where it starts."""
-OUTPUTS = {"pos_mm": "position_mm", "torque_a": "torque_a", "table_mm": "table_mm"}
+UNIT, UNIT_MAX = 1.5, 5e3
+"""Factors from which, and to which, a sensor may be in another unit: the search starts there then."""
 FACTORS = ("mass_kg", "newton_per_command", "coulomb_n", "static_n", "stribeck_velocity_mm_s", "viscous_n_s_per_mm")
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class AxisRunData:
-    """An axis in one run, or in the mean of repeated ones; (n,) each, as `twin.runlog` has them.
-
-    disturbance_n: known force that resists motion in +, or None; measured: output → values; count: of the runs averaged
-    regime: number of the regime (`twin.gap.labels`); rise_k: of the spindle's temperature since the start
-    """
-
-    name: str
-    t_s: Floats
-    reference_mm: Floats
-    measured: Mapping[str, Floats]
-    floor: Mapping[str, Floats]
-    regime: NDArray[np.int8]
-    rise_k: Floats | None
-    disturbance_n: Floats | None
-    count: int
-    fitted: bool
-
-    def stretches(self) -> tuple[slice, ...]:
-        """Of motion."""
-        return motion_stretches(self.t_s, self.reference_mm)
 
 
 def axis_effects() -> tuple[Effect, ...]:
@@ -98,8 +67,10 @@ class AxisStage:
 
     @property
     def healthy_rms(self) -> float:
-        """Where a cut pushes it, single teeth decide where it creeps to a stop, and the twin has their mean only."""
-        return 2.0 if any(run.disturbance_n is not None and run.disturbance_n.any() for run in self.runs) else 1.3
+        """Where a cut pushes it, single teeth decide where it creeps to a stop, and the twin has their mean only; where position
+        or torque was not recorded, how it starts from there is not known."""
+        blind = not {"pos_mm", "torque_a"} <= set(self.outputs)
+        return 2.0 if blind or any(run.disturbance_n is not None and run.disturbance_n.any() for run in self.runs) else 1.3
 
     @property
     def averaged(self) -> int:
@@ -133,12 +104,12 @@ class AxisStage:
         """A limit shows as the largest torque there was."""
         if candidate.effect == "torque_limit" and "torque_a" in self.outputs:
             largest = max(float(np.nanmax(np.abs(run.measured["torque_a"]))) for run in self.runs if run.fitted)
-            return tuple({"limit_a": f * largest} for f in (1.0, 0.97, 0.9))
+            return tuple({"limit_a": f * largest} for f in (1.0, 0.97, 0.9)) if largest > 0.0 else ()
         if candidate.effect == "sensor_lag":
             return lags_to_try(self.period_s)
         if candidate.effect == "sensor_scale":
             scale = self._scale(candidate.on.removeprefix(f"{self.letter}_"))
-            return ({"scale": scale},) if np.isfinite(scale) and not 1.0 / UNIT < scale < UNIT else ()
+            return ({"scale": scale},) if abs(scale) < UNIT_MAX and not 1.0 / UNIT < scale < UNIT else ()
         return ()
 
     def _scale(self, output: str) -> float:
@@ -274,10 +245,12 @@ class AxisStage:
     ) -> dict[str, Floats]:
         """The state at the first sample of a stretch, as the sensors of each lane would have it."""
         reference = data.reference_mm[where]
-        position = _near_start(data.measured.get("pos_mm", data.measured.get("table_mm", data.reference_mm))[where], reference)
-        torque = _near_start(data.measured.get("torque_a", np.zeros(len(data.t_s)))[where], np.zeros(len(reference)))
+        position = data.measured.get("pos_mm", data.measured.get("table_mm", data.reference_mm))[where]
+        torque = data.measured["torque_a"][where] if "torque_a" in data.measured else np.zeros(len(reference))
         read = start_state(self.axis, reference, position, torque, self.period_s)
         state = {k: np.full(lanes, v) for k, v in read.items()} | self._start_of_loops(values, read, float(reference[0]), lanes)
+        if "torque_a" not in data.measured and self.axis.velocity_integral_gain_a_per_mm > 0.0:
+            state["integral_a"] = constants.get("gravity__force_n", np.zeros(lanes)) / constants["newton_per_command"]
         held = constants["newton_per_command"] * state["integral_a"] - constants.get("gravity__force_n", 0.0)
         static = np.where(held > 0.0, constants["static_plus_n"], constants["static_minus_n"])
         held = np.clip(held, -static, static)
@@ -306,16 +279,6 @@ class AxisStage:
     def with_constants_left(self, left_out: frozenset[str]) -> "AxisStage":
         """The same without some effects in the catalogue."""
         return replace(self, left_out=left_out)
-
-
-def _near_start(values: Floats, instead: Floats) -> Floats:
-    """(n,) with what is missing taken from the nearest samples; `instead` where there is none near the start."""
-    known = np.flatnonzero(np.isfinite(values))
-    if len(known) == len(values):
-        return values
-    if not len(known) or known[0] > NEAR:
-        return instead
-    return np.interp(np.arange(len(values)), known, values[known])
 
 
 def _late(
@@ -349,49 +312,3 @@ def axis_constants_free(machine: MachineFile, letter: str) -> tuple[Free, ...]:
         zero = name == "viscous_n_s_per_mm" and not np.any(axis.friction.viscous_n_s_per_mm)
         free += [constant(name, sigma)] if sigma > 0.0 and not zero else []
     return tuple(free)
-
-
-def axis_run_data(
-    group: Sequence[Run], letter: str, floors: Floors, disturbance_n: Floats | None, fitted: bool
-) -> AxisRunData | None:
-    """An axis in a run, or in repeated ones averaged; None where they do not record it."""
-    log = group[0].log
-    reference = log.columns.get(f"{letter}_ref_mm")
-    outputs = [output for output in OUTPUTS if all(run.log.has(f"{letter}_{output}") for run in group)]
-    if reference is None or not outputs or not motion_stretches(log.t_s, reference):
-        return None
-    measured = {o: np.mean([run.log[f"{letter}_{o}"] for run in group], axis=0) for o in outputs}
-    floor = {o: floors.of(log, f"{letter}_{o}") for o in outputs}
-    regime = regime_labels(log, f"{letter}_ref_mm", floors.machine)[1]
-    return AxisRunData(
-        group[0].name, log.t_s, reference, measured, floor, regime, _rise_k(log), disturbance_n, len(group), fitted
-    )
-
-
-def _rise_k(log: RunLog) -> Floats | None:
-    """Rise of the recorded temperature, held between samples; its own noise is averaged out over a second."""
-    if not log.has("spindle_temp_c"):
-        return None
-    known = np.isfinite(log["spindle_temp_c"])
-    temperature = np.interp(log.t_s, log.t_s[known], log["spindle_temp_c"][known])
-    count = max(1, min(len(temperature) // 4, round(1.0 / max(float(np.median(np.diff(log.t_s))), 1e-6))))
-    smooth = np.convolve(np.pad(temperature, (count // 2, count - 1 - count // 2), mode="edge"), np.ones(count) / count, "valid")
-    return np.asarray(smooth - smooth[0])
-
-
-def repeated_groups(runs: Sequence[Run], repeats: Sequence[tuple[Run, Run]]) -> tuple[tuple[Run, ...], ...]:
-    """Runs of one program with the same references, together."""
-    groups: list[list[Run]] = []
-    for run in runs:
-        for group in groups:
-            if any({run, other} == set(pair) for other in group for pair in repeats) and _same_reference(group[0].log, run.log):
-                group.append(run)
-                break
-        else:
-            groups.append([run])
-    return tuple(tuple(group) for group in groups)
-
-
-def _same_reference(one: RunLog, other: RunLog) -> bool:
-    names = [n for n in one.columns if n.endswith("_ref_mm")]
-    return len(one) == len(other) and all(n in other.columns and np.allclose(one[n], other[n], atol=1e-6) for n in names)

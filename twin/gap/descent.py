@@ -55,7 +55,7 @@ def descend(
     cost, evaluations = _cost(here, theta, bounds), 1
     slopes = np.zeros((len(here), len(theta)))
     stale = True
-    for _ in range(steps_max):
+    for _ in range(steps_max if len(theta) else 0):
         slopes = _slopes(residuals, theta, here, bounds)
         stale = False
         trials = np.stack([_step(slopes, here, theta, bounds, damping) for damping in DAMPINGS])
@@ -82,6 +82,8 @@ def _cost(residual: Floats, theta: Floats, bounds: Bounds) -> float:
 
 def _slopes(residuals: Residuals, theta: Floats, here: Floats, bounds: Bounds) -> Floats:
     """(n, p), by differences towards the middle of the bounds."""
+    if not len(theta):
+        return np.zeros((len(here), 0))
     inward = np.where(theta > 0.5 * (bounds.low + bounds.high), -1.0, 1.0)
     moves = inward * STEP * np.maximum(1.0, np.abs(theta)) * np.minimum(1.0, 100.0 * bounds.sigma)
     shown = residuals(theta + np.diag(moves))

@@ -10,7 +10,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.gap.axis_stage import LANES, AxisRunData, axis_effects
+from twin.gap.axis_run import AxisRunData
+from twin.gap.axis_stage import LANES, axis_effects
 from twin.gap.floors import Floors
 from twin.gap_table import regimes_of
 from twin.machine import MachineFile

@@ -28,6 +28,8 @@ TEMPERATURE = "spindle_temp_c"
 UNDRIVEN_S = 60.0
 """Time for which what heats the spindle may be unknown without being mentioned."""
 HEAT = ("spindle_rpm", "spindle_load_pct", "ambient_temp_c")
+NEARLY_K = 4.0
+"""By which a spindle that starts cold may differ from its surroundings."""
 USUAL = (("spindle_rpm", "rev/min", 150.0), ("spindle_load_pct", "%", 1.0))
 """What the drives of the heat reach in any warm-up."""
 FEW = 100
@@ -107,6 +109,11 @@ def _heat_unknown(run: Run, log: RunLog, machine: MachineFile) -> list[str]:
         for name, unit, least in USUAL
         if 0.0 < np.nanmax(log[name]) < least
     ]
+    start, ambient = (float(log[n][np.isfinite(log[n])][0]) for n in (TEMPERATURE, "ambient_temp_c"))
+    for one, other, name in ((ambient, start, TEMPERATURE), (start, ambient, "ambient_temp_c")):
+        for unit, reading in (("°F", 1.8 * one + 32.0), ("K", one + 273.15)):
+            if abs(other - reading) < NEARLY_K and abs(other - one) > 2.0 * NEARLY_K:
+                said.append(f"{run.name}: {name} starts at {other:.4g}, which is {one:.4g} °C in {unit}; is it in {unit}?")
     for name in HEAT:
         there = np.append(log.t_s[np.isfinite(log[name])], log.t_s[-1])
         longest = int(np.argmax(np.diff(there))) if len(there) > 1 else 0

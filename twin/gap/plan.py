@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.case import Case, Run, RunKind
-from twin.gap.axis_stage import AxisRunData, AxisStage, axis_constants_free, axis_run_data, repeated_groups, standing_of
+from twin.gap.axis_run import AxisRunData, axis_run_data, repeated_groups
+from twin.gap.axis_stage import AxisStage, axis_constants_free, standing_of
 from twin.gap.cut_stage import CutStage, cut_runs
 from twin.gap.diagnosis import Effected, Verdict
 from twin.gap.disturbance import disturbance_of_repeats
@@ -44,8 +45,10 @@ class Ground:
 def ground_of(case: Case, left_out: frozenset[str]) -> Ground:
     """Floors and disturbance of a case, from its repeated runs."""
     machine = case.machine
-    runs = tuple(run for run in case.runs if run.entry.kind is not RunKind.PROGRAM)
-    floors = repeatability(runs, case.repeats(), machine)
+    recorded = tuple(run for run in case.runs if run.entry.kind is not RunKind.PROGRAM)
+    floors = repeatability(recorded, case.repeats(), machine)
+    # what was recorded while the twin was right says how well the machine repeats, and nothing of what is wrong now
+    runs = tuple(run for run in recorded if not run.entry.healthy) or recorded
     seen: dict[str, tuple[str, RunLog, AxisRunData]] = {}
     for one, _ in case.repeats():
         for letter in machine.axes:

@@ -24,6 +24,8 @@ STEP_PROBE = 1e-3
 def sensitivities(stage: Stage, parent: Fitted) -> list[Floats]:
     """Slopes of what is shown over the free numbers of a hypothesis, in σ, (n, p), for each run that is fitted."""
     count = len(parent.theta)
+    if not count:
+        return [np.zeros((len(o.measured), 0)) for o in stage.observed if o.fitted]
     low, high = (np.array([getattr(p, key) for p in parent.model.free]) for key in ("low", "high"))
     up, down = (np.minimum(parent.theta + STEP_PROBE, high), np.maximum(parent.theta - STEP_PROBE, low))
     both = np.concatenate([parent.theta + np.diag(end - parent.theta) for end in (up, down)])

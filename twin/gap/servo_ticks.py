@@ -23,6 +23,12 @@ SHAKEN_MAX = 5.0
 BLOCK = 100
 ANOTHER_CLOCK = 0.002
 """Part by which the period of a recording may differ from that of the loops without being mentioned."""
+SETTLED_S, SAMPLES_EVEN = 0.2, 3
+"""After which an axis has forgotten what it was told before: five time constants of a slow position loop, and some samples."""
+GAP_TICKS = 4
+"""Ticks over which a reference may be interpolated."""
+EVEN_MM, RESOLUTION_MM_MAX = 3e-4, 3e-3
+"""By which an even reference may bend from sample to sample, and what its resolution may add."""
 HELD = ("spindle_rpm", "coolant_on", "ambient_temp_c", "axial_depth_mm", "line")
 
 
@@ -82,6 +88,7 @@ def _rounded(log: RunLog, period_s: float) -> NDArray[np.intp]:
 def _placed(log: RunLog, place: NDArray[np.intp], period_s: float, *, slow: bool) -> RunLog:
     """The recording with its samples at these ticks."""
     ticks = np.arange(int(place[-1]) + 1)
+    settled = max(round(SETTLED_S / max(float(np.median(np.diff(log.t_s))), 1e-9)), SAMPLES_EVEN)
     columns: dict[str, Floats] = {}
     for name, values in log.columns.items():
         match = AXIS_COLUMN.match(name)
@@ -94,25 +101,31 @@ def _placed(log: RunLog, place: NDArray[np.intp], period_s: float, *, slow: bool
             continue
         if slow and not match:
             continue  # forces and the spindle's angle mean nothing at this rate
-        kept = values
-        if slow:
-            kept = np.where(_even_here(log.columns.get(f"{name[0]}_ref_mm"), len(values)), values, np.nan)
+        reference = log.columns.get(f"{match[1]}_ref_mm") if match else None
+        kept = np.where(_even_here(reference, len(values), settled), values, np.nan) if slow else values
         column = np.full(len(ticks), np.nan)
         column[place] = kept
-        columns[name] = column
+        columns[name] = column if reference is None or slow else _after_known(column, reference, place, period_s)
     text = log.text if len(ticks) == len(log) else {}
     return RunLog(np.asarray(ticks * period_s, dtype=np.float64), columns, text, log.ignored, log.source)
 
 
-def _even_here(reference: Floats | None, count: int) -> NDArray[np.bool_]:
-    """Where the reference has gone on evenly for three samples and does for one more."""
-    if reference is None or count < 6:
+def _after_known(column: Floats, reference: Floats, place: NDArray[np.intp], period_s: float) -> Floats:
+    """The column without what comes before an axis has settled after a gap in its reference: where it went is not known."""
+    known = place[np.isfinite(reference)]
+    for gap in np.flatnonzero(np.diff(known) > GAP_TICKS):
+        column[known[gap] + 1 : known[gap + 1] + round(SETTLED_S / period_s)] = np.nan
+    return column
+
+
+def _even_here(reference: Floats | None, count: int, settled: int) -> NDArray[np.bool_]:
+    """Where the reference has gone on evenly for so many samples and does for one more."""
+    if reference is None or count < 2 * SAMPLES_EVEN:
         return np.zeros(count, dtype=bool)
     bend = np.concatenate([[0.0], np.abs(np.diff(reference, 2)), [0.0]])
-    smooth = bend < 1e-3 + 1e-3 * np.abs(np.gradient(reference))
-    even = smooth.copy()
-    for back in (1, 2, 3):
-        even[back:] &= smooth[:-back]
-        even[:back] = False
+    resolution = min(3.0 * float(np.nanmedian(bend)), RESOLUTION_MM_MAX)
+    smooth = bend < EVEN_MM + resolution + 1e-3 * np.abs(np.gradient(reference)) / settled
+    since = np.arange(count) - np.maximum.accumulate(np.where(smooth, -1, np.arange(count)))
+    even = smooth & (since > settled)
     even[:-1] &= smooth[1:]
-    return even
+    return np.asarray(even)

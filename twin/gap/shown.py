@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from twin.case import Run
 from twin.effects.catalogue import effect_named
-from twin.gap.axis_stage import AxisStage, axis_run_data, standing_of
+from twin.gap.axis_run import axis_run_data
+from twin.gap.axis_stage import AxisStage, standing_of
 from twin.gap.cut_stage import CutStage, cut_runs
 from twin.gap.diagnosis import Effected
 from twin.gap.floors import Floors

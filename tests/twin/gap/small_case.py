@@ -110,7 +110,9 @@ def warm_case(*effects: AddedEffect) -> Case:
         rpm, load = (np.repeat(draw.uniform(low, high, 9), 300)[: len(t_s)] for low, high in ((2e3, 1e4), (5.0, 60.0)))
         rpm[(t_s > 3000.0) & (t_s < 4200.0)] = load[(t_s > 3000.0) & (t_s < 4200.0)] = 0.0
         ambient = np.full(len(t_s), 21.0)
-        thermal = HOT.thermal.model_copy(update={"resistance_k_per_w": 0.122, "capacity_j_per_k": 8900.0}) if HOT.thermal else None
+        thermal = (
+            HOT.thermal.model_copy(update={"resistance_k_per_w": 0.122, "capacity_j_per_k": 8900.0}) if HOT.thermal else None
+        )
         told = RunInput(t_s, spindle_rpm=rpm, ambient_temp_c=ambient, start_temp_c=21.0)
         real = HOT.model_copy(update={"thermal": thermal, "effects": effects})
         shown = respond(real, told, recorded={"spindle_load_pct": load}, seed=seed).columns["spindle_temp_c"]

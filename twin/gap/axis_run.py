@@ -1,0 +1,87 @@
+"""An axis in a recorded run, or in the mean of repeated ones: what it was told, what it answered, and how well that repeats."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.case import Run
+from twin.gap.floors import Floors
+from twin.gap.labels import regime_labels
+from twin.regimes import motion_stretches
+from twin.runlog import RunLog
+
+Floats = NDArray[np.float64]
+OUTPUTS = {"pos_mm": "position_mm", "torque_a": "torque_a", "table_mm": "table_mm"}
+"""Column of the run log, without the letter → output of the loops."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AxisRunData:
+    """An axis in one run, or in the mean of repeated ones; (n,) each, as `twin.runlog` has them.
+
+    disturbance_n: known force that resists motion in +, or None; measured: output → values; count: of the runs averaged
+    regime: number of the regime (`twin.gap.labels`); rise_k: of the spindle's temperature since the start
+    """
+
+    name: str
+    t_s: Floats
+    reference_mm: Floats
+    measured: Mapping[str, Floats]
+    floor: Mapping[str, Floats]
+    regime: NDArray[np.int8]
+    rise_k: Floats | None
+    disturbance_n: Floats | None
+    count: int
+    fitted: bool
+
+    def stretches(self) -> tuple[slice, ...]:
+        """Of motion."""
+        return motion_stretches(self.t_s, self.reference_mm)
+
+
+def axis_run_data(
+    group: Sequence[Run], letter: str, floors: Floors, disturbance_n: Floats | None, fitted: bool
+) -> AxisRunData | None:
+    """An axis in a run, or in repeated ones averaged; None where they do not record it."""
+    log = group[0].log
+    reference = log.columns.get(f"{letter}_ref_mm")
+    outputs = [output for output in OUTPUTS if all(run.log.has(f"{letter}_{output}") for run in group)]
+    if reference is None or not outputs or not motion_stretches(log.t_s, reference):
+        return None
+    measured = {o: np.mean([run.log[f"{letter}_{o}"] for run in group], axis=0) for o in outputs}
+    floor = {o: floors.of(log, f"{letter}_{o}") for o in outputs}
+    regime = regime_labels(log, f"{letter}_ref_mm", floors.machine)[1]
+    return AxisRunData(
+        group[0].name, log.t_s, reference, measured, floor, regime, _rise_k(log), disturbance_n, len(group), fitted
+    )
+
+
+def _rise_k(log: RunLog) -> Floats | None:
+    """Rise of the recorded temperature, held between samples; its own noise is averaged out over a second."""
+    if not log.has("spindle_temp_c"):
+        return None
+    known = np.isfinite(log["spindle_temp_c"])
+    temperature = np.interp(log.t_s, log.t_s[known], log["spindle_temp_c"][known])
+    count = max(1, min(len(temperature) // 4, round(1.0 / max(float(np.median(np.diff(log.t_s))), 1e-6))))
+    smooth = np.convolve(np.pad(temperature, (count // 2, count - 1 - count // 2), mode="edge"), np.ones(count) / count, "valid")
+    return np.asarray(smooth - smooth[0])
+
+
+def repeated_groups(runs: Sequence[Run], repeats: Sequence[tuple[Run, Run]]) -> tuple[tuple[Run, ...], ...]:
+    """Runs of one program with the same references, together."""
+    groups: list[list[Run]] = []
+    for run in runs:
+        for group in groups:
+            if any({run, other} == set(pair) for other in group for pair in repeats) and _same_reference(group[0].log, run.log):
+                group.append(run)
+                break
+        else:
+            groups.append([run])
+    return tuple(tuple(group) for group in groups)
+
+
+def _same_reference(one: RunLog, other: RunLog) -> bool:
+    names = [n for n in one.columns if n.endswith("_ref_mm")]
+    return len(one) == len(other) and all(n in other.columns and np.allclose(one[n], other[n], atol=1e-6) for n in names)
