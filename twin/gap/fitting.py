@@ -34,6 +34,12 @@ class Left:
         """By signal, (signals,); 0 where there is no sample."""
         return np.asarray(np.sqrt(self.squares.sum(axis=0) / np.maximum(self.counts.sum(axis=0), 1.0)))
 
+    def rms_but_worst(self, blocks: int) -> Floats:
+        """By signal, without its worst few blocks: how an axis comes to rest once is chance, a gap shows again and again."""
+        order = np.argsort(self.squares, axis=0)[: max(len(self.squares) - blocks, 1)]
+        squares, counts = (np.take_along_axis(v, order, axis=0).sum(axis=0) for v in (self.squares, self.counts))
+        return np.asarray(np.sqrt(squares / np.maximum(counts, 1.0)))
+
     def gap(self) -> float:
         """Of all signals: rms over the floor, each signal counted alike."""
         there = self.counts.sum(axis=0) > 0

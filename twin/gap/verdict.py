@@ -11,6 +11,7 @@ import numpy as np
 from twin.gap.diagnosis import Effected, Verdict
 from twin.gap.search import Explained, without
 
+CHANCE_BLOCKS = 2
 NAMED_MIN = 0.6
 """Part of a stage's gap that its causes have to close to be named."""
 REMAINDER_MAX = 25.0
@@ -31,7 +32,7 @@ class Judged:
 
 def judged(explained: Explained) -> Judged:
     """The verdict on one stage."""
-    before, after = (e.left.rms() for e in (explained.base, explained.best))
+    before, after = (e.left.rms_but_worst(CHANCE_BLOCKS) for e in (explained.base, explained.best))
     worst = explained.stage.healthy_rms
     gap_before, gap_after = bool((before > worst).any()), bool((after > worst).any())
     if not explained.best.effects:

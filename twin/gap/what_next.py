@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from twin.errors import TwinError
 from twin.gap.axis_stage import AxisStage
 from twin.gap.diagnosis import Cell, Effected, NextExperiment, Verdict
 from twin.gap.envelope import envelope_of
@@ -19,7 +20,19 @@ RIVALS_MAX = 3
 def what_next(
     ground: Ground, before: MachineFile, after: MachineFile, stages: Sequence[Judged], left: Sequence[Cell]
 ) -> NextExperiment | None:
-    """The experiment that would say most; None where nothing is open. left: where the gap lies that is left"""
+    """The experiment that would say most; None where nothing is open, or the menu's programs can't run such a machine.
+
+    left: where the gap lies that is left
+    """
+    try:
+        return _what_next(ground, before, after, stages, left)
+    except TwinError:  # an effect that needs what a short program in air has not got: a temperature, a cut
+        return None
+
+
+def _what_next(
+    ground: Ground, before: MachineFile, after: MachineFile, stages: Sequence[Judged], left: Sequence[Cell]
+) -> NextExperiment | None:
     measured = frozenset(s for run in ground.runs for s in measured_signals(run.log))
     floors = {
         signal: min(float(ground.floors.of(run.log, signal).min()) for run in ground.runs if run.log.has(signal))

@@ -102,9 +102,7 @@ def test_thinning_keeps_every_peak_and_invents_no_sample() -> None:
 def test_five_minutes_at_a_kilohertz_still_makes_a_small_page() -> None:
     given = explained()
     rng = np.random.default_rng(3)
-    long = tuple(
-        trace(rng.normal(0.0, 5.0, 300_000), signal=s) for s in ("x_torque_a", "y_torque_a", "z_torque_a", "force_x_n")
-    )
+    long = tuple(trace(rng.normal(0.0, 5.0, 300_000), signal=s) for s in ("x_torque_a", "y_torque_a", "z_torque_a", "force_x_n"))
     text = report_html(replace(given, traces=long), "machine")
     assert len(text.encode()) < 1_500_000
     samples = json.loads(next(s for s in PageReader(text).scripts if s.startswith("[")))
