@@ -12,6 +12,9 @@ from scipy.special import erfc
 from twin.gap.diagnosis import Effected
 from twin.gap.evidence import Advantage
 
+SMOOTH = 1.3
+"""What a healthy twin leaves of a signal at worst where nothing rough is about, in floors."""
+
 
 @dataclass(frozen=True, slots=True)
 class Null:
@@ -26,9 +29,13 @@ class Null:
     sigmas_spread: float = 1.5
     rms_typical: float = 1.1
 
-    def exceeded(self, effected: Effected, over: Advantage) -> bool:
-        """Whether a candidate helps more than it does on any healthy machine."""
-        least = self.closes.get(effected.effect, self.closes_any)
+    def exceeded(self, effected: Effected, over: Advantage, healthy_rms: float = SMOOTH) -> bool:
+        """Whether a candidate helps more than it does on any healthy machine.
+
+        healthy_rms: what a healthy twin leaves in this stage at worst, in floors; where that is much, much has to be taken away
+        """
+        rough = max((healthy_rms**2 - 1.0) / (SMOOTH**2 - 1.0), 1.0)
+        least = self.closes.get(effected.effect, self.closes_any) * rough
         return over.sigmas > self.sigmas and over.closes > least and over.share > self.share_least
 
     def p_value(self, over: Advantage) -> float:

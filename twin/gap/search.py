@@ -81,7 +81,7 @@ def explain(stage: Stage, *, null: Null = NULL, progress: Callable[[str], None] 
             break
         tried = _tried(stage, best, stage.candidates, null)
         first = first or tried
-        accepted = [t for t in tried if _accepted(t, null)]
+        accepted = [t for t in tried if _accepted(stage, t, null)]
         if not accepted:
             pair = _pair(stage, best, tried, null) if not number and best.left.gap() > PAIR_GAP else None
             if pair is None:
@@ -103,8 +103,8 @@ def _gap_left(best: Fitted, null: Null) -> bool:
     return bool((best.left.rms() > null.rms_typical).any())
 
 
-def _accepted(tried: Tried, null: Null) -> bool:
-    if tried.over is None or tried.found is None or not null.exceeded(tried.effected, tried.over):
+def _accepted(stage: Stage, tried: Tried, null: Null) -> bool:
+    if tried.over is None or tried.found is None or not null.exceeded(tried.effected, tried.over, stage.healthy_rms):
         return False
     return _is_there(tried.found, tried.effected)
 
@@ -189,7 +189,7 @@ def _pair(stage: Stage, parent: Fitted, tried: tuple[Tried, ...], null: Null) ->
     if best is None:
         return None
     over = advantage(parent.left, best.left)
-    return best if all(null.exceeded(e, over) for e in best.effects) else None
+    return best if all(null.exceeded(e, over, stage.healthy_rms) for e in best.effects) else None
 
 
 def _swapped(stage: Stage, best: Fitted, first: tuple[Tried, ...]) -> Fitted:
@@ -217,7 +217,7 @@ def _pruned(stage: Stage, best: Fitted, null: Null) -> Fitted:
     """Without the effects that the others have made needless."""
     for effected in best.effects[:-1]:
         without = _dropped(stage, best, effected)
-        if not null.exceeded(effected, advantage(without.left, best.left)):
+        if not null.exceeded(effected, advantage(without.left, best.left), stage.healthy_rms):
             best = without
     return best
 

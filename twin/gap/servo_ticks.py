@@ -119,13 +119,12 @@ def _after_known(column: Floats, reference: Floats, place: NDArray[np.intp], per
 
 
 def _even_here(reference: Floats | None, count: int, settled: int) -> NDArray[np.bool_]:
-    """Where the reference has gone on evenly for so many samples and does for one more."""
+    """Where the reference has gone on evenly for so many samples."""
     if reference is None or count < 2 * SAMPLES_EVEN:
         return np.zeros(count, dtype=bool)
     bend = np.concatenate([[0.0], np.abs(np.diff(reference, 2)), [0.0]])
     resolution = min(3.0 * float(np.nanmedian(bend)), RESOLUTION_MM_MAX)
     smooth = bend < EVEN_MM + resolution + 1e-3 * np.abs(np.gradient(reference)) / settled
     since = np.arange(count) - np.maximum.accumulate(np.where(smooth, -1, np.arange(count)))
-    even = smooth & (since > settled)
-    even[:-1] &= smooth[1:]
+    even = np.concatenate([[False], since[:-1] >= settled])  # what it is told after a sample does not show in it
     return np.asarray(even)
