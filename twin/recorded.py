@@ -72,7 +72,7 @@ def start_state(axis: Axis, reference_mm: Floats, position_mm: Floats, torque_a:
     moving = np.flatnonzero(np.diff(reference_mm) != 0)
     still = int(moving[0]) if len(moving) else len(reference_mm)
     if still >= STILL_MIN or len(reference_mm) < 12:
-        here = slice(0, max(still, 1))
+        here = slice(0, still + 1)  # it still stands where the reference begins to move
         position, velocity, step = _standing_mm(_known(position_mm[here], reference_mm[:1])), 0.0, 0.0
         torque = float(np.mean(_known(torque_a[here], np.zeros(1))[:SETTLED]))
     else:

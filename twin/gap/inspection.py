@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.case import Case, Run, RunAtHand, RunKind
-from twin.errors import CaseError
+from twin.errors import CaseError, RunLogError
 from twin.gap.at_odds import with_known_cut, without_axes_at_odds
 from twin.gap.cut_stage import cut_runs
 from twin.gap.heat_stage import heat_runs
@@ -32,8 +32,8 @@ NEARLY_K = 4.0
 """By which a spindle that starts cold may differ from its surroundings."""
 USUAL = (("spindle_rpm", "rev/min", 150.0), ("spindle_load_pct", "%", 1.0))
 """What the drives of the heat reach in any warm-up."""
-FEW = 100
-"""Samples below which a signal that does not change is nothing to wonder at."""
+ROWS_MIN, FEW = 10, 100
+"""Rows of a warm-up below which it says nothing; samples below which a signal that does not change is nothing to wonder at."""
 NOT_WHEN_SLOW = frozenset(
     {
         *("presliding", "command_delay", "acceleration_feedforward", "payload", "velocity_feedback_delay", "torque_ripple"),
@@ -81,6 +81,8 @@ def _comparable(run: Run, machine: MachineFile) -> bool:
 def _usable(run: Run, machine: MachineFile, notes: list[str]) -> Run:
     log = _cleaned(run, notes)
     if not log.axes():
+        if len(log) < ROWS_MIN:
+            raise RunLogError(f"{run.name}: has {len(log)} rows; a warm-up of less than {ROWS_MIN} says nothing")
         notes += _heat_unknown(run, log, machine)
         return RunAtHand(run.entry, run.folder, log)
     for letter in log.axes():

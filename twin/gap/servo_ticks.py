@@ -102,7 +102,8 @@ def _placed(log: RunLog, place: NDArray[np.intp], period_s: float, *, slow: bool
         if slow and not match:
             continue  # forces and the spindle's angle mean nothing at this rate
         reference = log.columns.get(f"{match[1]}_ref_mm") if match else None
-        kept = np.where(_even_here(reference, len(values), settled), values, np.nan) if slow else values
+        moving = match is not None and match[2] == "torque_a"
+        kept = np.where(_even_here(reference, place, settled, moving_only=moving), values, np.nan) if slow else values
         column = np.full(len(ticks), np.nan)
         column[place] = kept
         columns[name] = column if reference is None or slow else _after_known(column, reference, place, period_s)
@@ -118,13 +119,25 @@ def _after_known(column: Floats, reference: Floats, place: NDArray[np.intp], per
     return column
 
 
-def _even_here(reference: Floats | None, count: int, settled: int) -> NDArray[np.bool_]:
-    """Where the reference has gone on evenly for so many samples."""
+def _even_here(reference: Floats | None, place: NDArray[np.intp], settled: int, *, moving_only: bool) -> NDArray[np.bool_]:
+    """Where the reference has gone on evenly for so many samples and does for one more, or has stood still until then.
+
+    moving_only: not where it stands: what an axis sticks at is left over from motions that slow samples may have missed
+    """
+    count = len(place)
     if reference is None or count < 2 * SAMPLES_EVEN:
         return np.zeros(count, dtype=bool)
-    bend = np.concatenate([[0.0], np.abs(np.diff(reference, 2)), [0.0]])
+    moves, ticks = np.diff(reference), np.diff(place).astype(np.float64)
+    bend = np.concatenate([[0.0], np.abs(moves[1:] - moves[:-1] * ticks[1:] / ticks[:-1]), [0.0]])
     resolution = min(3.0 * float(np.nanmedian(bend)), RESOLUTION_MM_MAX)
     smooth = bend < EVEN_MM + resolution + 1e-3 * np.abs(np.gradient(reference)) / settled
-    since = np.arange(count) - np.maximum.accumulate(np.where(smooth, -1, np.arange(count)))
-    even = np.concatenate([[False], since[:-1] >= settled])  # what it is told after a sample does not show in it
-    return np.asarray(even)
+    even = _samples_since(~smooth) > settled
+    even[:-1] &= smooth[1:]
+    still = _samples_since(np.concatenate([[False], moves != 0.0])) > settled
+    return np.asarray(even & ~still if moving_only else even | still)
+
+
+def _samples_since(there: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Samples since the last one that is so, or since before the first one."""
+    index = np.arange(len(there))
+    return np.asarray(index - np.maximum.accumulate(np.where(there, index, -1)))
