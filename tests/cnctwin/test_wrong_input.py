@@ -94,7 +94,7 @@ def test_a_real_process_says_it_without_a_traceback() -> None:
     done = subprocess.run([sys.executable, "-m", "cnctwin", "process", "nonsense"], capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert done.stdout == ""
-    assert done.stderr == "cnctwin: no processor 'nonsense'; there are: cutting_force, mirror, thermal\n"
+    assert done.stderr == "cnctwin: no processor 'nonsense'; there are: cutting_force, gap, mirror, thermal\n"
 
 
 @pytest.mark.parametrize(

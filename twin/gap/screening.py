@@ -114,7 +114,7 @@ def _signatures(stage: Stage, model: Model, theta: Floats, slopes: list[Floats],
         observed = stage.observed[i]
         shown = stage.predict(model, theta, i)
         residual = np.nan_to_num((observed.measured - shown[0]) / observed.sigma)
-        weight = 1.0 / np.sqrt(1.0 + (residual / 20.0) ** 2)
+        weight = np.isfinite(observed.measured) / np.sqrt(1.0 + (residual / 20.0) ** 2)
         residuals.append(residual * weight)
         signatures.append(np.nan_to_num((shown[1:] - shown[0]).T / observed.sigma[:, None]) * weight[:, None])
         moves.append(slope * weight[:, None])

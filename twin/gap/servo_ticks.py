@@ -102,8 +102,7 @@ def _placed(log: RunLog, place: NDArray[np.intp], period_s: float, *, slow: bool
         if slow and not match:
             continue  # forces and the spindle's angle mean nothing at this rate
         reference = log.columns.get(f"{match[1]}_ref_mm") if match else None
-        moving = match is not None and match[2] == "torque_a"
-        kept = np.where(_even_here(reference, place, settled, moving_only=moving), values, np.nan) if slow else values
+        kept = np.where(_even_here(reference, place, settled), values, np.nan) if slow else values
         column = np.full(len(ticks), np.nan)
         column[place] = kept
         columns[name] = column if reference is None or slow else _after_known(column, reference, place, period_s)
@@ -119,10 +118,11 @@ def _after_known(column: Floats, reference: Floats, place: NDArray[np.intp], per
     return column
 
 
-def _even_here(reference: Floats | None, place: NDArray[np.intp], settled: int, *, moving_only: bool) -> NDArray[np.bool_]:
+def _even_here(reference: Floats | None, place: NDArray[np.intp], settled: int) -> NDArray[np.bool_]:
     """Where the reference has gone on evenly for so many samples and does for one more, or has stood still until then.
 
-    moving_only: not where it stands: what an axis sticks at is left over from motions that slow samples may have missed
+    What an axis sticks at is left over from motions that slow samples may have missed; of a rest only the samples before the next
+    motion are compared, which starts from them.
     """
     count = len(place)
     if reference is None or count < 2 * SAMPLES_EVEN:
@@ -134,7 +134,7 @@ def _even_here(reference: Floats | None, place: NDArray[np.intp], settled: int, 
     even = _samples_since(~smooth) > settled
     even[:-1] &= smooth[1:]
     still = _samples_since(np.concatenate([[False], moves != 0.0])) > settled
-    return np.asarray(even & ~still if moving_only else even | still)
+    return np.asarray(even | still)
 
 
 def _samples_since(there: NDArray[np.bool_]) -> NDArray[np.intp]:

@@ -82,5 +82,6 @@ def plate_slice(name: str) -> RunLog:
     """The first run of a plate from its last tool but one on."""
     columns = plate_runs(name)[0]
     first = int(np.argmax(np.asarray(columns["line"]) >= FIRST_LINE))
-    cut = {key: values[first:] for key, values in columns.items()}
+    # a knob is told only when it turns, and these recordings do not say what it stood at before
+    cut = {key: values[first:] for key, values in columns.items() if not key.endswith("_override_pct")}
     return run_log(cut | {"t_s": np.asarray(cut["t_s"], dtype=np.float64) - float(cut["t_s"][0])}, name)

@@ -117,6 +117,14 @@ def test_a_recording_faster_than_the_loops_is_one_line() -> None:
         inspected(mutilated(lambda own: own.update(t_s=0.5 * own["t_s"])))
 
 
+def test_the_last_samples_of_a_rest_are_kept_since_a_motion_starts_from_them() -> None:
+    looked, _ = inspected(mutilated(rows(lambda n: np.arange(0, n, 40))))
+    log = looked.runs[0].log
+    begins = np.flatnonzero(np.diff(log["z_ref_mm"]) != 0)
+    begins = begins[np.concatenate([[True], np.diff(begins) > 300])]
+    assert np.isfinite(log["z_torque_a"][begins]).any()
+
+
 @pytest.mark.parametrize("count", [1, 2, 5])
 def test_a_few_samples_are_one_line_or_nothing_to_compare(count: int) -> None:
     try:

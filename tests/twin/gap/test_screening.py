@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.twin.gap.one_line import BIAS, SCALE, OneLine
+from tests.twin.gap.one_line import BIAS, SAMPLES, SCALE, OneLine
 from twin.gap.fitting import fitted
 from twin.gap.screening import guesses, sensitivities
 from twin.gap.stage import Model
@@ -32,6 +32,15 @@ def test_what_the_constants_can_do_is_no_merit_of_a_candidate() -> None:
     found = screened(OneLine(slope=1.04))
     assert found[SCALE][0] < 0.2
     assert found[BIAS][0] < 0.2
+
+
+def test_samples_that_were_not_recorded_hide_no_signature() -> None:
+    stage = OneLine(bias=2.0)
+    for observed in stage.observed:
+        observed.measured[np.arange(SAMPLES) % 50 != 0] = np.nan
+    found = screened(stage)
+    assert found[BIAS][0] > 0.9 > found[SCALE][0]
+    assert found[BIAS][1] == pytest.approx(2.0, abs=0.3)
 
 
 def test_a_free_number_at_its_bound_is_not_probed_beyond_it() -> None:
