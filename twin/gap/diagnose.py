@@ -105,14 +105,23 @@ def _motion(
         not_observable=not_observable_of(checked, stages, without),
         not_identifiable=not_identifiable_of(stages),
         next_experiment=what_next(ground, twins.before, twins.after, stages, left),
-        notes=notes,
+        notes=notes + _flattering(checked, twins.runs),
         seconds=0.0,
     )
     return Diagnosed(diagnosis, twins.after, traces)
 
 
+def _flattering(case: Case, runs: tuple[Run, ...]) -> tuple[str, ...]:
+    """Says it where the runs that were to be judged on record nothing, and those that were fitted had to serve."""
+    if not case.of(role="check") or any(run.entry.role == "check" for run in runs):
+        return ()
+    return ("no run of role check records anything to compare: this is judged on the runs that were fitted, which flatters",)
+
+
 def _twins(ground: Ground, stages: Sequence[Judged]) -> _Twins:
-    runs = tuple(r for r in ground.runs if r.entry.role == "check") or ground.runs
+    runs = tuple(r for r in ground.runs if r.entry.role == "check")
+    if not squares_of(runs, shown_by_run(ground.machine, runs, ground.floors), ground.floors):
+        runs = tuple(r for r in ground.runs if r.entry.role == "fit")
     before, after = ground.machine, ground.machine
     for stage in stages:
         before = with_constants(before, stage.explained.stage, stage.explained.base)
