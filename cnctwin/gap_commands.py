@@ -39,7 +39,7 @@ def diagnose(folder: Path, out: Path, *, as_json: bool, console: Console) -> int
     if as_json:
         sys.stdout.write(texts[0])
     else:
-        _print(found.diagnosis, out, console)
+        _print(found, out, console)
     return 1 if found.diagnosis.verdict in (Verdict.UNKNOWN, Verdict.PARTLY) else 0
 
 
@@ -49,12 +49,14 @@ def in_threads(case: Case, progress: Callable[[str], None] = lambda _: None) -> 
         return diagnosed(case, clock=time.monotonic, progress=progress, side_by_side=pool.map)
 
 
-def _print(found: Diagnosis, out: Path, console: Console) -> None:
+def _print(answer: Diagnosed, out: Path, console: Console) -> None:
+    found = answer.diagnosis
+    unseen = "that were not fitted" if any(not trace.fitted for trace in answer.traces) else "that were fitted, which flatters"
     console.print(found.sentence, style="bold", highlight=False, soft_wrap=True)
     gap = found.gap
     console.print(
         f"gap {gap.before:.3g} → {gap.after:.3g} × what repeats; closed {100 * gap.closure:.1f} % "
-        f"({100 * gap.closure_low:.1f} to {100 * gap.closure_high:.1f}), on runs that were not fitted; "
+        f"({100 * gap.closure_low:.1f} to {100 * gap.closure_high:.1f}), on runs {unseen}; "
         f"as stated {gap.as_stated:.3g}",
         highlight=False,
         soft_wrap=True,

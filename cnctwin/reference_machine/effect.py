@@ -10,7 +10,6 @@ from cnctwin.reference_machine.physics import Physics
 Chance = np.random.Generator
 Parameters = Mapping[str, float]
 AXES = ("x", "y", "z")
-SCREWS = ("x", "y")
 """Axes that move in a cut."""
 
 

@@ -276,10 +276,6 @@ class AxisStage:
         half = self.disturbance.courses(self.pairs, ticks, self.period_s, seed=[11, ord(self.letter[0])])
         return np.concatenate([half, -half])
 
-    def with_constants_left(self, left_out: frozenset[str]) -> "AxisStage":
-        """The same without some effects in the catalogue."""
-        return replace(self, left_out=left_out)
-
 
 def _late(
     reference: Floats, data: AxisRunData, values: Mapping[Effected, Mapping[str, Floats]], letter: str, lanes: int

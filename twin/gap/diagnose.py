@@ -36,9 +36,8 @@ Shown = Mapping[str, Mapping[str, Floats]]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Twins:
-    """The machine as stated, with its constants refitted, and with the causes added; what each shows on the judging runs."""
+    """The machine with constants refitted, and with causes added; what both, and it as stated, show on the judging runs."""
 
-    stated: MachineFile
     before: MachineFile
     after: MachineFile
     runs: tuple[Run, ...]
@@ -120,19 +119,19 @@ def _flattering(case: Case, runs: tuple[Run, ...]) -> tuple[str, ...]:
 
 def _twins(ground: Ground, stages: Sequence[Judged]) -> _Twins:
     runs = tuple(r for r in ground.runs if r.entry.role == "check")
-    if not squares_of(runs, shown_by_run(ground.machine, runs, ground.floors), ground.floors):
+    stated = shown_by_run(ground.machine, runs, ground.floors)
+    if not squares_of(runs, stated, ground.floors):
         runs = tuple(r for r in ground.runs if r.entry.role == "fit")
+        stated = shown_by_run(ground.machine, runs, ground.floors)
     before, after = ground.machine, ground.machine
     for stage in stages:
         before = with_constants(before, stage.explained.stage, stage.explained.base)
         after = with_constants(after, stage.explained.stage, stage.explained.best)
     after = with_effects(after, found_effects(stages))
-    shown = {
-        name: shown_by_run(machine, runs, ground.floors)
-        for name, machine in (("stated", ground.machine), ("before", before), ("after", after))
-    }
+    shown = {"stated": stated}
+    shown |= {name: shown_by_run(m, runs, ground.floors) for name, m in (("before", before), ("after", after))}
     squares = {name: squares_of(runs, columns, ground.floors) for name, columns in shown.items()}
-    return _Twins(ground.machine, before, after, runs, squares, shown)
+    return _Twins(before, after, runs, squares, shown)
 
 
 def _closed(ground: Ground, stages: Sequence[Judged], twins: _Twins, some: frozenset[Effected]) -> float:

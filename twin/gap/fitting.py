@@ -60,7 +60,6 @@ class Fitted:
     known: Floats
     left: Left
     left_fit: Left
-    evaluations: int
 
     @property
     def effects(self) -> tuple[Effected, ...]:
@@ -145,7 +144,6 @@ def fitted(
         found.known,
         left_by(stage, model, found.theta, fitted=False),
         left_by(stage, model, found.theta, fitted=True),
-        found.evaluations,
     )
 
 

@@ -18,9 +18,12 @@ SMOOTH = 1.3
 
 @dataclass(frozen=True, slots=True)
 class Null:
-    """closes: decrease of a signal's mean square, in floors², by candidate; share_least: of what is above the floor there that a
-    candidate has to take away; sigmas: of its advantage; rms_typical: of
-    what a healthy twin leaves of a signal, in floors"""
+    """Thresholds.
+
+    closes, closes_any: decrease of a signal's mean square, in floors², of one candidate, of any other
+    share_least: part of what is above the floor there that has to be taken away; sigmas: of the advantage
+    sigmas_spread: standard deviation of those on healthy machines; rms_typical: what a healthy twin leaves of a signal, in floors
+    """
 
     closes: Mapping[str, float] = field(default_factory=dict)
     closes_any: float = 0.35

@@ -26,9 +26,7 @@ Floats = NDArray[np.float64]
 SCREENED_MAX = 9
 CLOSES_LEAST = 0.02
 ALWAYS = frozenset(
-    {
-        *("torque_limit", "presliding", "load_peak_hold", "second_thermal_mass", "viscous_warmup", "screw_compliance", "helix"),
-    }
+    ("torque_limit", "presliding", "load_peak_hold", "second_thermal_mass", "viscous_warmup", "screw_compliance", "helix")
 )
 """Thresholds, saturations, and what is far from linear: a signature at one size says little about them."""
 ROUNDS_MAX = 4
