@@ -38,6 +38,29 @@ class ProcessorConfig(BaseModel):
         return self
 
 
+ALL = "all"
+
+
+class CellConfig(ProcessorConfig):
+    """What the engine needs of the configuration of a processor that compares machines.
+
+    cells: the machines of each cell by name; those that stand in none are together in the cell "all"
+    """
+
+    cells: dict[str, tuple[str, ...]] = Field(default_factory=dict, max_length=1000)
+
+    @model_validator(mode="after")
+    def _a_machine_has_one_cell(self) -> Self:
+        named = [machine for machines in self.cells.values() for machine in machines]
+        if twice := sorted({machine for machine in named if named.count(machine) > 1}):
+            raise ValueError(f"cells has {', '.join(twice)} twice; a machine is in one cell")
+        return self
+
+    def cell_of(self, machine: str) -> str:
+        """The cell that a machine is in."""
+        return next((cell for cell, machines in self.cells.items() if machine in machines), ALL)
+
+
 C_co = TypeVar("C_co", bound=ProcessorConfig, covariant=True)
 
 

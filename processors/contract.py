@@ -4,6 +4,7 @@
 
 A file `processors/<name>.py` that ends in `PROCESSOR = Processor(...)` is found by discovery and put through the contract
 suite: same stream, same answer; a restart in the middle changes nothing; nothing crashes it; it emits only what it declares.
+Where machines are compared with each other, a `CellProcessor` folds the samples of all machines of a cell into one state.
 """
 
 from collections.abc import Callable, Sequence
@@ -11,7 +12,7 @@ from dataclasses import dataclass, is_dataclass
 from enum import Enum
 from typing import Generic, NamedTuple, TypeVar
 
-from processors.config import ProcessorConfig
+from processors.config import CellConfig, Configuration, ProcessorConfig
 from processors.errors import DeclarationError
 from processors.sample import Sample, SampleKind
 from sparkplug.datatype import DataType
@@ -21,7 +22,8 @@ from sparkplug.values import Value
 
 __all__ = [
     "TWIN_PREFIX",
-    "Key",
+    "CellConfig",
+    "CellProcessor",
     "NoState",
     "Output",
     "OutputSpec",
@@ -35,13 +37,6 @@ __all__ = [
 
 TWIN_PREFIX = "twin/"  # of the metrics
 TWIN_NODE_PREFIX = "twin-"  # of the edge nodes that publish them
-
-
-class Key(Enum):
-    """Over what a fold runs. CELL (all machines of a group in one state) is declared, and not built yet."""
-
-    MACHINE = "machine"
-    CELL = "cell"
 
 
 class Provenance(Enum):
@@ -100,6 +95,7 @@ class PlainSpec:
 
     prefix: str
     meaning: str
+    qos: int = 0
 
     def __post_init__(self) -> None:
         if not self.prefix.endswith("/") or self.prefix.startswith(("spBv1.0/", "$")) or set("+#") & set(self.prefix):
@@ -107,17 +103,22 @@ class PlainSpec:
 
 
 class Output(NamedTuple):
-    """A value for a declared metric, as of the sample's time. `value` None is a null and needs a reason."""
+    """A value for a declared metric. `value` None is a null and needs a reason.
+
+    machine, at_s: whose, and as of which event time; None = those of the sample
+    """
 
     name: str
     value: Value
     quality: Quality = Quality.GOOD
     reason: str | None = None
+    machine: str | None = None
+    at_s: float | None = None
 
     @classmethod
-    def null(cls, name: str, reason: str) -> "Output":
+    def null(cls, name: str, reason: str, machine: str | None = None, at_s: float | None = None) -> "Output":
         """A null that says why. Keep live figures out of `reason`: a changed reason is published again."""
-        return cls(name, None, Quality.BAD, reason)
+        return cls(name, None, Quality.BAD, reason, machine, at_s)
 
 
 class PlainOutput(NamedTuple):
@@ -134,12 +135,14 @@ class NoState:
 
 
 C = TypeVar("C", bound=ProcessorConfig)
+D = TypeVar("D", bound=CellConfig)
 S = TypeVar("S")
+Outputs = Sequence[Output | PlainOutput]
 
 
-@dataclass(frozen=True, slots=True)
-class Processor(Generic[C, S]):
-    """The declaration.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Declaration(Generic[C, S]):
+    """What both kinds of processor declare.
 
     version: of the state's form; a snapshot of another version is not restored
     inputs: names of the metrics that are read; None = all, those of other processors too
@@ -153,13 +156,9 @@ class Processor(Generic[C, S]):
     config: type[C]
     state: type[S]
     initial: Callable[[C], S]
-    step: Callable[[C, S, Sample], tuple[S, Sequence[Output | PlainOutput]]]
     plain: tuple[PlainSpec, ...] = ()
-    key: Key = Key.MACHINE
 
     def __post_init__(self) -> None:
-        if self.key is not Key.MACHINE:
-            raise DeclarationError(f"processor {self.name!r}: key {self.key.value!r} is not built yet; use Key.MACHINE")
         if not is_dataclass(self.state) or not self.state.__dataclass_params__.frozen:  # type: ignore[attr-defined]
             raise DeclarationError(f"processor {self.name!r}: state {self.state.__name__} has to be a frozen dataclass")
         names = [spec.name for spec in self.outputs]
@@ -177,3 +176,26 @@ class Processor(Generic[C, S]):
             return True
         reads_twins = self.inputs is None or any(name.startswith(TWIN_PREFIX) for name in self.inputs)
         return reads_twins and node != self.node
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Processor(_Declaration[C, S]):
+    """A fold over what one machine says: a state for each machine."""
+
+    step: Callable[[C, S, Sample], tuple[S, Outputs]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CellProcessor(_Declaration[D, S]):
+    """A fold over what the machines of a cell say: a state for each cell, and the configuration of each machine at hand.
+
+    The samples of its machines come as they are received, each in the event time of its own control; `sample.cell` holds the rows
+    of all that are online.
+
+    listens: filters of plain topics whose messages come as samples of kind PLAIN, to every cell
+    beats: whether a sample of kind BEAT comes once a second, by the clock on the wall
+    """
+
+    step: Callable[[Configuration[D], S, Sample], tuple[S, Outputs]]
+    listens: tuple[str, ...] = ()
+    beats: bool = False

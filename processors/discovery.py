@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Any
 
 import processors
-from processors.contract import Processor
+from processors.contract import CellProcessor, Processor
 from processors.errors import DeclarationError, UnknownProcessorError
 
-AnyProcessor = Processor[Any, Any]
+AnyProcessor = Processor[Any, Any] | CellProcessor[Any, Any]
 
 
 def discover() -> dict[str, AnyProcessor]:
@@ -40,6 +40,8 @@ def _declared_in(module_name: str) -> AnyProcessor | None:
     declared = getattr(importlib.import_module(f"processors.{module_name}"), "PROCESSOR", None)
     if declared is None:
         return None
-    if not isinstance(declared, Processor) or declared.name != module_name:
-        raise DeclarationError(f"processors/{module_name}.py: PROCESSOR has to be a Processor named {module_name!r}")
+    if not isinstance(declared, Processor | CellProcessor) or declared.name != module_name:
+        raise DeclarationError(
+            f"processors/{module_name}.py: PROCESSOR has to be one, named {module_name!r}"
+        )
     return declared

@@ -18,6 +18,7 @@ class PublishPlain(NamedTuple):
     topic: str
     payload: bytes
     retain: bool
+    qos: int = 0
 
 
 class Declare(NamedTuple):

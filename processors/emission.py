@@ -2,9 +2,9 @@
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import Any
 
-from processors.contract import PYTHON_TYPES, Output, OutputSpec, PlainOutput, Processor
+from processors.contract import PYTHON_TYPES, Output, OutputSpec, PlainOutput, PlainSpec
+from processors.discovery import AnyProcessor
 from processors.effects import PublishPlain
 from processors.errors import OutputError
 from sparkplug.metric import Change
@@ -15,28 +15,23 @@ from sparkplug.values import Value
 class Emission:
     """The outputs of one processor for one machine, with what was published last of each."""
 
-    __slots__ = ("_plain_prefixes", "_rules", "is_history", "latest", "processor_name")
+    __slots__ = ("_rules", "is_history", "latest", "processor_name")
 
-    def __init__(self, processor: Processor[Any, Any], *, is_history: bool) -> None:
+    def __init__(self, processor: AnyProcessor, *, is_history: bool) -> None:
         self.processor_name = processor.name
         self.is_history = is_history
         self.latest: dict[str, Change] = {}
         self._rules = {spec.name: (spec, float in PYTHON_TYPES[spec.datatype], spec.deadband) for spec in processor.outputs}
-        self._plain_prefixes = tuple(spec.prefix for spec in processor.plain)
 
-    def news(self, outputs: Iterable[Output | PlainOutput], at_ms: int) -> tuple[list[Change], list[PublishPlain]]:
+    def news(self, outputs: Iterable[Output], at_ms: int) -> list[Change]:
         """What of `outputs` has to be published. Changes nothing: `published` does.
 
         Raises OutputError where an output is not declared or is of another type: our own bug.
         """
         latest, rules, is_history = self.latest, self._rules, self.is_history
         changes: list[Change] = []
-        plain: list[PublishPlain] = []
         for output in outputs:
-            if isinstance(output, PlainOutput):
-                plain.append(self._plain(output))
-                continue
-            name, value, quality, reason = output
+            name, value, quality, reason, _, at_s = output
             known = latest.get(name)
             if known is not None and known[1] == value and known[3] is quality and known[4] == reason:
                 continue
@@ -48,18 +43,14 @@ class Emission:
             if known is not None and known[3] is quality and known[4] == reason and _is_near(known[1], value, deadband):
                 continue
             if not (is_history and spec.is_alarm):
-                changes.append(Change(name, value, at_ms, quality, reason, is_history))
-        return changes, plain
+                stamp_ms = at_ms if at_s is None else round(at_s * 1000)
+                changes.append(Change(name, value, stamp_ms, quality, reason, is_history))
+        return changes
 
     def known(self, at_ms: int) -> tuple[Change, ...]:
         """What a reader of a new twin device is told at once: the last values, and nulls that say why there is none yet."""
         nothing = "nothing computed yet"
         return tuple(self.latest.get(name) or Change(name, None, at_ms, Quality.BAD, nothing) for name in self._rules)
-
-    def _plain(self, output: PlainOutput) -> PublishPlain:
-        if not self._plain_prefixes or not output.topic.startswith(self._plain_prefixes):
-            raise OutputError(f"{self.processor_name} emits {output.topic!r}, which it does not declare")
-        return PublishPlain(*output)
 
     def published(self, changes: Sequence[Change]) -> None:
         """Remember what readers now know."""
@@ -67,9 +58,17 @@ class Emission:
             self.latest[change.name] = change
 
 
+def plain_message(processor_name: str, declared: Sequence[PlainSpec], output: PlainOutput) -> PublishPlain:
+    """A plain message as it is sent. Raises OutputError where its topic is not declared: our own bug."""
+    spec = next((spec for spec in declared if output.topic.startswith(spec.prefix)), None)
+    if spec is None:
+        raise OutputError(f"{processor_name} emits {output.topic!r}, which it does not declare")
+    return PublishPlain(*output, spec.qos)
+
+
 def _checked(spec: OutputSpec, output: Output) -> tuple[Value, Quality, str | None]:
     """The value as it may be published: of the declared type, and never a number that is none."""
-    _, value, quality, reason = output
+    _, value, quality, reason, *_ = output
     if value is None:
         return None, quality, reason
     allowed = PYTHON_TYPES[spec.datatype]

@@ -1,21 +1,24 @@
 """A processor's engine, without I/O: events of a host session in, what is to be sent out. The clock is an argument.
 
 It keeps a live lane and, once history comes, a history lane for each machine; decides which edge node a signal is taken from
-where two offer it; and keeps the ledger.
+where two offer it; and keeps the ledger. What has a state, and is saved as one, is a unit: a machine, or a cell of them.
 """
 
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from operator import itemgetter
-from typing import Any
 
-from processors.config import Configuration, ProcessorConfig
-from processors.contract import Processor
+from processors.config import ALL, CellConfig, Configuration, ProcessorConfig
+from processors.contract import CellProcessor
+from processors.counts import Counts
+from processors.discovery import AnyProcessor
 from processors.effects import Declare, Effect, PublishPlain, Remove
 from processors.errors import SnapshotError
-from processors.lane import Counts, Lane
+from processors.fold import Fold
+from processors.lane import Lane
 from processors.ledger import DropReason, Ledger
+from processors.sample import Sample, SampleKind
 from processors.snapshot import SnapshotCodec
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId, Reading
@@ -26,10 +29,21 @@ _IS_HISTORICAL: Callable[[Reading], bool] = itemgetter(Reading._fields.index("is
 
 
 @dataclass(slots=True)
+class _Unit:
+    """What has a state: a machine, or a cell with all its machines."""
+
+    name: str
+    live: Fold
+    machines: dict[str, "_Machine"] = field(default_factory=dict)
+    history: Fold | None = None
+
+
+@dataclass(slots=True)
 class _Machine:
     """A machine, the sources that are online, and which source each signal is taken from."""
 
     name: str
+    unit: _Unit
     live: Lane
     history: Lane | None = None
     online: set[NodeId] = field(default_factory=set)
@@ -42,7 +56,7 @@ class Engine:
 
     def __init__(
         self,
-        processor: Processor[Any, Any],
+        processor: AnyProcessor,
         configuration: Configuration[ProcessorConfig],
         *,
         lateness_margin_s: float = 2.0,
@@ -52,14 +66,24 @@ class Engine:
         self.counts = Counts()
         self._processor, self._configuration = processor, configuration
         self._margin_s, self._machines_max = lateness_margin_s, machines_max
+        self._cell_config: CellConfig | None = configuration.default if isinstance(configuration.default, CellConfig) else None
         self._machines: dict[str, _Machine] = {}
+        self._units: dict[str, _Unit] = {}
         self._changed: dict[str, None] = {}
         self._codec = SnapshotCodec(processor)
+        if self._cell_config is not None and isinstance(processor, CellProcessor) and (processor.beats or processor.listens):
+            for cell in [*self._cell_config.cells, ALL]:  # they work without any machine
+                self._unit(cell)
 
     @property
     def machines(self) -> tuple[str, ...]:
         """The machines that are online."""
         return tuple(name for name, machine in self._machines.items() if machine.online)
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """The machines, or the cells, that have a state to be kept."""
+        return tuple(dict.fromkeys(machine.unit.name for machine in self._machines.values() if machine.online))
 
     # Events.
 
@@ -88,7 +112,30 @@ class Engine:
             self.ledger.received -= 1  # a hole is no message
             if machine is not None:
                 machine.live.lost(event.detail, effects)
-        self._changed[device] = None
+        if machine is None:
+            machine = self._machines.get(device)
+        if machine is not None:
+            self._changed[machine.unit.name] = None
+        return effects
+
+    def plain(self, topic: str, payload: bytes, at_ms: int) -> list[Effect]:
+        """A plain message that the processor listens to; every cell is given it."""
+        detail = payload.decode("utf-8", "replace")
+        return self._of_no_machine(Sample("", SampleKind.PLAIN, at_ms / 1000, {}, detail=detail, topic=topic), at_ms)
+
+    def beat(self, at_ms: int) -> list[Effect]:
+        """A second has passed on the wall, where the processor wants to know."""
+        if not isinstance(self._processor, CellProcessor) or not self._processor.beats:
+            return []
+        return self._of_no_machine(Sample("", SampleKind.BEAT, at_ms / 1000, {}), at_ms)
+
+    def _of_no_machine(self, sample: Sample, at_ms: int) -> list[Effect]:
+        effects: list[Effect] = []
+        for unit in self._units.values():
+            before = unit.live.state
+            unit.live.take(sample._replace(cell=unit.live.cell), at_ms, effects)
+            if unit.live.state is not before:
+                self._changed[unit.name] = None
         return effects
 
     def silence(self, wall_s: float) -> list[Effect]:
@@ -98,42 +145,47 @@ class Engine:
             clock_ms = machine.live.clock_ms
             machine.live.silence(wall_s, self._margin_s, effects)
             if machine.live.clock_ms != clock_ms:
-                self._changed[machine.name] = None
+                self._changed[machine.unit.name] = None
         return effects
 
     # Snapshots.
 
     def restore(self, payload: bytes) -> str:
-        """Take a machine's snapshot, before any event of it; its name. Raises SnapshotError, and counts it."""
+        """Take the snapshot of a unit, before any event of it; its name. Raises SnapshotError, and counts it."""
         try:
-            name, document = self._codec.machine(payload)
-            if len(self._machines) >= self._machines_max:
-                raise SnapshotError(f"{name}: more than {self._machines_max} machines")
-            machine = _Machine(name, self._lane(name))
-            self._codec.restore(document.get("live"), machine.live)
+            name, document = self._codec.unit(payload)
+            unit = self._fresh_unit(name)
+            self._codec.restore(document.get("live"), unit.live, lambda machine: self._restored(unit, machine).live)
             if document.get("history") is not None:
-                machine.history = self._lane(name, is_history=True)
-                self._codec.restore(document["history"], machine.history)
+                unit.history = self._fold(name, is_history=True)
+                self._codec.restore(document["history"], unit.history, lambda machine: self._history_of(unit, machine))
+            if len(self._machines) + len(unit.machines) > self._machines_max:
+                raise SnapshotError(f"{name}: more than {self._machines_max} machines")
         except SnapshotError:
             self.counts.snapshots_rejected += 1
             raise
-        self._machines[name] = machine
+        self._units[name] = unit
+        self._machines.update(unit.machines)
+        for machine in [one for one in unit.machines if self._unit_name(one) != name]:
+            self._forget(machine)  # it has been given to another cell since
         return name
 
     def snapshot(self, name: str) -> bytes:
-        """The snapshot of a machine."""
-        machine = self._machines[name]
-        return self._codec.encode(name, machine.live, machine.history)
+        """The snapshot of a unit. Raises KeyError where there is none of that name."""
+        unit = self._units[name]
+        lanes = {machine.name: machine.live for machine in unit.machines.values()}
+        late = {machine.name: machine.history for machine in unit.machines.values() if machine.history is not None}
+        return self._codec.encode(name, unit.live, lanes, unit.history, late)
 
     def take_changed(self) -> list[str]:
-        """The machines that have moved since this was last called."""
-        changed = [name for name in self._changed if name in self._machines]
+        """The units that have moved since this was last called."""
+        changed = [name for name in self._changed if name in self._units]
         self._changed.clear()
         return changed
 
     def mark_all_changed(self) -> None:
         """The broker may have forgotten what it retained."""
-        self._changed.update(dict.fromkeys(self._machines))
+        self._changed.update(dict.fromkeys(self._units))
 
     def bury_unborn(self, at_ms: int) -> list[Effect]:
         """Machines that were restored and have not been born since are offline: say so."""
@@ -157,9 +209,44 @@ class Engine:
 
     # How it is done.
 
-    def _lane(self, name: str, *, is_history: bool = False) -> Lane:
-        config = self._configuration.of(name)
-        return Lane(self._processor, config, name, self.ledger, self.counts, is_history=is_history)
+    def _fold(self, name: str, *, is_history: bool) -> Fold:
+        return Fold(self._processor, self._configuration, name, self.counts, is_history=is_history)
+
+    def _fresh_unit(self, name: str) -> _Unit:
+        return _Unit(name, self._fold(name, is_history=False))
+
+    def _unit(self, name: str) -> _Unit:
+        """The unit of that name, made where there is none."""
+        if name not in self._units:
+            self._units[name] = self._fresh_unit(name)
+        return self._units[name]
+
+    def _lane(self, fold: Fold, machine: str) -> Lane:
+        config = self._configuration.of(machine) if self._cell_config is None else self._cell_config
+        return Lane(fold, self._processor.inputs, config, machine, self.ledger, self.counts)
+
+    def _unit_name(self, machine: str) -> str:
+        return machine if self._cell_config is None else self._cell_config.cell_of(machine)
+
+    def _joined(self, name: str) -> _Machine:
+        """A machine that is new here, in the unit that it belongs to."""
+        unit = self._unit(self._unit_name(name))
+        machine = self._machines[name] = self._restored(unit, name)
+        return machine
+
+    def _restored(self, unit: _Unit, name: str) -> _Machine:
+        """The machine of a unit, made where there is none; only the unit knows of it."""
+        if name not in unit.machines:
+            unit.machines[name] = _Machine(name, unit, self._lane(unit.live, name))
+        return unit.machines[name]
+
+    def _history_of(self, unit: _Unit, name: str) -> Lane:
+        machine = self._restored(unit, name)
+        if unit.history is None:
+            unit.history = self._fold(unit.name, is_history=True)
+        if machine.history is None:
+            machine.history = self._lane(unit.history, name)
+        return machine.history
 
     def _data(self, machine: _Machine, event: HostEvent, wall_s: float, effects: list[Effect]) -> None:
         readings: tuple[Reading, ...] | list[Reading] = event.readings
@@ -176,9 +263,8 @@ class Engine:
         if live:  # a message with both goes through both lanes, and counts as two
             machine.live.data(live, wall_s, effects)
             self.ledger.received += 1
-        if machine.history is None:
-            machine.history = self._lane(machine.name, is_history=True)
-        machine.history.data([reading for reading in readings if reading.is_historical], wall_s, effects)
+        history = self._history_of(machine.unit, machine.name)
+        history.data([reading for reading in readings if reading.is_historical], wall_s, effects)
 
     def _birth(self, machine: _Machine | None, event: HostEvent, wall_s: float, effects: list[Effect]) -> None:
         if len(event.readings) > SIGNALS_MAX:
@@ -188,8 +274,7 @@ class Engine:
             if len(self._machines) >= self._machines_max and not self._forget_one():
                 self.ledger.drop(DropReason.MACHINES_MAX)
                 return
-            name = event.device or ""
-            machine = self._machines[name] = _Machine(name, self._lane(name))
+            machine = self._joined(event.device or "")
         if not machine.online and self._processor.outputs:
             effects.append(Declare(machine.name, machine.live.emission.known(event.timestamp_ms)))
         machine.online.add(event.node)
@@ -229,7 +314,7 @@ class Engine:
         for machine in self._machines.values():
             if event.node in machine.online:
                 machine.live.lost(event.detail, effects)
-                self._changed[machine.name] = None
+                self._changed[machine.unit.name] = None
 
     def _source_dies(self, machine: _Machine, event: HostEvent, effects: list[Effect]) -> bool:
         machine.online.discard(event.node)
@@ -246,9 +331,16 @@ class Engine:
         """Make room: the machine that has been offline longest by order of arrival goes."""
         offline = itertools.islice((name for name, machine in self._machines.items() if not machine.online), 1)
         for name in list(offline):
-            lost = self._machines.pop(name)
-            for lane in (lost.live, lost.history):
-                if lane is not None:
-                    lane.drop_held()
+            self._forget(name)
             return True
         return False
+
+    def _forget(self, name: str) -> None:
+        lost = self._machines.pop(name)
+        for lane in (lost.live, lost.history):
+            if lane is not None:
+                lane.drop_held()
+                lane.fold.leave(name)
+        del lost.unit.machines[name]
+        if self._cell_config is None:
+            del self._units[name]

@@ -1,4 +1,4 @@
-"""One machine's stream through one fold: its clock, its row, its state. A machine's live data and its history have a lane each.
+"""One machine's stream through a fold: its clock and its row. A machine's live data and its history have a lane each.
 
 Event time is that of the readings. It only goes forward, in steps that hold on any day:
 
@@ -12,16 +12,14 @@ Event time is that of the readings. It only goes forward, in steps that hold on 
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from operator import itemgetter
 from types import MappingProxyType
 from typing import Any
 
 from processors.config import ProcessorConfig
-from processors.contract import Output, PlainOutput, Processor
-from processors.dead_letter import dead_letter
-from processors.effects import DeadLetter, Effect, Publish
-from processors.emission import Emission
+from processors.counts import Counts
+from processors.effects import Effect
+from processors.fold import Fold
 from processors.ledger import DropReason, Ledger
 from processors.sample import Sample, SampleKind
 from sparkplug.metric import Reading
@@ -32,54 +30,39 @@ _name: Callable[[Reading], str] = itemgetter(Reading._fields.index("name"))
 _timestamp_ms: Callable[[Reading], int] = itemgetter(Reading._fields.index("timestamp_ms"))
 
 
-@dataclass(slots=True)
-class Counts:
-    """What a processor counts beside the ledger."""
-
-    ticks: int = 0
-    holes: int = 0
-    late: int = 0
-    dead_letters: int = 0
-    ignored: int = 0
-    snapshots_rejected: int = 0
-
-
 class Lane:
     """See the module. `ticking`: the machine was online from clock_ms on, so that silence means that nothing changed."""
 
     __slots__ = (
-        "_anchor_ms", "_anchor_wall_s", "_config", "_counts", "_gap_ms", "_held", "_inputs", "_is_history", "_late_ms", "_ledger",
-        "_machine", "_name", "_step", "_tick_ms", "_view",
-        "clock_ms", "emission", "is_restored", "is_silent", "last_ms", "row", "state", "ticking",
+        "_anchor_ms", "_anchor_wall_s", "_counts", "_fold_in", "_gap_ms", "_held", "_inputs", "_late_ms", "_ledger", "_machine",
+        "_tick_ms", "_view",
+        "clock_ms", "emission", "fold", "is_restored", "is_silent", "last_ms", "row", "ticking",
     )  # fmt: skip
 
-    def __init__(
-        self,
-        processor: Processor[Any, Any],
-        config: ProcessorConfig,
-        machine: str,
-        ledger: Ledger,
-        counts: Counts,
-        *,
-        is_history: bool,
+    def __init__(  # noqa: PLR0917
+        self, fold: Fold, inputs: frozenset[str] | None, config: ProcessorConfig, machine: str, ledger: Ledger, counts: Counts
     ) -> None:
         self.row: dict[str, Reading] = {}
-        self.state: Any = processor.initial(config)
-        self.emission = Emission(processor, is_history=is_history)
+        self.fold = fold
+        self.emission = fold.join(machine)
         self.clock_ms: int | None = None  # event time that the fold has seen
         self.last_ms = 0  # event time of the newest message; meaningless while clock_ms is None
-        self.ticking = is_history
+        self.ticking = fold.is_history
         self.is_silent = False  # the hole of the present silence has been given
         self.is_restored = False
         self._view: Mapping[str, Reading] = MappingProxyType(self.row)
-        self._name, self._step, self._inputs = processor.name, processor.step, processor.inputs
-        self._config, self._machine, self._is_history = config, machine, is_history
+        self._fold_in, self._inputs, self._machine = fold.take, inputs, machine
         self._ledger, self._counts = ledger, counts
         self._tick_ms = max(1, round(config.tick_s * 1000))
         self._gap_ms = round(config.gap_s_max * 1000)
         self._late_ms = round(config.late_s_max * 1000)
         self._held: list[Sequence[Reading]] = []
         self._anchor_ms, self._anchor_wall_s = 0, 0.0
+
+    @property
+    def state(self) -> Any:
+        """The state that the fold has come to."""
+        return self.fold.state
 
     # Messages.
 
@@ -104,6 +87,7 @@ class Lane:
 
     def birth(self, readings: Sequence[Reading], taken: Sequence[Reading], wall_s: float, effects: list[Effect]) -> None:
         """A birth has come: the values `taken` of it hold, whatever was known before."""
+        self.fold.show(self._machine, self._view)
         if self._inputs is None:
             self.is_restored = False
             self._show(SampleKind.BIRTH, taken, effects)
@@ -141,7 +125,10 @@ class Lane:
         for name in names:
             self.row[name] = self.row[name]._replace(quality=Quality.STALE, reason=reason)
         now_ms = at_ms if self.clock_ms is None else self.clock_ms
-        return self._fold(SampleKind.DEATH, now_ms, tuple(names), effects, detail=reason)
+        folded = self._fold(SampleKind.DEATH, now_ms, tuple(names), effects, detail=reason)
+        if is_last:
+            self.fold.hide(self._machine)
+        return folded
 
     def lost(self, detail: str, effects: list[Effect]) -> None:
         """Messages were lost on the way."""
@@ -276,21 +263,6 @@ class Lane:
         gap_s: float = 0.0,
         detail: str = "",
     ) -> bool:
-        sample = Sample(self._machine, kind, at_ms / 1000, self._view, changed, gap_s, detail, self._is_history)
-        try:
-            state, outputs = self._step(self._config, self.state, sample)
-            if outputs:
-                self._emit(outputs, at_ms, effects)
-        except Exception as error:  # whatever a step does, the stream goes on with the state before
-            self._counts.dead_letters += 1
-            effects.append(DeadLetter(self._machine, dead_letter(self._name, sample, error)))
-            return False
-        self.state = state
-        return True
-
-    def _emit(self, outputs: Sequence[Output | PlainOutput], at_ms: int, effects: list[Effect]) -> None:
-        changes, plain = self.emission.news(outputs, at_ms)
-        if changes:
-            self.emission.published(changes)
-            effects.append(Publish(self._machine, tuple(changes)))
-        effects += plain
+        fold = self.fold
+        sample = Sample(self._machine, kind, at_ms / 1000, self._view, changed, gap_s, detail, fold.is_history, fold.cell)
+        return self._fold_in(sample, at_ms, effects)

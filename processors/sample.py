@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping
 from enum import Enum
+from types import MappingProxyType
 from typing import NamedTuple
 
 from sparkplug.metric import Reading
@@ -17,6 +18,8 @@ class SampleKind(Enum):
     BIRTH = "birth"  # the machine's edge came online, the row is complete
     DEATH = "death"  # an edge of the machine went offline, its part of the row is stale
     HOLE = "hole"  # messages were lost, or event time jumped; gap_s says how far
+    PLAIN = "plain"  # a plain message that a cell's processor listens to; of no machine
+    BEAT = "beat"  # a second has passed on the wall; of no machine
 
 
 class Sample(NamedTuple):
@@ -27,6 +30,8 @@ class Sample(NamedTuple):
     changed: names in the row that this message set
     gap_s: at a HOLE, how much event time was jumped over, forwards or backwards; 0 where it is not known
     is_history: an edge sends late what it had buffered; such samples fold into a state of their own
+    cell: the rows of all machines of the cell that are online, where the fold is a cell's
+    topic: of a PLAIN message; its text is in `detail`
     """
 
     machine: str
@@ -37,6 +42,8 @@ class Sample(NamedTuple):
     gap_s: float = 0.0
     detail: str = ""
     is_history: bool = False
+    cell: Mapping[str, Mapping[str, Reading]] = MappingProxyType({})
+    topic: str = ""
 
     def number(self, name: str) -> tuple[float | None, str | None]:
         """The value of `name` as (number, None), or (None, reason) where there is no number to go by.
@@ -50,11 +57,8 @@ class Sample(NamedTuple):
         value = reading.value
         if type(value) is float and reading.quality is Quality.GOOD and math.isfinite(value):
             return value, None  # what nearly every reading is
-        if reading.quality is not Quality.GOOD:
-            word = "stale" if reading.quality is Quality.STALE else "bad"
-            return None, f"{name} is {word}: {reading.reason}" if reading.reason else f"{name} is {word}"
-        if value is None:
-            return None, f"{name} is null: {reading.reason}" if reading.reason else f"{name} is null"
+        if (reason := why_unknown(reading)) is not None:
+            return None, reason
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             return None, f"{name} is not a number"
         try:
@@ -62,3 +66,14 @@ class Sample(NamedTuple):
         except OverflowError:
             return None, f"{name} is beyond any number"
         return (number, None) if math.isfinite(number) else (None, f"{name} is {number}")
+
+
+def why_unknown(reading: Reading) -> str | None:
+    """Why a reading says nothing of the present: stale, bad or null; None where it does."""
+    if reading.quality is not Quality.GOOD:
+        word = "stale" if reading.quality is Quality.STALE else "bad"
+    elif reading.value is None:
+        word = "null"
+    else:
+        return None
+    return f"{reading.name} is {word}: {reading.reason}" if reading.reason else f"{reading.name} is {word}"

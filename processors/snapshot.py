@@ -1,21 +1,23 @@
-"""The state of one machine's lanes as JSON, so that a processor can be killed anywhere and go on anywhere.
+"""The state of a machine, or of a cell, and its lanes, as JSON, so that a processor can be killed anywhere and go on anywhere.
 
 Floats are written with as many digits as make them come back the same, NaN and the infinities as Python's JSON writes them.
 Nothing is unpickled: what comes back is validated against the state's type.
 """
 
 import json
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from processors.contract import Processor
+from processors.discovery import AnyProcessor
 from processors.errors import SnapshotError
+from processors.fold import Fold
 from processors.lane import Lane
 from sparkplug.metric import Change, Reading
 from sparkplug.quality import Quality
 
-FORMAT = 1
+FORMAT = 2
 PLAIN_TYPES = (bool, int, float, str)
 
 
@@ -37,71 +39,85 @@ def decode_state(adapter: TypeAdapter[Any], dumped: Any) -> Any:
 
 
 class SnapshotCodec:
-    """Snapshots of one processor."""
+    """Snapshots of one processor; `unit` is the machine, or the cell, that has a state."""
 
-    def __init__(self, processor: Processor[Any, Any]) -> None:
+    def __init__(self, processor: AnyProcessor) -> None:
         self._name, self._version = processor.name, processor.version
         self._adapter: TypeAdapter[Any] = TypeAdapter(processor.state)
 
-    def encode(self, machine: str, live: Lane, history: Lane | None) -> bytes:
-        """The snapshot of a machine."""
+    def encode(self, unit: str, live: Fold, lanes: Mapping[str, Lane], history: Fold | None, late: Mapping[str, Lane]) -> bytes:
+        """The snapshot of a unit: its state and the lanes that lead to it, live and of its history."""
         document = {
             "format": FORMAT,
             "processor": self._name,
             "version": self._version,
-            "machine": machine,
-            "live": self._lane(live),
-            "history": None if history is None else self._lane(history),
+            "unit": unit,
+            "live": self._part(live, lanes),
+            "history": None if history is None else self._part(history, late),
         }
         return json.dumps(document, separators=(",", ":"), ensure_ascii=False).encode()
 
-    def machine(self, payload: bytes) -> tuple[str, dict[str, Any]]:
-        """The machine's name and the document. Raises SnapshotError where it is none of ours."""
+    def unit(self, payload: bytes) -> tuple[str, dict[str, Any]]:
+        """The unit's name and the document. Raises SnapshotError where it is none of ours."""
         try:
             document = json.loads(payload)
         except (ValueError, RecursionError) as error:
             raise SnapshotError(f"not JSON: {error}") from error
-        if not isinstance(document, dict) or not isinstance(document.get("machine"), str):
-            raise SnapshotError("no JSON object with a machine")
+        if not isinstance(document, dict) or not isinstance(document.get("unit"), str):
+            raise SnapshotError("no JSON object with a unit")
         found = (document.get("format"), document.get("processor"), document.get("version"))
         if found != (FORMAT, self._name, self._version):
             raise SnapshotError(f"format, processor, version are {found}; this is {(FORMAT, self._name, self._version)}")
-        return document["machine"], document
+        return document["unit"], document
 
-    def restore(self, document: Any, lane: Lane) -> None:
-        """Put one lane's part of a document into a fresh lane. Raises SnapshotError before anything is changed."""
+    def restore(self, document: Any, fold: Fold, lane_of: Callable[[str], Lane]) -> None:
+        """Put one part of a document into a fresh fold and fresh lanes. Raises SnapshotError before the state is changed."""
         try:
-            clock_ms, last_ms = _whole(document["clock_ms"]), _whole(document["last_ms"])
-            ticking, is_silent = document["ticking"] is True, document["is_silent"] is True
-            row = {name: _reading(name, entry) for name, entry in document["row"].items()}
-            latest = {name: _change(name, entry, lane.emission.is_history) for name, entry in document["latest"].items()}
+            lanes = [(lane_of(name), _lane_values(entry, fold.is_history)) for name, entry in document["machines"].items()]
             state = decode_state(self._adapter, document["state"])
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise SnapshotError(f"{type(error).__name__}: {error}") from error
-        lane.clock_ms, lane.last_ms, lane.ticking, lane.is_silent = clock_ms, last_ms or 0, ticking, is_silent
-        lane.row.update(row)
-        lane.emission.latest.update(latest)
-        lane.state = state
-        lane.is_restored = True
+        for lane, (clock_ms, last_ms, ticking, is_silent, row, latest) in lanes:
+            lane.clock_ms, lane.last_ms, lane.ticking, lane.is_silent = clock_ms, last_ms, ticking, is_silent
+            lane.row.update(row)
+            lane.emission.latest.update(latest)
+            lane.is_restored = True
+        fold.state = state
 
-    def _lane(self, lane: Lane) -> dict[str, Any]:
+    def _part(self, fold: Fold, lanes: Mapping[str, Lane]) -> dict[str, Any]:
         return {
-            "clock_ms": lane.clock_ms,
-            "last_ms": lane.last_ms,
-            "ticking": lane.ticking,
-            "is_silent": lane.is_silent,
-            "state": encode_state(self._adapter, lane.state),
-            # The broker gives tables, bytes and templates again with the next birth.
-            "row": {
-                name: [reading.value, reading.timestamp_ms, int(reading.quality), reading.unit, reading.reason]
-                for name, reading in lane.row.items()
-                if reading.value is None or isinstance(reading.value, PLAIN_TYPES)
-            },
-            "latest": {
-                name: [change.value, change.timestamp_ms, int(change.quality), change.reason]
-                for name, change in lane.emission.latest.items()
-            },
+            "state": encode_state(self._adapter, fold.state),
+            "machines": {name: _lane_document(lane) for name, lane in lanes.items()},
         }
+
+
+def _lane_document(lane: Lane) -> dict[str, Any]:
+    return {
+        "clock_ms": lane.clock_ms,
+        "last_ms": lane.last_ms,
+        "ticking": lane.ticking,
+        "is_silent": lane.is_silent,
+        # The broker gives tables, bytes and templates again with the next birth.
+        "row": {
+            name: [reading.value, reading.timestamp_ms, int(reading.quality), reading.unit, reading.reason]
+            for name, reading in lane.row.items()
+            if reading.value is None or isinstance(reading.value, PLAIN_TYPES)
+        },
+        "latest": {
+            name: [change.value, change.timestamp_ms, int(change.quality), change.reason]
+            for name, change in lane.emission.latest.items()
+        },
+    }
+
+
+_Values = tuple[int | None, int, bool, bool, dict[str, Reading], dict[str, Change]]
+
+
+def _lane_values(entry: Any, is_history: bool) -> _Values:
+    row = {name: _reading(name, reading) for name, reading in entry["row"].items()}
+    latest = {name: _change(name, change, is_history) for name, change in entry["latest"].items()}
+    clock_ms, last_ms = _whole(entry["clock_ms"]), _whole(entry["last_ms"]) or 0
+    return clock_ms, last_ms, entry["ticking"] is True, entry["is_silent"] is True, row, latest
 
 
 def _whole(value: Any) -> int | None:

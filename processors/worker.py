@@ -12,7 +12,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 from threading import Event
 
+from paho.mqtt.client import topic_matches_sub
+
 from processors.config import Configuration, ProcessorConfig
+from processors.contract import CellProcessor
 from processors.discovery import AnyProcessor
 from processors.effects import Declare, Effect, Publish, PublishPlain, Remove
 from processors.engine import Engine
@@ -47,9 +50,10 @@ class Worker:
         self._snapshot_prefix = f"cnctwin/snapshot/{processor.name}/"
         self._letter_prefix = f"cnctwin/deadletter/{processor.name}/"
         self._marker_topic = f"cnctwin/marker/{processor.name}"
+        self._listens = processor.listens if isinstance(processor, CellProcessor) else ()
         self._declared: set[str] = set()
         self._waiting: deque[HostEvent] = deque()
-        self._unsaved: dict[str, float] = {}  # machine: since when
+        self._unsaved: dict[str, float] = {}  # unit: since when
         self._saved: set[str] = set()
         self._letters_left = DEAD_LETTERS_A_REPORT_MAX
         self._reported_s = self._saved_s = 0.0
@@ -64,6 +68,8 @@ class Worker:
         """Work until `stop` is set, then save, say goodbye and disconnect."""
         self._host.subscribe_plain(self._snapshot_prefix + "+")
         self._host.subscribe_plain(self._marker_topic)
+        for wanted in self._listens:
+            self._host.subscribe_plain(wanted)
         self._host.start()
         self._edge.start()
         try:
@@ -80,8 +86,7 @@ class Worker:
         events = self._host.poll(POLL_S)
         now_s = time.monotonic()
         for event in events:
-            if event.kind is not EventKind.PLAIN:
-                self._feed(event, now_s)
+            self._take(event, now_s)
         if max(now_s - called_s, called_s - self._turned_s) > STALL_S:
             self._patient_until_s = now_s + STALL_S  # we slept: what came meanwhile is still on its way to the queue
         self._turned_s = now_s
@@ -93,10 +98,11 @@ class Worker:
         if now_s - self._reported_s >= REPORT_S:
             self._reported_s = now_s
             self._letters_left = DEAD_LETTERS_A_REPORT_MAX
+            self._apply(self.engine.beat(time.time_ns() // 1_000_000))
             self._note_changed(now_s)
             self._report(now_s)
-        if now_s - self._saved_s >= SNAPSHOT_S or not self._saved.issuperset(self.engine.machines):
-            # A machine that was never saved is saved at once: what its estimate was started from would be lost for good.
+        if now_s - self._saved_s >= SNAPSHOT_S or not self._saved.issuperset(self.engine.units):
+            # What was never saved is saved at once: what its estimate was started from would be lost for good.
             self._saved_s = now_s
             self._save(now_s)
 
@@ -110,12 +116,12 @@ class Worker:
                 marked_s = time.monotonic()
             complete = False
             for event in self._host.poll(POLL_S):
-                if event.kind is not EventKind.PLAIN:
-                    self._wait_with(event)
-                elif event.topic == self._marker_topic:
+                if event.topic == self._marker_topic:
                     complete = marked_s is not None
-                else:
+                elif event.topic.startswith(self._snapshot_prefix):
                     self._take_snapshot(event)
+                else:
+                    self._wait_with(event)
             if complete:
                 return True
             if marked_s is not None and time.monotonic() - marked_s > RESTORE_S_MAX:
@@ -137,15 +143,14 @@ class Worker:
             if self._is_message(event):
                 self.engine.ledger.received -= 1
                 self.engine.ledger.buffered -= 1
-            self._feed(event, now_s)
+            self._take(event, now_s)
 
     def _await_edge(self, stop: Event) -> None:
         """Results can go out once our own node is born; a moment's patience saves the first ones."""
         until_s = time.monotonic() + RESTORE_S_MAX
         while not (self._edge.online or stop.is_set() or time.monotonic() > until_s):
             for event in self._host.poll(POLL_S):
-                if event.kind is not EventKind.PLAIN:
-                    self._wait_with(event)
+                self._wait_with(event)
 
     def _is_message(self, event: HostEvent) -> bool:
         return event.device is not None and event.kind is not EventKind.HOLE and self._processor.listens_to(event.node.node)
@@ -161,7 +166,7 @@ class Worker:
         self._waiting.append(event)
 
     def _take_snapshot(self, event: HostEvent) -> None:
-        if not event.topic.startswith(self._snapshot_prefix) or not event.payload:
+        if not event.payload:
             return
         try:
             machine = self.engine.restore(event.payload)
@@ -184,6 +189,12 @@ class Worker:
 
     # Events and effects.
 
+    def _take(self, event: HostEvent, now_s: float) -> None:
+        if event.kind is not EventKind.PLAIN:
+            self._feed(event, now_s)
+        elif event.payload and any(topic_matches_sub(wanted, event.topic) for wanted in self._listens):
+            self._apply(self.engine.plain(event.topic, event.payload, event.timestamp_ms))
+
     def _feed(self, event: HostEvent, now_s: float) -> None:
         emitted = self.engine.ledger.emitted
         sent = self._apply(self.engine.feed(event, now_s))
@@ -199,7 +210,7 @@ class Worker:
             if isinstance(effect, Publish):
                 sent = self._publish(effect) and sent
             elif isinstance(effect, PublishPlain):
-                sent = self._host.publish_plain(effect.topic, effect.payload, retain=effect.retain) and sent
+                sent = self._host.publish_plain(effect.topic, effect.payload, qos=effect.qos, retain=effect.retain) and sent
             elif isinstance(effect, Declare):
                 self._edge.declare_device(effect.machine, [_with_latest(spec, effect.latest) for spec in self._specs])
                 self._declared.add(effect.machine)

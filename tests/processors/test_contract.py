@@ -91,10 +91,10 @@ def test_a_restart_in_the_middle_changes_nothing(processor: AnyProcessor, stream
     expected = fed(whole, *stream[:cut])
     assert _same(fed(restarted, *stream[:cut]), expected)
     adapter: TypeAdapter[Any] = TypeAdapter(processor.state)
-    for machine in restarted._machines.values():
-        for lane in (machine.live, machine.history):
-            if lane is not None:
-                lane.state = decode_state(adapter, json.loads(json.dumps(encode_state(adapter, lane.state))))
+    for unit in restarted._units.values():
+        for fold in (unit.live, unit.history):
+            if fold is not None:
+                fold.state = decode_state(adapter, json.loads(json.dumps(encode_state(adapter, fold.state))))
     assert _same(fed(restarted, *stream[cut:]), fed(whole, *stream[cut:]))
 
 
@@ -113,9 +113,10 @@ def test_a_snapshot_carries_a_machine_over_to_a_new_process(processor: AnyProces
     fed(first, *opening)
     fed(whole, *opening, *rest)
     second = engine_of(processor, ambient_temp_c=20.0) if processor.name == "thermal" else engine_of(processor)
-    assert second.restore(first.snapshot("okuma")) == "okuma"
+    (unit,) = first.units
+    assert second.restore(first.snapshot(unit)) == unit
     fed(second, birth(10.4, **values | {"spindle_load_pct": 50.0}), *rest)
-    assert json.loads(second.snapshot("okuma")) == json.loads(whole.snapshot("okuma"))
+    assert json.loads(second.snapshot(unit)) == json.loads(whole.snapshot(unit))
     assert second.counts.holes == 0
 
 
@@ -125,11 +126,11 @@ def test_a_snapshot_carries_a_machine_over_to_a_new_process(processor: AnyProces
 def test_every_snapshot_can_be_restored(processor: AnyProcessor, stream: list[HostEvent]) -> None:
     engine = engine_of(processor)
     fed(engine, *stream)
-    for machine in engine.take_changed():
-        snapshot = engine.snapshot(machine)
+    for unit in engine.take_changed():
+        snapshot = engine.snapshot(unit)
         again = engine_of(processor)
-        assert again.restore(snapshot) == machine
-        assert again.snapshot(machine) == snapshot
+        assert again.restore(snapshot) == unit
+        assert again.snapshot(unit) == snapshot
 
 
 @every_processor

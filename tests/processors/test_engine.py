@@ -1,10 +1,11 @@
 """What the engine does with time, rows, sources and failures, read from a processor that writes it down."""
 
 import json
+from dataclasses import replace
 
 import pytest
 
-from processors.contract import Key, NoState, OutputSpec, PlainSpec, Processor, Provenance
+from processors.contract import NoState, OutputSpec, PlainSpec, Provenance
 from processors.effects import DeadLetter, Declare, Publish, Remove
 from processors.engine import Engine
 from processors.errors import DeclarationError
@@ -322,7 +323,7 @@ def test_the_row_is_read_only() -> None:
         sample.row["spindle_rpm"] = reading("spindle_rpm", 1.0)  # type: ignore[index]
         return state, ()
 
-    processor = Processor("meddler", 1, None, (), RECORDER.config, NoState, lambda _: NoState(), meddle)
+    processor = replace(RECORDER, name="meddler", outputs=(), state=NoState, initial=lambda _: NoState(), step=meddle)
     effects = fed(engine_of(processor), birth(0.0, spindle_rpm=1.0))
     assert isinstance(effects[0], DeadLetter)
     assert b"does not support item assignment" in effects[0].payload
@@ -335,14 +336,12 @@ def test_a_wrong_declaration_is_refused_where_it_stands() -> None:
         OutputSpec("twin/table", DataType.DATASET, None, "", Provenance.MODELLED)
     with pytest.raises(DeclarationError, match=r"spBv1.0"):
         PlainSpec("spBv1.0/cnc/", "")
-    with pytest.raises(DeclarationError, match="not built yet"):
-        Processor("cell", 1, None, (), RECORDER.config, NoState, lambda _: NoState(), RECORDER.step, key=Key.CELL)
     with pytest.raises(DeclarationError, match="frozen dataclass"):
-        Processor("loose", 1, None, (), RECORDER.config, dict, lambda _: {}, RECORDER.step)
+        replace(RECORDER, state=dict)
 
 
 def test_the_kinds_of_samples_are_these() -> None:
-    assert [kind.value for kind in SampleKind] == ["data", "tick", "birth", "death", "hole"]
+    assert [kind.value for kind in SampleKind] == ["data", "tick", "birth", "death", "hole", "plain", "beat"]
 
 
 def test_a_hole_of_an_unknown_node_concerns_nobody() -> None:

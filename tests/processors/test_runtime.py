@@ -80,9 +80,10 @@ class Reader:
         return {name: self.readings[f"twin-{processor}", None, name].value for name in names}
 
     def state(self) -> dict[str, Any]:
-        """The live lane of the retained snapshot of the thermal processor."""
+        """The live lane of the retained snapshot of the thermal processor, and the state."""
         payload = self.plain.get("cnctwin/snapshot/thermal/okuma")
-        return {} if payload is None else json.loads(payload)["live"]
+        live = {} if payload is None else json.loads(payload)["live"]
+        return live["machines"]["okuma"] | {"state": live["state"]} if live else {}
 
 
 @pytest.fixture

@@ -58,9 +58,15 @@ def _broken(**changes: Any) -> bytes:
     return json.dumps(json.loads(_running().snapshot("okuma")) | changes).encode()
 
 
+def _broken_state(state: Any) -> bytes:
+    document = json.loads(_running().snapshot("okuma"))
+    document["live"]["state"] = state
+    return json.dumps(document).encode()
+
+
 def _broken_lane(**changes: Any) -> bytes:
     document = json.loads(_running().snapshot("okuma"))
-    document["live"] |= changes
+    document["live"]["machines"]["okuma"] |= changes
     return json.dumps(document).encode()
 
 
@@ -70,14 +76,14 @@ def _broken_lane(**changes: Any) -> bytes:
         (b"", "not JSON"),
         (b"\xff\xfe", "not JSON"),
         (b"[" * 100_000, "not JSON"),
-        (b"[]", "no JSON object with a machine"),
+        (b"[]", "no JSON object with a unit"),
         (_running().snapshot("okuma")[:-20], "not JSON"),
         (_broken(version=2), "format, processor, version are"),
         (_broken(format=99), "format, processor, version are"),
         (_broken(processor="mirror"), "format, processor, version are"),
         (_broken(live=None), "TypeError"),
-        (_broken_lane(state={}), "another form"),
-        (_broken_lane(state={"at_s": "noon"}), "state: at_s"),
+        (_broken_state({}), "another form"),
+        (_broken_state({"at_s": "noon"}), "state: at_s"),
         (_broken_lane(clock_ms="noon"), "no whole number"),
         (_broken_lane(row={"spindle_rpm": [1.0]}), "ValueError"),
         (_broken_lane(row={"spindle_rpm": [1.0, 0, 77, None, None]}), "77 is not a valid Quality"),
