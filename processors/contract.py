@@ -193,9 +193,11 @@ class CellProcessor(_Declaration[D, S]):
     of all that are online.
 
     listens: filters of plain topics whose messages come as samples of kind PLAIN, to every cell
+    wakes: signals whose change is folded as it comes; all others are seen at the next tick. None = every change is
     beats: whether a sample of kind BEAT comes once a second, by the clock on the wall
     """
 
     step: Callable[[Configuration[D], S, Sample], tuple[S, Outputs]]
     listens: tuple[str, ...] = ()
+    wakes: frozenset[str] | None = None
     beats: bool = False

@@ -24,7 +24,19 @@ Row = Mapping[str, Reading]
 class Fold:
     """`name` is the machine's, or the cell's; `cell` holds the rows of the cell's machines that are online."""
 
-    __slots__ = ("_config", "_counts", "_processor", "_rows", "_step", "cell", "emissions", "is_history", "name", "state")
+    __slots__ = (
+        "_config",
+        "_counts",
+        "_processor",
+        "_rows",
+        "_step",
+        "cell",
+        "emissions",
+        "is_history",
+        "name",
+        "state",
+        "wakes",
+    )
 
     def __init__(
         self,
@@ -41,6 +53,7 @@ class Fold:
         self.state: Any = processor.initial(config)
         self.emissions: dict[str, Emission] = {}
         self._processor, self._step, self._counts = processor, processor.step, counts
+        self.wakes = processor.wakes if isinstance(processor, CellProcessor) else None
         self._config: Any = configuration if is_cell else config
         self._rows: dict[str, Row] = {}
         self.cell: Mapping[str, Row] = MappingProxyType(self._rows if is_cell else {})
@@ -88,9 +101,7 @@ class Fold:
         for whose, own in by_machine.items():
             emission = self.emissions.get(whose)
             if emission is None:
-                raise OutputError(
-                    f"{self._processor.name} emits {own[0].name!r} of {whose!r}, no machine of {self.name!r}"
-                )
+                raise OutputError(f"{self._processor.name} emits {own[0].name!r} of {whose!r}, no machine of {self.name!r}")
             news.append((whose, emission, emission.news(own, at_ms)))
         for whose, emission, changes in news:
             if changes:

@@ -14,36 +14,47 @@ are published side by side.
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple, Self
+from typing import TYPE_CHECKING, Self
 
 from pydantic import Field, PositiveFloat, model_validator
 
 from processors.config import CellConfig, Configuration
 from processors.contract import CellProcessor, Output, OutputSpec, Provenance, Sample, SampleKind
-from processors.joint_frames import PENDING_MAX, Pending, Scored, frames, limits, without
-from processors.score_drift import Drift, drifted
+from processors.joint_frames import PENDING_MAX, Scored, frames, limits
+from processors.joint_member import (
+    ADJUSTED,
+    ALARM,
+    COMMON,
+    GATE,
+    GATE_SOURCE,
+    GATED_SHARE,
+    NO_MODEL,
+    NO_THRESHOLD,
+    PEER,
+    PEERS,
+    Judged,
+    Member,
+    Seat,
+    after,
+)
+from processors.score_drift import DRIFT
 from processors.tool_change_context import INPUTS as CONTEXT_INPUTS
 from processors.tool_change_context import tool_change_context
-from processors.tool_change_gate import Gate, Gated, GateRule, followed, gated, restarted
+from processors.tool_change_gate import GateRule, followed, gated, restarted
 from sparkplug.datatype import DataType
-from twin.anomaly.alarm import AlarmRule, AlarmState, after_tick
-from twin.anomaly.common_mode import Adjusted, CommonModeRule, Method, adjust_frame, standardised
+from twin.anomaly.alarm import AlarmRule, AlarmState
+from twin.anomaly.common_mode import CommonModeRule, Method, adjust_frame, standardised
 
 if TYPE_CHECKING:
     from twin.anomaly.model import AnomalyModel, Calibration
 
-RAW, ADJUSTED, COMMON, GATE = "twin/raw_score", "twin/adjusted_score", "twin/common_mode", "twin/tool_change_gate"
-GATE_SOURCE, PEER, PEERS = "twin/tool_change_gate_source", "twin/common_mode_peer", "twin/common_mode_peers"
-ALARM, THRESHOLD, BASIS = "twin/anomaly_alarm", "twin/anomaly_threshold", "twin/anomaly_basis"
-GATED_SHARE, DRIFT = "twin/gated_share_pct", "twin/score_drift"
+RAW, THRESHOLD, BASIS = "twin/raw_score", "twin/anomaly_threshold", "twin/anomaly_basis"
 CLOCK_OFFSET = "clock_offset_s"
-SHARE_S = 7 * 86_400.0
-NO_MODEL = "no model for this machine; cnctwin train anomaly makes one"
-NO_THRESHOLD = "the model has no threshold; cnctwin train anomaly fits one, or configure threshold"
+SEATS_MAX = 10_000
 NUMBERS = frozenset(
     {
         *("spindle_rpm", "spindle_rpm_cmd", "spindle_load_pct", "spindle_power_kw", "spindle_current_a", "feed_mm_min"),
@@ -93,8 +104,8 @@ class Config(CellConfig):
         return CommonModeRule(self.common_mode, self.common_mode_factor, self.exclude_gated_peers)
 
     @cached_property
-    def alarm_rules(self) -> dict[float, AlarmRule]:
-        """Made as they are needed: by threshold."""
+    def seats(self) -> dict[str, Seat]:
+        """By machine; filled as they are needed."""
         return {}
 
     @cached_property
@@ -119,75 +130,65 @@ class Config(CellConfig):
         return self
 
 
-class Member(NamedTuple):
-    """What is known of one machine.
-
-    tick: the last one that was scored; None until one was, and after a jump of its clock
-    total_s, gated_s: of the last week, forgotten slowly
-    """
-
-    tick: int | None = None
-    pending: Pending = ()
-    gate: Gate = Gate()
-    alarm: AlarmState = AlarmState()
-    total_s: float = 0.0
-    gated_s: float = 0.0
-    drift: Drift = Drift()
-
-
-class Judged(NamedTuple):
-    """A score beside its peers, and whether it counts."""
-
-    scored: Scored
-    gate: Gated
-    adjusted: Adjusted
-
-
 @dataclass(frozen=True, slots=True)
 class State:
-    """The machines of the cell."""
+    """The machines of the cell; the newest tick that one of them has come to, and how many have."""
 
     members: Mapping[str, Member] = field(default_factory=dict)
+    newest: int = -(2**62)
+    arrived: int = 0
 
 
 def step(config: Configuration[Config], state: State, sample: Sample) -> tuple[State, Sequence[Output]]:
-    """Follow the gate with every sample; score at ticks; judge the frames that are complete."""
-    kind, machine, shared = sample.kind, sample.machine, config.default
-    if sample.is_history or (kind is SampleKind.DATA and CONTEXT_INPUTS.isdisjoint(sample.changed)):
+    """Follow the gate with what concerns it; score at ticks; judge the frames that are complete."""
+    if sample.is_history:
         return state, ()
-    member = state.members.get(machine, Member())
-    if kind is SampleKind.HOLE and sample.gap_s:
-        member = member._replace(
-            tick=None, pending=(), gate=restarted(member.gate, sample.at_s), alarm=_interrupted(member.alarm)
-        )
-    gate = followed(member.gate, shared.gate_rule, tool_change_context(sample.row), sample.at_s)
-    member = member._replace(gate=gate) if gate is not member.gate else member
-    if kind is SampleKind.DEATH and machine not in state.members:
+    if sample.kind is SampleKind.TICK:
+        return _ticked(config, state, sample)
+    shared, machine, at_s = config.default, sample.machine, sample.at_s
+    member = state.members.get(machine)
+    if member is None and sample.kind is SampleKind.DEATH:
         return state, ()
-    if kind is SampleKind.BIRTH:
-        passed = _tick(shared, sample, math.floor)
-        member = member._replace(tick=passed if member.tick is None else max(passed, member.tick))
-    if kind is not SampleKind.TICK:
-        known = {name: one for name, one in state.members.items() if name in sample.cell}
-        return State({**known, machine: member}), _told(config, machine) if kind is SampleKind.BIRTH else ()
-    scored = _scored(shared, sample)
-    if member.tick is not None and scored.tick <= member.tick:
-        return State({**state.members, machine: member}), ()
-    member = member._replace(tick=scored.tick, pending=(*member.pending, scored)[-PENDING_MAX:])
-    raw = Output.null(RAW, scored.reason or "") if scored.raw is None else Output(RAW, scored.raw)
-    return _judged(config, {**state.members, machine: member}, sample, raw)
+    member = member or Member()
+    if sample.kind is SampleKind.HOLE and sample.gap_s:
+        member = member._replace(tick=None, pending=(), gate=restarted(member.gate, at_s), alarm=AlarmState(member.alarm.is_on))
+    member = member._replace(gate=followed(member.gate, shared.gate_rule, tool_change_context(sample.row), at_s))
+    if sample.kind is not SampleKind.BIRTH:
+        return replace(state, members={**state.members, machine: member}), ()
+    passed = math.floor(_place(shared, sample))
+    member = member._replace(tick=passed if member.tick is None else max(passed, member.tick))
+    known = {name: one for name, one in state.members.items() if name in sample.cell}
+    return replace(state, members={**known, machine: member}), _introduced(config, machine)
 
 
-def _tick(shared: Config, sample: Sample, whole: Callable[[float], int]) -> int:
-    """The number of the tick of a sample, on the clock that the peers have too."""
-    offset_s, _ = sample.number(CLOCK_OFFSET)
-    return whole((sample.at_s - (offset_s or 0.0)) / shared.tick_s)
+def _ticked(config: Configuration[Config], state: State, sample: Sample) -> tuple[State, Sequence[Output]]:
+    """Score a machine; judge where the tick may have made a frame complete: by the first machine to come to it, which others
+    may be too far behind of, by the last one, and by each that comes late."""
+    machine = sample.machine
+    seat = _seat(config, machine)
+    member = state.members.get(machine) or Member()
+    scored = _scored(seat, sample, round(_place(config.default, sample)))
+    tick, newest, arrived = scored.tick, state.newest, state.arrived
+    if member.tick is not None and tick <= member.tick:
+        return state, ()
+    members = {**state.members, machine: member.waiting_with(scored)}
+    arrived = arrived + 1 if tick == newest else 1 if tick > newest else arrived
+    outputs = [Output.null(RAW, scored.reason or "") if scored.raw is None else Output(RAW, scored.raw)]
+    if tick != newest or arrived >= len(sample.cell):
+        _judge(config, members, sample.cell, outputs)
+        newest = max((one.tick for one in members.values() if one.tick is not None), default=tick) if tick < newest else tick
+    return State(members, newest, arrived), outputs
 
 
-def _scored(shared: Config, sample: Sample) -> Scored:
+def _place(shared: Config, sample: Sample) -> float:
+    """Where a sample is among the ticks, by the clock that the peers have too."""
+    offset_s = sample.number(CLOCK_OFFSET)[0] or 0.0 if CLOCK_OFFSET in sample.row else 0.0
+    return (sample.at_s - offset_s) / shared.tick_s
+
+
+def _scored(seat: Seat, sample: Sample, tick: int) -> Scored:
     """The raw score of a machine as of a tick."""
-    tick = _tick(shared, sample, round)
-    model = shared.loaded.get(sample.machine)
+    model = seat.model
     if model is None:
         return Scored(tick, sample.at_s, None, NO_MODEL)
     values = []
@@ -199,116 +200,61 @@ def _scored(shared: Config, sample: Sample) -> Scored:
     return Scored(tick, sample.at_s, model.score_one(values))
 
 
-def _judged(
-    config: Configuration[Config], members: dict[str, Member], sample: Sample, raw: Output
-) -> tuple[State, Sequence[Output]]:
-    """The state after judging all frames that are complete now; what came of it."""
+def _judge(
+    config: Configuration[Config], members: dict[str, Member], online: Mapping[str, object], outputs: list[Output]
+) -> None:
+    """Judge all frames that are complete now; the members are replaced, what came of it is added to the outputs."""
     shared = config.default
-    last = {name: one.tick for name, one in members.items() if one.tick is not None and name in sample.cell}
+    last = {name: one.tick for name, one in members.items() if one.tick is not None and name in online}
     limit = limits(last, shared.wait_ticks, shared.look_back_ticks)
-    outputs = [raw]
     for frame in frames({name: members[name].pending for name in limit}, limit):
-        outputs += _frame(config, members, frame)
-    for name, up_to in limit.items():
-        waiting = members[name].pending
-        if waiting and waiting[0].tick <= up_to:
-            members[name] = members[name]._replace(pending=without(waiting, up_to))
-    return State(members), outputs
+        names = list(frame)
+        gates = [gated(members[name].gate, shared.gate_rule, frame[name].at_s) for name in names]
+        scores = [_on_the_scale(config, name, frame[name].raw) for name in names]
+        adjusted = adjust_frame(shared.common_mode_rule, scores, [gate.is_on is True for gate in gates])
+        for name, gate, one in zip(names, gates, adjusted, strict=True):
+            peer = names[one.peer] if one.is_common and one.peer is not None else "none"
+            judged = Judged(frame[name], gate, one.score, one.is_common, peer, one.peers)
+            members[name] = after(_seat(config, name), members[name], judged, shared.tick_s, outputs)
 
 
-def _frame(config: Configuration[Config], members: dict[str, Member], frame: Mapping[str, Scored]) -> list[Output]:
-    """Judge the scores of one tick beside each other; the members are replaced."""
-    shared = config.default
-    names = list(frame)
-    gates = [gated(members[name].gate, shared.gate_rule, frame[name].at_s) for name in names]
-    scores = [_on_the_scale(shared, name, frame[name].raw) for name in names]
-    outputs: list[Output] = []
-    judged = adjust_frame(shared.common_mode_rule, scores, [gate.is_on is True for gate in gates])
-    for name, gate, adjusted in zip(names, gates, judged, strict=True):
-        peer = "none" if adjusted.peer is None else names[adjusted.peer]
-        at_s = frame[name].at_s
-        members[name], own = _member(config, name, members[name], Judged(frame[name], gate, adjusted))
-        outputs += own
-        outputs += [
-            Output(COMMON, adjusted.is_common, machine=name, at_s=at_s),
-            Output(PEER, peer, machine=name, at_s=at_s),
-            Output(PEERS, adjusted.peers, machine=name, at_s=at_s),
-        ]
-    return outputs
-
-
-def _on_the_scale(shared: Config, name: str, raw: float | None) -> float | None:
+def _on_the_scale(config: Configuration[Config], name: str, raw: float | None) -> float | None:
     """The raw score for the published rule; for the residual, how many spreads it lies above its centre."""
-    if raw is None or shared.common_mode is Method.SOURCE:
+    if raw is None or config.default.common_mode is Method.SOURCE:
         return raw
-    calibration = shared.loaded[name].calibration
+    calibration = _seat(config, name).calibration
     return None if calibration is None else standardised(raw, calibration.raw_center, calibration.raw_spread)
 
 
-def _member(config: Configuration[Config], name: str, member: Member, judged: Judged) -> tuple[Member, list[Output]]:
-    """A machine after one of its scores was judged; its adjusted score, its gate and its alarm."""
-    scored, gate, adjusted = judged
-    shared, at_s = config.default, scored.at_s
-    threshold = _threshold(config, name)
-    is_gated = gate.is_on is True
-    outputs = [
-        _or_null(ADJUSTED, adjusted.score, scored.reason or "no z without the centre and spread of a calibration", name, at_s),
-        _or_null(GATE, gate.is_on, gate.reason or "", name, at_s),
-        Output(GATE_SOURCE, gate.source, machine=name, at_s=at_s),
-    ]
-    alarm = member.alarm
-    if threshold is None:
-        outputs.append(Output.null(ALARM, NO_MODEL if name not in shared.loaded else NO_THRESHOLD, name, at_s))
-    else:
-        alarm = after_tick(_alarm_rule(shared, threshold), alarm, adjusted.score, is_gated)
-        known = alarm.is_on if alarm.is_on or adjusted.score is not None else None
-        outputs.append(_or_null(ALARM, known, scored.reason or "no adjusted score", name, at_s))
-    total_s = min(member.total_s + shared.tick_s, SHARE_S)
-    gated_s = member.gated_s + (shared.tick_s if is_gated else 0.0) - (member.gated_s * shared.tick_s / SHARE_S)
-    share_pct = min(100.0 * gated_s / total_s, 100.0)
-    drift, told = drifted(member.drift, shared.loaded.get(name), None if is_gated else scored.raw, at_s)
-    outputs += [Output(GATED_SHARE, round(share_pct, 2), machine=name, at_s=at_s), *(one._replace(machine=name) for one in told)]
-    return member._replace(alarm=alarm, total_s=total_s, gated_s=gated_s, drift=drift), outputs
-
-
-def _or_null(name: str, value: float | bool | None, reason: str, machine: str, at_s: float) -> Output:
-    return Output.null(name, reason, machine, at_s) if value is None else Output(name, value, machine=machine, at_s=at_s)
-
-
-def _threshold(config: Configuration[Config], name: str) -> float | None:
-    """The configured threshold, else that of the model; None where neither is there."""
+def _seat(config: Configuration[Config], machine: str) -> Seat:
+    """What the configuration says of one machine, put together once."""
     shared = config.default
-    configured = config.of(name).threshold
-    model = shared.loaded.get(name)
-    if model is None:
-        return None
-    if configured is not None:
-        return configured
-    return None if model.calibration is None else model.calibration.threshold
+    seat = shared.seats.get(machine)
+    if seat is None:
+        model = shared.loaded.get(machine)
+        threshold = config.of(machine).threshold
+        if threshold is None and model is not None and model.calibration is not None:
+            threshold = model.calibration.threshold
+        rule = None if threshold is None or model is None else AlarmRule(threshold, shared.dwell_ticks, shared.clear_fraction)
+        if len(shared.seats) >= SEATS_MAX:
+            shared.seats.clear()
+        seat = shared.seats[machine] = Seat(machine, model, rule)
+    return seat
 
 
-def _alarm_rule(shared: Config, threshold: float) -> AlarmRule:
-    rule = shared.alarm_rules.get(threshold)
-    if rule is None:
-        rule = shared.alarm_rules[threshold] = AlarmRule(threshold, shared.dwell_ticks, shared.clear_fraction)
-    return rule
-
-
-def _interrupted(alarm: AlarmState) -> AlarmState:
-    return AlarmState(alarm.is_on)
-
-
-def _told(config: Configuration[Config], machine: str) -> list[Output]:
+def _introduced(config: Configuration[Config], machine: str) -> list[Output]:
     """What a reader of a machine has to know of its scores, once."""
-    shared, threshold = config.default, _threshold(config, machine)
-    model = shared.loaded.get(machine)
+    shared, seat = config.default, _seat(config, machine)
+    model, rule = seat.model, seat.rule
     if model is None:
         return [Output.null(THRESHOLD, NO_MODEL), Output(BASIS, NO_MODEL)]
-    found = model.calibration
-    fitted = "not fitted" if found is None or config.of(machine).threshold is not None else found.in_words
+    fitted = "configured" if config.of(machine).threshold is not None else "not fitted"
+    if fitted == "not fitted" and model.calibration is not None:
+        fitted = model.calibration.in_words
     common = f"common mode by {shared.common_mode.value}, factor {shared.common_mode_factor:g}"
     basis = f"{model.in_words}; threshold {fitted}; {common}; gate tail {shared.tail_s:g} s, look-back {shared.look_back_s:g} s"
-    return [_or_null(THRESHOLD, threshold, NO_THRESHOLD, machine, 0.0)._replace(at_s=None), Output(BASIS, basis)]
+    threshold = Output.null(THRESHOLD, NO_THRESHOLD) if rule is None else Output(THRESHOLD, rule.threshold)
+    return [threshold, Output(BASIS, basis)]
 
 
 def _models_in(folder: Path) -> "dict[str, AnomalyModel]":
@@ -350,7 +296,13 @@ def _specs() -> tuple[OutputSpec, ...]:
             ADJUSTED, number, None, "raw score; 0 while it is common mode or gated (residual: spreads over the peers)", inferred
         ),
         OutputSpec(COMMON, DataType.BOOLEAN, None, "peers are as unusual: no fault of this machine", inferred),
-        OutputSpec(PEER, text, None, "the peer with the largest score that counted", inferred),
+        OutputSpec(
+            PEER,
+            text,
+            None,
+            "the peer that makes the score common mode, the largest of them",
+            inferred,
+        ),
         OutputSpec(PEERS, DataType.INT64, None, "how many peers had a score as of the same tick", inferred),
         OutputSpec(GATE, DataType.BOOLEAN, None, "a tool change, its look-back or its tail: scores are not judged", inferred),
         OutputSpec(GATE_SOURCE, text, None, "who says so: controller, detector, none or stale", inferred),
@@ -375,4 +327,5 @@ PROCESSOR = CellProcessor(
     state=State,
     initial=lambda _: State(),
     step=step,
+    wakes=CONTEXT_INPUTS,
 )

@@ -49,11 +49,3 @@ def frames(pending: Mapping[str, Pending], limit: Mapping[str, int]) -> list[dic
                 break
             found.setdefault(scored.tick, {})[machine] = scored
     return [found[tick] for tick in sorted(found)]
-
-
-def without(waiting: Pending, up_to: int) -> Pending:
-    """What still waits, once frames are closed up to a tick."""
-    for place, scored in enumerate(waiting):
-        if scored.tick > up_to:
-            return waiting[place:]
-    return ()

@@ -178,10 +178,12 @@ class Lane:
             readings = [reading for reading in readings if reading[0] in inputs]
         if not readings:
             self._ledger.emitted += 1  # nothing in it for this processor, but the time
-        elif changed := self._update(readings, before_ms):
-            self._settle(self._fold(SampleKind.DATA, self._now_ms(readings), changed, effects))
-        else:
+        elif not (changed := self._update(readings, before_ms)):
             self._ledger.drop(DropReason.SUPERSEDED)
+        elif self.fold.wakes is not None and self.fold.wakes.isdisjoint(changed):
+            self._ledger.emitted += 1  # the next tick sees it
+        else:
+            self._settle(self._fold(SampleKind.DATA, self._now_ms(readings), changed, effects))
 
     def _reach(self, at_ms: int, wall_s: float, effects: list[Effect]) -> None:
         if self.clock_ms is None:

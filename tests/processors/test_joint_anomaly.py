@@ -11,7 +11,8 @@ from processors.config import Configuration
 from processors.effects import DeadLetter, Effect, Publish
 from processors.engine import Engine
 from processors.errors import ConfigurationError
-from processors.joint_anomaly import ADJUSTED, ALARM, COMMON, GATE, GATE_SOURCE, NO_MODEL, PEERS, PROCESSOR, RAW, Config
+from processors.joint_anomaly import PROCESSOR, RAW, Config
+from processors.joint_member import ADJUSTED, ALARM, COMMON, GATE, GATE_SOURCE, NO_MODEL, PEERS
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId
 from tests.processors.streams import T0_MS, birth, data, death, event, fed, reading
