@@ -41,7 +41,5 @@ def _declared_in(module_name: str) -> AnyProcessor | None:
     if declared is None:
         return None
     if not isinstance(declared, Processor | CellProcessor) or declared.name != module_name:
-        raise DeclarationError(
-            f"processors/{module_name}.py: PROCESSOR has to be one, named {module_name!r}"
-        )
+        raise DeclarationError(f"processors/{module_name}.py: PROCESSOR has to be one, named {module_name!r}")
     return declared

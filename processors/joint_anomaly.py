@@ -48,6 +48,7 @@ from processors.tool_change_gate import GateRule, followed, gated, restarted
 from sparkplug.datatype import DataType
 from twin.anomaly.alarm import AlarmRule, AlarmState
 from twin.anomaly.common_mode import CommonModeRule, Method, adjust_frame, standardised
+from twin.errors import TwinError
 
 if TYPE_CHECKING:
     from twin.anomaly.model import AnomalyModel, Calibration
@@ -263,7 +264,10 @@ def _models_in(folder: Path) -> "dict[str, AnomalyModel]":
         from twin.anomaly.model import load_models  # noqa: PLC0415  numpy comes with it
     except ImportError as error:
         raise ValueError(f"scoring needs {error.name}: pip install 'cnctwin[twin]'") from error
-    return load_models(folder)
+    try:
+        return load_models(folder)
+    except TwinError as error:
+        raise ValueError(str(error)) from error
 
 
 def _check_settings(config: Config, machine: str, calibration: "Calibration") -> None:

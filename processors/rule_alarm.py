@@ -1,0 +1,87 @@
+"""When a rule's condition becomes an alarm, and when it ends: dwell and hysteresis, in event time.
+
+A condition that is over its limit for `dwell_s` without a break raises the alarm; one that is under the lower limit for `clear_s`
+without a break ends it; in between, an alarm stays and none is raised. While a rule is excused (the spindle changes its speed)
+or its inputs are unknown, neither clock runs, and an alarm stays what it was: nothing has shown that it is over.
+"""
+
+from enum import Enum
+from typing import NamedTuple
+
+
+class Stand(Enum):
+    """How the value of a rule stands to its limits."""
+
+    OVER = "over"
+    BETWEEN = "between"
+    UNDER = "under"
+    EXCUSED = "excused"
+    UNKNOWN = "unknown"
+
+
+class Judgement(NamedTuple):
+    """What a rule finds at one moment. `reason`: why it is unknown; `finding`: what is over which limit, as a person reads it."""
+
+    stand: Stand
+    reason: str = ""
+    finding: str = ""
+
+
+class Timing(NamedTuple):
+    """How long over the limit until it alarms, how long under the lower one until it ends."""
+
+    dwell_s: float
+    clear_s: float
+
+
+class Latch(NamedTuple):
+    """One rule's alarm.
+
+    alarm_s: since when the condition held that raised it; None = no alarm. `finding` is of the moment at which it was raised
+    over_s, under_s: since when the value has been over, under, without a break
+    """
+
+    alarm_s: float | None = None
+    finding: str = ""
+    over_s: float | None = None
+    under_s: float | None = None
+
+    @property
+    def is_alarm(self) -> bool:
+        """Whether it alarms."""
+        return self.alarm_s is not None
+
+
+IDLE = Latch()
+
+
+def over_under(value: float, limit: float, clear_limit: float) -> Stand:
+    """How `value` stands to a limit and the lower one at which an alarm ends.
+
+    >>> [over_under(value, 110.0, 100.0).value for value in (111.0, 110.0, 99.0)]
+    ['over', 'between', 'under']
+    """
+    if value > limit:
+        return Stand.OVER
+    return Stand.BETWEEN if value >= clear_limit else Stand.UNDER
+
+
+def latched(latch: Latch, judgement: Judgement, timing: Timing, at_s: float) -> Latch:
+    """The alarm after one more judgement."""
+    stand, alarm_s = judgement.stand, latch.alarm_s
+    if stand is Stand.OVER:
+        over_s = at_s if latch.over_s is None else latch.over_s
+        if alarm_s is None and at_s - over_s >= timing.dwell_s:
+            return Latch(over_s, judgement.finding, over_s)
+        return latch if latch.over_s is not None and latch.under_s is None else Latch(alarm_s, latch.finding, over_s)
+    if stand is Stand.UNDER and alarm_s is not None:
+        under_s = at_s if latch.under_s is None else latch.under_s
+        if at_s - under_s >= timing.clear_s:
+            return IDLE
+        return latch if latch.under_s is not None and latch.over_s is None else Latch(alarm_s, latch.finding, None, under_s)
+    return rested(latch)
+
+
+def rested(latch: Latch) -> Latch:
+    """The alarm as it is, both clocks stopped."""
+    return latch if latch.over_s is None and latch.under_s is None else Latch(latch.alarm_s, latch.finding)
