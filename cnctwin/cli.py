@@ -120,12 +120,13 @@ def process(
         Path | None, typer.Option(help="Keeps birth/death numbers; else $CNCTWIN_STATE_DIR or ~/.local/state/cnctwin")
     ] = None,
 ) -> None:
-    """Run processors until SIGTERM or Ctrl-C."""
-    from processors.runtime import configured, run
+    """Run processors until SIGTERM or Ctrl-C; beside alerts, the courier that sends its notifications."""
+    from cnctwin.process_command import process as run_processors
+    from processors.runtime import configured
 
     configured(names, config)
     with stopped_by_signals() as stop, broker_or_own(address(broker)) as where:
-        run(names, where, config, stop, group=group, session_dir=folder_for_state(state_dir))
+        run_processors(names, config, where, stop, group=group, state_dir=folder_for_state(state_dir))
 
 
 @app.command()
