@@ -161,11 +161,18 @@ def identify(
 
 @app.command("import")
 def import_(
-    recording: Annotated[Path, typer.Argument(help="A recording in the time|key|value text of the NIST test bed")],
+    recording: Annotated[Path, typer.Argument(help="time|key|value text of the NIST test bed; or an SHDR log, with --devices")],
     out: Annotated[Path, typer.Option(help="The run log, .parquet or .csv; numbered where there are several runs")],
+    devices: Annotated[Path | None, typer.Option(help="The Devices.xml of the SHDR log")] = None,
+    device: Annotated[str | None, typer.Option(help="Which device of it, where there are several")] = None,
 ) -> None:
-    """Turn a recording into run logs, one for each program execution in it, with its pauses."""
-    _twin().import_recording(recording, out, _console())
+    """Turn a recording into run logs: one for each program execution, or of an SHDR log for each stretch without a gap."""
+    if devices is None:
+        _twin().import_recording(recording, out, _console())
+    else:
+        from cnctwin.shdr_import import import_shdr
+
+        import_shdr(recording, devices, device, out, _console())
 
 
 @gap_app.command("diagnose")
