@@ -6,7 +6,10 @@ TwinError
 ├── RunLogError       a recording that is not a run log
 ├── CaseError         a case folder that is not a case
 ├── EngagementError   a path, tool, stock or limit with which the engagement cannot be computed
-└── EffectError       an effect that does not exist, or is given what it does not take
+├── EffectError       an effect that does not exist, or is given what it does not take
+├── ModelError        an anomaly model that cannot be trained, read or used (twin/anomaly/errors.py)
+├── ForestError       arrays that are no forest, or a row that it cannot score (twin/forest/errors.py)
+└── TransientError    a tool-change detector that cannot be learned, read or used (twin/transient/errors.py)
 """
 
 

@@ -25,9 +25,11 @@ COLUMNS = frozenset(
         *("entry_angle_rad", "exit_angle_rad", "force_x_n", "force_y_n", "coolant_on", "ambient_temp_c", "spindle_temp_c"),
         *("vibration_rms_g", "feed_mm_min", "tool_number", "tool_change_active", "cutting_force_peak_n"),
         *("feed_override_pct", "rapid_override_pct", "spindle_override_pct"),
+        *("spindle_rpm_cmd", "spindle_current_a", "vibration_velocity_mm_s"),
+        *(f"axis_{axis}_load_pct" for axis in "xyzabc"),
     }
 )
-TEXT_COLUMNS = frozenset({"exec_state"})
+TEXT_COLUMNS = frozenset({"exec_state", "program"})
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,0 +1,1 @@
+"""`cnctwin train detector`: a tool-change detector from recorded runs."""

@@ -1,0 +1,243 @@
+"""Tool changes of a control that reports none, recognised by what the spindle's drive does (`twin/transient`).
+
+The signal of the model is sampled at ticks, held between reports. Where its beginning looks like that of a change, the gate opens
+provisionally; the whole pattern confirms it; without an end in time it is retracted. Feed and block number are taken into account
+where the model has weights for them and the control tells them. Without a model, without its signal, or too soon after a hole to
+have seen a whole change, the answer is null with the reason, never "no".
+
+A control that reports `tool_change_active` itself is believed first by those who read both; this goes on beside it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Self
+
+from pydantic import Field, PlainSerializer, PlainValidator, model_validator
+
+from processors.config import ProcessorConfig
+from processors.contract import TWIN_PREFIX, Output, OutputSpec, Processor, Provenance, Sample, SampleKind
+from sparkplug.datatype import DataType
+from sparkplug.quality import Quality
+
+if TYPE_CHECKING:
+    from twin.transient.detector import Detector
+    from twin.transient.detector import State as Search
+
+ACTIVE, SOURCE = f"{TWIN_PREFIX}tool_change_active", f"{TWIN_PREFIX}tool_change_source"
+CONFIDENCE, PHASE = f"{TWIN_PREFIX}tool_change_confidence", f"{TWIN_PREFIX}tool_change_phase"
+BASIS = f"{TWIN_PREFIX}tool_change_detector_basis"
+SIGNALS = ("spindle_rpm", "spindle_current_a", "spindle_load_pct")
+FEED, LINE, BLOCK, REPORTED = "feed_mm_min", "nc_line", "nc_block", "tool_change_active"
+RESTING_MM_MIN = 10.0
+UNKNOWN = -1.0
+NO_MODEL = "no model is configured: learn one from a captured change with `cnctwin train detector`"
+TOLD_S = 1.0
+BLOCK_CHARACTERS_MAX = 200
+
+
+class Config(ProcessorConfig):
+    """Which model. tick_s has to go into its sample period a whole number of times."""
+
+    tick_s: float = Field(default=0.1, ge=0.001, le=3600.0, description="the model's sample period, or a whole part of it")
+    model: Path | None = None
+    shown_s: float = Field(default=2.0, gt=0.0, le=60.0)
+    pattern_score: float | None = Field(default=None, ge=0.0, lt=1.0, description="in place of the model's, by the signal alone")
+    opens_early: bool = Field(default=True, description="whether the gate opens on the beginning alone")
+
+    @cached_property
+    def loaded(self) -> "tuple[Detector, str, int] | None":
+        """The detector, by what it is told from another, and ticks for each of its samples; None without a model."""
+        if self.model is None:
+            return None
+        try:
+            from twin.transient.artefact import load_detector  # noqa: PLC0415 - a light install has no arrays
+        except ImportError as error:
+            raise ValueError(f"a model needs {error.name}, which is not installed: pip install 'cnctwin[twin]'") from None
+
+        detector, mark = load_detector(self.model)
+        detector = replace(detector, shown_s=self.shown_s)
+        if self.pattern_score is not None:
+            detector = detector.with_score(self.pattern_score)
+        detector.warmed_up()
+        return detector, mark, round(detector.template.period_s / self.tick_s)
+
+    @model_validator(mode="after")
+    def _model_fits(self) -> Self:
+        if self.loaded is not None:
+            detector, _, ticks = self.loaded
+            period_s = detector.template.period_s
+            if ticks < 1 or abs(ticks * self.tick_s - period_s) > 1e-6 * period_s:
+                raise ValueError(
+                    f"tick_s {self.tick_s:g} does not go into the sample period {period_s:g} s of {self.model}: set it so"
+                )
+        return self
+
+
+def _dumped(search: "Search | None") -> Any:
+    if search is None:
+        return None
+    history = search.history
+    kept = [[int(value) for value in row] for row in history.kept()]
+    return {"length": history.length, "seen": history.seen, "kept": kept, "gate": list(search.gate)}
+
+
+def _restored(dumped: Any) -> "Search | None":
+    from twin.transient.detector import restored  # noqa: PLC0415
+
+    if dumped is None or not isinstance(dumped, dict):
+        return dumped
+    return restored(dumped["kept"], dumped["length"], dumped["seen"], dumped["gate"])
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """The search as of the last tick, and the samples of one of its periods.
+
+    mark: of the model that it belongs to; total, ticks: of the period that is being averaged
+    feed_rest, block_stand: run lengths in the model's samples; block: that is being executed; told: what was published last
+    """
+
+    search: Annotated[Any, PlainSerializer(_dumped), PlainValidator(_restored)] = None
+    mark: str = ""
+    total: float = 0.0
+    ticks: int = 0
+    feed_rest: float = UNKNOWN
+    block_stand: float = UNKNOWN
+    block: str | None = None
+    why_not: str = ""
+    told: str = ""
+    told_s: float = 0.0
+
+
+def step(config: Config, state: State, sample: Sample) -> tuple[State, Sequence[Output]]:
+    """Sample at ticks; what a hole or a death leaves behind is not a stream."""
+    if config.loaded is None:
+        return (state, _nulls("none", NO_MODEL)) if sample.kind is not SampleKind.DATA else (state, ())
+    if sample.kind is SampleKind.TICK:
+        return _told(config, _ticked(config, state, sample), sample)
+    if sample.kind is SampleKind.HOLE:
+        return _told(config, State(why_not=sample.detail or "messages were lost"), sample)
+    if sample.kind is SampleKind.DATA:
+        return state, ()
+    _, missing = sample.number(config.loaded[0].signal)
+    if sample.kind is SampleKind.DEATH and missing:
+        state = State(why_not=missing)  # there are no ticks until it comes back: what goes on is not seen
+    return _told(config, replace(state, told=""), sample)
+
+
+def _ticked(config: Config, state: State, sample: Sample) -> State:
+    """The state after a tick."""
+    assert config.loaded is not None
+    detector, mark, ticks_of_sample = config.loaded
+    value, why_not = sample.number(detector.signal)
+    if value is None:
+        return State(why_not=why_not or "", told=state.told, told_s=state.told_s)
+    if state.mark != mark or state.search is None:
+        state = State(detector.begun(), mark, why_not=state.why_not, told=state.told, told_s=state.told_s)
+    search, _, total, ticks, feed_rest, block_stand, block, why_not, told, told_s = _fields(state)
+    total, ticks = total + value, ticks + 1
+    if ticks < ticks_of_sample:
+        return State(search, mark, total, ticks, feed_rest, block_stand, block, why_not, told, told_s)
+    feed, _ = sample.number(FEED)
+    feed_rest = UNKNOWN if feed is None else max(feed_rest, 0.0) + 1.0 if abs(feed) < RESTING_MM_MIN else 0.0
+    now = _block(sample)
+    block_stand = UNKNOWN if now is None else max(block_stand, 0.0) + 1.0 if now == block else 0.0
+    search, _ = detector.advanced(search, total / ticks, feed_rest, block_stand)
+    return State(search, mark, 0.0, 0, feed_rest, block_stand, now, why_not, told, told_s)
+
+
+def _fields(state: State) -> tuple[Any, str, float, int, float, float, str | None, str, str, float]:
+    return (
+        state.search, state.mark, state.total, state.ticks, state.feed_rest, state.block_stand, state.block, state.why_not,
+        state.told, state.told_s,
+    )  # fmt: skip
+
+
+def _block(sample: Sample) -> str | None:
+    """What is executed now: the line, else the text of the block; None where neither is known."""
+    for name in (LINE, BLOCK):
+        reading = sample.row.get(name)
+        if reading is not None and reading.quality is Quality.GOOD and isinstance(reading.value, int | float | str):
+            return str(reading.value)[:BLOCK_CHARACTERS_MAX]
+    return None
+
+
+def _told(config: Config, state: State, sample: Sample) -> tuple[State, Sequence[Output]]:
+    """The outputs where they differ from those before, and once a second."""
+    assert config.loaded is not None
+    detector = config.loaded[0]
+    search: Search | None = state.search
+    gate = None if search is None else search.gate
+    key = state.why_not if gate is None else "none" if not gate.until else f"{gate.phase.value} {gate.confidence:.2f}"
+    if key == state.told and 0.0 <= sample.at_s - state.told_s < TOLD_S:
+        return state, ()
+    return replace(state, told=key, told_s=sample.at_s), _outputs(config, detector, search, state, sample)
+
+
+def _outputs(config: Config, detector: "Detector", search: "Search | None", state: State, sample: Sample) -> Sequence[Output]:
+    _, missing = sample.number(detector.signal)
+    if search is None or missing:
+        reading = sample.row.get(detector.signal)
+        source = "stale" if reading is not None and reading.quality is Quality.STALE else "none"
+        return _nulls(source, missing or state.why_not or f"{detector.signal} has not been seen yet")
+    phase = search.gate.phase
+    is_active = phase == "confirmed" or (phase == "provisional" and config.opens_early)
+    if phase not in ("provisional", "confirmed") and search.history.seen < detector.samples_min:
+        begun = f"; {state.why_not}" if state.why_not else ""
+        return _nulls(
+            "none", f"{detector.signal} was seen for less than the {detector.template.seconds:.3g} s of a change{begun}"
+        )
+    return (
+        Output(ACTIVE, is_active),
+        Output(SOURCE, "detector"),
+        Output(CONFIDENCE, round(search.gate.confidence, 3)),
+        Output(PHASE, str(phase.value)),
+        Output(BASIS, _basis(detector, sample)),
+    )
+
+
+def _basis(detector: "Detector", sample: Sample) -> str:
+    """What the answer rests on."""
+    limits = detector.limits
+    parts = [f"{detector.signal}: two-part matched filter, pattern from a score of {limits.pattern_score:.2f}"]
+    if detector.weighing is not None:
+        _, no_feed = sample.number(FEED)
+        has_block = _block(sample) is not None
+        parts.append("feed and block weighed" if has_block and not no_feed else f"signal alone: {no_feed or 'no block is told'}")
+    reported = sample.row.get(REPORTED)
+    if reported is not None and reported.quality is Quality.GOOD and isinstance(reported.value, bool):
+        parts.append(f"the control itself reports {REPORTED}")
+    return "; ".join(parts)
+
+
+def _nulls(source: str, reason: str) -> tuple[Output, ...]:
+    named = (ACTIVE, CONFIDENCE, PHASE)
+    return *(Output.null(name, reason) for name in named), Output(SOURCE, source), Output(BASIS, f"none: {reason}")
+
+
+_INFERRED = Provenance.INFERRED
+PROCESSOR = Processor(
+    name="tool_change_detector",
+    version=1,
+    inputs=frozenset({*SIGNALS, FEED, LINE, BLOCK, REPORTED}),
+    outputs=(
+        OutputSpec(ACTIVE, DataType.BOOLEAN, None, "whether a tool change is going on, by the drive's signal", _INFERRED),
+        OutputSpec(SOURCE, DataType.STRING, None, "who says so: detector; none or stale where it can say nothing", _INFERRED),
+        OutputSpec(
+            CONFIDENCE,
+            DataType.DOUBLE,
+            None,
+            "likeness to the pattern; with feed and block weighed, probability",
+            _INFERRED,
+            0.01,
+        ),
+        OutputSpec(PHASE, DataType.STRING, None, "none, provisional, confirmed or retracted", _INFERRED),
+        OutputSpec(BASIS, DataType.STRING, None, "what the detection rests on", _INFERRED),
+    ),
+    config=Config,
+    state=State,
+    initial=lambda _: State(),
+    step=step,
+)
