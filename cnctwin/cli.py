@@ -18,6 +18,7 @@ from rich.console import Console
 from typer.exceptions import TyperException
 
 from cnctwin import demo as demo_command
+from cnctwin.alert_commands import alerts_app
 from cnctwin.errors import BrokerStartError, ProgramError, UsageError
 from cnctwin.given_broker import address, broker_or_own
 from cnctwin.replay_command import replay
@@ -37,6 +38,7 @@ control_app = typer.Typer(no_args_is_help=True, help="Stand in for a control, to
 app.add_typer(edge_app, name="edge")
 app.add_typer(gap_app, name="gap")
 app.add_typer(control_app, name="simulate-control")
+app.add_typer(alerts_app, name="alerts")
 
 
 class Method(StrEnum):

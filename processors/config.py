@@ -95,8 +95,9 @@ def _validated(model: type[C_co], table: Mapping[str, Any], where: str) -> C_co:
         first = error.errors()[0]
         key = ".".join(str(part) for part in first["loc"])
         known = ", ".join(model.model_fields)
+        said = first["msg"].removeprefix("Value error, ")
         raise ConfigurationError(
-            f"[{where}] {key} = {first['input']!r}: {first['msg']} (known: {known})" if key else f"[{where}] {first['msg']}"
+            f"[{where}] {key} = {first['input']!r}: {said} (known: {known})" if key else f"[{where}] {said}"
         ) from error
 
 
