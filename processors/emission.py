@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable, Sequence
+from functools import lru_cache
 
 from processors.contract import PYTHON_TYPES, Output, OutputSpec, PlainOutput, PlainSpec
 from processors.discovery import AnyProcessor
@@ -21,18 +22,19 @@ class Emission:
         self.processor_name = processor.name
         self.is_history = is_history
         self.latest: dict[str, Change] = {}
-        self._rules = {spec.name: (spec, float in PYTHON_TYPES[spec.datatype], spec.deadband) for spec in processor.outputs}
+        self._rules = _rules(processor.outputs)
 
     def news(self, outputs: Iterable[Output], at_ms: int) -> list[Change]:
-        """What of `outputs` has to be published. Changes nothing: `published` does.
+        """What of `outputs` has to be published, each beside the one before it. Changes nothing: `published` does.
 
         Raises OutputError where an output is not declared or is of another type: our own bug.
         """
         latest, rules, is_history = self.latest, self._rules, self.is_history
         changes: list[Change] = []
+        told: dict[str, Change] = {}  # in this step: a metric may have values of several moments
         for output in outputs:
             name, value, quality, reason, _, at_s = output
-            known = latest.get(name)
+            known = told.get(name) or latest.get(name)
             if known is not None and known[1] == value and known[3] is quality and known[4] == reason:
                 continue
             if name not in rules:
@@ -44,7 +46,8 @@ class Emission:
                 continue
             if not (is_history and spec.is_alarm):
                 stamp_ms = at_ms if at_s is None else round(at_s * 1000)
-                changes.append(Change(name, value, stamp_ms, quality, reason, is_history))
+                told[name] = change = Change(name, value, stamp_ms, quality, reason, is_history)
+                changes.append(change)
         return changes
 
     def known(self, at_ms: int) -> tuple[Change, ...]:
@@ -56,6 +59,12 @@ class Emission:
         """Remember what readers now know."""
         for change in changes:
             self.latest[change.name] = change
+
+
+@lru_cache(maxsize=100)
+def _rules(outputs: tuple[OutputSpec, ...]) -> dict[str, tuple[OutputSpec, bool, float]]:
+    """By name: the declaration, whether it takes floats, and its deadband. The machines of a processor share them."""
+    return {spec.name: (spec, float in PYTHON_TYPES[spec.datatype], spec.deadband) for spec in outputs}
 
 
 def plain_message(processor_name: str, declared: Sequence[PlainSpec], output: PlainOutput) -> PublishPlain:

@@ -95,8 +95,10 @@ class Fold:
         for output in outputs:
             if isinstance(output, PlainOutput):
                 plain.append(plain_message(self._processor.name, self._processor.plain, output))
+            elif (own := by_machine.get(whose := output.machine or machine)) is None:
+                by_machine[whose] = [output]
             else:
-                by_machine.setdefault(output.machine or machine, []).append(output)
+                own.append(output)
         news = []
         for whose, own in by_machine.items():
             emission = self.emissions.get(whose)

@@ -14,8 +14,8 @@ are published side by side.
 """
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Container, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
@@ -24,7 +24,7 @@ from pydantic import Field, PositiveFloat, model_validator
 
 from processors.config import CellConfig, Configuration
 from processors.contract import CellProcessor, Output, OutputSpec, Provenance, Sample, SampleKind
-from processors.joint_frames import PENDING_MAX, Scored, frames, limits
+from processors.joint_frames import InStep, Scored, frames, in_step
 from processors.joint_member import (
     ADJUSTED,
     ALARM,
@@ -33,20 +33,22 @@ from processors.joint_member import (
     GATE_SOURCE,
     GATED_SHARE,
     NO_MODEL,
+    NO_PEER,
     NO_THRESHOLD,
     PEER,
     PEERS,
-    Judged,
     Member,
     Seat,
     after,
 )
-from processors.score_drift import DRIFT
+from processors.score_drift import DRIFT, NO_GOLDEN_WEEK
 from processors.tool_change_context import INPUTS as CONTEXT_INPUTS
 from processors.tool_change_context import tool_change_context
-from processors.tool_change_gate import GateRule, followed, gated, restarted
+from processors.tool_change_gate import GateRule, followed
 from sparkplug.datatype import DataType
-from twin.anomaly.alarm import AlarmRule, AlarmState
+from sparkplug.metric import Reading
+from sparkplug.quality import Quality
+from twin.anomaly.alarm import AlarmRule
 from twin.anomaly.common_mode import CommonModeRule, Method, adjust_frame, standardised
 from twin.errors import TwinError
 
@@ -55,7 +57,13 @@ if TYPE_CHECKING:
 
 RAW, THRESHOLD, BASIS = "twin/raw_score", "twin/anomaly_threshold", "twin/anomaly_basis"
 CLOCK_OFFSET = "clock_offset_s"
+_VALUE, _QUALITY = Reading._fields.index("value"), Reading._fields.index("quality")
 SEATS_MAX = 10_000
+MEMBERS_MAX = 2000  # of a cell; those that are offline are forgotten when there are more
+WAITING_MAX = 5000  # scores of one machine
+OFFSET_TICKS_MAX = 0.75  # that a clock's offset may change before it is a step of the clock
+TICK_ROUNDING = 1e-3
+NOT_FINITE = "the model has no finite answer"
 NUMBERS = frozenset(
     {
         *("spindle_rpm", "spindle_rpm_cmd", "spindle_load_pct", "spindle_power_kw", "spindle_current_a", "feed_mm_min"),
@@ -97,7 +105,8 @@ class Config(CellConfig):
     @cached_property
     def gate_rule(self) -> GateRule:
         """When scores are gated."""
-        return GateRule(self.tail_s, self.look_back_s, self.gate_s_max)
+        tail_ticks = math.ceil(self.tail_s / self.tick_s - TICK_ROUNDING)
+        return GateRule(tail_ticks * self.tick_s, self.look_back_ticks * self.tick_s, self.gate_s_max)
 
     @cached_property
     def common_mode_rule(self) -> CommonModeRule:
@@ -110,6 +119,11 @@ class Config(CellConfig):
         return {}
 
     @cached_property
+    def tick_ms(self) -> int:
+        """As the lanes count (`processors/lane.py`)."""
+        return max(1, round(self.tick_s * 1000.0))
+
+    @cached_property
     def wait_ticks(self) -> int:
         """For peers."""
         return round(self.peer_wait_s / self.tick_s)
@@ -117,12 +131,12 @@ class Config(CellConfig):
     @cached_property
     def look_back_ticks(self) -> int:
         """Before a frame is judged."""
-        return -round(-self.look_back_s // self.tick_s)
+        return math.ceil(self.look_back_s / self.tick_s - TICK_ROUNDING)
 
     @model_validator(mode="after")
     def _fits_the_models(self) -> Self:
-        if (self.look_back_s + self.peer_wait_s) / self.tick_s > PENDING_MAX / 4:
-            raise ValueError(f"look_back_s and peer_wait_s hold more than {PENDING_MAX // 4} ticks; make tick_s longer")
+        if (self.look_back_s + self.peer_wait_s) / self.tick_s > WAITING_MAX:
+            raise ValueError(f"look_back_s and peer_wait_s hold more than {WAITING_MAX} ticks; make tick_s longer")
         for machine, model in self.loaded.items():
             if unknown := [name for name in model.features if name not in NUMBERS]:
                 raise ValueError(f"the model of {machine} has the feature {unknown[0]!r}, which is no signal that is scored live")
@@ -133,97 +147,126 @@ class Config(CellConfig):
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """The machines of the cell; the newest tick that one of them has come to, and how many have."""
+    """The machines of the cell, and who of them is in step."""
 
     members: Mapping[str, Member] = field(default_factory=dict)
-    newest: int = -(2**62)
-    arrived: int = 0
+    in_step: InStep = field(default_factory=InStep)
 
 
 def step(config: Configuration[Config], state: State, sample: Sample) -> tuple[State, Sequence[Output]]:
-    """Follow the gate with what concerns it; score at ticks; judge the frames that are complete."""
+    """Score at ticks; follow what is said of tool changes, and who is there; judge the frames that are complete."""
     if sample.is_history:
         return state, ()
     if sample.kind is SampleKind.TICK:
         return _ticked(config, state, sample)
-    shared, machine, at_s = config.default, sample.machine, sample.at_s
-    member = state.members.get(machine)
-    if member is None and sample.kind is SampleKind.DEATH:
-        return state, ()
-    member = member or Member()
-    if sample.kind is SampleKind.HOLE and sample.gap_s:
-        member = member._replace(tick=None, pending=(), gate=restarted(member.gate, at_s), alarm=AlarmState(member.alarm.is_on))
-    member = member._replace(gate=followed(member.gate, shared.gate_rule, tool_change_context(sample.row), at_s))
-    if sample.kind is not SampleKind.BIRTH:
-        return replace(state, members={**state.members, machine: member}), ()
-    passed = math.floor(_place(shared, sample))
-    member = member._replace(tick=passed if member.tick is None else max(passed, member.tick))
-    known = {name: one for name, one in state.members.items() if name in sample.cell}
-    return replace(state, members={**known, machine: member}), _introduced(config, machine)
+    rule, machine, at_s = config.default.gate_rule, sample.machine, sample.at_s
+    member = state.members.get(machine) or Member()
+    member = member._replace(gate=followed(member.gate, rule, tool_change_context(sample.row), at_s))
+    outputs: list[Output] = []
+    if sample.kind is SampleKind.BIRTH:
+        member = _placed(config.default, member, sample)
+        member = member._replace(tick=_tick(config.default, member, at_s))
+        outputs = _introduced(config, machine)
+    elif sample.kind is SampleKind.DEATH and all(reading.quality is Quality.STALE for reading in sample.row.values()):
+        member = member.offline(rule)
+    elif sample.kind is SampleKind.HOLE and member.tick is not None and _tick(config.default, member, at_s) < member.tick:
+        member = member.set_back(at_s, member.offset_ticks)
+    members = {**state.members, machine: member}
+    if machine not in state.members:
+        members = _by_name(members, sample.cell)
+    elif member.tick == state.members[machine].tick:
+        return State(members, state.in_step), outputs
+    return _together(config, members, outputs)
 
 
 def _ticked(config: Configuration[Config], state: State, sample: Sample) -> tuple[State, Sequence[Output]]:
-    """Score a machine; judge where the tick may have made a frame complete: by the first machine to come to it, which others
-    may be too far behind of, by the last one, and by each that comes late."""
-    machine = sample.machine
-    seat = _seat(config, machine)
-    member = state.members.get(machine) or Member()
-    scored = _scored(seat, sample, round(_place(config.default, sample)))
-    tick, newest, arrived = scored.tick, state.newest, state.arrived
-    if member.tick is not None and tick <= member.tick:
-        return state, ()
-    members = {**state.members, machine: member.waiting_with(scored)}
-    arrived = arrived + 1 if tick == newest else 1 if tick > newest else arrived
+    """Score a machine; judge what its coming to this tick makes complete."""
+    shared, machine = config.default, sample.machine
+    seat, step_before = _seat(config, machine), state.in_step
+    member = _placed(shared, state.members.get(machine) or Member(), sample)
+    before, tick = member.tick, _tick(shared, member, sample.at_s)
+    scored = _scored(seat, sample, tick)
+    members = {**state.members, machine: member.waiting_with(scored, shared.gate_rule, shared.look_back_ticks)}
     outputs = [Output.null(RAW, scored.reason or "") if scored.raw is None else Output(RAW, scored.raw)]
-    if tick != newest or arrived >= len(sample.cell):
-        _judge(config, members, sample.cell, outputs)
-        newest = max((one.tick for one in members.values() if one.tick is not None), default=tick) if tick < newest else tick
-    return State(members, newest, arrived), outputs
+    step_now = step_before.moved(before, tick)
+    if step_now is None:
+        return _together(config, members, outputs)
+    if not step_now.has(tick):
+        _judge(config, members, (machine,), step_now, outputs)
+    return State(members, step_now), outputs
 
 
-def _place(shared: Config, sample: Sample) -> float:
-    """Where a sample is among the ticks, by the clock that the peers have too."""
-    offset_s = sample.number(CLOCK_OFFSET)[0] or 0.0 if CLOCK_OFFSET in sample.row else 0.0
-    return (sample.at_s - offset_s) / shared.tick_s
+def _by_name(members: dict[str, Member], online: Container[str]) -> dict[str, Member]:
+    """In an order that is not that of arrival; too many for one cell, those that are offline are forgotten."""
+    kept = sorted(members if len(members) <= MEMBERS_MAX else [name for name in members if name in online])
+    return {name: members[name] for name in kept}
+
+
+def _together(config: Configuration[Config], members: dict[str, Member], outputs: list[Output]) -> tuple[State, list[Output]]:
+    """Find out who is in step, and judge the frames that are complete by that."""
+    ticks = [one.tick for one in members.values() if one.tick is not None]
+    found = in_step(ticks, config.default.wait_ticks)
+    _judge(config, members, members, found, outputs)
+    return State(members, found), outputs
+
+
+def _placed(shared: Config, member: Member, sample: Sample) -> Member:
+    """The machine, whose clock may have been found to be ahead of that of its peers by another number of ticks than before."""
+    if CLOCK_OFFSET not in sample.row:
+        return member
+    offset_s = sample.number(CLOCK_OFFSET)[0]
+    if offset_s is None or abs(offset_s / shared.tick_s - member.offset_ticks) <= OFFSET_TICKS_MAX:
+        return member
+    return member.set_back(sample.at_s, round(offset_s / shared.tick_s))
+
+
+def _tick(shared: Config, member: Member, at_s: float) -> int:
+    """The last tick of a machine at its time, by the clock that the peers have too."""
+    return round(at_s * 1000.0) // shared.tick_ms - member.offset_ticks
 
 
 def _scored(seat: Seat, sample: Sample, tick: int) -> Scored:
-    """The raw score of a machine as of a tick."""
+    """The raw score of a machine as of a tick. A model that fails concerns its own machine only."""
     model = seat.model
     if model is None:
         return Scored(tick, sample.at_s, None, NO_MODEL)
-    values = []
+    row, values = sample.row, []
     for name in model.features:
-        value, why = sample.number(name)
-        if value is None:
-            return Scored(tick, sample.at_s, None, why)
+        reading = row.get(name)
+        value = None if reading is None or reading[_QUALITY] is not Quality.GOOD else reading[_VALUE]
+        if type(value) is not float or not -math.inf < value < math.inf:  # a float is what nearly every reading is
+            value, why = sample.number(name)
+            if value is None:
+                return Scored(tick, sample.at_s, None, why)
         values.append(value)
-    return Scored(tick, sample.at_s, model.score_one(values))
+    try:
+        raw = model.score_one(values)
+    except Exception as error:  # whatever a library does with these values
+        return Scored(tick, sample.at_s, None, f"the model fails: {type(error).__name__}")
+    return Scored(tick, sample.at_s, raw) if math.isfinite(raw) else Scored(tick, sample.at_s, None, NOT_FINITE)
 
 
 def _judge(
-    config: Configuration[Config], members: dict[str, Member], online: Mapping[str, object], outputs: list[Output]
+    config: Configuration[Config], members: dict[str, Member], names: Iterable[str], step_now: InStep, outputs: list[Output]
 ) -> None:
-    """Judge all frames that are complete now; the members are replaced, what came of it is added to the outputs."""
+    """Judge what is complete of these machines; the members are replaced, what came of it is added to the outputs."""
     shared = config.default
-    last = {name: one.tick for name, one in members.items() if one.tick is not None and name in online}
-    limit = limits(last, shared.wait_ticks, shared.look_back_ticks)
-    for frame in frames({name: members[name].pending for name in limit}, limit):
-        names = list(frame)
-        gates = [gated(members[name].gate, shared.gate_rule, frame[name].at_s) for name in names]
-        scores = [_on_the_scale(config, name, frame[name].raw) for name in names]
-        adjusted = adjust_frame(shared.common_mode_rule, scores, [gate.is_on is True for gate in gates])
-        for name, gate, one in zip(names, gates, adjusted, strict=True):
-            peer = names[one.peer] if one.is_common and one.peer is not None else "none"
-            judged = Judged(frame[name], gate, one.score, one.is_common, peer, one.peers)
-            members[name] = after(_seat(config, name), members[name], judged, shared.tick_s, outputs)
+    ready = {name: members[name].ready for name in names if members[name].ready}
+    for frame in frames(ready, step_now, shared.look_back_ticks):
+        seats = [_seat(config, name) for name in frame]
+        scores = [_on_the_scale(shared, seat, scored.raw) for seat, (scored, _) in zip(seats, frame.values(), strict=True)]
+        adjusted = adjust_frame(shared.common_mode_rule, scores, [label.is_on is True for _, label in frame.values()])
+        for seat, beside in zip(seats, adjusted, strict=True):
+            name = seat.machine
+            peer = seats[beside.peer].machine if beside.is_common and beside.peer is not None else NO_PEER
+            members[name] = after(seat, members[name], beside, peer, outputs)
 
 
-def _on_the_scale(config: Configuration[Config], name: str, raw: float | None) -> float | None:
+def _on_the_scale(shared: Config, seat: Seat, raw: float | None) -> float | None:
     """The raw score for the published rule; for the residual, how many spreads it lies above its centre."""
-    if raw is None or config.default.common_mode is Method.SOURCE:
+    if raw is None or shared.common_mode is Method.SOURCE:
         return raw
-    calibration = _seat(config, name).calibration
+    calibration = seat.calibration
     return None if calibration is None else standardised(raw, calibration.raw_center, calibration.raw_spread)
 
 
@@ -239,7 +282,7 @@ def _seat(config: Configuration[Config], machine: str) -> Seat:
         rule = None if threshold is None or model is None else AlarmRule(threshold, shared.dwell_ticks, shared.clear_fraction)
         if len(shared.seats) >= SEATS_MAX:
             shared.seats.clear()
-        seat = shared.seats[machine] = Seat(machine, model, rule)
+        seat = shared.seats[machine] = Seat(machine, model, rule, shared.tick_s)
     return seat
 
 
@@ -255,7 +298,8 @@ def _introduced(config: Configuration[Config], machine: str) -> list[Output]:
     common = f"common mode by {shared.common_mode.value}, factor {shared.common_mode_factor:g}"
     basis = f"{model.in_words}; threshold {fitted}; {common}; gate tail {shared.tail_s:g} s, look-back {shared.look_back_s:g} s"
     threshold = Output.null(THRESHOLD, NO_THRESHOLD) if rule is None else Output(THRESHOLD, rule.threshold)
-    return [threshold, Output(BASIS, basis)]
+    drift = [Output.null(DRIFT, NO_GOLDEN_WEEK)] if model.calibration is None else []
+    return [threshold, Output(BASIS, basis), *drift]
 
 
 def _models_in(folder: Path) -> "dict[str, AnomalyModel]":

@@ -1,14 +1,18 @@
 """Scores of the machines of a cell, put side by side as of the same moment.
 
-Each machine ticks by its own control, and the messages of one may come later than those of another. A score waits until all
-machines that are in step have come to its tick, and for the look-back of the gate; then the frame of that tick is judged. A
-machine whose clock is further than `wait_ticks` from that of most is out of step: nobody waits for it, its frames are its own.
+Each machine ticks by its own control, and the messages of one may come later than those of another. Machines are in step while
+their last ticks lie within `wait_ticks` of each other; where not all do, as many as can. A frame is judged when all machines that
+are in step have come to its tick (and further by the look-back of the gate), whatever the order in which they came. Nobody waits
+for a machine that is out of step; its scores are judged alone.
 """
 
-from collections.abc import Mapping
+from bisect import bisect_right
+from collections.abc import Collection, Mapping
 from typing import NamedTuple
 
-PENDING_MAX = 20_000  # scores of one machine that wait
+from processors.tool_change_gate import Gated
+
+NEVER = -(2**62)
 
 
 class Scored(NamedTuple):
@@ -20,32 +24,62 @@ class Scored(NamedTuple):
     reason: str | None = None
 
 
-Pending = tuple[Scored, ...]
+Ready = tuple[Scored, Gated]
+Frame = dict[str, Ready]
 
 
-def limits(last_ticks: Mapping[str, int], wait_ticks: int, look_back_ticks: int) -> dict[str, int]:
-    """By machine, the tick up to which its scores are judged, of the ticks that the machines have come to.
+class InStep(NamedTuple):
+    """The machines whose last tick is in `first` … `last`; `behind` of them are at `first`, which all have come to."""
 
-    Three machines are at 100, 101 and 103, a fourth is an hour behind:
+    first: int = NEVER
+    last: int = NEVER
+    behind: int = 0
 
-    >>> limits({"a": 103, "b": 100, "c": 101, "d": -3500}, 5, 10)
-    {'a': 90, 'b': 90, 'c': 90, 'd': -3510}
+    def moved(self, before: int | None, tick: int) -> "InStep | None":
+        """After a machine has come from tick `before` to `tick`; None = it is to be found anew, since a frame is complete, or the
+        machine joins or leaves.
+
+        >>> InStep(first=100, last=105, behind=2).moved(100, 101)
+        InStep(first=100, last=105, behind=1)
+        """
+        if before is None or before < self.first <= tick or before <= self.last < tick:
+            return None
+        if before != self.first:
+            return self
+        return InStep(self.first, self.last, self.behind - 1) if self.behind > 1 else None
+
+    def has(self, tick: int | None) -> bool:
+        """Whether a machine that has come to `tick` is in step."""
+        return tick is not None and self.first <= tick <= self.last
+
+
+def in_step(ticks: Collection[int], wait_ticks: int) -> InStep:
+    """Who is in step, of the last ticks of all machines: as many as lie within `wait_ticks`, the latest of those.
+
+    Three machines are at 100, 101 and 103, a fourth is an hour ahead:
+
+    >>> in_step([103, 100, 101, 3700], 5)
+    InStep(first=100, last=105, behind=1)
     """
-    ordered = sorted(last_ticks.values())
-    middle = ordered[(len(ordered) - 1) // 2]
-    first = next(tick for tick in ordered if tick >= middle - wait_ticks)
-    return {
-        machine: (first if abs(tick - middle) <= wait_ticks else tick) - look_back_ticks for machine, tick in last_ticks.items()
-    }
+    if not ticks:
+        return InStep()
+    first = min(ticks)
+    if max(ticks) - first > wait_ticks:
+        ordered = sorted(ticks)
+        _, first = max((bisect_right(ordered, tick + wait_ticks) - place, tick) for place, tick in enumerate(ordered))
+    return InStep(first, first + wait_ticks, sum(tick == first for tick in ticks))
 
 
-def frames(pending: Mapping[str, Pending], limit: Mapping[str, int]) -> list[dict[str, Scored]]:
-    """The scores up to the limit of each machine, side by side by tick, oldest first."""
-    found: dict[int, dict[str, Scored]] = {}
-    for machine, waiting in pending.items():
-        up_to = limit[machine]
-        for scored in waiting:
-            if scored.tick > up_to:
+def frames(ready: Mapping[str, tuple[Ready, ...]], step: InStep, look_back_ticks: int) -> list[Frame]:
+    """What is to be judged of the scores that wait, side by side by tick, oldest first: what all who are in step have come to,
+    and all scores of a machine whose clock is ahead of theirs."""
+    found: dict[int, Frame] = {}
+    up_to, last = step.first - look_back_ticks, step.last - look_back_ticks
+    for machine, waiting in ready.items():
+        is_ahead = waiting[-1][0].tick > last
+        for one in waiting:
+            tick = one[0].tick
+            if tick > up_to and not is_ahead:
                 break
-            found.setdefault(scored.tick, {})[machine] = scored
+            found.setdefault(tick, {})[machine] = one
     return [found[tick] for tick in sorted(found)]

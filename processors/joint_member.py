@@ -5,12 +5,14 @@ from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 from processors.contract import Output
-from processors.joint_frames import PENDING_MAX, Pending, Scored
+from processors.joint_frames import NEVER, Ready, Scored
 from processors.score_drift import Drift, drifted
-from processors.tool_change_gate import Gate, Gated
+from processors.tool_change_gate import Gate, Gated, GateRule, gated, restarted
+from sparkplug.quality import Quality
 from twin.anomaly.alarm import AlarmRule, AlarmState, after_tick
 
 if TYPE_CHECKING:
+    from twin.anomaly.common_mode import Adjusted
     from twin.anomaly.model import AnomalyModel, Calibration
 
 ADJUSTED, COMMON, GATE = "twin/adjusted_score", "twin/common_mode", "twin/tool_change_gate"
@@ -19,6 +21,8 @@ ALARM, GATED_SHARE = "twin/anomaly_alarm", "twin/gated_share_pct"
 SHARE_S = 7 * 86_400.0
 NO_MODEL = "no model for this machine; cnctwin train anomaly makes one"
 NO_THRESHOLD = "the model has no threshold; cnctwin train anomaly fits one, or configure threshold"
+NO_CALIBRATION = "no centre and spread: the model is not calibrated"
+NO_PEER = "none"
 
 
 @dataclass(frozen=True)
@@ -28,29 +32,28 @@ class Seat:
     machine: str
     model: "AnomalyModel | None"
     rule: AlarmRule | None
+    tick_s: float
 
     @cached_property
     def calibration(self) -> "Calibration | None":
         """Of the model."""
         return None if self.model is None else self.model.calibration
 
-
-class Judged(NamedTuple):
-    """A score beside its peers, and whether it counts; adjusted None = not known."""
-
-    scored: Scored
-    gate: Gated
-    adjusted: float | None
-    is_common: bool
-    peer: str
-    peers: int
+    @cached_property
+    def calm_below(self) -> float:
+        """Scores below it count towards the end of an alarm."""
+        return 0.0 if self.rule is None else self.rule.clear_fraction * self.rule.threshold
 
 
 class Told(NamedTuple):
-    """What readers were told last, beside the scores: it seldom changes, and is told again when it does."""
+    """What readers were told last, beside the scores: it seldom changes, and is told again when it does.
+
+    unknown: why there is no adjusted score, and no common mode; alarm None: why there is no alarm
+    """
 
     gate: Gated | None = None
     is_common: bool = False
+    unknown: str | None = None
     peer: str = ""
     peers: int = -1
     alarm: bool | None = None
@@ -61,52 +64,72 @@ class Told(NamedTuple):
 class Member(NamedTuple):
     """What is known of one machine.
 
-    tick: the last one that it has come to; None until one was, and after a jump of its clock
-    pending: scores that wait for those of the peers
+    tick: the last one that it has come to; None while it is offline
+    offset_ticks: its clock is ahead of that of its peers by so many
+    young, ready: scores that wait for what a late label may say of them; and then for those of the peers
+    judged: the last tick that was
     total_s, gated_s: of the last week, forgotten slowly
     """
 
     tick: int | None = None
-    pending: Pending = ()
+    offset_ticks: int = 0
+    young: tuple[Scored, ...] = ()
+    ready: tuple[Ready, ...] = ()
     gate: Gate = Gate()
+    judged: int = NEVER
     alarm: AlarmState = AlarmState()
     total_s: float = 0.0
     gated_s: float = 0.0
     drift: Drift = Drift()
     told: Told = Told()
 
-    def waiting_with(self, scored: Scored) -> "Member":
-        """The member with one more score that waits."""
-        pending = (*self.pending, scored)
-        if len(pending) > PENDING_MAX:
-            pending = pending[1:]
-        return Member(scored.tick, pending, *self[2:])
+    def waiting_with(self, scored: Scored, rule: GateRule, look_back_ticks: int) -> "Member":
+        """The machine with one more score. One that is older than the look-back is ready: whether it is gated stands."""
+        young, ready = (*self.young, scored), self.ready
+        while young and young[0].tick <= scored.tick - look_back_ticks:
+            ready = (*ready, (young[0], gated(self.gate, rule, young[0].at_s)))
+            young = young[1:]
+        return Member(scored.tick, self.offset_ticks, young, ready, *self[4:])
+
+    def offline(self, rule: GateRule) -> "Member":
+        """The machine has gone, and will say no more of its scores."""
+        labelled = tuple((scored, gated(self.gate, rule, scored.at_s)) for scored in self.young)
+        return self._replace(tick=None, young=(), ready=self.ready + labelled)
+
+    def set_back(self, at_s: float, offset_ticks: int) -> "Member":
+        """The machine's clock has been set: its scores can't be put beside those of its peers any more."""
+        return self._replace(tick=None, offset_ticks=offset_ticks, young=(), ready=(), gate=restarted(self.gate, at_s))
 
 
-def after(seat: Seat, member: Member, judged: Judged, tick_s: float, outputs: list[Output]) -> Member:
-    """The machine after the oldest of its waiting scores was judged; what is new is added to the outputs."""
-    scored, gate, adjusted, is_common, peer, peers = judged
-    name, at_s, is_gated = seat.machine, scored.at_s, gate.is_on is True
-    alarm, is_on, why = member.alarm, None, NO_THRESHOLD if seat.model is not None else NO_MODEL
-    if seat.rule is not None:
-        alarm = after_tick(seat.rule, alarm, adjusted, is_gated)
-        if alarm.is_on or adjusted is not None:
-            is_on, why = alarm.is_on, ""
-        else:
-            why = scored.reason or "no adjusted score"
-    total_s = min(member.total_s + tick_s, SHARE_S)
-    gated_s = member.gated_s * (1.0 - tick_s / SHARE_S) + (tick_s if is_gated else 0.0)
-    share_pct = min(round(200.0 * gated_s / total_s) / 2.0, 100.0)
-    drift, news = drifted(member.drift, seat.model, None if is_gated else scored.raw, at_s)
+def after(seat: Seat, member: Member, beside: "Adjusted", peer: str, outputs: list[Output]) -> Member:
+    """The machine after the oldest of its ready scores was judged; what is new is added to the outputs.
+
+    The dwell counts ticks in a row: one that is missing interrupts it like one that is gated.
+    """
+    tick, offset_ticks, young, ready, gate, judged, alarm, total_s, gated_s, drift, told = member
+    scored, label = ready[0]
+    name, tick_s, at_s, adjusted, is_gated = seat.machine, seat.tick_s, scored.at_s, beside.score, label.is_on is True
+    unknown, is_on, why = None, None, NO_MODEL if seat.model is None else NO_THRESHOLD
     if adjusted is None:
-        outputs.append(Output.null(ADJUSTED, scored.reason or "no centre and spread: the model is not calibrated", name, at_s))
+        unknown = scored.reason or NO_CALIBRATION
+        outputs.append(Output.null(ADJUSTED, unknown, name, at_s))
     else:
-        outputs.append(Output(ADJUSTED, adjusted, machine=name, at_s=at_s))
-    told = Told(gate, is_common, peer, peers, is_on, why, share_pct)
-    if told != member.told:
-        outputs += _news(name, at_s, told)
+        outputs.append(Output(ADJUSTED, adjusted, Quality.GOOD, None, name, at_s))
+    if seat.rule is not None:
+        if scored.tick != judged + 1:
+            alarm = AlarmState(alarm.is_on)
+        if adjusted is None or is_gated or adjusted >= seat.calm_below or alarm.calm_ticks < seat.rule.dwell_ticks:
+            alarm = after_tick(seat.rule, alarm, adjusted, is_gated)  # else it is calm, and stays so
+        is_on, why = (alarm.is_on, "") if alarm.is_on or unknown is None else (None, unknown)
+    total_s = min(total_s + tick_s, SHARE_S)
+    gated_s = gated_s * (1.0 - tick_s / SHARE_S) + (tick_s if is_gated else 0.0)
+    share_pct = min(round(200.0 * gated_s / total_s) / 2.0, 100.0)
+    now = Told(label, beside.is_common, unknown, peer, beside.peers, is_on, why, share_pct)
+    if now != told:
+        outputs += _news(name, at_s, now)
+    drift, news = drifted(drift, seat.calibration, None if is_gated else scored.raw, at_s)
     outputs += [one._replace(machine=name) for one in news]
-    return Member(member.tick, member.pending[1:], member.gate, alarm, total_s, gated_s, drift, told)
+    return Member(tick, offset_ticks, young, ready[1:], gate, scored.tick, alarm, total_s, gated_s, drift, now)
 
 
 def _news(name: str, at_s: float, told: Told) -> list[Output]:
@@ -116,7 +139,7 @@ def _news(name: str, at_s: float, told: Told) -> list[Output]:
     return [
         _known(GATE, gate.is_on, gate.reason or "", name, at_s),
         Output(GATE_SOURCE, gate.source, machine=name, at_s=at_s),
-        Output(COMMON, told.is_common, machine=name, at_s=at_s),
+        _known(COMMON, told.is_common if told.unknown is None else None, told.unknown or "", name, at_s),
         Output(PEER, told.peer, machine=name, at_s=at_s),
         Output(PEERS, told.peers, machine=name, at_s=at_s),
         _known(ALARM, told.alarm, told.why, name, at_s),

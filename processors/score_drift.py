@@ -14,7 +14,7 @@ from processors.contract import Output
 from processors.gap_growth import Baseline, Chart, charted, learned, rule_of
 
 if TYPE_CHECKING:
-    from twin.anomaly.model import AnomalyModel
+    from twin.anomaly.calibration import Calibration
 
 DRIFT = "twin/score_drift"
 BLOCK_S = 3600.0
@@ -22,7 +22,7 @@ TICKS_MIN = 60  # of an hour, for its mean to count
 FALSE_ALARMS_A_YEAR = 0.5
 WORTH_SPREADS = 0.5
 """The smallest drift that matters, in robust spreads of single scores."""
-NO_MODEL = "no model for this machine"
+NO_GOLDEN_WEEK = "the model is not calibrated; cnctwin train anomaly does that"
 TOO_SHORT = "the golden week has too few hours, or hours too much alike, to judge drift by"
 
 
@@ -35,18 +35,18 @@ class Drift(NamedTuple):
     chart: Chart = Chart()
 
 
-def drifted(drift: Drift, model: "AnomalyModel | None", raw: float | None, at_s: float) -> tuple[Drift, Sequence[Output]]:
+def drifted(drift: Drift, calibration: "Calibration | None", raw: float | None, at_s: float) -> tuple[Drift, Sequence[Output]]:
     """The drift after one more score, None where it was gated or not known; what there is to say at the end of an hour."""
-    if model is None or model.calibration is None:
+    if calibration is None:
         return drift, ()
     block = int(at_s // BLOCK_S)
     if block == drift.block:
         if raw is None:
             return drift, ()
         ticks = drift.ticks + 1
-        return drift._replace(ticks=ticks, mean=drift.mean + (raw - drift.mean) / ticks), ()
-    baseline = _baseline(model.calibration.hourly_means)
-    rule = rule_of(baseline, WORTH_SPREADS * model.calibration.raw_spread, 2.0 * 8766.0 / FALSE_ALARMS_A_YEAR)
+        return Drift(block, ticks, drift.mean + (raw - drift.mean) / ticks, drift.chart), ()
+    baseline = _baseline(calibration.hourly_means)
+    rule = rule_of(baseline, WORTH_SPREADS * calibration.raw_spread, 2.0 * 8766.0 / FALSE_ALARMS_A_YEAR)
     begun = Drift(block, int(raw is not None), raw or 0.0, drift.chart)
     if rule is None:
         return begun, [Output.null(DRIFT, TOO_SHORT, at_s=at_s)]

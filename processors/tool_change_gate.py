@@ -1,9 +1,11 @@
 """The tool-change gate of one machine, in event time: from the look-back before a change to the tail after its end.
 
-    gated(t) = rise − look_back ≤ t < fall + tail   of any change
+    gated(t) = rise − look_back < t ≤ fall + tail   of any change, tail and look-back being whole ticks
 
-The tail runs from the falling edge (twin/anomaly/gate.py is the same over arrays). A change whose end is never told stops gating
-after `gate_s_max`: a switch that sticks must not mute a machine for good. What nobody tells is unknown, and gates nothing.
+The tail runs from the falling edge. A tick at the time of an edge does not see it yet, as it sees no other value of that time, so
+that the gate is that of `twin/anomaly/gate.py` over the ticks; one difference: a change that comes and goes between two ticks is
+none there. A change whose end is never told stops gating after `gate_s_max`: a switch that sticks must not mute a machine for
+good. What nobody tells is unknown, and gates nothing.
 """
 
 from typing import NamedTuple
@@ -11,6 +13,7 @@ from typing import NamedTuple
 from processors.tool_change_context import NONE, STALE, ToolChangeContext
 
 CHANGES_MAX = 64  # that are remembered, while scores wait for what a late label says of them
+HALF_MS_S = 0.0005  # event times are whole ms, which floats of seconds are not
 
 
 class GateRule(NamedTuple):
@@ -36,7 +39,7 @@ class Gate(NamedTuple):
 
 
 class Gated(NamedTuple):
-    """Whether a score is to be judged: `is_on` None = nobody can tell, with the reason; the source says who did."""
+    """Whether a score is not to be judged: `is_on` None = nobody can tell, with the reason; the source says who did."""
 
     is_on: bool | None
     source: str
@@ -69,13 +72,13 @@ def gated(gate: Gate, rule: GateRule, at_s: float) -> Gated:
     >>> gate = followed(Gate(), rule, ToolChangeContext(True, "controller", 100.0), 100.0)
     >>> gate = followed(gate, rule, ToolChangeContext(False, "controller", 104.0), 104.5)
     >>> [at_s for at_s in range(88, 115) if gated(gate, rule, at_s).is_on][::21]
-    [90, 111]
+    [91, 112]
     """
     said = gate.said
-    for change in gate.changes:
-        until_s = change.rise_s + rule.gate_s_max if change.fall_s is None else change.fall_s + rule.tail_s
-        if change.rise_s - rule.look_back_s <= at_s < until_s:
-            return Gated(True, said.source)
+    for rise_s, fall_s in gate.changes:
+        until_s = rise_s + rule.gate_s_max if fall_s is None else fall_s + rule.tail_s
+        if rise_s - rule.look_back_s + HALF_MS_S < at_s < until_s + HALF_MS_S:
+            return Gated(True, STALE if said.active is None else said.source)  # what was said of the change still holds
     if said.active is None or said.source == STALE:
         return Gated(None, said.source, f"not gated: {said.reason}")
     if said.active and gate.changes and gate.changes[-1].rise_s <= at_s:

@@ -14,6 +14,8 @@ Coolant, air, mains, the sun on the hall or a fork-lift truck raise the scores o
 For one frame there is a form without numpy, for the stream; for a recording, arrays (T, N). Both give the same bits.
 """
 
+import math
+from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -98,32 +100,57 @@ def adjust_one(
         (score, place) for place, score in enumerate(peers) if score is not None and not (leaves_out and are_peers_gated[place])
     ]
     largest, peer = max(counted, key=lambda pair: pair[0]) if counted else (0.0, None)
+    if rule.method is Method.SOURCE or len(counted) < MEDIAN_PEERS_MIN:
+        return _left(rule, own, is_gated, largest, peer, len(counted))
+    scores = sorted(pair[0] for pair in counted)
+    centre = 0.5 * (scores[(len(scores) - 1) // 2] + scores[len(scores) // 2])
+    return _left(rule, own, is_gated, centre, peer, len(counted))
+
+
+def _left(rule: CommonModeRule, own: float | None, is_gated: bool, centre: float, peer: int | None, peers: int) -> Adjusted:
+    """What is left of a score; centre: of the peers' for the residual, the largest of them for `source`."""
     if own is None:
-        return Adjusted(None, False, peer, len(counted))
-    if rule.method is Method.SOURCE:
-        is_common = own > 0 and bool(counted) and largest >= rule.factor * own
-        return Adjusted(0.0 if is_common or is_gated else own, is_common, peer, len(counted))
-    if len(counted) < MEDIAN_PEERS_MIN:
-        centre = largest
-    else:
-        scores = sorted(pair[0] for pair in counted)
-        centre = 0.5 * (scores[(len(scores) - 1) // 2] + scores[len(scores) // 2])
-    centre = max(0.0, centre)
-    is_common = own > 0 and bool(counted) and centre >= rule.factor * own
-    return Adjusted(0.0 if is_gated else own - centre, is_common, peer, len(counted))
+        return Adjusted(None, False, peer, peers)
+    is_common = own > 0 and peers > 0 and centre >= rule.factor * own
+    if is_gated or (is_common and rule.method is Method.SOURCE):
+        return Adjusted(0.0, is_common, peer, peers)
+    return Adjusted(own if rule.method is Method.SOURCE else own - max(0.0, centre), is_common, peer, peers)
 
 
 def adjust_frame(rule: CommonModeRule, scores: Sequence[float | None], are_gated: Sequence[bool]) -> list[Adjusted]:
-    """Judge all machines of one frame beside each other; `peer` is the place in the frame.
+    """Judge all machines of one frame beside each other, the same as one by one; `peer` is the place in the frame.
+
+    The largest peer of a machine is the largest of all, or the second where it is that itself; the middle of its peers is that
+    of all in order, without itself.
 
     >>> [one.score for one in adjust_frame(CommonModeRule(), [0.3, 0.1, -0.1], [False] * 3)]
     [0.3, 0.0, -0.1]
     """
+    leaves_out, takes_median = rule.leaves_gated_peers_out, rule.method is Method.RESIDUAL
+    count, ordered = 0, []
+    first = second = -math.inf
+    first_place = second_place = None
+    for place, score in enumerate(scores):
+        if score is None or (leaves_out and are_gated[place]):
+            continue
+        count += 1
+        if takes_median:
+            ordered.append(score)
+        if first_place is None or score > first:
+            first, first_place, second, second_place = score, place, first, first_place
+        elif second_place is None or score > second:
+            second, second_place = score, place
+    ordered.sort()
     judged = []
     for place, own in enumerate(scores):
-        peers = [*scores[:place], *scores[place + 1 :]]
-        one = adjust_one(rule, own, are_gated[place], peers, [*are_gated[:place], *are_gated[place + 1 :]])
-        judged.append(one if one.peer is None or one.peer < place else one._replace(peer=one.peer + 1))
+        counts = own is not None and not (leaves_out and are_gated[place])
+        peers = count - counts
+        centre, peer = (second, second_place) if place == first_place else (first, first_place)
+        if takes_median and peers >= MEDIAN_PEERS_MIN:
+            at = bisect_left(ordered, own) if counts and own is not None else count
+            low, high = (peers - 1) // 2, peers // 2
+            centre = 0.5 * (ordered[low + (low >= at)] + ordered[high + (high >= at)])
+        judged.append(_left(rule, own, are_gated[place], centre, peer, peers))
     return judged
 
 
