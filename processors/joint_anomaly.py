@@ -24,7 +24,8 @@ from pydantic import Field, PositiveFloat, model_validator
 
 from processors.config import CellConfig, Configuration
 from processors.contract import CellProcessor, Output, OutputSpec, Provenance, Sample, SampleKind
-from processors.joint_frames import InStep, Scored, frames, in_step
+from processors.joint_features import beside_by_features
+from processors.joint_frames import Frame, InStep, Scored, frames, in_step
 from processors.joint_member import (
     ADJUSTED,
     ALARM,
@@ -37,6 +38,7 @@ from processors.joint_member import (
     NO_THRESHOLD,
     PEER,
     PEERS,
+    Beside,
     Member,
     Seat,
     after,
@@ -50,6 +52,7 @@ from sparkplug.metric import Reading
 from sparkplug.quality import Quality
 from twin.anomaly.alarm import AlarmRule
 from twin.anomaly.common_mode import CommonModeRule, Method, adjust_frame, standardised
+from twin.anomaly.preparation import CONTEXT, Preparation, standardised_row
 from twin.errors import TwinError
 
 if TYPE_CHECKING:
@@ -82,7 +85,8 @@ class Config(CellConfig):
 
     models: folder with one model for each machine, by name; "" = none: every score is null then, and says so
     threshold: in units of the adjusted score; absent = that of the model
-    peer_wait_s: how long a frame waits for the peers, in event time
+    peer_wait_s: machines whose ticks are no further apart wait for each other (`processors/joint_frames.py`); one that says
+        nothing is at least 2 s and a tick behind, since its messages might still be on their way
     """
 
     models: str = ""
@@ -140,6 +144,8 @@ class Config(CellConfig):
         for machine, model in self.loaded.items():
             if unknown := [name for name in model.features if name not in NUMBERS]:
                 raise ValueError(f"the model of {machine} has the feature {unknown[0]!r}, which is no signal that is scored live")
+            if self.common_mode is Method.FEATURES and model.preparation is None:
+                raise ValueError(f"common_mode = features, but the model of {machine} was not trained for it: train it anew so")
             if model.calibration is not None and self.threshold is None:
                 _check_settings(self, machine, model.calibration)
         return self
@@ -239,11 +245,18 @@ def _scored(seat: Seat, sample: Sample, tick: int) -> Scored:
             if value is None:
                 return Scored(tick, sample.at_s, None, why)
         values.append(value)
+    now = None if model.preparation is None else standardised_row(model.preparation, values, _context(model.preparation, row))
     try:
-        raw = model.score_one(values)
+        raw = model.score_one(values if now is None else now.values)
     except Exception as error:  # whatever a library does with these values
         return Scored(tick, sample.at_s, None, f"the model fails: {type(error).__name__}")
-    return Scored(tick, sample.at_s, raw) if math.isfinite(raw) else Scored(tick, sample.at_s, None, NOT_FINITE)
+    return Scored(tick, sample.at_s, raw, None, now) if math.isfinite(raw) else Scored(tick, sample.at_s, None, NOT_FINITE)
+
+
+def _context(preparation: Preparation, row: Mapping[str, Reading]) -> list[object]:
+    """What names the regime; None where it is not known."""
+    readings = [row.get(name) for name in preparation.context]
+    return [None if one is None or one.quality is not Quality.GOOD else one.value for one in readings]
 
 
 def _judge(
@@ -253,13 +266,24 @@ def _judge(
     shared = config.default
     ready = {name: members[name].ready for name in names if members[name].ready}
     for frame in frames(ready, step_now, shared.look_back_ticks):
-        seats = [_seat(config, name) for name in frame]
-        scores = [_on_the_scale(shared, seat, scored.raw) for seat, (scored, _) in zip(seats, frame.values(), strict=True)]
-        adjusted = adjust_frame(shared.common_mode_rule, scores, [label.is_on is True for _, label in frame.values()])
-        for seat, beside in zip(seats, adjusted, strict=True):
-            name = seat.machine
-            peer = seats[beside.peer].machine if beside.is_common and beside.peer is not None else NO_PEER
-            members[name] = after(seat, members[name], beside, peer, outputs)
+        seats = {name: _seat(config, name) for name in frame}
+        if shared.common_mode is Method.FEATURES:
+            found = beside_by_features(seats, frame, members)
+        else:
+            found = _beside_by_scores(shared, seats, frame)
+        for name, seat in seats.items():
+            members[name] = after(seat, members[name], found[name], outputs)
+
+
+def _beside_by_scores(shared: Config, seats: Mapping[str, Seat], frame: Frame) -> dict[str, Beside]:
+    """By the published rule, or the residual of the scores."""
+    names = list(seats)
+    scores = [_on_the_scale(shared, seat, frame[name][0].raw) for name, seat in seats.items()]
+    judged = adjust_frame(shared.common_mode_rule, scores, [frame[name][1].is_on is True for name in names])
+    return {
+        name: Beside(one.score, one.is_common, names[one.peer] if one.is_common and one.peer is not None else NO_PEER, one.peers)
+        for name, one in zip(names, judged, strict=True)
+    }
 
 
 def _on_the_scale(shared: Config, seat: Seat, raw: float | None) -> float | None:
@@ -369,7 +393,7 @@ def _specs() -> tuple[OutputSpec, ...]:
 PROCESSOR = CellProcessor(
     name="joint_anomaly",
     version=1,
-    inputs=NUMBERS | CONTEXT_INPUTS | {CLOCK_OFFSET},
+    inputs=NUMBERS | CONTEXT_INPUTS | {CLOCK_OFFSET, *CONTEXT},
     outputs=_specs(),
     config=Config,
     state=State,

@@ -11,17 +11,22 @@ from collections.abc import Collection, Mapping
 from typing import NamedTuple
 
 from processors.tool_change_gate import Gated
+from twin.anomaly.preparation import Standardised
 
 NEVER = -(2**62)
 
 
 class Scored(NamedTuple):
-    """A raw score of tick number `tick`, at `at_s` of the machine's own clock; None with the reason where there is none."""
+    """A raw score of tick number `tick`, at `at_s` of the machine's own clock; None with the reason where there is none.
+
+    now: the features beside what is usual, where the model knows that
+    """
 
     tick: int
     at_s: float
     raw: float | None
     reason: str | None = None
+    now: Standardised | None = None
 
 
 Ready = tuple[Scored, Gated]

@@ -10,9 +10,9 @@ from processors.score_drift import Drift, drifted
 from processors.tool_change_gate import Gate, Gated, GateRule, gated, restarted
 from sparkplug.quality import Quality
 from twin.anomaly.alarm import AlarmRule, AlarmState, after_tick
+from twin.anomaly.preparation import Smoothed
 
 if TYPE_CHECKING:
-    from twin.anomaly.common_mode import Adjusted
     from twin.anomaly.model import AnomalyModel, Calibration
 
 ADJUSTED, COMMON, GATE = "twin/adjusted_score", "twin/common_mode", "twin/tool_change_gate"
@@ -43,6 +43,22 @@ class Seat:
     def calm_below(self) -> float:
         """Scores below it count towards the end of an alarm."""
         return 0.0 if self.rule is None else self.rule.clear_fraction * self.rule.threshold
+
+
+class Beside(NamedTuple):
+    """What is left of a score beside those of the peers, and who of them makes it common mode.
+
+    score: None where it is not known, for the reason `why`; is_idle: nothing was judged, as in a gate
+    smoothed: the features of the machine after this tick, where they are judged
+    """
+
+    score: float | None
+    is_common: bool
+    peer: str
+    peers: int
+    why: str | None = None
+    is_idle: bool = False
+    smoothed: Smoothed | None = None
 
 
 class Told(NamedTuple):
@@ -82,6 +98,7 @@ class Member(NamedTuple):
     gated_s: float = 0.0
     drift: Drift = Drift()
     told: Told = Told()
+    smoothed: Smoothed | None = None
 
     def waiting_with(self, scored: Scored, rule: GateRule, look_back_ticks: int) -> "Member":
         """The machine with one more score. One that is older than the look-back is ready: whether it is gated stands."""
@@ -98,38 +115,41 @@ class Member(NamedTuple):
 
     def set_back(self, at_s: float, offset_ticks: int) -> "Member":
         """The machine's clock has been set: its scores can't be put beside those of its peers any more."""
-        return self._replace(tick=None, offset_ticks=offset_ticks, young=(), ready=(), gate=restarted(self.gate, at_s))
+        return self._replace(
+            tick=None, offset_ticks=offset_ticks, young=(), ready=(), gate=restarted(self.gate, at_s), smoothed=None
+        )
 
 
-def after(seat: Seat, member: Member, beside: "Adjusted", peer: str, outputs: list[Output]) -> Member:
+def after(seat: Seat, member: Member, beside: Beside, outputs: list[Output]) -> Member:
     """The machine after the oldest of its ready scores was judged; what is new is added to the outputs.
 
     The dwell counts ticks in a row: one that is missing interrupts it like one that is gated.
     """
-    tick, offset_ticks, young, ready, gate, judged, alarm, total_s, gated_s, drift, told = member
+    tick, offset_ticks, young, ready, gate, judged, alarm, total_s, gated_s, drift, told, _ = member
     scored, label = ready[0]
     name, tick_s, at_s, adjusted, is_gated = seat.machine, seat.tick_s, scored.at_s, beside.score, label.is_on is True
     unknown, is_on, why = None, None, NO_MODEL if seat.model is None else NO_THRESHOLD
     if adjusted is None:
-        unknown = scored.reason or NO_CALIBRATION
+        unknown = scored.reason or beside.why or NO_CALIBRATION
         outputs.append(Output.null(ADJUSTED, unknown, name, at_s))
     else:
         outputs.append(Output(ADJUSTED, adjusted, Quality.GOOD, None, name, at_s))
     if seat.rule is not None:
         if scored.tick != judged + 1:
             alarm = AlarmState(alarm.is_on)
-        if adjusted is None or is_gated or adjusted >= seat.calm_below or alarm.calm_ticks < seat.rule.dwell_ticks:
-            alarm = after_tick(seat.rule, alarm, adjusted, is_gated)  # else it is calm, and stays so
+        is_idle = is_gated or beside.is_idle
+        if adjusted is None or is_idle or adjusted >= seat.calm_below or alarm.calm_ticks < seat.rule.dwell_ticks:
+            alarm = after_tick(seat.rule, alarm, adjusted, is_idle)  # else it is calm, and stays so
         is_on, why = (alarm.is_on, "") if alarm.is_on or unknown is None else (None, unknown)
     total_s = min(total_s + tick_s, SHARE_S)
     gated_s = gated_s * (1.0 - tick_s / SHARE_S) + (tick_s if is_gated else 0.0)
     share_pct = min(round(200.0 * gated_s / total_s) / 2.0, 100.0)
-    now = Told(label, beside.is_common, unknown, peer, beside.peers, is_on, why, share_pct)
+    now = Told(label, beside.is_common, unknown, beside.peer, beside.peers, is_on, why, share_pct)
     if now != told:
         outputs += _news(name, at_s, now)
     drift, news = drifted(drift, seat.calibration, None if is_gated else scored.raw, at_s)
     outputs += [one._replace(machine=name) for one in news]
-    return Member(tick, offset_ticks, young, ready[1:], gate, scored.tick, alarm, total_s, gated_s, drift, now)
+    return Member(tick, offset_ticks, young, ready[1:], gate, scored.tick, alarm, total_s, gated_s, drift, now, beside.smoothed)
 
 
 def _news(name: str, at_s: float, told: Told) -> list[Output]:

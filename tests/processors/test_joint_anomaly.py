@@ -26,6 +26,7 @@ class PlainModel:
     features = ("spindle_load_pct",)
     in_words = "a model for tests"
     calibration: Any = None
+    preparation: Any = None
 
     def score_one(self, values: Sequence[float]) -> float:
         return (values[0] - 50.0) / 100.0
@@ -326,7 +327,7 @@ def test_history_that_comes_late_wakes_nobody() -> None:
 
 def test_a_threshold_is_refused_for_settings_that_it_was_not_fitted_with(monkeypatch: pytest.MonkeyPatch) -> None:
     fitted = Config().model_dump() | {"tick_s": 0.1}
-    model = SimpleNamespace(features=("spindle_load_pct",), calibration=SimpleNamespace(**fitted))
+    model = SimpleNamespace(features=("spindle_load_pct",), calibration=SimpleNamespace(**fitted), preparation=None)
     monkeypatch.setattr("processors.joint_anomaly._models_in", lambda _: {"a": model})
     with pytest.raises(ConfigurationError, match=r"tick_s = 1.0, but the threshold of a was fitted with 0.1"):
         Configuration(Config, {"models": "somewhere"}, name="joint_anomaly")

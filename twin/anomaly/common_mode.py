@@ -34,6 +34,7 @@ class Method(StrEnum):
 
     SOURCE = "source"
     RESIDUAL = "residual"
+    FEATURES = "features"  # not of scores: twin/anomaly/common_features.py
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,7 @@
+"""What can go wrong with an anomaly model."""
+
+from twin.errors import TwinError
+
+
+class ModelError(TwinError):
+    """A model that cannot be trained, read or used."""
