@@ -126,9 +126,9 @@ def process(
     from cnctwin.process_command import process as run_processors
     from processors.runtime import configured
 
-    configured(names, config)
+    pairs = configured(names, config)
     with stopped_by_signals() as stop, broker_or_own(address(broker)) as where:
-        run_processors(names, config, where, stop, group=group, state_dir=folder_for_state(state_dir))
+        run_processors(pairs, where, stop, group=group, state_dir=folder_for_state(state_dir))
 
 
 @app.command()

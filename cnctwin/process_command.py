@@ -5,24 +5,18 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from processors.config import Configuration, ProcessorConfig
-from processors.discovery import AnyProcessor
-from processors.runtime import configured, run
+from processors.runtime import Configured, run_configured
 from sparkplug.broker import BrokerAddress
 
 
-def process(
-    names: Sequence[str], config: Path | None, broker: BrokerAddress, stop: threading.Event, *, group: str, state_dir: Path
-) -> None:
-    """Run the processors `names` until `stop` is set. Raises ProcessorError before anything connects."""
-    with _courier(configured(names, config), broker, group):
-        run(names, broker, config, stop, group=group, session_dir=state_dir)
+def process(pairs: Sequence[Configured], broker: BrokerAddress, stop: threading.Event, *, group: str, state_dir: Path) -> None:
+    """Run configured processors until `stop` is set. Raises ConfigurationError where a secret is missing."""
+    with _courier(pairs, broker, group):
+        run_configured(pairs, broker, stop, group=group, session_dir=state_dir)
 
 
 @contextmanager
-def _courier(
-    pairs: Sequence[tuple[AnyProcessor, Configuration[ProcessorConfig]]], broker: BrokerAddress, group: str
-) -> Iterator[None]:
+def _courier(pairs: Sequence[Configured], broker: BrokerAddress, group: str) -> Iterator[None]:
     """The courier, where alerts run and somebody is to be told; else nothing, and httpx is not loaded."""
     from processors.alerts_config import AlertsConfig  # noqa: PLC0415  with the processor that needs it
 

@@ -35,7 +35,21 @@ def run(
     Everything is checked before anything connects. Raises UnknownProcessorError, ConfigurationError. `session_dir` keeps the
     birth/death sequence numbers over restarts; all other state is kept on the broker.
     """
-    pairs = configured(names, config_path)
+    run_configured(configured(names, config_path), broker, stop, group=group, session_dir=session_dir)
+
+
+Configured = tuple[AnyProcessor, Configuration[ProcessorConfig]]
+
+
+def run_configured(
+    pairs: Sequence[Configured],
+    broker: BrokerAddress,
+    stop: threading.Event | None = None,
+    *,
+    group: str = "cnc",
+    session_dir: Path | None = None,
+) -> None:
+    """The same of processors whose configuration has been checked."""
     workers = [_worker(processor, configuration, broker, group, session_dir) for processor, configuration in pairs]
     failures: list[BaseException] = []
     with _stopped_by_signals(stop) as stopped:
@@ -53,9 +67,7 @@ def run(
         raise failures[0]
 
 
-def configured(
-    names: Sequence[str], config_path: Path | None = None
-) -> list[tuple[AnyProcessor, Configuration[ProcessorConfig]]]:
+def configured(names: Sequence[str], config_path: Path | None = None) -> "list[Configured]":
     """The processors with their configuration, checked. Raises UnknownProcessorError, ConfigurationError."""
     tables = {} if config_path is None else read_tables(config_path)
     for table in tables:
