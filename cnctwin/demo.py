@@ -24,13 +24,14 @@ from cnctwin.errors import ProgramError, UsageError
 from cnctwin.plant import StageLedger, ledgers, machines, text
 from cnctwin.private_broker import PrivateBroker
 from cnctwin.simulated_machine import description
+from cnctwin.simulated_machine.anomaly_model import place_model
 from cnctwin.terminal import ledger_table
 from cnctwin.watch import show, viewer
 from sparkplug.errors import TopicError
 from sparkplug.host import EventKind, HostApplication, HostEvent
 from sparkplug.topics import check_id
 
-PROCESSORS = ("thermal", "cutting_force", "gap", "mirror")
+PROCESSORS = ("thermal", "cutting_force", "gap", "rules", "joint_anomaly", "alerts", "mirror")
 GROUP = "cnc"
 QUIET_S = 1.5
 SETTLE_S_MAX = 12.0
@@ -140,7 +141,7 @@ class Demo:
         edge = self._folder / "edge.toml"
         edge.write_text(self._edge_toml(url))
         settings = self._folder / "processors.toml"
-        settings.write_text(_PROCESSORS_TOML if self.options.recording else description.PROCESSORS.read_text())
+        settings.write_text(_PROCESSORS_TOML if self.options.recording else self._as_described())
         broker = ["--broker", self.broker.address.url]
         state = ["--state-dir", str(self._folder)]
         self._begin("processors", ["process", *PROCESSORS, "--config", str(settings), *broker, *state])
@@ -186,6 +187,10 @@ class Demo:
         """How often each part was started again."""
         parts = [self.broker.child, *self.children]
         return {child.name: child.restarts for child in parts if child.restarts}
+
+    def _as_described(self) -> str:
+        """What the processors are told of the simulated machine, and of the model of its scores."""
+        return description.PROCESSORS.read_text() + place_model(self._folder / "models", self.machine)
 
     def _agent(self) -> list[str]:
         """The command that stands in for the control."""

@@ -12,7 +12,7 @@ A file holds a table for each processor, so that one file can serve several:
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Generic, Self, TypeVar
+from typing import Any, ClassVar, Generic, Self, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
@@ -26,6 +26,8 @@ class ProcessorConfig(BaseModel):
     """What the engine needs of every processor's configuration. Durations are event time."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    of_one_machine: ClassVar[frozenset[str] | None] = None
+    """The keys that a machine may have a value of its own for; None = all."""
 
     tick_s: float = Field(default=1.0, ge=0.001, le=3600.0, description="a tick at each multiple of this")
     gap_s_max: float = Field(default=600.0, gt=0.0, le=86_400.0, description="a longer jump forwards is a hole")
@@ -73,6 +75,8 @@ class Configuration(Generic[C_co]):
         machines = shared.pop(MACHINES, {})
         if not isinstance(machines, dict) or not all(isinstance(own, dict) for own in machines.values()):
             raise ConfigurationError(f"[{name}.{MACHINES}] has to hold one table for each machine")
+        for machine, own in machines.items():
+            _check_own(model, own, f"{name}.{MACHINES}.{machine}")
         self.default: C_co = _validated(model, shared, name)
         self._of_machine: dict[str, C_co] = {
             machine: _validated(model, {**shared, **own}, f"{name}.{MACHINES}.{machine}") for machine, own in machines.items()
@@ -86,6 +90,16 @@ class Configuration(Generic[C_co]):
     def machines(self) -> tuple[str, ...]:
         """The machines that have values of their own."""
         return tuple(self._of_machine)
+
+
+def _check_own(model: type[ProcessorConfig], own: Mapping[str, Any], where: str) -> None:
+    """What holds for all machines together is not to be set for one, and then not heeded."""
+    allowed = model.of_one_machine
+    if allowed is not None and (common := [key for key in own if key in model.model_fields and key not in allowed]):
+        raise ConfigurationError(
+            f"[{where}] {common[0]} = {own[common[0]]!r} holds for all machines; one of them may have its own "
+            + ", ".join(sorted(allowed))
+        )
 
 
 def _validated(model: type[C_co], table: Mapping[str, Any], where: str) -> C_co:

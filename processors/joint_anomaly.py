@@ -16,9 +16,9 @@ are published side by side.
 import math
 from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, ClassVar, Self
 
 from pydantic import Field, PositiveFloat, model_validator
 
@@ -88,6 +88,8 @@ class Config(CellConfig):
     peer_wait_s: machines whose ticks are no further apart wait for each other (`processors/joint_frames.py`); one that says
         nothing is at least 2 s and a tick behind, since its messages might still be on their way
     """
+
+    of_one_machine: ClassVar[frozenset[str] | None] = frozenset({"threshold"})
 
     models: str = ""
     common_mode: Method = Method.SOURCE
@@ -245,8 +247,8 @@ def _scored(seat: Seat, sample: Sample, tick: int) -> Scored:
             if value is None:
                 return Scored(tick, sample.at_s, None, why)
         values.append(value)
-    now = None if model.preparation is None else standardised_row(model.preparation, values, _context(model.preparation, row))
     try:
+        now = None if model.preparation is None else standardised_row(model.preparation, values, _context(model.preparation, row))
         raw = model.score_one(values if now is None else now.values)
     except Exception as error:  # whatever a library does with these values
         return Scored(tick, sample.at_s, None, f"the model fails: {type(error).__name__}")
@@ -326,6 +328,7 @@ def _introduced(config: Configuration[Config], machine: str) -> list[Output]:
     return [threshold, Output(BASIS, basis), *drift]
 
 
+@lru_cache(maxsize=4)
 def _models_in(folder: Path) -> "dict[str, AnomalyModel]":
     """Raises ValueError where the folder or a model cannot be read."""
     try:

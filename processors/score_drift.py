@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 DRIFT = "twin/score_drift"
 BLOCK_S = 3600.0
-TICKS_MIN = 60  # of an hour, for its mean to count
+JUDGED_S_MIN = 600.0  # of an hour, for its mean to count
 FALSE_ALARMS_A_YEAR = 0.5
 WORTH_SPREADS = 0.5
 """The smallest drift that matters, in robust spreads of single scores."""
@@ -50,7 +50,7 @@ def drifted(drift: Drift, calibration: "Calibration | None", raw: float | None, 
     begun = Drift(block, int(raw is not None), raw or 0.0, drift.chart)
     if rule is None:
         return begun, [Output.null(DRIFT, TOO_SHORT, at_s=at_s)]
-    if drift.ticks < TICKS_MIN:
+    if drift.ticks * calibration.tick_s < JUDGED_S_MIN:
         return begun, ()
     chart = charted(drift.chart, rule, baseline, drift.mean, drift.block * BLOCK_S)
     return begun._replace(chart=chart), [Output(DRIFT, chart.grows != 0, at_s=at_s)]

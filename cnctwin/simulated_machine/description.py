@@ -12,6 +12,7 @@ AS_BUILT = FOLDER / "as_built.toml"
 DEVICES = FOLDER / "devices.xml"
 PROCESSORS = FOLDER / "processors.toml"
 SPARE_PART = FOLDER / "spare_part.txt"
+ANOMALY_MODEL = FOLDER / "model"
 NEEDED = ("numpy", "scipy", "numba", "pyarrow")
 SPEED_MAX = 200.0
 """Beyond it nothing but the wait for the next part would be seen."""

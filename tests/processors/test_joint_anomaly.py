@@ -338,3 +338,8 @@ def test_the_snapshot_of_a_cell_stays_small() -> None:
     engine = cell("a", "b", look_back_s=30.0)
     fed(engine, *born("a", "b"), *together(course("a", 200, {}), course("b", 200, {})))
     assert len(json.dumps(json.loads(engine.snapshot("all")))) < 12_000
+
+
+def test_what_holds_for_the_cell_cannot_be_set_for_one_machine_and_then_be_ignored() -> None:
+    with pytest.raises(ConfigurationError, match=r"machines.a\] tail_s = 20.0 holds for all machines; .* threshold"):
+        Configuration(Config, {"machines": {"a": {"tail_s": 20.0}}}, name="joint_anomaly")
