@@ -24,6 +24,8 @@ from cnctwin.given_broker import address, broker_or_own
 from cnctwin.replay_command import replay
 from cnctwin.state_dir import state_dir as folder_for_state
 from cnctwin.stopping import stopped_by_signals
+from cnctwin.train_commands import train_app
+from cnctwin.train_detector_command import train_detector
 from edge.errors import EdgeError
 from processors.errors import ProcessorError
 from sparkplug.errors import SparkplugError
@@ -39,6 +41,8 @@ app.add_typer(edge_app, name="edge")
 app.add_typer(gap_app, name="gap")
 app.add_typer(control_app, name="simulate-control")
 app.add_typer(alerts_app, name="alerts")
+app.add_typer(train_app, name="train")
+train_app.command("detector")(train_detector)
 
 
 class Method(StrEnum):

@@ -6,11 +6,12 @@ base u0 that has enough of them are its clusters, with maxima M of the dwell sco
 
 * Where the stretch saw many more alarms than are asked for, the threshold is read off: as many episodes as asked for.
 * Else, from peaks over u0 (Davison and Smith 1990):  rate(u) = rate(u0) · (1 + ξ (u − u0) / σ)^(−1/ξ)
-  The posterior of (σ, ξ) on a grid, ξ ~ N(0, 0.25²), rate(u0) ~ Gamma; the threshold is where the median of rate(u) is what was
-  asked for. Beyond the largest score seen it is an extrapolation, and says so.
+  The posterior of (σ, ξ) on a grid, ξ ~ N(0, 0.25²), rate(u0) ~ Gamma; the threshold is where the mean of rate(u) is what was
+  asked for, so that a fleet has what was asked for. Beyond the largest score seen it is an extrapolation, and says so.
 * The interval has 90 %: Poisson where it was read off (Garwood 1936), else of the posterior. Where alarms come in bunches from
   block to block, all counts are divided by their index of dispersion first, which widens it.
-* Too short a stretch, or too few clusters, is an error and no threshold.
+* Too short a stretch is an error and no threshold; so are too few clusters, unless an alert is asked for in the stretch itself:
+  then it is read off, with an interval as wide as that; just above 0 where no score was.
 
 It holds for the future that is like the stretch: the same programs, season and disturbances, and no fault in it.
 """
@@ -36,6 +37,7 @@ CLUSTERS, CLUSTERS_MIN = 50, 20
 EXPOSURE_MIN = 0.01
 """Shortest stretch, as a share of the mean time between the alerts that are asked for."""
 BLOCKS = 30
+JUST_ABOVE = 1e-6
 SHAPES = np.linspace(-0.75, 0.75, 61)
 LOG_SCALES = np.linspace(-1.5, 1.5, 61)
 SHAPE_SD = 0.25
@@ -76,13 +78,15 @@ class _Tail:
     shapes: Floats
     weights: Floats
 
-    def quantile(self, share: float, threshold: float) -> float:
-        """Of the rate at a threshold above the base, a week."""
+    def rate(self, threshold: float, share: float | None = None) -> float:
+        """Alerts a week at a threshold above the base: the mean, or a quantile."""
         over = np.maximum(0.0, 1.0 + self.shapes * (threshold - self.base) / self.scales)
         with np.errstate(divide="ignore", over="ignore"):
             beyond = np.where(
                 np.abs(self.shapes) < 1e-9, np.exp(-(threshold - self.base) / self.scales), over ** (-1.0 / self.shapes)
             )
+        if share is None:
+            return float((beyond * self.weights).sum() * self.rates.mean())
         rates = (beyond[:, None] * self.rates).ravel()
         order = np.argsort(rates)
         mass = np.cumsum(np.repeat(self.weights / len(self.rates), len(self.rates))[order])
@@ -121,12 +125,15 @@ def fit_threshold(
         return [_episodes(stream, threshold, clear_fraction)[1] for stream in streams]
 
     found = _base(streams, lambda threshold: sum(map(len, maxima(threshold))), max(CLUSTERS, math.ceil(2.0 * asked)))
+    if found is None and asked < 1.0:
+        raise ModelError(f"no score in {hours:.1f} h is above 0, so no threshold can be fitted on them: calibrate on more hours")
     if found is None:
-        raise ModelError(f"no score in {hours:.1f} h is above 0, so no threshold can be fitted on them")
+        most = float(gammaincinv(1.0, 0.5 + COVERAGE / 2)) / weeks
+        return Threshold(JUST_ABOVE, alerts_per_week, 0.0, 0.0, most, hours, False, 0)
     base, clusters = found
     bunched = _dispersion([_episodes(stream, base, clear_fraction)[0] for stream in streams], [len(one) for one in scores])
     top = max(float(stream.least.max()) for stream in streams)
-    if asked >= READ_OFF_MIN:
+    if asked >= READ_OFF_MIN or (clusters < CLUSTERS_MIN and asked >= 1.0):
         return _read_off(maxima, (base, top), (asked, weeks, bunched), alerts_per_week, hours)
     if clusters < CLUSTERS_MIN:
         raise ModelError(
@@ -134,8 +141,8 @@ def fit_threshold(
             f"calibrate on more hours, or ask for more than {alerts_per_week:g} alerts a week"
         )
     tail = _tail(np.concatenate(maxima(base)), base, weeks, bunched)
-    threshold = _where(lambda level: tail.quantile(0.5, level) <= alerts_per_week, base, top)
-    low, high = (tail.quantile(share, threshold) for share in (0.5 - COVERAGE / 2, 0.5 + COVERAGE / 2))
+    threshold = _where(lambda level: tail.rate(level) <= alerts_per_week, base, top)
+    low, high = (tail.rate(threshold, share) for share in (0.5 - COVERAGE / 2, 0.5 + COVERAGE / 2))
     return Threshold(threshold, alerts_per_week, alerts_per_week, low, high, hours, threshold > top, clusters)
 
 
