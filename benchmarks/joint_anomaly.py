@@ -25,7 +25,8 @@ from processors.config import Configuration
 from processors.contract import Output
 from processors.effects import Effect, Publish
 from processors.engine import Engine
-from processors.joint_anomaly import PROCESSOR, RAW, Config, State
+from processors.joint_anomaly import PROCESSOR, RAW, State
+from processors.joint_config import Config
 from processors.sample import Sample
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import Change, NodeId, Reading
@@ -145,8 +146,8 @@ def main() -> None:
         else:
             print(
                 f"{given.machines} machines at 10 Hz in cells of {cell}: {found['share_of_a_core']:.2f} of a core; "
-                f"{found['us_per_score']:.1f} µs a score, {found['times_the_empty_engine']:.1f} times an engine whose fold is empty "
-                f"({found['us_of_the_empty_engine']:.1f} µs); kernel {found['us_of_the_kernel']:.1f} µs"
+                f"{found['us_per_score']:.1f} µs a score, {found['times_the_empty_engine']:.1f} times an engine with an empty "
+                f"fold ({found['us_of_the_empty_engine']:.1f} µs); kernel {found['us_of_the_kernel']:.1f} µs"
             )
 
 

@@ -17,7 +17,7 @@ from cnctwin.anomaly_training.regimes import Ticks, fitted_preparation, held_run
 from cnctwin.anomaly_training.replayed_cell import Track, replayed
 from cnctwin.anomaly_training.time_split import split
 from cnctwin.errors import UsageError
-from processors.joint_anomaly import Config
+from processors.joint_config import Config
 from twin.anomaly.calibration import Calibration
 from twin.anomaly.common_mode import Method
 from twin.anomaly.detector import Detector, trained_model

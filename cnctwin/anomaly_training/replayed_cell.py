@@ -19,7 +19,8 @@ from processors.config import Configuration
 from processors.contract import Output, PlainOutput, Sample
 from processors.effects import DeadLetter
 from processors.engine import Engine
-from processors.joint_anomaly import PROCESSOR, RAW, Config
+from processors.joint_anomaly import PROCESSOR, RAW
+from processors.joint_config import Config
 from processors.joint_member import ADJUSTED, GATE
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId, Reading

@@ -8,7 +8,8 @@ which feature it comes from: a peer that vibrates then hides a spindle that is h
 strongly, hence the 2; a fifth of them may be broken or far away. A peer's feature counts for two minutes after it was last told
 of, so that a peer in a tool change still has a word, by what it was before: its transient never enters.
 
-tail_f is how far what is left goes in the training data, each side by itself: a rapid raises a feed far, a fault lowers it a little.
+tail_f is how far what is left goes in the training data, each side by itself: a rapid raises a feed far, a fault lowers it a
+little.
 """
 
 import math

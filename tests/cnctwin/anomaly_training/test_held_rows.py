@@ -10,7 +10,8 @@ from cnctwin.anomaly_training.replayed_cell import replayed
 from processors.config import Configuration
 from processors.effects import Publish
 from processors.engine import Engine
-from processors.joint_anomaly import PROCESSOR, Config
+from processors.joint_anomaly import PROCESSOR
+from processors.joint_config import Config
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId, Reading
 from sparkplug.quality import Quality
