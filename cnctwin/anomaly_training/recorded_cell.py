@@ -90,4 +90,9 @@ def part(run: RunLog, from_s: float, to_s: float) -> RunLog | None:
         if len(known):
             kept[0] = values[known[-1]]
         columns[name] = kept
-    return RunLog(run.t_s[first:last], columns, {}, (), run.source)
+    text = {}
+    for name, words in run.text.items():
+        told = words[first:last].copy()
+        told[0] = next((word for word in reversed(words[: first + 1]) if word), None)
+        text[name] = told
+    return RunLog(run.t_s[first:last], columns, text, (), run.source)

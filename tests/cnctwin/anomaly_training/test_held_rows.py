@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from cnctwin.anomaly_training.held_rows import held_rows, milliseconds
+from cnctwin.anomaly_training.recorded_cell import part
 from cnctwin.anomaly_training.replayed_cell import replayed
 from processors.config import Configuration
 from processors.effects import Publish
@@ -124,3 +125,12 @@ def test_machines_of_a_cell_are_judged_beside_each_other() -> None:
         assert {t: at[t] for t in told} == told
     a = tracks["a"]
     assert ((a.adjusted == 0.0) & (a.raw > 0.5)).sum() > 5
+
+
+def test_a_part_of_a_run_begins_with_what_was_said_before_it() -> None:
+    columns = {"t_s": np.arange(4.0), "spindle_rpm": np.array([1000.0, np.nan, np.nan, 900.0])}
+    run = run_log(columns | {"program": np.array(["O1", None, None, "O2"], dtype=object)})
+    rest = part(run, 2.0, np.inf)
+    assert rest is not None
+    assert rest["spindle_rpm"].tolist() == [1000.0, 900.0]
+    assert rest.text["program"].tolist() == ["O1", "O2"]
