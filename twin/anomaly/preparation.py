@@ -13,6 +13,7 @@ One form for the stream, without numpy, one for arrays (T, F); `fit_preparation`
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from pydantic import Field
@@ -35,6 +36,7 @@ SPREAD_FLOOR = 0.1
 EXPLAINS_NOTHING = 0.6
 BASELINE_S_MIN = 120.0
 REGIMES_MAX = 2000
+NAMES_KEPT = 4096
 NEVER = -(10**12)
 
 
@@ -87,13 +89,18 @@ def regime_name(preparation: Preparation, row: Sequence[float], context: Sequenc
     """
     if SPEED in preparation.signals and row[preparation.signals.index(SPEED)] < TURNS_RPM_MIN:
         return STANDING
-    return "|".join(_word(name, value) for name, value in zip(preparation.context, context, strict=True))
+    return _name(preparation.context, tuple(context))
+
+
+@lru_cache(maxsize=NAMES_KEPT)
+def _name(signals: tuple[str, ...], values: tuple[object, ...]) -> str:
+    return "|".join(_word(signal, value) for signal, value in zip(signals, values, strict=True))
 
 
 def _word(name: str, value: object) -> str:
     if value is None:
         return "?"
-    if isinstance(value, int | float) and not isinstance(value, bool):
+    if isinstance(value, int | float):
         return f"{10 * round(value / 10)}" if name.endswith("_pct") else f"{value:g}"
     return str(value)
 
