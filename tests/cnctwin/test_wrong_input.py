@@ -8,6 +8,7 @@ import pytest
 
 from cnctwin.cli import main
 from cnctwin.simulated_machine.description import SPARE_PART
+from processors.discovery import discover
 
 NO_TOML = "[machine\n"
 NO_SUCH_KEY = '[machine]\nname = "vmc"\ncolour = "blue"\n'
@@ -94,7 +95,7 @@ def test_a_real_process_says_it_without_a_traceback() -> None:
     done = subprocess.run([sys.executable, "-m", "cnctwin", "process", "nonsense"], capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert done.stdout == ""
-    assert done.stderr == "cnctwin: no processor 'nonsense'; there are: cutting_force, gap, mirror, thermal\n"
+    assert done.stderr == f"cnctwin: no processor 'nonsense'; there are: {', '.join(discover())}\n"
 
 
 @pytest.mark.parametrize(

@@ -39,12 +39,14 @@ STATED = Limits.of(
 OUTPUTS = ("position_mm", "torque_a", "table_mm")
 
 
-def run_with(values: dict[str, dict[str, float]]) -> AxisRun:
-    """The three axes with these effects."""
+def run_with(values: dict[str, dict[str, float]], *, reference_run: bool = False) -> AxisRun:
+    """The three axes with these effects; the reference run gives the same bits, and compiles nothing."""
     given = constants()
     for name, own in values.items():
         given = with_effect(given, name, own)
-    return run_axes(given, AxisInput(REFERENCE, np.arange(3)), effects=tuple(values), outputs=OUTPUTS)
+    return run_axes(
+        given, AxisInput(REFERENCE, np.arange(3)), effects=tuple(values), outputs=OUTPUTS, reference_run=reference_run
+    )
 
 
 def difference(one: AxisRun, other: AxisRun) -> float:
@@ -163,10 +165,11 @@ def test_no_effect_acts_on_programs_and_on_something_else() -> None:
 
 def test_effects_compose_without_knowing_of_each_other() -> None:
     typical = {effect.name: effect.typical_values() for effect in ON_AXES}
-    together = run_with(typical)
+    together = run_with(typical, reference_run=True)
     for effect in ON_AXES:
-        without = run_with({name: values for name, values in typical.items() if name != effect.name})
-        nulled = run_with(typical | {effect.name: effect.null_values()})
+        others = {name: values for name, values in typical.items() if name != effect.name}
+        without = run_with(others, reference_run=True)
+        nulled = run_with(typical | {effect.name: effect.null_values()}, reference_run=True)
         assert difference(without, nulled) == 0.0, f"{effect.name} is not nothing beside the others"
         assert difference(together, nulled) > 0.0
 
