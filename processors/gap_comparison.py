@@ -19,16 +19,19 @@ from enum import StrEnum
 from typing import NamedTuple
 
 from processors.sample import Sample, SampleKind
+from processors.tool_change_context import ACTIVE as CHANGE
+from processors.tool_change_context import DETECTED, STALE, tool_change_context
+from processors.tool_change_context import NONE as NOBODY
 from sparkplug.quality import Quality
 
 SPEED, COMMAND, FEED = "spindle_rpm", "spindle_rpm_cmd", "feed_mm_min"
 LOAD, TEMPERATURE = "spindle_load_pct", "spindle_temp_c"
 RESIDUAL, RISE = "twin/spindle_temp_residual_k", "twin/spindle_temp_rise_k"
-CHANGE, CHANGE_SOURCE = "tool_change_active", "tool_change_source"
+CHANGE_SOURCE = "tool_change_source"
 EXECUTION, PROGRAM = "exec_state", "program"
 AXIS_LOADS = tuple(f"axis_{letter}_load_pct" for letter in "xyzabc")
 SIGNALS = (TEMPERATURE, LOAD, SPEED, *AXIS_LOADS)
-INPUTS = frozenset({SPEED, COMMAND, FEED, LOAD, RESIDUAL, RISE, CHANGE, CHANGE_SOURCE, EXECUTION, PROGRAM, *AXIS_LOADS})
+INPUTS = frozenset({SPEED, COMMAND, FEED, LOAD, RESIDUAL, RISE, CHANGE, DETECTED, CHANGE_SOURCE, EXECUTION, PROGRAM, *AXIS_LOADS})
 REGIMES = {TEMPERATURE: ("warm_up", "steady", "cool_down"), LOAD: ("air", "cutting"), SPEED: ("turning",)}
 REGIMES |= dict.fromkeys(AXIS_LOADS, ("standstill",))
 UNITS = {TEMPERATURE: "K", LOAD: "%", SPEED: "rev/min"} | dict.fromkeys(AXIS_LOADS, "%")
@@ -214,9 +217,11 @@ def _feeding(given: Given, sample: Sample) -> Feeding:
 
 
 def _change(sample: Sample) -> ToolChange:
-    reading, source = sample.row.get(CHANGE), sample.row.get(CHANGE_SOURCE)
-    if reading is None or (source is not None and source.value == "none"):
+    """What the control says, else the detector; ABSENT where neither does."""
+    said = tool_change_context(sample.row)
+    if said.active is not None and said.source != STALE:
+        return ToolChange.ACTIVE if said.active else ToolChange.NONE
+    control, detected, source = sample.row.get(CHANGE), sample.row.get(DETECTED), sample.row.get(CHANGE_SOURCE)
+    if detected is None and (control is None or (source is not None and source.value == NOBODY)):
         return ToolChange.ABSENT
-    if reading.quality is not Quality.GOOD or not isinstance(reading.value, bool):
-        return ToolChange.UNKNOWN
-    return ToolChange.ACTIVE if reading.value else ToolChange.NONE
+    return ToolChange.UNKNOWN

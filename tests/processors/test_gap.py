@@ -109,6 +109,18 @@ def test_where_a_tool_change_is_not_known_nothing_is_compared_and_where_nobody_t
     assert last(ungated)[BASIS].value.endswith("tool changes are not gated: nobody tells them")
 
 
+def test_where_the_control_tells_nothing_the_detector_is_heeded() -> None:
+    engine = engine_of(PROCESSOR, floors=FLOORS, **DRIVE)
+    detector = NodeId("cnc", "twin-tool_change_detector")
+    change = "twin/tool_change_active"
+    events = [birth(0.0, **TURNING), birth(0.0, node=detector, **{change: False})]
+    for start_s in range(0, 600, 60):
+        events += [data(start_s + 20.0, node=detector, **{change: True}), data(start_s + 20.1, spindle_load_pct=90.0)]
+        events += [data(start_s + 30.0, node=detector, **{change: False}), data(start_s + 31.9, spindle_load_pct=4.0)]
+    fed(engine, *events, data(601.0, **TURNING))
+    assert last(engine)[f"{LOAD}/mean"].value == pytest.approx(-1.0, abs=0.01)
+
+
 def test_a_spindle_that_speeds_up_is_not_compared() -> None:
     engine = engine_of(PROCESSOR, floors=FLOORS, **DRIVE)
     fed(
