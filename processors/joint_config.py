@@ -17,6 +17,11 @@ from twin.errors import TwinError
 if TYPE_CHECKING:
     from twin.anomaly.model import AnomalyModel, Calibration
 
+FITTED_WITH = (
+    *("tick_s", "dwell_ticks", "clear_fraction", "common_mode", "common_mode_factor", "exclude_gated_peers", "tail_s"),
+    "look_back_s",
+)
+"""The settings that a threshold holds for."""
 WAITING_MAX = 5000  # scores of one machine
 TICK_ROUNDING = 1e-3
 NUMBERS = frozenset(
@@ -120,16 +125,7 @@ def _models_in(folder: Path) -> "dict[str, AnomalyModel]":
 
 def _check_settings(config: Config, machine: str, calibration: "Calibration") -> None:
     """A threshold means so many alerts a week for the settings that it was fitted with, and nothing for others."""
-    for key in (
-        "tick_s",
-        "dwell_ticks",
-        "clear_fraction",
-        "common_mode",
-        "common_mode_factor",
-        "exclude_gated_peers",
-        "tail_s",
-        "look_back_s",
-    ):
+    for key in FITTED_WITH:
         fitted, configured = getattr(calibration, key), getattr(config, key)
         if fitted != configured:
             raise ValueError(

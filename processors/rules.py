@@ -36,7 +36,6 @@ ANOMALY = f"{TWIN_PREFIX}anomaly_alarm"
 RULE = f"{TWIN_PREFIX}rule_"
 ZONE, SEVERITY, DETAIL = f"{TWIN_PREFIX}vibration_zone", f"{TWIN_PREFIX}severity", f"{RULE}detail"
 NONE, MEDIUM, HIGH = "none", "medium", "high"
-NOT_SEEN = Judgement(Stand.UNKNOWN, "nothing judged yet")
 
 
 class Config(SpindleLimits, TemperatureLimits, VibrationLimits):

@@ -16,6 +16,7 @@ from cnctwin.anomaly_training.recorded_cell import recorded_cell
 from cnctwin.anomaly_training.replayed_cell import replayed
 from cnctwin.errors import UsageError
 from cnctwin.twin_commands import working
+from processors.joint_config import FITTED_WITH
 from twin.anomaly.alarm import AlarmRule, is_alarm, onsets
 from twin.anomaly.common_mode import Method
 from twin.anomaly.detector import Detector
@@ -176,23 +177,13 @@ def _on_files(models: dict[str, tuple[Path, AnomalyModel]], arguments: Sequence[
     if unknown := [machine for machine in cell.machines if machine not in models]:
         there = ", ".join(models)
         raise UsageError(f"there is no model of {unknown[0]}; there are {there}: name the files, as {next(iter(models))}=FILE")
-    names = (
-        "tick_s",
-        "dwell_ticks",
-        "clear_fraction",
-        "common_mode",
-        "common_mode_factor",
-        "exclude_gated_peers",
-        "tail_s",
-        "look_back_s",
-    )
-    settings = {name: getattr(first.calibration, name) for name in names}
+    settings = {name: getattr(first.calibration, name) for name in FITTED_WITH}
     scorers = {machine: models[machine][1] for machine in cell.machines}
     alerts, ticks = dict.fromkeys(cell.machines, 0), dict.fromkeys(cell.machines, 0)
     for stretch in cell.stretches:
         for machine, track in replayed(stretch, scorers, {**settings, "threshold": 1.0}).items():
             found = scorers[machine].calibration
-            if found is None or {name: getattr(found, name) for name in names} != settings:
+            if found is None or {name: getattr(found, name) for name in FITTED_WITH} != settings:
                 raise ModelError(
                     f"the models of {machine} and {cell.machines[0]} were calibrated with different settings: check them apart"
                 )

@@ -16,7 +16,6 @@ Floats = NDArray[np.float64]
 DAY_S = 86400
 SHIFTS_S = (6 * 3600, 22 * 3600)
 WORK_DAYS = 6
-WARM_UP_S = 900
 WARM_UP = (
     Operation(300.0, 1000, 3, 8000, 0.03, 9),
     Operation(300.0, 4000, 4, 8000, 0.06, 9),
