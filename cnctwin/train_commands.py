@@ -13,7 +13,6 @@ from cnctwin.errors import UsageError
 train_app = typer.Typer(
     no_args_is_help=True, help="Models of a machine from its recordings: anomaly scores, the tool-change detector."
 )
-FEATURES = "spindle_load_pct,spindle_rpm,feed_mm_min,spindle_temp_c,vibration_rms_g"
 FILES = "Run logs (Parquet or CSV) as [NAME=]FILE; several files of a NAME are one after the other, several NAMEs a cell"
 
 
@@ -21,7 +20,10 @@ FILES = "Run logs (Parquet or CSV) as [NAME=]FILE; several files of a NAME are o
 def train_anomaly(  # noqa: PLR0917 - options are arguments
     files: Annotated[list[str], typer.Argument(help=FILES)],
     out: Annotated[Path, typer.Option(help="Folder for the models: <out>/<machine>/current is what scores")],
-    features: Annotated[str, typer.Option(help="Signals, in the order of the row")] = FEATURES,
+    features: Annotated[
+        str,
+        typer.Option(help="Signals, as a,b,c; else those of load, speed, feed, heat and vibration that all files have"),
+    ] = "",
     detector: Annotated[
         str, typer.Option(help="isolation_forest, or a detector of PyOD: IForest, ECOD, KNN, …")
     ] = "isolation_forest",
@@ -52,8 +54,6 @@ def train_anomaly(  # noqa: PLR0917 - options are arguments
     """Train a model of each machine, and fit its threshold to so many alerts a week."""
     training = _training()
     names = tuple(dict.fromkeys(name.strip() for name in features.split(",") if name.strip()))
-    if not names:
-        raise UsageError("--features is empty: name at least one signal")
     if common_mode not in (methods := [method.value for method in training.Method]):
         raise UsageError(f"--common-mode {common_mode}: it is one of {', '.join(methods)}")
     asked = training.Asked(

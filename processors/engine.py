@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from operator import itemgetter
 
 from processors.config import ALL, CellConfig, Configuration, ProcessorConfig
-from processors.contract import CellProcessor
+from processors.contract import TWIN_NODE_PREFIX, CellProcessor
 from processors.counts import Counts
 from processors.discovery import AnyProcessor
 from processors.effects import Declare, Effect, PublishPlain, Remove
@@ -40,7 +40,10 @@ class _Unit:
 
 @dataclass(slots=True)
 class _Machine:
-    """A machine, the sources that are online, and which source each signal is taken from."""
+    """A machine, the sources that are online, and which source each signal is taken from.
+
+    It is online while an edge of it is: what other processors say of it, they would go on saying of a machine that is off.
+    """
 
     name: str
     unit: _Unit
@@ -49,6 +52,15 @@ class _Machine:
     online: set[NodeId] = field(default_factory=set)
     owner: dict[str, NodeId] = field(default_factory=dict)
     excluded: dict[NodeId, frozenset[str]] = field(default_factory=dict)
+
+    @property
+    def is_online(self) -> bool:
+        """Whether an edge of it is."""
+        return any(not _is_twin(node) for node in self.online)
+
+
+def _is_twin(node: NodeId) -> bool:
+    return node.node.startswith(TWIN_NODE_PREFIX)
 
 
 class Engine:
@@ -78,12 +90,12 @@ class Engine:
     @property
     def machines(self) -> tuple[str, ...]:
         """The machines that are online."""
-        return tuple(name for name, machine in self._machines.items() if machine.online)
+        return tuple(name for name, machine in self._machines.items() if machine.is_online)
 
     @property
     def units(self) -> tuple[str, ...]:
         """The machines, or the cells, that have a state to be kept."""
-        return tuple(dict.fromkeys(machine.unit.name for machine in self._machines.values() if machine.online))
+        return tuple(dict.fromkeys(machine.unit.name for machine in self._machines.values() if machine.is_online))
 
     # Events.
 
@@ -191,9 +203,10 @@ class Engine:
         """Machines that were restored and have not been born since are offline: say so."""
         effects: list[Effect] = []
         for machine in self._machines.values():
-            if machine.live.is_restored and not machine.online:
+            if machine.live.is_restored and not machine.is_online:
                 machine.live.is_restored = False
-                self._die(machine, list(machine.live.row), at_ms, "not seen since the processor was started", effects)
+                reason = "not seen since the processor was started"
+                self._die(machine, list(machine.live.row), at_ms, reason, effects, is_last=True)
         return effects
 
     def farewell(self, at_ms: int) -> list[PublishPlain]:
@@ -203,7 +216,7 @@ class Engine:
         if not self._processor.plain:
             return []
         for machine in self._machines.values():
-            if machine.online:
+            if machine.is_online:
                 machine.live.death(list(machine.live.row), at_ms, "the processor was stopped", effects, is_last=True)
         return [effect for effect in effects if isinstance(effect, PublishPlain)]
 
@@ -248,6 +261,10 @@ class Engine:
             machine.history = self._lane(unit.history, name)
         return machine.history
 
+    def _is_of_twin(self, node: NodeId) -> bool:
+        """Whether only what is an input tells this processor the time: another processor may stamp by the wall's clock."""
+        return self._processor.inputs is not None and _is_twin(node)
+
     def _data(self, machine: _Machine, event: HostEvent, wall_s: float, effects: list[Effect]) -> None:
         readings: tuple[Reading, ...] | list[Reading] = event.readings
         excluded = machine.excluded.get(event.node)
@@ -255,6 +272,14 @@ class Engine:
             readings = [reading for reading in readings if reading.name not in excluded]
             if not readings and event.readings:
                 self.ledger.drop(DropReason.NAME_CLASH)
+                return
+        if self._is_of_twin(event.node):
+            readings = [reading for reading in readings if reading.name in (self._processor.inputs or ())]
+            if not readings:
+                self.ledger.emitted += 1  # nothing of it is for this processor
+                return
+            if not machine.is_online:
+                machine.live.note(readings)
                 return
         if True not in map(_IS_HISTORICAL, readings):
             machine.live.data(readings, wall_s, effects)
@@ -275,10 +300,16 @@ class Engine:
                 self.ledger.drop(DropReason.MACHINES_MAX)
                 return
             machine = self._joined(event.device or "")
-        if not machine.online and self._processor.outputs:
-            effects.append(Declare(machine.name, machine.live.emission.known(event.timestamp_ms)))
+        is_of_twin = self._is_of_twin(event.node)
+        was_online = machine.is_online
         machine.online.add(event.node)
-        machine.live.birth(event.readings, self._taken(machine, event), wall_s, effects)
+        taken = self._taken(machine, event)
+        if not machine.is_online and self._processor.inputs is not None:  # another processor is quicker than the edge
+            machine.live.note(taken)
+            return
+        if not was_online and self._processor.outputs:
+            effects.append(Declare(machine.name, machine.live.emission.known(event.timestamp_ms)))
+        machine.live.birth(taken if is_of_twin else event.readings, taken, wall_s, effects)
 
     def _taken(self, machine: _Machine, event: HostEvent) -> list[Reading]:
         """The readings of a birth that this processor takes from this source. A signal belongs to the first source that is
@@ -317,13 +348,15 @@ class Engine:
                 self._changed[machine.unit.name] = None
 
     def _source_dies(self, machine: _Machine, event: HostEvent, effects: list[Effect]) -> bool:
+        was_online = machine.is_online
         machine.online.discard(event.node)
         names = [name for name, source in machine.owner.items() if source == event.node and name in machine.live.row]
-        return self._die(machine, names, event.timestamp_ms, event.detail or "offline", effects)
+        is_last = was_online and not machine.is_online
+        return self._die(machine, names, event.timestamp_ms, event.detail or "offline", effects, is_last=is_last)
 
-    def _die(self, machine: _Machine, names: list[str], at_ms: int, reason: str, effects: list[Effect]) -> bool:
-        folded = machine.live.death(names, at_ms, reason, effects, is_last=not machine.online)
-        if not machine.online and self._processor.outputs:
+    def _die(self, machine: _Machine, names: list[str], at_ms: int, reason: str, effects: list[Effect], *, is_last: bool) -> bool:
+        folded = machine.live.death(names, at_ms, reason, effects, is_last=is_last)
+        if is_last and self._processor.outputs:
             effects.append(Remove(machine.name))
         return folded
 

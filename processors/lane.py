@@ -107,6 +107,11 @@ class Lane:
         names = tuple(reading.name for reading in taken)
         self._settle(self._fold(SampleKind.BIRTH, self._now_ms(readings), names, effects))
 
+    def note(self, readings: Sequence[Reading]) -> None:
+        """Keep what another processor says of a machine whose edge is offline: nothing is made of it until the edge is back."""
+        self.row.update((reading.name, reading) for reading in readings)
+        self._ledger.emitted += 1
+
     def _show(self, kind: SampleKind, readings: Sequence[Reading], effects: list[Effect]) -> None:
         """For a processor that reads everything, from several sources, each with a clock of its own: there is no common time.
 

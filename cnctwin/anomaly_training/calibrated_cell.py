@@ -124,7 +124,10 @@ def _preparations(machines: Sequence[str], training: Sequence[Stretch], asked: A
             found[machine] = fitted_preparation(held, asked.ticks)
         except ValueError as error:
             raise UsageError(f"{machine}: {error}") from None
-    return tailed_preparations(found, training, asked.ticks)
+    try:
+        return tailed_preparations(found, training, asked.ticks)
+    except ValueError as error:
+        raise UsageError(f"{', '.join(machines)}: {error}") from None
 
 
 def rows_to_score(machine: str, stretches: Sequence[Stretch], preparation: Preparation | None, asked: Asked) -> Floats:
@@ -162,7 +165,8 @@ def _provisional(machine: str, raw: Floats, asked: Asked) -> Calibration:
     spread = MAD_TO_SD * float(np.median(np.abs(raw - center)))
     if not spread > 0.0:
         raise UsageError(
-            f"{machine}: half of the scores are the same, {center:.3g}: the features do not change in this recording"
+            f"{machine}: half of the scores are the same, {center:.3g}: the model tells them not apart; record more, "
+            "or choose other --features"
         )
     unfitted: dict[str, Any] = {"threshold": 1.0, "estimate": 0.0, "low": 0.0, "high": 0.0, "hours": 0.0, "is_extrapolated": True}
     return Calibration(**asked.settings, **unfitted, alerts_per_week=asked.alerts_per_week, raw_center=center, raw_spread=spread)

@@ -3,7 +3,7 @@
 import json
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ from rich.console import Console
 
 from cnctwin.anomaly_training.calibrated_cell import Asked, Calibrated, calibrated_cell
 from cnctwin.anomaly_training.frozen_week import segments
-from cnctwin.anomaly_training.recorded_cell import recorded_cell
+from cnctwin.anomaly_training.recorded_cell import recorded_cell, shared_features
 from cnctwin.anomaly_training.replayed_cell import replayed
 from cnctwin.errors import UsageError
 from cnctwin.twin_commands import working
@@ -27,11 +27,15 @@ from twin.anomaly.store import current_of, promote, stored
 from twin.errors import TwinError
 from twin.forest.artefact import MANIFEST
 
+FEATURES = ("spindle_load_pct", "spindle_rpm", "feed_mm_min", "spindle_temp_c", "vibration_rms_g")
+"""The published ones, of which those are taken that all files have."""
 __all__ = ["Asked", "Detector", "Method", "check_models", "promote_model", "train_anomaly"]
 
 
 def train_anomaly(arguments: Sequence[str], asked: Asked, out: Path, *, as_json: bool, console: Console) -> None:
     """Train and calibrate the machines of a cell. A model that fails on the golden week of the one before is not promoted."""
+    if not asked.features:
+        asked = replace(asked, features=shared_features(arguments, FEATURES))
     cell = recorded_cell(arguments, asked.features, asked.tick_s)
     try:
         with working("training") as say:

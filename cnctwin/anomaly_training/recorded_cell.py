@@ -30,6 +30,15 @@ class RecordedCell:
         return sum(span_s(stretch)[1] - span_s(stretch)[0] for stretch in self.stretches) / 3600.0
 
 
+def shared_features(arguments: Sequence[str], wanted: Sequence[str]) -> tuple[str, ...]:
+    """Those of the wanted signals that all files have. Raises UsageError where a file is no run log, or they have none."""
+    runs = [_run(Path(argument.rpartition("=")[2]), (), 1.0) for argument in arguments]
+    shared = tuple(name for name in wanted if all(run.has(name) for run in runs))
+    if not shared:
+        raise UsageError(f"none of {', '.join(wanted)} is in all files: choose with --features")
+    return shared
+
+
 def span_s(stretch: Stretch) -> tuple[float, float]:
     """From the first to the last sample of any machine."""
     return min(float(run.t_s[0]) for run in stretch.values()), max(float(run.t_s[-1]) for run in stretch.values())
@@ -69,10 +78,9 @@ def _run(path: Path, features: Sequence[str], tick_s: float) -> RunLog:
         run = read_run(path)
     except RunLogError as error:
         raise UsageError(str(error)) from None
-    for name in features:
-        if not run.has(name):
-            there = ", ".join(column for column in run.columns if run.has(column)) or "no signals"
-            raise UsageError(f"{path}: there is no {name} in it; there are {there}: choose with --features")
+    if absent := [name for name in features if not run.has(name)]:
+        there = ", ".join(column for column in run.columns if run.has(column)) or "no signals"
+        raise UsageError(f"{path}: there is no {', '.join(absent)} in it; there are {there}: choose with --features")
     if (run.t_s[-1] - run.t_s[0]) / tick_s > TICKS_MAX:
         raise UsageError(f"{path}: more than {TICKS_MAX} ticks of {tick_s:g} s: make --tick-s longer, or split the file")
     return run

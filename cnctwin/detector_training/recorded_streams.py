@@ -1,7 +1,7 @@
 """Run logs as streams at a steady period, with the changes that are known in them.
 
-A change is known where `tool_change_active` rises, or a new `tool_number` comes, or a person gives its time. Where the control
-tells nothing for longer than HOLE_S, the stream ends, and another begins.
+A change is known where `tool_change_active` rises, or a new `tool_number` comes without it; where a person gives times, at these
+only. Where the control tells nothing for longer than HOLE_S, the stream ends, and another begins.
 """
 
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ from twin.transient.stream import Stream, held, resting, standing
 Floats = NDArray[np.float64]
 HOLE_S = 600.0
 SAME_CHANGE_S = 5.0
-"""A new number so soon after the flag, or another number, is the same change."""
+"""A new number so soon after the flag was up, or after another number, is the same change."""
 SAMPLES_MAX = 20_000_000
 
 
@@ -44,15 +44,19 @@ def streams_of(paths: Sequence[Path], signal: str, period_s: float, given_s: Seq
 def known_changes(run: RunLog) -> list[float]:
     """Times at which the run log says that a tool was changed."""
     times: list[float] = []
+    flagged_s = np.array([-np.inf])
     if "tool_change_active" in run.columns:
         active = np.nan_to_num(run["tool_change_active"]) > 0.0
         times += run.t_s[1:][active[1:] & ~active[:-1]].tolist()
         times += run.t_s[:1][active[:1]].tolist()
+        flagged_s = np.append(flagged_s, run.t_s[active])
     if "tool_number" in run.columns:
         number = run["tool_number"]
         is_tool = np.isfinite(number) & (number > 0.0)
         t_s, tools = run.t_s[is_tool], number[is_tool]
-        times += t_s[1:][np.diff(tools) != 0.0].tolist()
+        new_s = t_s[1:][np.diff(tools) != 0.0]
+        since_flag_s = new_s - flagged_s[np.searchsorted(flagged_s, new_s, side="right") - 1]
+        times += new_s[since_flag_s > SAME_CHANGE_S].tolist()
     kept: list[float] = []
     for at_s in sorted(times):
         if not kept or at_s - kept[-1] > SAME_CHANGE_S:
@@ -61,8 +65,8 @@ def known_changes(run: RunLog) -> list[float]:
 
 
 def streams_of_run(run: RunLog, source: str, signal: str, period_s: float, given_s: Sequence[float]) -> list[Stream]:
-    """The streams of one run, with the changes that it knows and those given."""
-    changes_s = [*known_changes(run), *given_s]
+    """The streams of one run, with the changes that are given, else those that it knows."""
+    changes_s = list(given_s) or known_changes(run)
     cuts = np.flatnonzero(np.diff(run.t_s) > HOLE_S) + 1
     streams = []
     for first, last in zip([0, *cuts.tolist()], [*cuts.tolist(), len(run)], strict=True):

@@ -220,7 +220,7 @@ def broken(folder: Path, tmp_path: Path) -> dict[str, tuple[list[str | Path], st
             "no spindle_load_pct in it; there are spindle_rpm: choose with --features",
         ),
         "too short": ([tmp_path / "short.csv"], "rows have all features: at least 64"),
-        "nothing moves": ([tmp_path / "still.csv"], "the features do not change in this recording"),
+        "nothing moves": ([tmp_path / "still.csv"], "the model tells them not apart"),
         "other numbers of runs": ([*a, *a, *named(folder, "b")], "different numbers of runs .a 2, b 1."),
         "no common time": ([*a, f"b={tmp_path / 'later.parquet'}"], "have no time in common"),
         "no such detector": ([*a, "--detector", "magic"], "there is no detector 'magic'"),

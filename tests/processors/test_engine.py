@@ -348,3 +348,35 @@ def test_a_hole_of_an_unknown_node_concerns_nobody() -> None:
     engine = engine_of(RECORDER)
     assert fed(engine, hole(0.0), HostEvent(EventKind.DEATH, EDGE, None, T0_MS)) == []
     assert engine.ledger.received == 0
+
+
+def test_what_another_processor_says_of_no_concern_does_not_move_the_time() -> None:
+    """A recording of 2022 is replayed; the alerts beside it are stamped by the clock on the wall."""
+    alerts = NodeId("cnc", "twin-alerts")
+    reader = replace(RECORDER, name="reader", inputs=frozenset({"spindle_rpm", "twin/raw_score"}))
+    engine = engine_of(reader)
+    years_s = 1.5e8
+    fed(engine, birth(0.0, spindle_rpm=1.0), birth(years_s, node=alerts, **{"twin/alert_state": "none"}))
+    fed(engine, data(years_s, node=alerts, **{"twin/alert_state": "firing"}), data(1.5, spindle_rpm=2.0))
+    assert [kind for kind, _ in log(engine)] == ["birth", "birth", "tick", "data"]
+    assert engine.counts.holes == 0
+    assert engine.ledger.balance == 0
+
+
+def test_a_machine_whose_edge_is_offline_is_offline_whatever_other_processors_go_on_saying() -> None:
+    rules = NodeId("cnc", "twin-rules")
+    reader = replace(RECORDER, name="reader", inputs=frozenset({"spindle_rpm", "twin/severity"}))
+    engine = engine_of(reader)
+    severe = {"twin/severity": "none"}
+    fed(engine, birth(0.0, node=rules, **severe))
+    assert engine.machines == (), "nobody's machine"
+    fed(engine, birth(0.0, spindle_rpm=1.0), data(1.0, node=rules, **severe))
+    assert engine.machines == ("okuma",)
+    effects = fed(engine, death(2.0))
+    assert effects[-1] == Remove("okuma")
+    assert engine.machines == ()
+    assert fed(engine, data(3.0, node=rules, **{"twin/severity": "high"}), birth(4.0, node=rules, **severe)) == []
+    assert engine.machines == ()
+    assert engine.ledger.balance == 0
+    assert Declare in map(type, fed(engine, birth(9.0, spindle_rpm=2.0)))
+    assert engine._machines["okuma"].live.row["twin/severity"].value == "none"

@@ -93,8 +93,13 @@ def lengths(preparation: Preparation, left: "NDArray[np.float64]") -> "NDArray[n
 
 
 def with_tails(preparation: Preparation, left: "NDArray[np.float64]") -> Preparation:
-    """The preparation with the tails of what was left in the training data, rows (T, F) that are judged."""
+    """The preparation with the tails of what was left in the training data, rows (T, F) that are judged.
+
+    Raises ValueError where there are none.
+    """
     import numpy as np  # noqa: PLC0415
 
+    if not len(left):
+        raise ValueError("no row is judged, outside tool changes, in an operation with two minutes or more of it: record more")
     up, down = (np.quantile(np.maximum(side, 0.0), TAIL_QUANTILE, axis=0) + TAIL_LEAST for side in (left, -left))
     return preparation.model_copy(update={"up": tuple(up.tolist()), "down": tuple(down.tolist())})

@@ -110,7 +110,9 @@ def program_runs(recording: Observations, before: Mapping[str, str] | None = Non
     rows = recording.rows
     starts = _starts(rows)
     if not starts:
-        raise RunLogError("no Program_Status|ACTIVE in this recording: no program ran")
+        raise RunLogError(
+            "no Program_Status|ACTIVE in this recording: no program ran, or it is an adapter's log (give its --devices)"
+        )
     runs, over = [], 0
     for n, first in enumerate(starts):
         after = starts[n + 1] if n + 1 < len(starts) else len(rows)
