@@ -83,7 +83,7 @@ def _machine(machine: MachineView) -> Panel:
     for title, ratio in (("measured", 3), ("", 4), ("time (UTC)", 2), ("twin", 4), ("", 4)):
         table.add_column(title, ratio=ratio, no_wrap=True, overflow="ellipsis")
     order = [name for name in FIRST if name in machine.measured] + sorted(machine.measured.keys() - set(FIRST))
-    twin = list(machine.twin.values())
+    twin = sorted(machine.twin.values(), key=lambda reading: reading.value is None)  # what is known stands first
     for row in range(max(len(order), len(twin))):
         reading = machine.measured[order[row]] if row < len(order) else None
         beside = twin[row] if row < len(twin) else None

@@ -54,6 +54,8 @@ def train_anomaly(  # noqa: PLR0917 - options are arguments
     """Train a model of each machine, and fit its threshold to so many alerts a week."""
     training = _training()
     names = tuple(dict.fromkeys(name.strip() for name in features.split(",") if name.strip()))
+    if features and not names:
+        raise UsageError("--features is empty: name at least one signal")
     if common_mode not in (methods := [method.value for method in training.Method]):
         raise UsageError(f"--common-mode {common_mode}: it is one of {', '.join(methods)}")
     asked = training.Asked(

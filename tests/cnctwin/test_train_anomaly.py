@@ -216,8 +216,8 @@ def broken(folder: Path, tmp_path: Path) -> dict[str, tuple[list[str | Path], st
     return {
         "no such file": ([tmp_path / "none.parquet"], "there is no such file"),
         "a signal that is not there": (
-            [tmp_path / "few.csv"],
-            "no spindle_load_pct in it; there are spindle_rpm: choose with --features",
+            [tmp_path / "few.csv", "--features", "spindle_load_pct,spindle_rpm,feed_mm_min"],
+            "no spindle_load_pct, feed_mm_min in it; there are spindle_rpm: choose with --features",
         ),
         "too short": ([tmp_path / "short.csv"], "rows have all features: at least 64"),
         "nothing moves": ([tmp_path / "still.csv"], "the model tells them not apart"),
