@@ -16,7 +16,6 @@ are published side by side.
 import math
 from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from processors.config import Configuration
 from processors.contract import CellProcessor, Output, OutputSpec, Provenance, Sample, SampleKind
@@ -51,9 +50,6 @@ from twin.anomaly.alarm import AlarmRule
 from twin.anomaly.common_mode import Method, adjust_frame, standardised
 from twin.anomaly.preparation import CONTEXT, Preparation, standardised_row
 
-if TYPE_CHECKING:
-    pass
-
 RAW, THRESHOLD, BASIS = "twin/raw_score", "twin/anomaly_threshold", "twin/anomaly_basis"
 CLOCK_OFFSET = "clock_offset_s"
 _VALUE, _QUALITY = Reading._fields.index("value"), Reading._fields.index("quality")
@@ -85,7 +81,7 @@ def step(config: Configuration[Config], state: State, sample: Sample) -> tuple[S
         member = _placed(config.default, member, sample)
         member = member._replace(tick=_tick(config.default, member, at_s))
         outputs = _introduced(config, machine)
-    elif sample.kind is SampleKind.DEATH and all(reading.quality is Quality.STALE for reading in sample.row.values()):
+    elif sample.kind is SampleKind.DEATH and machine not in sample.cell:
         member = member.offline(rule)
     elif sample.kind is SampleKind.HOLE and member.tick is not None and _tick(config.default, member, at_s) < member.tick:
         member = member.set_back(at_s, member.offset_ticks)

@@ -129,11 +129,10 @@ class Lane:
         self.ticking = self.ticking and not is_last
         for name in names:
             self.row[name] = self.row[name]._replace(quality=Quality.STALE, reason=reason)
-        now_ms = at_ms if self.clock_ms is None else self.clock_ms
-        folded = self._fold(SampleKind.DEATH, now_ms, tuple(names), effects, detail=reason)
         if is_last:
             self.fold.hide(self._machine)
-        return folded
+        now_ms = at_ms if self.clock_ms is None else self.clock_ms
+        return self._fold(SampleKind.DEATH, now_ms, tuple(names), effects, detail=reason)
 
     def lost(self, detail: str, effects: list[Effect]) -> None:
         """Messages were lost on the way."""

@@ -30,7 +30,8 @@ class Sample(NamedTuple):
     changed: names in the row that this message set
     gap_s: at a HOLE, how much event time was jumped over, forwards or backwards; 0 where it is not known
     is_history: an edge sends late what it had buffered; such samples fold into a state of their own
-    cell: the rows of all machines of the cell that are online, where the fold is a cell's
+    cell: the rows of all machines of the cell that are online, where the fold is a cell's; at the DEATH of its last edge
+        the machine is not among them
     topic: of a PLAIN message; its text is in `detail`
     """
 

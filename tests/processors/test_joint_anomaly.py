@@ -344,3 +344,12 @@ def test_the_snapshot_of_a_cell_stays_small() -> None:
 def test_what_holds_for_the_cell_cannot_be_set_for_one_machine_and_then_be_ignored() -> None:
     with pytest.raises(ConfigurationError, match=r"machines.a\] tail_s = 20.0 holds for all machines; .* threshold"):
         Configuration(Config, {"machines": {"a": {"tail_s": 20.0}}}, name="joint_anomaly")
+
+
+def test_nobody_waits_for_a_machine_that_is_off_while_the_detector_still_speaks_of_it() -> None:
+    detector = NodeId("cnc", "twin-tool_change_detector")
+    engine = cell("a", "b")
+    fed(engine, *born("a", "b"), birth(0.0, device="a", node=detector, **{"twin/tool_change_active": False}))
+    fed(engine, *together(course("a", 4, {}), course("b", 4, {})), death(3.6, device="a", node=NodeId("cnc", "a")))
+    effects = fed(engine, says(4.2, "b", spindle_load_pct=40.0), says(5.2, "b", spindle_load_pct=30.0))
+    assert metric(effects, ADJUSTED, "b")[-1][0] == 5.0
