@@ -6,7 +6,6 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -16,9 +15,8 @@ from sparkplug.datatype import DataType
 from sparkplug.edge_node import EdgeNode
 from sparkplug.metric import Change, MetricSpec, NodeId
 from tests.processors.courier.alert_shop import VIBRATION
+from tests.processors.courier.office import DELIVERY, OUTBOX, ROOT, Office, until
 from tests.processors.courier.receiving_server import Answer, ReceivingServer
-from tests.processors.courier.test_courier_on_a_broker import DELIVERY, OUTBOX, ROOT, Office, until
-from tests.wire.mosquitto import Mosquitto
 
 pytestmark = pytest.mark.broker
 KILLS = 6
@@ -48,18 +46,6 @@ type = "webhook"
 url = "{url}/desk"
 rate_high_per_hour = 1000
 """
-
-
-@pytest.fixture
-def broker(mosquitto: Mosquitto) -> BrokerAddress:
-    return BrokerAddress(*mosquitto.address)
-
-
-@pytest.fixture
-def office(broker: BrokerAddress) -> Iterator[Office]:
-    office = Office(broker)
-    yield office
-    office.close()
 
 
 @pytest.mark.parametrize("seed", [1])
