@@ -26,8 +26,8 @@ from cnctwin.mtconnect_agent.recording import Recording
 from cnctwin.mtconnect_agent.request import Answer, answer
 from cnctwin.twin_commands import check_suffix, write
 from edge.config import EdgeConfig
-from edge.mtconnect_config import MtconnectConfig
-from edge.mtconnect_cursor import next_request, parse, start
+from edge.controls.mtconnect.config import MtconnectConfig
+from edge.controls.mtconnect.cursor import next_request, parse, start
 from edge.pipeline import Pipeline
 from edge.sample import EdgeSample, SampleSet
 from sparkplug.quality import Quality

@@ -1,17 +1,17 @@
 """The edge for MTConnect agents, 1.2 to 2.x.
 
 `mtconnect_cursor` parses the documents and decides what to ask for next, `mtconnect_connection` asks, `mapping` and
-`mtconnect_names.toml` say which data item is which signal.
+`names.toml` say which data item is which signal.
 """
 
 from pathlib import Path
 
 from edge.adapter import Adapter
-from edge.mtconnect_check import describe
-from edge.mtconnect_config import MtconnectConfig
-from edge.mtconnect_connection import MtconnectConnection
-from edge.mtconnect_cursor import parse, place, resume, start
-from edge.mtconnect_draft import draft
+from edge.controls.mtconnect.check import describe
+from edge.controls.mtconnect.config import MtconnectConfig
+from edge.controls.mtconnect.connection import MtconnectConnection
+from edge.controls.mtconnect.cursor import parse, place, resume, start
+from edge.controls.mtconnect.draft import draft
 
 ADAPTER = Adapter(
     name="mtconnect",

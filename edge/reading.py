@@ -7,9 +7,8 @@
 """
 
 import re
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
-from edge.mapping import Target
 from edge.sample import EMPTY, UNAVAILABLE
 from edge.signals import Kind, Signal, signal
 from sparkplug.quality import Quality
@@ -28,6 +27,18 @@ _SYNONYMS |= {"IDLE": "READY", "RUNNING": "ACTIVE", "HOLD": "FEED_HOLD"}
 
 Value = str | int | float | bool | None
 Outcome = tuple[Value, Quality, str | None]
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """One data item and the signal that it feeds: canonical = value * factor + offset."""
+
+    data_item_id: str
+    signal: str
+    factor: float = 1.0
+    offset: float = 0.0
+    low: float | None = None
+    high: float | None = None
 
 
 def read(target: Target, text: str) -> Outcome:

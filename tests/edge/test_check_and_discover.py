@@ -7,10 +7,10 @@ import pytest
 from cnctwin.mtconnect_agent.replay_agent import ReplayAgent
 from edge.check import check, discover
 from edge.config_file import parse
+from edge.controls.mtconnect.documents import DevicesDocument, parse_document
+from edge.controls.mtconnect.draft import text_of
 from edge.errors import ConfigError, ConnectionLostError
-from edge.mtconnect_documents import DevicesDocument, parse_document
-from edge.mtconnect_draft import text_of
-from tests.edge.agent_documents import probe
+from tests.edge.controls.mtconnect.agent_documents import probe
 from tests.recordings import recording
 
 

@@ -7,9 +7,9 @@ import pytest
 from edge.check import discover
 from edge.config import BLOCK_PATTERN, EdgeConfig
 from edge.config_file import load, parse
+from edge.controls.mtconnect.config import MtconnectConfig
 from edge.errors import ConfigError
 from edge.mtconnect import ADAPTER
-from edge.mtconnect_config import MtconnectConfig
 from edge.run import broker_address
 
 FILE = Path("vmc.toml")

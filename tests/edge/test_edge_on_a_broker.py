@@ -13,9 +13,9 @@ import pytest
 
 from cnctwin.mtconnect_agent.replay_agent import ReplayAgent
 from edge.config import BrokerSection, EdgeConfig, MachineSection
+from edge.controls.mtconnect.check import describe
+from edge.controls.mtconnect.config import MtconnectConfig
 from edge.ledger import Ledger
-from edge.mtconnect_check import describe
-from edge.mtconnect_config import MtconnectConfig
 from edge.run import edge_runtime
 from edge.runtime import EdgeRuntime
 from sparkplug.broker import BrokerAddress

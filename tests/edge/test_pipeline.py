@@ -1,7 +1,7 @@
 """From frames to rows."""
 
 from edge.config import EdgeConfig, ReportSection, SignalSection
-from edge.mtconnect_config import MtconnectConfig
+from edge.controls.mtconnect.config import MtconnectConfig
 from edge.pipeline import Pipeline, rows_of
 from edge.sample import Drop, EdgeSample, SampleSet
 

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from edge.mtconnect_cursor import EDGE_RESTARTED, Phase, next_request, place, resume, start
+from edge.controls.mtconnect.cursor import EDGE_RESTARTED, Phase, next_request, place, resume, start
 from edge.place import Place, PlaceFile
 from edge.sample import Drop
-from tests.edge.agent_documents import CONFIG, fed, probe, streams, value, values
+from tests.edge.controls.mtconnect.agent_documents import CONFIG, fed, probe, streams, value, values
 
 WAS_AT = Place("1", 10)
 SHOWN = [value("rpm", 3, "100"), value("tool", 14, "8")]  # what /current shows: the tool has changed since

@@ -7,8 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from edge.errors import ConfigError
-from edge.mapping import Target
-from edge.reading import TEXT_LENGTH_MAX, read
+from edge.reading import TEXT_LENGTH_MAX, Target, read
 from edge.signals import SIGNALS, signal
 from edge.units import conversion
 from sparkplug.quality import Quality

@@ -10,12 +10,12 @@ from typing import Any
 import pytest
 
 from edge.config import EdgeConfig, MachineSection
+from edge.controls.mtconnect.config import MtconnectConfig
 from edge.ledger import Ledger
 from edge.mtconnect import ADAPTER
-from edge.mtconnect_config import MtconnectConfig
 from edge.runtime import EdgeRuntime
 from sparkplug.metric import Change, MetricSpec
-from tests.edge.agent_documents import error, probe, streams, value
+from tests.edge.controls.mtconnect.agent_documents import error, probe, streams, value
 
 CONFIG = EdgeConfig(source=MtconnectConfig(), machine=MachineSection(name="vmc", lost_after_s=30.0))
 

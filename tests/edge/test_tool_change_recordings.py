@@ -8,7 +8,7 @@ import pytest
 from edge.config import ToolChangeSection
 from edge.sample import EdgeSample
 from edge.tool_change import State, Step, step
-from tests.edge.shdr_lines import HURCO, MAZAK, OKUMA, samples_of
+from tests.edge.controls.mtconnect.shdr_lines import HURCO, MAZAK, OKUMA, samples_of
 from tests.recordings import PROJECT, recording, recordings_folder
 
 CONFIG = ToolChangeSection()

@@ -38,12 +38,13 @@ class Received:
 
 @dataclass(frozen=True)
 class Answer:
-    """How to behave: status and body; `wait_s` before; `drop`: take the request and close; `drip`: byte by byte."""
+    """How to behave: status and body; `wait_s` before, or when `hold` is set; `drop`: take it and close; `drip`: byte by byte."""
 
     status: int = 200
     body: bytes = b"{}"
     headers: tuple[tuple[str, str], ...] = ()
     wait_s: float = 0.0
+    hold: threading.Event | None = None
     drop: bool = False
     drip: bool = False
 
@@ -106,6 +107,8 @@ class ReceivingServer:
             self.received.append(Received(handler.command, parts.path, query, headers, body, time.monotonic()))
             answer = self.by_path.get(parts.path) or (self.answers.popleft() if self.answers else self.usual)
         time.sleep(answer.wait_s)
+        if answer.hold is not None:
+            answer.hold.wait(10)
         if answer.drop:
             handler.connection.shutdown(socket.SHUT_RDWR)
             handler.close_connection = True

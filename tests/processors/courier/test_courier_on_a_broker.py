@@ -59,12 +59,15 @@ def courier(broker: BrokerAddress, server: ReceivingServer) -> Iterator[Callable
 def test_a_notification_is_claimed_then_sent_then_said_to_be_delivered(
     office: Office, server: ReceivingServer, courier: Callable[..., Courier]
 ) -> None:
-    server.usual = Answer(wait_s=0.3)
+    may_answer = threading.Event()
+    server.usual = Answer(hold=may_answer)
     courier()
     office.put("a1")
     until(lambda: server.received, "the request")
-    claim = json.loads(office.topics[CLAIM + "a1"])  # it stands on the broker before the receiver has answered
+    until(lambda: CLAIM + "a1" in office.topics, "the claim")  # while the receiver has not answered yet
+    claim = json.loads(office.topics[CLAIM + "a1"])
     assert (claim["phase"], claim["attempt"]) == ("sending", 1)
+    may_answer.set()
     until(lambda: office.outcome("a1") == "delivered", "the delivery")
     office.publish(OUTBOX + "a1", b"")
     until(lambda: CLAIM + "a1" not in office.topics, "the end of the claim")

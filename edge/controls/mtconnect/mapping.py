@@ -1,6 +1,6 @@
 """Which data item of a device feeds which canonical signal.
 
-In order: what the configuration says; what the name says (`mtconnect_names.toml`, the names of Okuma, Mazak, Fanuc, Heidenhain,
+In order: what the configuration says; what the name says (`names.toml`, the names of Okuma, Mazak, Fanuc, Heidenhain,
 Siemens and Hurco); what the standard's type says; axes by the letter of their component. An item feeds at most one signal.
 
 A machine with several spindles has one canonical spindle: the first in the device description that reports both speed and load,
@@ -17,26 +17,15 @@ from functools import cache
 from importlib.resources import files
 
 from edge.config import SignalSection
+from edge.controls.mtconnect.model import DataItem, DeviceModel
 from edge.errors import ConfigError
-from edge.mtconnect_model import DataItem, DeviceModel
+from edge.reading import Target
 from edge.sample import Offer
 from edge.signals import signal
 from edge.units import conversion
 
 _SPEEDS = ("ROTARY_VELOCITY", "SPINDLE_SPEED")
 _AXIS_NAME = re.compile(r"([A-Za-z])(\d{0,2})")
-
-
-@dataclass(frozen=True, slots=True)
-class Target:
-    """One data item and the signal that it feeds: canonical = value * factor + offset."""
-
-    data_item_id: str
-    signal: str
-    factor: float = 1.0
-    offset: float = 0.0
-    low: float | None = None
-    high: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +60,7 @@ class TypeRule:
 @cache
 def names_and_types() -> tuple[Mapping[str, tuple[str, ...]], tuple[TypeRule, ...]]:
     """The table of names, lower case, and the rules by type."""
-    table = tomllib.loads(files("edge").joinpath("mtconnect_names.toml").read_text(encoding="utf-8"))
+    table = tomllib.loads(files("edge.controls.mtconnect").joinpath("names.toml").read_text(encoding="utf-8"))
     names = {name: tuple(dict.fromkeys(word.lower() for word in words)) for name, words in table["names"].items()}
     rules = tuple(
         TypeRule(row["signal"], tuple(row["type"]), tuple(row.get("sub_types", ())), tuple(row.get("above", ())))

@@ -8,8 +8,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from xml.etree.ElementTree import Element
 
+from edge.controls.mtconnect.xml import local_name
 from edge.errors import DocumentError
-from edge.mtconnect_xml import local_name
 
 DATA_ITEMS_MAX = 20_000
 

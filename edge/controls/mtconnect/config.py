@@ -16,7 +16,7 @@ def _http(url: str) -> str:
 
 
 class MtconnectConfig(Section):
-    """The agent and how it is asked. Empty `device`: the only one; empty `spindle`: see `edge.mapping`."""
+    """The agent and how it is asked. Empty `device`: the only one; empty `spindle`: see `edge.controls.mtconnect.mapping`."""
 
     url: Annotated[str, AfterValidator(_http)] = "http://127.0.0.1:5000"
     device: str = ""

@@ -10,12 +10,12 @@ import pytest
 
 from cnctwin.mtconnect_agent.replay_agent import ReplayAgent
 from edge.config import EdgeConfig
+from edge.controls.mtconnect.config import MtconnectConfig
+from edge.controls.mtconnect.connection import MtconnectConnection, client_of, fetch
+from edge.controls.mtconnect.cursor import Config, Phase, Request, parse, start
 from edge.errors import ConfigError, ConnectionLostError
-from edge.mtconnect_config import MtconnectConfig
-from edge.mtconnect_connection import MtconnectConnection, client_of, fetch
-from edge.mtconnect_cursor import Config, Phase, Request, parse, start
 from edge.sample import Drop, EdgeSample, Gap, SampleSet
-from tests.edge.agent_documents import DIALECTS, error, probe, streams, value
+from tests.edge.controls.mtconnect.agent_documents import DIALECTS, error, probe, streams, value
 from tests.recordings import recording
 
 

@@ -1,11 +1,11 @@
 """What an edge for MTConnect would publish: one probe, one current, the same parser as in operation, no broker."""
 
 from edge.adapter import Row
+from edge.controls.mtconnect.connection import fetch
+from edge.controls.mtconnect.cursor import Config, Phase, choose_device, next_request, parse, start
+from edge.controls.mtconnect.documents import DevicesDocument, parse_document
+from edge.controls.mtconnect.mapping import assign
 from edge.errors import ConfigError, ConnectionLostError, DocumentError
-from edge.mapping import assign
-from edge.mtconnect_connection import fetch
-from edge.mtconnect_cursor import Config, Phase, choose_device, next_request, parse, start
-from edge.mtconnect_documents import DevicesDocument, parse_document
 from edge.sample import EdgeSample, Offer
 from edge.signals import signal
 

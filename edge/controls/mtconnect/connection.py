@@ -1,4 +1,4 @@
-"""The connection to an agent: thin I/O on httpx, which asks for what `edge.mtconnect_cursor.next_request` says.
+"""The connection to an agent: thin I/O on httpx, which asks for what `edge.controls.mtconnect.cursor.next_request` says.
 
 Where the agent streams (multipart, either kind) one request lasts until something goes wrong; where it answers with a single
 document the same request is polled. The agent's heartbeat is the liveness timer: no whole part within three heartbeats, and the
@@ -16,10 +16,10 @@ from collections.abc import Callable, Iterator
 
 import httpx
 
+from edge.controls.mtconnect.cursor import Config, Cursor, Phase, Request, next_request
+from edge.controls.mtconnect.multipart import MultipartParser
+from edge.controls.mtconnect.xml import DOCUMENT_BYTES_MAX
 from edge.errors import ConfigError, ConnectionLostError
-from edge.mtconnect_cursor import Config, Cursor, Phase, Request, next_request
-from edge.mtconnect_xml import DOCUMENT_BYTES_MAX
-from edge.multipart import MultipartParser
 
 BACKOFF_S = 0.25
 BACKOFF_S_MAX = 30.0

@@ -3,13 +3,13 @@
 from pydantic import ValidationError
 
 from edge.config import EdgeConfig, without_secret
+from edge.controls.mtconnect.config import MtconnectConfig
+from edge.controls.mtconnect.connection import fetch
+from edge.controls.mtconnect.cursor import Request, choose_device
+from edge.controls.mtconnect.documents import DevicesDocument, parse_document
+from edge.controls.mtconnect.mapping import assign
+from edge.controls.mtconnect.model import DataItem, DeviceModel
 from edge.errors import ConfigError, ConnectionLostError
-from edge.mapping import assign
-from edge.mtconnect_config import MtconnectConfig
-from edge.mtconnect_connection import fetch
-from edge.mtconnect_cursor import Request, choose_device
-from edge.mtconnect_documents import DevicesDocument, parse_document
-from edge.mtconnect_model import DataItem, DeviceModel
 from edge.sample import Offer
 from edge.signals import signal
 

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from edge.controls.mtconnect.multipart import MultipartParser
 from edge.errors import ConnectionLostError
-from edge.multipart import MultipartParser
 
 PARTS = [b"<a/>", b"", b"<b>--bou\r\n</b>", b"<c>\r\n--boundar</c>"]
 KINDS = {

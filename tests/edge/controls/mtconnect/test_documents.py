@@ -4,11 +4,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from edge.controls.mtconnect.cursor import parse
+from edge.controls.mtconnect.documents import parse_document, timestamp_ms
+from edge.controls.mtconnect.xml import DEPTH_MAX, parse_xml
 from edge.errors import DocumentError
-from edge.mtconnect_cursor import parse
-from edge.mtconnect_documents import parse_document, timestamp_ms
-from edge.mtconnect_xml import DEPTH_MAX, parse_xml
-from tests.edge.agent_documents import CONFIG, fed, probe, streams, value
+from tests.edge.controls.mtconnect.agent_documents import CONFIG, fed, probe, streams, value
 
 BOMB = b'<!DOCTYPE a [<!ENTITY b "bbbb"><!ENTITY c "&b;&b;">]><MTConnectStreams>&c;</MTConnectStreams>'
 FRAMES = (probe(), streams(12, [value("rpm", 10, "3"), value("tool", 11)], conditions=[value("servo", 9, element="Normal")]))
@@ -38,7 +38,7 @@ def test_what_is_no_document_is_refused(raw: bytes) -> None:
 
 
 def test_a_document_beyond_the_bound_is_refused_before_it_is_parsed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("edge.mtconnect_xml.DOCUMENT_BYTES_MAX", 10)
+    monkeypatch.setattr("edge.controls.mtconnect.xml.DOCUMENT_BYTES_MAX", 10)
     with pytest.raises(DocumentError, match="the most that is read is 10"):
         parse_xml(b"<a>0123456789</a>")
 

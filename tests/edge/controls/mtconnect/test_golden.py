@@ -10,12 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from edge.config import EdgeConfig, ToolChangeSection
-from edge.mtconnect_config import MtconnectConfig
-from edge.mtconnect_cursor import Cursor, Phase
-from edge.multipart import MultipartParser
+from edge.controls.mtconnect.config import MtconnectConfig
+from edge.controls.mtconnect.cursor import Cursor, Phase
+from edge.controls.mtconnect.multipart import MultipartParser
 from edge.pipeline import Pipeline
 from edge.sample import Drop
-from tests.edge.agent_documents import CONFIG, fed, values
+from tests.edge.controls.mtconnect.agent_documents import CONFIG, fed, values
 from tests.recordings import recording
 
 OBSERVATIONS = 25_727

@@ -11,9 +11,9 @@ from datetime import UTC, datetime
 from typing import NamedTuple
 from xml.etree.ElementTree import Element
 
+from edge.controls.mtconnect.model import DeviceModel, devices_of
+from edge.controls.mtconnect.xml import local_name, parse_xml
 from edge.errors import DocumentError
-from edge.mtconnect_model import DeviceModel, devices_of
-from edge.mtconnect_xml import local_name, parse_xml
 
 UNAVAILABLE = "UNAVAILABLE"
 SEQUENCE_MAX = 2**63

@@ -4,11 +4,11 @@ import pytest
 from pydantic import TypeAdapter
 
 from edge.config import EdgeConfig, SignalSection
-from edge.mtconnect_config import MtconnectConfig
-from edge.mtconnect_cursor import Cursor, Phase, next_request
+from edge.controls.mtconnect.config import MtconnectConfig
+from edge.controls.mtconnect.cursor import Cursor, Phase, next_request
 from edge.sample import Drop
 from sparkplug.quality import Quality
-from tests.edge.agent_documents import CONFIG, DIALECTS, error, fed, probe, streams, value, values
+from tests.edge.controls.mtconnect.agent_documents import CONFIG, DIALECTS, error, fed, probe, streams, value, values
 
 dialects = pytest.mark.parametrize("version", DIALECTS)
 

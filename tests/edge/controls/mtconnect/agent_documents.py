@@ -4,8 +4,8 @@ from collections.abc import Iterable
 from xml.sax.saxutils import escape, quoteattr
 
 from edge.config import EdgeConfig
-from edge.mtconnect_config import MtconnectConfig
-from edge.mtconnect_cursor import Cursor, parse, start
+from edge.controls.mtconnect.config import MtconnectConfig
+from edge.controls.mtconnect.cursor import Cursor, parse, start
 from edge.sample import SampleSet
 
 DIALECTS = ("1.4", "2.3")

@@ -8,9 +8,9 @@ import pytest
 
 from cnctwin.mtconnect_agent.replay_agent import ReplayAgent
 from edge.config import EdgeConfig, SignalSection
-from edge.mtconnect_config import MtconnectConfig
-from edge.mtconnect_connection import fetch
-from edge.mtconnect_cursor import Phase, next_request, parse, start
+from edge.controls.mtconnect.config import MtconnectConfig
+from edge.controls.mtconnect.connection import fetch
+from edge.controls.mtconnect.cursor import Phase, next_request, parse, start
 from edge.pipeline import Pipeline
 from edge.sample import Drop, EdgeSample
 from tests.recordings import PROJECT, recording, recordings_folder

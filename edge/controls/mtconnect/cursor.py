@@ -25,12 +25,10 @@ from enum import StrEnum
 from typing import NamedTuple
 from urllib.parse import quote
 
-from edge.alarm import Alarm, all_unavailable, observe, text_of
 from edge.config import EdgeConfig
-from edge.errors import ConfigError, DocumentError
-from edge.mapping import Target, assign
-from edge.mtconnect_config import MtconnectConfig
-from edge.mtconnect_documents import (
+from edge.controls.mtconnect.alarm import Alarm, all_unavailable, observe, text_of
+from edge.controls.mtconnect.config import MtconnectConfig
+from edge.controls.mtconnect.documents import (
     DevicesDocument,
     ErrorDocument,
     Header,
@@ -38,9 +36,11 @@ from edge.mtconnect_documents import (
     StreamsDocument,
     parse_document,
 )
-from edge.mtconnect_model import DeviceModel
+from edge.controls.mtconnect.mapping import assign
+from edge.controls.mtconnect.model import DeviceModel
+from edge.errors import ConfigError, DocumentError
 from edge.place import Place
-from edge.reading import read
+from edge.reading import Target, read
 from edge.sample import UNAVAILABLE, Drop, EdgeSample, Gap, Offer, SampleSet
 from sparkplug.quality import Quality
 

@@ -3,8 +3,8 @@
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from edge.mapping import Target
-from edge.mtconnect_documents import timestamp_ms
+from edge.controls.mtconnect.documents import timestamp_ms
+from edge.controls.mtconnect.mapping import Target
 from edge.reading import read
 from edge.sample import EdgeSample
 

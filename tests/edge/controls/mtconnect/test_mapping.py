@@ -3,12 +3,12 @@
 import pytest
 
 from edge.config import SignalSection
+from edge.controls.mtconnect.documents import DevicesDocument, parse_document
+from edge.controls.mtconnect.mapping import Assignment, assign, names_and_types
+from edge.controls.mtconnect.model import DeviceModel
 from edge.errors import ConfigError
-from edge.mapping import Assignment, assign, names_and_types
-from edge.mtconnect_documents import DevicesDocument, parse_document
-from edge.mtconnect_model import DeviceModel
 from edge.signals import signal
-from tests.edge.agent_documents import probe
+from tests.edge.controls.mtconnect.agent_documents import probe
 from tests.recordings import recording
 
 CONTROLS = {
