@@ -66,6 +66,20 @@ class Offer:
 
 
 @dataclass(frozen=True, slots=True)
+class ClockReading:
+    """The control's clock beside the edge's (`edge_ms`, of the middle of the round trip); it was read to within `resolution_ms`.
+
+    `stamps_samples`: whether the stamps of the samples are this clock's; those of controls that give none are the edge's.
+    """
+
+    control_ms: int
+    edge_ms: int
+    round_trip_ms: int = 0
+    resolution_ms: int = 1
+    stamps_samples: bool = True
+
+
+@dataclass(frozen=True, slots=True)
 class SampleSet:
     """What one frame gave. `offers` is None where it says nothing about which signals there are."""
 
@@ -79,6 +93,7 @@ class SampleSet:
     backlog: int = 0  # observations that the control has and that were not asked for yet
     newest_ms: int | None = None  # the latest time stamp in the frame
     available: bool | None = None  # whether the control is connected to its server; None = the frame does not say
+    clock: ClockReading | None = None  # what the control's clock showed, where the frame tells
 
     def accounted(self) -> bool:
         """Whether each observation of the frame is a sample or a counted drop."""
