@@ -5,6 +5,7 @@ from dataclasses import replace
 
 from edge.sample import EdgeSample, Offer
 from edge.signals import DERIVED, Kind, signal
+from edge.tool_change import CUE
 from sparkplug.datatype import DataType
 from sparkplug.metric import MetricSpec
 
@@ -15,7 +16,7 @@ def device_metrics(offers: Iterable[Offer], last: Mapping[str, EdgeSample]) -> l
     """The metrics of the machine, with the values that are known already."""
     by_name = {offer.signal: offer for offer in offers}
     by_name |= {name: Offer(name, "edge") for name in ("tool_number", *DERIVED) if name not in by_name}
-    return [_metric(offer, last.get(name)) for name, offer in by_name.items()]
+    return [_metric(offer, last.get(name)) for name, offer in by_name.items() if name != CUE]
 
 
 def _metric(offer: Offer, last: EdgeSample | None) -> MetricSpec:

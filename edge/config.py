@@ -6,7 +6,7 @@ Checked before any I/O. Secrets do not stand in the file: it names the environme
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Generic, TypeVar
+from typing import Annotated, Generic, Literal, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
@@ -70,6 +70,22 @@ class ReportSection(Section):
     interval_s_max: float = Field(default=0.0, ge=0)
 
 
+class StoreSection(Section):
+    """Store and forward: what no broker has confirmed is kept on the disk. Empty `file`: beside the session file.
+
+    What is too old or too much goes, oldest first, and is counted; less than `free_bytes_min` is never left on the disk.
+    `synchronous = "full"` also outlives a power cut, at the price of an fsync for each frame.
+    """
+
+    enabled: bool = True
+    file: str = ""
+    age_s_max: float = Field(default=86_400.0, gt=0, allow_inf_nan=False)
+    bytes_max: int = Field(default=1_000_000_000, ge=1_000_000)
+    free_bytes_min: int = Field(default=500_000_000, ge=0)
+    synchronous: Literal["normal", "full"] = "normal"
+    history_rows_per_s: float = Field(default=1_000.0, ge=1, le=100_000)  # how fast what was stored follows what is live
+
+
 class ToolChangeSection(Section):
     """The state machine of `edge.tool_change`."""
 
@@ -93,6 +109,7 @@ class EdgeConfig(Generic[SourceT]):
     signals: dict[str, SignalSection] = field(default_factory=dict)
     report: ReportSection = field(default_factory=ReportSection)
     tool_change: ToolChangeSection = field(default_factory=ToolChangeSection)
+    store: StoreSection = field(default_factory=StoreSection)
     path: Path = Path("edge.toml")
 
     def __post_init__(self) -> None:

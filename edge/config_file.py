@@ -7,7 +7,16 @@ from typing import Any
 from pydantic import TypeAdapter, ValidationError
 
 from edge.adapter import adapters
-from edge.config import BrokerSection, EdgeConfig, MachineSection, ReportSection, SignalSection, ToolChangeSection, one_line
+from edge.config import (
+    BrokerSection,
+    EdgeConfig,
+    MachineSection,
+    ReportSection,
+    SignalSection,
+    StoreSection,
+    ToolChangeSection,
+    one_line,
+)
 from edge.errors import ConfigError
 
 _SECTIONS: dict[str, TypeAdapter[Any]] = {
@@ -16,6 +25,7 @@ _SECTIONS: dict[str, TypeAdapter[Any]] = {
     "signals": TypeAdapter(dict[str, SignalSection]),
     "report": TypeAdapter(ReportSection),
     "tool_change": TypeAdapter(ToolChangeSection),
+    "store": TypeAdapter(StoreSection),
 }
 
 

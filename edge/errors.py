@@ -3,7 +3,8 @@
 EdgeError
 ├── ConfigError            a configuration that cannot be used: it names file, key, value and the way out
 ├── DocumentError          bytes that are no document of the control, or one beyond the bounds
-└── ConnectionLostError    the control does not answer, or not in its protocol
+├── ConnectionLostError    the control does not answer, or not in its protocol
+└── StoreError             the store on the disk cannot be read or written
 """
 
 
@@ -21,3 +22,7 @@ class DocumentError(EdgeError):
 
 class ConnectionLostError(EdgeError):
     """The control does not answer, or not in its protocol."""
+
+
+class StoreError(EdgeError):
+    """The store on the disk cannot be read or written."""

@@ -1,5 +1,7 @@
 """How the edge itself is: lag, holes, reconnects, refused frames, published as metrics of the edge node."""
 
+from collections.abc import Mapping
+
 from edge.sample import Gap, SampleSet
 from sparkplug.datatype import DataType
 from sparkplug.metric import Change, MetricSpec
@@ -19,6 +21,13 @@ HEALTH = (
     MetricSpec("health/broker_reconnects", DataType.INT64, value=0),
     # They count as emitted, and went down with a connection to the broker before they were on the wire; a birth followed.
     MetricSpec("health/unsent_messages", DataType.INT64, "messages", value=0),
+    MetricSpec("health/store_rows", DataType.INT64, "rows", value=0),  # that no broker has confirmed yet
+    MetricSpec("health/store_waiting_rows", DataType.INT64, "rows", value=0),  # of these: not sent, they follow as history
+    MetricSpec("health/store_bytes", DataType.INT64, "B", value=0),
+    MetricSpec("health/store_age_s", DataType.DOUBLE, "s", value=0.0),  # of the oldest row
+    MetricSpec("health/store_history_rows", DataType.INT64, "rows", value=0),  # sent as history since the edge began
+    MetricSpec("health/store_evicted_rows", DataType.INT64, "rows", value=0),  # lost to a limit since the edge began
+    MetricSpec("health/store_error", DataType.STRING, value=""),
     MetricSpec("health/ledger_difference", DataType.INT64, "observations", value=0),
 )
 
@@ -55,7 +64,7 @@ class Health:
         self.lost_observations += gap.lost
         self.last_hole = f"{gap.reason}: sequence {gap.first_sequence} to {gap.last_sequence}, at most {gap.lost} lost"
 
-    def changes(self, now_ms: int, outside: dict[str, int | bool]) -> list[Change]:
+    def changes(self, now_ms: int, outside: Mapping[str, int | float | str | bool]) -> list[Change]:
         """All of it; `outside` holds what the loop knows: queue depth, connections, whether the control is there."""
         values: dict[str, int | float | str | bool | None] = {
             "health/lag_s": self.lag_s,

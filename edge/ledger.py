@@ -1,7 +1,8 @@
 """The ledger of one edge: received = emitted + dropped(reason) + buffered, in observations.
 
-`queued` is counted by the thread that reads, the rest by the thread that publishes; so at any moment at which the latter is
-between two documents the equation must hold, and `difference` says by how much it does not.
+Where rows are stored, emitted means that a broker has confirmed them; until then they are buffered. What an earlier life of the
+edge has left in the store is received again. `queued` is counted by the thread that reads, the rest by the one that publishes; so
+at any moment at which the latter is between two documents the equation must hold, and `difference` says by how much it does not.
 """
 
 import threading
@@ -22,6 +23,13 @@ class Ledger:
         self._emitted = 0
         self._dropped = dict.fromkeys(Drop, 0)
         self._held = 0
+        self._stored = 0
+
+    def recover(self, observations: int) -> None:
+        """Observations of an earlier life lie in the store."""
+        with self._lock:
+            self._received += observations
+            self._stored += observations
 
     def queue(self, observations: int) -> None:
         """Observations have been read and wait to be looked at."""
@@ -29,14 +37,14 @@ class Ledger:
             self._received += observations
             self._queued += observations
 
-    def settle(self, *, taken: int, emitted: int, dropped: Mapping[Drop, int], held: int) -> None:
-        """`taken` observations have left the queue; `held` now wait in the tool change's state machine."""
+    def settle(self, *, taken: int, emitted: int, dropped: Mapping[Drop, int], held: int, stored: int = 0) -> None:
+        """`taken` observations have left the queue; `held` wait in the tool change's state machine, `stored` in the store."""
         with self._lock:
             self._queued -= taken
             self._emitted += emitted
             for reason, number in dropped.items():
                 self._dropped[reason] += number
-            self._held = held
+            self._held, self._stored = held, stored
 
     def snapshot(self) -> dict[str, int]:
         """All counters by metric name."""
@@ -44,7 +52,7 @@ class Ledger:
             counters = {
                 "ledger/received": self._received,
                 "ledger/emitted": self._emitted,
-                "ledger/buffered": self._queued + self._held,
+                "ledger/buffered": self._queued + self._held + self._stored,
                 "ledger/dropped": sum(self._dropped.values()),
             }
             return counters | {f"ledger/dropped/{reason}": number for reason, number in self._dropped.items()}

@@ -15,6 +15,7 @@ from edge.config import EdgeConfig, SignalSection
 from edge.sample import Drop, EdgeSample, SampleSet
 
 _DEFAULT = SignalSection()
+_TAKEN_IN = ("tool_number", tool_change.CUE)  # signals that the state machine keeps, to hand on what it makes of them
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +55,8 @@ class Pipeline:
             done = tool_change.step(self._tool_change, self._change, sample)
             self._change = done.state
             dropped[Drop.DEBOUNCED] += done.debounced
-            candidates = done.samples if sample.signal == "tool_number" else (sample, *done.samples)
+            candidates = done.samples if sample.signal in _TAKEN_IN else (sample, *done.samples)
+            dropped[Drop.EVIDENCE] += sample.observations if sample.signal == tool_change.CUE else 0
             news.extend(self._reported(candidates, dropped))
         news.extend(self._reported(self._time_passes(frame, arrival_s, dropped), dropped))
         return Outcome(tuple(rows_of(news)), +dropped)

@@ -1,4 +1,4 @@
-"""One native text to one canonical value, with quality and reason.
+"""One native text, or typed value, to one canonical value, with quality and reason.
 
 >>> read(Target("Fact", "feed_mm_min", factor=60.0, low=0, high=300000), "2.5")
 (150.0, <Quality.GOOD: 192>, None)
@@ -6,6 +6,7 @@
 (None, <Quality.BAD: 0>, 'outside 0 to 200 %: 950')
 """
 
+import math
 import re
 from dataclasses import dataclass, replace
 
@@ -59,6 +60,32 @@ def read(target: Target, text: str) -> Outcome:
     if not _NUMBER.fullmatch(text):
         return bad(f"not a number: {text[:80]!r}")
     return _figure(target, known, float(text))
+
+
+def read_value(target: Target, value: Value) -> Outcome:
+    """The value that this typed value stands for, from a control that does not answer in text. A null always has a reason.
+
+    >>> read_value(Target("acts", "spindle_rpm", low=0, high=60000), 3500)
+    (3500.0, <Quality.GOOD: 192>, None)
+    >>> read_value(Target("tool", "tool_number"), 7.5)
+    (None, <Quality.BAD: 0>, 'not a whole number: 7.5')
+    """
+    known = signal(target.signal)
+    if value is None:
+        return None, Quality.BAD, UNAVAILABLE
+    if isinstance(value, str):
+        return read(target, value)
+    if known.kind is Kind.FLAG:
+        return (bool(value), Quality.GOOD, None) if value in (0, 1) else bad(f"neither on nor off: {value}")
+    if isinstance(value, bool):
+        return bad(f"not a {'text' if known.kind is Kind.TEXT else 'number'}: {value}")
+    if isinstance(value, float) and not math.isfinite(value):
+        return bad(f"not a finite number: {value:g}")
+    if known.kind is Kind.TEXT:
+        return _text(known, str(value))
+    if known.kind is Kind.INTEGER and isinstance(value, int):  # not by way of a float, which has 53 bits
+        return (value, Quality.GOOD, None) if abs(value) < 2**63 else bad("not a whole number of 64 bits")
+    return _figure(target, known, float(value)) if abs(value) <= 1e300 else bad("not a finite number: above 1e300")
 
 
 def bad(reason: str) -> Outcome:

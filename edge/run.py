@@ -1,6 +1,8 @@
 """One edge from its configuration file: the broker, the node and the loop put together."""
 
 import os
+import time
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -8,13 +10,18 @@ from typing import Any
 from edge.adapter import adapters
 from edge.config import BrokerSection, EdgeConfig
 from edge.errors import ConfigError
+from edge.forwarder import Forwarder
 from edge.health import HEALTH
 from edge.ledger import Ledger
-from edge.runtime import EdgeRuntime
+from edge.ring import Ring
+from edge.runtime import EdgeRuntime, Publisher
 from sparkplug.broker import BrokerAddress
 from sparkplug.edge_node import EdgeNode
 from sparkplug.errors import SparkplugError
 from sparkplug.metric import NodeId
+
+BARRIER = "cnctwin/barrier"
+"""Below it each edge node publishes its barriers, QoS 1; nobody has to read them."""
 
 
 def broker_address(section: BrokerSection, path: Path) -> BrokerAddress:
@@ -37,12 +44,39 @@ def broker_address(section: BrokerSection, path: Path) -> BrokerAddress:
 def edge_runtime(config: EdgeConfig[Any], address: BrokerAddress | None = None) -> EdgeRuntime:
     """An edge that publishes to the configured broker, or to this one."""
     broker, ledger = config.broker, Ledger()
+
+    def confirmed(token: int) -> None:
+        runtime.confirmed(token)
+
     node = EdgeNode(
         address or broker_address(broker, config.path),
         NodeId(broker.group, config.node),
         [*HEALTH, *ledger.metrics()],
         session_file=Path(broker.session_file) if broker.session_file else None,
         primary_host=broker.primary_host or None,
+        barrier_topic=f"{BARRIER}/{broker.group}/{config.node}",
+        on_confirmed=confirmed,
     )
-    place_file = Path(broker.session_file + ".place") if broker.session_file else None
-    return EdgeRuntime(config, adapters()[config.machine.adapter], node, ledger=ledger, place_file=place_file)
+    runtime = EdgeRuntime(
+        config,
+        adapters()[config.machine.adapter],
+        node,
+        ledger=ledger,
+        place_file=Path(broker.session_file + ".place") if broker.session_file else None,
+        open_store=_opener(config),
+    )
+    return runtime
+
+
+def _opener(config: EdgeConfig[Any]) -> Callable[[Publisher], Forwarder] | None:
+    """How the store of this edge is opened, by the thread that uses it; None where it has none."""
+    limits, session_file = config.store, config.broker.session_file
+    if not limits.enabled or not (limits.file or session_file):
+        return None
+    file = Path(limits.file or session_file + ".store")
+
+    def opened(node: Publisher) -> Forwarder:
+        ring = Ring(file, limits, wall_ms=lambda: time.time_ns() // 1_000_000, clock=time.monotonic)
+        return Forwarder(ring, node, config.machine.name, limits, time.monotonic)
+
+    return opened

@@ -1,10 +1,11 @@
 """The loop that runs one edge.
 
-    connection thread: agent → documents → parse → bounded queue
-    main thread:       queue → tool change → report by exception → edge node (its own thread) → broker
+    connection thread: control → frames → parse → bounded queue
+    main thread:       queue → tool change → report by exception → store → edge node (its own thread) → broker
 
 When the main thread falls behind, the queue fills and the connection thread stops reading: the agent's buffer is then the next to
-fill, and what it drops is a hole that is counted. Nothing is dropped here without a reason in the ledger.
+fill, and what it drops is a hole that is counted. Nothing is dropped here without a reason in the ledger. Without a store
+(`[store] enabled = false`) a row that finds no broker is dropped, and the next birth carries the values.
 """
 
 import logging
@@ -19,11 +20,13 @@ from edge import tool_change
 from edge.adapter import Adapter, Connection
 from edge.birth import device_metrics
 from edge.config import EdgeConfig
+from edge.forwarder import SEQUENCE, Forwarder, Sender
 from edge.health import Health
 from edge.ledger import Ledger
 from edge.pipeline import Outcome, Pipeline
 from edge.place import Place, PlaceFile
 from edge.sample import UNAVAILABLE, Drop, EdgeSample, Offer, SampleSet
+from sparkplug.datatype import DataType
 from sparkplug.metric import Change, MetricSpec
 
 _log = logging.getLogger(__name__)
@@ -31,16 +34,13 @@ QUEUE_FRAMES_MAX = 256
 REPORT_INTERVAL_S = 1.0
 
 
-class Publisher(Protocol):
+class Publisher(Sender, Protocol):
     """What the loop needs of `sparkplug.edge_node.EdgeNode`."""
 
     def start(self) -> None: ...
     def stop(self, timeout_s: float = 5.0) -> None: ...
     def declare_device(self, device: str, metrics: Sequence[MetricSpec]) -> None: ...
     def remove_device(self, device: str) -> None: ...
-    def publish(self, device: str | None, changes: Sequence[Change]) -> bool: ...
-    @property
-    def online(self) -> bool: ...
     @property
     def reconnects(self) -> int: ...
     @property
@@ -66,6 +66,7 @@ class EdgeRuntime:
         *,
         ledger: Ledger | None = None,
         place_file: Path | None = None,
+        open_store: Callable[[Publisher], Forwarder] | None = None,
         wall_s: Callable[[], float] = time.time,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
@@ -76,6 +77,8 @@ class EdgeRuntime:
         self._node = node
         self._connection: Connection = adapter.connect(config)
         self._places = PlaceFile(place_file)
+        self._open_store = open_store
+        self._forwarder: Forwarder | None = None
         self._wall_s, self._clock = wall_s, clock
         self._arrivals: queue.Queue[Arrival] = queue.Queue(QUEUE_FRAMES_MAX)
         self._pipeline = Pipeline(config)
@@ -91,7 +94,12 @@ class EdgeRuntime:
 
     def run(self) -> None:
         """Read, fold and publish until stopped; then publish the last ledger and the death certificates."""
-        reader = threading.Thread(target=self._read, name=f"{self._adapter.name}-reader", daemon=True)
+        place = self._places.read()
+        if self._open_store is not None:
+            self._forwarder = self._open_store(self._node)
+            self.ledger.recover(self._forwarder.observations)
+            place = self._forwarder.place() or place
+        reader = threading.Thread(target=self._read, args=(place,), name=f"{self._adapter.name}-reader", daemon=True)
         self._node.start()
         reader.start()
         due_s = self._clock()
@@ -112,13 +120,23 @@ class EdgeRuntime:
         deadline_s = self._clock() + 5.0
         while (reader.is_alive() or not self._arrivals.empty()) and self._clock() < deadline_s:
             self._once(timeout_s=0.05)
+        if self._forwarder is not None:
+            while not self._forwarder.is_done and self._node.online and self._clock() < deadline_s:
+                self._settle()
+                time.sleep(0.01)
         self._report()
         self._node.stop()
+        if self._forwarder is not None:
+            self._forwarder.close()
 
-    def _read(self) -> None:
+    def confirmed(self, token: int) -> None:
+        """The broker has acknowledged a barrier of the store. From any thread."""
+        if self._forwarder is not None:
+            self._forwarder.confirmed(token)
+
+    def _read(self, place: Place | None) -> None:
         """The connection thread. Whatever ends it that was not asked for ends the edge, loudly."""
         try:
-            place = self._places.read()
             cursor = self._adapter.start(self.config) if place is None else self._adapter.resume(self.config, place)
             self._connection.follow(cursor)
             for raw in self._connection.frames():
@@ -134,10 +152,10 @@ class EdgeRuntime:
     def _once(self, timeout_s: float) -> None:
         try:
             arrival = self._arrivals.get(timeout=timeout_s)
+            self._take(arrival)
         except queue.Empty:
-            self._watch()
-            return
-        self._take(arrival)
+            pass
+        self._settle()
         self._watch()
 
     def _take(self, arrival: Arrival) -> None:
@@ -147,9 +165,20 @@ class EdgeRuntime:
             self._offered(frame.offers)
         outcome = self._pipeline.take(frame, arrival.at_s)
         self._judge(frame, arrival.at_s)
-        emitted, dropped = self._publish(outcome)
-        self.ledger.settle(taken=frame.received, emitted=emitted, dropped=dropped, held=self._pipeline.held)
-        self._places.keep(arrival.place)
+        emitted, dropped = self._publish(outcome, arrival.place)
+        self.ledger.settle(taken=frame.received, emitted=emitted, dropped=dropped, held=self._pipeline.held, stored=self._stored)
+        if self._forwarder is None:
+            self._places.keep(arrival.place)
+
+    @property
+    def _stored(self) -> int:
+        return 0 if self._forwarder is None else self._forwarder.observations
+
+    def _settle(self) -> None:
+        """What has come to its end in the store."""
+        if self._forwarder is not None:
+            emitted, dropped = self._forwarder.pump()
+            self.ledger.settle(taken=0, emitted=emitted, dropped=dropped, held=self._pipeline.held, stored=self._stored)
 
     def _offered(self, offers: tuple[Offer, ...]) -> None:
         """The control has described itself. Other signals than before need a new birth."""
@@ -157,7 +186,7 @@ class EdgeRuntime:
             self._remove()
         self._offers = offers
         if not {offer.signal for offer in offers} & {"tool_number", "nc_block"}:
-            self._publish(self._pipeline.declare(tool_change.not_observable(round(self._wall_s() * 1000))))
+            self._publish(self._pipeline.declare(tool_change.not_observable(round(self._wall_s() * 1000))), None)
 
     def _judge(self, frame: SampleSet, at_s: float) -> None:
         """Does the control report? Its server says so; where that never did, one signal that is not unavailable is enough."""
@@ -170,9 +199,10 @@ class EdgeRuntime:
         if self._is_reporting and frame.error is None:
             self._reported_s = at_s
 
-    def _publish(self, outcome: Outcome) -> tuple[int, dict[Drop, int]]:
+    def _publish(self, outcome: Outcome, place: Place | None) -> tuple[int, dict[Drop, int]]:
         """Send the rows. While the control is lost its device is dead, and what still comes is dropped with that reason."""
         emitted, dropped = 0, dict(outcome.dropped)
+        stored: list[Sequence[EdgeSample]] = []
         self._declare_if_due()
         for row in outcome.rows:
             # The birth shows the state up to this row and no further: what follows must not be older than what is known.
@@ -181,10 +211,14 @@ class EdgeRuntime:
             observations = sum(sample.observations for sample in row)
             if not self._is_declared:
                 dropped[Drop.CONTROL_LOST] = dropped.get(Drop.CONTROL_LOST, 0) + observations
+            elif self._forwarder is not None:
+                stored.append(row)
             elif self._send(row):
                 emitted += observations
             else:
                 dropped[Drop.BROKER_OFFLINE] = dropped.get(Drop.BROKER_OFFLINE, 0) + observations
+        if self._forwarder is not None:
+            self._forwarder.put(stored, place)
         return emitted, dropped
 
     def _send(self, row: Iterable[EdgeSample]) -> bool:
@@ -195,12 +229,18 @@ class EdgeRuntime:
         """The birth, as soon as there is something to say and the control reports."""
         if self._is_declared or not self._is_reporting or not self._offers or not self._told:
             return
-        self._node.declare_device(self.config.machine.name, device_metrics(self._offers, self._told))
+        metrics = device_metrics(self._offers, self._told)
+        if self._forwarder is not None:
+            metrics.append(MetricSpec(SEQUENCE, DataType.INT64))
+            self._forwarder.declare(metric.name for metric in metrics)
+        self._node.declare_device(self.config.machine.name, metrics)
         self._is_declared = True
 
     def _remove(self) -> None:
         self._node.remove_device(self.config.machine.name)
         self._is_declared = False
+        if self._forwarder is not None:
+            self._forwarder.declare(())
 
     def _watch(self) -> None:
         """Declare the device dead when the control has been lost for long."""
@@ -211,7 +251,7 @@ class EdgeRuntime:
         """The ledger in one message, the health in another."""
         now_ms = round(self._wall_s() * 1000)
         counters = self.ledger.snapshot()
-        outside: dict[str, int | bool] = {
+        outside: dict[str, int | float | str | bool] = {
             "health/queue_depth": self._arrivals.qsize(),
             "health/reconnects": self._connection.reconnects,
             "health/control_online": self._is_declared,
@@ -219,6 +259,8 @@ class EdgeRuntime:
             "health/unsent_messages": self._node.unsent,
             "health/ledger_difference": Ledger.difference(counters),
         }
+        if self._forwarder is not None:
+            outside |= self._forwarder.health()
         fault = self._connection.reconnects, self._connection.last_error
         if fault != self._fault:
             if fault[1] != self._fault[1]:

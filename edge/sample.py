@@ -22,8 +22,13 @@ class Drop(StrEnum):
     DUPLICATE = "duplicate"  # it was taken before, by its sequence number
     DEBOUNCED = "debounced"  # a flap of the tool number that is no change
     OTHER_DEVICE = "other_device"  # it belongs to another device of the same agent
+    EVIDENCE = "evidence"  # it says whether a tool change is in progress, and is no signal of its own
     UNPARSABLE = "unparsable"  # it has no sequence number or no time
     CONTROL_LOST = "control_lost"  # the device is dead because the control reports nothing; this was one of its nulls
+    STORE_AGE = "store_age"  # it waited for a broker longer than the store keeps it
+    STORE_BYTES = "store_bytes"  # the store was full
+    STORE_DISK = "store_disk"  # the disk ran full
+    UNDECLARED = "undeclared"  # it waited in the store, and the machine does not have that signal any more
     BROKER_OFFLINE = "broker_offline"  # there was nobody to publish it to; the next birth carries the newest value
 
 

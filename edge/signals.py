@@ -72,6 +72,7 @@ _TABLE = (
     Signal("tool_change_active", Kind.FLAG),
     Signal("tool_change_source", Kind.TEXT, words=frozenset({"controller", "detector", "none", "stale"})),
     Signal("tool_change_evidence", Kind.TEXT),
+    Signal("tool_change_cue", Kind.FLAG),  # what a control says of itself, for `edge.tool_change`; never published
     # Controls that report whole degrees send 0 when they have no reading (a Mazak does, 1150 times in one day), and a spindle at
     # 0 °C is not found in a workshop: so 0 is no temperature here.
     _number("spindle_temp_c", "°C", 1, 150),
@@ -82,6 +83,7 @@ _TABLE = (
     Signal("alarm", Kind.TEXT),
     _number("clock_offset_s", "s", -1e12, 1e12),
     _number("clock_offset_spread_s", "s", 0, 1e12),
+    Signal("stamp_clock", Kind.TEXT, words=frozenset({"control", "edge"})),
 )
 SIGNALS = {entry.name: entry for entry in _TABLE}
 DERIVED = ("tool_change_active", "tool_change_source", "tool_change_evidence")

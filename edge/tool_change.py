@@ -18,7 +18,10 @@ What the recordings show, and what follows from it:
 * The state as found on (re)joining, and what comes with a jump of the clock (a recording has sections that are hours apart, in
   any order), is where we are, not something that happened.
 
-What a control does not tell cannot be known: a change that is not in the number or the block is not seen here.
+* An adapter that can see the change itself (a FANUC works on M6, a PLC has a bit for it) says so with the signal
+  `tool_change_cue`: it begins a change at once, and the change lasts as long as the cue does. It is evidence, never published.
+
+What a control does not tell cannot be known: a change that is not in the number, the block or a cue is not seen here.
 """
 
 import re
@@ -33,6 +36,8 @@ from sparkplug.quality import Quality
 CLOCK_BACK_MS_MAX = 10_000
 CLOCK_AHEAD_MS_MAX = 300_000
 REJOIN_MS = 1_000
+CUE = "tool_change_cue"
+COMMANDED = "block commands a tool change"
 _IDLE_STATES = frozenset({"READY", "STOPPED", "PROGRAM_COMPLETED", "PROGRAM_STOPPED"})
 _COMMENT = re.compile(r"\([^)]*\)?|;.*")
 _pattern = lru_cache(maxsize=64)(re.compile)
@@ -48,7 +53,10 @@ class Phase(Enum):
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """`tool` is what is published ("" = none in the spindle, None = not known yet), `candidate` a number that has to stand."""
+    """`tool` is what is published ("" = none in the spindle, None = not known yet), `candidate` a number that has to stand.
+
+    `passed_ms`: since when the block, or the cue, that commanded the change is over; `cue` is None where the control gives none.
+    """
 
     phase: Phase = Phase.SETTLED
     clock_ms: int | None = None
@@ -60,7 +68,9 @@ class State:
     blank: EdgeSample | None = None
     candidate: EdgeSample | None = None
     number_moved: bool = False
+    block: str | None = None
     shows_change: bool = False
+    cue: bool | None = None
     passed_ms: int | None = None
     is_idle: bool = False
     evidence: tuple[str, ...] = ()
@@ -93,6 +103,8 @@ def step(config: ToolChangeSection, state: State, sample: EdgeSample) -> Step:
         return done.then(_block(config, done.state, sample))
     if sample.signal == "exec_state":
         return done.then(_execution(done.state, sample))
+    if sample.signal == CUE:
+        return done.then(_cue(done.state, sample))
     return done
 
 
@@ -104,18 +116,29 @@ def tick(config: ToolChangeSection, state: State, now_ms: int) -> Step:
     if state.phase is not Phase.CHANGING:
         return Step(state)
     debounce_ms, change_ms_max = config.debounce_s * 1000, config.change_s_max * 1000
+    if state.cue:
+        given_up = now_ms - state.onset_ms >= change_ms_max
+        return _leave(state, round(state.onset_ms + change_ms_max), _given_up(config, "cue stayed")) if given_up else Step(state)
     if state.candidate is not None:
         since_ms = state.candidate.timestamp_ms
         return (
             _leave(state, since_ms, f"number stood {config.debounce_s:g} s") if now_ms - since_ms >= debounce_ms else Step(state)
         )
     if not state.number_moved and state.passed_ms is not None and now_ms - state.passed_ms >= debounce_ms:
-        return _leave(state, state.passed_ms, "block passed, same number")
+        return _leave(state, state.passed_ms, f"{_what_passed(state)}, same number")
     since_ms = state.onset_ms if state.blank_since_ms is None else state.blank_since_ms
     if now_ms - since_ms >= change_ms_max:
-        what = "stayed empty" if state.number_moved else "did not change"
-        return _leave(state, round(since_ms + change_ms_max), f"given up: number {what} for {config.change_s_max:g} s")
+        what = "number stayed empty" if state.number_moved else "number did not change"
+        return _leave(state, round(since_ms + change_ms_max), _given_up(config, what))
     return Step(state)
+
+
+def _what_passed(state: State) -> str:
+    return "block passed" if COMMANDED in state.evidence else "cue ended"
+
+
+def _given_up(config: ToolChangeSection, what: str) -> str:
+    return f"given up: {what} for {config.change_s_max:g} s"
 
 
 def not_observable(now_ms: int) -> tuple[EdgeSample, ...]:
@@ -180,7 +203,7 @@ def _number(config: ToolChangeSection, state: State, sample: EdgeSample) -> Step
         sample = replace(sample, value=None, reason="0: no tool in the spindle")
     is_found = sample.is_baseline or state.tool is None
     is_found |= state.rejoined_ms is not None and abs(sample.timestamp_ms - state.rejoined_ms) <= REJOIN_MS
-    if is_found and (tool or state.phase is Phase.SETTLED):
+    if is_found and (tool or state.phase is Phase.SETTLED) and not (state.cue and state.phase is Phase.CHANGING):
         return _found(state, sample, tool)
     if state.phase is Phase.CHANGING:
         return _number_while_changing(state, sample, tool)
@@ -241,18 +264,38 @@ def _number_while_changing(state: State, sample: EdgeSample, tool: str) -> Step:
 
 
 def _block(config: ToolChangeSection, state: State, sample: EdgeSample) -> Step:
-    shows = isinstance(sample.value, str) and is_tool_change_block(config, sample.value)
+    block = sample.value if isinstance(sample.value, str) else None
+    if block == state.block:  # a control that is looked at shows its block again at each look
+        return _announce(state, sample)
+    shows = block is not None and is_tool_change_block(config, block)
     passed_ms = sample.timestamp_ms if state.shows_change and not shows else state.passed_ms
-    after = replace(state, shows_change=shows, passed_ms=None if shows else passed_ms)
+    after = replace(state, block=block, shows_change=shows, passed_ms=None if shows else passed_ms)
     announced = _announce(after, sample)
     if not shows or state.is_idle or (sample.is_baseline and state.phase is not Phase.DOUBT):
         return announced
-    return announced.then(_commanded(announced.state, sample.timestamp_ms))
+    return announced.then(_commanded(announced.state, sample.timestamp_ms, COMMANDED))
 
 
-def _commanded(state: State, at_ms: int) -> Step:
-    """A running block commands a tool change."""
-    why = "block commands a tool change"
+def _cue(state: State, sample: EdgeSample) -> Step:
+    """The control says of itself whether it is changing the tool (None: it does not say)."""
+    at_ms, before = sample.timestamp_ms, state.cue
+    cue = sample.value if isinstance(sample.value, bool) else None
+    after = replace(state, cue=cue)
+    if cue and not before:
+        done = Step(after)
+        if before is False and state.phase is Phase.CHANGING and state.passed_ms is not None:
+            done = _leave(after, state.passed_ms, f"{_what_passed(state)}, same number")
+        done = done.then(Step(replace(done.state, passed_ms=None)))
+        return done.then(_commanded(done.state, at_ms, sample.reason or "cue of the control"))
+    if cue is False and before and state.phase is Phase.CHANGING:
+        if state.candidate is not None:
+            return _leave(after, max(at_ms, state.candidate.timestamp_ms), "cue ended")
+        return Step(replace(after, passed_ms=at_ms))  # the number may follow in the next look
+    return _announce(after, sample)
+
+
+def _commanded(state: State, at_ms: int, why: str) -> Step:
+    """A running block commands a tool change, or the control works on one."""
     if state.phase is Phase.SETTLED:
         return _enter(state, at_ms, why)
     if state.phase is Phase.DOUBT:
@@ -270,7 +313,7 @@ def _execution(state: State, sample: EdgeSample) -> Step:
     is_idle = sample.value in _IDLE_STATES
     after = replace(state, is_idle=is_idle)
     if state.is_idle and not is_idle and state.shows_change and state.phase is Phase.SETTLED and not sample.is_baseline:
-        return _enter(after, sample.timestamp_ms, "block commands a tool change")
+        return _enter(after, sample.timestamp_ms, COMMANDED)
     if is_idle and state.shows_change and state.passed_ms is None:  # the program ended on the block
         after = replace(after, passed_ms=sample.timestamp_ms)
     return Step(after)
@@ -324,7 +367,8 @@ def _announce(state: State, sample: EdgeSample) -> Step:
     if state.is_announced or state.phase is not Phase.SETTLED or sample.value is None:
         return Step(state)
     after = replace(state, is_announced=True)
-    return Step(after, _active(False, sample.timestamp_ms, "as found: block text", sample.is_baseline))
+    evidence = "as found: no cue" if sample.signal == CUE else "as found: block text"
+    return Step(after, _active(False, sample.timestamp_ms, evidence, sample.is_baseline))
 
 
 def _active(value: bool, at_ms: int, evidence: str, is_baseline: bool = False) -> tuple[EdgeSample, ...]:

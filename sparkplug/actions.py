@@ -40,7 +40,17 @@ class WalkToNextServer(NamedTuple):
     """Close the connection and go on to the next broker of the list (5.4, primary host offline)."""
 
 
-Action = Publish | Subscribe | Disconnect | WalkToNextServer
+class Barrier(NamedTuple):
+    """Publish `token` at QoS 1 and tell when the broker has acknowledged it.
+
+    A broker takes the packets of a connection in order, so it has then taken all that was sent before, QoS 0 included.
+    """
+
+    topic: str
+    token: int
+
+
+Action = Barrier | Publish | Subscribe | Disconnect | WalkToNextServer
 
 
 class HostState(NamedTuple):

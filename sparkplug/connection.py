@@ -23,7 +23,7 @@ from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
 from paho.mqtt.reasoncodes import ReasonCode
 
-from sparkplug.actions import Action, Connect, Disconnect, Publish, Subscribe
+from sparkplug.actions import Action, Barrier, Connect, Disconnect, Publish, Subscribe
 from sparkplug.broker import BrokerAddress
 from sparkplug.errors import BrokerAddressError
 from sparkplug.paho_client import CONNECT_TIMEOUT_S, ReadingAheadClient
@@ -49,6 +49,7 @@ class Listener:
     message: Callable[[str, bytes], None]
     lost: Callable[[], None]
     tick: Callable[[], None]
+    confirmed: Callable[[int], None] = lambda _: None  # the broker has taken all that was sent before this barrier
 
 
 class MqttConnection:
@@ -83,6 +84,7 @@ class MqttConnection:
         self._client: ReadingAheadClient | None = None
         self._accepted = False
         self._outbox: deque[Action] = deque()
+        self._barriers: dict[int, int] = {}  # packet id → token, of this connection
         self._stopping = threading.Event()
         self._asleep = False
         self._ticked_s = 0.0
@@ -202,6 +204,7 @@ class MqttConnection:
             self._idle.clear()
         self._ended = False
         self._client, self._accepted = client, False
+        self._barriers.clear()
         try:
             self._open(client, broker)
             while not self._ended:
@@ -227,6 +230,7 @@ class MqttConnection:
         client.on_connect = self._on_connect
         client.on_message = self._on_message
         client.on_disconnect = self._on_disconnect
+        client.on_publish = self._on_publish
         if broker.username is not None:
             client.username_pw_set(broker.username, broker.password)
         if broker.tls:
@@ -293,6 +297,8 @@ class MqttConnection:
     def _do(self, client: ReadingAheadClient, action: Action) -> None:
         if isinstance(action, Publish):
             client.publish(action.topic, action.payload, action.qos, action.retain)
+        elif isinstance(action, Barrier):
+            self._barriers[client.publish(action.topic, str(action.token), 1).mid] = action.token
         elif isinstance(action, Subscribe):
             client.subscribe(action.topic_filter, action.qos)
         else:
@@ -330,6 +336,15 @@ class MqttConnection:
 
     def _on_message(self, _client: Any, _userdata: Any, message: paho.MQTTMessage) -> None:
         self._listener.message(message.topic, bytes(message.payload))
+
+    def _on_publish(self, _client: Any, _userdata: Any, packet_id: int, reason: Any, _properties: Any) -> None:
+        token = self._barriers.pop(packet_id, None)
+        if token is None:
+            return
+        if reason.is_failure:
+            self._note(f"{self._brokers[self._server].url} refuses the barrier that shows what has arrived: {reason}")
+        else:
+            self._listener.confirmed(token)
 
     def _on_disconnect(self, _client: Any, _userdata: Any, _flags: Any, reason: Any, _properties: Any) -> None:
         if reason.is_failure and not self.last_error:

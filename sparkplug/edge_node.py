@@ -4,11 +4,13 @@ import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
-from sparkplug.actions import Action, Connect
+from sparkplug.actions import Action, Barrier, Connect
+from sparkplug.alias_file import AliasFile
 from sparkplug.bdseq import BdSeq
 from sparkplug.broker import BrokerAddress
 from sparkplug.connection import Listener, MqttConnection, now_ms
 from sparkplug.edge_session import Command, EdgeNodeSession, Phase
+from sparkplug.errors import SparkplugError
 from sparkplug.metric import Change, MetricSpec, NodeId
 from sparkplug.values import Template
 
@@ -17,8 +19,9 @@ class EdgeNode:
     """Publishes the metrics of one edge node and its devices; every method may be called from any thread.
 
     `brokers` is one address, or a list that is walked while the primary host is offline. `session_file` keeps bdSeq over
-    restarts. `mqtt_version` (4 or 5) goes before that of the first address. `on_command` is called from the connection's
-    thread for each value that a host wants written.
+    restarts, and a file beside it the aliases. `mqtt_version` (4 or 5) goes before that of the first address. `on_command` is
+    called from the connection's thread for each value that a host wants written, `on_confirmed` for each `barrier` that the
+    broker has acknowledged; they are published on `barrier_topic`.
     """
 
     def __init__(
@@ -32,12 +35,21 @@ class EdgeNode:
         templates: Mapping[str, Template] | None = None,
         mqtt_version: int | None = None,
         on_command: Callable[[Command], None] | None = None,
+        barrier_topic: str = "",
+        on_confirmed: Callable[[int], None] = lambda _: None,
     ) -> None:
         self._bd_seq = BdSeq(session_file)
-        self._session = EdgeNodeSession(node, metrics, now_ms=now_ms(), primary_host=primary_host, templates=templates)
+        self._aliases = AliasFile(None if session_file is None else session_file.with_name(session_file.name + ".aliases"))
+        self._session = EdgeNodeSession(
+            node, metrics, now_ms=now_ms(), primary_host=primary_host, templates=templates, aliases=self._aliases.read()
+        )
+        self._number = 0
+        self._barrier_topic = barrier_topic
         self._lock = threading.Lock()
         self._on_command = on_command
-        listener = Listener(self._connecting, self._bd_seq.give_back, self._connected, self._message, self._lost, self._tick)
+        listener = Listener(
+            self._connecting, self._bd_seq.give_back, self._connected, self._message, self._lost, self._tick, on_confirmed
+        )
         addresses = (brokers,) if isinstance(brokers, BrokerAddress) else tuple(brokers)
         self._connection = MqttConnection(
             addresses, f"{node.group}/{node.node}", listener, mqtt_version=mqtt_version or addresses[0].mqtt_version
@@ -45,6 +57,7 @@ class EdgeNode:
 
     def start(self) -> None:
         """Begin to connect; returns at once."""
+        self._aliases.keep(self._session.aliases)
         self._connection.start()
 
     def stop(self, timeout_s: float = 5.0) -> None:
@@ -57,6 +70,11 @@ class EdgeNode:
     def online(self) -> bool:
         """Whether the node is born: connected, and the primary host, if one is needed, is online."""
         return self._session.phase is Phase.BORN
+
+    @property
+    def session(self) -> int:
+        """The number of the present connection, or of the last one. What was sent in one that ended may not have arrived."""
+        return self._number
 
     @property
     def reconnects(self) -> int:
@@ -84,7 +102,9 @@ class EdgeNode:
     def declare_device(self, device: str, metrics: Iterable[MetricSpec]) -> None:
         """Add a device (its birth is sent now if the node is born), or give one other metrics."""
         with self._lock:
-            self._connection.send(self._session.declare_device(device, metrics, now_ms()))
+            actions = self._session.declare_device(device, metrics, now_ms())
+            self._aliases.keep(self._session.aliases)
+            self._connection.send(actions)
 
     def remove_device(self, device: str) -> None:
         """Publish the death of a device and forget it."""
@@ -106,8 +126,22 @@ class EdgeNode:
             self._connection.send(actions)
         return bool(actions)
 
+    def barrier(self, token: int, session: int) -> bool:
+        """Have `on_confirmed(token)` called when the broker has taken all that was published before in this session.
+
+        False where that session is over: what was published in it has to be taken as lost.
+        """
+        if not self._barrier_topic:
+            raise SparkplugError(f"edge node {self._session.node} was given no barrier_topic")
+        with self._lock:
+            if session != self._number or self._session.phase is Phase.OFFLINE:
+                return False
+            self._connection.send([Barrier(self._barrier_topic, token)])
+        return True
+
     def _connecting(self, server: int) -> Connect:
         with self._lock:
+            self._number += 1
             return self._session.connecting(self._bd_seq.next(), now_ms(), server)
 
     def _connected(self) -> None:

@@ -28,6 +28,10 @@ REBIRTH_INTERVAL_MS_MIN = 1000
 COMMANDS_PENDING_MAX = 1000
 
 
+Aliases = dict[tuple[str | None, str], int]
+"""Of each metric, by device (None: the node's own) and name. They are 1 to n, so that the next one is n + 1."""
+
+
 class Phase(Enum):
     """Where a session stands."""
 
@@ -49,7 +53,8 @@ class Command:
 class EdgeNodeSession:
     """One edge node on one broker at a time.
 
-    `primary_host` is the id of the host without which nothing is published. `templates` maps names to definitions.
+    `primary_host` is the id of the host without which nothing is published. `templates` maps names to definitions; `aliases` are
+    those of an earlier life, so that metrics keep theirs.
     """
 
     def __init__(
@@ -61,6 +66,7 @@ class EdgeNodeSession:
         primary_host: str | None = None,
         templates: Mapping[str, Template] | None = None,
         rebirth_interval_ms_min: int = REBIRTH_INTERVAL_MS_MIN,
+        aliases: Aliases | None = None,
     ) -> None:
         self.node = NodeId(check_id(node.group, "group id"), check_id(node.node, "edge node id"))
         if node.group == "STATE":
@@ -70,7 +76,7 @@ class EdgeNodeSession:
         self.commands: list[Command] = []
         self.commands_dropped = 0
         self.malformed = 0
-        self._aliases: dict[tuple[str | None, str], int] = {}
+        self.aliases: Aliases = {} if aliases is None else dict(aliases)
         self._templates = dict(templates or {})
         self._certificate = Certificate(f"edge node {node}", metrics, partial(self._alias, None), now_ms, self._templates)
         self._devices: dict[str, Certificate] = {}
@@ -191,7 +197,7 @@ class EdgeNodeSession:
 
     def _alias(self, device: str | None, name: str) -> int:
         """The alias of a metric, unique over the node and its devices, the same at each birth (6.4.7)."""
-        return self._aliases.setdefault((device, name), len(self._aliases) + 1)
+        return self.aliases.setdefault((device, name), len(self.aliases) + 1)
 
     def _stamp(self, now_ms: int) -> int:
         """The time stamp of a payload: never earlier than the one before, so that a host can tell old from new (5.7)."""

@@ -61,3 +61,13 @@ def test_an_agent_that_has_more_or_fails_says_nothing_of_the_time() -> None:
     assert one.take(frame(backlog=3), arrival_s=200).rows == ()
     assert one.take(frame(error="no answer"), arrival_s=200).rows == ()
     assert one.held == 1
+
+
+def test_a_cue_is_never_published_and_counts_as_evidence() -> None:
+    one = pipeline()
+    cues = [EdgeSample("tool_number", 1, 0), *(EdgeSample("tool_change_cue", at >= 2, at * 100, reason="M6") for at in range(4))]
+    outcome = one.take(frame(*cues), arrival_s=0)
+    published = [s for row in outcome.rows for s in row]
+    assert "tool_change_cue" not in {s.signal for s in (*published, *one.last)}
+    assert [(s.value, s.timestamp_ms) for s in published if s.signal == "tool_change_active"] == [(False, 0), (True, 200)]
+    assert outcome.dropped == {Drop.EVIDENCE: 4}

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from edge.errors import ConfigError
-from edge.reading import TEXT_LENGTH_MAX, Target, read
+from edge.reading import TEXT_LENGTH_MAX, Target, Value, read, read_value
 from edge.signals import SIGNALS, signal
 from edge.units import conversion
 from sparkplug.quality import Quality
@@ -51,6 +51,43 @@ def test_texts_become_values_or_reasons(name: str, text: str, expected: object) 
 
 
 @pytest.mark.parametrize(
+    ("name", "value", "expected"),
+    [
+        ("tool_number", 7, (7, GOOD, None)),
+        ("tool_number", 7.0, (7, GOOD, None)),
+        ("tool_number", 0, (0, GOOD, None)),
+        ("tool_number", "", (None, GOOD, "empty")),
+        ("tool_number", None, (None, BAD, "unavailable")),
+        ("tool_number", 7.5, (None, BAD, "not a whole number: 7.5")),
+        ("tool_number", True, (None, BAD, "not a number: True")),
+        ("nc_line", 2**53 + 1, (2**53 + 1, GOOD, None)),
+        ("nc_line", 2**63, (None, BAD, "not a whole number of 64 bits")),
+        ("spindle_rpm", 1000, (1000.0, GOOD, None)),
+        ("spindle_rpm", -0.5, (-0.5, GOOD, None)),
+        ("spindle_rpm", "1e3", (1000.0, GOOD, None)),
+        ("spindle_rpm", math.nan, (None, BAD, "not a finite number: nan")),
+        ("spindle_rpm", -math.inf, (None, BAD, "not a finite number: -inf")),
+        ("spindle_rpm", 10**400, (None, BAD, "not a finite number: above 1e300")),
+        ("spindle_rpm", 60001, (None, BAD, "outside -60000 to 60000 rev/min: 60001")),
+        ("spindle_rpm", False, (None, BAD, "not a number: False")),
+        ("exec_state", "active", ("ACTIVE", GOOD, None)),
+        ("exec_state", 3, (None, BAD, "no word of the vocabulary: '3'")),
+        ("program", 1234, ("1234", GOOD, None)),
+        ("program", True, (None, BAD, "not a text: True")),
+        ("coolant_on", True, (True, GOOD, None)),
+        ("coolant_on", 0, (False, GOOD, None)),
+        ("coolant_on", "ON", (True, GOOD, None)),
+        ("coolant_on", 255, (None, BAD, "neither on nor off: 255")),
+    ],
+)
+def test_typed_values_become_values_or_reasons(name: str, value: Value, expected: object) -> None:
+    known = signal(name)
+    found = read_value(Target("x", name, low=known.low, high=known.high), value)
+    assert found == expected
+    assert type(found[0]) is type(expected[0])
+
+
+@pytest.mark.parametrize(
     ("native", "canonical", "value", "expected"),
     [
         ("INCH/MINUTE", "mm/min", 10, 254),
@@ -83,6 +120,17 @@ def test_a_unit_that_is_not_known_is_refused_with_those_that_are() -> None:
 def test_any_text_gives_a_value_of_the_right_type_or_a_null_with_a_reason(name: str, text: str) -> None:
     known = signal(name)
     value, quality, reason = read(Target("x", name, 60.0, low=known.low, high=known.high), text)
+    if value is None:
+        assert reason
+    else:
+        assert quality is GOOD
+        assert not isinstance(value, float) or math.isfinite(value)
+
+
+@given(st.sampled_from(sorted(SIGNALS)), st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=20))
+def test_any_typed_value_gives_a_value_of_the_right_type_or_a_null_with_a_reason(name: str, native: Value) -> None:
+    known = signal(name)
+    value, quality, reason = read_value(Target("x", name, 60.0, low=known.low, high=known.high), native)
     if value is None:
         assert reason
     else:

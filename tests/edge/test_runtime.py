@@ -25,7 +25,7 @@ class Notebook:
 
     def __init__(self) -> None:
         self.online = True
-        self.reconnects = self.unsent = 0
+        self.reconnects = self.unsent = self.session = 0
         self.births: list[dict[str, MetricSpec]] = []
         self.deaths: list[str] = []
         self.stopped = False
@@ -53,6 +53,9 @@ class Notebook:
         if self.online:
             self.messages.append((device, list(changes)))
         return self.online
+
+    def barrier(self, token: int, session: int) -> bool:
+        raise AssertionError("there is no store")
 
     def told(self, name: str) -> list[object]:
         return [change.value for _, changes in self.messages for change in changes if change.name == name]

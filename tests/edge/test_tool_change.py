@@ -18,7 +18,11 @@ Event = tuple[float, str, object]
 
 def sample(at_s: float, kind: str, value: object, *, is_baseline: bool = False) -> EdgeSample:
     at_ms = T0 + round(at_s * 1000)
-    signal = {"tool": "tool_number", "block": "nc_block", "exec": "exec_state", "time": "spindle_rpm"}[kind]
+    kinds = {"tool": "tool_number", "block": "nc_block", "exec": "exec_state", "time": "spindle_rpm", "cue": "tool_change_cue"}
+    signal = kinds[kind]
+    if kind == "cue":
+        assert isinstance(value, bool | None)
+        return EdgeSample(signal, value, at_ms, reason="M6" if value else "", is_baseline=is_baseline)
     if kind == "tool" and value == "":
         return EdgeSample(signal, None, at_ms, Quality.GOOD, "empty", is_baseline=is_baseline)
     if value == "UNAVAILABLE":
@@ -214,6 +218,68 @@ def test_a_control_that_tells_nothing_is_said_to() -> None:
     assert source.value == "none"
 
 
+def test_a_cue_begins_a_change_at_once_and_the_change_lasts_as_long_as_it() -> None:
+    run = Run((10, "cue", False), (12, "cue", True), (12.2, "cue", True), (13, "tool", 2), (19, "cue", True))
+    assert run.changes == [(12, True)]  # the number has stood for long, but the control is still at it
+    run.feed((20, "tool", 2), (20, "cue", False), (30, "cue", False))
+    assert run.changes == [(12, True), (20, False)]
+    assert run.of("tool_number") == [(0, 1), (13, 2)]
+    assert run.evidence == "M6 + cue ended"
+
+
+def test_a_number_that_follows_the_cue_by_a_look_belongs_to_the_same_change() -> None:
+    run = Run((10, "cue", True), (14, "cue", False), (14.2, "tool", 2), (20, "time", 0))
+    assert run.changes == [(10, True), (14.2, False)]
+
+
+def test_a_cue_and_the_same_number_is_a_change_too() -> None:
+    run = Run((10, "cue", True), (14, "cue", False), (15.9, "time", 0))
+    assert run.changes == [(10, True)]
+    run.feed((16, "time", 0))
+    assert run.changes == [(10, True), (14, False)]
+    assert run.evidence == "M6 + cue ended, same number"
+
+
+def test_a_cue_dates_a_change_that_an_empty_number_had_begun() -> None:
+    run = Run((10, "tool", ""), (10.2, "cue", True), (13, "tool", 2), (13.2, "cue", False))
+    assert run.changes == [(10, True), (13.2, False)]
+    assert run.evidence == "tool number empty + M6 + cue ended"
+
+
+def test_two_cues_close_together_are_two_changes() -> None:
+    run = Run((10, "cue", True), (13, "cue", False), (14, "cue", True), (17, "tool", 2), (17, "cue", False))
+    assert run.changes == [(10, True), (13, False), (14, True), (17, False)]
+
+
+def test_a_cue_that_stays_is_given_up_on_and_begins_no_second_change() -> None:
+    run = Run((10, "cue", True), *((at, "cue", True) for at in range(11, 100, 5)))
+    assert run.changes == [(10, True), (70, False)]
+    assert run.evidence == "M6 + given up: cue stayed for 60 s"
+
+
+def test_a_cue_that_the_control_stops_giving_leaves_the_rest_to_the_number() -> None:
+    run = Run((10, "cue", True), (11, "cue", None), (13, "tool", 2), (15, "time", 0))
+    assert run.changes == [(10, True), (13, False)]
+
+
+def test_an_edge_that_joins_while_the_control_works_on_m6_says_so() -> None:
+    run = Run()
+    for event in ((0.1, "tool", 1), (0.1, "cue", True)):
+        run.take(step(CONFIG, run.state, sample(*event, is_baseline=True)))
+    assert run.changes == [(0.1, True)]
+    lone = Run()
+    lone.state, lone.published = State(), []
+    lone.take(step(CONFIG, lone.state, sample(0, "cue", False, is_baseline=True)))
+    assert (lone.of("tool_change_active"), lone.evidence) == ([(0, False)], "as found: no cue")
+
+
+def test_a_block_that_is_shown_at_each_look_commands_one_change() -> None:
+    run = Run((10, "block", "T2 M6"), (12, "tool", 2), *((at / 5, "block", "T2 M6") for at in range(61, 100)))
+    assert run.changes == [(10, True), (12, False)]
+    run.feed((20, "block", "G0 X1"), (30, "block", "T2 M6"), (31, "block", "G0 X1"), (40, "time", 0))
+    assert run.changes[2:] == [(30, True), (31, False)]
+
+
 @pytest.mark.parametrize(
     ("block", "expected"),
     [
@@ -241,8 +307,9 @@ def test_m6_counts_as_a_word(block: str, expected: bool) -> None:
 _tools = st.sampled_from(["", 0, 1, 2, "UNAVAILABLE", "DRILL"]).map(lambda v: ("tool", v))
 _blocks = st.sampled_from(["", "M06", "M602", "G0 X1", "UNAVAILABLE"]).map(lambda v: ("block", v))
 _states = st.sampled_from(["ACTIVE", "READY", "STOPPED", "UNAVAILABLE"]).map(lambda v: ("exec", v))
+_cues = st.sampled_from([True, False, None]).map(lambda v: ("cue", v))
 _events = st.tuples(
-    st.floats(-20_000, 20_000) | st.floats(0, 3), st.one_of(_tools, _blocks, _states, st.just(("time", 0))), st.booleans()
+    st.floats(-20_000, 20_000) | st.floats(0, 3), st.one_of(_tools, _blocks, _states, _cues, st.just(("time", 0))), st.booleans()
 )
 
 

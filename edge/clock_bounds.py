@@ -1,0 +1,122 @@
+"""What each look at the control's clock proves of its offset, and what many of them prove together.
+
+An offset is the control's clock minus the edge's, in seconds. A clock that was read over a round trip proves an interval: it was
+read somewhere between question and answer, and shows the start of the step of its resolution that it was in (clocks truncate):
+
+    control - edge - round_trip/2  <=  offset  <=  control - edge + round_trip/2 + resolution
+
+With readings at different phases of the second such intervals overlap by little, and the offset lies in what is left (`agreed`).
+Stamps of samples go one way only: arrival minus stamp is the least latency plus what more this sample took, so the largest
+stamp minus arrival of a window is a lower bound, and the offset lies above it by the least latency of the window (`above`).
+
+A bound ages: a clock may have drifted since, by as much as `DRIFT_PPM_MAX`.
+
+Marzullo, K.: Maintaining the time in a distributed system, Stanford, 1984 (as in NTP, RFC 5905, 11.2.1).
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from edge.sample import ClockReading
+
+DRIFT_PPM_MAX = 500.0
+"""Of a clock against another: a quartz is within 100, and NTP turns a clock by 500 at most."""
+ROUNDING_MS = 1.0
+"""Of times that are whole milliseconds."""
+NEWEST_WEIGHT = 1.5
+"""Against 1 of each other bound: where two disagree, the newer one is believed."""
+
+
+class Bound(NamedTuple):
+    """The offset was in `low_s` ... `high_s` at the edge's monotonic time `at_s`."""
+
+    at_s: float
+    low_s: float
+    high_s: float
+
+    @property
+    def offset_s(self) -> float:
+        """The middle."""
+        return (self.low_s + self.high_s) / 2.0
+
+    @property
+    def spread_s(self) -> float:
+        """Half the width: the offset is within so much of the middle."""
+        return (self.high_s - self.low_s) / 2.0
+
+    def aged(self, at_s: float) -> "Bound":
+        """What is left of it at another time.
+
+        >>> Bound(0.0, 1.0, 2.0).aged(1000.0)
+        Bound(at_s=1000.0, low_s=0.5, high_s=2.5)
+        """
+        wider_s = abs(at_s - self.at_s) * DRIFT_PPM_MAX * 1e-6
+        return Bound(at_s, self.low_s - wider_s, self.high_s + wider_s)
+
+    def moved(self, by_s: float) -> "Bound":
+        """After the edge's own clock was set."""
+        return Bound(self.at_s, self.low_s + by_s, self.high_s + by_s)
+
+    def meets(self, other: "Bound") -> bool:
+        """Whether both can be true."""
+        return self.low_s <= other.high_s and other.low_s <= self.high_s
+
+    def both(self, other: "Bound") -> "Bound":
+        """What is left where both are true; they have to meet."""
+        return Bound(self.at_s, max(self.low_s, other.low_s), min(self.high_s, other.high_s))
+
+
+class Agreement(NamedTuple):
+    """Where most bounds overlap, and how many do."""
+
+    bound: Bound
+    number: int
+
+
+def of_reading(reading: ClockReading, arrival_ms: float, at_s: float) -> Bound:
+    """What one reading proves. One without the edge's time came in one way, within `round_trip_ms`, and arrived at `arrival_ms`.
+
+    A clock of whole seconds, read within 20 ms:
+
+    >>> of_reading(ClockReading(1_700_000_003_000, 1_700_000_000_500, 20, 1000), 0.0, 7.0)
+    Bound(at_s=7.0, low_s=2.489, high_s=3.511)
+    """
+    half_ms = reading.round_trip_ms / 2.0
+    edge_ms = reading.edge_ms if reading.edge_ms else arrival_ms - half_ms
+    ahead_ms = reading.control_ms - edge_ms
+    low_ms, high_ms = ahead_ms - half_ms - ROUNDING_MS, ahead_ms + half_ms + max(reading.resolution_ms, 1)
+    return Bound(at_s, low_ms / 1000.0, (high_ms + ROUNDING_MS) / 1000.0)
+
+
+def agreed(bounds: Sequence[Bound], at_s: float) -> Agreement:
+    """Where most of them overlap, as of `at_s`; the newest comes last. There has to be one.
+
+    >>> agreed([Bound(0.0, 1.0, 2.0), Bound(0.0, 1.5, 2.5), Bound(0.0, 8.0, 9.0)], 0.0)
+    Agreement(bound=Bound(at_s=0.0, low_s=1.5, high_s=2.0), number=2)
+    """
+    edges = list[tuple[float, int, float]]()
+    for place, bound in enumerate(bounds):
+        now, weight = bound.aged(at_s), NEWEST_WEIGHT if place == len(bounds) - 1 else 1.0
+        edges += [(now.low_s, 0, weight), (now.high_s, 1, weight)]
+    edges.sort()
+    total = best = 0.0
+    number = best_number = 0
+    low_s = high_s = edges[0][0]
+    for (at, is_end, weight), following in zip(edges, [*edges[1:], edges[-1]], strict=True):
+        total, number = (total - weight, number - 1) if is_end else (total + weight, number + 1)
+        if total > best:
+            best, best_number, low_s, high_s = total, number, at, following[0]
+    return Agreement(Bound(at_s, low_s, high_s), best_number)
+
+
+def above(lows: Sequence[Bound], at_s: float, latency_s_max: float) -> Bound:
+    """The offset where each bound's `low_s` is a stamp minus its arrival, and the least latency is at most `latency_s_max`.
+
+    The largest of four or more is left out: one stamp from the future is an error of the control's, and no offset.
+
+    >>> above([Bound(0.0, low_s, low_s) for low_s in (0.5, 0.8, 0.9, 77.0)], 0.0, 1.0)
+    Bound(at_s=0.0, low_s=0.9, high_s=1.9)
+    """
+    ordered = sorted(bound.aged(at_s).low_s for bound in lows)
+    least_s = ordered[-2] if len(ordered) >= 4 else ordered[-1]
+    return Bound(at_s, least_s, least_s + latency_s_max)

@@ -1,0 +1,276 @@
+"""Store and forward: rows of one machine on their way from the pipeline to a broker that has confirmed them.
+
+    put ──► ring (on the disk) ──► sent live ──────────┐
+                │                                      ├──► barrier ──acknowledged──► deleted, counted as emitted
+                └── not sent, or not confirmed ──► sent as history ──┘
+
+Data messages are QoS 0 in Sparkplug, so no broker confirms them. A QoS 1 message that follows them on the same connection (a
+barrier) does: a broker takes the packets of a connection in order, and what the barrier follows has been taken with it. What was
+sent on a connection that ended before its barrier came back may have arrived or not: it is sent again, as history, with the
+`edge_sequence` that it had, by which a reader can tell.
+
+Live rows go out at once, whatever waits. History follows in the order of its numbers, no faster than the configured rate, with
+its own time stamps and `is_historical`, and only as far ahead of its confirmation as one second of that rate.
+"""
+
+import json
+import logging
+from collections import Counter, deque
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple, Protocol
+
+from edge.config import StoreSection
+from edge.errors import StoreError
+from edge.place import Place
+from edge.ring import Eviction, Ring, StoredRow
+from edge.sample import Drop, EdgeSample
+from edge.spans import Spans
+from sparkplug.errors import SparkplugError
+from sparkplug.metric import Change
+from sparkplug.quality import Quality
+
+SEQUENCE = "edge_sequence"
+BARRIER_ROWS = 500
+BARRIER_S = 0.5
+HOUSEKEEPING_S = 1.0
+READ_AT_ONCE = 100
+_log = logging.getLogger(__name__)
+_ENCODE = json.JSONEncoder(ensure_ascii=False, separators=(",", ":")).encode
+_DROPS = {Eviction.AGE: Drop.STORE_AGE, Eviction.BYTES: Drop.STORE_BYTES, Eviction.DISK: Drop.STORE_DISK}
+
+
+class Sender(Protocol):
+    """What is needed of `sparkplug.edge_node.EdgeNode`."""
+
+    def publish(self, device: str | None, changes: Sequence[Change]) -> bool: ...
+    def barrier(self, token: int, session: int) -> bool: ...
+    @property
+    def online(self) -> bool: ...
+    @property
+    def session(self) -> int: ...
+
+
+@dataclass(slots=True)
+class _Flight:
+    """Rows sent in one session, and the barrier behind them (0: not sent yet)."""
+
+    session: int
+    token: int = 0
+    rows: int = 0
+    spans: Spans = field(default_factory=Spans)
+
+
+class Settled(NamedTuple):
+    """Observations that have come to their end since the last time."""
+
+    emitted: int
+    dropped: Counter[Drop]
+
+
+class Forwarder:
+    """The rows of one device. All methods but `confirmed` belong to one thread."""
+
+    def __init__(self, ring: Ring, node: Sender, device: str, limits: StoreSection, clock: Callable[[], float]) -> None:
+        self._ring, self._node, self._device, self._limits, self._clock = ring, node, device, limits, clock
+        self._waiting = Spans(ring.spans())
+        self._flights: deque[_Flight] = deque()
+        self._confirmed: deque[int] = deque(maxlen=1_000)
+        self._token = 0
+        self._declared: frozenset[str] = frozenset()
+        self._budget_rows, self._paid_s = 0.0, clock()
+        self._barrier_s = self._kept_s = clock()
+        self._place: Place | None = None
+        self._emitted, self._dropped = 0, Counter[Drop]()
+        self.history_rows = 0
+        self.evicted_rows = 0
+        self.error = ""
+
+    # What the loop has.
+
+    def place(self) -> Place | None:
+        """Where the control has to be asked next, as stored."""
+        return self._ring.place()
+
+    def declare(self, names: Iterable[str]) -> None:
+        """What the present birth declares: history of anything else can't be told any more. Empty: the device is dead."""
+        self._declared = frozenset(names)
+
+    def put(self, rows: Sequence[Sequence[EdgeSample]], place: Place | None) -> None:
+        """Store the rows of a frame with the place after it, then send them. A frame without rows only moves the place."""
+        self._place = place or self._place
+        if not rows:
+            return
+        try:
+            first = self._ring.append([(_observations(row), _body(row)) for row in rows], self._place)
+            self._place = None
+        except StoreError as error:
+            self._fail(error)
+            for row in rows:
+                self._send_unstored(row)
+            return
+        for sequence, row in enumerate(rows, start=first):
+            changes = [Change(s.signal, s.value, s.timestamp_ms, s.quality, s.reason) for s in row]
+            self._fly(sequence, [*changes, Change(SEQUENCE, sequence, changes[-1].timestamp_ms)])
+
+    def confirmed(self, token: int) -> None:
+        """The broker has acknowledged a barrier. From any thread."""
+        self._confirmed.append(token)
+
+    def pump(self) -> Settled:
+        """Do what is due: take confirmations, send history, set a barrier, keep the ring in its bounds."""
+        now_s = self._clock()
+        try:
+            self._land()
+            self._history(now_s)
+            self._bar(now_s)
+            if now_s - self._kept_s >= HOUSEKEEPING_S:
+                self._kept_s = now_s
+                self._keep_bounds()
+        except StoreError as error:
+            self._fail(error)
+        settled = Settled(self._emitted, self._dropped)
+        self._emitted, self._dropped = 0, Counter()
+        return settled
+
+    def close(self) -> None:
+        """Write the place and close the ring; what is unconfirmed stays in it."""
+        try:
+            if self._place is not None:
+                self._ring.keep_place(self._place)
+        except StoreError as error:
+            self._fail(error)
+        self._ring.close()
+
+    # What it shows.
+
+    @property
+    def observations(self) -> int:
+        """How many are stored."""
+        return self._ring.observations
+
+    @property
+    def is_done(self) -> bool:
+        """Whether all that was sent is confirmed."""
+        return not self._flights
+
+    def health(self) -> dict[str, int | float | str | bool]:
+        """Its metrics."""
+        try:
+            size, age_s = self._ring.bytes, self._ring.age_s
+        except StoreError as error:
+            self._fail(error)
+            size, age_s = 0, 0.0
+        return {
+            "health/store_rows": self._ring.rows,
+            "health/store_waiting_rows": len(self._waiting),
+            "health/store_bytes": size,
+            "health/store_age_s": age_s,
+            "health/store_history_rows": self.history_rows,
+            "health/store_evicted_rows": self.evicted_rows,
+            "health/store_error": self.error,
+        }
+
+    # How it is done.
+
+    def _fly(self, sequence: int, changes: Sequence[Change]) -> bool:
+        """Send one message; the row is in flight where it was sent in one session, else it waits."""
+        session = self._node.session
+        if not self._node.publish(self._device, changes) or session != self._node.session:
+            self._waiting.add(sequence, sequence)
+            return False
+        flight = self._flights[-1] if self._flights else None
+        if flight is None or flight.token or flight.session != session:
+            flight = _Flight(session)
+            self._flights.append(flight)
+        flight.spans.add(sequence, sequence)
+        flight.rows += 1
+        return True
+
+    def _land(self) -> None:
+        """What was confirmed is done; what was sent in a session that is over waits again."""
+        while self._confirmed:
+            token = self._confirmed.popleft()
+            while self._flights and 0 < self._flights[0].token <= token:
+                for first, last in self._flights.popleft().spans:
+                    self._emitted += self._ring.delete(first, last)[1]
+                self.error = ""
+        while self._flights and self._flights[0].session != self._node.session:
+            for first, last in self._flights.popleft().spans:
+                self._waiting.add(first, last)
+
+    def _history(self, now_s: float) -> None:
+        rate, paid_s = self._limits.history_rows_per_s, self._paid_s
+        self._paid_s = now_s
+        if not self._declared or not self._waiting or not self._node.online:
+            return
+        self._budget_rows = min(self._budget_rows + (now_s - paid_s) * rate, max(rate, 1.0))
+        in_flight = sum(flight.rows for flight in self._flights)
+        allowed = min(int(self._budget_rows), READ_AT_ONCE, int(rate) + BARRIER_ROWS - in_flight)
+        if allowed < 1 or (span := self._waiting.take(allowed)) is None:
+            return
+        self._budget_rows -= span[1] - span[0] + 1
+        for row in self._ring.read(*span):
+            self._tell(row)
+
+    def _tell(self, row: StoredRow) -> None:
+        """One row of history. What the device does not declare any more cannot be told, and is counted."""
+        try:
+            changes = [change for change in _changes(row) if change.name in self._declared]
+            if not changes:
+                raise StoreError("nothing of it is declared")
+            stamp_ms = changes[-1].timestamp_ms
+            if self._fly(row.sequence, [*changes, Change(SEQUENCE, row.sequence, stamp_ms, is_historical=True)]):
+                self.history_rows += 1
+        except (SparkplugError, StoreError, ValueError, TypeError) as error:
+            _log.warning("%s: row %d of the store cannot be told any more: %s", self._ring.file, row.sequence, error)
+            self._dropped[Drop.UNDECLARED] += self._ring.delete(row.sequence, row.sequence)[1]
+
+    def _bar(self, now_s: float) -> None:
+        """Set a barrier behind what was sent since the last one."""
+        flight = self._flights[-1] if self._flights else None
+        if flight is None or flight.token:
+            return
+        if flight.rows >= BARRIER_ROWS or now_s - self._barrier_s >= BARRIER_S:
+            self._barrier_s = now_s
+            if self._node.barrier(self._token + 1, flight.session):
+                self._token += 1
+                flight.token = self._token
+
+    def _keep_bounds(self) -> None:
+        if self._place is not None:
+            self._ring.keep_place(self._place)
+            self._place = None
+        flying = [first for flight in self._flights for first, _ in flight.spans]
+        gone = self._ring.evict(min(flying, default=self._ring.last + 1) - 1)
+        while gone is not None:
+            self._waiting.cut(gone.last)
+            self._dropped[_DROPS[gone.reason]] += gone.observations
+            self.evicted_rows += gone.rows
+            gone = self._ring.evict(min(flying, default=self._ring.last + 1) - 1)
+
+    def _send_unstored(self, row: Sequence[EdgeSample]) -> None:
+        """Where the disk takes nothing the edge goes on without: what is not sent now is lost, and counted."""
+        changes = [Change(s.signal, s.value, s.timestamp_ms, s.quality, s.reason) for s in row]
+        if self._node.publish(self._device, changes):
+            self._emitted += _observations(row)
+        else:
+            self._dropped[Drop.BROKER_OFFLINE] += _observations(row)
+
+    def _fail(self, error: StoreError) -> None:
+        if str(error) != self.error:
+            _log.warning("%s", error)
+        self.error = str(error)
+
+
+def _observations(row: Iterable[EdgeSample]) -> int:
+    return sum(sample.observations for sample in row)
+
+
+def _body(row: Iterable[EdgeSample]) -> str:
+    return _ENCODE([(s.signal, s.value, s.timestamp_ms, int(s.quality), s.reason) for s in row])
+
+
+def _changes(row: StoredRow) -> list[Change]:
+    told = json.loads(row.body)
+    return [Change(name, value, stamp, Quality(quality), why, is_historical=True) for name, value, stamp, quality, why in told]

@@ -1,0 +1,229 @@
+"""The store of one edge: rows that nobody has confirmed yet, in a bounded ring on SQLite.
+
+A row is one message to be. Its number (`sequence`) is given once and never again, over restarts and after deletion, so that a
+reader who has a row twice can tell, and one who misses a row too. Rows and the place in the control's stream from which the
+control has to be asked next are written in one transaction: a kill -9 loses neither, and takes none twice.
+
+WAL with synchronous=NORMAL (https://sqlite.org/wal.html): a commit survives the death of the process; with "full" that of the
+power too, at the price of an fsync each. What is too much goes oldest first: past the age, the bytes, or where the disk is full.
+"""
+
+import json
+import logging
+import shutil
+import sqlite3
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
+from enum import StrEnum
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from edge.config import StoreSection
+from edge.errors import StoreError
+from edge.place import Place
+
+EVICTED_AT_ONCE = 200
+"""Rows; more would hold up what is live."""
+_log = logging.getLogger(__name__)
+_SCHEMA = """
+CREATE TABLE IF NOT EXISTS rows(
+    sequence INTEGER PRIMARY KEY AUTOINCREMENT, stored_ms INTEGER NOT NULL, observations INTEGER NOT NULL, body TEXT NOT NULL);
+CREATE TABLE IF NOT EXISTS kept(name TEXT PRIMARY KEY, value TEXT NOT NULL);
+"""
+
+
+class Eviction(StrEnum):
+    """Why a row had to go before anybody had it."""
+
+    AGE = "age"
+    BYTES = "bytes"
+    DISK = "disk"
+
+
+class StoredRow(NamedTuple):
+    """One message to be: its number, when it was stored (ms since 1970), how many observations it is, and its text."""
+
+    sequence: int
+    stored_ms: int
+    observations: int
+    body: str
+
+
+class Evicted(NamedTuple):
+    """Rows that had to go: how many, up to which number, and how many observations they were."""
+
+    reason: Eviction
+    rows: int
+    last: int
+    observations: int
+
+
+class Ring:
+    """One file. Every method belongs to the thread that made it; StoreError where the disk or the file fails.
+
+    wall_ms: ms since 1970, asked once; clock: seconds from then on. The wall's clock may be set while we run (a gateway without a
+        battery starts in 1970), and no row is to be thrown away for that.
+    free_bytes: of the disk that holds a folder
+    """
+
+    def __init__(
+        self,
+        file: Path,
+        limits: StoreSection,
+        *,
+        wall_ms: Callable[[], int],
+        clock: Callable[[], float],
+        free_bytes: Callable[[Path], int] = lambda folder: shutil.disk_usage(folder).free,
+    ) -> None:
+        self.file, self._limits, self._free_bytes = file, limits, free_bytes
+        self._clock, self._began_s, self._began_ms = clock, clock(), wall_ms()
+        try:
+            file.parent.mkdir(parents=True, exist_ok=True)
+            self._db = self._open()
+        except (sqlite3.Error, OSError) as error:
+            raise StoreError(f"{file}: cannot be used as a store: {error}") from error
+
+    def _open(self) -> sqlite3.Connection:
+        """The database; one that is damaged is put aside, under a name that says so, and a new one is begun."""
+        try:
+            return self._connect()
+        except sqlite3.DatabaseError as error:
+            if isinstance(error, sqlite3.OperationalError):
+                raise
+            aside = self.file.with_name(f"{self.file.name}.damaged-{self._now_ms()}")
+            _log.warning("%s: is damaged (%s); it is kept as %s, and a new store is begun", self.file, error, aside.name)
+            self.file.replace(aside)
+            for tail in ("-wal", "-shm"):
+                self.file.with_name(self.file.name + tail).unlink(missing_ok=True)
+            return self._connect()
+
+    def _connect(self) -> sqlite3.Connection:
+        db = sqlite3.connect(self.file, isolation_level=None, timeout=1.0)
+        try:
+            db.execute("PRAGMA auto_vacuum = INCREMENTAL")
+            db.execute("PRAGMA journal_mode = WAL")
+            db.execute(f"PRAGMA synchronous = {self._limits.synchronous}")
+            db.execute("PRAGMA journal_size_limit = 4194304")
+            db.executescript(_SCHEMA)
+            found = db.execute("SELECT seq FROM sqlite_sequence WHERE name = 'rows'").fetchone()
+            self.last = 0 if found is None else int(found[0])
+            count, observations, newest = db.execute("SELECT count(*), sum(observations), max(stored_ms) FROM rows").fetchone()
+            self.rows, self.observations = int(count), int(observations or 0)
+            self._page_bytes = int(db.execute("PRAGMA page_size").fetchone()[0])
+            self._began_ms = max(self._began_ms, int(newest or 0))
+        except BaseException:
+            db.close()
+            raise
+        return db
+
+    def _now_ms(self) -> int:
+        return self._began_ms + round((self._clock() - self._began_s) * 1000)
+
+    def close(self) -> None:
+        """Close the file."""
+        with suppress(sqlite3.Error):
+            self._db.close()
+
+    def append(self, rows: Sequence[tuple[int, str]], place: Place | None = None) -> int:
+        """Store rows (observations, body) and the place after them in one transaction; the number of the first."""
+        first, stored_ms = self.last + 1, self._now_ms()
+        numbered = [(first + i, stored_ms, observations, body) for i, (observations, body) in enumerate(rows)]
+        self._write(numbered, place)
+        self.last += len(rows)
+        self.rows += len(rows)
+        self.observations += sum(observations for observations, _ in rows)
+        return first
+
+    def keep_place(self, place: Place) -> None:
+        """Store a place alone."""
+        self._write((), place)
+
+    def _write(self, numbered: Sequence[tuple[int, int, int, str]], place: Place | None) -> None:
+        try:
+            self._db.execute("BEGIN IMMEDIATE")
+            try:
+                self._db.executemany("INSERT INTO rows VALUES (?, ?, ?, ?)", numbered)
+                if place is not None:
+                    self._db.execute("INSERT OR REPLACE INTO kept VALUES ('place', ?)", (json.dumps(place),))
+                self._db.execute("COMMIT")
+            except BaseException:
+                with suppress(sqlite3.Error):
+                    self._db.execute("ROLLBACK")
+                raise
+        except sqlite3.Error as error:
+            raise StoreError(f"{self.file}: cannot be written: {error}") from error
+
+    def place(self) -> Place | None:
+        """The place that was stored last."""
+        found = self._ask("SELECT value FROM kept WHERE name = 'place'")
+        if not found:
+            return None
+        try:
+            instance, next_sequence = json.loads(found[0][0])
+        except ValueError:
+            return None
+        return Place(instance, next_sequence) if isinstance(instance, str) and type(next_sequence) is int else None
+
+    def spans(self) -> list[tuple[int, int]]:
+        """Which numbers are stored, as spans from first to last."""
+        # A row begins a span where the one before it is missing: number minus rank is the same within a span.
+        asked = "SELECT min(sequence), max(sequence) FROM (SELECT sequence, sequence - row_number() OVER (ORDER BY sequence) AS g"
+        return [(int(a), int(b)) for a, b in self._ask(f"{asked} FROM rows) GROUP BY g ORDER BY 1")]
+
+    def read(self, first: int, last: int) -> list[StoredRow]:
+        """The rows with these numbers that are there, in order."""
+        asked = "SELECT sequence, stored_ms, observations, body FROM rows WHERE sequence BETWEEN ? AND ? ORDER BY sequence"
+        return [StoredRow(*row) for row in self._ask(asked, (first, last))]
+
+    def delete(self, first: int, last: int) -> tuple[int, int]:
+        """Rows that are not needed any more; how many there were, and how many observations."""
+        asked = "DELETE FROM rows WHERE sequence BETWEEN ? AND ? RETURNING observations"
+        gone = self._ask(asked, (first, last))
+        observations = sum(row[0] for row in gone)
+        self.rows -= len(gone)
+        self.observations -= observations
+        return len(gone), observations
+
+    def evict(self, upto: int) -> Evicted | None:
+        """The oldest rows with numbers up to `upto`, where one limit is passed: some at a time; None where none has to go."""
+        reason = self._passed()
+        if reason is None:
+            return None
+        asked = "SELECT sequence, stored_ms FROM rows WHERE sequence <= ? ORDER BY sequence LIMIT ?"
+        oldest = self._ask(asked, (upto, EVICTED_AT_ONCE))
+        if reason is Eviction.AGE:
+            limit_ms = self._now_ms() - round(self._limits.age_s_max * 1000)
+            oldest = [row for row in oldest if row[1] < limit_ms]
+        if not oldest:
+            return None
+        last = int(oldest[-1][0])
+        rows, observations = self.delete(int(oldest[0][0]), last)
+        self._ask(f"PRAGMA incremental_vacuum({EVICTED_AT_ONCE})")
+        return Evicted(reason, rows, last, observations)
+
+    def _passed(self) -> Eviction | None:
+        if not self.rows:
+            return None
+        if self.age_s > self._limits.age_s_max:
+            return Eviction.AGE
+        if self.bytes > self._limits.bytes_max:
+            return Eviction.BYTES
+        return Eviction.DISK if self._free_bytes(self.file.parent) < self._limits.free_bytes_min else None
+
+    @property
+    def age_s(self) -> float:
+        """Of the oldest row, seconds."""
+        found = self._ask("SELECT stored_ms FROM rows ORDER BY sequence LIMIT 1")
+        return max(self._now_ms() - int(found[0][0]), 0) / 1000 if found else 0.0
+
+    @property
+    def bytes(self) -> int:
+        """Of the file that is in use."""
+        pages = int(self._ask("PRAGMA page_count")[0][0]) - int(self._ask("PRAGMA freelist_count")[0][0])
+        return pages * self._page_bytes
+
+    def _ask(self, text: str, values: Iterable[int] = ()) -> list[tuple[Any, ...]]:
+        try:
+            return self._db.execute(text, tuple(values)).fetchall()
+        except sqlite3.Error as error:
+            raise StoreError(f"{self.file}: cannot be read: {error}") from error
