@@ -81,6 +81,7 @@ class Forwarder:
         self._budget_rows, self._paid_s = 0.0, clock()
         self._barrier_s = self._kept_s = clock()
         self._place: Place | None = None
+        self._memory: str | None = None
         self._emitted, self._dropped = 0, Counter[Drop]()
         self.history_rows = 0
         self.evicted_rows = 0
@@ -92,18 +93,25 @@ class Forwarder:
         """Where the control has to be asked next, as stored."""
         return self._ring.place()
 
+    def memory(self) -> str | None:
+        """Of the pipeline, as stored."""
+        return self._ring.memory()
+
     def declare(self, names: Iterable[str]) -> None:
         """What the present birth declares: history of anything else can't be told any more. Empty: the device is dead."""
         self._declared = frozenset(names)
 
-    def put(self, rows: Sequence[Sequence[EdgeSample]], place: Place | None) -> None:
-        """Store the rows of a frame with the place after it, then send them. A frame without rows only moves the place."""
-        self._place = place or self._place
+    def put(self, rows: Sequence[Sequence[EdgeSample]], place: Place | None, memory: str | None = None) -> None:
+        """Store the rows of a frame with the place and the memory after it, then send them.
+
+        What a frame without rows has moved is written with the next one, or within a second: a killed edge takes it again.
+        """
+        self._place, self._memory = place or self._place, memory or self._memory
         if not rows:
             return
         try:
-            first = self._ring.append([(_observations(row), _body(row)) for row in rows], self._place)
-            self._place = None
+            first = self._ring.append([(_observations(row), _body(row)) for row in rows], self._place, self._memory)
+            self._place = self._memory = None
         except StoreError as error:
             self._fail(error)
             for row in rows:
@@ -136,8 +144,7 @@ class Forwarder:
     def close(self) -> None:
         """Write the place and close the ring; what is unconfirmed stays in it."""
         try:
-            if self._place is not None:
-                self._ring.keep_place(self._place)
+            self._keep_place()
         except StoreError as error:
             self._fail(error)
         self._ring.close()
@@ -238,9 +245,7 @@ class Forwarder:
                 flight.token = self._token
 
     def _keep_bounds(self) -> None:
-        if self._place is not None:
-            self._ring.keep_place(self._place)
-            self._place = None
+        self._keep_place()
         flying = [first for flight in self._flights for first, _ in flight.spans]
         gone = self._ring.evict(min(flying, default=self._ring.last + 1) - 1)
         while gone is not None:
@@ -248,6 +253,11 @@ class Forwarder:
             self._dropped[_DROPS[gone.reason]] += gone.observations
             self.evicted_rows += gone.rows
             gone = self._ring.evict(min(flying, default=self._ring.last + 1) - 1)
+
+    def _keep_place(self) -> None:
+        if self._place is not None:
+            self._ring.append((), self._place, self._memory)
+            self._place = self._memory = None
 
     def _send_unstored(self, row: Sequence[EdgeSample]) -> None:
         """Where the disk takes nothing the edge goes on without: what is not sent now is lost, and counted."""

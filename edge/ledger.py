@@ -25,11 +25,11 @@ class Ledger:
         self._held = 0
         self._stored = 0
 
-    def recover(self, observations: int) -> None:
-        """Observations of an earlier life lie in the store."""
+    def recover(self, stored: int, held: int) -> None:
+        """Observations of an earlier life lie in the store, and in the tool change's memory."""
         with self._lock:
-            self._received += observations
-            self._stored += observations
+            self._received += stored + held
+            self._stored, self._held = stored, held
 
     def queue(self, observations: int) -> None:
         """Observations have been read and wait to be looked at."""

@@ -3,17 +3,26 @@
 A message is one row of the machine: the changes of one moment, in the order in which they happened. A consumer that keeps the
 last value of each signal thus sees each state that the machine was in. The state as found on (re)joining is one row, whatever the
 age of its values.
+
+What waits in the state machine for more evidence has left the control and is in no row yet. So its memory is stored with the
+rows, and an edge that was killed in the middle of a tool change goes on in the middle of it, where the control's server still has
+what came since; after a hole it begins anew.
 """
 
+import logging
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
+
+from pydantic import TypeAdapter, ValidationError
 
 from edge import report_by_exception, tool_change
 from edge.config import EdgeConfig, SignalSection
 from edge.sample import Drop, EdgeSample, SampleSet
+from edge.signals import DERIVED
 
+_log = logging.getLogger(__name__)
 _DEFAULT = SignalSection()
 _TAKEN_IN = ("tool_number", tool_change.CUE)  # signals that the state machine keeps, to hand on what it makes of them
 
@@ -26,21 +35,44 @@ class Outcome:
     dropped: Counter[Drop] = field(default_factory=Counter)
 
 
-class Pipeline:
-    """The two folds of one machine, one after the other."""
+class Memory(NamedTuple):
+    """What outlives a restart: the tool change's state, and what was last published of it."""
 
-    def __init__(self, config: EdgeConfig[Any]) -> None:
+    change: tool_change.State
+    last: tuple[EdgeSample, ...]
+
+
+_MEMORY: TypeAdapter[Memory] = TypeAdapter(Memory)
+_REMEMBERED = ("tool_number", *DERIVED)
+_FED = ("tool_number", "nc_block", "exec_state", tool_change.CUE)
+
+
+class Pipeline:
+    """The two folds of one machine, one after the other. `memory`: of the edge that was here before, as `memory` gave it."""
+
+    def __init__(self, config: EdgeConfig[Any], memory: str | None = None) -> None:
         self._tool_change = config.tool_change
         self._sections = config.signals
         self._interval_ms_max = round(config.report.interval_s_max * 1000)
         self._change = tool_change.State()
         self._report = report_by_exception.State()
         self._heard: tuple[int, float] | None = None
+        self._before = _remembered(memory)
+        self._kept: Memory | None = None
 
     @property
     def held(self) -> int:
         """Observations that wait for more evidence."""
-        return self._change.held
+        return self._change.held + (0 if self._before is None else self._before.change.held)
+
+    def memory(self) -> str | None:
+        """To be stored with the rows of the frame that was taken last; None where nothing of it has changed."""
+        last = tuple(self._report.last[name] for name in _REMEMBERED if name in self._report.last)
+        now = Memory(replace(self._change, clock_ms=None), last)
+        if self._before is not None or now == self._kept:
+            return None
+        self._kept = now
+        return _MEMORY.dump_json(Memory(self._change, last)).decode()
 
     @property
     def last(self) -> tuple[EdgeSample, ...]:
@@ -51,7 +83,17 @@ class Pipeline:
         """The samples of one frame that arrived at this (monotonic) time."""
         dropped: Counter[Drop] = Counter({Drop(reason): number for reason, number in frame.dropped.items()})
         news: list[EdgeSample] = []
+        continues = self._before is not None and any(sample.is_baseline for sample in frame.samples)
+        if continues and self._before is not None:
+            news.extend(self._resumed(self._before, frame, dropped))
+            continues = not frame.gaps
         for sample in frame.samples:
+            if continues and sample.is_baseline and sample.signal in _FED:  # the memory knows it, and better
+                if sample.signal in _TAKEN_IN:
+                    dropped[Drop.DUPLICATE] += sample.observations
+                else:
+                    news.extend(self._reported((sample,), dropped))
+                continue
             done = tool_change.step(self._tool_change, self._change, sample)
             self._change = done.state
             dropped[Drop.DEBOUNCED] += done.debounced
@@ -65,6 +107,15 @@ class Pipeline:
         """Samples that come from no observation."""
         dropped: Counter[Drop] = Counter()
         return Outcome(tuple(rows_of(self._reported(samples, dropped))), +dropped)
+
+    def _resumed(self, before: Memory, frame: SampleSet, dropped: Counter[Drop]) -> Iterator[EdgeSample]:
+        """The edge has rejoined: it goes on where it was, or after a hole begins anew."""
+        self._before = None
+        if frame.gaps:
+            dropped[Drop.DEBOUNCED] += before.change.held
+            return
+        self._change = before.change
+        yield from self._reported((replace(sample, is_baseline=True, observations=0) for sample in before.last), dropped)
 
     def _time_passes(self, frame: SampleSet, arrival_s: float, dropped: Counter[Drop]) -> tuple[EdgeSample, ...]:
         """A frame without news says that nothing happened until now; only then may the clock go further than the samples."""
@@ -87,6 +138,17 @@ class Pipeline:
                 yield sample
             else:
                 dropped[drop] += sample.observations
+
+
+def _remembered(text: str | None) -> Memory | None:
+    """What `Pipeline.memory` has written; None where that cannot be read, for instance by another version."""
+    if text is None:
+        return None
+    try:
+        return _MEMORY.validate_json(text)
+    except ValidationError as error:
+        _log.warning("the tool change's memory cannot be read and is left behind: %s", error.errors(include_url=False)[0]["msg"])
+        return None
 
 
 def rows_of(samples: Iterable[EdgeSample]) -> Iterator[tuple[EdgeSample, ...]]:

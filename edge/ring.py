@@ -124,27 +124,25 @@ class Ring:
         with suppress(sqlite3.Error):
             self._db.close()
 
-    def append(self, rows: Sequence[tuple[int, str]], place: Place | None = None) -> int:
-        """Store rows (observations, body) and the place after them in one transaction; the number of the first."""
+    def append(self, rows: Sequence[tuple[int, str]], place: Place | None = None, memory: str | None = None) -> int:
+        """Store rows (observations, body), and the place and memory after them, in one transaction; the number of the first."""
         first, stored_ms = self.last + 1, self._now_ms()
         numbered = [(first + i, stored_ms, observations, body) for i, (observations, body) in enumerate(rows)]
-        self._write(numbered, place)
+        self._write(numbered, place, memory)
         self.last += len(rows)
         self.rows += len(rows)
         self.observations += sum(observations for observations, _ in rows)
         return first
 
-    def keep_place(self, place: Place) -> None:
-        """Store a place alone."""
-        self._write((), place)
-
-    def _write(self, numbered: Sequence[tuple[int, int, int, str]], place: Place | None) -> None:
+    def _write(self, numbered: Sequence[tuple[int, int, int, str]], place: Place | None, memory: str | None) -> None:
         try:
             self._db.execute("BEGIN IMMEDIATE")
             try:
                 self._db.executemany("INSERT INTO rows VALUES (?, ?, ?, ?)", numbered)
                 if place is not None:
                     self._db.execute("INSERT OR REPLACE INTO kept VALUES ('place', ?)", (json.dumps(place),))
+                if memory is not None:
+                    self._db.execute("INSERT OR REPLACE INTO kept VALUES ('memory', ?)", (memory,))
                 self._db.execute("COMMIT")
             except BaseException:
                 with suppress(sqlite3.Error):
@@ -163,6 +161,11 @@ class Ring:
         except ValueError:
             return None
         return Place(instance, next_sequence) if isinstance(instance, str) and type(next_sequence) is int else None
+
+    def memory(self) -> str | None:
+        """The memory that was stored last."""
+        found = self._ask("SELECT value FROM kept WHERE name = 'memory'")
+        return str(found[0][0]) if found else None
 
     def spans(self) -> list[tuple[int, int]]:
         """Which numbers are stored, as spans from first to last."""

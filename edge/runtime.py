@@ -97,7 +97,8 @@ class EdgeRuntime:
         place = self._places.read()
         if self._open_store is not None:
             self._forwarder = self._open_store(self._node)
-            self.ledger.recover(self._forwarder.observations)
+            self._pipeline = Pipeline(self.config, self._forwarder.memory())
+            self.ledger.recover(self._forwarder.observations, self._pipeline.held)
             place = self._forwarder.place() or place
         reader = threading.Thread(target=self._read, args=(place,), name=f"{self._adapter.name}-reader", daemon=True)
         self._node.start()
@@ -218,7 +219,7 @@ class EdgeRuntime:
             else:
                 dropped[Drop.BROKER_OFFLINE] = dropped.get(Drop.BROKER_OFFLINE, 0) + observations
         if self._forwarder is not None:
-            self._forwarder.put(stored, place)
+            self._forwarder.put(stored, place, self._pipeline.memory())
         return emitted, dropped
 
     def _send(self, row: Iterable[EdgeSample]) -> bool:

@@ -33,6 +33,7 @@ KEEPALIVE_S = 15
 UNACKNOWLEDGED_MAX = 65_535  # all packet ids
 BACKOFF_S_MIN = 0.2
 BACKOFF_S_MAX = 15.0
+ABSENT_S_MAX = 0.5  # where nobody listens: knocking costs nobody anything, and live values are wanted soon after its return
 STABLE_S = 5.0
 TICK_S = 0.1
 DRIVEN_S = 0.05
@@ -82,7 +83,7 @@ class MqttConnection:
         self._chance = chance or Random()  # noqa: S311 — spreads reconnects, keeps no secret
         self._server = 0
         self._client: ReadingAheadClient | None = None
-        self._accepted = False
+        self._accepted = self._reached = False
         self._outbox: deque[Action] = deque()
         self._barriers: dict[int, int] = {}  # packet id → token, of this connection
         self._stopping = threading.Event()
@@ -191,7 +192,8 @@ class MqttConnection:
                 _log.exception("%s: the session failed", self._client_id)
                 self._note(repr(error))
             # Only a connection that lasted was a good one: two nodes with one id throw each other out again and again.
-            pause_s = BACKOFF_S_MIN if time.monotonic() - began_s > STABLE_S else min(2 * pause_s, BACKOFF_S_MAX)
+            longest_s = BACKOFF_S_MAX if self._reached else ABSENT_S_MAX
+            pause_s = BACKOFF_S_MIN if time.monotonic() - began_s > STABLE_S else min(2 * pause_s, longest_s)
             self._stopping.wait(pause_s * self._chance.uniform(0.8, 1.2))
 
     def _serve(self, broker: BrokerAddress) -> None:
@@ -203,10 +205,11 @@ class MqttConnection:
         if not self._stopping.is_set():
             self._idle.clear()
         self._ended = False
-        self._client, self._accepted = client, False
+        self._client, self._accepted, self._reached = client, False, False
         self._barriers.clear()
         try:
             self._open(client, broker)
+            self._reached = True
             while not self._ended:
                 if self._driving or time.monotonic() - self._driven_s < DRIVEN_S:
                     self._idle.wait(DRIVEN_S)

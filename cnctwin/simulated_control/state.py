@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from itertools import takewhile
 from typing import Any
 
 from cnctwin.simulated_machine.moment import Moment
@@ -106,12 +107,14 @@ class _AlreadyCut:
         return spare_part()
 
 
-def production(seconds: float) -> Iterator[ControlState]:
+def production_moments(seconds: float) -> Iterator[Moment]:
     """So many seconds of a working day: the same part again and again, five tool changes each, the door open in between."""
-    for state in states(working_day(_AlreadyCut, spare_part, 0.0)):
-        if state.at_s > seconds:
-            return
-        yield state
+    return takewhile(lambda moment: moment.at_s <= seconds, working_day(_AlreadyCut, spare_part, 0.0))
+
+
+def production(seconds: float) -> Iterator[ControlState]:
+    """The same as states."""
+    return states(production_moments(seconds))
 
 
 @dataclass(frozen=True, slots=True)
