@@ -2,10 +2,11 @@
 
 import tomllib
 from collections.abc import Sequence
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from dataclasses import replace
 from pathlib import Path
-from threading import Event, Thread
+from threading import Event
+from typing import Any
 
 from rich.table import Table
 from rich.text import Text
@@ -13,27 +14,35 @@ from rich.text import Text
 from cnctwin.given_broker import broker_or_own
 from cnctwin.state_dir import state_dir
 from edge.adapter import Row
-from edge.config_file import load
+from edge.config import EdgeConfig
+from edge.gateway import Gateway
 from edge.run import broker_address, edge_runtime
+from edge.runtime import EdgeRuntime
 from sparkplug.broker import BrokerAddress
 
 
-def run(config_path: Path, given: BrokerAddress | None, stop: Event) -> dict[str, int]:
-    """Run the edge of this file until stopped; the last ledger.
+def run(path: Path, given: BrokerAddress | None, stop: Event) -> dict[str, int]:
+    """Run the edge of this file, or those of a folder of files, until stopped; the last ledger, or the sum of them.
 
-    `given` takes the place of the broker in the file; where neither names one, one of our own is started.
+    `given` takes the place of the brokers in the files; where neither names one, one of our own is started.
     """
-    config = load(config_path)
-    if not config.broker.session_file:
-        file = state_dir() / f"{config.broker.group}.{config.node}.json"
-        config = replace(config, broker=config.broker.model_copy(update={"session_file": str(file)}))
-    if given is None and _names_broker(config_path):
-        given = broker_address(config.broker, config.path)
-    with broker_or_own(given) as broker:
-        runtime = edge_runtime(config, broker)
-        Thread(target=_pass_on, args=(stop, runtime.stop), daemon=True).start()
-        runtime.run()
-        return runtime.ledger.snapshot()
+    files = sorted(path.glob("*.toml")) if path.is_dir() else [path]
+    needs_own = given is None and not all(map(_names_broker, files))
+    with broker_or_own(given) if needs_own or given is not None else nullcontext() as broker:
+
+        def begin(config: EdgeConfig[Any], restarts: int) -> EdgeRuntime:
+            named = given is None and _names_broker(config.path)
+            address = broker_address(config.broker, config.path) if named or broker is None else broker
+            return edge_runtime(_with_session_file(config), address, restarts=restarts)
+
+        return Gateway(path, begin).run(stop)
+
+
+def _with_session_file(config: EdgeConfig[Any]) -> EdgeConfig[Any]:
+    if config.broker.session_file:
+        return config
+    file = state_dir() / f"{config.broker.group}.{config.node}.json"
+    return replace(config, broker=config.broker.model_copy(update={"session_file": str(file)}))
 
 
 def table(rows: Sequence[Row]) -> Table:
@@ -52,8 +61,3 @@ def _names_broker(path: Path) -> bool:
     with suppress(OSError, ValueError, AttributeError):
         return "url" in tomllib.loads(path.read_text()).get("broker", {})
     return False
-
-
-def _pass_on(stop: Event, runtime_stop: Event) -> None:
-    stop.wait()
-    runtime_stop.set()

@@ -28,6 +28,7 @@ HEALTH = (
     MetricSpec("health/store_history_rows", DataType.INT64, "rows", value=0),  # sent as history since the edge began
     MetricSpec("health/store_evicted_rows", DataType.INT64, "rows", value=0),  # lost to a limit since the edge began
     MetricSpec("health/store_error", DataType.STRING, value=""),
+    MetricSpec("health/restarts", DataType.INT64, value=0),  # of this edge in its gateway, after it had ended by itself
     MetricSpec("health/ledger_difference", DataType.INT64, "observations", value=0),
 )
 

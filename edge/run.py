@@ -41,8 +41,8 @@ def broker_address(section: BrokerSection, path: Path) -> BrokerAddress:
     return address
 
 
-def edge_runtime(config: EdgeConfig[Any], address: BrokerAddress | None = None) -> EdgeRuntime:
-    """An edge that publishes to the configured broker, or to this one."""
+def edge_runtime(config: EdgeConfig[Any], address: BrokerAddress | None = None, *, restarts: int = 0) -> EdgeRuntime:
+    """An edge that publishes to the configured broker, or to this one; `restarts`: how often it was begun again."""
     broker, ledger = config.broker, Ledger()
 
     def confirmed(token: int) -> None:
@@ -64,6 +64,7 @@ def edge_runtime(config: EdgeConfig[Any], address: BrokerAddress | None = None) 
         ledger=ledger,
         place_file=Path(broker.session_file + ".place") if broker.session_file else None,
         open_store=_opener(config),
+        restarts=restarts,
     )
     return runtime
 

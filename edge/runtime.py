@@ -67,6 +67,7 @@ class EdgeRuntime:
         ledger: Ledger | None = None,
         place_file: Path | None = None,
         open_store: Callable[[Publisher], Forwarder] | None = None,
+        restarts: int = 0,
         wall_s: Callable[[], float] = time.time,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
@@ -77,7 +78,7 @@ class EdgeRuntime:
         self._node = node
         self._connection: Connection = adapter.connect(config)
         self._places = PlaceFile(place_file)
-        self._open_store = open_store
+        self._open_store, self._restarts = open_store, restarts
         self._forwarder: Forwarder | None = None
         self._wall_s, self._clock = wall_s, clock
         self._arrivals: queue.Queue[Arrival] = queue.Queue(QUEUE_FRAMES_MAX)
@@ -258,6 +259,7 @@ class EdgeRuntime:
             "health/control_online": self._is_declared,
             "health/broker_reconnects": self._node.reconnects,
             "health/unsent_messages": self._node.unsent,
+            "health/restarts": self._restarts,
             "health/ledger_difference": Ledger.difference(counters),
         }
         if self._forwarder is not None:
