@@ -19,9 +19,9 @@ from typer.exceptions import TyperException
 
 from cnctwin import demo as demo_command
 from cnctwin.alert_commands import alerts_app
+from cnctwin.control_commands import control_app
 from cnctwin.errors import BrokerStartError, ProgramError, UsageError
 from cnctwin.given_broker import address, broker_or_own
-from cnctwin.replay_command import replay
 from cnctwin.state_dir import state_dir as folder_for_state
 from cnctwin.stopping import stopped_by_signals
 from cnctwin.train_commands import train_app
@@ -36,7 +36,6 @@ app = typer.Typer(
 )
 edge_app = typer.Typer(no_args_is_help=True, help="Turn what a control says into Sparkplug B metrics.")
 gap_app = typer.Typer(no_args_is_help=True, help="The sim-to-real gap: where it lies, what causes it, how far it shrinks.")
-control_app = typer.Typer(no_args_is_help=True, help="Stand in for a control, to develop and test without a machine.")
 app.add_typer(edge_app, name="edge")
 app.add_typer(gap_app, name="gap")
 app.add_typer(control_app, name="simulate-control")
@@ -213,8 +212,11 @@ def gap_check(
 
 
 @edge_app.command("run")
-def edge_run(config: Annotated[Path, typer.Argument(help="The TOML file of one machine")], broker: Broker = None) -> None:
-    """Run an edge until SIGTERM or Ctrl-C."""
+def edge_run(
+    config: Annotated[Path, typer.Argument(help="The TOML file of one machine, or a folder with one for each")],
+    broker: Broker = None,
+) -> None:
+    """Run an edge, or one for each file of a folder, until SIGTERM or Ctrl-C; changes of the files are taken up."""
     from cnctwin.edge_commands import run
 
     with stopped_by_signals() as stop:
@@ -236,54 +238,13 @@ def edge_check(config: Annotated[Path, typer.Argument(help="The TOML file of one
 
 @edge_app.command("discover")
 def edge_discover(
-    url: Annotated[str, typer.Argument(help="The address of an MTConnect agent, http://host:port")],
+    url: Annotated[str, typer.Argument(help="http://host:port (MTConnect), focas://host, opc.tcp://host:port, lsv2://host")],
     device: Annotated[str, typer.Option(help="Which of several devices; else the first")] = "",
 ) -> None:
     """Draft a configuration from a control's own description."""
     from edge.check import discover
 
     sys.stdout.write(discover(url, device=device))
-
-
-@control_app.command("mtconnect")
-def simulate_mtconnect(
-    recording: Annotated[Path, typer.Argument(help="SHDR log or time|key|value text")],
-    devices: Annotated[Path | None, typer.Option(help="Its Devices.xml; else a device model is drafted from its keys")] = None,
-    device: Annotated[str | None, typer.Option(help="Which device of the model the recording belongs to")] = None,
-    speed: Annotated[float, typer.Option(help="How many times faster than recorded")] = 1.0,
-    port: Annotated[int, typer.Option(help="HTTP port on loopback; 0 = any", min=0, max=65535)] = 0,
-    style: Annotated[str, typer.Option(help="The generation of the agent: 2.3 or 1.4")] = "2.3",
-    loop: Annotated[bool, typer.Option("--loop", help="Begin again at the end")] = False,
-    wait: Annotated[bool, typer.Option("--wait", help="Begin when the first client asks for samples")] = False,
-    state_file: Annotated[Path | None, typer.Option(help="Keep address and ledger in this JSON file", hidden=True)] = None,
-) -> None:
-    """Serve a recording as a real MTConnect agent serves its machine."""
-    with stopped_by_signals() as stop:
-        replay(
-            recording,
-            devices,
-            stop,
-            device=device,
-            speed=speed,
-            port=port,
-            style=style,
-            loop=loop,
-            wait=wait,
-            state_file=state_file,
-        )
-
-
-@control_app.command("machine")
-def simulate_machine(
-    speed: Annotated[float, typer.Option(help="How many times faster than real time")] = 1.0,
-    port: Annotated[int, typer.Option(help="HTTP port on loopback; 0 = any", min=0, max=65535)] = 0,
-    state_file: Annotated[Path | None, typer.Option(help="Keep address and ledger in this JSON file", hidden=True)] = None,
-) -> None:
-    """Serve the simulated machine, which cuts one part after the other, as an MTConnect agent."""
-    from cnctwin.machine_command import simulate_machine as serve
-
-    with stopped_by_signals() as stop:
-        serve(stop, speed=speed, port=port, state_file=state_file)
 
 
 def _twin() -> ModuleType:

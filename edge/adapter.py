@@ -58,10 +58,11 @@ class Adapter:
 
     `place` says up to where a cursor has taken everything (None: not begun); `resume` is `start` from such a place.
     `describe` says what would be published, asking the control but no broker; `draft` writes a configuration for the control at
-    an address (and the device of that name, where it serves several).
+    an address (and the device of that name, where it serves several), which begins with one of `schemes`.
     """
 
     name: str
+    schemes: tuple[str, ...]
     config_model: type[BaseModel]
     start: Callable[[EdgeConfig[Any]], Any]
     place: Callable[[Any], Place | None]

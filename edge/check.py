@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from edge.adapter import Row, adapters
+from edge.config import without_secret
 from edge.config_file import load
 from edge.errors import ConfigError
 
@@ -13,8 +14,11 @@ def check(config_path: Path) -> list[Row]:
     return adapters()[config.machine.adapter].describe(config)
 
 
-def discover(url: str, *, device: str = "", adapter: str = "mtconnect") -> str:
+def discover(url: str, *, device: str = "") -> str:
     """A configuration for the control at this address, as text; of several devices `device` names one, else it is the first."""
-    if adapter not in adapters():
-        raise ConfigError(f"adapter {adapter!r}: no such adapter; there are {', '.join(sorted(adapters()))}")
-    return adapters()[adapter].draft(url, device)
+    scheme = url.partition("://")[0].lower()
+    for adapter in adapters().values():
+        if "://" in url and scheme in adapter.schemes:
+            return adapter.draft(url, device)
+    known = ", ".join(f"{scheme}:// ({adapter.name})" for adapter in adapters().values() for scheme in adapter.schemes)
+    raise ConfigError(f"{without_secret(url)}: no adapter speaks to such an address; there are {known}")

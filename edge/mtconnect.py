@@ -15,6 +15,7 @@ from edge.controls.mtconnect.draft import draft
 
 ADAPTER = Adapter(
     name="mtconnect",
+    schemes=("http", "https"),
     config_model=MtconnectConfig,
     start=start,
     place=place,

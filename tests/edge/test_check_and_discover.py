@@ -67,7 +67,5 @@ def test_what_is_wrong_is_said_in_one_line(tmp_path: Path) -> None:
             assert "\n" not in str(caught.value)
     with pytest.raises(ConnectionLostError, match="is the agent running, and the address right"):
         discover("http://127.0.0.1:1")
-    with pytest.raises(ConfigError, match="adapter 'focas': no such adapter; there are mtconnect"):
-        discover("http://127.0.0.1:1", adapter="focas")
-    with pytest.raises(ConfigError, match="address 'agent:5000' is no http:// or https:// address, such as http://agent:5000"):
+    with pytest.raises(ConfigError, match=r"no adapter speaks to such an address; there are .*http:// \(mtconnect\)"):
         discover("agent:5000")
