@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
+from edge import clock
 from edge.sample import EdgeSample, Offer
 from edge.signals import DERIVED, Kind, signal
 from edge.tool_change import CUE
@@ -15,7 +16,7 @@ DATATYPES = {Kind.NUMBER: DataType.DOUBLE, Kind.INTEGER: DataType.INT64, Kind.TE
 def device_metrics(offers: Iterable[Offer], last: Mapping[str, EdgeSample]) -> list[MetricSpec]:
     """The metrics of the machine, with the values that are known already."""
     by_name = {offer.signal: offer for offer in offers}
-    by_name |= {name: Offer(name, "edge") for name in ("tool_number", *DERIVED) if name not in by_name}
+    by_name |= {name: Offer(name, "edge") for name in ("tool_number", *DERIVED, *clock.SIGNALS) if name not in by_name}
     return [_metric(offer, last.get(name)) for name, offer in by_name.items() if name != CUE]
 
 

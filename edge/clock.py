@@ -3,9 +3,10 @@
     done = clock.step(state, clock.heard(frame, at_s, arrival_ms))     # after each frame
     state, samples, health = done
 
-Evidence, best first (`edge/clock_bounds.py`): readings of the clock (SampleSet.clock), each of which proves an interval; stamps
-of samples against their arrival, a lower bound; and the signals themselves (`edge/clock_signals.py`), where a sensor of the edge
-sees the spindle too. It is gathered for `BUCKET_S`, and windows of such buckets are put together by where most of them agree.
+Evidence, best first (`edge/clock_bounds.py`): readings of the clock over a round trip, each of which proves an interval; the time
+of documents that come one way (a ClockReading with `edge_ms` 0; most within `round_trip_ms`); the stamps of samples, which come
+one way too; and the signals themselves (`edge/clock_signals.py`), where a sensor of the edge sees the spindle. It is gathered for
+`BUCKET_S`, and windows of such buckets are put together.
 
 A clock was set (a step) when the last buckets agree with each other and not with those before; the windows start anew with them.
 What the edge's own clock was set by is seen against its monotonic clock, and taken off all bounds. Drift is a robust line
@@ -15,10 +16,11 @@ Stamps are never changed: consumers that put machines side by side subtract the 
 A control that gives no stamps has its samples stamped by the edge; there the offset is a figure about the control, and no more.
 """
 
-from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any, NamedTuple, TypeVar
 
-from edge.clock_bounds import Bound, above, agreed, of_reading
+from edge.clock_bounds import Bound, OneWay, above, agreed, largest_gap, of_reading
 from edge.clock_drift import Drift, Series, drift
 from edge.sample import ClockReading, EdgeSample, SampleSet
 from sparkplug.datatype import DataType
@@ -33,19 +35,23 @@ HEALTH = (
     MetricSpec("health/clock_alarm", DataType.STRING, value=""),
     MetricSpec("health/clock_method", DataType.STRING, value=""),
 )
+NEVER_S = -1e300
 BUCKET_S = 10.0
 BUCKET_READINGS_MAX = 128
 WINDOW_BUCKETS_MAX = 60
 WINDOW_S = 3600.0  # evidence that is older is forgotten
 STEP_BUCKETS = 3  # of readings that agree on another offset
-STEP_STAMP_BUCKETS = 6
-STAMP_BUCKETS_MIN = 4
+STEP_WAY_BUCKETS = 6  # of what came one way
+STEADY_BUCKETS = 4
 STAMP_LATENCY_S_MAX = 1.0  # of the fastest sample of a window, from its stamp to the edge
 STAMP_BEHIND_S_MAX = 10.0  # stamps that are further behind the clock of their server are those of another clock
 EDGE_STEP_S = 0.5
+BEGINNING_S = 300.0  # after which the offset is known well enough for what it began with
 ALARM_S = 1.0  # of drift
 ALARM_STANDS_S = 3600.0  # after a step
-MOVED_S_MIN = 0.002  # less is not told
+ROOM_S, ROOM_SHARE = 0.015, 0.2  # that an offset may move before it is published again, and of its spread
+NARROWER = 0.6
+READINGS, DOCUMENTS = "readings of the clock", "times of documents"
 UNSTEADY = "the clock does not keep to the rate of the edge's"
 OUTDATED = "the control's clock was not read for an hour"
 
@@ -79,30 +85,34 @@ class Told(NamedTuple):
     stamped_by: str
 
 
-@dataclass(frozen=True, slots=True)
-class State:
+class State(NamedTuple):
     """What is known of one control's clock.
 
-    bucket, stamp_s: readings and the largest stamp minus arrival of the bucket that is open until `until_s`
-    readings, stamps, peaks: a bound for each bucket that is closed
+    bucket, document, phases, stamp: of the bucket that is open until `until_s`: readings; the largest lower bound of documents,
+        and when they arrived, modulo the clock's resolution; the largest lower bound of stamps
+    readings, documents, stamps: one for each bucket that is closed; peaks: of the signals
     stamps_samples: as the last reading says; None while there was none
     wall_ahead_s: the edge's wall clock minus its monotonic one
     """
 
-    until_s: float = -1e300
+    until_s: float = NEVER_S
     bucket: tuple[Bound, ...] = ()
-    stamp_s: float | None = None
+    document: OneWay | None = None
+    phases: tuple[float, ...] = ()
+    resolution_s: float = 1.0
+    stamp: OneWay | None = None
     readings: tuple[Bound, ...] = ()
-    stamps: tuple[Bound, ...] = ()
+    documents: tuple[OneWay, ...] = ()
+    stamps: tuple[OneWay, ...] = ()
     peaks: tuple[Bound, ...] = ()
     stamps_samples: bool | None = None
     newest_ms: int | None = None
     wall_ahead_s: float | None = None
-    series: Series = field(default_factory=Series)
+    series: Series = Series()
     drift: Drift | None = None
     began: Bound | None = None
     steps: int = 0
-    step_s: float = -1e300
+    step_s: float = NEVER_S
     step: str = ""
     told: Told | None = None
 
@@ -117,7 +127,10 @@ class Done(NamedTuple):
 
 def step(state: State, heard: Heard) -> Done:
     """Take a look in; judge where a bucket is full, and at the first reading."""
-    state = _gathered(_edge_clock(state, heard), heard)
+    ahead_s = heard.arrival_ms / 1000.0 - heard.at_s
+    if state.wall_ahead_s is not None and abs(ahead_s - state.wall_ahead_s) > EDGE_STEP_S:
+        state = _edge_clock_set(state, state.wall_ahead_s - ahead_s, heard.at_s)
+    state = state._replace(wall_ahead_s=ahead_s, **_gathered(state, heard))
     if heard.at_s < state.until_s and not (state.told is None and state.bucket):
         return Done(state)
     if heard.at_s >= state.until_s:
@@ -126,89 +139,97 @@ def step(state: State, heard: Heard) -> Done:
     if judged is None:
         return Done(state)
     state = _followed(state, judged.bound)
-    is_news = _is_news(state.told, judged)
+    is_news, told = _is_news(state.told, judged), _padded(judged)
     stamp_ms = state.newest_ms if state.stamps_samples and state.newest_ms is not None else round(heard.arrival_ms)
-    after = replace(state, told=judged) if is_news else state
-    return Done(after, _samples(judged, stamp_ms) if is_news else (), _health(after, judged, heard.at_s))
+    after = state._replace(told=told) if is_news else state
+    return Done(after, _samples(told, stamp_ms) if is_news else (), _health(after, judged, heard.at_s))
 
 
-def _edge_clock(state: State, heard: Heard) -> State:
-    """The edge's clock, if it was set, moves all offsets the other way."""
-    ahead_s = heard.arrival_ms / 1000.0 - heard.at_s
-    before_s = state.wall_ahead_s
-    if before_s is None or abs(ahead_s - before_s) <= EDGE_STEP_S:
-        return replace(state, wall_ahead_s=ahead_s)
-    by_s = before_s - ahead_s
-    return replace(
-        state,
-        wall_ahead_s=ahead_s,
+def _edge_clock_set(state: State, by_s: float, at_s: float) -> State:
+    """The edge's clock was set: that moves all offsets the other way, `by_s`."""
+    return state._replace(
         bucket=tuple(bound.moved(by_s) for bound in state.bucket),
-        stamp_s=None if state.stamp_s is None else state.stamp_s + by_s,
+        document=None if state.document is None else state.document.moved(by_s),
+        stamp=None if state.stamp is None else state.stamp.moved(by_s),
         readings=tuple(bound.moved(by_s) for bound in state.readings),
-        stamps=tuple(bound.moved(by_s) for bound in state.stamps),
+        documents=tuple(way.moved(by_s) for way in state.documents),
+        stamps=tuple(way.moved(by_s) for way in state.stamps),
         peaks=tuple(bound.moved(by_s) for bound in state.peaks),
         series=state.series.moved(by_s),
         began=None if state.began is None else state.began.moved(by_s),
         steps=state.steps + 1,
-        step_s=heard.at_s,
+        step_s=at_s,
         step=f"the edge's own clock was set by {-by_s:+.3f} s",
     )
 
 
-def _gathered(state: State, heard: Heard) -> State:
-    """The open bucket with one look more."""
-    bucket, stamp_s, stamps_samples = state.bucket, state.stamp_s, state.stamps_samples
-    if heard.reading is not None:
-        stamps_samples = heard.reading.stamps_samples
-        if len(bucket) < BUCKET_READINGS_MAX:
-            bucket = (*bucket, of_reading(heard.reading, heard.arrival_ms, heard.at_s))
+def _gathered(state: State, heard: Heard) -> dict[str, Any]:
+    """What changes of the open bucket with one look more."""
+    reading, changes = heard.reading, dict[str, Any]()
+    if reading is not None:
+        changes["stamps_samples"] = reading.stamps_samples
+        if not reading.edge_ms:
+            way = OneWay(heard.at_s, (reading.control_ms - heard.arrival_ms) / 1000.0, reading.round_trip_ms / 1000.0)
+            resolution_s = max(reading.resolution_ms, 1) / 1000.0
+            phase = heard.arrival_ms / 1000.0 / resolution_s % 1.0
+            changes |= {"document": _larger(state.document, way), "resolution_s": resolution_s}
+            changes["phases"] = (*state.phases[1 - BUCKET_READINGS_MAX :], phase)
+        elif len(state.bucket) < BUCKET_READINGS_MAX:
+            changes["bucket"] = (*state.bucket, of_reading(reading, heard.at_s))
     if heard.newest_ms is not None:
-        ahead_s = (heard.newest_ms - heard.arrival_ms) / 1000.0
-        stamp_s = ahead_s if stamp_s is None else max(stamp_s, ahead_s)
-    peaks = state.peaks if heard.peak is None else (*state.peaks, heard.peak)
-    newest_ms = state.newest_ms if heard.newest_ms is None else heard.newest_ms
-    until_s = heard.at_s + BUCKET_S if state.until_s == -1e300 else state.until_s
-    return replace(
-        state,
-        until_s=until_s,
-        bucket=bucket,
-        stamp_s=stamp_s,
-        peaks=peaks,
-        stamps_samples=stamps_samples,
-        newest_ms=newest_ms,
-    )
+        way = OneWay(heard.at_s, (heard.newest_ms - heard.arrival_ms) / 1000.0, STAMP_LATENCY_S_MAX)
+        changes |= {"stamp": _larger(state.stamp, way), "newest_ms": heard.newest_ms}
+    if heard.peak is not None:
+        changes["peaks"] = (*state.peaks, heard.peak)
+    if state.until_s == NEVER_S:
+        changes["until_s"] = heard.at_s + BUCKET_S
+    return changes
+
+
+def _larger(before: OneWay | None, way: OneWay) -> OneWay:
+    return before if before is not None and before.low_s > way.low_s else way
 
 
 def _closed(state: State, at_s: float) -> State:
     """The bucket goes into the windows, and may be the one that shows a step."""
-    readings, stamps = _kept(state.readings, at_s), _kept(state.stamps, at_s)
-    by_s: float | None = None
+    readings, documents, stamps = _kept(state.readings, at_s), _kept(state.documents, at_s), _kept(state.stamps, at_s)
+    found: list[float | None] = []
     if state.bucket:
-        readings = (*readings, agreed(state.bucket, at_s).bound)
-        readings, by_s = _stepped(readings, at_s)
-    if state.stamp_s is not None and state.stamps_samples:
-        stamps = (*stamps, Bound(at_s, state.stamp_s, state.stamp_s))
-        stamps, stamps_by_s = _stamps_stepped(stamps, at_s)
-        by_s = stamps_by_s if by_s is None and not readings else by_s
-    after = replace(
-        state,
+        readings, by_s = _stepped((*readings, agreed(state.bucket, at_s).bound), at_s)
+        found.append(by_s)
+    if state.document is not None:
+        hidden_s = largest_gap(state.phases) * state.resolution_s
+        document = state.document._replace(doubt_s=state.document.doubt_s + hidden_s)
+        documents, by_s = _way_stepped((*documents, document), at_s)
+        found.append(by_s)
+    if state.stamp is not None and state.stamps_samples:
+        stamps, by_s = _way_stepped((*stamps, state.stamp), at_s)
+        found.append(by_s)
+    after = state._replace(
         until_s=at_s + BUCKET_S,
         bucket=(),
-        stamp_s=None,
+        document=None,
+        phases=(),
+        stamp=None,
         readings=readings,
+        documents=documents,
         stamps=stamps,
         peaks=_kept(state.peaks, at_s),
     )
+    by_s = next(iter(found), None)  # of the best evidence that there is
     if by_s is None:
         return after
     words = f"the control's clock was set by {by_s:+.3f} s"
-    return replace(
-        after, steps=state.steps + 1, step_s=at_s, step=words, series=Series(), drift=None, began=None, peaks=after.peaks[-1:]
-    )
+    after = after._replace(steps=state.steps + 1, step_s=at_s, step=words, series=Series(), drift=None, began=None, peaks=())
+    is_read = bool(state.bucket or state.document)
+    return after._replace(documents=() if state.bucket else documents, stamps=() if is_read else stamps)
 
 
-def _kept(window: tuple[Bound, ...], at_s: float) -> tuple[Bound, ...]:
-    return tuple(bound for bound in window[1 - WINDOW_BUCKETS_MAX :] if at_s - bound.at_s <= WINDOW_S)
+WayT = TypeVar("WayT", Bound, OneWay)
+
+
+def _kept(window: tuple[WayT, ...], at_s: float) -> tuple[WayT, ...]:
+    return tuple(one for one in window[1 - WINDOW_BUCKETS_MAX :] if at_s - one.at_s <= WINDOW_S)
 
 
 def _stepped(window: tuple[Bound, ...], at_s: float) -> tuple[tuple[Bound, ...], float | None]:
@@ -222,50 +243,68 @@ def _stepped(window: tuple[Bound, ...], at_s: float) -> tuple[tuple[Bound, ...],
     return last, now.bound.offset_s - was.bound.offset_s
 
 
-def _stamps_stepped(window: tuple[Bound, ...], at_s: float) -> tuple[tuple[Bound, ...], float | None]:
-    before, last = window[:-STEP_STAMP_BUCKETS], window[-STEP_STAMP_BUCKETS:]
-    if not before or not _is_steady(last, STEP_STAMP_BUCKETS):
+def _way_stepped(window: tuple[OneWay, ...], at_s: float) -> tuple[tuple[OneWay, ...], float | None]:
+    before, last = window[:-STEP_WAY_BUCKETS], window[-STEP_WAY_BUCKETS:]
+    if not before or not _is_steady(last, STEP_WAY_BUCKETS):
         return window, None
-    was, now = above(before, at_s, STAMP_LATENCY_S_MAX), above(last, at_s, STAMP_LATENCY_S_MAX)
+    was, now = above(before, at_s), above(last, at_s)
     return (window, None) if now.meets(was) else (last, now.low_s - was.low_s)
 
 
-def _is_steady(stamps: tuple[Bound, ...], number: int) -> bool:
+def _is_steady(ways: tuple[OneWay, ...], number: int) -> bool:
     """Whether the last of them are no further apart than latencies are."""
-    lows = [bound.low_s for bound in stamps[-number:]]
-    return len(lows) == number and max(lows) - min(lows) <= STAMP_LATENCY_S_MAX
+    last = ways[-number:]
+    lows = [way.low_s for way in last]
+    return len(last) == number and max(lows) - min(lows) <= max(way.doubt_s for way in last)
+
+
+def _is_running_away(ways: tuple[OneWay, ...]) -> bool:
+    """Whether the last of them went the same way each time, by more than latencies do."""
+    last = ways[-STEADY_BUCKETS:]
+    moves = [(after.low_s - before.low_s) / before.doubt_s for before, after in pairwise(last)]
+    return len(last) == STEADY_BUCKETS and (min(moves) > 1.0 or max(moves) < -1.0)
 
 
 def _judged(state: State, at_s: float) -> Told | None:
     """The offset as all the evidence has it; None while there never was any."""
     stamped_by = "control" if state.stamps_samples else "edge"
+    stamps = state.stamps if state.stamps_samples and len(state.stamps) >= STEADY_BUCKETS else ()
+    stamps = () if _is_running_away(stamps) else stamps
     window = (*state.readings, agreed(state.bucket, at_s).bound) if state.bucket else state.readings
-    stamps = None
-    if state.stamps_samples and _is_steady(state.stamps, STAMP_BUCKETS_MIN):
-        stamps = above(state.stamps, at_s, STAMP_LATENCY_S_MAX)
-    if not window:
-        if stamps is not None:
-            return _by_stamps(state, stamps, at_s)
-        return None if state.told is None else Told(None, OUTDATED, state.told.method, stamped_by)
-    found = agreed(window, at_s)
-    if 2 * found.number < len(window):
-        return Told(None, UNSTEADY, "readings of the control's clock", stamped_by)
-    read = found.bound
-    if stamps is None or stamps.low_s <= read.low_s <= stamps.low_s + STAMP_BEHIND_S_MAX:
-        return Told(read, "", "readings of the control's clock", stamped_by)
-    if read.low_s < stamps.low_s <= read.high_s:
-        narrower = read._replace(low_s=stamps.low_s)
-        return Told(narrower, "", "readings of the control's clock, and stamps of samples", stamped_by)
-    return _by_stamps(state, stamps, at_s, "; the clock that is read is another")
+    if window:
+        found = agreed(window, at_s)
+        if 2 * found.number < len(window):
+            return Told(None, UNSTEADY, READINGS, stamped_by)
+        return _beside_stamps(state, found.bound, READINGS, stamps)
+    if state.documents:
+        if _is_running_away(state.documents):
+            return Told(None, UNSTEADY, DOCUMENTS, stamped_by)
+        return _beside_stamps(state, above(state.documents, at_s), DOCUMENTS, stamps)
+    if stamps:
+        return _by_stamps(state, above(stamps, at_s))
+    return None if state.told is None else Told(None, OUTDATED, state.told.method, stamped_by)
 
 
-def _by_stamps(state: State, stamps: Bound, at_s: float, but: str = "") -> Told:
+def _beside_stamps(state: State, read: Bound, method: str, stamps: tuple[OneWay, ...]) -> Told:
+    """The clock that was read, unless the stamps show that theirs is another; else they may show that it is further ahead."""
+    stamped_by = "control" if state.stamps_samples else "edge"
+    last = stamps[-STEP_WAY_BUCKETS:]
+    if len(last) == STEP_WAY_BUCKETS:
+        is_ahead = all(way.low_s > read.high_s for way in last)
+        if is_ahead or all(way.low_s + STAMP_BEHIND_S_MAX < read.low_s for way in last):
+            return _by_stamps(state, above(last, read.at_s), "; the clock that is read is another")
+    if last and read.low_s < (low_s := above(stamps, read.at_s).low_s) <= read.high_s:
+        return Told(read._replace(low_s=low_s), "", f"{method}, stamps of samples", stamped_by)
+    return Told(read, "", method, stamped_by)
+
+
+def _by_stamps(state: State, stamps: Bound, but: str = "") -> Told:
     """Where there are no readings of the clock that stamps: the signals may know better what a sample takes."""
     if state.peaks:
-        peak = agreed(state.peaks, at_s).bound
+        peak = agreed(state.peaks, stamps.at_s).bound
         if peak.high_s >= stamps.low_s:
             both = stamps.both(peak) if peak.meets(stamps) else peak
-            return Told(both, "", f"stamps of samples, and signals{but}", "control")
+            return Told(both, "", f"stamps of samples, signals{but}", "control")
     return Told(stamps, "", f"stamps of samples{but}", "control")
 
 
@@ -275,16 +314,29 @@ def _followed(state: State, bound: Bound | None) -> State:
         return state
     series = state.series.taken(bound)
     found = state.drift if series is state.series else drift(series)
-    return replace(state, series=series, drift=found, began=state.began or bound)
+    is_beginning = bound.at_s - series.points[0].at_s <= BEGINNING_S
+    return state._replace(series=series, drift=found, began=bound if is_beginning or state.began is None else state.began)
 
 
 def _is_news(told: Told | None, judged: Told) -> bool:
+    """Whether what was published is no longer true, or much less than what is known."""
     if told is None or told[1:] != judged[1:] or told.bound is None or judged.bound is None:
-        return told is None or told[1:] != judged[1:] or (told.bound is None) != (judged.bound is None)
+        return told is None or told[1:] != judged[1:]
     before, now = told.bound, judged.bound
-    if abs(now.offset_s - before.offset_s) > max(MOVED_S_MIN, 0.25 * min(before.spread_s, now.spread_s)):
-        return True
-    return not 0.8 * before.spread_s <= now.spread_s <= 1.25 * before.spread_s + MOVED_S_MIN
+    return now.low_s < before.low_s or now.high_s > before.high_s or _room_s(now) + now.spread_s < NARROWER * before.spread_s
+
+
+def _padded(judged: Told) -> Told:
+    """As it is published: with room for what it may move before it is published again."""
+    bound = judged.bound
+    if bound is None:
+        return judged
+    room_s = _room_s(bound)
+    return judged._replace(bound=Bound(bound.at_s, bound.low_s - room_s, bound.high_s + room_s))
+
+
+def _room_s(bound: Bound) -> float:
+    return ROOM_S + ROOM_SHARE * bound.spread_s
 
 
 def _samples(judged: Told, stamp_ms: int) -> tuple[EdgeSample, ...]:
@@ -293,7 +345,7 @@ def _samples(judged: Told, stamp_ms: int) -> tuple[EdgeSample, ...]:
     if judged.bound is None:
         null = EdgeSample(OFFSET, None, stamp_ms, Quality.BAD, judged.reason, observations=0)
         return null, replace(null, signal=SPREAD), by
-    offset_s, spread_s = round(judged.bound.offset_s, 4), round(judged.bound.spread_s + 0.0001, 4)
+    offset_s, spread_s = round(judged.bound.offset_s, 4), round(judged.bound.spread_s + 0.0001, 4)  # up
     offset = EdgeSample(OFFSET, offset_s, stamp_ms, observations=0)
     return offset, EdgeSample(SPREAD, spread_s, stamp_ms, observations=0), by
 

@@ -6,8 +6,10 @@ read somewhere between question and answer, and shows the start of the step of i
     control - edge - round_trip/2  <=  offset  <=  control - edge + round_trip/2 + resolution
 
 With readings at different phases of the second such intervals overlap by little, and the offset lies in what is left (`agreed`).
-Stamps of samples go one way only: arrival minus stamp is the least latency plus what more this sample took, so the largest
-stamp minus arrival of a window is a lower bound, and the offset lies above it by the least latency of the window (`above`).
+
+What comes one way only (a stamp, a document with the time of its making) was made before it arrived, so its time minus its
+arrival is a lower bound, and the largest of many is below the offset by the least latency, and by what the clock's resolution
+hid (`above`). How large that latency is cannot be known from one way; it is taken to be no more than a stated one.
 
 A bound ages: a clock may have drifted since, by as much as `DRIFT_PPM_MAX`.
 
@@ -15,6 +17,7 @@ Marzullo, K.: Maintaining the time in a distributed system, Stanford, 1984 (as i
 """
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 from edge.sample import ClockReading
@@ -66,6 +69,18 @@ class Bound(NamedTuple):
         return Bound(self.at_s, max(self.low_s, other.low_s), min(self.high_s, other.high_s))
 
 
+class OneWay(NamedTuple):
+    """The offset was above `low_s`, by no more than `doubt_s` if one of those that came was as quick as is taken for granted."""
+
+    at_s: float
+    low_s: float
+    doubt_s: float
+
+    def moved(self, by_s: float) -> "OneWay":
+        """After the edge's own clock was set."""
+        return OneWay(self.at_s, self.low_s + by_s, self.doubt_s)
+
+
 class Agreement(NamedTuple):
     """Where most bounds overlap, and how many do."""
 
@@ -73,19 +88,27 @@ class Agreement(NamedTuple):
     number: int
 
 
-def of_reading(reading: ClockReading, arrival_ms: float, at_s: float) -> Bound:
-    """What one reading proves. One without the edge's time came in one way, within `round_trip_ms`, and arrived at `arrival_ms`.
+def of_reading(reading: ClockReading, at_s: float) -> Bound:
+    """What a reading over a round trip proves.
 
     A clock of whole seconds, read within 20 ms:
 
-    >>> of_reading(ClockReading(1_700_000_003_000, 1_700_000_000_500, 20, 1000), 0.0, 7.0)
+    >>> of_reading(ClockReading(1_700_000_003_000, 1_700_000_000_500, 20, 1000), 7.0)
     Bound(at_s=7.0, low_s=2.489, high_s=3.511)
     """
-    half_ms = reading.round_trip_ms / 2.0
-    edge_ms = reading.edge_ms if reading.edge_ms else arrival_ms - half_ms
-    ahead_ms = reading.control_ms - edge_ms
+    ahead_ms, half_ms = reading.control_ms - reading.edge_ms, reading.round_trip_ms / 2.0
     low_ms, high_ms = ahead_ms - half_ms - ROUNDING_MS, ahead_ms + half_ms + max(reading.resolution_ms, 1)
     return Bound(at_s, low_ms / 1000.0, (high_ms + ROUNDING_MS) / 1000.0)
+
+
+def largest_gap(phases: Sequence[float]) -> float:
+    """The largest stretch of a circle of length 1 that holds none of these phases.
+
+    >>> largest_gap([0.25, 0.5, 0.875]), largest_gap([0.5])
+    (0.375, 1.0)
+    """
+    ordered = sorted(phases)
+    return max(ordered[0] + 1.0 - ordered[-1], *(right - left for left, right in pairwise(ordered)), 0.0)
 
 
 def agreed(bounds: Sequence[Bound], at_s: float) -> Agreement:
@@ -109,14 +132,14 @@ def agreed(bounds: Sequence[Bound], at_s: float) -> Agreement:
     return Agreement(Bound(at_s, low_s, high_s), best_number)
 
 
-def above(lows: Sequence[Bound], at_s: float, latency_s_max: float) -> Bound:
-    """The offset where each bound's `low_s` is a stamp minus its arrival, and the least latency is at most `latency_s_max`.
+def above(ways: Sequence[OneWay], at_s: float) -> Bound:
+    """The offset, from what came one way.
 
     The largest of four or more is left out: one stamp from the future is an error of the control's, and no offset.
 
-    >>> above([Bound(0.0, low_s, low_s) for low_s in (0.5, 0.8, 0.9, 77.0)], 0.0, 1.0)
+    >>> above([OneWay(0.0, low_s, 1.0) for low_s in (0.5, 0.8, 0.9, 77.0)], 0.0)
     Bound(at_s=0.0, low_s=0.9, high_s=1.9)
     """
-    ordered = sorted(bound.aged(at_s).low_s for bound in lows)
-    least_s = ordered[-2] if len(ordered) >= 4 else ordered[-1]
-    return Bound(at_s, least_s, least_s + latency_s_max)
+    ordered = sorted(way.low_s - abs(at_s - way.at_s) * DRIFT_PPM_MAX * 1e-6 for way in ways)
+    low_s = ordered[-2] if len(ordered) >= 4 else ordered[-1]
+    return Bound(at_s, low_s, low_s + min(way.doubt_s for way in ways))

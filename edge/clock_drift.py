@@ -14,7 +14,7 @@ from typing import NamedTuple
 from edge.clock_bounds import Bound
 
 FIRST_S = 60.0
-POINTS_MAX = 96
+POINTS_MAX = 64
 POINTS_MIN = 5
 KNOWN_PPM = 50.0
 
@@ -37,10 +37,10 @@ class Series:
         """With one more, where it is due.
 
         >>> series = Series()
-        >>> for minute in range(97):
+        >>> for minute in range(65):
         ...     series = series.taken(Bound(60.0 * minute, 0.0, 1.0))
         >>> len(series.points), series.every_s
-        (49, 120.0)
+        (33, 120.0)
         """
         if self.points and bound.at_s - self.points[-1].at_s < self.every_s:
             return self

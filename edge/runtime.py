@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
-from edge import tool_change
+from edge import clock, tool_change
 from edge.adapter import Adapter, Connection
 from edge.birth import device_metrics
 from edge.config import EdgeConfig
@@ -48,10 +48,11 @@ class Publisher(Sender, Protocol):
 
 
 class Arrival(NamedTuple):
-    """One parsed frame, the monotonic time at which it came, and where in the control's stream it ends."""
+    """One parsed frame, when it came (by the monotonic clock and by the wall's), and where in the control's stream it ends."""
 
     frame: SampleSet
     at_s: float
+    wall_ms: int
     place: Place | None = None
 
 
@@ -69,7 +70,7 @@ class EdgeRuntime:
         open_store: Callable[[Publisher], Forwarder] | None = None,
         restarts: int = 0,
         wall_s: Callable[[], float] = time.time,
-        clock: Callable[[], float] = time.monotonic,
+        monotonic_s: Callable[[], float] = time.monotonic,
     ) -> None:
         self.config = config
         self.ledger = ledger or Ledger()
@@ -80,16 +81,18 @@ class EdgeRuntime:
         self._places = PlaceFile(place_file)
         self._open_store, self._restarts = open_store, restarts
         self._forwarder: Forwarder | None = None
-        self._wall_s, self._clock = wall_s, clock
+        self._wall_s, self._clock = wall_s, monotonic_s
         self._arrivals: queue.Queue[Arrival] = queue.Queue(QUEUE_FRAMES_MAX)
         self._pipeline = Pipeline(config)
+        self._clocks = clock.State()
+        self._clock_health: dict[str, int | float | str | bool | None] = {}
         self._offers: tuple[Offer, ...] = ()
         self._told: dict[str, EdgeSample] = {}  # the latest of each signal, as far as the rows have gone
         self._is_declared = False
         self._is_reporting = True  # whether the control gives values, as far as its server knows
         self._was_available = False
         self._fault = 0, ""
-        self._reported_s = clock()
+        self._reported_s = monotonic_s()
         self.health = Health()
         self._crash: BaseException | None = None
 
@@ -145,7 +148,8 @@ class EdgeRuntime:
                 cursor, frame = self._adapter.parse(self.config, cursor, raw)
                 self._connection.follow(cursor)
                 self.ledger.queue(frame.received)
-                self._arrivals.put(Arrival(frame, self._clock(), self._adapter.place(cursor)))
+                now = self._clock(), round(self._wall_s() * 1000)
+                self._arrivals.put(Arrival(frame, *now, self._adapter.place(cursor)))
         except BaseException as error:
             self._crash = error
         finally:
@@ -165,12 +169,21 @@ class EdgeRuntime:
         self.health.note(frame, self._wall_s())
         if frame.offers is not None:
             self._offered(frame.offers)
+        self._compare_clocks(arrival)
         outcome = self._pipeline.take(frame, arrival.at_s)
         self._judge(frame, arrival.at_s)
         emitted, dropped = self._publish(outcome, arrival.place)
         self.ledger.settle(taken=frame.received, emitted=emitted, dropped=dropped, held=self._pipeline.held, stored=self._stored)
         if self._forwarder is None:
             self._places.keep(arrival.place)
+
+    def _compare_clocks(self, arrival: Arrival) -> None:
+        """What the frame says of the control's clock."""
+        done = clock.step(self._clocks, clock.heard(arrival.frame, arrival.at_s, arrival.wall_ms))
+        self._clocks = done.state
+        self._clock_health |= done.health
+        if done.samples:
+            self._publish(self._pipeline.declare(done.samples), None)
 
     @property
     def _stored(self) -> int:
@@ -262,6 +275,7 @@ class EdgeRuntime:
             "health/restarts": self._restarts,
             "health/ledger_difference": Ledger.difference(counters),
         }
+        outside |= {name: value for name, value in self._clock_health.items() if value is not None}
         if self._forwarder is not None:
             outside |= self._forwarder.health()
         fault = self._connection.reconnects, self._connection.last_error

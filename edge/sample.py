@@ -74,7 +74,8 @@ class Offer:
 class ClockReading:
     """The control's clock beside the edge's (`edge_ms`, of the middle of the round trip); it was read to within `resolution_ms`.
 
-    `stamps_samples`: whether the stamps of the samples are this clock's; those of controls that give none are the edge's.
+    edge_ms: 0 = not known to the parser; it came one way within the round trip, and its arrival is taken
+    stamps_samples: whether the stamps of the samples are this clock's; those of controls that give none are the edge's
     """
 
     control_ms: int

