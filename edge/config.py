@@ -14,7 +14,7 @@ from edge.errors import ConfigError
 from edge.signals import DERIVED, Kind, signal
 from edge.units import conversion
 
-BLOCK_PATTERN = r"(?<![A-Z_])M0*6(?![\d.])|\bTOOL CALL (?:\d|\"|QS?\d)"
+BLOCK_PATTERN = r'(?<![A-Z_])M0*6(?![\d.])|\bTOOL CALL (?:\d|"|QS?\d)'
 
 
 class Section(BaseModel):
