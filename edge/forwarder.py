@@ -58,6 +58,7 @@ class _Flight:
     session: int
     token: int = 0
     rows: int = 0
+    observations: int = 0
     spans: Spans = field(default_factory=Spans)
 
 
@@ -119,7 +120,7 @@ class Forwarder:
             return
         for sequence, row in enumerate(rows, start=first):
             changes = [Change(s.signal, s.value, s.timestamp_ms, s.quality, s.reason) for s in row]
-            self._fly(sequence, [*changes, Change(SEQUENCE, sequence, changes[-1].timestamp_ms)])
+            self._fly(sequence, _observations(row), [*changes, Change(SEQUENCE, sequence, changes[-1].timestamp_ms)])
 
     def confirmed(self, token: int) -> None:
         """The broker has acknowledged a barrier. From any thread."""
@@ -163,16 +164,11 @@ class Forwarder:
 
     def health(self) -> dict[str, int | float | str | bool]:
         """Its metrics."""
-        try:
-            size, age_s = self._ring.bytes, self._ring.age_s
-        except StoreError as error:
-            self._fail(error)
-            size, age_s = 0, 0.0
         return {
             "health/store_rows": self._ring.rows,
             "health/store_waiting_rows": len(self._waiting),
-            "health/store_bytes": size,
-            "health/store_age_s": age_s,
+            "health/store_bytes": self._ring.bytes,
+            "health/store_age_s": self._ring.age_s,
             "health/store_history_rows": self.history_rows,
             "health/store_evicted_rows": self.evicted_rows,
             "health/store_error": self.error,
@@ -180,7 +176,7 @@ class Forwarder:
 
     # How it is done.
 
-    def _fly(self, sequence: int, changes: Sequence[Change]) -> bool:
+    def _fly(self, sequence: int, observations: int, changes: Sequence[Change]) -> bool:
         """Send one message; the row is in flight where it was sent in one session, else it waits."""
         session = self._node.session
         if not self._node.publish(self._device, changes) or session != self._node.session:
@@ -192,6 +188,7 @@ class Forwarder:
             self._flights.append(flight)
         flight.spans.add(sequence, sequence)
         flight.rows += 1
+        flight.observations += observations
         return True
 
     def _land(self) -> None:
@@ -199,8 +196,10 @@ class Forwarder:
         while self._confirmed:
             token = self._confirmed.popleft()
             while self._flights and 0 < self._flights[0].token <= token:
-                for first, last in self._flights.popleft().spans:
-                    self._emitted += self._ring.delete(first, last)[1]
+                flight = self._flights.popleft()
+                for number, (first, last) in enumerate(flight.spans):
+                    self._ring.delete(first, last, 0 if number else flight.observations)
+                self._emitted += flight.observations
                 self.error = ""
         while self._flights and self._flights[0].session != self._node.session:
             for first, last in self._flights.popleft().spans:
@@ -227,11 +226,14 @@ class Forwarder:
             if not changes:
                 raise StoreError("nothing of it is declared")
             stamp_ms = changes[-1].timestamp_ms
-            if self._fly(row.sequence, [*changes, Change(SEQUENCE, row.sequence, stamp_ms, is_historical=True)]):
+            if self._fly(
+                row.sequence, row.observations, [*changes, Change(SEQUENCE, row.sequence, stamp_ms, is_historical=True)]
+            ):
                 self.history_rows += 1
         except (SparkplugError, StoreError, ValueError, TypeError) as error:
             _log.warning("%s: row %d of the store cannot be told any more: %s", self._ring.file, row.sequence, error)
-            self._dropped[Drop.UNDECLARED] += self._ring.delete(row.sequence, row.sequence)[1]
+            self._ring.delete(row.sequence, row.sequence, row.observations)
+            self._dropped[Drop.UNDECLARED] += row.observations
 
     def _bar(self, now_s: float) -> None:
         """Set a barrier behind what was sent since the last one."""
@@ -246,6 +248,7 @@ class Forwarder:
 
     def _keep_bounds(self) -> None:
         self._keep_place()
+        self._ring.look()
         flying = [first for flight in self._flights for first, _ in flight.spans]
         gone = self._ring.evict(min(flying, default=self._ring.last + 1) - 1)
         while gone is not None:
@@ -256,7 +259,7 @@ class Forwarder:
 
     def _keep_place(self) -> None:
         if self._place is not None:
-            self._ring.append((), self._place, self._memory)
+            self._ring.keep(self._place, self._memory)
             self._place = self._memory = None
 
     def _send_unstored(self, row: Sequence[EdgeSample]) -> None:

@@ -68,11 +68,13 @@ class Pipeline:
     def memory(self) -> str | None:
         """To be stored with the rows of the frame that was taken last; None where nothing of it has changed."""
         last = tuple(self._report.last[name] for name in _REMEMBERED if name in self._report.last)
-        now = Memory(replace(self._change, clock_ms=None), last)
+        change = self._change
+        # A block that commands nothing changes nothing, and a program shows ten of them a second.
+        now = Memory(replace(change, clock_ms=None, block=change.block if change.shows_change else None), last)
         if self._before is not None or now == self._kept:
             return None
         self._kept = now
-        return _MEMORY.dump_json(Memory(self._change, last)).decode()
+        return _MEMORY.dump_json(now._replace(change=replace(now.change, clock_ms=change.clock_ms))).decode()
 
     @property
     def last(self) -> tuple[EdgeSample, ...]:
@@ -154,13 +156,13 @@ def _remembered(text: str | None) -> Memory | None:
 def rows_of(samples: Iterable[EdgeSample]) -> Iterator[tuple[EdgeSample, ...]]:
     """Cut where the moment changes or a signal comes again."""
     row: dict[str, EdgeSample] = {}
+    before: EdgeSample | None = None
     for sample in samples:
-        if row:
-            before = next(reversed(row.values()))
+        if before is not None:
             same_moment = sample.timestamp_ms == before.timestamp_ms or (sample.is_baseline and before.is_baseline)
             if not same_moment or sample.signal in row:
                 yield tuple(row.values())
                 row = {}
-        row[sample.signal] = sample
+        row[sample.signal] = before = sample
     if row:
         yield tuple(row.values())

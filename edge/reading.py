@@ -108,5 +108,6 @@ def _figure(target: Target, known: Signal, native: float) -> Outcome:
         whole = native == int(native) and abs(native) < 2**63
         return (int(native), Quality.GOOD, None) if whole else bad(f"not a whole number: {native:g}")
     value = native * target.factor + target.offset
-    reason = replace(known, low=target.low, high=target.high).plausible(value)
-    return (value, Quality.GOOD, None) if reason is None else bad(reason)
+    if target.low is None or target.high is None or target.low <= value <= target.high:
+        return value, Quality.GOOD, None
+    return bad(replace(known, low=target.low, high=target.high).plausible(value) or "")

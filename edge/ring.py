@@ -27,8 +27,22 @@ EVICTED_AT_ONCE = 200
 _log = logging.getLogger(__name__)
 _SCHEMA = """
 CREATE TABLE IF NOT EXISTS rows(
-    sequence INTEGER PRIMARY KEY AUTOINCREMENT, stored_ms INTEGER NOT NULL, observations INTEGER NOT NULL, body TEXT NOT NULL);
+    sequence INTEGER PRIMARY KEY AUTOINCREMENT, stored_ms INTEGER NOT NULL, observations INTEGER NOT NULL, body TEXT NOT NULL,
+    place TEXT, memory TEXT);
 CREATE TABLE IF NOT EXISTS kept(name TEXT PRIMARY KEY, value TEXT NOT NULL);
+CREATE TRIGGER IF NOT EXISTS keep_place AFTER INSERT ON rows WHEN NEW.place IS NOT NULL
+    BEGIN INSERT OR REPLACE INTO kept VALUES ('place', NEW.place); END;
+CREATE TRIGGER IF NOT EXISTS keep_memory AFTER INSERT ON rows WHEN NEW.memory IS NOT NULL
+    BEGIN INSERT OR REPLACE INTO kept VALUES ('memory', NEW.memory); END;
+"""
+# Each statement gives up the interpreter's lock and has to get it back, which with a hundred threads is what costs. So a frame is
+# one statement: the triggers keep place and memory in the same transaction.
+_ROWS_A_STATEMENT = 100
+_KEEP = "INSERT OR REPLACE INTO kept VALUES (?, ?)"
+_INSERT = "INSERT INTO rows VALUES (?, ?, ?, ?, ?, ?)"
+_LOOK = """
+SELECT (SELECT stored_ms FROM rows ORDER BY sequence LIMIT 1),
+    (SELECT page_count FROM pragma_page_count) - (SELECT freelist_count FROM pragma_freelist_count)
 """
 
 
@@ -111,6 +125,7 @@ class Ring:
             self.rows, self.observations = int(count), int(observations or 0)
             self._page_bytes = int(db.execute("PRAGMA page_size").fetchone()[0])
             self._began_ms = max(self._began_ms, int(newest or 0))
+            self.age_s, self.bytes = 0.0, 0
         except BaseException:
             db.close()
             raise
@@ -127,22 +142,36 @@ class Ring:
     def append(self, rows: Sequence[tuple[int, str]], place: Place | None = None, memory: str | None = None) -> int:
         """Store rows (observations, body), and the place and memory after them, in one transaction; the number of the first."""
         first, stored_ms = self.last + 1, self._now_ms()
-        numbered = [(first + i, stored_ms, observations, body) for i, (observations, body) in enumerate(rows)]
-        self._write(numbered, place, memory)
+        numbered: list[tuple[Any, ...]] = [
+            (first + i, stored_ms, observations, body, None, None) for i, (observations, body) in enumerate(rows)
+        ]
+        if numbered:
+            numbered[-1] = (*numbered[-1][:4], None if place is None else json.dumps(place), memory)
+        self._write(numbered)
         self.last += len(rows)
         self.rows += len(rows)
         self.observations += sum(observations for observations, _ in rows)
         return first
 
-    def _write(self, numbered: Sequence[tuple[int, int, int, str]], place: Place | None, memory: str | None) -> None:
+    def keep(self, place: Place, memory: str | None) -> None:
+        """Store a place, and a memory that belongs to it, without a row."""
         try:
+            values = {"place": json.dumps(place)} | ({} if memory is None else {"memory": memory})
+            pairs = [text for pair in values.items() for text in pair]
+            self._db.execute(_KEEP + ", (?, ?)" * (len(values) - 1), pairs)
+        except sqlite3.Error as error:
+            raise StoreError(f"{self.file}: cannot be written: {error}") from error
+
+    def _write(self, numbered: Sequence[tuple[Any, ...]]) -> None:
+        try:
+            if len(numbered) <= _ROWS_A_STATEMENT:
+                self._db.execute(
+                    _INSERT + ", (?, ?, ?, ?, ?, ?)" * (len(numbered) - 1), [value for row in numbered for value in row]
+                )
+                return
             self._db.execute("BEGIN IMMEDIATE")
             try:
-                self._db.executemany("INSERT INTO rows VALUES (?, ?, ?, ?)", numbered)
-                if place is not None:
-                    self._db.execute("INSERT OR REPLACE INTO kept VALUES ('place', ?)", (json.dumps(place),))
-                if memory is not None:
-                    self._db.execute("INSERT OR REPLACE INTO kept VALUES ('memory', ?)", (memory,))
+                self._db.executemany(_INSERT, numbered)
                 self._db.execute("COMMIT")
             except BaseException:
                 with suppress(sqlite3.Error):
@@ -178,31 +207,37 @@ class Ring:
         asked = "SELECT sequence, stored_ms, observations, body FROM rows WHERE sequence BETWEEN ? AND ? ORDER BY sequence"
         return [StoredRow(*row) for row in self._ask(asked, (first, last))]
 
-    def delete(self, first: int, last: int) -> tuple[int, int]:
-        """Rows that are not needed any more; how many there were, and how many observations."""
-        asked = "DELETE FROM rows WHERE sequence BETWEEN ? AND ? RETURNING observations"
-        gone = self._ask(asked, (first, last))
-        observations = sum(row[0] for row in gone)
-        self.rows -= len(gone)
-        self.observations -= observations
-        return len(gone), observations
+    def delete(self, first: int, last: int, observations: int) -> None:
+        """Rows that are not needed any more, and how many observations they are."""
+        try:
+            self.rows -= self._db.execute("DELETE FROM rows WHERE sequence BETWEEN ? AND ?", (first, last)).rowcount
+            self.observations -= observations
+        except sqlite3.Error as error:
+            raise StoreError(f"{self.file}: cannot be written: {error}") from error
+
+    def look(self) -> None:
+        """See how old and how much it is: `age_s` and `bytes` are as of the last look."""
+        oldest_ms, pages = self._ask(_LOOK)[0]
+        self.age_s = 0.0 if oldest_ms is None else max(self._now_ms() - int(oldest_ms), 0) / 1000
+        self.bytes = int(pages) * self._page_bytes
 
     def evict(self, upto: int) -> Evicted | None:
-        """The oldest rows with numbers up to `upto`, where one limit is passed: some at a time; None where none has to go."""
+        """After a look: the oldest rows with numbers up to `upto`, where a limit is passed, some at a time; else None."""
         reason = self._passed()
         if reason is None:
             return None
-        asked = "SELECT sequence, stored_ms FROM rows WHERE sequence <= ? ORDER BY sequence LIMIT ?"
+        asked = "SELECT sequence, stored_ms, observations FROM rows WHERE sequence <= ? ORDER BY sequence LIMIT ?"
         oldest = self._ask(asked, (upto, EVICTED_AT_ONCE))
         if reason is Eviction.AGE:
             limit_ms = self._now_ms() - round(self._limits.age_s_max * 1000)
             oldest = [row for row in oldest if row[1] < limit_ms]
         if not oldest:
             return None
-        last = int(oldest[-1][0])
-        rows, observations = self.delete(int(oldest[0][0]), last)
+        last, observations = int(oldest[-1][0]), sum(row[2] for row in oldest)
+        self.delete(int(oldest[0][0]), last, observations)
         self._ask(f"PRAGMA incremental_vacuum({EVICTED_AT_ONCE})")
-        return Evicted(reason, rows, last, observations)
+        self.look()
+        return Evicted(reason, len(oldest), last, observations)
 
     def _passed(self) -> Eviction | None:
         if not self.rows:
@@ -212,18 +247,6 @@ class Ring:
         if self.bytes > self._limits.bytes_max:
             return Eviction.BYTES
         return Eviction.DISK if self._free_bytes(self.file.parent) < self._limits.free_bytes_min else None
-
-    @property
-    def age_s(self) -> float:
-        """Of the oldest row, seconds."""
-        found = self._ask("SELECT stored_ms FROM rows ORDER BY sequence LIMIT 1")
-        return max(self._now_ms() - int(found[0][0]), 0) / 1000 if found else 0.0
-
-    @property
-    def bytes(self) -> int:
-        """Of the file that is in use."""
-        pages = int(self._ask("PRAGMA page_count")[0][0]) - int(self._ask("PRAGMA freelist_count")[0][0])
-        return pages * self._page_bytes
 
     def _ask(self, text: str, values: Iterable[int] = ()) -> list[tuple[Any, ...]]:
         try:

@@ -13,6 +13,7 @@ either, because then each consumer would have to look at the quality before it c
 import re
 from dataclasses import dataclass, replace
 from enum import Enum
+from functools import lru_cache
 
 from edge.errors import ConfigError
 
@@ -96,6 +97,7 @@ _AXES = (
 )
 
 
+@lru_cache(maxsize=4096)
 def signal(name: str) -> Signal:
     """The signal of this canonical name, or ConfigError."""
     known = SIGNALS.get(name)

@@ -35,7 +35,7 @@ BACKOFF_S_MIN = 0.2
 BACKOFF_S_MAX = 15.0
 ABSENT_S_MAX = 0.5  # where nobody listens: knocking costs nobody anything, and live values are wanted soon after its return
 STABLE_S = 5.0
-TICK_S = 0.1
+TICK_S = 0.2
 DRIVEN_S = 0.05
 _log = logging.getLogger(__name__)
 
