@@ -4,6 +4,7 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import lru_cache
 from hashlib import sha256
 from typing import Any
 
@@ -32,6 +33,7 @@ class Notice:
     expires_s: float = 0.0
 
 
+@lru_cache(4096)  # the same few moments are written at every beat
 def iso(at_ms: int) -> str:
     """UTC as RFC 3339; no time where no calendar reaches it.
 

@@ -12,19 +12,21 @@ done again. What cannot be read is counted and shown, and changes nothing.
 import json
 from collections.abc import Callable
 from dataclasses import replace
+from datetime import UTC, datetime
 from hashlib import sha256
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from processors.alerts_body import Notice, item
+from processors.alerts_body import ALERTS_A_BODY_MAX, Notice, iso, item
 from processors.alerts_config import AlertsConfig
-from processors.alerts_notices import remembered
+from processors.alerts_recall import recalled
 from processors.alerts_state import (
     FAILURES_MAX,
     OUTCOMES_MAX,
     SETTLED_MAX,
     SILENCES_MAX,
+    Alert,
     AlertsState,
     CommandOutcome,
     Failure,
@@ -32,7 +34,9 @@ from processors.alerts_state import (
     Phase,
     ReceiverState,
     Settled,
+    Severity,
     Silence,
+    fingerprint,
 )
 
 TOPIC = "cnctwin/alerts/"
@@ -95,12 +99,29 @@ class Delivery(_Message):
     reason: Comment = ""
 
 
+class OutboxAlert(_Message):
+    """What is read of an alert in our own outbox."""
+
+    fingerprint: Name
+    labels: dict[str, str]
+    annotations: dict[str, str] = {}
+    ended: str = Field(alias="endsAt")
+
+
+class OutboxBody(_Message):
+    """The alerts of a notification in our own outbox."""
+
+    alerts: list[OutboxAlert] = Field(default=[], max_length=ALERTS_A_BODY_MAX)
+
+
 class OutboxItem(_Message):
     """What is read of our own outbox."""
 
     id: Name
     receiver: Name
     kind: Name
+    created: str = ""
+    body: OutboxBody = OutboxBody()
     says: list[Annotated[str, Field(max_length=200)]] = Field(max_length=5000)
 
 
@@ -249,4 +270,26 @@ def _own(state: AlertsState, found: OutboxItem, text: str) -> AlertsState:
         state.clock_s,
         state.clock_s + TEST_EXPIRES_S,
     )
-    return remembered(state, made)
+    written = {one.fingerprint: _written(one) for one in found.body.alerts if _is_ours(one)}
+    return recalled(state, made, written, is_later=found.created > iso(round(state.wall_s * 1000)))
+
+
+def _is_ours(found: OutboxAlert) -> bool:
+    """Whether its labels are those of its fingerprint."""
+    labels = {name: value for name, value in found.labels.items() if name != "severity"}
+    return {"machine", "alertname", "severity"} <= found.labels.keys() and fingerprint(labels) == found.fingerprint
+
+
+def _written(found: OutboxAlert) -> Alert:
+    """The alert of no episode yet. Raises ValueError where its severity or its end is none."""
+    labels = found.labels
+    return Alert(
+        labels["machine"],
+        labels["alertname"],
+        labels.get("signal", ""),
+        found.fingerprint,
+        Severity(labels["severity"]),
+        0,
+        ended_ms=round(datetime.fromisoformat(found.ended).replace(tzinfo=UTC).timestamp() * 1000),
+        context=found.annotations.get("description", ""),
+    )

@@ -13,15 +13,14 @@ from typing import NamedTuple
 from processors.alerts_body import Notice, item
 from processors.alerts_config import AlertsConfig
 from processors.alerts_receivers import AnyReceiver
-from processors.alerts_routing import FIRING, PASSED, RAISED, REPEAT, RESOLVED, Change, changes_for, has_passed
+from processors.alerts_routing import FIRING, OVER, PASSED, RAISED, REPEAT, RESOLVED, Change, changes_for, has_passed
 from processors.alerts_silence import silenced_by
-from processors.alerts_state import OUTBOX_MAX, Alert, AlertsState, Group, Item, ReceiverState, Severity, Told
+from processors.alerts_state import OUTBOX_MAX, Alert, AlertsState, Group, ReceiverState, Severity, Told
 from processors.config import Configuration
 
 HOUR_S = 3600.0
 EXPIRES_S = 6 * HOUR_S
 DIGEST = "digest"
-OVER = (RESOLVED, PASSED)
 
 
 class _Bundle(NamedTuple):
@@ -215,22 +214,3 @@ def _group_key(config: AlertsConfig, alert: Alert) -> str:
 
 def _group_labels(config: AlertsConfig, alert: Alert) -> dict[str, str]:
     return {"machine": alert.machine} if config.group_by == "machine" else {}
-
-
-def remembered(state: AlertsState, made: Item) -> AlertsState:
-    """A notification of ours that this state does not know: made before a crash, after the last snapshot. It is told."""
-    known = state.receivers.get(made.receiver, ReceiverState())
-    told = dict(known.told)
-    for said in made.says:
-        parts = said.split(".")
-        if len(parts) != 5 or parts[4] not in {severity.value for severity in Severity}:
-            continue
-        fingerprint, episode, what, count, severity = parts[0], int(parts[1]), parts[2], int(parts[3]), Severity(parts[4])
-        before = told.get(fingerprint)
-        if before is None or (before.episode, before.count) < (episode, count + 1):
-            told[fingerprint] = Told(episode, severity, what not in OVER, state.clock_s, count + 1)
-    receivers = state.receivers | {made.receiver: replace(known, told=told)}
-    outbox = state.outbox
-    if made.id not in state.settled and len(outbox) < OUTBOX_MAX:
-        outbox = outbox | {made.id: made}
-    return replace(state, receivers=receivers, outbox=outbox)

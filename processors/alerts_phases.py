@@ -78,14 +78,17 @@ def advanced(alert: Alert, rule: Rule, condition: Condition, beat: Beat, config:
         if unknown_s > config.forget_after_s:
             return _ended(alert, beat, round(beat.wall_s * 1000))
         return replace(alert, unknown=condition.reason, unknown_s=unknown_s)
-    alert = replace(alert, unknown="", unknown_s=0.0)
+    if alert.unknown or alert.unknown_s:
+        alert = replace(alert, unknown="", unknown_s=0.0)
     if alert.phase is Phase.PENDING:
         if not condition.stands:
             return _gone(alert)
         held_s = alert.held_s + beat.seen_s
         return _fired(alert, beat) if held_s >= rule.for_s else replace(alert, held_s=held_s)
     if condition.stands:
-        is_rise = alert.clear_s is not None and alert.clear_s >= rule.keep_firing_for_s
+        if alert.clear_s is None:
+            return alert
+        is_rise = alert.clear_s >= rule.keep_firing_for_s
         rises_s = (*alert.rises_s, beat.clock_s)[-RISES_MAX:] if is_rise else alert.rises_s
         return replace(alert, clear_s=None, rises_s=rises_s)
     clear_s = 0.0 if alert.clear_s is None else alert.clear_s + beat.seen_s
@@ -102,6 +105,21 @@ def raised(alert: Alert, severity: Severity, beat: Beat) -> Alert:
     if worse.phase is Phase.ACKNOWLEDGED:
         return replace(worse, phase=Phase.FIRING, since_wall_s=beat.wall_s, acknowledged_by="", comment="")
     return worse
+
+
+def caught_up(alert: Alert, severity: Severity, episode: int, ended_ms: int | None, beat: Beat) -> Alert:
+    """The alert as far as an earlier life of ours took it: it told that this episode fires, or that it was over at `ended_ms`.
+
+    An alert that is further already stays as it is.
+    """
+    if alert.episode > episode or (alert.episode == episode and alert.phase is Phase.RESOLVED):
+        return alert
+    if alert.episode < episode:
+        alert = begun(alert, Rule(severity=severity), Condition(True, "", episode), beat)
+    elif alert.phase is Phase.PENDING:
+        alert = _fired(alert, beat)
+    alert = raised(alert, severity, beat)
+    return alert if ended_ms is None else _over(alert, beat, ended_ms)
 
 
 def flaps(alert: Alert, clock_s: float, config: AlertsConfig) -> bool:
@@ -137,14 +155,15 @@ def _gone(alert: Alert) -> Alert | None:
 
 
 def _ended(alert: Alert, beat: Beat, at_ms: int) -> Alert | None:
-    if not alert.is_on:
-        return _gone(alert)
-    ended_ms = max(at_ms, alert.episode)
+    return _over(alert, beat, at_ms) if alert.is_on else _gone(alert)
+
+
+def _over(alert: Alert, beat: Beat, at_ms: int) -> Alert:
     return replace(
         alert,
         phase=Phase.RESOLVED,
         since_wall_s=beat.wall_s,
-        ended_ms=ended_ms,
+        ended_ms=max(at_ms, alert.episode),
         resolved_s=beat.clock_s,
         clear_s=None,
         unknown="",

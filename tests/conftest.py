@@ -1,6 +1,8 @@
 """What tests of several packages share: a real broker, and the proxy in front of it."""
 
+import os
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -11,6 +13,38 @@ from tests.wire.proxy import Proxy
 # How long an example takes says more of the machine that it runs on than of the code.
 settings.register_profile("house", deadline=None)
 settings.load_profile("house")
+
+# Our tests start hundreds of processes: each module is compiled once, whatever the caller's environment says of that.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+os.environ.setdefault("PYTHONPYCACHEPREFIX", str(Path(__file__).parents[1] / ".cache" / "bytecode"))
+
+# Files that take half a minute and more. They begin first, so that none of them is left for one worker when the others are done.
+LONG = (
+    "cnctwin/test_kill_and_restart.py",
+    "processors/courier/test_courier_on_a_broker.py",
+    "cnctwin/test_demo.py",
+    "twin/identification/test_identify.py",
+    "twin/gap/test_program_time.py",
+    "processors/test_contract.py",
+    "twin/gap/test_diagnose.py",
+    "twin/anomaly/test_detector.py",
+    "cnctwin/test_demo_by_peer.py",
+    "cnctwin/test_train_anomaly.py",
+    "processors/courier/test_processor_and_courier_killed.py",
+    "processors/courier/test_simulated_crashes.py",
+)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """pytest-xdist would begin with the files that hold the most tests; it is given them in our order."""
+    config.option.loadscopereorder = False
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """The long files first."""
+    tests = Path(__file__).parent
+    ranks = {tests / name: rank for rank, name in enumerate(LONG)}
+    items.sort(key=lambda item: ranks.get(item.path, len(LONG)))
 
 
 @pytest.fixture(scope="session", autouse=True)

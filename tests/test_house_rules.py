@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.conftest import LONG
+
 ROOT = Path(__file__).parent.parent
 PACKAGES = ("sparkplug", "twin", "edge", "processors", "cnctwin")
 LINES_MAX = 400
@@ -63,6 +65,10 @@ def test_nothing_is_unpickled_evaluated_or_left_unbounded(path: Path) -> None:
 def test_tests_mirror_the_tree() -> None:
     missing = [package for package in PACKAGES if not any((ROOT / "tests" / package).glob("test_*.py"))]
     assert not missing
+
+
+def test_the_files_that_begin_first_are_there() -> None:
+    assert [name for name in LONG if not (ROOT / "tests" / name).exists()] == []
 
 
 def test_the_arrows_between_packages_hold() -> None:

@@ -83,7 +83,7 @@ def check_sessions(proxy: Proxy) -> None:
             watch = watches[packet.client_id]
             watch.connecting(actions.Connect(will), numbers.get(packet.client_id))
             numbers[packet.client_id] = watch.will_bd_seq
-        elif isinstance(packet, Publish) and recorded.connection in client_of:
+        elif isinstance(packet, Publish) and packet.topic.startswith("spBv1.0/") and recorded.connection in client_of:
             watch = watches[client_of[recorded.connection]]
             watch.sent(actions.Publish(packet.topic, packet.payload, packet.qos, packet.retain), declared=[])
     assert len(watches) == 4, "the edge and three processors"

@@ -1,22 +1,47 @@
 """The twin from the command line: figures, files, and one line for what is wrong."""
 
+import io
 import json
 import subprocess
 import sys
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
+from cnctwin.cli import main
 from tests.twin.test_simulation import MACHINE, SLOT
 from twin.machine import machine_to_toml, read_machine
 from twin.runlog import read_run, write_run
 from twin.simulation import simulate
 
 
-def cnctwin(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
-    """The command, run to its end."""
-    command = [sys.executable, "-m", "cnctwin", *map(str, arguments)]
-    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=120, check=False)
+class Done(NamedTuple):
+    """What came of a command."""
+
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+def cnctwin(*arguments: object, cwd: Path = Path()) -> Done:
+    """The command, run to its end in this process, which has loaded and compiled what it needs."""
+    out, err = io.StringIO(), io.StringIO()
+    with pytest.MonkeyPatch.context() as patch, redirect_stdout(out), redirect_stderr(err):
+        patch.setattr(sys, "argv", ["cnctwin", *map(str, arguments)])
+        patch.chdir(cwd)
+        with pytest.raises(SystemExit) as ended:
+            main()
+    return Done(int(ended.value.code or 0), out.getvalue(), err.getvalue())
+
+
+def test_a_process_of_its_own_says_the_same(folder: Path) -> None:
+    arguments = ("simulate", "slot.nc", "--machine", "machine.toml", "--json")
+    command = [sys.executable, "-m", "cnctwin", *arguments]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=120, check=False)
+    assert done.stderr == ""
+    assert json.loads(done.stdout) == json.loads(cnctwin(*arguments, cwd=folder).stdout)
 
 
 @pytest.fixture

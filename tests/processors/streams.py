@@ -1,5 +1,7 @@
 """Streams of host events for the tests of processors, in one line each."""
 
+import math
+from random import Random
 from typing import Any
 
 from hypothesis import strategies as st
@@ -76,56 +78,54 @@ def plain(effects: list[Effect]) -> dict[str, bytes]:
 
 
 SIGNALS = ("spindle_rpm", "spindle_load_pct", "ambient_temp_c", "spindle_temp_c", "tool_number", "program", "twin/raw_score")
-_values = st.one_of(
-    st.none(),
-    st.booleans(),
-    st.integers(-(2**63), 2**64 - 1),
-    st.floats(allow_nan=True, allow_infinity=True),
-    st.floats(0, 200),
-    st.text(max_size=5),
-    st.binary(max_size=3),
-    st.tuples(st.floats(), st.floats()),
+_VALUES = (
+    *(None, True, False, 0, 1, -1, 2**53 + 1, -(2**63), 2**64 - 1),
+    *(0.0, -0.0, 1e-300, 5e-324, 1.7976931348623157e308, -1e17, math.nan, math.inf, -math.inf),
+    *("", "A", "\x00", "Ω\n", "\U0010ffff", b"", b"\x00\xff", (0.0, math.nan), (1.0, -math.inf)),
 )
 # Mostly forward in small steps, with standstills, back-steps, leaps of hours, and the ends of what 64 bits can say.
-_steps_ms = st.one_of(
-    st.integers(0, 3000),
-    st.sampled_from([0, 0, -80, -4_000, -900_000, 700_000, 13_320_000, -13_320_000, 10**13, -(10**13)]),
-)
-_nodes = st.sampled_from(
-    [EDGE, EDGE, EDGE, NodeId("cnc", "edge-vibration"), NodeId("cnc", "twin-thermal"), NodeId("cnc", "twin-x")]
-)
+_LEAPS_MS = (0, 0, -80, -4_000, -900_000, 700_000, 13_320_000, -13_320_000, 10**13, -(10**13))
+_NODES = (EDGE, EDGE, EDGE, NodeId("cnc", "edge-vibration"), NodeId("cnc", "twin-thermal"), NodeId("cnc", "twin-x"))
+_KINDS = (*[EventKind.DATA] * 6, EventKind.BIRTH, EventKind.DEATH, EventKind.HOLE)
 
 
-@st.composite
-def _readings(draw: st.DrawFn, at_ms: int) -> tuple[Reading, ...]:
-    names = draw(st.lists(st.sampled_from(SIGNALS), max_size=4))
+def _value(chance: Random) -> Any:
+    drawn = (chance.choice(_VALUES), chance.uniform(0.0, 200.0), chance.randint(0, 8), 10.0 ** chance.uniform(-30, 30))
+    return chance.choice(drawn)
+
+
+def _readings(chance: Random, at_ms: int) -> tuple[Reading, ...]:
     return tuple(
         Reading(
             name,
-            draw(_values),
-            min(max(at_ms + draw(st.sampled_from([0, 0, 0, -80, 10**14])), 0), 2**64 - 1),
-            draw(st.sampled_from([Quality.GOOD, Quality.GOOD, Quality.GOOD, Quality.BAD, Quality.STALE])),
+            _value(chance),
+            min(max(at_ms + chance.choice((0, 0, 0, -80, 10**14)), 0), 2**64 - 1),
+            chance.choice((Quality.GOOD, Quality.GOOD, Quality.GOOD, Quality.BAD, Quality.STALE)),
             "unit",
-            draw(st.sampled_from([None, "because"])),
-            draw(st.sampled_from([False, False, False, True])),
+            chance.choice((None, "because")),
+            chance.random() < 0.25,
         )
-        for name in names
+        for name in chance.choices(SIGNALS, k=chance.randrange(5))
     )
 
 
-@st.composite
-def wild_streams(draw: st.DrawFn, length_max: int = 25) -> list[HostEvent]:
+def wild_stream(length: int, seed: int) -> list[HostEvent]:
     """Anything that a broker could ever bring: late, duplicate, null, NaN, out of order, of several sources, dead and born."""
-    at_ms = T0_MS
+    chance, at_ms = Random(seed), T0_MS
     stream = [birth(0.0, spindle_rpm=0.0, spindle_load_pct=0.0, tool_number=1, program="A")]
-    for _ in range(draw(st.integers(0, length_max))):
-        if len(stream) > 1 and draw(st.integers(0, 9)) == 0:
+    for _ in range(length):
+        if len(stream) > 1 and chance.randrange(10) == 0:
             stream.append(stream[-1])
             continue
-        at_ms = min(max(at_ms + draw(_steps_ms), 0), 2**63)
-        kinds = [EventKind.DATA] * 6 + [EventKind.BIRTH, EventKind.DEATH, EventKind.HOLE]
-        kind = draw(st.sampled_from(kinds))
-        device = None if kind is EventKind.HOLE else draw(st.sampled_from(["okuma", "okuma", "mazak", None]))
-        readings = () if kind in (EventKind.DEATH, EventKind.HOLE) else draw(_readings(at_ms))
-        stream.append(HostEvent(kind, draw(_nodes), device, at_ms, readings, "detail"))
+        step_ms = chance.randint(0, 3000) if chance.random() < 0.5 else chance.choice(_LEAPS_MS)
+        at_ms = min(max(at_ms + step_ms, 0), 2**63)
+        kind = chance.choice(_KINDS)
+        device = None if kind is EventKind.HOLE else chance.choice(("okuma", "okuma", "mazak", None))
+        readings = () if kind in (EventKind.DEATH, EventKind.HOLE) else _readings(chance, at_ms)
+        stream.append(HostEvent(kind, chance.choice(_NODES), device, at_ms, readings, "detail"))
     return stream
+
+
+def wild_streams(length_max: int = 25) -> st.SearchStrategy[list[HostEvent]]:
+    """Wild streams by their length and a seed: drawing each value by itself takes longer than what is tested."""
+    return st.builds(wild_stream, st.integers(0, length_max), st.integers(0, 2**32))

@@ -51,7 +51,7 @@ def live(shop: Shop, happenings: list[tuple[Any, ...]], without: tuple[str, ...]
                 shop.rows[machine] = away.pop(machine)
             shop.set(machine, quality=quality, reason="by chance", **{signal: value})
         elif what == "wait":
-            shop.wait(values[0], beat_s=2.0)
+            shop.wait(values[0], beat_s=4.0)
         elif what == "offline" and values[0] in shop.rows:
             away[values[0]] = shop.offline(values[0])
         elif what == "ack":
@@ -105,7 +105,7 @@ def test_every_firing_that_nobody_silenced_or_acknowledged_is_told_to_everybody(
     }
     shop = Shop(receivers=ROOMY, signals=signals)
     live(shop, happenings, without=("ack", "silence", "clock"))
-    shop.wait(400)  # longer than any interval
+    shop.wait(400, beat_s=4.0)  # longer than any interval
     firing = {(alert.fingerprint, alert.episode) for alert in shop.state.alerts.values() if alert.rises_s}
     for receiver in ROOMY:
         told = {tuple(entry.split(".")[:2]) for one in shop.told if one.receiver == receiver for entry in one.says}

@@ -52,7 +52,7 @@ def test_what_no_courier_takes_is_said_to_have_failed() -> None:
     shop.set(vibration=True)
     shop.wait(30)
     shop.command("ack", fingerprint=shop.fingerprint())
-    shop.wait(7 * 3600, beat_s=5.0)
+    shop.wait(7 * 3600, beat_s=30.0)
     assert [one["reason"] for one in shop.shown()["failures"]] == ["no courier said what became of it; it may have arrived"]
     assert outbox(shop) == {}
 

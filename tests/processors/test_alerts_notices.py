@@ -3,11 +3,6 @@
 from datetime import UTC, datetime
 from typing import Any
 
-import pytest
-
-from processors.alerts_config import AlertsConfig
-from processors.config import Configuration
-from processors.errors import ConfigurationError
 from tests.processors.courier.alert_shop import DESK, PHONE, T0_S, VIBRATION, Shop
 
 BRISK = {"keep_firing_for_s": 0.0}
@@ -33,7 +28,7 @@ def test_one_firing_is_one_notification_and_its_end_another() -> None:
     assert news(shop.wait(600)) == [["firing"]]
     shop.set(vibration=False)
     assert news(shop.wait(600)) == [["resolved"]]
-    assert news(shop.wait(3600, beat_s=5.0)) == []
+    assert news(shop.wait(3600, beat_s=30.0)) == []
 
 
 def test_what_happens_together_on_a_machine_is_told_together() -> None:
@@ -98,7 +93,7 @@ def test_every_firing_is_told_also_where_ends_are_not_wanted() -> None:
 def test_the_repeat_interval_holds_for_an_alert_that_flaps() -> None:
     """alertmanager #3846: an alert that fires every half an hour is told each time, whatever repeat_interval says."""
     shop = Shop(**FLAPPY, repeat_interval_s=76 * 3600.0)
-    for _ in range(48):
+    for _ in range(20):
         shop.set(vibration=True)
         shop.wait(900, beat_s=5.0)
         shop.set(vibration=False)
@@ -182,7 +177,7 @@ def test_an_alert_that_is_over_before_its_group_was_told_is_told_all_the_same() 
     (told,) = shop.wait(60)
     assert (told.news, told.title) == (["passed"], "[resolved] okuma: rule_vibration")
     assert told.text == "over: rule_vibration on okuma from 2026-11-18T11:06:41.000Z to 2026-11-18T11:06:44.000Z"
-    assert shop.wait(3600, beat_s=5.0) == []
+    assert shop.wait(3600, beat_s=30.0) == []
 
 
 def test_what_is_over_at_the_end_of_quiet_hours_is_not_told_unless_it_was_high() -> None:
@@ -195,7 +190,7 @@ def test_what_is_over_at_the_end_of_quiet_hours_is_not_told_unless_it_was_high()
         shop.set(score=False)
         shop.set("mazak", vibration=False)
         shop.wait(400)
-    told = shop.wait(8 * 3600, beat_s=5.0)
+    told = shop.wait(8 * 3600, beat_s=30.0)
     assert told == []
     assert [(one.title, one.news) for one in shop.told] == [("[resolved] mazak: rule_vibration", ["passed"])] * 2
 
@@ -220,7 +215,7 @@ def test_what_is_acknowledged_in_time_goes_to_nobody_else() -> None:
     shop.set(vibration=True)
     shop.wait(500)
     shop.command("ack", fingerprint=shop.fingerprint())
-    assert shop.wait(3600, beat_s=5.0) == []
+    assert shop.wait(3600, beat_s=30.0) == []
 
 
 def test_what_could_not_be_delivered_goes_to_the_next_at_once() -> None:
@@ -258,7 +253,7 @@ def test_what_the_rate_limit_holds_back_is_counted_and_said_and_high_has_a_limit
     (told,) = shop.wait(30)
     assert "high" in told.title
     assert told.text.endswith("7 notifications were held back before this one")
-    later = shop.wait(7300, beat_s=5.0)
+    later = shop.wait(7300, beat_s=30.0)
     assert {one.title.split()[3] for one in later} == {f"m{number}:" for number in range(5, 12)}  # each of them in the end
 
 
@@ -281,11 +276,11 @@ def test_in_quiet_hours_only_high_alerts_are_told_and_the_rest_as_one_digest_aft
     shop.set("okuma", score=True)
     shop.set("mazak", score=True)
     shop.set("haas", drift=True)
-    assert shop.wait(3600, beat_s=5.0) == []
+    assert shop.wait(3600, beat_s=30.0) == []
     shop.set("okuma", vibration=True)
     assert [one.title for one in shop.wait(60)] == ["[2 firing, high] okuma: anomaly_alarm, rule_vibration"]
     shop.set("haas", drift=False)
-    told = shop.wait(6 * 3600 + 60, beat_s=5.0)
+    told = shop.wait(6 * 3600 + 60, beat_s=30.0)
     digests = [one for one in told if one.kind == "digest"]
     assert [(one.title, one.news) for one in digests] == [
         ("after quiet hours: [1 firing, medium] mazak: anomaly_alarm", ["firing"])
@@ -299,7 +294,7 @@ def test_a_night_without_news_has_no_digest() -> None:
     shop.set(score=True)
     shop.wait(600)
     shop.set(score=False)
-    assert shop.wait(8 * 3600, beat_s=5.0) == []
+    assert shop.wait(8 * 3600, beat_s=30.0) == []
 
 
 def test_quiet_hours_may_be_those_of_one_receiver() -> None:
@@ -329,89 +324,6 @@ def test_a_test_is_told_to_the_one_receiver() -> None:
     assert (told.kind, told.title, told.text) == ("test", "Test of cnctwin's alerts", "asked for by ada")
     outcome = shop.command("test", receiver="nobody")
     assert outcome == {"done": False, "text": "there is no receiver 'nobody'; there are: desk"}
-
-
-# The body.
-
-
-def test_the_body_is_that_of_alertmanagers_webhook_version_4() -> None:
-    shop = Shop(labels={"site": "north"}, external_url="https://twin.plant.example")
-    shop.set(vibration=True)
-    (told,) = shop.wait(20)
-    (alert,) = told.body["alerts"]
-    labels = {"alertname": "rule_vibration", "machine": "okuma", "signal": VIBRATION, "severity": "high", "site": "north"}
-    assert told.body == {
-        "version": "4",
-        "groupKey": "{}/{receiver='desk'}:{machine='okuma'}",
-        "truncatedAlerts": 0,
-        "status": "firing",
-        "receiver": "desk",
-        "groupLabels": {"machine": "okuma"},
-        "commonLabels": labels,
-        "commonAnnotations": alert["annotations"],
-        "externalURL": "https://twin.plant.example",
-        "alerts": [alert],
-    }
-    assert alert == {
-        "status": "firing",
-        "labels": labels,
-        "annotations": {"summary": "rule_vibration on okuma"},
-        "startsAt": "2026-11-18T11:06:40.000Z",
-        "endsAt": "0001-01-01T00:00:00Z",
-        "generatorURL": "https://twin.plant.example",
-        "fingerprint": shop.fingerprint(),
-    }
-
-
-def test_a_body_holds_fifty_alerts_and_says_how_many_more_there_are() -> None:
-    shop = Shop(group_by="all")
-    for number in range(60):
-        shop.set(f"m{number:02d}", score=True)
-    (told,) = shop.wait(30)
-    assert (len(told.body["alerts"]), told.body["truncatedAlerts"], len(told.news)) == (50, 10, 60)
-
-
-# Configuration.
-
-
-@pytest.mark.parametrize(
-    ("table", "said"),
-    [
-        ({"signals": {"twin/nonsense": {"severity": "high"}}}, "'twin/nonsense' is no alarm signal"),
-        ({"routes": [{"receivers": ["nobody"]}]}, "there is no receiver 'nobody'"),
-        ({"heartbeat": {"receiver": "nobody"}}, "heartbeat: there is no receiver"),
-        ({"cells": {"a": ["okuma"]}}, "alerts watch all machines together"),
-        ({"labels": {"machine": "x"}}, "labels: 'machine'"),
-        ({"quiet_hours": [{"time_zone": "Mars/Olympus", "start": "22:00", "end": "06:00"}]}, "no time zone 'Mars/Olympus'"),
-        ({"quiet_hours": [{"time_zone": "UTC", "start": "25:00", "end": "06:00"}]}, "'25:00' is no time of the day"),
-        ({"receivers": {"a b": DESK["desk"]}}, "receivers: 'a b'"),
-    ],
-)
-def test_a_wrong_configuration_says_what_is_wrong(table: dict[str, Any], said: str) -> None:
-    with pytest.raises(ConfigurationError) as error:
-        Configuration(AlertsConfig, table, name="alerts")
-    assert said in str(error.value)
-
-
-@pytest.mark.parametrize(
-    ("receiver", "said"),
-    [
-        ({"type": "pushover", "token": "hunter2", "user": "$U"}, "a secret does not stand in the configuration"),
-        ({"type": "pushover", "token": "$T", "user": "$U", "password": "hunter2"}, "Extra inputs are not permitted"),
-        ({"type": "webhook", "url": "https://ada:hunter2@plant.example/x"}, "holds a user name or a password"),
-        ({"type": "webhook", "url": "https://plant.example/x?key=hunter2"}, "has a query"),
-        ({"type": "webhook", "url": "http://plant.example/hunter2"}, "is not encrypted: use https://"),
-        ({"type": "webhook", "url": "ftp://plant.example/hunter2"}, "is not https://"),
-        ({"type": "apprise", "url": "pover://hunter2@hunter2"}, "a secret does not stand in the configuration"),
-        ({"type": "hunter2"}, "receivers.x"),
-    ],
-)
-def test_a_secret_in_the_configuration_is_refused_and_not_repeated(receiver: dict[str, Any], said: str) -> None:
-    with pytest.raises(ConfigurationError) as error:
-        Configuration(AlertsConfig, {"receivers": {"x": receiver}}, name="alerts")
-    assert said in str(error.value)
-    if receiver["type"] != "hunter2":
-        assert "hunter2" not in str(error.value)
 
 
 def test_the_start_of_a_shop_is_a_wednesday() -> None:

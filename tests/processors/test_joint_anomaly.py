@@ -288,6 +288,17 @@ def test_a_known_clock_offset_is_taken_off_before_machines_are_compared() -> Non
     assert metric(effects, COMMON)[0] == (1.0, True)
 
 
+@pytest.mark.parametrize(("stamped_by", "common"), [("edge", [True]), ("control", [])])
+def test_the_offset_of_a_clock_is_taken_off_the_stamps_of_that_clock_only(stamped_by: str, common: list[bool]) -> None:
+    """b's control is 100 s ahead too, but the samples carry the time of the edge, which is that of a's."""
+    told = {"clock_offset_s": 100.0, "stamp_clock": stamped_by}
+    b = [birth(0.0, device="b", node=NodeId("cnc", "b"), spindle_load_pct=90.0, **told)]
+    b += [says((one.timestamp_ms - T0_MS) / 1000, "b", spindle_load_pct=90.0) for one in course("b", 20, {})]
+    a = course("a", 20, {0.5: {"load": 90.0}})
+    effects = fed(cell("a", "b"), *born("a", load=90.0), *(one for pair in zip(a, b, strict=False) for one in pair))
+    assert [value for at_s, value in metric(effects, COMMON) if value] == common
+
+
 def test_a_restart_in_the_middle_of_a_change_loses_nothing() -> None:
     whole, first, second = (cell("a", look_back_s=5.0) for _ in range(3))
     stream = change_of_15_s(load_until_s=45.2)

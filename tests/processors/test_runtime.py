@@ -6,7 +6,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -23,24 +23,14 @@ from sparkplug.host import HostApplication
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import Change, MetricSpec, NodeId, Reading
 from sparkplug.quality import Quality
+from tests.processors.courier.office import until
 from tests.processors.streams import T0_MS, UNITS, engine_of, fed
 from tests.processors.streams import birth as birth_event
 from tests.processors.streams import data as data_event
 from tests.wire.mosquitto import Mosquitto
 from twin.thermal import rise_after
 
-PATIENCE_S = 20.0
 CONFIGURATION = "[thermal]\nambient_temp_c = 20.0\n"
-
-
-def until(true: Callable[[], Any], what: str) -> Any:
-    """Wait for something; the value that was not false."""
-    deadline_s = time.monotonic() + PATIENCE_S
-    while time.monotonic() < deadline_s:
-        if value := true():
-            return value
-        time.sleep(0.02)
-    raise AssertionError(f"{what} did not come within {PATIENCE_S:g} s")
 
 
 class Reader:

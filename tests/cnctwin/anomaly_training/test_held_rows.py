@@ -72,13 +72,13 @@ def with_a_hole(run: RunLog, from_s: float, to_s: float) -> RunLog:
 
 
 LOGS = {
-    "each signal every half second": machine_log(900.0, 1),
-    "signals now and then": machine_log(900.0, 2, sparse=True),
-    "faster than the ticks": machine_log(200.0, 3, period_s=0.02, sparse=True),
-    "slower than the ticks": machine_log(3000.0, 4, period_s=13.0, sparse=True),
+    "each signal every half second": machine_log(500.0, 1),
+    "signals now and then": machine_log(500.0, 2, sparse=True),
+    "faster than the ticks": machine_log(120.0, 3, period_s=0.02, sparse=True),
+    "slower than the ticks": machine_log(1800.0, 4, period_s=13.0, sparse=True),
     "on the ticks": run_log({**machine_log(300.0, 5, period_s=1.0).columns, "t_s": np.arange(300.0)}),
-    "with a hole": with_a_hole(machine_log(2500.0, 6), 500.0, 1700.0),
-    "with a short silence": with_a_hole(machine_log(900.0, 7), 300.0, 420.0),
+    "with a hole": with_a_hole(machine_log(1700.0, 6), 500.0, 1300.0),
+    "with a short silence": with_a_hole(machine_log(500.0, 7), 200.0, 320.0),
 }
 
 

@@ -1,6 +1,8 @@
 """Regimes and prepared features of a recording are, tick by tick, those that the stream computes one by one."""
 
+from bisect import bisect_left
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -33,12 +35,18 @@ LOGS = {name: log_in_operations(seed) for seed, name in enumerate("abc")}
 HELD = {name: held_run(log, TICKS) for name, log in LOGS.items()}
 
 
-def context_of(log: RunLog, at_s: float) -> tuple[object, ...]:
+@cache
+def said(name: str) -> tuple[tuple[list[float], list[object]], ...]:
+    """When program, tool and override were said, and what."""
+    log = LOGS[name]
+    columns = (log.text["program"], log["tool_number"], log["feed_override_pct"])
+    known = [[(t, x) for t, x in zip(log.t_s.tolist(), one.tolist(), strict=True) if x is not None and x == x] for one in columns]
+    return tuple(([t for t, _ in one], [x for _, x in one]) for one in known)
+
+
+def context_of(name: str, at_s: float) -> tuple[object, ...]:
     """What was last said before a tick."""
-    before = log.t_s < at_s
-    said = [log.text["program"][before]] + [log[name][before] for name in ("tool_number", "feed_override_pct")]
-    known = [[x for x in one.tolist() if x is not None and x == x] for one in said]
-    return tuple(one[-1] if one else None for one in known)
+    return tuple(values[place - 1] if (place := bisect_left(times, at_s)) else None for times, values in said(name))
 
 
 def test_the_regime_at_each_tick_is_that_of_what_was_last_said() -> None:
@@ -48,7 +56,7 @@ def test_the_regime_at_each_tick_is_that_of_what_was_last_said() -> None:
     assert STANDING in held.names
     for place in range(0, len(held.at_ms), 7):
         row = np.nan_to_num(held.rows[place], nan=1e9).tolist()
-        name = regime_name(preparation, row, context_of(LOGS["a"], held.at_ms[place] / 1000))
+        name = regime_name(preparation, row, context_of("a", held.at_ms[place] / 1000))
         assert held.names[held.codes[place]] == name
 
 
@@ -57,7 +65,7 @@ def test_prepared_rows_are_those_of_the_stream() -> None:
     values, judged = standardised(preparation, HELD["a"])
     assert 100 < judged.sum() < len(judged)
     for place in np.flatnonzero(HELD["a"].quiet)[::5].tolist():
-        one = standardised_row(preparation, HELD["a"].rows[place].tolist(), context_of(LOGS["a"], HELD["a"].at_ms[place] / 1000))
+        one = standardised_row(preparation, HELD["a"].rows[place].tolist(), context_of("a", HELD["a"].at_ms[place] / 1000))
         assert one.values == tuple(values[place].tolist())
         assert (one.unknown is None) == judged[place]
 
@@ -87,7 +95,7 @@ def test_what_is_left_beside_the_peers_is_that_of_the_stream() -> None:
 
 
 def told_at(held: Held, name: str, place: int) -> tuple[object, ...]:
-    return context_of(LOGS[name], held.at_ms[place] / 1000)
+    return context_of(name, held.at_ms[place] / 1000)
 
 
 def test_a_spindle_that_never_turns_teaches_nothing() -> None:

@@ -18,6 +18,7 @@ STATE = "cnctwin/alerts/state"
 
 
 def until(true: Callable[[], Any], what: str, seconds: float = PATIENCE_S) -> Any:
+    """Wait for something; the value that was not false."""
     deadline_s = time.monotonic() + seconds
     while time.monotonic() < deadline_s:
         if value := true():

@@ -190,7 +190,7 @@ def test_killed_at_any_moment_nothing_comes_twice_and_what_is_missing_is_said_to
     seed: int, broker: BrokerAddress, office: Office, server: ReceivingServer
 ) -> None:
     chance = random.Random(seed)
-    keys = [f"n{number:03d}" for number in range(120)]
+    keys = [f"n{number:03d}" for number in range(80)]
     for key in keys:
         office.put(key)
     kills = 0
@@ -200,7 +200,7 @@ def test_killed_at_any_moment_nothing_comes_twice_and_what_is_missing_is_said_to
         life = started(broker, server)
         until(lambda before=before: len(server.received) + len(office.deliveries) > before, "a sign of life")
         time.sleep(chance.uniform(0.0, 0.25))
-        if kills < 10:
+        if kills < 7:
             life.kill()
             kills += 1
         else:

@@ -19,7 +19,7 @@ from tests.processors.courier.office import DELIVERY, OUTBOX, ROOT, Office, unti
 from tests.processors.courier.receiving_server import Answer, ReceivingServer
 
 pytestmark = pytest.mark.broker
-KILLS = 6
+KILLS = 4
 MARKER = "cnctwin/marker/alerts"
 CODE = """
 import sys
@@ -77,7 +77,7 @@ def test_nothing_comes_twice_and_what_is_missing_is_said_to_have_failed(
             life = subprocess.Popen(command, cwd=ROOT, stdin=subprocess.DEVNULL)
             try:
                 until(lambda: office.topics.pop(MARKER, b""), "a sign of life")
-                toggle(chance.uniform(2.5, 7.0))
+                toggle(chance.uniform(2.5, 4.5))
             finally:
                 life.kill()
                 life.wait()
@@ -87,7 +87,7 @@ def test_nothing_comes_twice_and_what_is_missing_is_said_to_have_failed(
             until(
                 lambda: {t.removeprefix(OUTBOX) for t in office.topics if t.startswith(OUTBOX)} <= set(office.deliveries), "fates"
             )
-            time.sleep(5.0)
+            time.sleep(2.0)
             outbox.update({topic: payload for topic, payload in office.topics.items() if topic.startswith(OUTBOX)})
         finally:
             life.terminate()

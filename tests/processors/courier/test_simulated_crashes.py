@@ -30,7 +30,7 @@ from tests.processors.courier.alert_shop import DESK, PHONE, T0_S, VIBRATION
 
 MACHINES = ("okuma", "mazak", "haas", "dmg")
 TABLE = {
-    "receivers": {name: one | {"give_up_after_s": 60.0} for name, one in (DESK | PHONE).items()},
+    "receivers": {name: one | {"give_up_after_s": 60.0, "rate_per_hour": 1000} for name, one in (DESK | PHONE).items()},
     "group_wait_s": 2.0,
     "group_interval_s": 5.0,
     "repeat_interval_s": 60.0,
@@ -41,10 +41,10 @@ ADAPTER: TypeAdapter[Any] = TypeAdapter(AlertsState)
 
 
 class Plant:
-    """See the module."""
+    """See the module. `killing`: how likely the courier dies at its turn, and the fold in the middle of what it publishes."""
 
-    def __init__(self, seed: int) -> None:
-        self.chance = Random(seed)
+    def __init__(self, seed: int, killing: float = 0.08) -> None:
+        self.chance, self.killing = Random(seed), killing
         group_by = "all" if seed % 3 else "machine"  # together, what is told depends on the moment
         self.configuration = Configuration(AlertsConfig, TABLE | {"group_by": group_by}, name="alerts")
         self.wall_s = T0_S
@@ -56,6 +56,7 @@ class Plant:
         self.outcomes: dict[str, list[str]] = {}
         self.firings: Counter[tuple[str, str, str]] = Counter()  # what ids said, once each
         self.known: set[str] = set()
+        self.believed: dict[tuple[str, str], str] = {}  # receiver and alert: what was told last
         self.lives = 0
         self.start_fold()
         self.start_courier()
@@ -84,6 +85,7 @@ class Plant:
             self.known.add(message.id)
             for said in message.says:
                 fingerprint, episode, what, *_ = said.split(".")
+                self.believed[message.receiver, fingerprint] = what
                 if what == "firing":
                     self.firings[message.receiver, fingerprint, episode] += 1
 
@@ -107,7 +109,7 @@ class Plant:
 
     def beat(self) -> None:
         self.wall_s += 1.0
-        self.fold(Sample("", SampleKind.BEAT, self.wall_s, {}, cell=self.rows), die=self.chance.random() < 0.02)
+        self.fold(Sample("", SampleKind.BEAT, self.wall_s, {}, cell=self.rows), die=self.chance.random() < self.killing)
         self.beats += 1
         if self.beats % 2 == 0:
             self.snapshot = json.dumps(encode_state(ADAPTER, self.state))
@@ -186,7 +188,7 @@ class Plant:
 
     # All of it.
 
-    def live(self, steps: int, killing: float) -> None:
+    def live(self, steps: int) -> None:
         for _ in range(steps):
             what = self.chance.random()
             if what < 0.25:
@@ -196,12 +198,12 @@ class Plant:
             elif what < 0.75:
                 self.courier_message()
             elif what < 0.88:
-                self.courier_turn(die=self.chance.random() < killing)
+                self.courier_turn(die=self.chance.random() < self.killing)
             elif what < 0.93:
                 self.network()
             elif what < 0.98:
                 self.toggle()
-            elif self.chance.random() < killing:
+            elif self.chance.random() < self.killing:
                 (self.start_fold if self.chance.random() < 0.5 else self.start_courier)()
 
     def settle(self) -> None:
@@ -221,46 +223,55 @@ class Plant:
                     self.fold_message()
 
 
-@given(seed=st.integers(0, 2**32))
-@settings(max_examples=30, deadline=None, derandomize=True)
-def test_killed_anywhere_nothing_arrives_twice_and_what_is_missing_is_said_to_have_failed(seed: int) -> None:
-    plant = Plant(seed)
-    plant.live(1500, killing=0.08)
+def lived(seed: int, killing: float = 0.08, steps: int = 1500) -> Plant:
+    """A plant after its life, and after everything has come to its end."""
+    plant = Plant(seed, killing)
+    plant.live(steps)
     plant.settle()
+    return plant
+
+
+def told_twice(plant: Plant) -> list[tuple[str, str, str]]:
+    return [said for said, count in plant.firings.items() if count > 1]
+
+
+def believed_to_fire(plant: Plant) -> list[tuple[str, str]]:
+    return [who for who, what in plant.believed.items() if what not in ("resolved", "passed")]
+
+
+@given(seed=st.integers(0, 2**32))
+@settings(max_examples=20, deadline=None, derandomize=True)
+def test_killed_anywhere_nothing_arrives_twice_and_what_is_missing_is_said_to_have_failed(seed: int) -> None:
+    plant = lived(seed)
     twice = [item for item, count in Counter(plant.arrived).items() if count > 1]
     assert twice == []
     arrived = {key for _, key in plant.arrived}
     assert [key for key in plant.known if key not in arrived and "failed" not in plant.outcomes.get(key, [])] == []
     assert [key for key in plant.known if len(set(plant.outcomes[key])) > 1] == []
-    assert [said for said, count in plant.firings.items() if count > 1] == [], "a firing was told by two notifications"
+    assert told_twice(plant) == [], "a firing was told by two notifications"
+    assert believed_to_fire(plant) == [], "nobody was told of the end"
     left = [topic for topic in plant.retained if topic.startswith((OUTBOX, DELIVERY, CLAIM))]
     assert left == []
 
 
-@pytest.mark.xfail(strict=True, reason="known: killed while it publishes, the fold can tell a firing again under another id")
-def test_a_firing_is_told_by_one_notification_however_the_fold_is_killed() -> None:
-    plant = Plant(223757)
-    plant.live(1500, killing=0.08)
-    plant.settle()
-    assert [said for said, count in plant.firings.items() if count > 1] == []
+# Of these, each told a firing again under another id, when a fold that came back believed its snapshot only.
+@pytest.mark.parametrize("seed", [106, 115, 118, 124])
+def test_a_firing_is_told_by_one_notification_however_the_fold_is_killed(seed: int) -> None:
+    plant = lived(seed, killing=0.15)
+    assert told_twice(plant) == []
+    assert believed_to_fire(plant) == []
 
 
 def test_the_simulation_does_send_fail_and_kill() -> None:
     """A law that nothing ever tried is none."""
-    plants = [Plant(seed) for seed in range(10)]
-    for plant in plants:
-        plant.live(1500, killing=0.08)
-        plant.settle()
+    plants = [lived(seed) for seed in range(4)]
     outcomes = Counter(outcome for plant in plants for told in plant.outcomes.values() for outcome in told)
     assert outcomes["delivered"] > 50
     assert outcomes["failed"] > 20
-    assert sum(plant.lives for plant in plants) > 50
+    assert sum(plant.lives for plant in plants) > 20
 
 
-@pytest.mark.parametrize("killing", [0.0])
-def test_undisturbed_every_firing_is_told_to_both(killing: float) -> None:
-    plant = Plant(7)
-    plant.live(3000, killing)
-    plant.settle()
+def test_undisturbed_every_firing_is_told_to_both() -> None:
+    plant = lived(7, killing=0.0, steps=3000)
     receivers = Counter(receiver for receiver, _, _ in plant.firings)
     assert receivers["desk"] == receivers["phone"] > 5

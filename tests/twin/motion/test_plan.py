@@ -210,7 +210,8 @@ def test_the_reference_is_continuous_and_exact_at_both_ends(path: Path, jerk: fl
 @settings(deadline=None)
 @given(path=WANDERING)
 def test_an_endless_jerk_is_the_trapezoid(path: Path) -> None:
-    assert plan(path, LIMITS.with_(jerk_mm_s3=1e12)).total_s == pytest.approx(plan(path, TRAPEZOID).total_s, rel=1e-3)
+    endless = plan(path, LIMITS.with_(jerk_mm_s3=1e12)).total_s  # each of its ramps still takes a few nanoseconds
+    assert endless == pytest.approx(plan(path, TRAPEZOID).total_s, rel=1e-3, abs=1e-8)
 
 
 @settings(deadline=None)
