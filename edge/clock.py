@@ -49,9 +49,9 @@ EDGE_STEP_S = 0.5
 BEGINNING_S = 300.0  # after which the offset is known well enough for what it began with
 ALARM_S = 1.0  # of drift
 ALARM_STANDS_S = 3600.0  # after a step
-ROOM_S, ROOM_SHARE = 0.015, 0.2  # that an offset may move before it is published again, and of its spread
+ROOM_S, ROOM_SHARE = 0.025, 0.2  # that an offset may move before it is published again, and of its spread
 NARROWER = 0.6
-READINGS, DOCUMENTS = "readings of the clock", "times of documents"
+READINGS, DOCUMENTS, STAMPS = "readings of the clock", "times of documents", "stamps of samples"
 UNSTEADY = "the clock does not keep to the rate of the edge's"
 OUTDATED = "the control's clock was not read for an hour"
 
@@ -138,7 +138,7 @@ def step(state: State, heard: Heard) -> Done:
     judged = _judged(state, heard.at_s)
     if judged is None:
         return Done(state)
-    state = _followed(state, judged.bound)
+    state = _followed(state, judged)
     is_news, told = _is_news(state.told, judged), _padded(judged)
     stamp_ms = state.newest_ms if state.stamps_samples and state.newest_ms is not None else round(heard.arrival_ms)
     after = state._replace(told=told) if is_news else state
@@ -193,7 +193,7 @@ def _larger(before: OneWay | None, way: OneWay) -> OneWay:
 def _closed(state: State, at_s: float) -> State:
     """The bucket goes into the windows, and may be the one that shows a step."""
     readings, documents, stamps = _kept(state.readings, at_s), _kept(state.documents, at_s), _kept(state.stamps, at_s)
-    found: list[float | None] = []
+    found: list[float | None] = []  # steps, as the evidence has them that is read now, best first
     if state.bucket:
         readings, by_s = _stepped((*readings, agreed(state.bucket, at_s).bound), at_s)
         found.append(by_s)
@@ -204,7 +204,7 @@ def _closed(state: State, at_s: float) -> State:
         found.append(by_s)
     if state.stamp is not None and state.stamps_samples:
         stamps, by_s = _way_stepped((*stamps, state.stamp), at_s)
-        found.append(by_s)
+        found = [by_s] if _is_by_stamps(state.told) else [*found, by_s]
     after = state._replace(
         until_s=at_s + BUCKET_S,
         bucket=(),
@@ -216,13 +216,13 @@ def _closed(state: State, at_s: float) -> State:
         stamps=stamps,
         peaks=_kept(state.peaks, at_s),
     )
-    by_s = next(iter(found), None)  # of the best evidence that there is
+    by_s = next(iter(found), None)
     if by_s is None:
         return after
     words = f"the control's clock was set by {by_s:+.3f} s"
     after = after._replace(steps=state.steps + 1, step_s=at_s, step=words, series=Series(), drift=None, began=None, peaks=())
-    is_read = bool(state.bucket or state.document)
-    return after._replace(documents=() if state.bucket else documents, stamps=() if is_read else stamps)
+    is_read = not _is_by_stamps(state.told) and bool(state.bucket or state.document)
+    return after._replace(documents=() if is_read and state.bucket else documents, stamps=() if is_read else stamps)
 
 
 WayT = TypeVar("WayT", Bound, OneWay)
@@ -294,7 +294,7 @@ def _beside_stamps(state: State, read: Bound, method: str, stamps: tuple[OneWay,
         if is_ahead or all(way.low_s + STAMP_BEHIND_S_MAX < read.low_s for way in last):
             return _by_stamps(state, above(last, read.at_s), "; the clock that is read is another")
     if last and read.low_s < (low_s := above(stamps, read.at_s).low_s) <= read.high_s:
-        return Told(read._replace(low_s=low_s), "", f"{method}, stamps of samples", stamped_by)
+        return Told(read._replace(low_s=low_s), "", f"{method}, {STAMPS}", stamped_by)
     return Told(read, "", method, stamped_by)
 
 
@@ -304,14 +304,21 @@ def _by_stamps(state: State, stamps: Bound, but: str = "") -> Told:
         peak = agreed(state.peaks, stamps.at_s).bound
         if peak.high_s >= stamps.low_s:
             both = stamps.both(peak) if peak.meets(stamps) else peak
-            return Told(both, "", f"stamps of samples, signals{but}", "control")
-    return Told(stamps, "", f"stamps of samples{but}", "control")
+            return Told(both, "", f"{STAMPS}, signals{but}", "control")
+    return Told(stamps, "", f"{STAMPS}{but}", "control")
 
 
-def _followed(state: State, bound: Bound | None) -> State:
-    """The series for the drift, and where it began."""
+def _is_by_stamps(told: Told | None) -> bool:
+    return told is not None and told.method.startswith(STAMPS)
+
+
+def _followed(state: State, judged: Told) -> State:
+    """The series for the drift, and where it began; of another clock than before both begin anew."""
+    bound = judged.bound
     if bound is None:
         return state
+    if _is_by_stamps(state.told) != _is_by_stamps(judged):
+        state = state._replace(series=Series(), drift=None, began=None)
     series = state.series.taken(bound)
     found = state.drift if series is state.series else drift(series)
     is_beginning = bound.at_s - series.points[0].at_s <= BEGINNING_S
@@ -322,7 +329,7 @@ def _is_news(told: Told | None, judged: Told) -> bool:
     """Whether what was published is no longer true, or much less than what is known."""
     if told is None or told[1:] != judged[1:] or told.bound is None or judged.bound is None:
         return told is None or told[1:] != judged[1:]
-    before, now = told.bound, judged.bound
+    before, now = told.bound, judged.bound.aged(judged.bound.at_s + 2.0 * BUCKET_S)  # when it is looked at again
     return now.low_s < before.low_s or now.high_s > before.high_s or _room_s(now) + now.spread_s < NARROWER * before.spread_s
 
 

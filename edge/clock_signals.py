@@ -13,7 +13,7 @@ before, which takes that out; with 0 it is the sample-and-hold of the plain meth
 
 import math
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import accumulate, pairwise
 from operator import mul, sub
@@ -21,6 +21,7 @@ from statistics import median
 from typing import NamedTuple
 
 from edge.clock_bounds import Bound
+from edge.sample import EdgeSample
 
 WINDOW_S = 120.0
 SEARCH_S = 5.0
@@ -54,6 +55,16 @@ class News(NamedTuple):
 
     speed: Points = ()
     envelope: Points = ()
+
+
+def speed_of(samples: Iterable[EdgeSample]) -> Points:
+    """The control's spindle speeds of a frame, by its own stamps.
+
+    >>> speed_of([EdgeSample("spindle_rpm", 1200.0, 5_000), EdgeSample("tool_number", 7, 5_000)])
+    ((5.0, 1200.0),)
+    """
+    speeds = (one for one in samples if one.signal == "spindle_rpm" and not one.is_baseline)
+    return tuple((one.timestamp_ms / 1000.0, float(one.value)) for one in speeds if isinstance(one.value, int | float))
 
 
 def step(state: State, news: News, *, at_s: float, around_s: float, poll_s: float) -> tuple[State, Bound | None]:

@@ -8,19 +8,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Generic, Literal, TypeVar
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, Field, ValidationError
 
+from edge.accelerometer_section import AccelerometerSection
 from edge.errors import ConfigError
+from edge.section import Section
 from edge.signals import DERIVED, Kind, signal
 from edge.units import conversion
 
 BLOCK_PATTERN = r'(?<![A-Z_])M0*6(?![\d.])|\bTOOL CALL (?:\d|"|QS?\d)'
-
-
-class Section(BaseModel):
-    """A table of the file: nothing that it does not know, nothing that changes later."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 def _pattern(text: str) -> str:
@@ -110,6 +106,7 @@ class EdgeConfig(Generic[SourceT]):
     report: ReportSection = field(default_factory=ReportSection)
     tool_change: ToolChangeSection = field(default_factory=ToolChangeSection)
     store: StoreSection = field(default_factory=StoreSection)
+    accelerometer: AccelerometerSection = field(default_factory=AccelerometerSection)
     path: Path = Path("edge.toml")
 
     def __post_init__(self) -> None:

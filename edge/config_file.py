@@ -6,6 +6,7 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
+from edge.accelerometer_section import AccelerometerSection
 from edge.adapter import adapters
 from edge.config import (
     BrokerSection,
@@ -26,6 +27,7 @@ _SECTIONS: dict[str, TypeAdapter[Any]] = {
     "report": TypeAdapter(ReportSection),
     "tool_change": TypeAdapter(ToolChangeSection),
     "store": TypeAdapter(StoreSection),
+    "accelerometer": TypeAdapter(AccelerometerSection),
 }
 
 

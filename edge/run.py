@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from edge import clock
+from edge import accelerometer, clock
 from edge.adapter import adapters
 from edge.config import BrokerSection, EdgeConfig
 from edge.errors import ConfigError
@@ -52,7 +52,7 @@ def edge_runtime(config: EdgeConfig[Any], address: BrokerAddress | None = None, 
     node = EdgeNode(
         address or broker_address(broker, config.path),
         NodeId(broker.group, config.node),
-        [*HEALTH, *clock.HEALTH, *ledger.metrics()],
+        [*HEALTH, *clock.HEALTH, *(accelerometer.HEALTH if config.accelerometer.url else ()), *ledger.metrics()],
         session_file=Path(broker.session_file) if broker.session_file else None,
         primary_host=broker.primary_host or None,
         barrier_topic=f"{BARRIER}/{broker.group}/{config.node}",

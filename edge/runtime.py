@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 from edge import clock, tool_change
+from edge.accelerometer import Accelerometer
 from edge.adapter import Adapter, Connection
 from edge.birth import device_metrics
 from edge.config import EdgeConfig
@@ -80,6 +81,7 @@ class EdgeRuntime:
         self._connection: Connection = adapter.connect(config)
         self._places = PlaceFile(place_file)
         self._open_store, self._restarts = open_store, restarts
+        self._sensor = Accelerometer(config.accelerometer) if config.accelerometer.url else None
         self._forwarder: Forwarder | None = None
         self._wall_s, self._clock = wall_s, monotonic_s
         self._arrivals: queue.Queue[Arrival] = queue.Queue(QUEUE_FRAMES_MAX)
@@ -107,6 +109,8 @@ class EdgeRuntime:
         reader = threading.Thread(target=self._read, args=(place,), name=f"{self._adapter.name}-reader", daemon=True)
         self._node.start()
         reader.start()
+        if self._sensor is not None:
+            self._sensor.start()
         due_s = self._clock()
         try:
             while not self.stop.is_set():
@@ -117,6 +121,8 @@ class EdgeRuntime:
         finally:
             self.stop.set()
             self._connection.close()
+            if self._sensor is not None:
+                self._sensor.close()
             self._finish(reader)
         if self._crash is not None:
             raise self._crash
@@ -162,6 +168,7 @@ class EdgeRuntime:
         except queue.Empty:
             pass
         self._settle()
+        self._sense()
         self._watch()
 
     def _take(self, arrival: Arrival) -> None:
@@ -176,6 +183,14 @@ class EdgeRuntime:
         self.ledger.settle(taken=frame.received, emitted=emitted, dropped=dropped, held=self._pipeline.held, stored=self._stored)
         if self._forwarder is None:
             self._places.keep(arrival.place)
+
+    def _sense(self) -> None:
+        """What the accelerometer has sent: figures like those of the control, and raw blocks, which are live or lost."""
+        for delivery in self._sensor.taken() if self._sensor is not None else ():
+            self.health.note(SampleSet(gaps=delivery.frame.gaps), self._wall_s())
+            self._publish(self._pipeline.declare(delivery.frame.samples), None)
+            for change in delivery.changes if self._is_declared else ():
+                self._node.publish(self.config.machine.name, [change])
 
     def _compare_clocks(self, arrival: Arrival) -> None:
         """What the frame says of the control's clock."""
@@ -244,7 +259,10 @@ class EdgeRuntime:
         """The birth, as soon as there is something to say and the control reports."""
         if self._is_declared or not self._is_reporting or not self._offers or not self._told:
             return
-        metrics = device_metrics(self._offers, self._told)
+        sensed = () if self._sensor is None else self._sensor.offers()
+        metrics = device_metrics((*self._offers, *sensed), self._told)
+        if self._sensor is not None:
+            metrics.extend(self._sensor.metrics())
         if self._forwarder is not None:
             metrics.append(MetricSpec(SEQUENCE, DataType.INT64))
             self._forwarder.declare(metric.name for metric in metrics)
@@ -278,6 +296,8 @@ class EdgeRuntime:
         outside |= {name: value for name, value in self._clock_health.items() if value is not None}
         if self._forwarder is not None:
             outside |= self._forwarder.health()
+        if self._sensor is not None:
+            outside |= self._sensor.health()
         fault = self._connection.reconnects, self._connection.last_error
         if fault != self._fault:
             if fault[1] != self._fault[1]:

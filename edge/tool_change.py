@@ -63,6 +63,7 @@ class State:
     rejoined_ms: int | None = None
     tool: str | None = None
     is_announced: bool = False
+    is_lost: bool = False  # the number is unavailable, and that was said
     onset_ms: int = 0
     blank_since_ms: int | None = None
     blank: EdgeSample | None = None
@@ -110,7 +111,8 @@ def step(config: ToolChangeSection, state: State, sample: EdgeSample) -> Step:
 
 def tick(config: ToolChangeSection, state: State, now_ms: int) -> Step:
     """Time has passed in the machine's own clock: what had to stand for a while may have stood long enough."""
-    state = replace(state, clock_ms=now_ms)
+    if now_ms != state.clock_ms:  # all samples of one look have one time
+        state = replace(state, clock_ms=now_ms)
     if state.phase is Phase.DOUBT and now_ms - state.onset_ms >= config.blank_s * 1000:
         return _enter(state, state.onset_ms, "tool number empty")
     if state.phase is not Phase.CHANGING:
@@ -163,8 +165,10 @@ def is_tool_change_block(config: ToolChangeSection, block: str) -> bool:
 def _advance(config: ToolChangeSection, state: State, sample: EdgeSample) -> Step:
     """Tell the time. A clock that jumps means another section of a recording, or a machine that was away."""
     now_ms, clock_ms = sample.timestamp_ms, state.clock_ms
-    if clock_ms is None or sample.is_baseline:
-        return Step(replace(state, clock_ms=max(now_ms, clock_ms or 0)))
+    if clock_ms is None or (sample.is_baseline and now_ms > clock_ms):
+        return Step(replace(state, clock_ms=now_ms))
+    if sample.is_baseline:
+        return Step(state)
     if now_ms < clock_ms - CLOCK_BACK_MS_MAX:
         return _rejoin(state, now_ms)
     if now_ms > clock_ms + CLOCK_AHEAD_MS_MAX:
@@ -196,8 +200,9 @@ def _tool_of(config: ToolChangeSection, sample: EdgeSample) -> str:
 
 
 def _number(config: ToolChangeSection, state: State, sample: EdgeSample) -> Step:
-    if sample.reason == UNAVAILABLE:
+    if str(sample.reason).startswith(UNAVAILABLE):
         return _unavailable(state, sample)
+    state = replace(state, is_lost=False) if state.is_lost else state
     tool = _tool_of(config, sample)
     if tool == "" and sample.value is not None:
         sample = replace(sample, value=None, reason="0: no tool in the spindle")
@@ -240,6 +245,11 @@ def _found(state: State, sample: EdgeSample, tool: str) -> Step:
 
 
 def _unavailable(state: State, sample: EdgeSample) -> Step:
+    if state.cue is not None:  # the control says of itself whether it is changing the tool
+        kept = state if state.phase is Phase.CHANGING else _settled(state, None)
+        return Step(replace(kept, tool=None, blank_since_ms=None, candidate=None, number_moved=False), (sample,), state.held)
+    if state.is_lost:  # said before; the block may show a change all the same
+        return Step(state, (sample,))
     at_ms, reason = sample.timestamp_ms, "the control does not report its tool"
     samples = (
         sample,
@@ -247,7 +257,7 @@ def _unavailable(state: State, sample: EdgeSample) -> Step:
         EdgeSample("tool_change_source", "stale", at_ms, observations=0),
         EdgeSample("tool_change_evidence", "none: tool number unavailable", at_ms, observations=0),
     )
-    return Step(replace(_settled(state, None), is_announced=False), samples, state.held)
+    return Step(replace(_settled(state, None), is_announced=False, is_lost=True), samples, state.held)
 
 
 def _number_while_changing(state: State, sample: EdgeSample, tool: str) -> Step:
@@ -269,8 +279,11 @@ def _block(config: ToolChangeSection, state: State, sample: EdgeSample) -> Step:
         return _announce(state, sample)
     shows = block is not None and is_tool_change_block(config, block)
     passed_ms = sample.timestamp_ms if state.shows_change and not shows else state.passed_ms
-    after = replace(state, block=block, shows_change=shows, passed_ms=None if shows else passed_ms)
-    announced = _announce(after, sample)
+    ended = Step(state)
+    if shows and state.cue is False and state.phase is Phase.CHANGING and state.passed_ms is not None:
+        ended = _leave(state, state.passed_ms, f"{_what_passed(state)}, same number")
+    after = replace(ended.state, block=block, shows_change=shows, passed_ms=None if shows else passed_ms)
+    announced = ended.then(_announce(after, sample))
     if not shows or state.is_idle or (sample.is_baseline and state.phase is not Phase.DOUBT):
         return announced
     return announced.then(_commanded(announced.state, sample.timestamp_ms, COMMANDED))
@@ -288,8 +301,9 @@ def _cue(state: State, sample: EdgeSample) -> Step:
         done = done.then(Step(replace(done.state, passed_ms=None)))
         return done.then(_commanded(done.state, at_ms, sample.reason or "cue of the control"))
     if cue is False and before and state.phase is Phase.CHANGING:
-        if state.candidate is not None:
-            return _leave(after, max(at_ms, state.candidate.timestamp_ms), "cue ended")
+        if state.candidate is not None or sample.is_baseline:
+            since_ms = at_ms if state.candidate is None else max(at_ms, state.candidate.timestamp_ms)
+            return _leave(after, since_ms, "as found: no cue" if sample.is_baseline else "cue ended")
         return Step(replace(after, passed_ms=at_ms))  # the number may follow in the next look
     return _announce(after, sample)
 

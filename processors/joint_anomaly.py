@@ -51,7 +51,8 @@ from twin.anomaly.common_mode import Method, adjust_frame, standardised
 from twin.anomaly.preparation import CONTEXT, Preparation, standardised_row
 
 RAW, THRESHOLD, BASIS = "twin/raw_score", "twin/anomaly_threshold", "twin/anomaly_basis"
-CLOCK_OFFSET = "clock_offset_s"
+CLOCK_OFFSET, STAMP_CLOCK = "clock_offset_s", "stamp_clock"
+BY_EDGE = "edge"  # the control gives no stamps: its samples carry the edge's time, whatever its own clock shows
 _VALUE, _QUALITY = Reading._fields.index("value"), Reading._fields.index("quality")
 SEATS_MAX = 10_000
 MEMBERS_MAX = 2000  # of a cell; those that are offline are forgotten when there are more
@@ -128,7 +129,9 @@ def _placed(shared: Config, member: Member, sample: Sample) -> Member:
     """The machine, whose clock may have been found to be ahead of that of its peers by another number of ticks than before."""
     if CLOCK_OFFSET not in sample.row:
         return member
-    offset_s = sample.number(CLOCK_OFFSET)[0]
+    stamped_by = sample.row.get(STAMP_CLOCK)
+    is_by_edge = stamped_by is not None and stamped_by.value == BY_EDGE
+    offset_s = 0.0 if is_by_edge else sample.number(CLOCK_OFFSET)[0]
     if offset_s is None or abs(offset_s / shared.tick_s - member.offset_ticks) <= OFFSET_TICKS_MAX:
         return member
     return member.set_back(sample.at_s, round(offset_s / shared.tick_s))
@@ -269,7 +272,7 @@ def _specs() -> tuple[OutputSpec, ...]:
 PROCESSOR = CellProcessor(
     name="joint_anomaly",
     version=1,
-    inputs=NUMBERS | CONTEXT_INPUTS | {CLOCK_OFFSET, *CONTEXT},
+    inputs=NUMBERS | CONTEXT_INPUTS | {CLOCK_OFFSET, STAMP_CLOCK, *CONTEXT},
     outputs=_specs(),
     config=Config,
     state=State,

@@ -3,7 +3,7 @@
     {"value": 2400.0, "t": "2022-02-10T13:51:02.250Z", "unit": "rev/min", "quality": "good"}
 
 quality is good, stale (its edge is offline; the value is the last one) or bad. A null stays null, with its reason. History is not
-mirrored: a topic holds the present.
+mirrored: a topic holds the present. Neither are arrays of more than 256 numbers, the raw blocks of sensors.
 """
 
 import json
@@ -19,6 +19,7 @@ from sparkplug.metric import Reading
 from sparkplug.quality import Quality
 
 PREFIX = "cnc/"
+ARRAY_MAX = 256
 _QUALITY = {Quality.GOOD: "good", Quality.STALE: "stale", Quality.BAD: "bad"}
 _ENCODE = json.JSONEncoder(ensure_ascii=False, allow_nan=False, separators=(",", ":")).encode
 
@@ -32,7 +33,14 @@ def step(_: Config, state: NoState, sample: Sample) -> tuple[NoState, Sequence[P
     if sample.is_history or sample.kind in (SampleKind.TICK, SampleKind.HOLE):
         return state, ()
     machine, row = sample.machine, sample.row
-    return state, [PlainOutput(_topic(machine, name), mirrored(row[name])) for name in sample.changed]
+    return state, [
+        PlainOutput(_topic(machine, name), mirrored(row[name])) for name in sample.changed if not _is_long(row[name].value)
+    ]
+
+
+def _is_long(value: object) -> bool:
+    """A raw block of a sensor: thousands of numbers as text, twice a second, are nothing for a topic that shows the present."""
+    return isinstance(value, tuple) and len(value) > ARRAY_MAX
 
 
 def mirrored(reading: Reading) -> bytes:

@@ -233,7 +233,6 @@ class MqttConnection:
         client.on_connect = self._on_connect
         client.on_message = self._on_message
         client.on_disconnect = self._on_disconnect
-        client.on_publish = self._on_publish
         if broker.username is not None:
             client.username_pw_set(broker.username, broker.password)
         if broker.tls:
@@ -301,6 +300,7 @@ class MqttConnection:
         if isinstance(action, Publish):
             client.publish(action.topic, action.payload, action.qos, action.retain)
         elif isinstance(action, Barrier):
+            client.on_publish = self._on_publish  # only while a barrier is out: it would be called for each QoS 0 message too
             self._barriers[client.publish(action.topic, str(action.token), 1).mid] = action.token
         elif isinstance(action, Subscribe):
             client.subscribe(action.topic_filter, action.qos)
@@ -340,10 +340,12 @@ class MqttConnection:
     def _on_message(self, _client: Any, _userdata: Any, message: paho.MQTTMessage) -> None:
         self._listener.message(message.topic, bytes(message.payload))
 
-    def _on_publish(self, _client: Any, _userdata: Any, packet_id: int, reason: Any, _properties: Any) -> None:
+    def _on_publish(self, client: Any, _userdata: Any, packet_id: int, reason: Any, _properties: Any) -> None:
         token = self._barriers.pop(packet_id, None)
         if token is None:
             return
+        if not self._barriers:
+            client.on_publish = None
         if reason.is_failure:
             self._note(f"{self._brokers[self._server].url} refuses the barrier that shows what has arrived: {reason}")
         else:

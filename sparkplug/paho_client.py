@@ -23,15 +23,39 @@ class BufferedSocket:
         self._sock = sock
         self._buffer = b""
         self._start = 0
+        self.failure: OSError | None = None  # what ended it, which paho keeps to itself
 
     def recv(self, size: int) -> bytes:
         available = len(self._buffer) - self._start
         if not available:
-            self._buffer, self._start = self._sock.recv(_READ_BYTES), 0
+            self._buffer, self._start = self._received(), 0
             available = len(self._buffer)
         end = self._start + min(size, available)
         data: bytes = self._buffer[self._start : end]
         self._start = end
+        return data
+
+    def send(self, data: Any) -> int:
+        """As the socket's. Where it fails, what the other side has said before it hung up is worth more than the failure."""
+        try:
+            sent: int = self._sock.send(data)
+        except (BlockingIOError, ssl.SSLWantReadError, ssl.SSLWantWriteError):
+            raise
+        except OSError as error:
+            self.failure = error
+            with suppress(OSError):
+                self._received()
+            raise
+        return sent
+
+    def _received(self) -> bytes:
+        try:
+            data: bytes = self._sock.recv(_READ_BYTES)
+        except (BlockingIOError, ssl.SSLWantReadError, ssl.SSLWantWriteError):
+            raise
+        except OSError as error:
+            self.failure = error
+            raise
         return data
 
     def pending(self) -> int:
@@ -63,6 +87,13 @@ class BufferedSocket:
 class ReadingAheadClient(paho.Client):
     """A paho client on such a socket."""
 
+    _buffered: BufferedSocket | None = None
+
+    @property
+    def failure(self) -> OSError | None:
+        """What ended the connection while it was read, if that was an error."""
+        return None if self._buffered is None else self._buffered.failure
+
     def _ssl_wrap_socket(self, tcp_sock: Any) -> Any:
         """As paho's, but a handshake that fails leaves no open socket behind, and one that hangs ends with CONNECT_TIMEOUT_S."""
         context: ssl.SSLContext = self._ssl_context  # type: ignore[assignment]
@@ -78,4 +109,5 @@ class ReadingAheadClient(paho.Client):
     def _create_socket(self) -> Any:
         sock: Any = super()._create_socket()
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        return BufferedSocket(sock)
+        self._buffered = BufferedSocket(sock)
+        return self._buffered

@@ -41,10 +41,11 @@ from edge.controls.mtconnect.model import DeviceModel
 from edge.errors import ConfigError, DocumentError
 from edge.place import Place
 from edge.reading import Target, read
-from edge.sample import UNAVAILABLE, Drop, EdgeSample, Gap, Offer, SampleSet
+from edge.sample import UNAVAILABLE, ClockReading, Drop, EdgeSample, Gap, Offer, SampleSet
 from sparkplug.quality import Quality
 
 ATTEMPTS_BEFORE_PROBE = 3
+DOCUMENT_MS_MAX = 500  # from its making to the edge, for most documents; those that take longer are outvoted
 EDGE_RESTARTED = "edge restarted"  # the hole of an edge that knows where it was, but not what it had taken
 Config = EdgeConfig[MtconnectConfig]
 
@@ -118,12 +119,21 @@ def parse(config: Config, cursor: Cursor, raw: bytes) -> tuple[Cursor, SampleSet
     try:
         document = parse_document(raw)
         if isinstance(document, DevicesDocument):
-            return _devices(config, cursor, document)
+            after, given = _devices(config, cursor, document)
+        elif isinstance(document, ErrorDocument):
+            after, given = _error(cursor, document)
+        else:
+            after, given = _streams(cursor, document)
     except (DocumentError, ConfigError) as error:
         return _refused(cursor, str(error))
-    if isinstance(document, ErrorDocument):
-        return _error(cursor, document)
-    return _streams(cursor, document)
+    return after, replace(given, clock=_clock(document.header))
+
+
+def _clock(header: Header) -> ClockReading | None:
+    """What the agent's clock showed; when that was by the edge's, `edge.clock` finds from when the document arrived."""
+    if header.created_ms is None:
+        return None
+    return ClockReading(header.created_ms, 0, DOCUMENT_MS_MAX, header.resolution_ms)
 
 
 def _refused(cursor: Cursor, error: str) -> tuple[Cursor, SampleSet]:

@@ -20,13 +20,18 @@ SEQUENCE_MAX = 2**63
 
 
 class Header(NamedTuple):
-    """What each document says of the agent. Sequence numbers are None where the document has none."""
+    """What each document says of the agent. Sequence numbers are None where the document has none.
+
+    created_ms: the agent's clock when it made the document, to within `resolution_ms`; None where it cannot be read
+    """
 
     instance_id: str
     buffer_size: int | None
     first_sequence: int | None
     last_sequence: int | None
     next_sequence: int | None
+    created_ms: int | None = None
+    resolution_ms: int = 1000
 
 
 class Observation(NamedTuple):
@@ -116,8 +121,26 @@ def _header(root: Element) -> Header:
     element = next((child for child in root if local_name(child) == "Header"), None)
     if element is None:
         raise DocumentError("document without a Header")
-    numbers = (element.get(name) for name in ("bufferSize", "firstSequence", "lastSequence", "nextSequence"))
-    return Header(element.get("instanceId", ""), *(_sequence(number) for number in numbers))
+    created = element.get("creationTime", "")
+    return Header(
+        element.get("instanceId", ""),
+        buffer_size=_sequence(element.get("bufferSize")),
+        first_sequence=_sequence(element.get("firstSequence")),
+        last_sequence=_sequence(element.get("lastSequence")),
+        next_sequence=_sequence(element.get("nextSequence")),
+        created_ms=timestamp_ms(created),
+        resolution_ms=_resolution_ms(created),
+    )
+
+
+def _resolution_ms(text: str) -> int:
+    """How fine a time is that is written so. Both agents that were looked at write whole seconds, and truncate.
+
+    >>> [_resolution_ms(f"2026-05-04T06:00:{seconds}") for seconds in ("00Z", "00.25Z", "00.000Z", "00.123456+09:00")]
+    [1000, 10, 1000, 1]
+    """
+    digits = text.rpartition(".")[2].partition("+")[0].rstrip("Zz") if "." in text else ""
+    return 10 ** max(0, 3 - len(digits)) if digits.strip("0") else 1000
 
 
 def _observations(root: Element) -> Iterator[Observation]:

@@ -1,0 +1,28 @@
+"""The edge for controls with an OPC UA server: SINUMERIK, and those that follow OPC 40501-1 or OPC 40502.
+
+`maps/*.toml` say which node is which signal, `resolve` finds the nodes, `session` holds the line, `delivery` finds what is
+missing, `cursor` parses. The library asyncua is an extra: only a connection imports it.
+"""
+
+from pathlib import Path
+
+from edge.adapter import Adapter
+from edge.controls.opcua.check import describe
+from edge.controls.opcua.config import OpcUaConfig
+from edge.controls.opcua.connection import OpcUaConnection
+from edge.controls.opcua.cursor import parse, place, resume, start
+from edge.controls.opcua.draft import draft
+
+ADAPTER = Adapter(
+    name="opcua",
+    schemes=("opc.tcp",),
+    config_model=OpcUaConfig,
+    start=start,
+    place=place,
+    resume=resume,
+    parse=parse,
+    connect=OpcUaConnection,
+    describe=describe,
+    draft=draft,
+    sample_config=Path(__file__).with_name("opcua.toml"),
+)
