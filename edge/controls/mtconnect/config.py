@@ -4,7 +4,7 @@ from typing import Annotated
 
 from pydantic import AfterValidator, Field
 
-from edge.config import Section
+from edge.section import Section
 
 
 def _http(url: str) -> str:
