@@ -52,7 +52,7 @@ class State(NamedTuple):
     number, rate_hz: of the last block; edge_us: when its last sample was, by the edge's clock
     carried: the filters' state; without it the next block begins a stream
     settling: chunks that are still to be left out; chunk, window: sums of those that are not full
-    pending: samples that wait for a block to publish to be full; told_rate_hz: as it was published
+    pending: samples that wait for a block to publish to be full
     why_not: what stands in place of values, "" while there are some
     """
 
@@ -64,7 +64,6 @@ class State(NamedTuple):
     chunk: Sums = Sums()
     window: Sums = Sums()
     pending: tuple[float, ...] = ()
-    told_rate_hz: float = 0.0
     why_not: str = NO_BLOCK
 
 
@@ -121,7 +120,7 @@ def _wrong(section: AccelerometerSection, block: Block) -> str:
 
 def _broken(state: State, reason: str, now_ms: int) -> tuple[State, Delivery]:
     """No stream; the values are null and say why, once."""
-    after = State(state.number, state.rate_hz, state.edge_us, told_rate_hz=state.told_rate_hz, why_not=reason)
+    after = State(state.number, state.rate_hz, state.edge_us, why_not=reason)
     if state.why_not == reason:
         return after, Delivery()
     null = EdgeSample(RMS, None, now_ms, Quality.BAD, reason, observations=0)
@@ -173,8 +172,6 @@ def _blocks(section: AccelerometerSection, state: State, block: Block, stamp_us:
     while at + size <= len(waiting):
         at += size
         stamp_ms = round((stamp_us - 1e6 * (len(waiting) - at) / block.rate_hz) / 1000.0)
-        if state.told_rate_hz != block.rate_hz:
-            changes.append(Change(RATE, block.rate_hz, stamp_ms))
-            state = state._replace(told_rate_hz=block.rate_hz)
-        changes.append(Change(BLOCK, waiting[at - size : at], stamp_ms))
+        # The rate goes with each block: whoever has missed one of them has it with the next.
+        changes += [Change(RATE, block.rate_hz, stamp_ms), Change(BLOCK, waiting[at - size : at], stamp_ms)]
     return state._replace(pending=waiting[at:]), changes

@@ -46,6 +46,7 @@ class BrokerSection(Section):
     primary_host: str = ""
     username: str = ""
     password_env: str = ""
+    password_file: str = ""
 
 
 class SignalSection(Section):

@@ -33,6 +33,10 @@ def broker_address(section: BrokerSection, path: Path) -> BrokerAddress:
         raise ConfigError(f"{path}: broker.url: {error}") from error
     if section.username:
         address = replace(address, username=section.username)
+    if section.password_env and section.password_file:
+        raise ConfigError(f"{path}: broker has password_env and password_file; name one of them")
+    if section.password_file:
+        return address.with_password(_secret_in(Path(section.password_file), path))
     if section.password_env:
         if section.password_env not in os.environ:
             raise ConfigError(
@@ -40,6 +44,19 @@ def broker_address(section: BrokerSection, path: Path) -> BrokerAddress:
             )
         address = address.with_password(os.environ[section.password_env])
     return address
+
+
+def _secret_in(file: Path, path: Path) -> str:
+    """The first line of a file that only its owner can read."""
+    try:
+        mode, lines = file.stat().st_mode, file.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: broker.password_file = {str(file)!r}: cannot be read: {error}") from error
+    if mode & 0o077:
+        raise ConfigError(f"{path}: broker.password_file = {str(file)!r}: others can read it; chmod 600 it")
+    if not lines or not lines[0]:
+        raise ConfigError(f"{path}: broker.password_file = {str(file)!r}: is empty; put the password into its first line")
+    return lines[0]
 
 
 def edge_runtime(config: EdgeConfig[Any], address: BrokerAddress | None = None, *, restarts: int = 0) -> EdgeRuntime:

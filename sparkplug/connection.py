@@ -7,6 +7,7 @@ client, so that nothing of an earlier session is ever sent again.
 import logging
 import select
 import socket
+import ssl
 import threading
 import time
 from collections import deque
@@ -27,6 +28,7 @@ from sparkplug.actions import Action, Barrier, Connect, Disconnect, Publish, Sub
 from sparkplug.broker import BrokerAddress
 from sparkplug.errors import BrokerAddressError
 from sparkplug.paho_client import CONNECT_TIMEOUT_S, ReadingAheadClient
+from sparkplug.tls_failure import explained
 
 OUTBOX_MAX = 20_000
 KEEPALIVE_S = 15
@@ -237,7 +239,11 @@ class MqttConnection:
             client.username_pw_set(broker.username, broker.password)
         if broker.tls:
             ca_file, certificate, key = broker.ca_file, broker.certificate_file, broker.key_file
-            client.tls_set(_text(ca_file), _text(certificate), _text(key))
+            try:
+                client.tls_set(_text(ca_file), _text(certificate), _text(key))
+            except OSError as error:
+                self._listener.unsent()
+                raise OSError(f"broker {broker.url}: {explained(error, broker)}") from error
         return client
 
     def _open(self, client: ReadingAheadClient, broker: BrokerAddress) -> None:
@@ -250,7 +256,7 @@ class MqttConnection:
                 client.connect(broker.host, broker.port, KEEPALIVE_S)
         except OSError as error:
             self._listener.unsent()
-            raise OSError(f"no connection to {broker.url}: {error}") from error
+            raise OSError(f"no connection to {broker.url}: {explained(error, broker)}") from error
 
     def _step(self, client: ReadingAheadClient, wait_s_max: float) -> bool:
         """Wait for something to do and do it; False when the connection is over."""
@@ -351,9 +357,12 @@ class MqttConnection:
         else:
             self._listener.confirmed(token)
 
-    def _on_disconnect(self, _client: Any, _userdata: Any, _flags: Any, reason: Any, _properties: Any) -> None:
-        if reason.is_failure and not self.last_error:
-            self._note(f"the connection to {self._brokers[self._server].url} ended: {reason}")
+    def _on_disconnect(self, client: Any, _userdata: Any, _flags: Any, reason: Any, _properties: Any) -> None:
+        broker, failure = self._brokers[self._server], client.failure
+        if reason.is_failure and isinstance(failure, ssl.SSLError):
+            self._note(f"the connection to {broker.url} ended: {explained(failure, broker)}")
+        elif reason.is_failure and not self.last_error:
+            self._note(f"the connection to {broker.url} ended: {reason}")
 
     def _note(self, error: str) -> None:
         if error != self.last_error:

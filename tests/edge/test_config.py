@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from edge.check import discover
-from edge.config import BLOCK_PATTERN, EdgeConfig
+from edge.config import BLOCK_PATTERN, BrokerSection, EdgeConfig
 from edge.config_file import load, parse
 from edge.controls.mtconnect.config import MtconnectConfig
 from edge.errors import ConfigError
@@ -100,3 +100,23 @@ def test_an_address_with_a_password_is_refused_without_showing_it(tmp_path: Path
     with pytest.raises(ConfigError, match="must hold no user or password") as caught:
         discover("http://u:hunter2@127.0.0.1:5000")
     assert "hunter2" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "mode", "expected"),
+    [
+        ("secret\n", 0o600, "secret"),
+        ("secret\n", 0o640, "others can read it; chmod 600 it"),
+        ("\n", 0o600, "is empty; put the password into its first line"),
+    ],
+)
+def test_a_password_comes_from_a_file_that_only_its_owner_can_read(tmp_path: Path, text: str, mode: int, expected: str) -> None:
+    secret = tmp_path / "secret"
+    secret.write_text(text)
+    secret.chmod(mode)
+    section = BrokerSection(username="edge", password_file=str(secret))
+    if expected == "secret":
+        assert broker_address(section, FILE).password == expected
+        return
+    with pytest.raises(ConfigError, match=expected):
+        broker_address(section, FILE)

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import paho.mqtt.publish
@@ -71,9 +72,17 @@ def _live(mosquitto: Mosquitto, proxy: Proxy, version: int, file: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def lives(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[int, Proxy]]:
+def new_broker() -> Callable[[], AbstractContextManager[Mosquitto]]:
+    """At which broker the lives are lived; tests/hivemq has another one."""
+    return Mosquitto
+
+
+@pytest.fixture(scope="module")
+def lives(
+    tmp_path_factory: pytest.TempPathFactory, new_broker: Callable[[], AbstractContextManager[Mosquitto]]
+) -> Iterator[dict[int, Proxy]]:
     """The recordings of the same life with MQTT 3.1.1 (4) and with MQTT 5."""
-    with Mosquitto() as broker, Proxy(broker.address) as with_311, Proxy(broker.address) as with_5:
+    with new_broker() as broker, Proxy(broker.address) as with_311, Proxy(broker.address) as with_5:
         recordings = {4: with_311, 5: with_5}
         for version, proxy in recordings.items():
             _live(broker, proxy, version, tmp_path_factory.mktemp("edge") / "session.json")

@@ -3,6 +3,7 @@
 import json
 import time
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
 from typing import Any
 
 import paho.mqtt.publish
@@ -52,6 +53,7 @@ def _live(broker: Mosquitto, proxy: Proxy, version: int) -> None:
     _poll_until(host, proxy, _is_up_birth(proxy, 2))
     proxy.cut()
     _poll_until(host, proxy, _is_up_birth(proxy, 3))
+    _poll_until(host, proxy, lambda _: any(p.kind == "puback" for p in proxy.packets("down", Acknowledgement, connection=1)))
     host.stop()
     proxy.wait_for(lambda packet: isinstance(packet, Disconnect))
 
@@ -67,11 +69,17 @@ def _say(broker: Mosquitto, topic: str, payload: bytes, *, retain: bool = False)
 
 
 @pytest.fixture(scope="module")
-def lives() -> Iterator[dict[int, Proxy]]:
+def new_broker() -> Callable[[], AbstractContextManager[Mosquitto]]:
+    """At which broker the lives are lived; tests/hivemq has another one."""
+    return Mosquitto
+
+
+@pytest.fixture(scope="module")
+def lives(new_broker: Callable[[], AbstractContextManager[Mosquitto]]) -> Iterator[dict[int, Proxy]]:
     """The recordings of the same life with MQTT 3.1.1 (4) and with MQTT 5."""
     recordings = {}
     for version in (4, 5):
-        with Mosquitto() as broker, Proxy(broker.address) as proxy:
+        with new_broker() as broker, Proxy(broker.address) as proxy:
             _live(broker, proxy, version)
             recordings[version] = proxy
     yield recordings
