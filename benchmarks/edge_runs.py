@@ -67,7 +67,7 @@ def store(rows: int) -> None:
             drain_s = timed(lambda ring=ring: drain(ring))  # type: ignore[misc]
             ring.close()
             print(
-                f"{batch:3d} rows a commit: append {count / append_s:8.0f} rows/s, {append_s / limit_s:4.2f} x the bare database; "
+                f"{batch:3d} rows a commit: append {count / append_s:8.0f} rows/s, {append_s / limit_s:4.2f} x bare SQLite; "
                 f"read and delete {count / drain_s:8.0f} rows/s"
             )
 

@@ -1,6 +1,6 @@
 """How the edge itself is: lag, holes, reconnects, refused frames, published as metrics of the edge node."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from edge.sample import Gap, SampleSet
 from sparkplug.datatype import DataType
@@ -53,17 +53,18 @@ class Health:
             self.last_error = frame.error
         else:
             self.backlog = frame.backlog
-        for gap in frame.gaps:
-            self._hole(gap)
+        self.holes_in(frame.gaps)
         if frame.instance is not None:
             self.instance_id = frame.instance
         if frame.newest_ms is not None:
             self.lag_s = now_s - frame.newest_ms / 1000
 
-    def _hole(self, gap: Gap) -> None:
-        self.holes += 1
-        self.lost_observations += gap.lost
-        self.last_hole = f"{gap.reason}: sequence {gap.first_sequence} to {gap.last_sequence}, at most {gap.lost} lost"
+    def holes_in(self, gaps: Iterable[Gap]) -> None:
+        """What nobody can get any more."""
+        for gap in gaps:
+            self.holes += 1
+            self.lost_observations += gap.lost
+            self.last_hole = f"{gap.reason}: {gap.first_sequence} to {gap.last_sequence}, at most {gap.lost} lost"
 
     def changes(self, now_ms: int, outside: Mapping[str, int | float | str | bool]) -> list[Change]:
         """All of it; `outside` holds what the loop knows: queue depth, connections, whether the control is there."""

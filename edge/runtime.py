@@ -12,11 +12,12 @@ import logging
 import queue
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
-from edge import clock, tool_change
+from edge import clock, clock_signals, tool_change
 from edge.accelerometer import Accelerometer
 from edge.adapter import Adapter, Connection
 from edge.birth import device_metrics
@@ -32,6 +33,8 @@ from sparkplug.metric import Change, MetricSpec
 
 _log = logging.getLogger(__name__)
 QUEUE_FRAMES_MAX = 256
+SPEED_POLL_S = 0.35  # how far apart speeds of the spindle are at least
+ENVELOPE_MAX = 3000  # of a sensor, ten a second
 REPORT_INTERVAL_S = 1.0
 
 
@@ -86,7 +89,8 @@ class EdgeRuntime:
         self._wall_s, self._clock = wall_s, monotonic_s
         self._arrivals: queue.Queue[Arrival] = queue.Queue(QUEUE_FRAMES_MAX)
         self._pipeline = Pipeline(config)
-        self._clocks = clock.State()
+        self._clocks, self._signals = clock.State(), clock_signals.State()
+        self._envelope: deque[tuple[float, float]] = deque(maxlen=ENVELOPE_MAX)
         self._clock_health: dict[str, int | float | str | bool | None] = {}
         self._offers: tuple[Offer, ...] = ()
         self._told: dict[str, EdgeSample] = {}  # the latest of each signal, as far as the rows have gone
@@ -187,14 +191,24 @@ class EdgeRuntime:
     def _sense(self) -> None:
         """What the accelerometer has sent: figures like those of the control, and raw blocks, which are live or lost."""
         for delivery in self._sensor.taken() if self._sensor is not None else ():
-            self.health.note(SampleSet(gaps=delivery.frame.gaps), self._wall_s())
+            self.health.holes_in(delivery.frame.gaps)
+            self._envelope.extend(delivery.envelope)
             self._publish(self._pipeline.declare(delivery.frame.samples), None)
             for change in delivery.changes if self._is_declared else ():
                 self._node.publish(self.config.machine.name, [change])
 
     def _compare_clocks(self, arrival: Arrival) -> None:
         """What the frame says of the control's clock."""
-        done = clock.step(self._clocks, clock.heard(arrival.frame, arrival.at_s, arrival.wall_ms))
+        peak = None
+        if self._sensor is not None:  # whose clock is the edge's own: what the spindle does shows in both
+            news = clock_signals.News(clock_signals.speed_of(arrival.frame.samples), tuple(self._envelope))
+            self._envelope.clear()
+            known = None if self._clocks.told is None else self._clocks.told.bound
+            around_s = 0.0 if known is None else known.offset_s
+            self._signals, peak = clock_signals.step(
+                self._signals, news, at_s=arrival.at_s, around_s=around_s, poll_s=SPEED_POLL_S
+            )
+        done = clock.step(self._clocks, clock.heard(arrival.frame, arrival.at_s, arrival.wall_ms, peak))
         self._clocks = done.state
         self._clock_health |= done.health
         if done.samples:

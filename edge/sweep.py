@@ -81,7 +81,7 @@ class Sweep:
             "available": self.available,
             "error": self.error,
         }
-        return json.dumps(document, separators=(",", ":"), ensure_ascii=False).encode()
+        return json.dumps(document, separators=(",", ":"), ensure_ascii=False).encode("utf-8", "replace")
 
     @classmethod
     def decode(cls, raw: bytes) -> "Sweep":

@@ -98,8 +98,7 @@ def entries(fields: tuple[str, ...], width_of: Callable[[str], int]) -> Iterator
 
 def _unknown_width(fields: tuple[str, ...], position: int) -> int:
     """Skip an unknown condition whole, so that its empty fields aren't taken for further keys."""
-    rest = fields[position + 1 :]
-    is_condition = position == 0 and len(rest) == CONDITION_WIDTH and rest[0].upper() in CONDITION_LEVELS
+    is_condition = position == 0 and len(fields) == 1 + CONDITION_WIDTH and fields[1].upper() in CONDITION_LEVELS
     return CONDITION_WIDTH if is_condition else 1
 
 
@@ -113,7 +112,7 @@ def _joined(head: Line, source: Iterator[str]) -> Line | Unusable:
         if text == mark:
             whole = "\n".join((head.text, *body, mark))
             return Line(head.stamp, (*head.fields[:-1], "\n".join(body)), whole)
-        chars += len(text)
+        chars += len(text) + 1
         if chars > LINE_CHARS_MAX:
             return Unusable("line_too_long", head.text)
         body.append(text)

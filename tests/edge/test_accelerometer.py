@@ -250,7 +250,7 @@ def test_a_file_is_played_at_its_own_pace_and_its_end_is_told(tmp_path: Path) ->
     assert sum(waited) == pytest.approx(2.6)
     names = [change.name for delivery in found for change in delivery.changes]
     assert names.count(BLOCK) == 5
-    assert names.count(RATE) == 1
+    assert names.count(RATE) == 5
 
 
 @pytest.mark.parametrize(

@@ -83,9 +83,9 @@ def test_blocks_are_published_in_the_configured_length_with_the_time_of_their_la
     samples_g = shaken(2.2)
     _, found = folded(BOTH.model_copy(update={"publish": Publish.BLOCKS}), blocks(samples_g, size=333))
     changes = [change for delivery in found for change in delivery.changes]
-    assert [change.name for change in changes] == [RATE, *[BLOCK] * 4]
-    assert [change.timestamp_ms - T0_MS for change in changes[1:]] == [500, 1000, 1500, 2000]
-    assert [value for change in changes[1:] for value in change.value] == samples_g[:20_000]  # type: ignore[union-attr]
+    assert [change.name for change in changes] == [RATE, BLOCK] * 4
+    assert [change.timestamp_ms - T0_MS for change in changes[1::2]] == [500, 1000, 1500, 2000]
+    assert [value for change in changes[1::2] for value in change.value] == samples_g[:20_000]  # type: ignore[union-attr]
     assert told(found) == []
 
 

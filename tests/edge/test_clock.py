@@ -71,6 +71,16 @@ def after(looks: Iterator[Heard], state: State | None = None) -> State:
     return done.state
 
 
+def last_health(looks: Iterator[Heard], state: State | None = None) -> tuple[dict[str, object], State]:
+    """The health that was told last, and the state after all."""
+    health: dict[str, object] = {}
+    for _, done in folded(looks, state):
+        health |= done.health
+        state = done.state
+    assert state is not None
+    return health, state
+
+
 def values(samples: tuple[EdgeSample, ...]) -> dict[str, object]:
     return {sample.signal: sample.value for sample in samples}
 
@@ -205,11 +215,24 @@ def test_stamps_of_another_clock_than_the_one_that_is_read_are_found_out(stamps_
         for look in one.looks(0.0, 200.0)
         if look.newest_ms is not None
     )
-    state = after(looks)
+    health, state = last_health(looks)
+    assert health["health/clock_alarm"] == ""
     assert state.told is not None
     assert state.told.bound is not None
     assert abs(state.told.bound.offset_s - 1.0 - stamps_ahead_s) <= state.told.bound.spread_s
     assert state.told.method == "stamps of samples; the clock that is read is another"
+
+
+def test_a_step_of_the_clock_that_stamps_is_found_where_another_one_is_read() -> None:
+    one = Clock(1.0, every_s=1.0, one_way_ms=500, stamps_samples=True)
+
+    def stamped(looks: Iterator[Heard], ahead_ms: int) -> Iterator[Heard]:
+        return (look._replace(newest_ms=look.newest_ms + ahead_ms) for look in looks if look.newest_ms is not None)
+
+    state = after(stamped(one.looks(0.0, 200.0), 40_000))
+    health, _ = last_health(stamped(one.looks(200.0, 400.0), 3_640_000), state)
+    assert health["health/clock_step"] == 1
+    assert str(health["health/clock_alarm"]).startswith("the control's clock was set by +3600.")
 
 
 def test_one_stamp_from_the_future_moves_nothing() -> None:

@@ -68,7 +68,7 @@ def test_points_come_one_by_one_and_the_state_stays_bounded() -> None:
         bounds += [bound] if bound is not None else []
     assert [bound.low_s <= 1.0 <= bound.high_s for bound in bounds] == [True]
     assert len(state.envelope) < 700
-    for number in range(3 * clock_signals.POINTS_MAX):
+    for number in range(clock_signals.POINTS_MAX + 50):
         state, _ = step(state, News(((200.0 + number, 1.0),)), at_s=0.0, around_s=0.0, poll_s=0.35)
     assert len(state.speed) <= clock_signals.POINTS_MAX
 

@@ -153,7 +153,7 @@ def test_a_hole_is_counted_and_published() -> None:
     notebook, _ = played(probe(), BASELINE, error("OUT_OF_RANGE", "too old"), current)
     assert notebook.told("health/holes")[-1] == 1
     assert notebook.told("health/lost_observations")[-1] == 317
-    assert notebook.told("health/last_hole")[-1] == "overrun: sequence 10 to 327, at most 317 lost"
+    assert notebook.told("health/last_hole")[-1] == "overrun: 10 to 327, at most 317 lost"
     assert notebook.told("health/last_error")[-1] == "the agent answers OUT_OF_RANGE: too old"
     assert notebook.told("health/refused_frames")[-1] == 1
 

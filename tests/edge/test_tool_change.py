@@ -251,6 +251,20 @@ def test_two_cues_close_together_are_two_changes() -> None:
     assert run.changes == [(10, True), (13, False), (14, True), (17, False)]
 
 
+def test_a_block_that_commands_the_next_change_ends_one_whose_cue_is_over() -> None:
+    run = Run(
+        (9, "cue", False), (10, "cue", True), (13, "cue", False), (14, "block", "T3 M6"), (14.2, "cue", True), (17, "cue", False)
+    )
+    run.feed((20, "time", 0))
+    assert run.changes == [(10, True), (13, False), (14, True), (17, False)]
+
+
+def test_a_change_that_ended_in_a_hole_ends_where_the_hole_does() -> None:
+    run = Run((10, "cue", True))
+    run.take(step(CONFIG, run.state, sample(18, "cue", False, is_baseline=True)))
+    assert (run.changes, run.evidence) == ([(10, True), (18, False)], "M6 + as found: no cue")
+
+
 def test_a_cue_that_stays_is_given_up_on_and_begins_no_second_change() -> None:
     run = Run((10, "cue", True), *((at, "cue", True) for at in range(11, 100, 5)))
     assert run.changes == [(10, True), (70, False)]
@@ -271,6 +285,20 @@ def test_an_edge_that_joins_while_the_control_works_on_m6_says_so() -> None:
     lone.state, lone.published = State(), []
     lone.take(step(CONFIG, lone.state, sample(0, "cue", False, is_baseline=True)))
     assert (lone.of("tool_change_active"), lone.evidence) == ([(0, False)], "as found: no cue")
+
+
+def test_a_number_that_cannot_be_had_leaves_the_cue_alone() -> None:
+    lost = [event for at in (10, 11, 12.5, 14) for event in ((at, "tool", "UNAVAILABLE"), (at, "cue", at == 11))]
+    run = Run((9, "cue", False), *lost, (20, "tool", 2))
+    assert run.changes == [(11, True), (12.5, False)]
+    assert run.of("tool_number") == [(0, 1), (10, None), (20, 2)]
+
+
+def test_a_number_that_cannot_be_had_for_long_is_said_once_and_the_block_still_tells() -> None:
+    lost = [(at / 5, "tool", "UNAVAILABLE") for at in range(50, 100)]
+    blocks = [(at / 5, "block", "T3 M6" if 60 <= at < 75 else "G0 X1") for at in range(50, 100)]
+    run = Run(*(event for pair in zip(lost, blocks, strict=True) for event in pair))
+    assert run.changes == [(10, None), (10, False), (12, True), (15, False)]
 
 
 def test_a_block_that_is_shown_at_each_look_commands_one_change() -> None:

@@ -32,6 +32,7 @@ class MultipartParser:
         self._in_part = False
         self._is_first = True
         self._length: int | None = None
+        self._searched = 0  # up to here there is no delimiter in the buffer
         self.closed = False
 
     def feed(self, data: bytes) -> list[bytes]:
@@ -80,8 +81,9 @@ class MultipartParser:
     def _body(self) -> bytes | None:
         length = self._length
         if length is None:
-            length = self._buffer.find(b"\n" + self._delimiter)
+            length = self._buffer.find(b"\n" + self._delimiter, self._searched)
             if length < 0:
+                self._searched = max(len(self._buffer) - len(self._delimiter), 0)
                 if len(self._buffer) > self._part_bytes_max:
                     raise ConnectionLostError(f"part of more than {self._part_bytes_max} bytes")
                 return None
@@ -91,5 +93,5 @@ class MultipartParser:
             return None
         part = bytes(self._buffer[:length])
         del self._buffer[:length]
-        self._in_part = False
+        self._in_part, self._searched = False, 0
         return part

@@ -13,13 +13,16 @@ from edge.errors import DocumentError
 
 DOCUMENT_BYTES_MAX = 64 * 1024 * 1024
 DEPTH_MAX = 64
+ELEMENTS_MAX = 500_000
+ATTRIBUTES_MAX = 100  # of one element
 _NAMESPACE = re.compile(r"\{urn:mtconnect\.org:MTConnect(\w+):(\d+(?:\.\d+)*)\}")
 
 
 class _Builder(ET.TreeBuilder):
-    """The usual tree, but no document type and no bottomless nesting."""
+    """The usual tree, but no document type, no bottomless nesting and no flood of elements."""
 
     _depth = 0
+    _elements = 0
 
     def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
         raise DocumentError(f"document type {name!r} refused: an MTConnect document has none")
@@ -28,6 +31,11 @@ class _Builder(ET.TreeBuilder):
         self._depth += 1
         if self._depth > DEPTH_MAX:
             raise DocumentError(f"elements nested deeper than {DEPTH_MAX}")
+        self._elements += 1
+        if self._elements > ELEMENTS_MAX:
+            raise DocumentError(f"document of more than {ELEMENTS_MAX} elements")
+        if len(attrs) > ATTRIBUTES_MAX:
+            raise DocumentError(f"element {tag:.80} has {len(attrs)} attributes; the most that is read is {ATTRIBUTES_MAX}")
         return super().start(tag, attrs)
 
     def end(self, tag: Any, /) -> Any:

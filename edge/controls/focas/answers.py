@@ -1,0 +1,205 @@
+"""Which commands of the Ethernet protocol a call needs, and what their answers hold. No I/O.
+
+Two calls have no published command: cnc_modal and cnc_toolnum. The modal M, S, T and F are read from the system variables that
+FANUC's manuals define for them (#4113, #4119, #4120, #4109), whose reading is known from captures; cnc_toolnum is answered here
+with EW_FUNC, so the tool number comes from the T code.
+"""
+
+import struct
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+from edge.controls.focas import wire
+from edge.controls.focas.calls import CLOCK_WORDS, STATUS_WORDS, Answer, Call, Found, Identity, Request, alarm_text
+from edge.controls.focas.pmc import AREAS, pmc_address
+from edge.controls.focas.policy import DATA, FUNC, OK, told
+from edge.controls.focas.wire import PMC, Block, Reply
+from edge.errors import DocumentError
+
+BLOCK_CHARS = 256
+ALARMS_MAX = 10
+ALARM_CHARS = 64
+LENGTH_GEOMETRY = 1003
+_MODAL_FIRST, _MODAL_LAST = 4109, 4120
+_MODAL_NUMBERS = {"M": 4113, "S": 4119, "T": 4120, "F": 4109}
+IDENTITY_BLOCKS = (Block(0x18), Block(0xA4, (2,)), Block(0x89))
+
+
+class Exchange(NamedTuple):
+    """The blocks of one call, how long their answers are at the most, and how they are read."""
+
+    blocks: tuple[Block, ...]
+    answer_bytes: int
+    read: Callable[[Sequence[Reply], Identity], tuple[Found, ...]]
+
+
+def identity(found: Sequence[Reply]) -> Identity:
+    """Who answers, from `IDENTITY_BLOCKS`."""
+    system, count, axis_names = found
+    if system.status != OK or len(system.data) < 18:
+        raise DocumentError(f"no system information: {told(system.status)}")
+    cnc_type, mt_type, series, version, axes = struct.unpack(">4x2s2s4s4s2s", system.data[:18])
+    if count.status == OK and len(count.data) >= 2:
+        controlled = int.from_bytes(count.data[:2], "big")
+    else:
+        controlled = int(wire.text(axes)) if wire.text(axes).isdigit() else 0
+    named = tuple(wire.names(axis_names.data, controlled)) if axis_names.status == OK else ()
+    unique = tuple(name if name and named.count(name) == 1 else f"{name}{at}" for at, name in enumerate(named, 1))
+    return Identity(wire.text(cnc_type), wire.text(mt_type), wire.text(series), wire.text(version), unique)
+
+
+def exchange(request: Request, path: int = 1) -> Exchange | None:
+    """How this call is put; None where the protocol has no known command for it."""
+    match request.call:
+        case Call.STATUS:
+            return Exchange((Block(0x19),), 32, _status)
+        case Call.DYNAMIC:
+            blocks = (Block(0x1C), Block(0x1D), Block(0x24), Block(0x25), Block(0x26, (1, -1)))
+            return Exchange(blocks, 390, _dynamic)
+        case Call.SERVO_LOAD:
+            return Exchange((Block(0x56, (1,)),), 272, _servo_load)
+        case Call.SPINDLE_LOAD:
+            return Exchange((Block(0x40, (4, -1)),), 80, _spindle_load)
+        case Call.BLOCK:
+            return Exchange((Block(0x20, (BLOCK_CHARS,)),), BLOCK_CHARS + 24, _block)
+        case Call.MODAL:
+            return Exchange((Block(0x15, (_MODAL_FIRST, _MODAL_LAST)),), 112, _modal)
+        case Call.PMC:
+            return _pmc(request.argument)
+        case Call.PROGRAM:
+            return Exchange((Block(0xFC), Block(0xCF)), 330, _program)
+        case Call.ALARMS:
+            return Exchange((Block(0x23, (-1, ALARMS_MAX, 2, ALARM_CHARS)),), 820, _alarms)
+        case Call.G_CODE:
+            return Exchange((Block(0x96, (int(request.argument), 0)),), 28, _g_code(request.argument))
+        case Call.OFFSET:
+            number = int(request.argument)
+            return Exchange((Block(0x08, (number, number, LENGTH_GEOMETRY)),), 24, _offset)
+        case Call.CLOCK:
+            return Exchange((Block(0x45, (0,)), Block(0x45, (1,))), 60, _clock)
+    return None
+
+
+def answer(request: Request, plan: Exchange, found: Sequence[Reply], who: Identity) -> Answer:
+    """The facts of one call. Data that cannot be read is EW_DATA, for this call only."""
+    if all(reply.status != OK for reply in found):
+        return Answer(found[0].status)
+    try:
+        return Answer(OK, plan.read(found, who))
+    except (DocumentError, struct.error):
+        return Answer(DATA)
+
+
+def unknown() -> Answer:
+    """To a call that the protocol has no known command for."""
+    return Answer(FUNC)
+
+
+def _whole(key: str, reply: Reply) -> Found:
+    if reply.status != OK:
+        return Found(key, None, reply.status)
+    if len(reply.data) < 4:
+        return Found(key, None, DATA)
+    return Found(key, int.from_bytes(reply.data[:4], "big", signed=True))
+
+
+def _row(keys: Sequence[str], reply: Reply) -> tuple[Found, ...]:
+    if reply.status != OK:
+        return tuple(Found(key, None, reply.status) for key in keys)
+    return tuple(_figure(key, reply.data[at * 8 : at * 8 + 8]) for at, key in enumerate(keys))
+
+
+def _figure(key: str, data: bytes) -> Found:
+    try:
+        figure = wire.value(data)
+    except DocumentError:
+        return Found(key, None, DATA)
+    return Found(key, figure, OK if figure is not None else DATA)
+
+
+def _status(found: Sequence[Reply], who: Identity) -> tuple[Found, ...]:
+    words = struct.unpack(">7h", found[0].data[:14])
+    return tuple(Found(f"status.{name}", word) for name, word in zip(STATUS_WORDS, words, strict=True))
+
+
+def _dynamic(found: Sequence[Reply], who: Identity) -> tuple[Found, ...]:
+    programs, sequence, feed, spindle, positions = found
+    main = Reply(programs.status, programs.data[4:8])
+    return (
+        _whole("program.number", programs),
+        _whole("program.main", main),
+        _whole("sequence", sequence),
+        *_row(("feed",), feed),
+        *_row(("spindle_rpm",), spindle),
+        *_row([f"position.{axis}" for axis in who.axes], positions),
+    )
+
+
+def _servo_load(found: Sequence[Reply], who: Identity) -> tuple[Found, ...]:
+    return _row([f"servo_load.{axis}" for axis in who.axes], found[0])
+
+
+def _spindle_load(found: Sequence[Reply], who: Identity) -> tuple[Found, ...]:
+    return _row(("spindle_load",), found[0])
+
+
+def _block(found: Sequence[Reply], who: Identity) -> tuple[Found, ...]:
+    if len(found[0].data) < 4:
+        raise DocumentError("no block")
+    return (Found("block", wire.text(found[0].data[4:])),)
+
+
+def _modal(found: Sequence[Reply], who: Identity) -> tuple[Found, ...]:
+    row = wire.values(found[0].data, _MODAL_LAST - _MODAL_FIRST + 1)
+    figures = ((word, row[number - _MODAL_FIRST]) for word, number in _MODAL_NUMBERS.items())
+    return tuple(Found(f"modal.{word}", figure) for word, figure in figures)  # None: none commanded since the control is on
+
+
+def _pmc(address: str) -> Exchange:
+    area, byte, _, width = pmc_address(address)
+
+    def read(found: Sequence[Reply], who: Identity) -> tuple[Found, ...]:
+        data = found[0].data
+        if len(data) != width:
+            raise DocumentError(f"{len(data)} bytes of the PMC in place of {width}")
+        return (Found(f"pmc.{address}", int.from_bytes(data, "little")),)
+
+    return Exchange((Block(0x8001, (byte, byte + width - 1, AREAS[area], 0), PMC),), 16 + width, read)
+
+
+def _program(found: Sequence[Reply], who: Identity) -> tuple[Found, ...]:
+    """The full name, or that of older controls."""
+    full, short = found
+    if full.status == OK:
+        return (Found("program.name", wire.text(full.data)),)
+    return (Found("program.name", wire.text(short.data[4:])),)
+
+
+def _alarms(found: Sequence[Reply], who: Identity) -> tuple[Found, ...]:
+    data, texts = found[0].data, list[str]()
+    record = 16 + ALARM_CHARS
+    for at in range(0, len(data) - record + 1, record):
+        number, kind, _, length = struct.unpack_from(">4i", data, at)
+        message = wire.text(data[at + 16 : at + 16 + max(0, min(length, ALARM_CHARS))])
+        texts.append(alarm_text(kind, number, message))
+    return (Found("alarms", "; ".join(texts)),)
+
+
+def _g_code(group: str) -> Callable[[Sequence[Reply], Identity], tuple[Found, ...]]:
+    def read(found: Sequence[Reply], who: Identity) -> tuple[Found, ...]:
+        code, tenths = struct.unpack_from(">6xHxxH", found[0].data)
+        return (Found(f"modal.G{group}", f"G{code / 10:g}" if tenths else f"G{code}"),)
+
+    return read
+
+
+def _offset(found: Sequence[Reply], who: Identity) -> tuple[Found, ...]:
+    return _row(("tool_offset",), found[0])
+
+
+def _clock(found: Sequence[Reply], who: Identity) -> tuple[Found, ...]:
+    if any(reply.status != OK for reply in found):
+        raise DocumentError("half a clock")
+    date, time = found
+    figures = (*struct.unpack(">3H", date.data[:6]), *struct.unpack(">3H", time.data[-6:]))
+    return tuple(Found(f"clock.{word}", figure) for word, figure in zip(CLOCK_WORDS, figures, strict=True))

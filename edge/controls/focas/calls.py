@@ -1,0 +1,141 @@
+"""What a FANUC control is asked, by the names of its functions, and the shape of what it answers: the interface of both backends.
+
+A call answers with facts (`Found`), one for each value, each with a return code of its own: a control that has not got the option
+for spindle loads still tells its servo loads.
+"""
+
+from collections.abc import Sequence
+from enum import StrEnum
+from typing import NamedTuple, Protocol
+
+from edge.sweep import Plain
+
+
+class Call(StrEnum):
+    """The functions that are used. All of them read."""
+
+    STATUS = "cnc_statinfo"
+    DYNAMIC = "cnc_rddynamic2"
+    SERVO_LOAD = "cnc_rdsvmeter"
+    SPINDLE_LOAD = "cnc_rdspmeter"
+    BLOCK = "cnc_rdexecprog"
+    MODAL = "cnc_modal"
+    TOOL = "cnc_toolnum"
+    PMC = "pmc_rdpmcrng"
+    PROGRAM = "cnc_exeprgname"
+    ALARMS = "cnc_rdalmmsg2"
+    G_CODE = "cnc_rdgcode"
+    OFFSET = "cnc_rdtofs"
+    CLOCK = "cnc_gettimer"
+
+
+STATUS_WORDS = ("aut", "run", "motion", "mstb", "emergency", "alarm", "edit")
+MODAL_WORDS = {"M": 106, "S": 107, "T": 108, "F": 103}  # the number of the modal datum in cnc_modal
+CLOCK_WORDS = ("year", "month", "day", "hour", "minute", "second")
+
+
+class Request(NamedTuple):
+    """One call. `argument`: a PMC address, a G group, the number of an offset."""
+
+    call: Call
+    argument: str = ""
+
+    @property
+    def name(self) -> str:
+        """For messages, and to remember that it was refused."""
+        return f"{self.call} {self.argument}".rstrip()
+
+
+class Found(NamedTuple):
+    """One value, or the code that came in its place."""
+
+    key: str
+    value: Plain = None
+    code: int = 0
+
+
+class Identity(NamedTuple):
+    """What the control says of itself. `mt_type`: M a machining centre, T a lathe; axes by name, in their order."""
+
+    cnc_type: str = ""
+    mt_type: str = ""
+    series: str = ""
+    version: str = ""
+    axes: tuple[str, ...] = ()
+
+
+class Opened(NamedTuple):
+    """Whether there is a handle, and whose."""
+
+    code: int
+    identity: Identity = Identity()
+    why: str = ""
+
+
+class Answer(NamedTuple):
+    """What became of one request. `code` other than 0: nothing was found."""
+
+    code: int
+    found: tuple[Found, ...] = ()
+
+
+class FocasBackend(Protocol):
+    """One way to a control. No call blocks for longer than its timeout; `close` may come from any thread."""
+
+    def open(self) -> Opened:
+        """Make a handle, and ask who is there."""
+
+    def ask(self, requests: Sequence[Request]) -> tuple[Answer, ...]:
+        """The answers, in the order of the requests. One with RECONNECT in it means that the handle is gone."""
+
+    def close(self) -> None:
+        """Free the handle. `open` may follow."""
+
+
+def keys_of(request: Request, axes: Sequence[str]) -> tuple[str, ...]:
+    """The facts that a call would give, for one that gave none.
+
+    >>> keys_of(Request(Call.SERVO_LOAD), ("X", "Z"))
+    ('servo_load.X', 'servo_load.Z')
+    """
+    match request.call:
+        case Call.STATUS:
+            return tuple(f"status.{word}" for word in STATUS_WORDS)
+        case Call.DYNAMIC:
+            plain = ("program.number", "program.main", "sequence", "feed", "spindle_rpm")
+            return (*plain, *(f"position.{axis}" for axis in axes))
+        case Call.SERVO_LOAD:
+            return tuple(f"servo_load.{axis}" for axis in axes)
+        case Call.MODAL:
+            return tuple(f"modal.{word}" for word in MODAL_WORDS)
+        case Call.PMC:
+            return (f"pmc.{request.argument}",)
+        case Call.G_CODE:
+            return (f"modal.G{request.argument}",)
+        case Call.OFFSET:
+            return ("tool_offset",)
+        case Call.CLOCK:
+            return tuple(f"clock.{word}" for word in CLOCK_WORDS)
+    return (_LONE[request.call],)
+
+
+_LONE = {
+    Call.SPINDLE_LOAD: "spindle_load",
+    Call.BLOCK: "block",
+    Call.TOOL: "tool",
+    Call.PROGRAM: "program.name",
+    Call.ALARMS: "alarms",
+}
+
+
+ALARM_LETTERS = ("SW", "PW", "IO", "PS", "OT", "OH", "SV", "SR", "MC", "SP", "DS", "IE", "BG", "SN", "", "EX", "", "", "", "PC")
+
+
+def alarm_text(kind: int, number: int, text: str) -> str:
+    """An alarm as the control's screen names it (series 30i and 0i-D to 0i-F; of older ones the letters may differ).
+
+    >>> alarm_text(3, 10, "IMPROPER G-CODE")
+    'PS0010 IMPROPER G-CODE'
+    """
+    letters = ALARM_LETTERS[kind] if 0 <= kind < len(ALARM_LETTERS) else ""
+    return f"{letters or f'type {kind} '}{number:04d} {text}".strip()

@@ -1,0 +1,34 @@
+"""What an edge for a FANUC control would publish: one handle, one look, the same parser as in operation, no broker."""
+
+from edge.adapter import Row
+from edge.controls.focas.config import Backend, Config
+from edge.controls.focas.connection import FocasConnection
+from edge.controls.focas.cursor import parse, start
+from edge.errors import ConnectionLostError
+from edge.sample import SampleSet
+from edge.signals import signal
+from edge.sweep import Sweep
+
+
+def describe(config: Config) -> list[Row]:
+    """What would be published for the control that the configuration names; what it refuses is a null with the reason."""
+    _, frame = look(config)
+    last = {sample.signal: sample for sample in frame.samples}
+    way = "experimental ethernet: " if config.source.backend is Backend.ETHERNET else ""
+    rows = []
+    for offer in frame.offers or ():
+        sample = last.get(offer.signal)
+        value, reason = (None, "not reported yet") if sample is None else (sample.value, sample.reason)
+        rows.append(Row(offer.signal, way + offer.source, signal(offer.signal).unit, offer.native_unit, value, reason))
+    return rows
+
+
+def look(config: Config) -> tuple[Sweep, SampleSet]:
+    """The first sweep and what it gives; ConnectionLostError where there is none."""
+    connection = FocasConnection(config, wait=lambda _: None)
+    raw = connection.once()
+    if raw is None:
+        source = config.source
+        way_out = f"is the control on, and does it answer FOCAS on port {source.port}?"
+        raise ConnectionLostError(f"{connection.last_error}; {way_out} (docs/edge-focas.md)")
+    return Sweep.decode(raw), parse(config, start(config), raw)[1]

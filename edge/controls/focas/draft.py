@@ -1,0 +1,81 @@
+"""A first configuration for the FANUC control at an address."""
+
+from urllib.parse import urlsplit
+
+from pydantic import ValidationError
+
+from edge.config import EdgeConfig, without_secret
+from edge.controls.focas.check import look
+from edge.controls.focas.config import FocasConfig
+from edge.errors import ConfigError
+from edge.sample import SampleSet
+from edge.sweep import Sweep
+
+PORT = 8193
+
+
+def draft(url: str, device: str = "") -> str:
+    """A configuration for the control at `focas://host:8193`, as text. `device` is the machine's name."""
+    config = EdgeConfig(source=_source(url))
+    sweep, frame = look(config)
+    return text_of(config.source, device, sweep, frame)
+
+
+def _source(url: str) -> FocasConfig:
+    try:
+        parts = urlsplit(url)
+        if parts.scheme != "focas" or not parts.hostname or parts.path.strip("/"):
+            raise ValueError("is no address of a FANUC control")
+        return FocasConfig(host=parts.hostname, port=parts.port or PORT)
+    except ValidationError as error:
+        raise ConfigError(f"address {without_secret(repr(url))}: {error.errors()[0]['msg']}") from None
+    except ValueError as error:
+        raise ConfigError(f"address {without_secret(repr(url))} {error}; write it as focas://192.168.1.10:{PORT}") from None
+
+
+def text_of(source: FocasConfig, device: str, sweep: Sweep, frame: SampleSet) -> str:
+    """The configuration, with what the control says of itself as comments."""
+    told = {fact.key.removeprefix("control."): str(fact.value) for fact in sweep.facts if fact.key.startswith("control.")}
+    refused = [f"#   {fact.key}: {fact.fault}" for fact in sweep.facts if fact.fault]
+    nulls = {sample.signal for sample in frame.samples if sample.value is None}
+    signals = [offer.signal for offer in frame.offers or () if offer.signal not in nulls]
+    lines = [
+        f"# Drafted from focas://{source.host}:{source.port}. Values that are not here have their defaults; see edge/focas.toml.",
+        _comment(f"{told['cnc_type']}i-{told['mt_type']} series {told['series']} version {told['version']}, axes {told['axes']}"),
+        "",
+        "[machine]",
+        f"name = {_quoted(_topic_word(device or 'machine'))}",
+        'adapter = "focas"',
+        "",
+        "[broker]",
+        'url = "mqtt://127.0.0.1:1883"',
+        "",
+        "[focas]",
+        f"host = {_quoted(source.host)}",
+        f"port = {source.port}",
+        'backend = "ethernet"  # experimental; with your own library: backend = "library" and library = "/path/of/libfwlib32.so"',
+        'tool_change_pmc = ""  # a bit that is on during a tool change, if the builder\'s ladder has one, such as "R100.3"',
+        "",
+        "# Published:",
+        *(_comment(f"  {name}") for name in signals),
+        "# Refused by the control:",
+        *(map(_one_line, refused) if refused else ("#   nothing",)),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _comment(text: str) -> str:
+    return _one_line(f"# {text}")
+
+
+def _one_line(text: str) -> str:
+    return "".join(c if c.isprintable() else " " for c in text)
+
+
+def _topic_word(name: str) -> str:
+    return "".join("-" if c in "/+#" or c.isspace() else c for c in name)
+
+
+def _quoted(text: str) -> str:
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
+    return '"' + "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in escaped) + '"'

@@ -1,0 +1,267 @@
+"""The user's own FOCAS library by ctypes. Runs in a process of its own (`library_process`), because it may crash or hang.
+
+Only functions in `READS` are ever called: none of them writes to the control. (cnc_setpath chooses which path the handle reads.)
+"""
+
+import ctypes
+import os
+from collections.abc import Callable
+from ctypes import byref, c_char, c_int16, c_long, c_uint16, sizeof
+from typing import Any
+
+from edge.controls.focas import structures as st
+from edge.controls.focas.answers import ALARMS_MAX, BLOCK_CHARS
+from edge.controls.focas.calls import (
+    CLOCK_WORDS,
+    MODAL_WORDS,
+    STATUS_WORDS,
+    Answer,
+    Call,
+    Found,
+    Identity,
+    Request,
+    alarm_text,
+    keys_of,
+)
+from edge.controls.focas.pmc import AREAS, pmc_address
+from edge.controls.focas.policy import FUNC, OK, Policy, policy_of
+
+READS = frozenset(
+    {
+        "cnc_startupprocess",
+        "cnc_exitprocess",
+        "cnc_allclibhndl3",
+        "cnc_freelibhndl",
+        "cnc_setpath",
+        "cnc_sysinfo",
+        "cnc_statinfo",
+        "cnc_rdaxisname",
+        "cnc_getfigure",
+        "cnc_rddynamic2",
+        "cnc_rdspeed",
+        "cnc_acts",
+        "cnc_acts2",
+        "cnc_rdsvmeter",
+        "cnc_rdspmeter",
+        "cnc_rdexecprog",
+        "cnc_exeprgname",
+        "cnc_modal",
+        "cnc_rdgcode",
+        "cnc_toolnum",
+        "cnc_rdtofs",
+        "cnc_rdalmmsg2",
+        "cnc_gettimer",
+        "pmc_rdpmcrng",
+    }
+)
+LENGTH_GEOMETRY = 3
+POSITION_FIGURES = 0
+DECIMALS_USUAL = 3
+
+
+class Fwlib:
+    """One handle of the library."""
+
+    def __init__(self, path: str) -> None:
+        self._library = ctypes.CDLL(path)
+        self._handle = c_uint16(0)
+        self._is_open = False
+        self._has_process = False
+        self._decimals: tuple[int, ...] = ()
+        self.identity = Identity()
+        self._readers: dict[Call, Callable[[Request], tuple[Found, ...] | int]] = {
+            Call.STATUS: self._status,
+            Call.DYNAMIC: self._dynamic,
+            Call.SERVO_LOAD: self._servo_load,
+            Call.SPINDLE_LOAD: self._spindle_load,
+            Call.BLOCK: self._block,
+            Call.MODAL: self._modal,
+            Call.TOOL: self._tool,
+            Call.PMC: self._pmc,
+            Call.PROGRAM: self._program,
+            Call.ALARMS: self._alarms,
+            Call.G_CODE: self._g_code,
+            Call.OFFSET: self._offset,
+            Call.CLOCK: self._clock,
+        }
+
+    def open(self, host: str, port: int, timeout_s: int, path: int) -> int:
+        """A handle, and who is there."""
+        self.close()
+        if not self._has_process:
+            self._invoke("cnc_startupprocess", 0, os.devnull.encode())  # Linux only; elsewhere it is not there
+            self._has_process = True
+        code = self._invoke("cnc_allclibhndl3", host.encode(), c_uint16(port), c_long(timeout_s), byref(self._handle))
+        if code != OK:
+            return code
+        self._is_open = True
+        if path != 1:
+            code = self._call("cnc_setpath", c_int16(path))
+        return code or self._identify()
+
+    def close(self) -> None:
+        """Free the handle."""
+        if self._is_open:
+            self._is_open = False
+            self._call("cnc_freelibhndl")
+
+    def call(self, request: Request) -> Answer:
+        """One call, one answer."""
+        found = self._readers[request.call](request)
+        return Answer(found) if isinstance(found, int) else Answer(OK, found)
+
+    def _invoke(self, name: str, *arguments: Any) -> int:
+        """A function of the library, by name; EW_FUNC where this library has not got it."""
+        assert name in READS, name
+        function = getattr(self._library, name, None)
+        if function is None:
+            return FUNC
+        function.restype = c_int16
+        return int(function(*arguments))
+
+    def _call(self, name: str, *arguments: Any) -> int:
+        return self._invoke(name, self._handle, *arguments)
+
+    def _identify(self) -> int:
+        system = st.OdbSys()
+        code = self._call("cnc_sysinfo", byref(system))
+        if code != OK:
+            return code
+        count, axes = c_int16(st.MAX_AXIS), (st.AxisName * st.MAX_AXIS)()
+        code = self._call("cnc_rdaxisname", byref(count), axes)
+        if policy_of(code) is Policy.RECONNECT:
+            return code
+        named = [_word(one.name + one.suff.strip(b"\0 ")) for one in axes[: max(0, count.value)]] if code == OK else []
+        unique = (name if name and named.count(name) == 1 else f"{name}{at}" for at, name in enumerate(named, 1))
+        cnc_type, mt_type, series, version = map(_word, (system.cnc_type, system.mt_type, system.series, system.version))
+        self.identity = Identity(cnc_type, mt_type, series, version, tuple(unique))
+        valid, inputs, outputs = c_int16(0), (c_int16 * st.MAX_AXIS)(), (c_int16 * st.MAX_AXIS)()
+        code = self._call("cnc_getfigure", c_int16(POSITION_FIGURES), byref(valid), inputs, outputs)
+        known = [int(outputs[at]) for at in range(len(named))] if code == OK else []
+        self._decimals = tuple(figures if 0 <= figures <= 9 else DECIMALS_USUAL for figures in known)
+        return code if policy_of(code) is Policy.RECONNECT else OK
+
+    def _status(self, request: Request) -> tuple[Found, ...] | int:
+        status = st.OdbSt()
+        code = self._call("cnc_statinfo", byref(status))
+        return code or tuple(Found(f"status.{word}", getattr(status, word)) for word in STATUS_WORDS)
+
+    def _dynamic(self, request: Request) -> tuple[Found, ...] | int:
+        """Machine positions axis by axis; programs and speeds come with the first."""
+        axes = self.identity.axes
+        found, positions = list[Found](), list[Found]()
+        for number, axis in enumerate(axes or ("",), 1):
+            dynamic = st.OdbDy2()
+            code = self._call("cnc_rddynamic2", c_int16(number), c_int16(sizeof(dynamic)), byref(dynamic))
+            if code != OK and (number == 1 or policy_of(code) is Policy.RECONNECT):
+                return code
+            if number == 1:
+                found += [
+                    Found("program.number", dynamic.prgnum),
+                    Found("program.main", dynamic.prgmnum),
+                    Found("sequence", dynamic.seqnum),
+                    *self._speeds(dynamic),
+                ]
+            decimals = self._decimals[number - 1] if number <= len(self._decimals) else DECIMALS_USUAL
+            value = _scaled(dynamic.machine, decimals) if code == OK else None
+            positions += [Found(f"position.{axis}", value, code)] if axis else []
+        return (*found, *positions)
+
+    def _speeds(self, dynamic: st.OdbDy2) -> tuple[Found, Found]:
+        """Feed and speed with their decimals, which rddynamic2 leaves out; where rdspeed is missing, those whole figures."""
+        speed = st.OdbSpeed()
+        code = self._call("cnc_rdspeed", c_int16(-1), byref(speed))
+        if code != OK:
+            return Found("feed", dynamic.actf), Found("spindle_rpm", self._spindle_rpm(dynamic.acts))
+        return (
+            Found("feed", _scaled(speed.actf.data, speed.actf.dec)),
+            Found("spindle_rpm", _scaled(speed.acts.data, speed.acts.dec)),
+        )
+
+    def _spindle_rpm(self, rough: int) -> int:
+        several, one = st.OdbAct2(), st.OdbAct()
+        if self._call("cnc_acts2", c_int16(1), byref(several)) == OK:
+            return int(several.data[0])
+        return int(one.data) if self._call("cnc_acts", byref(one)) == OK else rough
+
+    def _servo_load(self, request: Request) -> tuple[Found, ...] | int:
+        count, loads = c_int16(st.MAX_AXIS), (st.LoadElm * st.MAX_AXIS)()
+        code = self._call("cnc_rdsvmeter", byref(count), loads)
+        pairs = zip(keys_of(request, self.identity.axes), loads[: max(0, count.value)], strict=False)
+        return code or tuple(Found(key, _scaled(load.data, load.dec)) for key, load in pairs)
+
+    def _spindle_load(self, request: Request) -> tuple[Found, ...] | int:
+        count, loads = c_int16(1), (st.OdbSpLoad * 8)()
+        code = self._call("cnc_rdspmeter", c_int16(-1), byref(count), loads)
+        return code or (Found("spindle_load", _scaled(loads[0].spload.data, loads[0].spload.dec)),)
+
+    def _block(self, request: Request) -> tuple[Found, ...] | int:
+        length, block, text = c_uint16(BLOCK_CHARS), c_int16(0), (c_char * (BLOCK_CHARS + 1))()
+        code = self._call("cnc_rdexecprog", byref(length), byref(block), text)
+        return code or (Found("block", _word(text.raw[: min(length.value, BLOCK_CHARS)])),)
+
+    def _modal(self, request: Request) -> tuple[Found, ...] | int:
+        found = list[Found]()
+        for word, number in MODAL_WORDS.items():
+            modal = st.OdbMdl()
+            code = self._call("cnc_modal", c_int16(number), c_int16(0), byref(modal))
+            if policy_of(code) is Policy.RECONNECT:
+                return code
+            found.append(Found(f"modal.{word}", int(modal.aux_data) if code == OK else None, code))
+        return tuple(found)
+
+    def _tool(self, request: Request) -> tuple[Found, ...] | int:
+        tool = st.OdbTLife4()
+        code = self._call("cnc_toolnum", c_int16(0), c_int16(0), byref(tool))
+        return code or (Found("tool", tool.data),)
+
+    def _pmc(self, request: Request) -> tuple[Found, ...] | int:
+        area, byte, _, width = pmc_address(request.argument)
+        data = st.IodbPmc()
+        last = c_uint16(byte + width - 1)
+        length = c_uint16(8 + width)
+        code = self._call("pmc_rdpmcrng", c_int16(AREAS[area]), c_int16(0), c_uint16(byte), last, length, byref(data))
+        raw = bytes(data)[st.IodbPmc.cdata.offset : st.IodbPmc.cdata.offset + width]
+        return code or (Found(f"pmc.{request.argument}", int.from_bytes(raw, "little")),)
+
+    def _program(self, request: Request) -> tuple[Found, ...] | int:
+        program = st.OdbExePrg()
+        code = self._call("cnc_exeprgname", byref(program))
+        return code or (Found("program.name", _word(program.name)),)
+
+    def _alarms(self, request: Request) -> tuple[Found, ...] | int:
+        count, alarms = c_int16(ALARMS_MAX), (st.OdbAlmMsg2 * ALARMS_MAX)()
+        code = self._call("cnc_rdalmmsg2", c_int16(-1), byref(count), alarms)
+        told = alarms[: max(0, count.value)]
+        texts = (alarm_text(one.type, one.alm_no, _word(one.alm_msg[: max(0, one.msg_len)])) for one in told)
+        return code or (Found("alarms", "; ".join(texts)),)
+
+    def _g_code(self, request: Request) -> tuple[Found, ...] | int:
+        count, codes = c_int16(1), (st.OdbGcd * 4)()
+        code = self._call("cnc_rdgcode", c_int16(int(request.argument)), c_int16(0), byref(count), codes)
+        return code or (Found(f"modal.G{request.argument}", _word(codes[0].code)),)
+
+    def _offset(self, request: Request) -> tuple[Found, ...] | int:
+        offset = st.OdbTOfs()
+        number = c_int16(int(request.argument))
+        code = self._call("cnc_rdtofs", number, c_int16(LENGTH_GEOMETRY), c_int16(sizeof(offset)), byref(offset))
+        decimals = self._decimals[0] if self._decimals else DECIMALS_USUAL
+        return code or (Found("tool_offset", _scaled(offset.data, decimals)),)
+
+    def _clock(self, request: Request) -> tuple[Found, ...] | int:
+        words = list[int]()
+        for kind in (0, 1):
+            timer = st.IodbTimer(type=kind)
+            code = self._call("cnc_gettimer", byref(timer))
+            if code != OK:
+                return code
+            words += timer.words
+        return tuple(Found(f"clock.{name}", int(word)) for name, word in zip(CLOCK_WORDS, words, strict=True))
+
+
+def _scaled(data: int, decimals: int) -> float | int:
+    return int(data) if decimals <= 0 else int(data) / 10.0 ** min(decimals, 9)
+
+
+def _word(raw: bytes) -> str:
+    return raw.split(b"\0", 1)[0].decode("ascii", errors="replace").strip()

@@ -1,0 +1,113 @@
+"""What is asked when: at each look, once in a slow interval, and what the control has refused for good."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+from edge.controls.focas.calls import Answer, Call, Found, Request, keys_of
+from edge.controls.focas.config import Backend, FocasConfig, Group, ToolSource
+from edge.controls.focas.pmc import PmcAddress, pmc_address
+from edge.controls.focas.policy import Policy, policy_of
+
+G_GROUPS = ("0", "1", "2")
+LOOKS_BUSY_MAX = 25  # a value that the control is too busy to give for so many looks is not known any more
+
+
+@dataclass(frozen=True, slots=True)
+class Signals:
+    """The PMC addresses that FANUC's interface defines; those of path 2 are 1000 further on, and so on.
+
+    strobe: F7.0, MF, on while an M code is worked on; code: F10 to F13, the M code
+    feed: G12, the feed override in negative logic; rapid: G14.0 and .1; spindle: G30, the spindle override in %
+    """
+
+    strobe: str
+    code: str
+    feed: str
+    rapid: str
+    spindle: str
+
+    @classmethod
+    def of(cls, path: int) -> "Signals":
+        """Those of one path.
+
+        >>> Signals.of(2).feed
+        'G1012'
+        """
+        on = 1000 * (path - 1)
+        return cls(f"F{7 + on}", f"F{10 + on}:4", f"G{12 + on}", f"G{14 + on}", f"G{30 + on}")
+
+
+def change_bit(config: FocasConfig) -> PmcAddress | None:
+    """The bit of the machine's builder that is on during a tool change, where it is configured."""
+    return pmc_address(config.tool_change_pmc) if config.tool_change_pmc else None
+
+
+def quick(config: FocasConfig) -> tuple[Request, ...]:
+    """What each look asks. What belongs to a tool change comes first, to be of one moment."""
+    groups, signals, bit = config.groups, Signals.of(config.path), change_bit(config)
+    requests = [Request(Call.STATUS), Request(Call.DYNAMIC)]
+    if Group.MODAL in groups:
+        requests += [Request(Call.MODAL), Request(Call.PMC, signals.strobe), Request(Call.PMC, signals.code)]
+    if config.backend is Backend.LIBRARY and config.tool_number in (ToolSource.AUTO, ToolSource.TOOLNUM):
+        requests.append(Request(Call.TOOL))
+    if bit is not None:
+        requests.append(Request(Call.PMC, bit.byte_name))
+    if config.tool_number_pmc:
+        requests.append(Request(Call.PMC, config.tool_number_pmc))
+    if Group.OVERRIDES in groups:
+        requests += [Request(Call.PMC, address) for address in (signals.feed, signals.rapid, signals.spindle)]
+    if Group.BLOCK in groups:
+        requests.append(Request(Call.BLOCK))
+    if Group.LOADS in groups:
+        requests += [Request(Call.SPINDLE_LOAD), Request(Call.SERVO_LOAD)]
+    return tuple(dict.fromkeys(requests))
+
+
+def slow(config: FocasConfig, tool: int) -> tuple[Request, ...]:
+    """What a slow look asks besides. `tool`: whose offset, 0 for none."""
+    requests = [Request(Call.PROGRAM)]
+    if Group.ALARMS in config.groups:
+        requests.append(Request(Call.ALARMS))
+    if Group.MODAL in config.groups:
+        requests += [Request(Call.G_CODE, group) for group in G_GROUPS]
+    if Group.OFFSET in config.groups and 0 < tool <= 9999:
+        requests.append(Request(Call.OFFSET, str(tool)))
+    return tuple(requests)
+
+
+@dataclass(slots=True)
+class Refusals:
+    """What this control has refused for good, and what it was too busy for. Forgotten with the handle: options can be bought."""
+
+    given_up: dict[str, int] = field(default_factory=dict)
+    busy: dict[str, int] = field(default_factory=dict)
+
+    def asked(self, requests: Iterable[Request], axes: Sequence[str]) -> tuple[Request, ...]:
+        """The requests that can still give something."""
+        return tuple(
+            request
+            for request in requests
+            if request.name not in self.given_up and not all(key in self.given_up for key in keys_of(request, axes))
+        )
+
+    def judge(self, request: Request, answer: Answer, axes: Sequence[str]) -> tuple[Found, ...]:
+        """The facts of an answer that are to be told: values, and refusals the first time."""
+        if answer.code == 0:
+            found = answer.found
+        else:
+            found = tuple(Found(key, None, answer.code) for key in keys_of(request, axes))
+            if policy_of(answer.code) is Policy.GIVE_UP:
+                self.given_up[request.name] = answer.code
+        return tuple(one for one in found if self._is_told(one))
+
+    def _is_told(self, one: Found) -> bool:
+        policy = policy_of(one.code)
+        if policy is Policy.RETRY:
+            self.busy[one.key] = self.busy.get(one.key, 0) + 1
+            return self.busy[one.key] >= LOOKS_BUSY_MAX
+        self.busy.pop(one.key, None)
+        if policy is not Policy.GIVE_UP:
+            return True
+        is_new = one.key not in self.given_up
+        self.given_up[one.key] = one.code
+        return is_new

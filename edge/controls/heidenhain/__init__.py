@@ -1,0 +1,1 @@
+"""The parts of the edge for HEIDENHAIN controls over LSV2."""

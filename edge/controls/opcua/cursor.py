@@ -1,0 +1,194 @@
+"""The frames of an OPC UA server as samples: deliveries of a subscription in the order of their own time stamps.
+
+The connection names each value by the signal that it stands for (`edge.controls.opcua.point`), or `tool:<n>:<field>` where the
+tool in the spindle has to be found from where each tool is. Everything else happens here: words, units, plausibility.
+"""
+
+import re
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from itertools import groupby
+
+from edge.controls.opcua.config import Config, points_of
+from edge.controls.opcua.point import TOOL, Point
+from edge.controls.opcua.spindle_tool import Tools, in_spindle
+from edge.controls.opcua.spindle_tool import told as tool_told
+from edge.errors import ConfigError
+from edge.place import Place
+from edge.reading import Target, bad, read_value
+from edge.sample import EMPTY, Drop, EdgeSample, Offer, SampleSet
+from edge.signals import signal
+from edge.sweep import Fact, Stand, Sweep, take, told
+from edge.units import conversion
+from sparkplug.quality import Quality
+
+MEANINGS_MAX = 4096
+
+
+@dataclass(frozen=True, slots=True)
+class Meaning:
+    """What the values of one key stand for."""
+
+    target: Target
+    words: tuple[tuple[str, str], ...] = ()
+    prefix: str = ""
+    source: str = ""
+    native_unit: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Cursor:
+    """Where the parser stands; what the keys of this life mean; the tools, and which of them was told last ("?" = none yet)."""
+
+    stand: Stand = field(default_factory=Stand)
+    meanings: tuple[Meaning, ...] = ()
+    unmapped: tuple[str, ...] = ()
+    tools: Tools = ()
+    tool: str = "?"
+
+
+def start(_config: Config) -> Cursor:
+    """The cursor of an edge that has heard nothing yet."""
+    return Cursor()
+
+
+def place(cursor: Cursor) -> Place | None:
+    """Up to when everything is taken; None while nothing is."""
+    return cursor.stand.place()
+
+
+def resume(_config: Config, kept: Place) -> Cursor:
+    """The cursor of an edge that was here before."""
+    return Cursor(stand=Stand.resumed(kept))
+
+
+def parse(config: Config, cursor: Cursor, raw: bytes) -> tuple[Cursor, SampleSet]:
+    """One frame."""
+    taken = take(cursor.stand, raw)
+    sweep = taken.sweep
+    if sweep is None:
+        return replace(cursor, stand=taken.stand), taken.about
+    is_new = sweep.life != cursor.stand.life
+    before = Cursor() if is_new else cursor
+    after = _learned(config, replace(before, stand=taken.stand), sweep.facts)
+    after, samples, dropped = _samples(config, after, sweep, taken.is_baseline)
+    offers = _offers(after) if is_new or after.meanings != before.meanings or bool(after.tools) != bool(before.tools) else None
+    return after, told(taken.about, samples=samples, dropped=dropped, offers=offers)
+
+
+def _learned(config: Config, cursor: Cursor, facts: Iterable[Fact]) -> Cursor:
+    """What keys mean that have not come before in this life."""
+    known = {meaning.target.data_item_id for meaning in cursor.meanings} | set(cursor.unmapped)
+    fresh = [key for key in dict.fromkeys(fact.key for fact in facts) if key not in known and not _is_tool(key)]
+    if not fresh or len(known) + len(fresh) > MEANINGS_MAX:
+        return cursor
+    points, found = points_of(config), list[Meaning]()
+    unmapped: list[str] = []
+    for key in fresh:
+        meaning = _meaning(config, points, key)
+        if meaning is None:
+            unmapped.append(key)
+        else:
+            found.append(meaning)
+    return replace(cursor, meanings=(*cursor.meanings, *found), unmapped=(*cursor.unmapped, *unmapped))
+
+
+def _meaning(config: Config, points: Iterable[Point], key: str) -> Meaning | None:
+    point = next((point for point in points if point.signal != TOOL and _stands_for(point.signal, key)), None)
+    if point is None:
+        return None
+    try:
+        known, section = signal(key), config.signals.get(key)
+        native = (section.native_unit if section else "") or point.native_unit
+        way = conversion(native, known.unit)
+    except ConfigError:  # a name that is not canonical, of an axis with a long name for instance
+        return None
+    if section is not None and not section.publish:
+        return None
+    low = section.low if section and section.low is not None else known.low
+    high = section.high if section and section.high is not None else known.high
+    scale = point.scale * (section.scale if section else 1.0)
+    target = Target(key, key, way.factor * scale, way.offset, low, high)
+    return Meaning(target, tuple(point.words.items()), point.prefix, point.label, native)
+
+
+def _stands_for(template: str, key: str) -> bool:
+    return re.fullmatch(re.escape(template).replace(re.escape("{name}"), r"[a-z]\d{0,2}"), key) is not None
+
+
+def _offers(cursor: Cursor) -> tuple[Offer, ...]:
+    offers = [Offer(m.target.signal, m.source, m.native_unit, m.target.low, m.target.high) for m in cursor.meanings]
+    if cursor.tools:
+        offers.append(Offer("tool_number", "ToolType/Location"))
+    return tuple(offers)
+
+
+def _samples(
+    config: Config, cursor: Cursor, sweep: Sweep, is_baseline: bool
+) -> tuple[Cursor, tuple[EdgeSample, ...], dict[str, int]]:
+    """The facts in the order of their time stamps. What is found on joining is one state: its tools are looked at once."""
+    meanings = {meaning.target.data_item_id: meaning for meaning in cursor.meanings}
+    dropped: Counter[str] = Counter()
+    samples: list[EdgeSample] = []
+    ordered = sorted(sweep.facts, key=lambda fact: sweep.t_ms if fact.t_ms is None else fact.t_ms)
+    moments = [ordered] if is_baseline else [list(group) for _, group in groupby(ordered, key=lambda fact: fact.t_ms)]
+    for moment in moments:
+        placed = [fact for fact in moment if _is_tool(fact.key)]
+        if placed:
+            cursor, sample = _tool(config, cursor, placed, sweep)
+            dropped[Drop.UNCHANGED] += len(placed) - (0 if sample is None else 1)
+            samples += [] if sample is None else [sample]
+        for fact in moment:
+            meaning = meanings.get(fact.key)
+            if meaning is not None:
+                samples.append(_sample(meaning, fact, sweep))
+            elif not _is_tool(fact.key):
+                dropped[Drop.UNMAPPED] += 1
+    marked = tuple(replace(sample, is_baseline=is_baseline) for sample in samples)
+    return cursor, marked, dict(+dropped)
+
+
+def _sample(meaning: Meaning, fact: Fact, sweep: Sweep) -> EdgeSample:
+    at_ms = sweep.t_ms if fact.t_ms is None else fact.t_ms
+    value, quality, reason = bad(fact.fault) if fact.fault else read_value(meaning.target, _worded(meaning, fact))
+    return EdgeSample(meaning.target.signal, value, at_ms, quality, reason, sweep.number)
+
+
+def _worded(meaning: Meaning, fact: Fact) -> str | int | float | bool | None:
+    value = fact.value
+    if isinstance(value, float) and value.is_integer() and meaning.words:
+        value = int(value)
+    if value is not None:
+        value = dict(meaning.words).get(str(value), value)
+    if isinstance(value, str) and meaning.prefix:
+        value = value.strip().removeprefix(meaning.prefix)
+    return value
+
+
+def _is_tool(key: str) -> bool:
+    return key.startswith(TOOL + ":")
+
+
+def _tool(config: Config, cursor: Cursor, placed: Iterable[Fact], sweep: Sweep) -> tuple[Cursor, EdgeSample | None]:
+    """The tool in the spindle after these values of tools; None where it is the same as before."""
+    tools, at_ms = cursor.tools, sweep.t_ms
+    for fact in placed:
+        index, field = _tool_key(fact.key)
+        tools = tool_told(tools, index, field, None if fact.fault else fact.value)
+        at_ms = sweep.t_ms if fact.t_ms is None else fact.t_ms
+    number, is_known = in_spindle(tools, config.source.spindle_place)
+    shown = str(number) if number is not None else ("" if is_known else "unknown")
+    after = replace(cursor, tools=tools, tool=shown)
+    if shown == cursor.tool:
+        return after, None
+    if not is_known:
+        why = f"no one tool is at the place {config.source.spindle_place!r}"
+        return after, EdgeSample("tool_number", None, at_ms, Quality.BAD, why, sweep.number)
+    return after, EdgeSample("tool_number", number, at_ms, Quality.GOOD, EMPTY if number is None else None, sweep.number)
+
+
+def _tool_key(key: str) -> tuple[int, str]:
+    _, _, rest = key.partition(":")
+    index, _, field = rest.partition(":")
+    return (int(index) if index.isascii() and index.isdigit() and len(index) < 6 else -1), field

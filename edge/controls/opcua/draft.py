@@ -1,0 +1,150 @@
+"""A first configuration from what a server shows of itself: which of the models that we know it follows, and what that gives.
+
+The address may say how to get in, since there is no file yet: `?security=none`, `?username=…&password_env=…`,
+`?server_fingerprint=…`.
+"""
+
+from pathlib import Path
+from typing import Any, NamedTuple
+from urllib.parse import parse_qsl
+
+from pydantic import ValidationError
+
+from edge.config import EdgeConfig, one_line
+from edge.controls.opcua.check import read_all, run
+from edge.controls.opcua.config import Config, OpcUaConfig
+from edge.controls.opcua.cursor import parse, start
+from edge.controls.opcua.library import require
+from edge.controls.opcua.point import maps
+from edge.errors import ConfigError, ConnectionLostError
+from edge.sample import SampleSet
+from edge.signals import signal
+from edge.sweep import Sweep
+from edge.units import conversion
+
+SHOWN_MAX = 200
+_UNITS = {
+    "m/min": "METER/MINUTE",
+    "mm/s": "MILLIMETER/SECOND",
+    "in/min": "INCH/MINUTE",
+    "in": "INCH",
+    "m": "METER",
+    "rad": "RADIAN",
+}
+
+
+class Looked(NamedTuple):
+    """What was found: by model what it gives, the best of them, the units that it declares; else the server's variables."""
+
+    found: dict[str, SampleSet]
+    best: str
+    units: dict[str, str]
+    variables: list[str]
+    fingerprint: str
+
+
+def draft(url: str, device: str) -> str:
+    """A configuration for the server at this address, as TOML. `device`: the machine's name."""
+    require()
+    config = _config(url)
+    return run(_drafted(config, device))
+
+
+def _config(url: str) -> Config:
+    address, _, query = url.partition("?")
+    given: dict[str, Any] = dict(parse_qsl(query))
+    try:
+        return EdgeConfig(source=OpcUaConfig.model_validate(given | {"url": address, "map": ""}))
+    except ValidationError as error:
+        raise ConfigError(one_line(Path(address), "opcua", error)) from error
+
+
+async def _drafted(config: Config, device: str) -> str:
+    from edge.controls.opcua import session  # noqa: PLC0415  asyncua is an extra
+
+    async with session.opened(config) as client:
+        try:
+            looked = await _look(config, client)
+        except session.FAILURES as error:
+            raise ConnectionLostError(session.one_line(config, error)) from error
+    return _text(config, device, looked)
+
+
+async def _look(config: Config, client: Any) -> Looked:
+    from edge.controls.opcua import resolve, session  # noqa: PLC0415  asyncua is an extra
+
+    namespaces = await client.get_namespace_array()
+    models = [name for name, known in maps().items() if known.namespace in namespaces]
+    found: dict[str, SampleSet] = {}
+    units: dict[str, dict[str, str]] = {}
+    for name in models:
+        with_map = EdgeConfig(source=config.source.model_copy(update={"map": name}))
+        nodes = await resolve.resolve(with_map, client)
+        facts = await read_all(with_map, client, nodes)
+        found[name] = parse(with_map, start(with_map), Sweep("draft", 0, 1, facts).encode())[1]
+        units[name] = await session.units_of(client, {one.key: one.node for one in nodes if one.node is not None})
+    best = max(models, key=lambda name: _worth(found[name]), default="")
+    shown = [] if best else await resolve.browse(client, namespaces, "")
+    variables = [resolve.name_of(one.node, namespaces) for one in shown if one.is_variable][:SHOWN_MAX]
+    pinned = session.fingerprint_of(client)
+    return Looked(found, best, units.get(best, {}), variables, pinned)
+
+
+def _worth(found: SampleSet) -> tuple[bool, int]:
+    """Which of two models to take: the one that knows the tool, then the one with more signals that have a value."""
+    there = {sample.signal for sample in found.samples if sample.value is not None or sample.reason == "empty"}
+    return "tool_number" in there, len(there)
+
+
+def _text(config: Config, device: str, looked: Looked) -> str:
+    source, best = config.source, looked.best
+    lines = [
+        f"# Drafted from {source.url}. Compare the values of `cnctwin edge check` with the control's screen before you go on.",
+        *(f"# It follows {maps()[name].title}: {len(one.offers or ())} signals" for name, one in looked.found.items()),
+        "",
+        "[machine]",
+        f"name = {_quoted(device or 'machine')}",
+        'adapter = "opcua"',
+        "",
+        "[opcua]",
+        f"url = {_quoted(source.url)}",
+        f"map = {_quoted(best)}" if best else 'map = ""  # no model that we know: name the nodes below',
+    ]
+    if source.security == "none":
+        lines.append('security = "none"  # nothing is encrypted, and the server is not authenticated')
+    if looked.fingerprint:
+        lines.append(f"server_fingerprint = {_quoted(looked.fingerprint)}")
+    if source.username:
+        lines += [f"username = {_quoted(source.username)}", f"password_env = {_quoted(source.password_env)}"]
+    lines += ["", *(_signals(looked.found[best], looked.units) if best else _unknown(looked.variables))]
+    return "\n".join(lines) + "\n"
+
+
+def _signals(found: SampleSet, units: dict[str, str]) -> list[str]:
+    """What the map gives, as comments; a unit that the server declares and that is not ours becomes a table."""
+    values = {sample.signal: sample for sample in found.samples}
+    lines = []
+    for offer in found.offers or ():
+        sample = values.get(offer.signal)
+        shown = "not reported" if sample is None else (sample.reason or sample.value)
+        native = _UNITS.get(units.get(offer.signal, "").strip(), "")
+        if native and conversion(native, signal(offer.signal).unit).factor != 1.0:
+            lines += [f"[signals.{offer.signal}]  # {offer.source}", f"native_unit = {_quoted(native)}"]
+        else:
+            unit = units.get(offer.signal, "")
+            lines.append(f"# {offer.signal}: {offer.source}{f' in {unit}' if unit else ''}, now {str(shown)[:60]!r}")
+    return lines
+
+
+def _unknown(variables: list[str]) -> list[str]:
+    head = [
+        "# [signals.tool_number]",
+        "# data_item = " + _quoted(variables[0] if variables else "nsu=urn:example;s=ToolNumber"),
+        "#",
+    ]
+    return [*head, "# Variables of this server:", *(f"#   {name}" for name in variables)]
+
+
+def _quoted(text: str) -> str:
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
+    return '"' + "".join(char if char.isprintable() else f"\\u{ord(char):04x}" for char in escaped) + '"'

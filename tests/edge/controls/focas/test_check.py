@@ -1,0 +1,61 @@
+"""What `edge check` and `edge discover` say of a control, on our own server."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from cnctwin.focas_server.server import FocasServer
+from cnctwin.simulated_control.control import SimulatedControl
+from cnctwin.simulated_control.state import ControlState
+from edge.config import EdgeConfig
+from edge.config_file import parse
+from edge.controls.focas.check import describe
+from edge.controls.focas.config import FocasConfig
+from edge.controls.focas.draft import draft
+from edge.errors import ConfigError, ConnectionLostError
+
+
+@pytest.fixture
+def server() -> Iterator[FocasServer]:
+    with FocasServer(SimulatedControl([ControlState(exec_state="ACTIVE", program="O1701", spindle_rpm=3500.0)])) as one:
+        yield one
+
+
+def test_check_shows_each_signal_its_function_and_that_the_way_is_experimental(server: FocasServer) -> None:
+    rows = {row.signal: row for row in describe(EdgeConfig(source=FocasConfig(port=server.port)))}
+    assert (rows["spindle_rpm"].value, rows["spindle_rpm"].unit) == (3500.0, "rev/min")
+    assert rows["spindle_rpm"].source == "experimental ethernet: cnc_acts"
+    assert rows["axis_z_pos_mm"].source.endswith("cnc_rddynamic2 machine Z")
+    assert {"tool_number", "nc_block", "program", "alarm", "feed_override_pct"} <= rows.keys()
+
+
+def test_check_shows_what_the_control_refuses(server: FocasServer) -> None:
+    server.faults.failing = {(1, 0x40): 6}
+    rows = {row.signal: row for row in describe(EdgeConfig(source=FocasConfig(port=server.port)))}
+    assert rows["spindle_load_pct"].value is None
+    assert str(rows["spindle_load_pct"].reason).startswith("EW_NOOPT (6)")
+
+
+def test_a_draft_can_be_used_as_it_is(server: FocasServer) -> None:
+    server.faults.failing = {(1, 0x40): 6}
+    text = draft(server.url, "vmc 1")
+    config = parse(text, Path("edge.toml"))
+    assert (config.machine.name, config.source.port, config.source.host) == ("vmc-1", server.port, "127.0.0.1")
+    assert "# 31i-M series" in text
+    assert "#   spindle_load: EW_NOOPT (6)" in text
+    assert {row.signal for row in describe(config)} >= {"spindle_rpm", "exec_state"}
+
+
+@pytest.mark.parametrize("url", ["http://host", "focas://", "focas://host:99999", "focas://host/path", "host"])
+def test_an_address_that_is_none_is_refused(url: str) -> None:
+    with pytest.raises(ConfigError, match="write it as focas:"):
+        draft(url)
+
+
+def test_nobody_there_is_one_line_with_the_way_out(server: FocasServer) -> None:
+    server.stop()
+    with pytest.raises(ConnectionLostError) as caught:
+        draft(server.url)
+    assert "EW_SOCKET (-16)" in str(caught.value)
+    assert "is the control on" in str(caught.value)
