@@ -22,11 +22,11 @@ from cnctwin.alert_commands import alerts_app
 from cnctwin.control_commands import control_app
 from cnctwin.errors import BrokerStartError, ProgramError, UsageError
 from cnctwin.given_broker import address, broker_or_own
-from cnctwin.state_dir import state_dir as folder_for_state
 from cnctwin.stopping import stopped_by_signals
 from cnctwin.train_commands import train_app
 from cnctwin.train_detector_command import train_detector
 from edge.errors import EdgeError
+from edge.state_dir import state_dir as folder_for_state
 from processors.errors import ProcessorError
 from sparkplug.errors import SparkplugError
 from twin.errors import TwinError

@@ -12,12 +12,12 @@ from rich.table import Table
 from rich.text import Text
 
 from cnctwin.given_broker import broker_or_own
-from cnctwin.state_dir import state_dir
 from edge.adapter import Row
 from edge.config import EdgeConfig
 from edge.gateway import Gateway
 from edge.run import broker_address, edge_runtime
 from edge.runtime import EdgeRuntime
+from edge.state_dir import state_dir
 from sparkplug.broker import BrokerAddress
 
 
@@ -47,7 +47,8 @@ def _with_session_file(config: EdgeConfig[Any]) -> EdgeConfig[Any]:
 
 def table(rows: Sequence[Row]) -> Table:
     """What an edge would publish, for a person to read."""
-    shown = Table(title=f"{len(rows)} signals would be published", title_justify="left")
+    signals = sum(not row.signal.startswith("(") for row in rows)  # "(warning)" is none
+    shown = Table(title=f"{signals} signals would be published", title_justify="left")
     for column in ("signal", "from", "unit", "native unit", "value now", "why not"):
         shown.add_column(column, overflow="fold")
     for row in rows:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from edge import accelerometer, clock
-from edge.adapter import adapters
+from edge.adapter import Adapter, adapters
 from edge.config import BrokerSection, EdgeConfig
 from edge.errors import ConfigError
 from edge.forwarder import Forwarder
@@ -59,8 +59,13 @@ def _secret_in(file: Path, path: Path) -> str:
     return lines[0]
 
 
-def edge_runtime(config: EdgeConfig[Any], address: BrokerAddress | None = None, *, restarts: int = 0) -> EdgeRuntime:
-    """An edge that publishes to the configured broker, or to this one; `restarts`: how often it was begun again."""
+def edge_runtime(
+    config: EdgeConfig[Any], address: BrokerAddress | None = None, *, adapter: Adapter | None = None, restarts: int = 0
+) -> EdgeRuntime:
+    """An edge that publishes to the configured broker, or to this one.
+
+    adapter: in place of the configured one, for a control that is no real one; restarts: how often the edge was begun again
+    """
     broker, ledger = config.broker, Ledger()
 
     def confirmed(token: int) -> None:
@@ -77,7 +82,7 @@ def edge_runtime(config: EdgeConfig[Any], address: BrokerAddress | None = None, 
     )
     runtime = EdgeRuntime(
         config,
-        adapters()[config.machine.adapter],
+        adapter or adapters()[config.machine.adapter],
         node,
         ledger=ledger,
         place_file=Path(broker.session_file + ".place") if broker.session_file else None,

@@ -8,7 +8,7 @@ from threading import Event
 from cnctwin.errors import ProgramError
 from cnctwin.simulated_control.control import SimulatedControl
 from cnctwin.simulated_control.state import production
-from cnctwin.state_dir import state_dir
+from edge.state_dir import state_dir
 
 STATE_S = 0.5
 DAY_S = 8 * 3600.0

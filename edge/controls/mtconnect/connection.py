@@ -24,20 +24,26 @@ from edge.errors import ConfigError, ConnectionLostError
 BACKOFF_S = 0.25
 BACKOFF_S_MAX = 30.0
 HEARTBEATS_MAX = 3
-_ERROR_ROOT = b"MTConnectError"
+_ERROR_ROOT, _STREAMS_ROOT = b"MTConnectError", b"MTConnectStreams"
 
 
 class MtconnectConnection:
     """Raw documents of one agent, in order, reconnecting by itself."""
 
     def __init__(
-        self, config: Config, *, clock: Callable[[], float] = time.monotonic, chance: random.Random | None = None
+        self,
+        config: Config,
+        *,
+        clock: Callable[[], float] = time.monotonic,
+        wait: Callable[[float], object] | None = None,
+        chance: random.Random | None = None,
     ) -> None:
         self._config = config
         self._clock = clock
         self._chance = chance or random.Random()  # noqa: S311  jitter, not a secret
         self._cursor = Cursor()
         self._closed = threading.Event()
+        self._wait = wait or self._closed.wait
         self._socket: socket.socket | None = None
         self._streams = True
         self._heard_s = clock()
@@ -89,9 +95,6 @@ class MtconnectConnection:
         longest = min(BACKOFF_S_MAX, BACKOFF_S * 2.0 ** min(failures, 16))
         return longest * self._chance.uniform(0.5, 1.0)
 
-    def _wait(self, seconds: float) -> None:
-        self._closed.wait(seconds)
-
     def _answer(self, client: httpx.Client, request: Request) -> Iterator[bytes]:
         with client.stream("GET", request.path, params=list(request.parameters)) as response:
             self._socket = response.extensions["network_stream"].get_extra_info("socket")
@@ -104,8 +107,8 @@ class MtconnectConnection:
                 if _ERROR_ROOT not in body[:4096]:
                     if response.status_code >= 400:
                         raise ConnectionLostError(f"HTTP {response.status_code} {response.reason_phrase} for {request.path}")
-                    if request.path.endswith("/sample"):
-                        self._streams = False
+                    if request.path.endswith("/sample") and _STREAMS_ROOT in body[:4096]:
+                        self._streams = False  # anything else is somebody who stands between us and the agent
                 yield self._heard(body)
             finally:
                 self._socket = None

@@ -60,7 +60,10 @@ class Phase(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Cursor:
-    """Where the parser stands. `hole` is why a baseline is needed, "" where none is; `attempt` counts refused frames in a row."""
+    """Where the parser stands. `hole` is why a baseline is needed, "" where none is; `attempt` counts refused frames in a row.
+
+    left_instance, left_sequence: the place that was given up for another instance, as long as nothing of that one was taken
+    """
 
     phase: Phase = Phase.PROBE
     instance_id: str = ""
@@ -75,6 +78,8 @@ class Cursor:
     publishes_alarm: bool = True
     hole: str = ""
     attempt: int = 0
+    left_instance: str = ""
+    left_sequence: int = 0
 
 
 class Request(NamedTuple):
@@ -181,11 +186,20 @@ def _devices(config: Config, cursor: Cursor, document: DevicesDocument) -> tuple
 
 
 def _new_instance(after: Cursor, before: Cursor, header: Header) -> Cursor:
-    """The agent is another: its numbers start anew, and what the old one had after our last request is lost."""
+    """The agent is another: its numbers start anew, and what the old one had after our last request is lost.
+
+    Where the one that we left answers after all, and nothing was taken in between, we go on where we were.
+    """
+    if before.left_instance == header.instance_id:
+        back = replace(after, instance_id=header.instance_id, next_sequence=before.left_sequence, hole="overrun")
+        return replace(back, left_instance="", left_sequence=0)
     if before.hole.startswith("agent restarted") or not before.next_sequence:
-        return replace(after, instance_id=header.instance_id, next_sequence=0, alarms=())
+        return replace(after, instance_id=header.instance_id, next_sequence=0)
     why = f"agent restarted: instance {before.instance_id} ended somewhere after sequence {before.next_sequence - 1}"
-    return replace(after, instance_id=header.instance_id, next_sequence=0, alarms=(), hole=why)
+    after = replace(after, instance_id=header.instance_id, next_sequence=0, hole=why)
+    if before.hole == EDGE_RESTARTED:  # its place is known, but not its values
+        return after
+    return replace(after, left_instance=before.instance_id, left_sequence=before.next_sequence)
 
 
 def _error(cursor: Cursor, document: ErrorDocument) -> tuple[Cursor, SampleSet]:
@@ -224,7 +238,9 @@ def _streams(cursor: Cursor, document: StreamsDocument) -> tuple[Cursor, SampleS
 
 def _baseline(cursor: Cursor, document: StreamsDocument, next_sequence: int) -> tuple[Cursor, SampleSet]:
     wanted, first, why = cursor.next_sequence, document.header.first_sequence or 0, cursor.hole or "overrun"
-    ready = replace(cursor, phase=Phase.SAMPLE, hole="")
+    ready = replace(cursor, phase=Phase.SAMPLE, hole="", left_instance="", left_sequence=0)
+    if not wanted:
+        ready = replace(ready, alarms=())
     if not cursor.hole and not wanted:
         return _take(ready, document, floor=0, next_sequence=next_sequence, is_baseline=True)
     restarted = cursor.hole == EDGE_RESTARTED

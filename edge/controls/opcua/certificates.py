@@ -18,6 +18,7 @@ from cryptography.hazmat.primitives.asymmetric import rsa
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from edge.errors import ConfigError, ConnectionLostError
+from edge.state_dir import state_dir
 
 VALID_DAYS = 3650
 KEY_BITS = 2048
@@ -47,12 +48,7 @@ def leaf_of(chain: bytes) -> bytes:
 
 def folder_of(given: str) -> Path:
     """Where certificates are kept: the given folder, else `opcua` in the program's state folder."""
-    if given:
-        return Path(given)
-    if named := os.environ.get("CNCTWIN_STATE_DIR"):
-        return Path(named) / "opcua"
-    home = os.environ.get("XDG_STATE_HOME")
-    return (Path(home) if home else Path.home() / ".local" / "state") / "cnctwin" / "opcua"
+    return Path(given) if given else state_dir() / "opcua"
 
 
 def own_identity(folder: Path, *, name: str = "edge", valid_days: int = VALID_DAYS, is_server: bool = False) -> Identity:

@@ -99,7 +99,7 @@ class OpcUaConnection:
     def close(self) -> None:
         """End `frames`, from any thread."""
         self._closed.set()
-        stop = self._stop
+        stop, self._stop = self._stop, None  # once: what is told twice does not get to close its socket
         if stop is not None:
             stop()
 

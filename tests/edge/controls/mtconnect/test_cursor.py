@@ -279,3 +279,13 @@ def test_a_cursor_is_plain_json() -> None:
 def test_availability_and_backlog_are_told() -> None:
     _, frame = fed(streams(11, [value("avail", 10, "UNAVAILABLE")]), cursor=sampling())
     assert (frame.available, frame.backlog, frame.dropped) == (False, 0, {Drop.UNMAPPED: 1})
+
+
+def test_one_document_of_another_instance_in_the_middle_loses_nothing() -> None:
+    here, _ = fed(probe(), streams(10, [value("rpm", 3, "100")]), streams(12, [value("rpm", 10, "1"), value("rpm", 11, "2")]))
+    lost, frame = fed(streams(40, [value("rpm", 39, "9")], instance=2), cursor=here)
+    assert (lost.phase, frame.samples, frame.gaps) == (Phase.PROBE, (), ())
+    back, frame = fed(probe(), streams(14, [value("rpm", 13, "4")]), cursor=lost)
+    assert (back.next_sequence, frame.samples, frame.gaps) == (12, (), ())
+    _, frame = fed(streams(14, [value("rpm", 12, "3"), value("rpm", 13, "4")]), cursor=back)
+    assert values(frame) == [("spindle_rpm", 3.0), ("spindle_rpm", 4.0)]

@@ -4,7 +4,6 @@ As a program it reads one command a line and answers each with one line, both JS
 told to, so that an hour of it takes as long as its values need, and is the same each time.
 """
 
-import gc
 import json
 import os
 import signal
@@ -103,12 +102,9 @@ def serve(folder: Path, port: int, seconds: float, machine_s: float, missing: li
     from cnctwin.simulated_control.control import SimulatedControl
     from cnctwin.simulated_control.state import production
 
-    gc.disable()  # the standard's address space is many objects, none of them garbage
     now_s = machine_s
     control = SimulatedControl(production(seconds), machine_s=lambda: now_s, switched_on_s=SWITCHED_ON_S)
     with OpcUaServer(control, folder, port=port, missing=missing, stepped=True) as server:
-        gc.freeze()
-        gc.enable()
         print(json.dumps({"fingerprint": server.fingerprint}), flush=True)
         for line in sys.stdin:
             told = json.loads(line)

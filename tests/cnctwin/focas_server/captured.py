@@ -1,0 +1,61 @@
+"""Frames that real controls sent and were sent, as published: facts of the protocol that nobody of us has made up.
+
+A 31i (Robodrill) and a 160i: diohpix/pyfanuc (Unlicense), sample_multipacket.md and sample_with_error.md.
+A 0i-M: the request and response templates of a FANUC honeypot of 2018.
+"""
+
+
+def _blocks(*asked: str) -> str:
+    """Blocks of 28 bytes, of which the end is 0."""
+    return "".join(f"001c{block}".ljust(56, "0") for block in asked)
+
+
+OPEN = bytes.fromhex("a0a0a0a0000101010002 0001")
+OPENED_0I_BEGINS = bytes.fromhex(
+    "a0a0a0a0 0004 0102 0168 00060005000100200008000a00030003000200020000000100010000000100000000000000000000"
+    "204d00010000000200020000000100010000"
+)
+OPEN_FOR_COMMANDS = bytes.fromhex("a0a0a0a0000101010002 0002")
+CLOSE = bytes.fromhex("a0a0a0a00001020100 00")
+CLOSED_31I = bytes.fromhex("a0a0a0a0000402020000")
+
+SYSINFO = bytes.fromhex("a0a0a0a000012101001e0001" + _blocks("000100010018"))
+SYSINFO_0I = bytes.fromhex("a0a0a0a0000421020024000100220001000100180000000000000012040200202030204d4435463331312e303032")
+SELECT_PROGRAM = bytes.fromhex("a0a0a0a000012101001e0001" + _blocks("00010001000300000001"))
+DELETE_PROGRAM = bytes.fromhex("a0a0a0a000012101001e0001" + _blocks("00010001000500000005"))
+
+LOADS = bytes.fromhex(
+    "a0a0a0a0000121010072 0004" + _blocks("0001000100a400000002", "000100010089", "00010001005600000001", "0001000100a400000002")
+)
+LOADS_31I = bytes.fromhex(
+    "a0a0a0a0000421020156 0004"
+    "0012 0001000100a4 000000000000 0002 0004"
+    "0020 000100010089 000000000000 0010 58000000 59000000 5a000000 42000000"
+    "0110 000100010056 000000000000 0100 00000000000a0000 fffffffd000a0000 00000021000a0000 00000000000a0000"
+    + "00000000000a0000" * 28
+    + "0012 0001000100a4 000000000000 0002 0004"
+)
+
+NINE = bytes.fromhex(
+    "a0a0a0a00001210100fe 0009"
+    + _blocks(
+        "00010001001a",
+        "00010001001c",
+        "00010001001d",
+        "000100010024",
+        "000100010025",
+        "00010001002600000004ffffffff",
+        "00010001002600000001ffffffff",
+        "00010001002600000006ffffffff",
+        "00010001002600000007ffffffff",
+    )
+)
+NINE_160I_BEGINS = bytes.fromhex(
+    "0014 00010001001a 000000000000 0004 00000000"
+    "0018 00010001001c 000000000000 0008 00000bb800000bb8"
+    "0014 00010001001d 000000000000 0004 00000000"
+)
+NINE_160I_LENGTHS = [0x14, 0x18, 0x14, 0x18, 0x10, 0x50, 0x50, 0x50]
+SPINDLE_SPEED_REFUSED_160I = bytes.fromhex("0010 000100010025 000100000000 0000")
+
+PMC_D2204 = bytes.fromhex("a0a0a0a000012101001e0001" + _blocks("0002000180010000089c0000089d0000000900000001"))
