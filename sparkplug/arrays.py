@@ -30,6 +30,7 @@ _CODES = {
     DataType.DOUBLE_ARRAY: "d",
     DataType.DATETIME_ARRAY: "q",
 }
+ELEMENTS_MAX = 1_000_000  # that are read; eight booleans take one byte on the wire and 64 here
 _COUNT = struct.Struct("<I")
 
 
@@ -55,9 +56,15 @@ def unpack(datatype: DataType, data: bytes) -> tuple[Any, ...]:
         return unpackers[datatype](data)
     code = _CODES[datatype]
     size = struct.calcsize(code)
+    _check_count(datatype, len(data) // size)
     if len(data) % size:
         raise PayloadError(f"{datatype.name} of {len(data)} bytes is not a whole number of {size}-byte elements")
     return struct.unpack(f"<{len(data) // size}{code}", data)
+
+
+def _check_count(datatype: DataType, count: int) -> None:
+    if count > ELEMENTS_MAX:
+        raise PayloadError(f"{datatype.name} of {count} elements is above the limit of {ELEMENTS_MAX}")
 
 
 def _pack_booleans(values: tuple[bool, ...]) -> bytes:
@@ -77,6 +84,7 @@ def _unpack_booleans(data: bytes) -> tuple[bool, ...]:
     bits = data[_COUNT.size :]
     if count > 8 * len(bits):
         raise PayloadError(f"BOOLEAN_ARRAY says {count} elements and carries {8 * len(bits)}")
+    _check_count(DataType.BOOLEAN_ARRAY, count)
     return tuple(bool(bits[index // 8] & (0x80 >> index % 8)) for index in range(count))
 
 
@@ -89,6 +97,7 @@ def _pack_strings(values: tuple[str, ...]) -> bytes:
 def _unpack_strings(data: bytes) -> tuple[str, ...]:
     if data and not data.endswith(b"\0"):
         raise PayloadError("STRING_ARRAY does not end with a zero byte")
+    _check_count(DataType.STRING_ARRAY, data.count(b"\0"))
     try:
         return tuple(part.decode() for part in data.split(b"\0")[:-1])
     except UnicodeDecodeError as error:

@@ -25,8 +25,12 @@ from sparkplug.values import (
 )
 from sparkplug.wire_value import READ, WRITE
 
-PAYLOAD_BYTES_MAX = 16 * 1024 * 1024
+PAYLOAD_BYTES_MAX = 4 * 1024 * 1024
 TEMPLATE_DEPTH_MAX = 16
+# Metrics, properties, rows, cells and parameters of one payload. An empty one takes two bytes on the wire, and a hundred times
+# that here; what is smaller than COUNTED_BYTES_MIN cannot hold too many.
+PARTS_MAX = 100_000
+COUNTED_BYTES_MIN = 64 * 1024
 _METADATA = ("is_multi_part", "content_type", "size", "seq", "file_name", "file_type", "md5", "description")
 # A field that holds a value of its own shape; every other one is a scalar or packed bytes.
 _GUESS = {
@@ -67,13 +71,47 @@ def encode(payload: Payload) -> bytes:
 
 
 def parse(data: bytes) -> Any:
-    """The protobuf message behind `data`; raises PayloadError where it is none, or too large."""
+    """The protobuf message behind `data`; raises PayloadError where it is none, or too large, or has too many parts."""
     if len(data) > PAYLOAD_BYTES_MAX:
         raise PayloadError(f"payload of {len(data)} bytes is above the limit of {PAYLOAD_BYTES_MAX}")
     try:
-        return PayloadMessage.FromString(data)
+        message = PayloadMessage.FromString(data)
     except DecodeError as error:
         raise PayloadError(f"{len(data)} bytes are no Sparkplug payload: {error}") from error
+    if len(data) > COUNTED_BYTES_MIN:
+        _check_parts(message)
+    return message
+
+
+def _check_parts(payload: Any) -> None:
+    left = PARTS_MAX - len(payload.metrics)
+    owners: list[Any] = [payload]  # what has metrics that are still to be looked into
+    sets: list[Any] = []  # and what has properties
+    while (owners or sets) and left >= 0:
+        if sets:
+            properties = sets.pop()
+            left -= len(properties.keys) + len(properties.values)
+            for value in properties.values if left >= 0 else ():
+                if value.HasField("propertyset_value"):
+                    sets.append(value.propertyset_value)
+                elif value.HasField("propertysets_value"):
+                    left -= len(value.propertysets_value.propertyset)
+                    sets += value.propertysets_value.propertyset
+            continue
+        for metric in owners.pop().metrics:
+            if metric.HasField("properties"):
+                sets.append(metric.properties)
+            if metric.HasField("dataset_value"):
+                table = metric.dataset_value
+                left -= len(table.columns) + len(table.types) + len(table.rows)
+                left -= sum(len(row.elements) for row in table.rows) if left >= 0 else 0
+            elif metric.HasField("template_value"):
+                left -= len(metric.template_value.metrics) + len(metric.template_value.parameters)
+                owners.append(metric.template_value)
+            if left < 0:
+                break
+    if left < 0:
+        raise PayloadError(f"payload of more than {PARTS_MAX} metrics, properties, rows and cells")
 
 
 def decode(data: bytes, type_of: TypeOf | None = None) -> Payload:

@@ -50,7 +50,7 @@ def test_any_lines_are_taken_apart_or_counted(texts: list[str]) -> None:
 )
 def test_the_longest_line_takes_no_longer_than_its_length(text: str) -> None:
     assert len(text) <= LINE_CHARS_MAX
-    with within(15.0, 400.0):
+    with within(8.0):
         parsed = parse_line(text)
         if isinstance(parsed, Line):
             for _ in entries(parsed.fields, lambda _: 0):
@@ -62,7 +62,7 @@ def test_an_asset_of_nothing_but_empty_lines_ends_somewhere() -> None:
         return [f"{STAMP}|@ASSET@|1|CuttingTool|{MULTILINE_MARK}A", *[""] * (2 * LINE_CHARS_MAX)]
 
     lines = endless()
-    with within(15.0, 60.0):
+    with within(8.0):
         first = next(parse_lines(iter(lines)))
     assert isinstance(first, Unusable) and first.reason == "line_too_long"
 

@@ -116,7 +116,7 @@ class MtconnectConnection:
     def _parts(self, response: httpx.Response, content_type: str) -> Iterator[bytes]:
         parser = MultipartParser(content_type)
         alive_s = HEARTBEATS_MAX * self._config.source.heartbeat_ms / 1000
-        instance = self._cursor.instance_id
+        instance, begun_s = self._cursor.instance_id, self._clock()
         for data in response.iter_bytes():
             for part in parser.feed(data):
                 yield self._heard(part)
@@ -125,7 +125,7 @@ class MtconnectConnection:
                     return
             if parser.closed:
                 break
-            if self.silent_s() > alive_s:
+            if min(self.silent_s(), self._clock() - begun_s) > alive_s:  # what was before this stream is not its fault
                 raise ConnectionLostError(f"no document within {alive_s:g} s")
         if not self._closed.is_set():
             raise ConnectionLostError("the agent ended the stream")

@@ -13,7 +13,7 @@ from edge.errors import DocumentError
 
 DOCUMENT_BYTES_MAX = 64 * 1024 * 1024
 DEPTH_MAX = 64
-ELEMENTS_MAX = 500_000
+ELEMENTS_MAX = 200_000
 ATTRIBUTES_MAX = 100  # of one element
 _NAMESPACE = re.compile(r"\{urn:mtconnect\.org:MTConnect(\w+):(\d+(?:\.\d+)*)\}")
 

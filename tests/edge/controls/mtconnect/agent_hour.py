@@ -10,7 +10,6 @@ import re
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from cnctwin.mtconnect_agent.agent import Agent
@@ -54,7 +53,7 @@ class Hour:
 
     moments: list[Moment]
     observations: dict[str, dict[int, Observation]] = field(default_factory=dict)
-    devices_items: set[str] = field(default_factory=set)
+    joined: tuple[str, int] = ("", 0)
     taken: list[tuple[str, EdgeSample]] = field(default_factory=list)
     documented: dict[str, set[int]] = field(default_factory=dict)
     published: list[EdgeSample] = field(default_factory=list)
@@ -125,6 +124,8 @@ class Watch:
             hour.holes += [Hole(cursor.instance_id, gap) for gap in given.gaps]
             if given.error is None and given.received:
                 hour.documented.setdefault(cursor.instance_id, set()).update(map(int, _SEQUENCE.findall(raw)))
+            if cursor.phase is Phase.SAMPLE and not hour.joined[0]:
+                hour.joined = cursor.instance_id, cursor.next_sequence
             self.cursor = cursor
 
 
@@ -139,8 +140,6 @@ class Shop:
         spoken = dialect("1.4" if seed % 2 else "2.3")
         model = read_device_model(DEVICES.read_text(encoding="utf-8"), spoken.schema)
         self.agent = Agent(model, model.devices[0], spoken, buffer_size=BUFFER_SIZE, assets_max=4, now=self._wall_s)
-        self.hour.devices_items = {item.id for item in self.agent.device.items}
-        self._seen = 0
         self._server: AgentServer | None = AgentServer(self.agent, port=0, clients_max=8)
         self._port = int(self._server.url.rpartition(":")[2])
         self._server.start()
@@ -213,7 +212,8 @@ class Shop:
         ):
             if watch.error is not None:
                 raise watch.error
-            told = f"{watch.cursor}; {watch.connection.last_error}; {self.hour.errors}"
+            place = watch.cursor.phase, watch.cursor.instance_id, watch.cursor.next_sequence, watch.cursor.attempt, watch.cursor.hole
+            told = f"{place}, the agent {self.agent.instance_id} {self.agent.buffer.next_sequence}; {watch.connection.last_error}"
             assert time.monotonic() < until, f"at {self.now_s:.1f} s, {self.hour.episodes[-1:]}: {told}"
             time.sleep(0.001)
         watch.settled_s = self.now_s
@@ -257,5 +257,3 @@ class Shop:
 def run(seconds: float, seed: int, *, pause_s: float = 25.0, is_polled: bool = False, is_well: bool = False) -> Hour:
     """So many seconds of production, read by the edge, with faults unless all is well. Odd seeds: an agent 1.4, even ones: 2.3."""
     return Shop(seconds, seed, pause_s=pause_s, is_polled=is_polled, is_well=is_well).hour
-
-

@@ -26,10 +26,6 @@ class Shop(Protocol):
     def find_adapter(self) -> None: ...
 
 
-def _nothing(_: Shop) -> None:
-    return None
-
-
 def _heal(shop: Shop) -> None:
     shop.link.fault = Fault()
 
@@ -45,14 +41,9 @@ class Episode:
     end: Callable[[Shop], None] = _heal
 
 
-def foreign(instance: str) -> str:
-    """What `another instance` makes of an instance's number."""
-    return "9" + instance[1:]
-
-
 def episodes(chance: random.Random) -> Iterator[Episode]:
     """Without end."""
-    kinds = [killed, restarted, hung, slow, wrong, wrong, partial, overrun, adapter_lost, another_instance]
+    kinds = [killed, restarted, hung, slow, wrong, wrong, partial, overrun, adapter_lost, changed]
     while True:
         for kind in chance.sample(kinds, len(kinds)):
             yield kind(chance)
@@ -109,7 +100,7 @@ def wrong(chance: random.Random) -> Episode:
     return Episode(f"wrong: {what}", chance.uniform(0.3, 15.0), 0.05, _broken(fault, cuts=True))
 
 
-def another_instance(chance: random.Random) -> Episode:
+def changed(chance: random.Random) -> Episode:
     """Bytes of the agent's documents are changed: torn, of a wrong length, or as if another instance had answered."""
     changes: list[tuple[str, Callable[[bytes], bytes]]] = [
         ("torn", lambda data: data.replace(b"</", b"<<")),
@@ -143,10 +134,10 @@ def _once(change: Callable[[bytes], bytes]) -> Callable[[bytes], bytes]:
     """Changes the first bytes that it can change, and no others."""
     done = list[bool]()
 
-    def changed(data: bytes) -> bytes:
+    def change_once(data: bytes) -> bytes:
         after = data if done else change(data)
         if after != data:
             done.append(True)
         return after
 
-    return changed
+    return change_once

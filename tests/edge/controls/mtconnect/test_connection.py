@@ -271,6 +271,20 @@ def test_an_agent_that_hangs_is_given_up_after_three_heartbeats() -> None:
         assert "timed out" in reader.connection.last_error
 
 
+def test_after_a_long_outage_a_document_that_comes_in_pieces_is_waited_for() -> None:
+    whole = part(streams(11, [value("rpm", 10, "1")]))
+
+    def rest(connection: socket.socket) -> None:
+        time.sleep(0.1)
+        connection.sendall(whole[300:])
+        hang(connection)
+
+    pieces = multipart(whole[:300], then=rest)
+    with server(answer(probe()), BASELINE, hang, pieces) as url, Reader(url, heartbeat_ms=100, timeout_s=0.3) as reader:
+        reader.wait(lambda: reader.cursor.next_sequence == 11)
+        assert reader.connection.reconnects == 1
+
+
 def test_an_agent_that_drips_without_ever_finishing_a_part_is_given_up() -> None:
     def drip(connection: socket.socket) -> None:
         for _ in range(200):
