@@ -70,7 +70,7 @@ class Settled(NamedTuple):
 
 
 class Forwarder:
-    """The rows of one device. All methods but `confirmed` belong to one thread."""
+    """The rows of one device. All methods but `confirmed` are for one thread at a time."""
 
     def __init__(self, ring: Ring, node: Sender, device: str, limits: StoreSection, clock: Callable[[], float]) -> None:
         self._ring, self._node, self._device, self._limits, self._clock = ring, node, device, limits, clock
@@ -161,6 +161,11 @@ class Forwarder:
     def is_done(self) -> bool:
         """Whether all that was sent is confirmed."""
         return not self._flights
+
+    @property
+    def is_behind(self) -> bool:
+        """Whether history waits that could be sent now."""
+        return bool(self._waiting) and bool(self._declared) and self._node.online
 
     def health(self) -> dict[str, int | float | str | bool]:
         """Its metrics."""

@@ -9,7 +9,6 @@ from sparkplug.metric import Change, MetricSpec
 HEALTH = (
     MetricSpec("health/lag_s", DataType.DOUBLE, "s"),  # edge clock minus the time of the newest observation taken
     MetricSpec("health/backlog", DataType.INT64, "observations", value=0),
-    MetricSpec("health/queue_depth", DataType.INT64, "frames", value=0),
     MetricSpec("health/holes", DataType.INT64, value=0),
     MetricSpec("health/lost_observations", DataType.INT64, "observations", value=0),
     MetricSpec("health/last_hole", DataType.STRING, value=""),

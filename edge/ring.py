@@ -73,7 +73,7 @@ class Evicted(NamedTuple):
 
 
 class Ring:
-    """One file. Every method belongs to the thread that made it; StoreError where the disk or the file fails.
+    """One file. One thread at a time; StoreError where the disk or the file fails.
 
     wall_ms: ms since 1970, asked once; clock: seconds from then on. The wall's clock may be set while we run (a gateway without a
         battery starts in 1970), and no row is to be thrown away for that.
@@ -112,7 +112,7 @@ class Ring:
             return self._connect()
 
     def _connect(self) -> sqlite3.Connection:
-        db = sqlite3.connect(self.file, isolation_level=None, timeout=1.0)
+        db = sqlite3.connect(self.file, isolation_level=None, timeout=1.0, check_same_thread=False)
         try:
             db.execute("PRAGMA auto_vacuum = INCREMENTAL")
             db.execute("PRAGMA journal_mode = WAL")

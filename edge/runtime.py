@@ -1,15 +1,15 @@
 """The loop that runs one edge.
 
-    connection thread: control → frames → parse → bounded queue
-    main thread:       queue → tool change → report by exception → store → edge node (its own thread) → broker
+    connection thread: control → frames → parse → tool change → report by exception → store → edge node → broker
+    main thread:       each tenth of a second: what is due in the store, the sensor, the health
 
-When the main thread falls behind, the queue fills and the connection thread stops reading: the agent's buffer is then the next to
-fill, and what it drops is a hole that is counted. Nothing is dropped here without a reason in the ledger. Without a store
-(`[store] enabled = false`) a row that finds no broker is dropped, and the next birth carries the values.
+Both hold the edge's lock while they work. A frame goes all its way in the thread that read it: handing it to another one costs
+more, with many machines in one process, than the work itself. When that thread falls behind it reads no more, the agent's buffer
+is the next to fill, and what it drops is a hole that is counted. Nothing is dropped without a reason in the ledger. Without a
+store (`[store] enabled = false`) a row that finds no broker is dropped, and the next birth carries the values.
 """
 
 import logging
-import queue
 import threading
 import time
 from collections import deque
@@ -32,7 +32,8 @@ from sparkplug.datatype import DataType
 from sparkplug.metric import Change, MetricSpec
 
 _log = logging.getLogger(__name__)
-QUEUE_FRAMES_MAX = 256
+TURN_S, HISTORY_TURN_S = 0.1, 0.02
+FAREWELL_S_MAX = 5.0
 SPEED_POLL_S = 0.35  # how far apart speeds of the spindle are at least
 ENVELOPE_MAX = 3000  # of a sensor, ten a second
 REPORT_INTERVAL_S = 1.0
@@ -87,7 +88,7 @@ class EdgeRuntime:
         self._sensor = Accelerometer(config.accelerometer) if config.accelerometer.url else None
         self._forwarder: Forwarder | None = None
         self._wall_s, self._clock = wall_s, monotonic_s
-        self._arrivals: queue.Queue[Arrival] = queue.Queue(QUEUE_FRAMES_MAX)
+        self._lock = threading.Lock()
         self._pipeline = Pipeline(config)
         self._clocks, self._signals = clock.State(), clock_signals.State()
         self._envelope: deque[tuple[float, float]] = deque(maxlen=ENVELOPE_MAX)
@@ -117,8 +118,8 @@ class EdgeRuntime:
             self._sensor.start()
         due_s = self._clock()
         try:
-            while not self.stop.is_set():
-                self._once(timeout_s=0.1)
+            while not self.stop.wait(self._pause_s):
+                self._turn()
                 if self._clock() >= due_s:
                     due_s = self._clock() + REPORT_INTERVAL_S
                     self._report()
@@ -132,17 +133,16 @@ class EdgeRuntime:
             raise self._crash
 
     def _finish(self, reader: threading.Thread) -> None:
-        deadline_s = self._clock() + 5.0
-        while (reader.is_alive() or not self._arrivals.empty()) and self._clock() < deadline_s:
-            self._once(timeout_s=0.05)
-        if self._forwarder is not None:
-            while not self._forwarder.is_done and self._node.online and self._clock() < deadline_s:
-                self._settle()
-                time.sleep(0.01)
+        deadline_s = self._clock() + FAREWELL_S_MAX
+        reader.join(FAREWELL_S_MAX)
+        while self._forwarder is not None and not self._forwarder.is_done and self._node.online and self._clock() < deadline_s:
+            self._turn()
+            time.sleep(0.01)
         self._report()
         self._node.stop()
         if self._forwarder is not None:
-            self._forwarder.close()
+            with self._lock:
+                self._forwarder.close()
 
     def confirmed(self, token: int) -> None:
         """The broker has acknowledged a barrier of the store. From any thread."""
@@ -159,21 +159,23 @@ class EdgeRuntime:
                 self._connection.follow(cursor)
                 self.ledger.queue(frame.received)
                 now = self._clock(), round(self._wall_s() * 1000)
-                self._arrivals.put(Arrival(frame, *now, self._adapter.place(cursor)))
+                with self._lock:
+                    self._take(Arrival(frame, *now, self._adapter.place(cursor)))
         except BaseException as error:
             self._crash = error
         finally:
             self.stop.set()
 
-    def _once(self, timeout_s: float) -> None:
-        try:
-            arrival = self._arrivals.get(timeout=timeout_s)
-            self._take(arrival)
-        except queue.Empty:
-            pass
-        self._settle()
-        self._sense()
-        self._watch()
+    @property
+    def _pause_s(self) -> float:
+        """Until the next turn: short while history waits, which goes out a little at a time."""
+        return HISTORY_TURN_S if self._forwarder is not None and self._forwarder.is_behind else TURN_S
+
+    def _turn(self) -> None:
+        with self._lock:
+            self._settle()
+            self._sense()
+            self._watch()
 
     def _take(self, arrival: Arrival) -> None:
         frame = arrival.frame
@@ -296,10 +298,13 @@ class EdgeRuntime:
 
     def _report(self) -> None:
         """The ledger in one message, the health in another."""
+        with self._lock:
+            self._tell_health()
+
+    def _tell_health(self) -> None:
         now_ms = round(self._wall_s() * 1000)
         counters = self.ledger.snapshot()
         outside: dict[str, int | float | str | bool] = {
-            "health/queue_depth": self._arrivals.qsize(),
             "health/reconnects": self._connection.reconnects,
             "health/control_online": self._is_declared,
             "health/broker_reconnects": self._node.reconnects,

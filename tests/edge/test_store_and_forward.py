@@ -125,6 +125,7 @@ def written(agent: ReplayAgent, mosquitto: Mosquitto, folder: Path) -> Path:
     file = folder / "vmc.toml"
     file.write_text(
         f'[machine]\nname = "vmc"\n[broker]\nurl = "mqtt://{host}:{port}"\nsession_file = "{folder / "session"}"\n'
+        'primary_host = "reader"\n'
         f'[store]\nhistory_rows_per_s = 5000\nfree_bytes_min = 0\n[mtconnect]\nurl = "{agent.url}"\ninterval_ms = 20\n',
         encoding="utf-8",
     )

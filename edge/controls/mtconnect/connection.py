@@ -164,14 +164,17 @@ def fetch(config: Config, request: Request) -> bytes:
             with client.stream("GET", request.path, params=list(request.parameters)) as response:
                 body = _body(response)
                 if response.status_code >= 400 and _ERROR_ROOT not in body[:4096]:
-                    raise ConnectionLostError(
-                        f"{config.source.url}{request.path}: HTTP {response.status_code} {response.reason_phrase}"
-                    )
+                    refusal = f"HTTP {response.status_code} {response.reason_phrase}"
+                    raise ConnectionLostError(f"{config.source.url}{request.path}: {refusal}; {_way_out(response.status_code)}")
                 return body
         except (httpx.HTTPError, httpx.InvalidURL, OSError) as error:
             raise ConnectionLostError(
                 f"{config.source.url}{request.path}: {error}; is the agent running, and the address right?"
             ) from error
+
+
+def _way_out(status: int) -> str:
+    return "it wants mtconnect.username and password_env" if status == 401 else "is this the address of an MTConnect agent?"
 
 
 def _body(response: httpx.Response) -> bytes:

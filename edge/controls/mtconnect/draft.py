@@ -9,7 +9,7 @@ from edge.controls.mtconnect.cursor import Request, choose_device
 from edge.controls.mtconnect.documents import DevicesDocument, parse_document
 from edge.controls.mtconnect.mapping import assign
 from edge.controls.mtconnect.model import DataItem, DeviceModel
-from edge.errors import ConfigError, ConnectionLostError
+from edge.errors import ConfigError, ConnectionLostError, DocumentError
 from edge.sample import Offer
 from edge.signals import signal
 
@@ -21,7 +21,10 @@ def draft(url: str, device: str = "") -> str:
     except ValidationError as error:
         why = error.errors()[0]["msg"].removeprefix("Value error, ")
         raise ConfigError(f"address {without_secret(repr(url))} {why}, such as http://agent:5000") from None
-    document = parse_document(fetch(config, Request("/probe")))
+    try:
+        document = parse_document(fetch(config, Request("/probe")))
+    except DocumentError as error:
+        raise ConnectionLostError(f"{url}/probe: {error}; is this the address of an MTConnect agent?") from error
     if not isinstance(document, DevicesDocument):
         raise ConnectionLostError(f"{url}/probe: the agent answers {document} in place of its device description")
     machines = [d for d in document.devices if not d.is_agent]

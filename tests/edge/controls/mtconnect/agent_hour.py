@@ -212,7 +212,13 @@ class Shop:
         ):
             if watch.error is not None:
                 raise watch.error
-            place = watch.cursor.phase, watch.cursor.instance_id, watch.cursor.next_sequence, watch.cursor.attempt, watch.cursor.hole
+            place = (
+                watch.cursor.phase,
+                watch.cursor.instance_id,
+                watch.cursor.next_sequence,
+                watch.cursor.attempt,
+                watch.cursor.hole,
+            )
             told = f"{place}, the agent {self.agent.instance_id} {self.agent.buffer.next_sequence}; {watch.connection.last_error}"
             assert time.monotonic() < until, f"at {self.now_s:.1f} s, {self.hour.episodes[-1:]}: {told}"
             time.sleep(0.001)
@@ -255,5 +261,5 @@ class Shop:
 
 
 def run(seconds: float, seed: int, *, pause_s: float = 25.0, is_polled: bool = False, is_well: bool = False) -> Hour:
-    """So many seconds of production, read by the edge, with faults unless all is well. Odd seeds: an agent 1.4, even ones: 2.3."""
+    """So many seconds of production, read by the edge, with faults unless all is well. Odd seeds: agent 1.4, even: 2.3."""
     return Shop(seconds, seed, pause_s=pause_s, is_polled=is_polled, is_well=is_well).hour

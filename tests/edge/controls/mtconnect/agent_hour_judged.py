@@ -31,7 +31,11 @@ KEYS = {
     "tool_number": "Tool_number",
     "coolant_on": "coolant",
     "ambient_temp_c": "room_temp",
-} | {f"axis_{letter}_{name}": f"{letter.upper()}{key}" for letter in "xyz" for name, key in (("pos_mm", "abs"), ("load_pct", "load"))}
+} | {
+    f"axis_{letter}_{name}": f"{letter.upper()}{key}"
+    for letter in "xyz"
+    for name, key in (("pos_mm", "abs"), ("load_pct", "load"))
+}
 """By signal, what the machine's adapter calls it."""
 DEBOUNCE_S = 2.0
 TOLERANCE_S = 0.002  # two stamps in whole milliseconds

@@ -13,6 +13,7 @@ from edge.config import EdgeConfig
 from edge.controls.mtconnect.config import MtconnectConfig
 from edge.controls.mtconnect.connection import MtconnectConnection, client_of, fetch
 from edge.controls.mtconnect.cursor import Config, Phase, Request, parse, start
+from edge.controls.mtconnect.draft import draft
 from edge.errors import ConfigError, ConnectionLostError
 from edge.sample import Drop, EdgeSample, Gap, SampleSet
 from tests.edge.controls.mtconnect.agent_documents import DIALECTS, error, probe, streams, value
@@ -158,15 +159,17 @@ def test_a_lost_adapter_makes_all_unavailable_and_comes_back(version: str) -> No
 
 
 @contextmanager
-def server(*answers: Callable[[socket.socket], None]) -> Iterator[str]:
-    """Answers the n-th connection with the n-th answer, the last one again and again."""
+def server(*answers: Callable[[socket.socket], None], asked: list[bytes] | None = None) -> Iterator[str]:
+    """Answers the n-th connection with the n-th answer, the last one again and again. `asked`: for the requests."""
     listener = socket.create_server(("127.0.0.1", 0))
     stop = threading.Event()
     open_sockets: list[socket.socket] = []
 
     def one(connection: socket.socket, answer: Callable[[socket.socket], None]) -> None:
         with connection, suppress(OSError):
-            connection.recv(65536)
+            request = connection.recv(65536)
+            if asked is not None:
+                asked.append(request)
             answer(connection)
 
     def serve() -> None:
@@ -315,6 +318,29 @@ def test_an_agent_that_is_not_there_is_tried_again_later_and_later() -> None:
 def test_a_single_document_that_is_not_there_names_the_way_out() -> None:
     with pytest.raises(ConnectionLostError, match="is the agent running, and the address right"):
         fetch(EdgeConfig(source=MtconnectConfig(url="http://127.0.0.1:1")), Request("/probe"))
+
+
+@pytest.mark.parametrize(
+    ("reply", "way_out"),
+    [
+        (answer(b"", status="401 Unauthorized"), "HTTP 401 Unauthorized; it wants mtconnect.username and password_env"),
+        (answer(b"", status="404 Not Found"), "HTTP 404 Not Found; is this the address of an MTConnect agent?"),
+        (answer(b"<html>log in", kind="text/html"), "is this the address of an MTConnect agent?"),
+    ],
+)
+def test_whoever_is_no_agent_is_told_apart(reply: Callable[[socket.socket], None], way_out: str) -> None:
+    with server(reply) as url, pytest.raises(ConnectionLostError) as refused:
+        draft(url)
+    assert str(refused.value).startswith(f"{url}/probe: ")
+    assert way_out in str(refused.value)
+
+
+def test_a_page_in_the_agents_place_does_not_end_the_streaming() -> None:
+    page, alive = answer(b"<html>log in</html>", kind="text/html"), multipart(part(streams(11, [value("rpm", 10, "1")])))
+    asked = list[bytes]()
+    with server(answer(probe()), BASELINE, page, alive, asked=asked) as url, Reader(url, heartbeat_ms=2000) as reader:
+        reader.wait(lambda: reader.cursor.next_sequence == 11)
+    assert [b"interval=10" in request for request in asked] == [False, False, True, True]
 
 
 def test_the_password_comes_from_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
