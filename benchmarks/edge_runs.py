@@ -157,8 +157,8 @@ class Reader:
             self.ages_s.append(time.time() - told["edge_sequence"].timestamp_ms / 1000)
 
 
-def gateway(machines: int, rate_hz: float, seconds: float) -> None:
-    """Machines at 10 Hz behind MTConnect agents, in one process of `cnctwin edge run FOLDER`."""
+def gateway(machines: int, rate_hz: float, seconds: float, pin: bool) -> None:
+    """Machines at 10 Hz behind MTConnect agents, in one process of `cnctwin edge run FOLDER`; `pin`: on one processor."""
     with (
         tempfile.TemporaryDirectory() as temporary,
         Mosquitto() as mosquitto,
@@ -173,6 +173,8 @@ def gateway(machines: int, rate_hz: float, seconds: float) -> None:
                 f'[mtconnect]\nurl = "http://127.0.0.1:{port}/m{number:02d}"\n'
             )
         with Reader(BrokerAddress(*mosquitto.address)) as reader, child("-m", "cnctwin", "edge", "run", str(folder)) as edge:
+            if pin:  # before it has threads, which inherit it
+                os.sched_setaffinity(edge.pid, {max(os.sched_getaffinity(0))})
             deadline_s = time.monotonic() + 120
             while len(reader.messages) < machines and time.monotonic() < deadline_s:
                 time.sleep(0.2)
@@ -186,7 +188,9 @@ def gateway(machines: int, rate_hz: float, seconds: float) -> None:
             ages = sorted(reader.ages_s)
     floor_us = xml_floor_us()
     print(f"{len(reader.messages)} of {machines} machines, {messages / wall_s:.0f} messages/s of 8 values for {wall_s:.0f} s")
-    print(f"gateway: {used_s / wall_s:.2f} of a core, {1e6 * used_s / messages:.0f} us a message, {memory.split()[1]} kB")
+    print(
+        f"gateway{' on one processor' if pin else ''}: {used_s / wall_s:.2f} of a core, {1e6 * used_s / messages:.0f} us a message, {memory.split()[1]} kB"
+    )
     print(f"of it reading the XML with the C parser alone: {floor_us:.0f} us a document")
     print(f"age at the reader: median {1000 * ages[len(ages) // 2]:.0f} ms, 99 % {1000 * ages[len(ages) * 99 // 100]:.0f} ms")
 
@@ -252,6 +256,7 @@ def main() -> None:
     parser.add_argument("--rows", type=int, default=100_000)
     parser.add_argument("--machines", type=int, default=50)
     parser.add_argument("--rate-hz", type=float, default=10.0)
+    parser.add_argument("--pin", action="store_true", help="the gateway on one processor, as CPUAffinity of systemd does")
     parser.add_argument("--seconds", type=float, default=20.0)
     parser.add_argument("--hours", type=float, default=24.0)
     parser.add_argument("--kills", type=int, default=10)
@@ -261,7 +266,7 @@ def main() -> None:
     if chosen.what == "store":
         store(chosen.rows)
     elif chosen.what == "gateway":
-        gateway(chosen.machines, chosen.rate_hz, chosen.seconds)
+        gateway(chosen.machines, chosen.rate_hz, chosen.seconds, chosen.pin)
     else:
         outage(chosen.hours, chosen.kills, chosen.rows_per_s, chosen.seed)
 
