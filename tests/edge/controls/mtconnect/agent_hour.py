@@ -83,6 +83,9 @@ class Watch:
         self._config, self._hour = config, hour
         self.connection = MtconnectConnection(config, wait=lambda s: time.sleep(s / FASTER), chance=random.Random(seed))
         self._thread = threading.Thread(target=self._run, name="hour-edge")
+
+    def start(self) -> None:
+        """Begin to read."""
         self._thread.start()
 
     def close(self) -> None:
@@ -145,19 +148,23 @@ class Shop:
         self._server.start()
         self.link = FaultyLink(self._port, is_polled=is_polled)
         source = {"url": self.link.url, "interval_ms": 1, "heartbeat_ms": 100, "timeout_s": 0.3, "poll_ms": 50}
-        config: Config = EdgeConfig(source=MtconnectConfig.model_validate(source))
-        with self.link:
-            self._watch = Watch(config, self.hour, seed)
-            try:
-                self._work()
-            finally:
-                self._watch.close()
-                self.stop()
+        self._watch = Watch(EdgeConfig(source=MtconnectConfig.model_validate(source)), self.hour, seed)
+
+    def __enter__(self) -> "Shop":
+        self.link.start()
+        self._watch.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._watch.close()
+        self.stop()
+        self.link.close()
 
     def _wall_s(self) -> float:
         return SWITCHED_ON_S + self.now_s
 
-    def _work(self) -> None:
+    def work(self) -> None:
+        """Until the time is over."""
         plan = episodes(self.chance)
         self._advance(2.0)
         self.arrived()
@@ -174,7 +181,7 @@ class Shop:
             ends_s, until_s = self.now_s + episode.lasts_s, time.monotonic() + episode.real_s
             while self.now_s < ends_s:
                 self._advance(self.chance.uniform(*STRETCH_S))
-                time.sleep(episode.real_s * 0.1)
+                time.sleep(0.002)
             time.sleep(max(until_s - time.monotonic(), 0.0))
             episode.end(self)
             self.arrived()
@@ -198,7 +205,7 @@ class Shop:
         """Keep what the agent has stored; a stretch is shorter than its buffer."""
         buffer = self.agent.buffer
         known = self.hour.observations.setdefault(str(self.agent.instance_id), {})
-        new, _ = buffer.since(max(known, default=0) + 1, BUFFER_SIZE)
+        new, _ = buffer.since(len(known) + 1, BUFFER_SIZE)
         known.update((observation.sequence, observation) for observation in new)
 
     def arrived(self) -> None:
@@ -262,4 +269,6 @@ class Shop:
 
 def run(seconds: float, seed: int, *, pause_s: float = 25.0, is_polled: bool = False, is_well: bool = False) -> Hour:
     """So many seconds of production, read by the edge, with faults unless all is well. Odd seeds: agent 1.4, even: 2.3."""
-    return Shop(seconds, seed, pause_s=pause_s, is_polled=is_polled, is_well=is_well).hour
+    with Shop(seconds, seed, pause_s=pause_s, is_polled=is_polled, is_well=is_well) as shop:
+        shop.work()
+    return shop.hour

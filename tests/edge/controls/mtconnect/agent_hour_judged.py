@@ -8,7 +8,6 @@ from bisect import bisect_left, bisect_right
 from collections import defaultdict
 from collections.abc import Iterator
 
-from cnctwin.mtconnect_agent.observation import Observation
 from cnctwin.mtconnect_agent.stamp import stamp_text
 from cnctwin.simulated_control.state import ToolChange, states, tool_changes
 from edge.controls.mtconnect.documents import timestamp_ms
@@ -179,13 +178,13 @@ def unseen_s(hour: Hour) -> list[tuple[float, float]]:
     unseen = list(hour.without_adapter)
     for ranges in lost(hour):
         stored = [hour.observations[instance].get(number) for instance, numbers in ranges.items() for number in numbers]
-        stamps = [_at_s(observation) for observation in stored if observation is not None]
+        stamps = [_at_s(text) for text in {observation.timestamp for observation in stored if observation is not None}]
         unseen += [(min(stamps), max(stamps))] if stamps else []
     return [(from_s - DEBOUNCE_S, to_s) for from_s, to_s in unseen]
 
 
-def _at_s(stored: Observation) -> float:
-    at_ms = timestamp_ms(stored.timestamp)
+def _at_s(text: str) -> float:
+    at_ms = timestamp_ms(text)
     assert at_ms is not None
     return at_ms / 1000 - SWITCHED_ON_S
 

@@ -77,11 +77,12 @@ class FaultyLink:
         self.url = f"http://127.0.0.1:{self._listener.getsockname()[1]}"
         self._threads = [threading.Thread(target=self._accept, name="faulty-link")]
 
-    def __enter__(self) -> "FaultyLink":
+    def start(self) -> None:
+        """Take connections."""
         self._threads[0].start()
-        return self
 
-    def __exit__(self, *_: object) -> None:
+    def close(self) -> None:
+        """End all connections, and take no more."""
         self._closing.set()
         for thread in list(self._threads):
             thread.join(5.0)
