@@ -188,9 +188,8 @@ def gateway(machines: int, rate_hz: float, seconds: float, pin: bool) -> None:
             ages = sorted(reader.ages_s)
     floor_us = xml_floor_us()
     print(f"{len(reader.messages)} of {machines} machines, {messages / wall_s:.0f} messages/s of 8 values for {wall_s:.0f} s")
-    print(
-        f"gateway{' on one processor' if pin else ''}: {used_s / wall_s:.2f} of a core, {1e6 * used_s / messages:.0f} us a message, {memory.split()[1]} kB"
-    )
+    where, message_us = " on one processor" if pin else "", 1e6 * used_s / messages
+    print(f"gateway{where}: {used_s / wall_s:.2f} of a core, {message_us:.0f} us a message, {memory.split()[1]} kB")
     print(f"of it reading the XML with the C parser alone: {floor_us:.0f} us a document")
     print(f"age at the reader: median {1000 * ages[len(ages) // 2]:.0f} ms, 99 % {1000 * ages[len(ages) * 99 // 100]:.0f} ms")
 

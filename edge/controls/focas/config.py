@@ -58,6 +58,9 @@ def _register(text: str) -> str:
     return text.upper()
 
 
+OVERRIDE_BYTES = ("G12.", "G14.", "G30.")
+
+
 class FocasConfig(Section):
     """The control and how it is asked. `library` is the path of the user's own fwlib; `path` counts from 1."""
 
@@ -85,6 +88,10 @@ class FocasConfig(Section):
             )
         if self.backend is Backend.ETHERNET and self.tool_number is ToolSource.TOOLNUM:
             raise ValueError('tool_number = "toolnum" needs backend = "library": the protocol has no known command for it')
+        if self.tool_change_pmc.upper().startswith(OVERRIDE_BYTES):
+            raise ValueError(
+                f'tool_change_pmc = "{self.tool_change_pmc}" lies in a byte of an override; name the bit of the builder\'s ladder'
+            )
         return self
 
 

@@ -163,7 +163,8 @@ class FocasConnection:
 
     def _control_clock(self) -> ClockReading | None:
         """The control's date and time, without zone and fractions. A reading around midnight may be torn, and is left out."""
-        self._clock_s = self._clock()
+        # Not at always the same phase of the control's seconds: many looks then tell more than one.
+        self._clock_s = self._clock() - self._chance.uniform(0.0, 1.0)
         if Group.CLOCK not in self._config.groups or self._identity is None:
             return None
         request = Request(Call.CLOCK)
