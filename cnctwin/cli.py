@@ -239,7 +239,9 @@ def edge_check(config: Annotated[Path, typer.Argument(help="The TOML file of one
 @edge_app.command("discover")
 def edge_discover(
     url: Annotated[str, typer.Argument(help="http://host:port (MTConnect), focas://host, opc.tcp://host:port, lsv2://host")],
-    device: Annotated[str, typer.Option(help="Which of several devices; else the first")] = "",
+    device: Annotated[
+        str, typer.Option(help="MTConnect: which of several devices, else the first. All others: the machine's name")
+    ] = "",
 ) -> None:
     """Draft a configuration from a control's own description."""
     from edge.check import discover

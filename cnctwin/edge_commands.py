@@ -14,11 +14,14 @@ from rich.text import Text
 from cnctwin.given_broker import broker_or_own
 from edge.adapter import Row
 from edge.config import EdgeConfig
+from edge.config_file import load
+from edge.errors import ConfigError
 from edge.gateway import Gateway
 from edge.run import broker_address, edge_runtime
 from edge.runtime import EdgeRuntime
 from edge.state_dir import state_dir
 from sparkplug.broker import BrokerAddress
+from sparkplug.errors import SparkplugError
 
 
 def run(path: Path, given: BrokerAddress | None, stop: Event) -> dict[str, int]:
@@ -27,13 +30,18 @@ def run(path: Path, given: BrokerAddress | None, stop: Event) -> dict[str, int]:
     `given` takes the place of the brokers in the files; where neither names one, one of our own is started.
     """
     files = sorted(path.glob("*.toml")) if path.is_dir() else [path]
+    if not path.is_dir():
+        load(path)  # what is wrong with it is said before a broker of our own is started
     needs_own = given is None and not all(map(_names_broker, files))
     with broker_or_own(given) if needs_own or given is not None else nullcontext() as broker:
 
         def begin(config: EdgeConfig[Any], restarts: int) -> EdgeRuntime:
-            named = given is None and _names_broker(config.path)
+            named = given is None and "url" in config.broker.model_fields_set  # not by the file, which may be in pieces by now
             address = broker_address(config.broker, config.path) if named or broker is None else broker
-            return edge_runtime(_with_session_file(config), address, restarts=restarts)
+            try:
+                return edge_runtime(_with_session_file(config), address, restarts=restarts)
+            except SparkplugError as error:  # such as a certificate's file that is not there
+                raise ConfigError(f"{config.path}: {error}") from error
 
         return Gateway(path, begin).run(stop)
 

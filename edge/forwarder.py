@@ -35,6 +35,8 @@ BARRIER_ROWS = 500
 BARRIER_S = 0.5
 HOUSEKEEPING_S = 1.0
 READ_AT_ONCE = 100
+FLIGHTS_MAX = 500  # what a broker leaves unconfirmed for so many barriers waits again, and can be evicted
+EVICTION_S_MAX = 0.05  # in one go: the rows that come meanwhile have to wait
 _log = logging.getLogger(__name__)
 _ENCODE = json.JSONEncoder(ensure_ascii=False, separators=(",", ":")).encode
 _DROPS = {Eviction.AGE: Drop.STORE_AGE, Eviction.BYTES: Drop.STORE_BYTES, Eviction.DISK: Drop.STORE_DISK}
@@ -77,7 +79,7 @@ class Forwarder:
         self._waiting = Spans(ring.spans())
         self._flights: deque[_Flight] = deque()
         self._confirmed: deque[int] = deque(maxlen=1_000)
-        self._token = 0
+        self._token = self._landed = 0
         self._declared: frozenset[str] = frozenset()
         self._budget_rows, self._paid_s = 0.0, clock()
         self._barrier_s = self._kept_s = clock()
@@ -135,7 +137,7 @@ class Forwarder:
             self._bar(now_s)
             if now_s - self._kept_s >= HOUSEKEEPING_S:
                 self._kept_s = now_s
-                self._keep_bounds()
+                self._keep_bounds(now_s)
         except StoreError as error:
             self._fail(error)
         settled = Settled(self._emitted, self._dropped)
@@ -154,8 +156,8 @@ class Forwarder:
 
     @property
     def observations(self) -> int:
-        """How many are stored."""
-        return self._ring.observations
+        """How many are stored, or have come to their end since the last `pump`."""
+        return self._ring.observations + self._emitted + self._dropped.total()
 
     @property
     def is_done(self) -> bool:
@@ -189,6 +191,7 @@ class Forwarder:
             return False
         flight = self._flights[-1] if self._flights else None
         if flight is None or flight.token or flight.session != session:
+            self._strand(session)  # so that all flights are of one session, and no barrier confirms what another one took
             flight = _Flight(session)
             self._flights.append(flight)
         flight.spans.add(sequence, sequence)
@@ -197,23 +200,31 @@ class Forwarder:
         return True
 
     def _land(self) -> None:
-        """What was confirmed is done; what was sent in a session that is over waits again."""
+        """What was confirmed is done. Where the disk fails the flight stays, and lands with a later pump."""
         while self._confirmed:
-            token = self._confirmed.popleft()
-            while self._flights and 0 < self._flights[0].token <= token:
-                flight = self._flights.popleft()
-                for number, (first, last) in enumerate(flight.spans):
-                    self._ring.delete(first, last, 0 if number else flight.observations)
-                self._emitted += flight.observations
-                self.error = ""
-        while self._flights and self._flights[0].session != self._node.session:
+            self._landed = max(self._landed, self._confirmed.popleft())
+        while self._flights and 0 < self._flights[0].token <= self._landed:
+            flight = self._flights[0]
+            *others, final = flight.spans
+            for span in others:
+                self._ring.delete(*span, 0)
+            self._ring.delete(*final, flight.observations)
+            self._flights.popleft()
+            self._emitted += flight.observations
+            self.error = ""
+        self._strand(self._node.session)
+
+    def _strand(self, session: int) -> None:
+        """What was sent in another session, or is not confirmed for long, waits again."""
+        while self._flights and (self._flights[0].session != session or len(self._flights) >= FLIGHTS_MAX):
             for first, last in self._flights.popleft().spans:
                 self._waiting.add(first, last)
 
     def _history(self, now_s: float) -> None:
         rate, paid_s = self._limits.history_rows_per_s, self._paid_s
         self._paid_s = now_s
-        if not self._declared or not self._waiting or not self._node.online:
+        confirms = len(self._flights) < FLIGHTS_MAX // 2  # else all of it would be sent again and again
+        if not self._declared or not self._waiting or not self._node.online or not confirms:
             return
         self._budget_rows = min(self._budget_rows + (now_s - paid_s) * rate, max(rate, 1.0))
         in_flight = sum(flight.rows for flight in self._flights)
@@ -221,7 +232,12 @@ class Forwarder:
         if allowed < 1 or (span := self._waiting.take(allowed)) is None:
             return
         self._budget_rows -= span[1] - span[0] + 1
-        for row in self._ring.read(*span):
+        try:
+            rows = self._ring.read(*span)
+        except StoreError:
+            self._waiting.add(*span)
+            raise
+        for row in rows:
             self._tell(row)
 
     def _tell(self, row: StoredRow) -> None:
@@ -237,7 +253,15 @@ class Forwarder:
                 self.history_rows += 1
         except (SparkplugError, StoreError, ValueError, TypeError) as error:
             _log.warning("%s: row %d of the store cannot be told any more: %s", self._ring.file, row.sequence, error)
+            self._forget(row)
+
+    def _forget(self, row: StoredRow) -> None:
+        try:
             self._ring.delete(row.sequence, row.sequence, row.observations)
+        except StoreError as error:
+            self._waiting.add(row.sequence, row.sequence)
+            self._fail(error)
+        else:
             self._dropped[Drop.UNDECLARED] += row.observations
 
     def _bar(self, now_s: float) -> None:
@@ -251,16 +275,18 @@ class Forwarder:
                 self._token += 1
                 flight.token = self._token
 
-    def _keep_bounds(self) -> None:
+    def _keep_bounds(self, now_s: float) -> None:
         self._keep_place()
         self._ring.look()
         flying = [first for flight in self._flights for first, _ in flight.spans]
-        gone = self._ring.evict(min(flying, default=self._ring.last + 1) - 1)
-        while gone is not None:
+        upto = min(flying, default=self._ring.last + 1) - 1
+        while (gone := self._ring.evict(upto)) is not None:
             self._waiting.cut(gone.last)
             self._dropped[_DROPS[gone.reason]] += gone.observations
             self.evicted_rows += gone.rows
-            gone = self._ring.evict(min(flying, default=self._ring.last + 1) - 1)
+            if self._clock() - now_s > EVICTION_S_MAX:
+                self._kept_s -= HOUSEKEEPING_S  # goes on at the next turn
+                break
 
     def _keep_place(self) -> None:
         if self._place is not None:

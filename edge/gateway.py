@@ -41,6 +41,7 @@ class _Edge:
     due_s: float = 0.0
     pause_s: float = RESTART_S_MIN
     restarts: int = 0
+    is_to_end: bool = False
 
     @property
     def runs(self) -> bool:
@@ -72,6 +73,7 @@ class Gateway:
         end_s_max: float = END_S_MAX,
     ) -> None:
         self._path, self._begin, self._clock, self._look_s, self._end_s_max = path, begin, clock, look_s, end_s_max
+        self._is_single = not path.is_dir()  # once: a folder that is away for a moment has not become a file
         self._edges: dict[Path, _Edge] = {}
         self._seen = _Seen()
 
@@ -108,7 +110,12 @@ class Gateway:
             self._watch(file, edge)
 
     def _files(self) -> dict[Path, Signature]:
-        single = self._path.is_file() or not self._path.is_dir()
+        single = self._is_single
+        if not single and not self._path.is_dir():
+            self._complain(self._path, f"{self._path}: is away; the edges go on as they were")
+            return {file: signature for file, signature in self._seen.signatures.items() if file in self._edges}
+        if not single:
+            self._seen.complaints.pop(self._path, None)
         found: dict[Path, Signature] = {}
         for file in [self._path] if single else sorted(self._path.glob("*.toml"))[:EDGES_MAX]:
             try:
@@ -121,17 +128,17 @@ class Gateway:
             found.setdefault(self._path, self._seen.signatures[self._path])  # an editor is just replacing it
         return found
 
-    @property
-    def _is_single(self) -> bool:
-        return not self._path.is_dir()
-
     def _take_up(self, file: Path) -> None:
+        is_read = False
         try:
             config = load(file)
+            is_read = True
             self._check_apart(file, config)
         except ConfigError as error:
             if self._is_single and file not in self._edges:
                 raise
+            if is_read:
+                self._seen.signatures[file] = 0, 0  # the other file may change too: look again
             what = "; the edge goes on as it was" if file in self._edges else ""
             self._complain(file, f"{error}{what}")
             return
@@ -178,6 +185,8 @@ class Gateway:
         def run() -> None:
             try:
                 edge.runtime = self._begin(edge.config, edge.restarts)
+                if edge.is_to_end:  # told so while it was being made, when there was nothing yet to tell
+                    edge.runtime.stop.set()
                 edge.runtime.run()
             except BaseException as error:  # whatever it is, it ends this edge only
                 edge.error = error
@@ -187,22 +196,24 @@ class Gateway:
         edge.thread = threading.Thread(target=run, name=f"edge {edge.config.machine.name}", daemon=True)
         edge.thread.start()
 
-    def _end(self, file: Path) -> None:
+    def _end(self, file: Path, until_s: float | None = None) -> None:
+        """until_s: by the monotonic clock; None: as long as an edge may take."""
         edge = self._edges.pop(file)
         self._tell_to_end(edge)
         if edge.thread is not None:
-            edge.thread.join(self._end_s_max)
+            edge.thread.join(self._end_s_max if until_s is None else max(until_s - time.monotonic(), 0.0))
             if edge.thread.is_alive():
                 _log.warning("%s: the edge of %s does not end; it is left behind", file, edge.config.machine.name)
 
     def _end_all(self) -> dict[str, int]:
         """All at once; the sums of their ledgers."""
+        until_s = time.monotonic() + self._end_s_max
         for edge in self._edges.values():
             self._tell_to_end(edge)
         ledger: dict[str, int] = {}
         runtimes = [edge.runtime for edge in self._edges.values() if edge.runtime is not None]
         for file in list(self._edges):
-            self._end(file)
+            self._end(file, until_s)
         for runtime in runtimes:
             for name, number in runtime.ledger.snapshot().items():
                 ledger[name] = ledger.get(name, 0) + number
@@ -210,6 +221,7 @@ class Gateway:
 
     @staticmethod
     def _tell_to_end(edge: _Edge) -> None:
+        edge.is_to_end = True
         if edge.runtime is not None:
             edge.runtime.stop.set()
 

@@ -24,12 +24,17 @@ from edge.place import Place
 
 EVICTED_AT_ONCE = 200
 """Rows; more would hold up what is live."""
+SPARE_PAGES, RETURNED_AT_ONCE = 1_000, 1_000
+"""Pages that the file keeps for what comes; of more, so many are given back to the disk with each look."""
 _log = logging.getLogger(__name__)
 _SCHEMA = """
 CREATE TABLE IF NOT EXISTS rows(
     sequence INTEGER PRIMARY KEY AUTOINCREMENT, stored_ms INTEGER NOT NULL, observations INTEGER NOT NULL, body TEXT NOT NULL,
     place TEXT, memory TEXT);
 CREATE TABLE IF NOT EXISTS kept(name TEXT PRIMARY KEY, value TEXT NOT NULL);
+CREATE TRIGGER IF NOT EXISTS number_once BEFORE INSERT ON rows
+    WHEN NEW.sequence <= (SELECT seq FROM sqlite_sequence WHERE name = 'rows')
+    BEGIN SELECT RAISE(ABORT, 'another edge writes this store too, and has given that number'); END;
 CREATE TRIGGER IF NOT EXISTS keep_place AFTER INSERT ON rows WHEN NEW.place IS NOT NULL
     BEGIN INSERT OR REPLACE INTO kept VALUES ('place', NEW.place); END;
 CREATE TRIGGER IF NOT EXISTS keep_memory AFTER INSERT ON rows WHEN NEW.memory IS NOT NULL
@@ -42,7 +47,7 @@ _KEEP = "INSERT OR REPLACE INTO kept VALUES (?, ?)"
 _INSERT = "INSERT INTO rows VALUES (?, ?, ?, ?, ?, ?)"
 _LOOK = """
 SELECT (SELECT stored_ms FROM rows ORDER BY sequence LIMIT 1),
-    (SELECT page_count FROM pragma_page_count) - (SELECT freelist_count FROM pragma_freelist_count)
+    (SELECT page_count FROM pragma_page_count), (SELECT freelist_count FROM pragma_freelist_count)
 """
 
 
@@ -109,7 +114,11 @@ class Ring:
             self.file.replace(aside)
             for tail in ("-wal", "-shm"):
                 self.file.with_name(self.file.name + tail).unlink(missing_ok=True)
-            return self._connect()
+            db = self._connect()
+            # Which numbers the lost store has given nobody knows; fewer than one a millisecond since 1970, that much is sure.
+            self.last = self._now_ms()
+            db.execute("INSERT INTO sqlite_sequence VALUES ('rows', ?)", (self.last,))
+            return db
 
     def _connect(self) -> sqlite3.Connection:
         db = sqlite3.connect(self.file, isolation_level=None, timeout=1.0, check_same_thread=False)
@@ -125,7 +134,7 @@ class Ring:
             self.rows, self.observations = int(count), int(observations or 0)
             self._page_bytes = int(db.execute("PRAGMA page_size").fetchone()[0])
             self._began_ms = max(self._began_ms, int(newest or 0))
-            self.age_s, self.bytes = 0.0, 0
+            self.age_s, self.bytes, self._spare_bytes = 0.0, 0, 0
         except BaseException:
             db.close()
             raise
@@ -217,9 +226,11 @@ class Ring:
 
     def look(self) -> None:
         """See how old and how much it is: `age_s` and `bytes` are as of the last look."""
-        oldest_ms, pages = self._ask(_LOOK)[0]
+        oldest_ms, pages, spare = self._ask(_LOOK)[0]
         self.age_s = 0.0 if oldest_ms is None else max(self._now_ms() - int(oldest_ms), 0) / 1000
-        self.bytes = int(pages) * self._page_bytes
+        self.bytes, self._spare_bytes = (int(pages) - int(spare)) * self._page_bytes, int(spare) * self._page_bytes
+        if spare > SPARE_PAGES:
+            self._give_back(RETURNED_AT_ONCE)
 
     def evict(self, upto: int) -> Evicted | None:
         """After a look: the oldest rows with numbers up to `upto`, where a limit is passed, some at a time; else None."""
@@ -235,9 +246,18 @@ class Ring:
             return None
         last, observations = int(oldest[-1][0]), sum(row[2] for row in oldest)
         self.delete(int(oldest[0][0]), last, observations)
-        self._ask(f"PRAGMA incremental_vacuum({EVICTED_AT_ONCE})")
+        if reason is Eviction.DISK:
+            self._give_back(RETURNED_AT_ONCE)
         self.look()
         return Evicted(reason, len(oldest), last, observations)
+
+    def _give_back(self, pages: int) -> None:
+        """Make the file shorter by so many pages at most."""
+        try:
+            # As a script: `execute` takes the first step of it only, which is one page. The file is shorter once it is checkpointed.
+            self._db.executescript(f"PRAGMA incremental_vacuum({pages}); PRAGMA wal_checkpoint")
+        except sqlite3.Error as error:
+            raise StoreError(f"{self.file}: cannot be written: {error}") from error
 
     def _passed(self) -> Eviction | None:
         if not self.rows:
@@ -246,7 +266,11 @@ class Ring:
             return Eviction.AGE
         if self.bytes > self._limits.bytes_max:
             return Eviction.BYTES
-        return Eviction.DISK if self._free_bytes(self.file.parent) < self._limits.free_bytes_min else None
+        try:
+            free_bytes = self._free_bytes(self.file.parent) + self._spare_bytes
+        except OSError as error:
+            raise StoreError(f"{self.file}: nobody knows how much the disk has left: {error}") from error
+        return Eviction.DISK if free_bytes < self._limits.free_bytes_min else None
 
     def _ask(self, text: str, values: Iterable[int] = ()) -> list[tuple[Any, ...]]:
         try:

@@ -125,24 +125,29 @@ class EdgeRuntime:
                     self._report()
         finally:
             self.stop.set()
-            self._connection.close()
-            if self._sensor is not None:
-                self._sensor.close()
-            self._finish(reader)
+            try:
+                self._connection.close()
+                if self._sensor is not None:
+                    self._sensor.close()
+                self._finish(reader)
+            finally:  # a node that is not stopped would keep the name of this edge, and throw out the next one that has it
+                self._node.stop()
+                if self._forwarder is not None:
+                    with self._lock:
+                        self._forwarder.close()
         if self._crash is not None:
             raise self._crash
 
     def _finish(self, reader: threading.Thread) -> None:
         deadline_s = self._clock() + FAREWELL_S_MAX
         reader.join(FAREWELL_S_MAX)
+        if self._forwarder is not None:
+            with self._lock:
+                self._forwarder.declare(())  # what history is not out yet waits for the next life
         while self._forwarder is not None and not self._forwarder.is_done and self._node.online and self._clock() < deadline_s:
             self._turn()
             time.sleep(0.01)
         self._report()
-        self._node.stop()
-        if self._forwarder is not None:
-            with self._lock:
-                self._forwarder.close()
 
     def confirmed(self, token: int) -> None:
         """The broker has acknowledged a barrier of the store. From any thread."""

@@ -5,7 +5,6 @@ client, so that nothing of an earlier session is ever sent again.
 """
 
 import logging
-import select
 import socket
 import ssl
 import threading
@@ -27,7 +26,7 @@ from paho.mqtt.reasoncodes import ReasonCode
 from sparkplug.actions import Action, Barrier, Connect, Disconnect, Publish, Subscribe
 from sparkplug.broker import BrokerAddress
 from sparkplug.errors import BrokerAddressError
-from sparkplug.paho_client import CONNECT_TIMEOUT_S, ReadingAheadClient
+from sparkplug.paho_client import CONNECT_TIMEOUT_S, ReadingAheadClient, ready
 from sparkplug.tls_failure import explained
 
 OUTBOX_MAX = 20_000
@@ -89,7 +88,7 @@ class MqttConnection:
         self._outbox: deque[Action] = deque()
         self._barriers: dict[int, int] = {}  # packet id → token, of this connection
         self._stopping = threading.Event()
-        self._asleep = False
+        self._asleep = self._reading = False
         self._ticked_s = 0.0
         self._ended = self._driving = False
         self._driven_s = 0.0
@@ -255,6 +254,7 @@ class MqttConnection:
             else:
                 client.connect(broker.host, broker.port, KEEPALIVE_S)
         except OSError as error:
+            self._reached = isinstance(error, ssl.SSLError)  # somebody listens, whom each handshake costs something
             self._listener.unsent()
             raise OSError(f"no connection to {broker.url}: {explained(error, broker)}") from error
 
@@ -267,15 +267,16 @@ class MqttConnection:
         try:
             # Whatever was put into the outbox before `_asleep` was set is seen here; what comes later wakes us.
             wait_s = 0.0 if sock.pending() or (self._outbox and self._accepted and not client.want_write()) else wait_s_max
-            readable, _, _ = select.select([sock, self._wake_reader], [sock] if client.want_write() else [], [], wait_s)
+            descriptor = sock.fileno()
+            readable = ready([sock, self._wake_reader], [sock] if client.want_write() else [], wait_s)
         except ValueError:
             return False  # another thread's write has found the connection broken and closed it
         finally:
             self._asleep = False
         with self._touching:
-            if self._wake_reader in readable:
+            if self._wake_reader.fileno() in readable:
                 self._quiet()
-            if (sock.pending() or sock in readable) and not self._read(client, sock):
+            if (sock.pending() or descriptor in readable) and not self._read(client, sock):
                 return False
             if client.want_write():
                 client.loop_write()
@@ -289,11 +290,15 @@ class MqttConnection:
 
     def _read(self, client: ReadingAheadClient, sock: Any) -> bool:
         """Handle all packets that have come."""
-        while True:
-            if client.loop_read() != MQTTErrorCode.MQTT_ERR_SUCCESS or client.socket() is None:
-                return False
-            if not sock.pending():
-                return True
+        self._reading = True
+        try:
+            while True:
+                if client.loop_read() != MQTTErrorCode.MQTT_ERR_SUCCESS or client.socket() is None:
+                    return False
+                if not sock.pending():
+                    return True
+        finally:
+            self._reading = False
 
     def _drain(self, client: ReadingAheadClient) -> None:
         """Hand actions to paho as long as the socket takes them."""
@@ -307,7 +312,9 @@ class MqttConnection:
             client.publish(action.topic, action.payload, action.qos, action.retain)
         elif isinstance(action, Barrier):
             client.on_publish = self._on_publish  # only while a barrier is out: it would be called for each QoS 0 message too
-            self._barriers[client.publish(action.topic, str(action.token), 1).mid] = action.token
+            told = client.publish(action.topic, str(action.token), 1)
+            if told.rc == MQTTErrorCode.MQTT_ERR_SUCCESS:  # else an older barrier, 65,535 packets ago, still has that id
+                self._barriers[told.mid] = action.token
         elif isinstance(action, Subscribe):
             client.subscribe(action.topic_filter, action.qos)
         else:
@@ -325,7 +332,7 @@ class MqttConnection:
         deadline_s = time.monotonic() + CONNECT_TIMEOUT_S
         sock: Any = client.socket()
         while client.want_write() and client.socket() is not None and time.monotonic() < deadline_s:
-            select.select([], [sock], [], TICK_S)
+            ready([], [sock], TICK_S)
             client.loop_write()
 
     @staticmethod
@@ -347,7 +354,8 @@ class MqttConnection:
         self._listener.message(message.topic, bytes(message.payload))
 
     def _on_publish(self, client: Any, _userdata: Any, packet_id: int, reason: Any, _properties: Any) -> None:
-        token = self._barriers.pop(packet_id, None)
+        # What was read is an acknowledgement; a QoS 0 message that was written may have the id of a barrier, after 65,535 others.
+        token = self._barriers.pop(packet_id, None) if self._reading else None
         if token is None:
             return
         if not self._barriers:

@@ -2,6 +2,7 @@
 
 import importlib.util
 import json
+import logging
 from pathlib import Path
 from threading import Event
 
@@ -29,6 +30,7 @@ def simulate_opcua(
         raise ProgramError("an OPC UA server needs the library asyncua; install it with: pip install 'cnctwin[opcua]'")
     from cnctwin.opcua_server.server import OpcUaServer  # noqa: PLC0415  asyncua is an extra
 
+    logging.getLogger("asyncua.server.server").setLevel(logging.CRITICAL)  # why it can't start is told below, without a traceback
     control = SimulatedControl(production(DAY_S), speed=speed, clock_offset_s=clock_offset_s)
     with OpcUaServer(control, state_dir() / "simulated-opcua", port=port, open_too=is_open) as server:
         discover = f"cnctwin edge discover '{server.url}?server_fingerprint={server.fingerprint}'"

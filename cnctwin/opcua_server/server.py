@@ -123,7 +123,8 @@ class OpcUaServer:
         self._thread = threading.Thread(target=self._work, name="opcua-server", daemon=True)
         self._thread.start()
         if not self._ready.wait(START_S_MAX) or self.error is not None:
-            raise ProgramError(f"port {self.port}: no OPC UA server can be started: {self.error or 'it took too long'}")
+            why = self.error or "it took too long"
+            raise ProgramError(f"port {self.port}: no OPC UA server can be started: {why}; give another with --port")
 
     def stop(self) -> None:
         """End it; the control goes on."""

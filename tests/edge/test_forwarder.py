@@ -8,9 +8,10 @@ from pathlib import Path
 import pytest
 
 from edge.config import StoreSection
-from edge.forwarder import SEQUENCE, Forwarder
+from edge.errors import StoreError
+from edge.forwarder import FLIGHTS_MAX, SEQUENCE, Forwarder
 from edge.place import Place
-from edge.ring import Ring
+from edge.ring import Ring, StoredRow
 from edge.sample import Drop, EdgeSample
 from sparkplug.metric import Change
 
@@ -217,5 +218,71 @@ def test_a_disk_that_takes_nothing_stops_no_live_value(tmp_path: Path) -> None:
     world.take(2)
     assert plain == [1.0, 2.0]
     assert "cannot be written" in world.forwarder.error
+    assert world.forwarder.observations == 2, "buffered until the ledger has heard of them"
     world.pump()
     assert world.emitted == 2
+
+
+def test_what_one_session_took_is_not_confirmed_by_the_barrier_of_the_next(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    world = World(tmp_path / "edge.store", 1)
+    wire, ring, world.wire.lost_acknowledgements = world.wire, world.forwarder._ring, 0.0
+    world.take(1)
+    world.seconds = 0.6
+    world.pump()  # the row and its barrier are on their way
+    wire.online = False
+    world.take(1)
+    wire.online = True
+
+    def reads_while_the_connection_is_made_anew(first: int, last: int) -> list[StoredRow]:
+        wire.cut()
+        wire.back()
+        return Ring.read(ring, first, last)
+
+    monkeypatch.setattr(ring, "read", reads_while_the_connection_is_made_anew)
+    world.seconds = 1.2
+    world.pump()
+    monkeypatch.undo()
+    world.to_the_end()
+    assert {message.sequence for message in wire.got} == {1, 2}
+    world.forwarder.close()
+
+
+@pytest.mark.parametrize("what", ["read", "delete"])
+def test_a_disk_that_fails_for_a_while_leaves_no_row_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, what: str) -> None:
+    world = World(tmp_path / "edge.store", 1)
+    world.wire.lost_acknowledgements = 0.0
+    world.take(3)
+    world.wire.online = False
+    world.take(3)
+    world.wire.back()
+
+    def fails(*_: object) -> None:
+        raise StoreError("the disk is full")
+
+    monkeypatch.setattr(world.forwarder._ring, what, fails)
+    for _ in range(5):
+        world.seconds += 0.6
+        world.pump()
+        world.wire.deliver(100)
+    assert (world.forwarder.error, world.forwarder.observations + world.emitted) == ("the disk is full", 6)
+    monkeypatch.undo()
+    world.to_the_end()
+    assert (world.emitted, world.forwarder._ring.rows) == (6, 0)
+    assert {message.sequence for message in world.wire.got} == set(range(1, 7))
+    world.forwarder.close()
+
+
+def test_a_broker_that_confirms_nothing_does_not_make_the_store_grow_for_ever(tmp_path: Path) -> None:
+    world = World(tmp_path / "edge.store", 1)
+    world.wire.lost_acknowledgements = 0.0
+    world.forwarder.confirmed = lambda token: None  # type: ignore[method-assign]
+    for _ in range(FLIGHTS_MAX + 50):
+        world.take(1)
+        world.seconds += 0.6
+        world.pump()
+        world.wire.deliver(10)
+    assert len(world.forwarder._flights) <= FLIGHTS_MAX
+    assert min(first for flight in world.forwarder._flights for first, _ in flight.spans) > 1, "the oldest may be evicted"
+    world.forwarder.close()

@@ -198,3 +198,63 @@ def test_a_single_file_whose_control_cannot_serve_it_ends_with_that_error(works:
     works.fates["a"] = refuse
     with pytest.raises(ConfigError, match="no such device"):
         works.over(works.write("a")).run(threading.Event())
+
+
+def test_many_that_hang_hold_up_the_end_no_longer_than_one(works: Works) -> None:
+    hang = threading.Event()
+    for name in "abcdef":
+        works.fates[name] = lambda: cast(None, hang.wait(10))
+        works.write(name)
+    works.look(lambda: len(works.running) == 6)
+    stop = threading.Event()
+    stop.set()
+    began_s = time.monotonic()
+    works.gateway.run(stop)
+    hang.set()
+    assert time.monotonic() - began_s < 0.6, "0.2 s is what one may take"
+
+
+def test_one_that_is_told_to_end_while_it_is_being_made_ends(works: Works, monkeypatch: pytest.MonkeyPatch) -> None:
+    made = threading.Event()
+    begin = works._begin
+
+    def slow(config: EdgeConfig[Any], restarts: int) -> EdgeRuntime:
+        made.wait(5)
+        return begin(config, restarts)
+
+    monkeypatch.setattr(works.gateway, "_begin", slow)
+    file = works.write("a")
+    works.look()
+    thread = works.gateway._edges[file].thread
+    file.unlink()
+    works.look()
+    made.set()
+    assert thread is not None
+    thread.join(5)
+    assert not thread.is_alive()
+
+
+def test_a_folder_that_is_away_for_a_moment_ends_nobody(works: Works, tmp_path: Path) -> None:
+    folder = works.folder = tmp_path / "machines"
+    folder.mkdir()
+    works.gateway = works.over(folder)
+    works.write("a")
+    works.look(lambda: works.running == ["a"])
+    folder.rename(tmp_path / "aside")
+    works.look()
+    assert works.running == ["a"]
+    (tmp_path / "aside").rename(folder)
+    works.look()
+    assert works.begun["a"] == 1
+
+
+def test_one_that_was_like_another_is_taken_up_as_soon_as_the_other_is_not(
+    works: Works, caplog: pytest.LogCaptureFixture
+) -> None:
+    works.write("a")
+    works.write("a", file="b")
+    for _ in range(3):
+        works.look(lambda: works.running == ["a"])
+    assert caplog.text.count("give each machine its own") == 1
+    works.write("other", file="a")
+    works.look(lambda: works.running == ["a", "other"])

@@ -75,6 +75,56 @@ def test_a_number_is_never_given_twice_not_even_when_its_row_is_gone(open_ring: 
     assert (again.rows, again.append([(1, "c")])) == (0, 3)
 
 
+def test_a_second_edge_on_the_same_store_gives_no_number_again(open_ring: OpenRing) -> None:
+    ring, other = open_ring(), open_ring()
+    ring.append([(1, "a")])
+    ring.delete(1, 1, 1)
+    with pytest.raises(StoreError, match="another edge writes this store too"):
+        other.append([(1, "b")])
+
+
+def test_what_was_stored_and_is_gone_is_given_back_to_the_disk(open_ring: OpenRing, tmp_path: Path, clock: Clock) -> None:
+    ring = open_ring()
+    for _ in range(300):
+        ring.append([(1, "x" * 1_000)] * 100)
+    ring.delete(1, ring.last - 1, ring.last - 1)
+    clock.free = 490_000_000
+    for _ in range(12):
+        ring.look()
+        assert ring.evict(ring.last) is None, "the file itself holds what the disk lacks"
+        clock.free = PLENTY
+        ring.append([(1, "y")])
+    assert (tmp_path / "edge.store").stat().st_size < 10_000_000
+
+
+def test_a_disk_that_somebody_else_fills_costs_no_more_rows_than_it_lacks(clock: Clock, tmp_path: Path) -> None:
+    file = tmp_path / "edge.store"
+    ring = clock.ring(file, StoreSection(free_bytes_min=1_000_000))
+    for _ in range(300):
+        ring.append([(1, "x" * 1_000)] * 100)
+    room = file.stat().st_size - 3_000_000  # so it is 4 MB too much, and what is not checkpointed yet
+    ring._free_bytes = lambda _: room - file.stat().st_size
+    ring.look()
+    evicted = 0
+    while (gone := ring.evict(ring.last)) is not None:
+        assert gone.reason is Eviction.DISK
+        evicted += gone.rows
+    assert 3_000 < evicted < 9_000, "of 30,000, a kilobyte each"
+    ring.close()
+
+
+def test_a_disk_that_cannot_be_asked_is_an_error_of_the_store(open_ring: OpenRing, monkeypatch: pytest.MonkeyPatch) -> None:
+    ring = open_ring()
+    ring.append([(1, "a")])
+
+    def gone(_: Path) -> int:
+        raise FileNotFoundError("no such folder")
+
+    monkeypatch.setattr(ring, "_free_bytes", gone)
+    with pytest.raises(StoreError, match="no such folder"):
+        ring.evict(1)
+
+
 def test_stored_numbers_are_told_as_spans(open_ring: OpenRing) -> None:
     ring = open_ring()
     ring.append([(1, "x")] * 9)
@@ -134,7 +184,9 @@ def test_a_damaged_file_is_put_aside_and_the_edge_goes_on(
     with caplog.at_level(logging.WARNING):
         ring = open_ring()
     assert "is damaged" in caplog.text
-    assert ring.append([(1, "a")]) == 1
+    assert ring.append([(1, "a")]) == 1_000_001, "no number that the damaged store may have given"
+    ring.close()
+    assert open_ring().last == 1_000_001
     assert len(list(tmp_path.glob("edge.store.damaged-*"))) == 1
 
 

@@ -248,3 +248,15 @@ def test_an_edge_that_is_started_again_goes_on_where_it_was(tmp_path: Path) -> N
     notebook, runtime = played(probe(), streams(90, [value("rpm", 80, "500")], first=40), place_file=place_file)
     assert runtime.health.holes == 1
     assert (runtime.health.lost_observations, Ledger.difference(runtime.ledger.snapshot())) == (73, 0)
+
+
+def test_whatever_ends_the_loop_ends_the_node_too() -> None:
+    class Fails(Notebook):
+        def publish(self, device: str | None, changes: Sequence[Change]) -> bool:
+            raise ValueError("a bug")
+
+    notebook = Fails()
+    runtime = EdgeRuntime(CONFIG, replace(ADAPTER, connect=lambda _: Script()), notebook)
+    with pytest.raises(ValueError, match="a bug"):
+        runtime.run()
+    assert notebook.stopped, "else it keeps its name on the broker, and throws out the edge that is begun in its place"

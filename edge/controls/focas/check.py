@@ -23,12 +23,16 @@ def describe(config: Config) -> list[Row]:
     return rows
 
 
+def _way_out(config: Config, error: str) -> str:
+    if "EW_NODLL" in error:
+        return "correct focas.library, and put the library for your series beside it"
+    return f"is the control on, and does it answer FOCAS on port {config.source.port}?"
+
+
 def look(config: Config) -> tuple[Sweep, SampleSet]:
     """The first sweep and what it gives; ConnectionLostError where there is none."""
     connection = FocasConnection(config, wait=lambda _: None)
     raw = connection.once()
     if raw is None:
-        source = config.source
-        way_out = f"is the control on, and does it answer FOCAS on port {source.port}?"
-        raise ConnectionLostError(f"{connection.last_error}; {way_out} (docs/edge-focas.md)")
+        raise ConnectionLostError(f"{connection.last_error}; {_way_out(config, connection.last_error)} (docs/edge-focas.md)")
     return Sweep.decode(raw), parse(config, start(config), raw)[1]

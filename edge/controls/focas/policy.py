@@ -37,7 +37,7 @@ _CODES = {
     0: _Code("EW_OK", Policy.OK, "done"),
     -17: _Code("EW_PROTOCOL", Policy.RECONNECT, "an answer that is not in the protocol"),
     -16: _Code("EW_SOCKET", Policy.RECONNECT, "no answer, or the connection is gone"),
-    -15: _Code("EW_NODLL", Policy.BAD, "the library for this series is missing beside the one that was loaded"),
+    -15: _Code("EW_NODLL", Policy.BAD, "the library, or the one for this series beside it, cannot be loaded"),
     -11: _Code("EW_BUS", Policy.BAD, "bus error"),
     -10: _Code("EW_SYSTEM2", Policy.BAD, "error in the control's system"),
     -9: _Code("EW_HSSB", Policy.BAD, "error of the high-speed serial bus"),

@@ -45,7 +45,7 @@ def address_of(url: str) -> tuple[str, int]:
         parts = urlsplit(url)
         host, port = parts.hostname, parts.port or PORT
     except ValueError as error:
-        raise ConfigError(f"is no address: {error}") from error
+        raise ConfigError(f"is no address: {error}; write it as lsv2://tnc640:19000") from error
     if parts.scheme != "lsv2" or not host:
         raise ConfigError("is no lsv2:// address, such as lsv2://tnc640:19000")
     if parts.username or parts.password or parts.path.strip("/") or parts.query:

@@ -17,7 +17,7 @@ def draft(url: str, device: str = "") -> str:
         config = EdgeConfig(source=HeidenhainConfig(url=url))
     except ValidationError as error:
         why = error.errors()[0]["msg"].removeprefix("Value error, ")
-        raise ConfigError(f"address {without_secret(repr(url))} {why}, such as lsv2://tnc640:19000") from None
+        raise ConfigError(f"address {without_secret(repr(url))} {why}") from None
     frame = first_look(config)
     sweep = Sweep.decode(frame)
     offers, last = looked_at_frame(config, frame)

@@ -144,7 +144,7 @@ class ReadOnlyLink:
         (length,) = struct.unpack_from("!L", header)
         answer = header[4:].decode("latin-1")
         if answer not in READS[word] and answer not in _REFUSALS:
-            raise ConnectionLostError(f"answers {answer!r} to {word}; is this a control that speaks LSV2?")
+            raise ConnectionLostError(f"answers {answer!r} to {word}, which is no LSV2")
         if length > PAYLOAD_BYTES_MAX:
             raise ConnectionLostError(f"announces {length} bytes in answer to {word}; the limit is {PAYLOAD_BYTES_MAX}")
         return answer, self._exactly(opened, length)

@@ -66,7 +66,10 @@ class MultipartParser:
             if len(self._buffer) - after > HEAD_BYTES_MAX:
                 raise ConnectionLostError(f"the head of a part is longer than {HEAD_BYTES_MAX} bytes")
             return False
-        length = _LENGTH.search(bytes(self._buffer[after : end.start()]).replace(b"\r", b""))
+        head = bytes(self._buffer[after : end.start()])
+        if head.partition(b"\n")[0].strip() or self._delimiter in head:
+            raise ConnectionLostError(f"out of step: {head[:40]!r} behind a delimiter")
+        length = _LENGTH.search(head.replace(b"\r", b""))
         self._length = None if length is None else int(length.group(1))
         if self._length is not None and self._length > self._part_bytes_max:
             raise ConnectionLostError(f"part of {self._length} bytes; the most that is read is {self._part_bytes_max}")

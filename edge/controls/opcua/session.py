@@ -197,6 +197,8 @@ def one_line(config: Config, error: Exception) -> str:
         return f"{url}: no answer in time; is the server running, and opcua.timeout_s long enough?"
     if isinstance(error, ConnectionRefusedError | socket.gaierror):
         return f"{url}: {error.strerror or error}; is the server running, and the address right?"
+    if isinstance(error, ConnectionError):
+        return f"{url}: {str(error) or type(error).__name__}; does an OPC UA server answer there? its port is mostly 4840"
     return f"{url}: {str(error) or type(error).__name__}"
 
 

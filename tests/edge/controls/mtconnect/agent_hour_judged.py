@@ -57,9 +57,8 @@ def told_by_key(hour: Hour) -> Told:
 def _texts(told: Told, key: str, at_ms: int) -> set[str]:
     """What stood at this time; several where several were told in one millisecond."""
     after = bisect_right(told[key], (at_ms, "\uffff"))
-    return {text for told_ms, text in told[key][max(after - 1, 0) : after] + told[key][:after][-4:] if told_ms == at_ms} or {
-        told[key][after - 1][1]
-    }
+    last = told[key][max(after - 4, 0) : after]
+    return {text for told_ms, text in last if told_ms == at_ms} or {last[-1][1]}
 
 
 def _is_value(signal: str, value: object, reason: str | None, text: str) -> bool:
@@ -171,15 +170,20 @@ def holes_that_state_too_little(hour: Hour) -> list[str]:
 
 
 def unseen_s(hour: Hour) -> list[tuple[float, float]]:
-    """Times of which nothing can be known: holes, by the stamps of what was lost in them, and the agent without its adapter.
+    """Times of which nothing can be known: holes, by the stamps around them, and the agent without its adapter.
 
     What happened so shortly before that it had not stood for `debounce_s` yet is not known either.
     """
     unseen = list(hour.without_adapter)
     for ranges in lost(hour):
-        stored = [hour.observations[instance].get(number) for instance, numbers in ranges.items() for number in numbers]
-        stamps = [_at_s(text) for text in {observation.timestamp for observation in stored if observation is not None}]
-        unseen += [(min(stamps), max(stamps))] if stamps else []
+        stamps = {
+            stored.timestamp
+            for instance, numbers in ranges.items()
+            for number in range(numbers.start - 1, numbers.stop)
+            if (stored := hour.observations[instance].get(number)) is not None
+        }
+        times = [_at_s(stamp) for stamp in stamps]
+        unseen += [(min(times), max(times))] if times else []
     return [(from_s - DEBOUNCE_S, to_s) for from_s, to_s in unseen]
 
 

@@ -108,7 +108,7 @@ class FaultyLink:
         try:
             self._relay(ends)
         except OSError:
-            return  # one side is gone, and so the other one goes too
+            return  # one side is gone, or the link is cut, and so the other one goes too
         finally:
             for end in ends:
                 end.close()
@@ -125,7 +125,7 @@ class FaultyLink:
                     return None
                 asked += data
             if left.is_over and left.fault.cuts:
-                return _end(client, left.fault)
+                raise _end(client, left.fault)
             if b"\r\n\r\n" in asked and not left.is_over:
                 if left.fault.answer is not None:
                     return client.sendall(left.fault.answer(asked.split(b" ")[1].decode()))
@@ -147,7 +147,7 @@ class FaultyLink:
             client.sendall(passed)
             if len(passed) < len(piece):
                 if fault.cuts:
-                    return
+                    raise _end(client, fault)
                 while fault is self.fault and not self._closing.is_set():
                     time.sleep(WATCH_S)  # it hangs; when it does not any more, the rest follows
                 client.sendall(piece[len(passed) :])
@@ -158,9 +158,10 @@ class FaultyLink:
         return re.sub(rb"&(interval|heartbeat)=\d+", b"", asked) if self._is_polled else asked
 
 
-def _end(client: socket.socket, fault: Fault) -> None:
+def _end(client: socket.socket, fault: Fault) -> ConnectionAbortedError:
     if fault.resets:
         client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    return ConnectionAbortedError("cut")
 
 
 def _pieces(data: bytes, size: int) -> Iterator[bytes]:

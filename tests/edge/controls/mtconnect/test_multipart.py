@@ -53,6 +53,15 @@ def test_a_stream_cut_anywhere_any_number_of_times_gives_the_same_parts(cuts: li
     assert fed(KINDS["mixed"][0], [raw[a:b] for a, b in pairwise(edges)]) == PARTS
 
 
+@pytest.mark.parametrize(
+    "lost", [b"\r\nContent-type: text/xml\r\nContent-LENGTH: 4\r\n\r\n<a/>", b": text/xml\r\nContent-LENGTH: 4\r\n\r\n<a/>"]
+)
+def test_bytes_that_were_lost_in_a_head_lose_no_part_in_silence(lost: bytes) -> None:
+    raw = stream(b"\r\n")
+    with pytest.raises(ConnectionLostError, match="out of step"):
+        fed(KINDS["mixed"][0], [raw.replace(lost, b"", 1)])
+
+
 def test_lost_bytes_are_noticed() -> None:
     raw = stream(b"\r\n").replace(b"<a/>", b"")
     with pytest.raises(ConnectionLostError, match="out of step"):
