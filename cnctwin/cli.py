@@ -229,6 +229,8 @@ def edge_check(config: Annotated[Path, typer.Argument(help="The TOML file of one
     from cnctwin.edge_commands import table
     from edge.check import check
 
+    if config.is_dir():
+        raise UsageError(f"{config}: is a folder; check one of its files at a time")
     rows = check(config)
     if as_json:
         _print_json([asdict(row) for row in rows])

@@ -254,7 +254,7 @@ class Ring:
     def _give_back(self, pages: int) -> None:
         """Make the file shorter by so many pages at most."""
         try:
-            # As a script: `execute` takes the first step of it only, which is one page. The file is shorter once it is checkpointed.
+            # As a script, for `execute` takes only its first step, which is one page; a checkpoint then makes the file shorter.
             self._db.executescript(f"PRAGMA incremental_vacuum({pages}); PRAGMA wal_checkpoint")
         except sqlite3.Error as error:
             raise StoreError(f"{self.file}: cannot be written: {error}") from error

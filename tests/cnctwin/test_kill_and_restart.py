@@ -23,9 +23,9 @@ LINES_ALL = len(SPARE_PART.read_text(encoding="utf-8").splitlines())
 SAVED_WITHIN_S = 2.5
 # A restarted processor has not seen the heat of the moments in between, which it counts as a hole; and a figure is published
 # only when it has moved by 0.05 K, in whichever direction.
+MODELLED_WITHIN = dict.fromkeys(("spindle_temp_c", "spindle_temp_rise_k", "spindle_temp_residual_k"), 0.11)
 EACH_TIME_ANEW = ("_basis", "/edge_sequence", "/clock_offset_s", "/clock_offset_spread_s", "/stamp_clock")
 """An edge that was killed tells once more where it stands, and compares the clocks from the beginning."""
-MODELLED_WITHIN = dict.fromkeys(("spindle_temp_c", "spindle_temp_rise_k", "spindle_temp_residual_k"), 0.11)
 
 
 def run(folder: Path, killed: str | None) -> tuple[dict[str, Any], Plant]:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import paho.mqtt.client as paho
 import pytest
-from paho.mqtt.enums import CallbackAPIVersion
+from paho.mqtt.enums import CallbackAPIVersion, MQTTErrorCode
 from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.reasoncodes import ReasonCode
 
@@ -87,9 +87,9 @@ def test_a_message_with_the_packet_id_of_a_barrier_confirms_nothing(monkeypatch:
     connection._on_publish(client(), None, 7, reason, None)  # as paho does when it has written a QoS 0 message
     assert confirmed == []
 
-    def acknowledged() -> paho.MQTTErrorCode:
+    def acknowledged() -> MQTTErrorCode:
         connection._on_publish(client(), None, 7, reason, None)
-        return paho.MQTTErrorCode.MQTT_ERR_CONN_LOST
+        return MQTTErrorCode.MQTT_ERR_CONN_LOST
 
     reading = client()
     monkeypatch.setattr(reading, "loop_read", acknowledged)

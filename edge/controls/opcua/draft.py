@@ -23,6 +23,7 @@ from edge.sweep import Sweep
 from edge.units import conversion
 
 SHOWN_MAX = 200
+_NO_FILE = Path("the address")  # what messages name in place of a file
 _UNITS = {
     "m/min": "METER/MINUTE",
     "mm/s": "MILLIMETER/SECOND",
@@ -54,9 +55,9 @@ def _config(url: str) -> Config:
     address, _, query = url.partition("?")
     given: dict[str, Any] = dict(parse_qsl(query))
     try:
-        return EdgeConfig(source=OpcUaConfig.model_validate(given | {"url": address, "map": ""}))
+        return EdgeConfig(path=_NO_FILE, source=OpcUaConfig.model_validate(given | {"url": address, "map": ""}))
     except ValidationError as error:
-        raise ConfigError(one_line(Path(address), "opcua", error)) from error
+        raise ConfigError(one_line(_NO_FILE, "opcua", error)) from error
 
 
 async def _drafted(config: Config, device: str) -> str:
