@@ -117,7 +117,12 @@ class Gateway:
         if not single:
             self._seen.complaints.pop(self._path, None)
         found: dict[Path, Signature] = {}
-        for file in [self._path] if single else sorted(self._path.glob("*.toml"))[:EDGES_MAX]:
+        files = [self._path] if single else sorted(self._path.glob("*.toml"), key=lambda file: (file not in self._edges, file))
+        if len(files) > EDGES_MAX:
+            self._complain(
+                self._path, f"{self._path}: {len(files)} files; {EDGES_MAX} edges run in one process, start another one"
+            )
+        for file in files[:EDGES_MAX]:
             try:
                 status = file.stat()
                 found[file] = status.st_mtime_ns, status.st_size
