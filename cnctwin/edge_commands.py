@@ -1,5 +1,6 @@
 """`cnctwin edge run` and the table of `cnctwin edge check`."""
 
+import sys
 import tomllib
 from collections.abc import Sequence
 from contextlib import nullcontext, suppress
@@ -39,9 +40,11 @@ def run(path: Path, given: BrokerAddress | None, stop: Event) -> dict[str, int]:
             named = given is None and "url" in config.broker.model_fields_set  # not by the file, which may be in pieces by now
             address = broker_address(config.broker, config.path) if named or broker is None else broker
             try:
-                return edge_runtime(_with_session_file(config), address, restarts=restarts)
+                runtime = edge_runtime(_with_session_file(config), address, restarts=restarts)
             except SparkplugError as error:  # such as a certificate's file that is not there
                 raise ConfigError(f"{config.path}: {error}") from error
+            print(f"{config.path}: the edge of {config.machine.name} begins, to {address.url}", file=sys.stderr, flush=True)
+            return runtime
 
         return Gateway(path, begin).run(stop)
 

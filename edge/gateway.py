@@ -102,6 +102,9 @@ class Gateway:
         for file in [file for file in self._edges if file not in files]:
             _log.warning("%s: is gone; its edge ends", file)
             self._end(file)
+        for file in [file for file in self._seen.signatures if file not in files]:  # one that comes back is new, whatever its age
+            del self._seen.signatures[file]
+            self._seen.complaints.pop(file, None)
         for file, signature in files.items():
             if self._seen.signatures.get(file) != signature:
                 self._seen.signatures[file] = signature
@@ -119,9 +122,8 @@ class Gateway:
         found: dict[Path, Signature] = {}
         files = [self._path] if single else sorted(self._path.glob("*.toml"), key=lambda file: (file not in self._edges, file))
         if len(files) > EDGES_MAX:
-            self._complain(
-                self._path, f"{self._path}: {len(files)} files; {EDGES_MAX} edges run in one process, start another one"
-            )
+            text = f"{self._path}: {len(files)} files; {EDGES_MAX} edges run in one process, start another one"
+            self._complain(self._path / "*.toml", text)
         for file in files[:EDGES_MAX]:
             try:
                 status = file.stat()

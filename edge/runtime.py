@@ -325,7 +325,7 @@ class EdgeRuntime:
         fault = self._connection.reconnects, self._connection.last_error
         if fault != self._fault:
             if fault[1] != self._fault[1]:
-                _log.warning("%s: %s", self.config.machine.name, fault[1])
+                _log.warning("%s: %s", self.config.machine.name, fault[1] or "the control answers again")
             self._fault, self.health.last_error = fault, fault[1]
         self._node.publish(None, [Change(name, number, now_ms) for name, number in counters.items()])
         self._node.publish(None, self.health.changes(now_ms, outside))

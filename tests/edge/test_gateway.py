@@ -138,6 +138,18 @@ def test_machines_come_and_go_while_others_run(works: Works) -> None:
     assert works.begun["a"] == 1
 
 
+def test_a_file_that_goes_and_comes_back_as_it_was_runs_again(works: Works, tmp_path: Path) -> None:
+    works.write("b")
+    file = works.write("a")
+    works.look(lambda: works.running == ["a", "b"])
+    aside = tmp_path / "aside"
+    file.rename(aside)
+    works.look(lambda: works.running == ["b"])
+    aside.rename(file)
+    works.look(lambda: works.running == ["a", "b"])
+    assert works.begun == {"a": 2, "b": 1}
+
+
 def test_a_file_with_a_mistake_changes_nothing_and_is_told_once(works: Works, caplog: pytest.LogCaptureFixture) -> None:
     works.write("a")
     works.look(lambda: works.running == ["a"])
