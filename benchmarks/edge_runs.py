@@ -14,7 +14,6 @@ import sqlite3
 import subprocess
 import sys
 import tempfile
-import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -26,8 +25,10 @@ from edge.config import StoreSection
 from edge.place import Place
 from edge.ring import Ring
 from sparkplug.broker import BrokerAddress
-from sparkplug.host import EventKind, HostApplication
+from sparkplug.host import EventKind
+from sparkplug.host_session import HostEvent
 from tests.edge.controls.mtconnect.agent_documents import streams
+from tests.edge.host_watch import HostWatch
 from tests.wire.mosquitto import Mosquitto
 
 PROJECT = Path(__file__).parents[1]
@@ -113,38 +114,24 @@ def child(*command: str) -> Iterator[subprocess.Popen[str]]:
         process.stdout.close()
 
 
-class Reader:
+class Reader(HostWatch):
     """A host that counts what arrives of each machine, and how old it is."""
 
     def __init__(self, address: BrokerAddress) -> None:
-        self.host = HostApplication(address, "reader")
+        super().__init__(address, "reader")
         self.messages: dict[str, int] = {}
         self.numbers: dict[str, set[int]] = {}
         self.repeated = 0
         self.ages_s: list[float] = []
         self.births: dict[str, float] = {}
-        self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._watch, daemon=True)
 
-    def __enter__(self) -> "Reader":
-        self.host.start()
-        self._thread.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._stop.set()
-        self._thread.join(5)
-        self.host.stop()
-
-    def _watch(self) -> None:
-        while not self._stop.is_set():
-            for event in self.host.poll(0.05):
-                if event.device is None:
-                    continue
-                if event.kind is EventKind.BIRTH:
-                    self.births.setdefault(event.device, time.monotonic())
-                elif event.kind is EventKind.DATA:
-                    self._take(event.device, event.readings)
+    def take(self, event: HostEvent) -> None:
+        if event.device is None:
+            return
+        if event.kind is EventKind.BIRTH:
+            self.births.setdefault(event.device, time.monotonic())
+        elif event.kind is EventKind.DATA:
+            self._take(event.device, event.readings)
 
     def _take(self, device: str, readings: object) -> None:
         told = {reading.name: reading for reading in readings}  # type: ignore[attr-defined]

@@ -4,7 +4,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -19,19 +19,21 @@ from edge.ledger import Ledger
 from edge.run import edge_runtime
 from edge.runtime import EdgeRuntime
 from sparkplug.broker import BrokerAddress
-from sparkplug.host import EventKind, HostApplication
+from sparkplug.host import EventKind
+from sparkplug.host_session import HostEvent
 from sparkplug.metric import Reading
+from tests.edge.host_watch import HostWatch, wait
 from tests.recordings import PROJECT, recording
 from tests.wire.mosquitto import Mosquitto
 
 pytestmark = pytest.mark.broker
 
 
-class Onlooker:
+class Onlooker(HostWatch):
     """What a host application has seen of one machine and its edge."""
 
     def __init__(self, address: BrokerAddress) -> None:
-        self.host = HostApplication(address, "onlooker", rebirth_interval_ms_min=200)
+        super().__init__(address, "onlooker", rebirth_interval_ms_min=200)
         self.machine: dict[str, Reading] = {}
         self.node: dict[str, Reading] = {}
         self.changes: list[object] = []
@@ -39,32 +41,18 @@ class Onlooker:
         self.births = 0
         self.holes = 0
         self.history = 0
-        self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._watch, daemon=True)
 
-    def __enter__(self) -> "Onlooker":
-        self.host.start()
-        self._thread.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._stop.set()
-        self._thread.join(5)
-        self.host.stop()
-
-    def _watch(self) -> None:
-        while not self._stop.is_set():
-            for event in self.host.poll(0.05):
-                self.births += event.kind is EventKind.BIRTH and event.device is not None
-                self.holes += event.kind is EventKind.HOLE
-                picture = self.node if event.device is None else self.machine
-                for reading in event.readings:
-                    if reading.is_historical:
-                        self.history += 1
-                        continue
-                    picture[reading.name] = reading
-                    if event.kind is EventKind.DATA and event.device is not None:
-                        self._note(reading)
+    def take(self, event: HostEvent) -> None:
+        self.births += event.kind is EventKind.BIRTH and event.device is not None
+        self.holes += event.kind is EventKind.HOLE
+        picture = self.node if event.device is None else self.machine
+        for reading in event.readings:
+            if reading.is_historical:
+                self.history += 1
+                continue
+            picture[reading.name] = reading
+            if event.kind is EventKind.DATA and event.device is not None:
+                self._note(reading)
 
     def _note(self, reading: Reading) -> None:
         if reading.name == "tool_change_active" and (not self.changes or self.changes[-1] != reading.value):
@@ -74,13 +62,6 @@ class Onlooker:
 
     def count(self, name: str) -> int:
         return int(str(self.node[name].value)) if name in self.node else -1
-
-
-def wait(condition: Callable[[], bool], what: str, timeout_s: float = 60.0) -> None:
-    deadline = time.monotonic() + timeout_s
-    while not condition():
-        assert time.monotonic() < deadline, f"waited {timeout_s} s for {what}"
-        time.sleep(0.02)
 
 
 def config_for(agent: ReplayAgent, mosquitto: Mosquitto, session: Path) -> EdgeConfig[MtconnectConfig]:

@@ -5,7 +5,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
@@ -16,44 +16,32 @@ from cnctwin.simulated_control.state import production_moments
 from cnctwin.simulated_machine.description import DEVICES
 from cnctwin.simulated_machine.moment import Adapter
 from sparkplug.broker import BrokerAddress
-from sparkplug.host import EventKind, HostApplication
+from sparkplug.host import EventKind
+from sparkplug.host_session import HostEvent
+from tests.edge.host_watch import HostWatch, wait
 from tests.wire.mosquitto import Mosquitto
 
 pytestmark = pytest.mark.broker
 PROJECT = Path(__file__).parents[2]
 
 
-class Seen:
+class Seen(HostWatch):
     """How many data messages came of each machine, and how old the newest is."""
 
     def __init__(self, address: BrokerAddress) -> None:
-        self.host = HostApplication(address, "onlooker", rebirth_interval_ms_min=200)
+        super().__init__(address, "onlooker", rebirth_interval_ms_min=200)
         self.messages: dict[str, int] = {}
         self.deaths: list[str] = []
         self.heard_s: dict[str, float] = {}
-        self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._watch, daemon=True)
 
-    def __enter__(self) -> "Seen":
-        self.host.start()
-        self._thread.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._stop.set()
-        self._thread.join(5)
-        self.host.stop()
-
-    def _watch(self) -> None:
-        while not self._stop.is_set():
-            for event in self.host.poll(0.02):
-                if event.device is None:
-                    continue
-                if event.kind is EventKind.DATA:
-                    self.messages[event.device] = self.messages.get(event.device, 0) + 1
-                    self.heard_s[event.device] = time.monotonic()
-                elif event.kind is EventKind.DEATH:
-                    self.deaths.append(event.device)
+    def take(self, event: HostEvent) -> None:
+        if event.device is None:
+            return
+        if event.kind is EventKind.DATA:
+            self.messages[event.device] = self.messages.get(event.device, 0) + 1
+            self.heard_s[event.device] = time.monotonic()
+        elif event.kind is EventKind.DEATH:
+            self.deaths.append(event.device)
 
 
 class Silence:
@@ -88,13 +76,6 @@ class Silence:
                     client.sendall(self._nonsense)
             except OSError:
                 continue
-
-
-def wait(condition: Callable[[], bool], what: str, timeout_s: float = 60.0) -> None:
-    deadline = time.monotonic() + timeout_s
-    while not condition():
-        assert time.monotonic() < deadline, f"waited {timeout_s} s for {what}"
-        time.sleep(0.02)
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
 
@@ -20,8 +20,10 @@ from edge.adapter import adapters
 from edge.config_file import load
 from edge.runtime import EdgeRuntime
 from sparkplug.broker import BrokerAddress
-from sparkplug.host import EventKind, HostApplication
+from sparkplug.host import EventKind
+from sparkplug.host_session import HostEvent
 from sparkplug.metric import Change, MetricSpec, Reading
+from tests.edge.host_watch import HostWatch, wait
 from tests.wire.mosquitto import Mosquitto
 
 pytestmark = pytest.mark.broker
@@ -31,35 +33,21 @@ ORIGIN_MS = 1_772_438_400_000
 Told = tuple[str, int, object]
 
 
-class Reader:
+class Reader(HostWatch):
     """A host that keeps each row by its number, and how old live values were when they came."""
 
     def __init__(self, address: BrokerAddress) -> None:
-        self.host = HostApplication(address, "reader", rebirth_interval_ms_min=200)
+        super().__init__(address, "reader", rebirth_interval_ms_min=200)
         self.rows: dict[int, tuple[Reading, ...]] = {}
         self.history: list[int] = []
         self.live: list[int] = []
         self.first_live_s: float | None = None
-        self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._watch, daemon=True)
 
-    def __enter__(self) -> "Reader":
-        self.host.start()
-        self._thread.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._stop.set()
-        self._thread.join(5)
-        self.host.stop()
-
-    def _watch(self) -> None:
-        while not self._stop.is_set():
-            for event in self.host.poll(0.02):
-                if event.kind is EventKind.DATA and event.device == "vmc":
-                    self._take(event.readings)
-                elif event.kind is EventKind.BIRTH and event.device == "vmc" and self.first_live_s is None:
-                    self.first_live_s = time.monotonic()
+    def take(self, event: HostEvent) -> None:
+        if event.kind is EventKind.DATA and event.device == "vmc":
+            self._take(event.readings)
+        elif event.kind is EventKind.BIRTH and event.device == "vmc" and self.first_live_s is None:
+            self.first_live_s = time.monotonic()
 
     def _take(self, readings: Sequence[Reading]) -> None:
         number = next(int(str(reading.value)) for reading in readings if reading.name == "edge_sequence")
@@ -70,13 +58,6 @@ class Reader:
 
 def replace_history(reading: Reading) -> Reading:
     return reading._replace(is_historical=False)
-
-
-def wait(condition: Callable[[], bool], what: str, timeout_s: float = 60.0) -> None:
-    deadline = time.monotonic() + timeout_s
-    while not condition():
-        assert time.monotonic() < deadline, f"waited {timeout_s} s for {what}"
-        time.sleep(0.02)
 
 
 @pytest.fixture(scope="module")
