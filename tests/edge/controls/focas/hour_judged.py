@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from cnctwin.focas_server.shown import CodedState
 from cnctwin.simulated_control.state import ToolChange, tool_changes
 from edge.controls.focas.connection import HOLE_INTERVALS
+from tests.edge.controls.changes_told import changes_told
 from tests.edge.controls.focas.machine_hour import SWITCHED_ON_S, Hour
 
 INTERVAL_S = 0.2
@@ -99,22 +100,6 @@ def values_that_were_not_shown(hour: Hour) -> list[str]:
     return found
 
 
-def changes_told(hour: Hour) -> list[tuple[float, float]]:
-    """When `tool_change_active` is true, as published; one that is open at the end lasts for ever."""
-    told, since_s = list[tuple[float, float]](), float("nan")
-    is_active = False
-    for sample in hour.samples:
-        if sample.signal != "tool_change_active":
-            continue
-        at_s = sample.timestamp_ms / 1000 - SWITCHED_ON_S
-        if is_active and not sample.value:
-            told.append((since_s, at_s))
-        elif not is_active and sample.value:
-            since_s = at_s
-        is_active = bool(sample.value)
-    return [*told, (since_s, float("inf"))] if is_active else told
-
-
 def changes_seen(hour: Hour) -> list[ToolChange]:
     """The true changes that no hole touches, and that are over before the last looks."""
     stated = holes(hour)
@@ -127,7 +112,7 @@ def changes_seen(hour: Hour) -> list[ToolChange]:
 
 def changes_told_wrongly(hour: Hour) -> list[str]:
     """Changes that were seen and not told from the first look that shows them to the first that shows the end."""
-    told, found = changes_told(hour), list[str]()
+    told, found = changes_told(hour.samples, SWITCHED_ON_S), list[str]()
     for change in changes_seen(hour):
         overlapping = [(a, b) for a, b in told if a <= change.to_s and change.from_s <= b]
         if len(overlapping) != 1:
@@ -146,7 +131,7 @@ def changes_made_up(hour: Hour) -> list[str]:
     true = tool_changes([*hour.states, _over(hour.states[-1])])
     return [
         f"{a:.2f} to {b:.2f}"
-        for a, b in changes_told(hour)
+        for a, b in changes_told(hour.samples, SWITCHED_ON_S)
         if not any(a <= next_look(hour, change.to_s)[1] and next_look(hour, change.from_s)[0] <= b for change in true)
     ]
 

@@ -12,6 +12,7 @@ from cnctwin.mtconnect_agent.stamp import stamp_text
 from cnctwin.simulated_control.state import ToolChange, states, tool_changes
 from edge.controls.mtconnect.documents import timestamp_ms
 from edge.sample import EMPTY, UNAVAILABLE, EdgeSample
+from tests.edge.controls.changes_told import changes_told
 from tests.edge.controls.mtconnect.agent_hour import SWITCHED_ON_S, Hour
 
 KEYS = {
@@ -193,21 +194,6 @@ def _at_s(text: str) -> float:
     return at_ms / 1000 - SWITCHED_ON_S
 
 
-def changes_told(hour: Hour) -> list[tuple[float, float]]:
-    """When `tool_change_active` is true, as published; one that is open at the end lasts for ever."""
-    told, since_s, is_active = list[tuple[float, float]](), 0.0, False
-    for sample in hour.published:
-        if sample.signal != "tool_change_active":
-            continue
-        at_s = sample.timestamp_ms / 1000 - SWITCHED_ON_S
-        if is_active and not sample.value:
-            told.append((since_s, at_s))
-        elif not is_active and sample.value:
-            since_s = at_s
-        is_active = bool(sample.value)
-    return [*told, (since_s, float("inf"))] if is_active else told
-
-
 def true_changes(hour: Hour) -> list[ToolChange]:
     """All changes of the machine that were over before the end."""
     return [change for change in tool_changes(states(hour.moments)) if change.to_s < hour.moments[-1].at_s - 3.0]
@@ -221,7 +207,7 @@ def changes_seen(hour: Hour) -> list[ToolChange]:
 
 def changes_told_wrongly(hour: Hour) -> list[str]:
     """Changes that were seen and not told once, with the time stamps that the machine gave them."""
-    told, found = changes_told(hour), []
+    told, found = changes_told(hour.published, SWITCHED_ON_S), []
     for change in changes_seen(hour):
         overlapping = [(a, b) for a, b in told if a <= change.to_s and change.from_s <= b]
         if len(overlapping) != 1 or not _fits(change, *overlapping[0]):
@@ -238,7 +224,7 @@ def changes_made_up(hour: Hour) -> list[str]:
     covered = sorted([*unseen_s(hour), *((change.from_s, change.to_s) for change in tool_changes(states(hour.moments)))])
     covered += [(hour.moments[-1].at_s - 3.0, float("inf"))]
     found = []
-    for told_from_s, to_s in changes_told(hour):
+    for told_from_s, to_s in changes_told(hour.published, SWITCHED_ON_S):
         at_s = told_from_s
         for a, b in covered:
             if a <= at_s + TOLERANCE_S:
