@@ -13,6 +13,7 @@ from enum import Enum
 from typing import Generic, NamedTuple, TypeVar
 
 from processors.config import CellConfig, Configuration, ProcessorConfig
+from processors.effects import Pin
 from processors.errors import DeclarationError
 from processors.sample import Sample, SampleKind
 from sparkplug.datatype import DataType
@@ -27,6 +28,7 @@ __all__ = [
     "NoState",
     "Output",
     "OutputSpec",
+    "Pin",
     "PlainOutput",
     "PlainSpec",
     "Processor",
@@ -137,7 +139,7 @@ class NoState:
 C = TypeVar("C", bound=ProcessorConfig)
 D = TypeVar("D", bound=CellConfig)
 S = TypeVar("S")
-Outputs = Sequence[Output | PlainOutput]
+Outputs = Sequence[Output | PlainOutput | Pin]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

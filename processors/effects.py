@@ -41,4 +41,13 @@ class DeadLetter(NamedTuple):
     payload: bytes
 
 
-Effect = Publish | PublishPlain | Declare | Remove | DeadLetter
+class Pin(NamedTuple):
+    """Keep what came of a machine in [from_ms, to_ms) for good, and why."""
+
+    machine: str
+    from_ms: int
+    to_ms: int
+    reason: str
+
+
+Effect = Publish | PublishPlain | Declare | Remove | DeadLetter | Pin

@@ -3,16 +3,16 @@
 A sample whose step fails, or returns what is not declared, changes nothing: a dead letter says what it was.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
 
 from processors.config import Configuration, ProcessorConfig
-from processors.contract import CellProcessor, Output, PlainOutput
+from processors.contract import CellProcessor, Output, Outputs, PlainOutput
 from processors.counts import Counts
 from processors.dead_letter import dead_letter
 from processors.discovery import AnyProcessor
-from processors.effects import DeadLetter, Effect, Publish
+from processors.effects import DeadLetter, Effect, Pin, Publish
 from processors.emission import Emission, plain_message
 from processors.errors import OutputError
 from processors.sample import Sample
@@ -88,13 +88,15 @@ class Fold:
         self.state = state
         return True
 
-    def _emit(self, outputs: Sequence[Output | PlainOutput], machine: str, at_ms: int, effects: list[Effect]) -> None:
+    def _emit(self, outputs: Outputs, machine: str, at_ms: int, effects: list[Effect]) -> None:
         """All outputs of a step, or none: what is not declared raises before anything is remembered."""
         by_machine: dict[str, list[Output]] = {}
-        plain = []
+        beside: list[Effect] = []
         for output in outputs:
-            if isinstance(output, PlainOutput):
-                plain.append(plain_message(self._processor.name, self._processor.plain, output))
+            if isinstance(output, Pin):
+                beside.append(output)
+            elif isinstance(output, PlainOutput):
+                beside.append(plain_message(self._processor.name, self._processor.plain, output))
             elif (own := by_machine.get(whose := output.machine or machine)) is None:
                 by_machine[whose] = [output]
             else:
@@ -109,4 +111,4 @@ class Fold:
             if changes:
                 emission.published(changes)
                 effects.append(Publish(whose, tuple(changes)))
-        effects += plain
+        effects += beside

@@ -1,8 +1,9 @@
-"""What the runtime needs of the outside: a host application to read from, an edge node to write to."""
+"""What the runtime needs of the outside: a host application to read from, an edge node to write to, memory to keep things in."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Protocol
 
+from processors.effects import Pin
 from sparkplug.host_session import HostEvent
 from sparkplug.metric import Change, MetricSpec
 
@@ -35,3 +36,16 @@ class EdgePort(Protocol):
     def publish(self, device: str | None, changes: Sequence[Change]) -> bool: ...
     @property
     def online(self) -> bool: ...
+
+
+class Recorder(Protocol):
+    """Keeps what a processor hears. It never blocks for long: what it cannot take it counts as dropped, with the reason."""
+
+    def keep(self, event: HostEvent, received_ms: int) -> None:
+        """Keep an event, of a device or of a node, as it came."""
+
+    def pin(self, pin: Pin) -> None:
+        """Keep a stretch of a machine from being swept."""
+
+    def health(self) -> Mapping[str, int | float]:
+        """How it is, by name: published as `health/<name>` of the processor's node."""

@@ -17,12 +17,12 @@ from paho.mqtt.client import topic_matches_sub
 from processors.config import Configuration, ProcessorConfig
 from processors.contract import CellProcessor
 from processors.discovery import AnyProcessor
-from processors.effects import Declare, Effect, Publish, PublishPlain, Remove
+from processors.effects import Declare, Effect, Pin, Publish, PublishPlain, Remove
 from processors.engine import Engine
 from processors.errors import SnapshotError
 from processors.ledger import DropReason
 from processors.plain_topic import topic_level
-from processors.ports import EdgePort, HostPort
+from processors.ports import EdgePort, HostPort, Recorder
 from sparkplug.errors import SparkplugError
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import Change, MetricSpec
@@ -42,10 +42,15 @@ class Worker:
     """See the module."""
 
     def __init__(
-        self, processor: AnyProcessor, configuration: Configuration[ProcessorConfig], host: HostPort, edge: EdgePort
+        self,
+        processor: AnyProcessor,
+        configuration: Configuration[ProcessorConfig],
+        host: HostPort,
+        edge: EdgePort,
+        recorder: Recorder | None = None,
     ) -> None:
         self.engine = Engine(processor, configuration)
-        self._processor, self._host, self._edge = processor, host, edge
+        self._processor, self._host, self._edge, self._recorder = processor, host, edge, recorder
         self._specs: tuple[MetricSpec, ...] = tuple(spec.metric() for spec in processor.outputs)
         self._snapshot_prefix = f"cnctwin/snapshot/{processor.name}/"
         self._letter_prefix = f"cnctwin/deadletter/{processor.name}/"
@@ -191,6 +196,8 @@ class Worker:
 
     def _take(self, event: HostEvent, now_s: float) -> None:
         if event.kind is not EventKind.PLAIN:
+            if self._recorder is not None and self._processor.listens_to(event.node.node):
+                self._recorder.keep(event, time.time_ns() // 1_000_000)
             self._feed(event, now_s)
         elif event.payload and any(topic_matches_sub(wanted, event.topic) for wanted in self._listens):
             self._apply(self.engine.plain(event.topic, event.payload, event.timestamp_ms))
@@ -218,6 +225,9 @@ class Worker:
                 if effect.machine in self._declared:
                     self._declared.discard(effect.machine)
                     self._edge.remove_device(effect.machine)
+            elif isinstance(effect, Pin):
+                if self._recorder is not None:
+                    self._recorder.pin(effect)
             elif self._letters_left > 0:
                 self._letters_left -= 1
                 _log.warning("%s: dead letter of %s: %s", self._processor.name, effect.machine, effect.payload.decode())
@@ -276,6 +286,8 @@ class Worker:
             "snapshots_rejected": counts.snapshots_rejected,
             "reconnects": host.reconnects,
         }
+        if self._recorder is not None:
+            health |= self._recorder.health()
         self._edge.publish(None, [Change(f"health/{name}", value, at_ms) for name, value in health.items()])
 
 

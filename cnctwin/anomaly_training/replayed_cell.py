@@ -16,7 +16,7 @@ from cnctwin.anomaly_training.held_rows import held_rows, milliseconds
 from cnctwin.anomaly_training.recorded_cell import TOOL_CHANGE, Stretch
 from cnctwin.errors import UsageError
 from processors.config import Configuration
-from processors.contract import Output, PlainOutput, Sample
+from processors.contract import Output, Outputs, Sample
 from processors.effects import DeadLetter
 from processors.engine import Engine
 from processors.joint_anomaly import PROCESSOR, RAW
@@ -68,7 +68,7 @@ def replayed(stretch: Stretch, models: Mapping[str, AnomalyModel], settings: Map
     configuration = Configuration(Config, dict(settings), name=PROCESSOR.name)
     configuration.default.__dict__["loaded"] = dict(models)
 
-    def step(config: Configuration[Config], state: Any, sample: Sample) -> tuple[Any, Sequence[Output | PlainOutput]]:
+    def step(config: Configuration[Config], state: Any, sample: Sample) -> tuple[Any, Outputs]:
         state, outputs = PROCESSOR.step(config, state, sample)
         for output in outputs:
             if isinstance(output, Output):

@@ -1,0 +1,196 @@
+"""What a store is, wherever the bytes lie: a log of messages, and questions to it.
+
+A message is kept whole and in the order in which it came, so that the processors can be run over it again and give what they gave
+then. A sample of it is kept once: what comes again (a birth repeats what is known, an edge sends again what nobody confirmed) is
+told by machine, node, signal and time. Two values of one signal within the same millisecond are two samples: the microseconds of
+a stamp number them.
+
+Raw and derived are apart: what a processor says (`twin/…`, of a node `twin-…`) is `cnc_twin_state`, all else `cnc_raw`.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+from cnctwin.errors import ProgramError
+from sparkplug.host_session import HostEvent
+from sparkplug.quality import Quality
+from sparkplug.values import Value
+
+RAW, DERIVED = "cnc_raw", "cnc_twin_state"
+TWIN_PREFIX = "twin/"
+
+
+class StoreError(ProgramError):
+    """The store cannot do what it is asked; the text names the place, the trouble and the way out."""
+
+
+class Message(NamedTuple):
+    """What came of one device (or, with `event.device` None, of a node: a hole), and when, ms since 1970 by our clock."""
+
+    received_ms: int
+    event: HostEvent
+
+
+class Appended(NamedTuple):
+    """What became of the samples of a batch. stored + repeated + refused = all of them.
+
+    repeated: were there already
+    refused: cannot be kept (of another type than a store has); counted, never silent
+    """
+
+    stored: int
+    repeated: int
+    refused: int
+
+
+class Pinned(NamedTuple):
+    """A stretch of a machine that no sweep may take, and why. Stretches that overlap stay two: each has its reason."""
+
+    machine: str
+    from_ms: int
+    to_ms: int
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Query:
+    """Signals of one machine in [from_ms, to_ms). every_ms None: as they came; else a value for each window, which begins at a
+    multiple of every_ms since 1970. A signal that nobody ever told has an empty column."""
+
+    machine: str
+    signals: tuple[str, ...]
+    from_ms: int
+    to_ms: int
+    every_ms: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.to_ms <= self.from_ms:
+            raise StoreError(f"to {self.to_ms} is not after from {self.from_ms}; give a stretch of time")
+        if self.every_ms is not None and not 1 <= self.every_ms <= 86_400_000 * 7:
+            raise StoreError(f"windows of {self.every_ms} ms: give 1 ms to a week")
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """The samples of one signal, oldest first; all lists have one length, `low`, `high` and `count` are empty without windows.
+
+    t_us: µs since 1970, of a window its beginning; windows without a sample are left out
+    value: number, bool, text or None; of a window the time-unweighted mean of its good numbers, of a text or bool the last one
+    quality: GOOD, STALE or BAD; of a window that of its worst sample
+    reason: why it is null or not good, else None
+    """
+
+    signal: str
+    unit: str | None
+    t_us: list[int]
+    value: list[Value]
+    quality: list[Quality]
+    reason: list[str | None]
+    low: list[float | None]
+    high: list[float | None]
+    count: list[int]
+
+
+class Series(NamedTuple):
+    """One signal of one machine as one node tells it."""
+
+    machine: str
+    node: str
+    signal: str
+    unit: str | None
+    first_us: int
+    last_us: int
+
+    @property
+    def measurement(self) -> str:
+        """Raw or derived."""
+        return DERIVED if self.signal.startswith(TWIN_PREFIX) else RAW
+
+
+class Sample(NamedTuple):
+    """The last that is known of a signal."""
+
+    signal: str
+    t_us: int
+    value: Value
+    quality: Quality
+    reason: str | None
+    unit: str | None
+
+
+class Snapshot(NamedTuple):
+    """The state of a processor for a unit (a machine or a cell), as it was published at `received_ms`."""
+
+    processor: str
+    unit: str
+    received_ms: int
+    payload: bytes
+
+
+class Tidied(NamedTuple):
+    """What `tidy` did: hours sealed, hours swept, bytes given back, pins honoured."""
+
+    sealed: int
+    swept: int
+    bytes_freed: int
+    pinned: int
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """How the store is: samples and bytes on the disk, oldest and newest sample, how long the disk lasts at the present rate
+    (None: not known yet), samples that wait to be written, and in one line what is wrong ('' = nothing)."""
+
+    samples: int
+    bytes: int
+    oldest_ms: int | None
+    newest_ms: int | None
+    days_left: float | None
+    waiting: int
+    trouble: str
+
+
+class Store(Protocol):
+    """One thread at a time for `append`, `pin`, `keep_snapshot` and `tidy`; questions from any thread or process beside it."""
+
+    def append(self, messages: Sequence[Message]) -> Appended:
+        """Keep messages; when this returns, a kill -9 loses none of them. Raises StoreError."""
+
+    def pin(self, pinned: Pinned) -> None:
+        """Keep a stretch from being swept, in whole, also what of it is still to come. Twice the same is once."""
+
+    def pins(self, machine: str | None = None) -> list[Pinned]:
+        """All pins, oldest first."""
+
+    def keep_snapshot(self, snapshot: Snapshot) -> None:
+        """Keep one snapshot an hour of each processor and unit: the first of the hour."""
+
+    def snapshot_before(self, processor: str, unit: str, at_ms: int) -> Snapshot | None:
+        """The last snapshot that was received before a moment."""
+
+    def machines(self) -> list[str]:
+        """All machines, by name."""
+
+    def series(self, machine: str) -> list[Series]:
+        """The signals of a machine, by name."""
+
+    def latest(self, machine: str) -> dict[str, Sample]:
+        """The last sample of each signal."""
+
+    def query(self, query: Query) -> list[Column]:
+        """A column for each signal asked for, in that order."""
+
+    def messages(self, machine: str, from_ms: int, to_ms: int) -> Iterator[Message]:
+        """What came of a machine (and of nodes that it hangs on: their holes) with received_ms in [from_ms, to_ms), in the order
+        in which it came: a BIRTH whole, of DATA what was not there already. Raises StoreError where the store keeps no messages,
+        only samples."""
+
+    def tidy(self, now_ms: int) -> Tidied:
+        """What is due, once a minute: seal whole hours, roll up, sweep what is past its time or beyond the disk's budget."""
+
+    def status(self) -> Status:
+        """How the store is; cheap."""
+
+    def close(self) -> None:
+        """Write what waits, and close."""
