@@ -20,6 +20,7 @@ from typer.exceptions import TyperException
 from cnctwin import demo as demo_command
 from cnctwin.alert_commands import alerts_app
 from cnctwin.control_commands import control_app
+from cnctwin.demo_parts import DemoOptions
 from cnctwin.errors import BrokerStartError, ProgramError, UsageError
 from cnctwin.given_broker import address, broker_or_own
 from cnctwin.stopping import stopped_by_signals
@@ -64,12 +65,11 @@ def demo(
     seconds: Annotated[float | None, typer.Option(help="Stop by itself after so long; else at Ctrl-C")] = None,
     port: Annotated[int | None, typer.Option(help="The private broker's port; else 1883 or a free one", min=1, max=65535)] = None,
     machine: Annotated[str | None, typer.Option(help="The device's name; else that of the device model")] = None,
-    no_open: Annotated[bool, typer.Option("--no-open", help="Do not open a browser (there is no page yet)")] = False,
+    no_open: Annotated[bool, typer.Option("--no-open", help="Do not open the page in a browser")] = False,
     as_json: AsJson = False,
 ) -> None:
     """Show a machine, its edge, a real broker and the twin, and account for everything that went through."""
-    del no_open  # Accepted already now, so that scripts need not change when the page exists.
-    options = demo_command.DemoOptions(recording, devices, speed, seconds, port, machine, as_json)
+    options = DemoOptions(recording, devices, speed, seconds, port, machine, as_json, no_open)
     with stopped_by_signals() as stop:
         code = demo_command.run(options, stop)
     raise typer.Exit(code)

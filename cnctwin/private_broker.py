@@ -44,9 +44,9 @@ class PrivateBroker:
 
     def __init__(self, folder: Path, port: int | None = None) -> None:
         program = find_mosquitto()
-        if port is not None and not _free(port):
+        if port is not None and not is_free(port):
             raise UsageError(f"port {port} of 127.0.0.1 is in use; name another one with --port")
-        self.port = port or (DEFAULT_PORT if _free(DEFAULT_PORT) else _any_port())
+        self.port = port or (DEFAULT_PORT if is_free(DEFAULT_PORT) else _any_port())
         folder = folder.resolve()
         folder.mkdir(parents=True, exist_ok=True)
         configuration = folder / "mosquitto.conf"
@@ -102,7 +102,8 @@ def answers(host: str, port: int) -> bool:
         return False
 
 
-def _free(port: int) -> bool:
+def is_free(port: int) -> bool:
+    """Whether nobody on this computer listens on it."""
     with socket.socket() as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:

@@ -1,18 +1,42 @@
-"""`cnctwin process`: processors at work, and beside `alerts` the courier that sends what its receivers are to be told."""
+"""`cnctwin process`: processors at work, beside `alerts` the courier that sends what its receivers are to be told, and beside
+`historian` the store that it keeps."""
 
 import threading
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
+from processors.ports import Recorder
 from processors.runtime import Configured, run_configured
 from sparkplug.broker import BrokerAddress
 
 
 def process(pairs: Sequence[Configured], broker: BrokerAddress, stop: threading.Event, *, group: str, state_dir: Path) -> None:
-    """Run configured processors until `stop` is set. Raises ConfigurationError where a secret is missing."""
-    with _courier(pairs, broker, group):
-        run_configured(pairs, broker, stop, group=group, session_dir=state_dir)
+    """Run configured processors until `stop` is set. Raises ConfigurationError where a secret is missing, StoreError where the
+    store cannot be used."""
+    with ExitStack() as stack:
+        recorder = stack.enter_context(_recorder(pairs, group))
+        stack.enter_context(_courier(pairs, broker, group))
+        run_configured(pairs, broker, stop, group=group, session_dir=state_dir, recorder=recorder)
+
+
+@contextmanager
+def _recorder(pairs: Sequence[Configured], group: str) -> Iterator[Recorder | None]:
+    """The store's recorder, where the historian runs; else nothing, and no store is loaded."""
+    from processors.historian import HistorianConfig  # noqa: PLC0415  with the processor that needs it
+
+    config = next((one.default for _, one in pairs if isinstance(one.default, HistorianConfig)), None)
+    if config is None:
+        yield None
+        return
+    from cnctwin.historian import StoreRecorder, store_of  # noqa: PLC0415
+
+    recorder = StoreRecorder(store_of(config), group)
+    recorder.start()
+    try:
+        yield recorder
+    finally:
+        recorder.stop()
 
 
 @contextmanager

@@ -11,6 +11,8 @@ sent on a connection that ended before its barrier came back may have arrived or
 
 Live rows go out at once, whatever waits. History follows in the order of its numbers, no faster than the configured rate, with
 its own time stamps and `is_historical`, and only as far ahead of its confirmation as one second of that rate.
+
+With `await_receipt` what the broker has confirmed stays until a memory confirms it too (`edge.receipts`).
 """
 
 import json
@@ -23,6 +25,7 @@ from typing import NamedTuple, Protocol
 from edge.config import StoreSection
 from edge.errors import StoreError
 from edge.place import Place
+from edge.receipts import Receipts
 from edge.ring import Eviction, Ring, StoredRow
 from edge.sample import Drop, EdgeSample
 from edge.spans import Spans
@@ -79,6 +82,7 @@ class Forwarder:
         self._waiting = Spans(ring.spans())
         self._flights: deque[_Flight] = deque()
         self._confirmed: deque[int] = deque(maxlen=1_000)
+        self._receipts = Receipts() if limits.await_receipt else None
         self._token = self._landed = 0
         self._declared: frozenset[str] = frozenset()
         self._budget_rows, self._paid_s = 0.0, clock()
@@ -128,11 +132,16 @@ class Forwarder:
         """The broker has acknowledged a barrier. From any thread."""
         self._confirmed.append(token)
 
+    def receipt(self, text: str) -> None:
+        """A memory has written which rows it keeps. From any thread."""
+        if self._receipts is not None:
+            self._receipts.hear(text)
+
     def pump(self) -> Settled:
         """Do what is due: take confirmations, send history, set a barrier, keep the ring in its bounds."""
         now_s = self._clock()
         try:
-            self._land()
+            self._land(now_s)
             self._history(now_s)
             self._bar(now_s)
             if now_s - self._kept_s >= HOUSEKEEPING_S:
@@ -199,20 +208,33 @@ class Forwarder:
         flight.observations += observations
         return True
 
-    def _land(self) -> None:
+    def _land(self, now_s: float) -> None:
         """What was confirmed is done. Where the disk fails the flight stays, and lands with a later pump."""
         while self._confirmed:
             self._landed = max(self._landed, self._confirmed.popleft())
         while self._flights and 0 < self._flights[0].token <= self._landed:
             flight = self._flights[0]
-            *others, final = flight.spans
-            for span in others:
-                self._ring.delete(*span, 0)
-            self._ring.delete(*final, flight.observations)
+            if self._receipts is None:
+                *others, final = flight.spans
+                for span in others:
+                    self._ring.delete(*span, 0)
+                self._ring.delete(*final, flight.observations)
+                self._emitted += flight.observations
+            else:
+                self._receipts.wait(flight.spans, now_s)
             self._flights.popleft()
-            self._emitted += flight.observations
             self.error = ""
         self._strand(self._node.session)
+        if self._receipts is not None:
+            self._receive(self._receipts, now_s)
+
+    def _receive(self, receipts: Receipts, now_s: float) -> None:
+        """What a memory keeps is done; what it has missed is told again."""
+        kept, missed = receipts.settle(now_s)
+        for span in kept:
+            self._emitted += self._ring.forget(*span)
+        for span in missed:
+            self._waiting.add(*span)
 
     def _strand(self, session: int) -> None:
         """What was sent in another session, or is not confirmed for long, waits again."""
@@ -282,6 +304,8 @@ class Forwarder:
         upto = min(flying, default=self._ring.last + 1) - 1
         while (gone := self._ring.evict(upto)) is not None:
             self._waiting.cut(gone.last)
+            if self._receipts is not None:
+                self._receipts.cut(gone.last)
             self._dropped[_DROPS[gone.reason]] += gone.observations
             self.evicted_rows += gone.rows
             if self._clock() - now_s > EVICTION_S_MAX:

@@ -224,6 +224,13 @@ class Ring:
         except sqlite3.Error as error:
             raise StoreError(f"{self.file}: cannot be written: {error}") from error
 
+    def forget(self, first: int, last: int) -> int:
+        """Delete the rows with these numbers that are there; how many observations they were."""
+        found = self._ask("SELECT sum(observations) FROM rows WHERE sequence BETWEEN ? AND ?", (first, last))
+        observations = int(found[0][0] or 0)
+        self.delete(first, last, observations)
+        return observations
+
     def look(self) -> None:
         """See how old and how much it is: `age_s` and `bytes` are as of the last look."""
         oldest_ms, pages, spare = self._ask(_LOOK)[0]

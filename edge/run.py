@@ -18,6 +18,7 @@ from edge.ring import Ring
 from edge.runtime import EdgeRuntime, Publisher
 from sparkplug.broker import BrokerAddress
 from sparkplug.edge_node import EdgeNode
+from sparkplug.edge_session import Command
 from sparkplug.errors import SparkplugError
 from sparkplug.metric import NodeId
 
@@ -71,6 +72,9 @@ def edge_runtime(
     def confirmed(token: int) -> None:
         runtime.confirmed(token)
 
+    def commanded(command: Command) -> None:
+        runtime.commanded(command)
+
     node = EdgeNode(
         address or broker_address(broker, config.path),
         NodeId(broker.group, config.node),
@@ -79,6 +83,7 @@ def edge_runtime(
         primary_host=broker.primary_host or None,
         barrier_topic=f"{BARRIER}/{broker.group}/{config.node}",
         on_confirmed=confirmed,
+        on_command=commanded,
     )
     runtime = EdgeRuntime(
         config,

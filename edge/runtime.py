@@ -27,8 +27,10 @@ from edge.health import Health
 from edge.ledger import Ledger
 from edge.pipeline import Outcome, Pipeline
 from edge.place import Place, PlaceFile
+from edge.receipts import RECEIPT
 from edge.sample import UNAVAILABLE, Drop, EdgeSample, Offer, SampleSet
 from sparkplug.datatype import DataType
+from sparkplug.edge_session import Command
 from sparkplug.metric import Change, MetricSpec
 
 _log = logging.getLogger(__name__)
@@ -153,6 +155,12 @@ class EdgeRuntime:
         """The broker has acknowledged a barrier of the store. From any thread."""
         if self._forwarder is not None:
             self._forwarder.confirmed(token)
+
+    def commanded(self, command: Command) -> None:
+        """A host has written a value. The only one that is heeded is the receipt of a memory. From any thread."""
+        is_receipt = command.name == RECEIPT and command.device == self.config.machine.name
+        if is_receipt and self._forwarder is not None and isinstance(command.value, str):
+            self._forwarder.receipt(command.value)
 
     def _read(self, place: Place | None) -> None:
         """The connection thread. Whatever ends it that was not asked for ends the edge, loudly."""
@@ -286,6 +294,8 @@ class EdgeRuntime:
             metrics.extend(self._sensor.metrics())
         if self._forwarder is not None:
             metrics.append(MetricSpec(SEQUENCE, DataType.INT64))
+            if self.config.store.await_receipt:
+                metrics.append(MetricSpec(RECEIPT, DataType.STRING))
             self._forwarder.declare(metric.name for metric in metrics)
         self._node.declare_device(self.config.machine.name, metrics)
         self._is_declared = True

@@ -48,6 +48,29 @@ class Spans:
             if last > upto:
                 self._spans.insert(0, (upto + 1, last))
 
+    def discard(self, first: int, last: int) -> list[tuple[int, int]]:
+        """Take out what of `first` to `last` is in it; the spans of that.
+
+        >>> spans = Spans([(1, 4), (7, 9)])
+        >>> spans.discard(3, 7), list(spans)
+        ([(3, 4), (7, 7)], [(1, 2), (8, 9)])
+        """
+        begin = max(bisect_left(self._spans, (first, first)) - 1, 0)
+        end = begin
+        out: list[tuple[int, int]] = []
+        rest: list[tuple[int, int]] = []
+        while end < len(self._spans) and self._spans[end][0] <= last:
+            low, high = self._spans[end]
+            end += 1
+            if high < first:
+                rest.append((low, high))
+                continue
+            out.append((max(low, first), min(high, last)))
+            rest += [(low, first - 1)] if low < first else []
+            rest += [(last + 1, high)] if high > last else []
+        self._spans[begin:end] = rest
+        return out
+
     def take(self, number_max: int) -> tuple[int, int] | None:
         """Take out the lowest span, but no more than so many; None where there is nothing."""
         if not self._spans:

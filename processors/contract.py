@@ -149,6 +149,7 @@ class _Declaration(Generic[C, S]):
     version: of the state's form; a snapshot of another version is not restored
     inputs: names of the metrics that are read; None = all, those of other processors too
     state: a frozen dataclass of JSON-able fields; `initial` makes the first one
+    records: whether the runtime hands all that it hears to a recorder, as it comes, before the fold sees it
     """
 
     name: str
@@ -159,6 +160,7 @@ class _Declaration(Generic[C, S]):
     state: type[S]
     initial: Callable[[C], S]
     plain: tuple[PlainSpec, ...] = ()
+    records: bool = False
 
     def __post_init__(self) -> None:
         if not is_dataclass(self.state) or not self.state.__dataclass_params__.frozen:  # type: ignore[attr-defined]

@@ -18,8 +18,20 @@ HEALTH = (
     MetricSpec("health/reconnects", DataType.INT64, properties={"meaning": "connections made again"}),
 )
 
+STORE = (
+    MetricSpec("health/store_samples", DataType.INT64, properties={"meaning": "samples that were stored since the start"}),
+    MetricSpec("health/store_repeated", DataType.INT64, properties={"meaning": "samples that the store had already"}),
+    MetricSpec("health/store_refused", DataType.INT64, properties={"meaning": "samples that the store cannot keep"}),
+    MetricSpec("health/store_dropped", DataType.INT64, properties={"meaning": "messages for which there was no room to wait"}),
+    MetricSpec("health/store_waiting", DataType.INT64, properties={"meaning": "samples that wait to be written"}),
+    MetricSpec("health/store_bytes", DataType.INT64, unit="bytes", properties={"meaning": "on the disk"}),
+    MetricSpec("health/store_days_left", DataType.DOUBLE, unit="d", properties={"meaning": "that the disk lasts at this rate"}),
+    MetricSpec("health/store_pins", DataType.INT64, properties={"meaning": "stretches that no sweep may take"}),
+    MetricSpec("health/store_trouble", DataType.STRING, properties={"meaning": "what is wrong with the store; empty: nothing"}),
+)
 
-def node_metrics() -> tuple[MetricSpec, ...]:
-    """All metrics of the node: its ledger, in messages of devices, and its health."""
+
+def node_metrics(*, records: bool = False) -> tuple[MetricSpec, ...]:
+    """All metrics of the node: its ledger, in messages of devices, its health, and that of the store where it keeps one."""
     ledger = (MetricSpec(name, DataType.INT64, unit="messages") for name in Ledger().metrics())
-    return (*ledger, *HEALTH)
+    return (*ledger, *HEALTH, *(STORE if records else ()))

@@ -1,11 +1,11 @@
 """What the runtime needs of the outside: a host application to read from, an edge node to write to, memory to keep things in."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from processors.effects import Pin
 from sparkplug.host_session import HostEvent
-from sparkplug.metric import Change, MetricSpec
+from sparkplug.metric import Change, MetricSpec, NodeId
 
 
 class HostPort(Protocol):
@@ -18,6 +18,7 @@ class HostPort(Protocol):
     def poll(self, timeout_s: float) -> list[HostEvent]: ...
     def publish_plain(self, topic: str, payload: bytes, *, qos: int = 0, retain: bool = False) -> bool: ...
     def subscribe_plain(self, topic_filter: str) -> None: ...
+    def send_command(self, node: NodeId, device: str | None, changes: Sequence[Change]) -> bool: ...
     @property
     def online(self) -> bool: ...
     @property
@@ -38,14 +39,30 @@ class EdgePort(Protocol):
     def online(self) -> bool: ...
 
 
+class Receipt(NamedTuple):
+    """A value to be written to a device that declares the metric: which of its rows are kept."""
+
+    node: NodeId
+    device: str
+    name: str
+    value: str
+
+
 class Recorder(Protocol):
-    """Keeps what a processor hears. It never blocks for long: what it cannot take it counts as dropped, with the reason."""
+    """Keeps what a processor hears. It never blocks for long: what it cannot take it counts as dropped."""
 
     def keep(self, event: HostEvent, received_ms: int) -> None:
-        """Keep an event, of a device or of a node, as it came."""
+        """Keep an event, of a device or of a node, as it came; or a plain message of `keeps_plain`."""
 
     def pin(self, pin: Pin) -> None:
         """Keep a stretch of a machine from being swept."""
 
-    def health(self) -> Mapping[str, int | float]:
+    @property
+    def keeps_plain(self) -> str:
+        """The filter of the plain messages that it wants."""
+
+    def receipts(self) -> Iterable[Receipt]:
+        """What has been kept since this was last asked, for those who wait for it."""
+
+    def health(self) -> Mapping[str, int | float | str]:
         """How it is, by name: published as `health/<name>` of the processor's node."""

@@ -12,6 +12,7 @@ from processors.config import Configuration, ProcessorConfig, read_tables
 from processors.discovery import AnyProcessor, find
 from processors.errors import ConfigurationError
 from processors.health import node_metrics
+from processors.ports import Recorder
 from processors.worker import Worker
 from sparkplug.broker import BrokerAddress
 from sparkplug.edge_node import EdgeNode
@@ -48,9 +49,12 @@ def run_configured(
     *,
     group: str = "cnc",
     session_dir: Path | None = None,
+    recorder: Recorder | None = None,
 ) -> None:
-    """The same of processors whose configuration has been checked."""
-    workers = [_worker(processor, configuration, broker, group, session_dir) for processor, configuration in pairs]
+    """The same of processors whose configuration has been checked. `recorder` is for the one that `records`."""
+    workers = [
+        _worker(processor, configuration, broker, group, session_dir, recorder=recorder) for processor, configuration in pairs
+    ]
     failures: list[BaseException] = []
     with _stopped_by_signals(stop) as stopped:
         threads = [
@@ -96,11 +100,13 @@ def _worker(
     broker: BrokerAddress,
     group: str,
     session_dir: Path | None,
+    *,
+    recorder: Recorder | None,
 ) -> Worker:
     host = HostApplication(broker, processor.node, (f"spBv1.0/{group}/#",), wanted=lambda node: processor.listens_to(node.node))
     session_file = None if session_dir is None else session_dir / f"{processor.node}.json"
-    edge = EdgeNode(broker, NodeId(group, processor.node), node_metrics(), session_file=session_file)
-    return Worker(processor, configuration, host, edge)
+    edge = EdgeNode(broker, NodeId(group, processor.node), node_metrics(records=processor.records), session_file=session_file)
+    return Worker(processor, configuration, host, edge, recorder if processor.records else None)
 
 
 def _guarded(worker: Worker, stop: threading.Event, failures: list[BaseException]) -> None:

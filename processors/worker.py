@@ -9,6 +9,7 @@ import logging
 import time
 from collections import deque
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from threading import Event
 
@@ -75,6 +76,8 @@ class Worker:
         self._host.subscribe_plain(self._marker_topic)
         for wanted in self._listens:
             self._host.subscribe_plain(wanted)
+        if self._recorder is not None:
+            self._host.subscribe_plain(self._recorder.keeps_plain)
         self._host.start()
         self._edge.start()
         try:
@@ -199,6 +202,8 @@ class Worker:
             if self._recorder is not None and self._processor.listens_to(event.node.node):
                 self._recorder.keep(event, time.time_ns() // 1_000_000)
             self._feed(event, now_s)
+        elif self._recorder is not None and topic_matches_sub(self._recorder.keeps_plain, event.topic):
+            self._recorder.keep(event, event.timestamp_ms)
         elif event.payload and any(topic_matches_sub(wanted, event.topic) for wanted in self._listens):
             self._apply(self.engine.plain(event.topic, event.payload, event.timestamp_ms))
 
@@ -273,7 +278,7 @@ class Worker:
         ledger.dropped[DropReason.QUEUE_FULL] += overflowed
         at_ms = time.time_ns() // 1_000_000
         self._edge.publish(None, [Change(name, count, at_ms) for name, count in ledger.metrics().items()])
-        health: dict[str, int | float] = {
+        health: dict[str, int | float | str] = {
             "machines": len(self.engine.machines),
             "lag_s": round(self._lag_s, 3),
             "queue_depth": host.queue_depth,
@@ -287,8 +292,15 @@ class Worker:
             "reconnects": host.reconnects,
         }
         if self._recorder is not None:
+            self._give_receipts(self._recorder, at_ms)
             health |= self._recorder.health()
         self._edge.publish(None, [Change(f"health/{name}", value, at_ms) for name, value in health.items()])
+
+    def _give_receipts(self, recorder: Recorder, at_ms: int) -> None:
+        """Tell the edges that wait for it what is kept."""
+        for node, device, name, value in recorder.receipts():
+            with suppress(SparkplugError):  # an edge that is gone, or does not ask for receipts
+                self._host.send_command(node, device, [Change(name, value, at_ms)])
 
 
 def _with_latest(spec: MetricSpec, latest: Sequence[Change]) -> MetricSpec:

@@ -13,7 +13,8 @@ from typing import Any
 import pytest
 
 from cnctwin import demo as demo_module
-from cnctwin.demo import Demo, DemoOptions, Summary, ToolChanges, greeting, machine_name, run
+from cnctwin.demo import Summary, ToolChanges, greeting, run
+from cnctwin.demo_parts import PROCESSORS, Demo, DemoOptions, machine_name
 from cnctwin.errors import UsageError
 from cnctwin.plant import StageLedger, ledgers
 from cnctwin.private_broker import answers
@@ -28,7 +29,7 @@ pytestmark = [pytest.mark.broker, pytest.mark.usefixtures("mosquitto_program")]
 OWN = ["--recording", str(SPARE_PART), "--devices", str(DEVICES)]
 LINES_OF_OUR_RECORDING = len(SPARE_PART.read_text(encoding="utf-8").splitlines())
 SECONDS = 13.0  # enough for it at fifteen times its pace, with time to start
-STAGES = ["edge-vmc", *sorted(f"twin-{name}" for name in demo_module.PROCESSORS)]
+STAGES = ["edge-vmc", *sorted(f"twin-{name}" for name in PROCESSORS)]
 START_S_MAX = 60.0  # with the kernels of the scores to compile, on a computer that has other things to do
 PARTS = ["edge", "mosquitto", "process", "simulate-control"]
 
@@ -147,7 +148,7 @@ def test_the_exit_code_is_1_when_a_stage_is_missing(monkeypatch: pytest.MonkeyPa
 
 @pytest.mark.parametrize(("port", "option"), [(1883, ""), (18830, " -p 18830")])
 def test_the_usual_port_need_not_be_named(tmp_path: Path, port: int, option: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cnctwin.private_broker._free", lambda _port: True)
+    monkeypatch.setattr("cnctwin.private_broker.is_free", lambda _port: True)
     said = greeting(Demo(DemoOptions(port=port), tmp_path))
     assert f"mosquitto_sub{option} -t 'cnc/#' -v" in said
     assert f"mqtt://127.0.0.1:{port}" in said

@@ -1,0 +1,139 @@
+"""Memory: everything that is said on the broker goes into the store as it comes, and what matters is pinned there.
+
+The runtime hands each message to the recorder, whole; this fold decides only which raw windows are pinned: where a flag rises (an
+anomaly, a rule, a growing gap), from `pin_before_s` before to `pin_after_s` after it, so that whoever looks into it a year later
+finds the machine's own values and not a roll-up. A growing gap names the window that should be diagnosed; that one is pinned too.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime
+
+from pydantic import Field
+
+from processors.config import ProcessorConfig
+from processors.contract import Output, OutputSpec, Pin, Processor, Provenance, Sample, SampleKind
+from sparkplug.datatype import DataType
+from sparkplug.metric import Reading
+from sparkplug.quality import Quality
+
+PINS, REASON, WINDOW = "twin/history_pins", "twin/history_pin_reason", "twin/gap_window"
+DAY_MS = 86_400_000
+
+
+class HistorianConfig(ProcessorConfig):
+    """Where things are kept and for how long (docs/store.md), and what is pinned."""
+
+    store: str = ""
+    pin_before_s: float = Field(default=600.0, ge=0.0, le=86_400.0)
+    pin_after_s: float = Field(default=600.0, ge=0.0, le=86_400.0)
+    pin_s_max: float = Field(default=21_600.0, gt=0.0, le=604_800.0)
+    pins_a_day_max: int = Field(default=50, ge=1, le=10_000)
+    flags: tuple[str, ...] = (
+        "twin/anomaly_alarm",
+        "twin/gap_growing",
+        "twin/rule_load_over_limit",
+        "twin/rule_thermal_runaway",
+        "twin/rule_load_without_feed",
+        "twin/rule_vibration",
+    )
+    raw_days: float = Field(default=365.0, gt=0.0, le=36_500.0)
+    block_days: float = Field(default=7.0, gt=0.0, le=36_500.0)
+    disk_gb: float = Field(default=0.0, ge=0.0, le=1e6)
+
+
+@dataclass(frozen=True, slots=True)
+class Risen:
+    """A flag that stands, and since when."""
+
+    flag: str
+    since_ms: int
+
+
+@dataclass(frozen=True, slots=True)
+class HistorianState:
+    """The flags that stand; how many stretches were pinned, in all and on the day that is counted."""
+
+    risen: tuple[Risen, ...] = ()
+    pins: int = 0
+    day: int = 0
+    pins_of_day: int = 0
+    window: str = ""
+
+
+def step(config: HistorianConfig, state: HistorianState, sample: Sample) -> tuple[HistorianState, Sequence[Output | Pin]]:
+    """Pin what the flags that changed ask for."""
+    if sample.is_history or sample.kind not in (SampleKind.DATA, SampleKind.BIRTH):
+        return state, ()
+    pins: list[Pin] = []
+    for name in sample.changed:
+        if name in config.flags:
+            state = _see(config, state, sample.machine, sample.row[name], pins)
+        elif name == WINDOW:
+            state = _see_window(state, sample.machine, sample.row[name], pins)
+    if not pins:
+        return state, ()
+    return _counted(config, state, pins)
+
+
+def _see(config: HistorianConfig, state: HistorianState, machine: str, reading: Reading, pins: list[Pin]) -> HistorianState:
+    """A flag was told: where it rises or falls, the stretch about it. What is null or stale neither rises nor falls."""
+    if reading.quality is not Quality.GOOD or not isinstance(reading.value, bool):
+        return state
+    flag, at_ms = reading.name, reading.timestamp_ms
+    since_ms = next((risen.since_ms for risen in state.risen if risen.flag == flag), None)
+    if reading.value == (since_ms is not None):
+        return state
+    before_ms, after_ms = round(config.pin_before_s * 1000), round(config.pin_after_s * 1000)
+    if since_ms is None:
+        pins.append(Pin(machine, at_ms - before_ms, at_ms + max(after_ms, 1), flag.removeprefix("twin/")))
+        return replace(state, risen=(*state.risen, Risen(flag, at_ms)))
+    to_ms = min(at_ms + after_ms, since_ms + round(config.pin_s_max * 1000))
+    if to_ms > since_ms + after_ms:  # what the rise has not pinned already
+        pins.append(Pin(machine, since_ms - before_ms, to_ms, flag.removeprefix("twin/")))
+    return replace(state, risen=tuple(risen for risen in state.risen if risen.flag != flag))
+
+
+def _see_window(state: HistorianState, machine: str, reading: Reading, pins: list[Pin]) -> HistorianState:
+    """The stretch that the gap processor wants diagnosed, as `begin/end` in ISO 8601; each is pinned once."""
+    text = reading.value
+    if reading.quality is not Quality.GOOD or not isinstance(text, str) or text == state.window:
+        return state
+    begin, _, end = text.partition("/")
+    try:
+        from_ms, to_ms = (round(datetime.fromisoformat(moment).timestamp() * 1000) for moment in (begin, end))
+    except ValueError:
+        return state
+    if from_ms < to_ms:
+        pins.append(Pin(machine, from_ms, to_ms, "gap window to diagnose"))
+    return replace(state, window=text)
+
+
+def _counted(
+    config: HistorianConfig, state: HistorianState, pins: Sequence[Pin]
+) -> tuple[HistorianState, Sequence[Output | Pin]]:
+    """No more than a day may have; the last one is told."""
+    day = max(pin.to_ms for pin in pins) // DAY_MS
+    used = state.pins_of_day if day == state.day else 0
+    taken = pins[: max(config.pins_a_day_max - used, 0)]
+    counted = replace(state, pins=state.pins + len(taken), day=day, pins_of_day=used + len(pins))
+    if not taken:
+        too_many = f"more than {config.pins_a_day_max} stretches a day are asked for: the rest is not pinned"
+        return counted, [Output(REASON, too_many, Quality.BAD)]
+    return counted, [*taken, Output(PINS, counted.pins), Output(REASON, taken[-1].reason)]
+
+
+PROCESSOR = Processor(
+    name="historian",
+    version=1,
+    inputs=None,
+    outputs=(
+        OutputSpec(PINS, DataType.INT64, "stretches", "stretches of raw data that no sweep may take", Provenance.INFERRED),
+        OutputSpec(REASON, DataType.STRING, None, "why the last stretch was pinned", Provenance.INFERRED),
+    ),
+    config=HistorianConfig,
+    state=HistorianState,
+    initial=lambda _: HistorianState(),
+    step=step,
+    records=True,
+)

@@ -1,0 +1,131 @@
+"""An edge that waits for a memory's receipts: whatever is killed, the memory has every row, and the edge forgets no other."""
+
+import random
+from pathlib import Path
+
+import pytest
+
+from edge.config import StoreSection
+from edge.forwarder import Forwarder
+from edge.receipts import REPEAT_S, Receipts, spans_of
+from edge.ring import Ring
+from tests.edge.test_forwarder import NAMES, Wire, World
+
+LIMITS = StoreSection(free_bytes_min=0, history_rows_per_s=2_000, await_receipt=True)
+
+
+class Memory:
+    """A historian: what it has heard is safe once it is committed, and only then it is told."""
+
+    def __init__(self) -> None:
+        self.is_alive = True
+        self.heard: list[int] = []
+        self.kept: set[int] = set()
+        self.repeated = 0
+
+    def hear(self, sequence: int) -> None:
+        if self.is_alive:
+            self.heard.append(sequence)
+
+    def commit(self) -> str:
+        """The receipt."""
+        self.repeated += len(self.kept.intersection(self.heard))
+        self.kept.update(self.heard)
+        told, self.heard = " ".join(map(str, self.heard)), []
+        return told
+
+    def kill(self) -> None:
+        self.is_alive, self.heard = False, []
+
+
+class HeardWire(Wire):
+    """The same broker, with a memory that listens to it."""
+
+    def __init__(self, chance: random.Random) -> None:
+        super().__init__(chance)
+        self.memory = Memory()
+
+    def deliver(self, packets: int) -> None:
+        before = len(self.got)
+        super().deliver(packets)
+        for message in self.got[before:]:
+            self.memory.hear(message.sequence)
+
+
+class RememberedWorld(World):
+    """The same world, in which the memory is killed too."""
+
+    def __init__(self, file: Path, seed: int) -> None:
+        super().__init__(file, seed)
+        self.wire: HeardWire = HeardWire(self.chance)
+        self.begin()
+
+    def begin(self) -> None:
+        ring = Ring(self.file, LIMITS, wall_ms=lambda: 0, clock=lambda: self.seconds, free_bytes=lambda _: 10**12)
+        self.forwarder = self.wire.forwarder = Forwarder(ring, self.wire, "vmc", LIMITS, lambda: self.seconds)
+        self.forwarder.declare(NAMES)
+
+    def pump(self) -> None:
+        super().pump()
+        what = self.chance.random()
+        memory = self.wire.memory
+        if what < 0.05:
+            memory.kill()
+        elif what < 0.15:
+            memory.is_alive = True
+        elif what < 0.6 and memory.is_alive:
+            told = memory.commit()
+            if what < 0.55:  # else it is killed before it could tell
+                self.forwarder.receipt(told)
+
+
+@pytest.mark.parametrize("seed", range(15))
+def test_whatever_is_killed_the_memory_has_every_row(tmp_path: Path, seed: int) -> None:
+    world = RememberedWorld(tmp_path / "edge.store", seed)
+    for _ in range(400):
+        world.chapter()
+    world.to_the_end()
+    assert world.wire.memory.kept == set(range(1, world.taken + 1))
+    assert not world.dropped
+    world.forwarder.close()
+
+
+def test_without_a_fault_the_memory_hears_each_row_once(tmp_path: Path) -> None:
+    world = RememberedWorld(tmp_path / "edge.store", 1)
+    world.wire.lost_acknowledgements = 0.0
+    for _ in range(200):
+        world.take(5)
+        World.pump(world)
+        world.seconds += 0.1
+        world.wire.deliver(1_000)
+        world.forwarder.receipt(world.wire.memory.commit())
+    assert world.wire.memory.kept == set(range(1, 1_001))
+    assert world.wire.memory.repeated == 0
+
+
+def test_while_nobody_gives_receipts_nothing_is_told_again(tmp_path: Path) -> None:
+    world = RememberedWorld(tmp_path / "edge.store", 1)
+    world.wire.lost_acknowledgements = 0.0
+    world.wire.memory.kill()
+    for _ in range(100):
+        world.take(1)
+        World.pump(world)
+        world.seconds += 1.0
+        world.wire.deliver(1_000)
+    assert [message.sequence for message in world.wire.got] == list(range(1, 101))
+    assert world.forwarder.observations == 100, "and nothing is forgotten"
+
+
+def test_a_receipt_may_come_before_the_broker_has_acknowledged() -> None:
+    receipts = Receipts()
+    receipts.hear("1-3 7")
+    assert receipts.settle(0.0) == ([], [])
+    receipts.wait([(1, 5)], 0.0)
+    assert receipts.settle(1.0) == ([(1, 3)], [])
+    receipts.hear("6")
+    assert receipts.settle(REPEAT_S + 0.1) == ([], [(4, 5)])
+
+
+@pytest.mark.parametrize("text", ["", "x", "-5", "9-3", "1e5", "1–2", "1.5"])
+def test_what_names_no_row_is_no_receipt(text: str) -> None:
+    assert spans_of(text) == []
