@@ -23,9 +23,13 @@ from cnctwin.control_commands import control_app
 from cnctwin.demo_parts import DemoOptions
 from cnctwin.errors import BrokerStartError, ProgramError, UsageError
 from cnctwin.given_broker import address, broker_or_own
+from cnctwin.history_commands import replay_history
+from cnctwin.model_commands import model_app
+from cnctwin.page_commands import serve
 from cnctwin.stopping import stopped_by_signals
 from cnctwin.train_commands import train_app
 from cnctwin.train_detector_command import train_detector
+from cnctwin.validate_command import validate
 from edge.errors import EdgeError
 from edge.state_dir import state_dir as folder_for_state
 from processors.errors import ProcessorError
@@ -43,6 +47,7 @@ app.add_typer(control_app, name="simulate-control")
 app.add_typer(alerts_app, name="alerts")
 app.add_typer(train_app, name="train")
 train_app.command("detector")(train_detector)
+app.add_typer(model_app, name="model")
 
 
 class Method(StrEnum):
@@ -125,7 +130,7 @@ def process(
         Path | None, typer.Option(help="Keeps birth/death numbers; else $CNCTWIN_STATE_DIR or ~/.local/state/cnctwin")
     ] = None,
 ) -> None:
-    """Run processors until SIGTERM or Ctrl-C; beside alerts, the courier that sends its notifications."""
+    """Run processors until SIGTERM or Ctrl-C; beside alerts the courier that sends, beside historian the store that it keeps."""
     from cnctwin.process_command import process as run_processors
     from processors.runtime import configured
 
@@ -249,6 +254,11 @@ def edge_discover(
     from edge.check import discover
 
     sys.stdout.write(discover(url, device=device))
+
+
+app.command()(serve)
+app.command("replay")(replay_history)
+app.command()(validate)
 
 
 def _twin() -> ModuleType:

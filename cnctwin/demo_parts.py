@@ -34,6 +34,9 @@ ambient_temp_c = 22.0
 rated_power_kw = 11.0
 tool_diameter_mm = 12.0
 
+[gap]
+shown_s_min = 5.0
+
 [gap.floors]
 spindle_temp_c = 0.3
 spindle_load_pct = 0.5

@@ -19,7 +19,7 @@ from pydantic import AwareDatetime, Field, NonNegativeFloat, PositiveFloat, mode
 
 from processors.config import ProcessorConfig
 from processors.contract import TWIN_PREFIX, Output, OutputSpec, Processor, Provenance, Sample, SampleKind
-from processors.gap_cell import SHOWN_S_MIN, Cell, Moments, Terms, closed, seen
+from processors.gap_cell import Cell, Moments, Terms, closed, seen
 from processors.gap_comparison import (
     INPUTS,
     LOAD,
@@ -71,6 +71,7 @@ class Config(ProcessorConfig):
     block_s: float = Field(default=3600.0, ge=60.0, le=86_400.0)
     window_hours: float = Field(default=2.0, gt=0.0, le=48.0)
     standing_hours: float = Field(default=8.0, gt=0.0, le=720.0)
+    shown_s_min: float = Field(default=60.0, ge=1.0, le=3600.0, description="of a regime, before its standing figure is told")
     settle_s: NonNegativeFloat = 2.0
     rapid_feed_mm_min: PositiveFloat = 15_000.0
     rated_power_kw: PositiveFloat | None = None
@@ -233,10 +234,11 @@ def _figures(config: Config, state: State, signal: str, missing: str | None, at_
             square = sum(cell.standing.seconds * (cell.rms / floor) ** 2 for cell, floor in found)
             total_s = sum(cell.standing.seconds for cell, _ in found)
             outputs.append(Output(title, round(math.sqrt(square / total_s), 3), quality, missing))
-        elif missing or any(cell.standing.seconds >= SHOWN_S_MIN for key, cell in cells.items() if key.startswith(regime)):
+        elif missing or any(cell.standing.seconds >= config.shown_s_min for key, cell in cells.items() if key.startswith(regime)):
             outputs.append(Output.null(title, missing or _why_not_judged(config, state, at_s)))
         else:
-            outputs.append(Output.null(title, f"less than {SHOWN_S_MIN:g} s seen of {regime or ' or '.join(REGIMES[signal])}"))
+            of = regime or " or ".join(REGIMES[signal])
+            outputs.append(Output.null(title, f"less than {config.shown_s_min:g} s seen of {of}"))
     if not known:
         return [*outputs, Output.null(f"{name}/mean", outputs[0].reason or "")]
     total_s = sum(cell.standing.seconds for cell, _ in known.values())
@@ -249,7 +251,7 @@ def _known(config: Config, state: State, signal: str, cells: Mapping[str, Cell],
     is_learned = at_s >= _healthy_s(config, state)[1]
     known = {}
     for regime, cell in cells.items():
-        if cell.standing.seconds >= SHOWN_S_MIN and (not cell.is_learned or (is_learned and cell.is_judged)):
+        if cell.standing.seconds >= config.shown_s_min and (not cell.is_learned or (is_learned and cell.is_judged)):
             floor = _floor(config, state, signal, cell, at_s)
             if floor is not None:
                 known[regime] = cell, floor

@@ -15,8 +15,8 @@ from typing import NamedTuple
 from processors.gap_growth import Baseline, Chart, Rule, charted, is_enough, learned, rule_of
 
 STRAY = 6.0
-SHOWN_S_MIN = 60.0
-"""Standing figures of less than that are not shown."""
+STRAYS_CUT_S = 60.0
+"""Before so much of a regime was seen, nothing is taken for a stray."""
 BLOCK_PART_MIN = 1.0 / 60.0
 """A block that has seen its regime for less than this part of its length is carried on into the next one."""
 SPREAD_WORTH = math.log(1.5)
@@ -136,7 +136,7 @@ class Terms(NamedTuple):
 def seen(cell: Cell, terms: Terms, d: float, at_s: float, seconds: float, *, is_healthy: bool) -> Cell:
     """The cell with `d` held for the `seconds` up to `at_s`."""
     standing = cell.standing
-    if standing.seconds >= SHOWN_S_MIN:
+    if standing.seconds >= STRAYS_CUT_S:
         reach = STRAY * max(math.sqrt(standing.variance), terms.floor or 0.0, terms.resolution)
         d = min(max(d, standing.mean - reach), standing.mean + reach)
     return cell._replace(

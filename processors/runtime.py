@@ -20,6 +20,7 @@ from sparkplug.host import HostApplication
 from sparkplug.metric import NodeId
 
 JOIN_S_MAX = 15.0
+OTHERS = ("validation",)  # tables of the same file that are for no processor
 
 
 def run(
@@ -75,7 +76,8 @@ def configured(names: Sequence[str], config_path: Path | None = None) -> "list[C
     """The processors with their configuration, checked. Raises UnknownProcessorError, ConfigurationError."""
     tables = {} if config_path is None else read_tables(config_path)
     for table in tables:
-        _table_owner(table, config_path)
+        if table not in OTHERS:
+            _table_owner(table, config_path)
     processors = [find(name) for name in dict.fromkeys(names)]
     try:
         return [
