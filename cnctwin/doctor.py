@@ -1,6 +1,7 @@
 """`cnctwin doctor`: is everything connected, in order and accounted for?"""
 
 import time
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -8,7 +9,10 @@ from cnctwin.plant import StageLedger, health, ledgers, machines
 from cnctwin.watch import viewer
 from sparkplug.broker import BrokerAddress
 from sparkplug.host import HostApplication
+from sparkplug.metric import Reading
 from sparkplug.quality import Quality
+
+COME_AND_GO = ("twin-validation",)  # nodes that tell what they have found, and end
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +63,10 @@ def diagnose(host: HostApplication, url: str) -> Report:
     for node in host.nodes():
         picture = host.picture(node)
         online = picture is not None and picture.online
-        findings.append(Finding(online, f"{node} is {'online' if online else 'offline, or gives no birth'}"))
+        if not online and node.node in COME_AND_GO:
+            findings.append(Finding(True, f"{node} has told what it had to tell, and is gone"))
+        else:
+            findings.append(Finding(online, f"{node} is {'online' if online else 'offline, or gives no birth'}"))
     if not host.nodes():
         findings.append(Finding(False, "no edge node was heard of; start one with `cnctwin edge run CONFIG`"))
     for machine in machines(host):
@@ -78,7 +85,20 @@ def diagnose(host: HostApplication, url: str) -> Report:
             count = metrics[name].value if name in metrics else 0
             if isinstance(count, int) and count:
                 findings.append(Finding(True, f"{node_id}: {count} {name.replace('_', ' ')} so far, counted"))
+        findings += of_store(node_id, metrics)
     counts = host.counts
     order = f"{counts.get('lost', 0)} messages lost, {counts.get('malformed', 0)} malformed while listening"
     findings.append(Finding(not counts.get("lost") and not counts.get("malformed"), order))
     return Report(tuple(findings), tuple(stages))
+
+
+def of_store(node_id: str, metrics: Mapping[str, Reading]) -> list[Finding]:
+    """What a historian says of its store; nothing of any other node."""
+    if not {"store_samples", "store_dropped", "store_trouble"} <= metrics.keys():
+        return []
+    counts = [metrics[f"store_{name}"].value if f"store_{name}" in metrics else 0 for name in ("samples", "waiting", "dropped")]
+    stored, waiting, dropped = (count if isinstance(count, int) else 0 for count in counts)
+    told = metrics["store_trouble"].value
+    trouble = f"; {told}" if isinstance(told, str) and told else ""
+    text = f"{node_id}: {stored} samples stored, {waiting} waiting, {dropped} messages without room{trouble}"
+    return [Finding(not trouble and not dropped, text)]

@@ -10,11 +10,12 @@ from contextlib import contextmanager
 import pytest
 
 from cnctwin.cli import main
-from cnctwin.doctor import Report, examine
+from cnctwin.doctor import Report, examine, of_store
 from sparkplug.broker import BrokerAddress
 from sparkplug.datatype import DataType
 from sparkplug.edge_node import EdgeNode
-from sparkplug.metric import Change, MetricSpec, NodeId
+from sparkplug.metric import Change, MetricSpec, NodeId, Reading
+from sparkplug.quality import Quality
 from tests.cnctwin.program import free_port, until
 from tests.wire.mosquitto import Mosquitto
 
@@ -120,3 +121,17 @@ def test_a_program_reads_the_whole_report(
     assert ledger["node"] == "edge-vmc"
     assert ledger["balances"] is (code == 0)
     assert ledger["reasons"] == {"unmapped": 2}
+
+
+@pytest.mark.parametrize(
+    "dropped, trouble, good", [(0, "", True), (3, "", False), (0, "the disk is full; make room", False), (0, None, True)]
+)
+def test_a_store_that_cannot_keep_all_is_bad_news(dropped: int, trouble: str | None, good: bool) -> None:
+    told = {"store_samples": 10, "store_dropped": dropped, "store_trouble": trouble}
+    metrics = {name: Reading(name, value, 0, Quality.GOOD, None, None, False) for name, value in told.items()}
+    (finding,) = of_store("twin-historian", metrics)
+    assert finding.good is good
+    assert finding.text == f"twin-historian: 10 samples stored, 0 waiting, {dropped} messages without room" + (
+        f"; {trouble}" if trouble else ""
+    )
+    assert of_store("twin-thermal", {}) == []
