@@ -260,16 +260,19 @@ class StoreRecorder:
             self._store.keep_snapshot(batch.other)
 
     def _note_kept(self, messages: Sequence[Message]) -> None:
-        """The numbers of the rows that edges have told; a birth shows the state after a row, and is not the row."""
-        for _, event in messages:
-            if event.kind is not EventKind.DATA or event.device is None:
-                continue
-            number = next((one.value for one in reversed(event.readings) if one.name == SEQUENCE), None)
-            if isinstance(number, int):
-                with self._receipts_lock:
-                    spans = self._receipts.setdefault((event.node, event.device), Spans())
-                    spans.discard(number, number)
-                    spans.add(number, number)
+        """Which devices wait for receipts, and the numbers of their rows; a birth shows the state after a row, and is not it."""
+        with self._receipts_lock:
+            for _, event in messages:
+                if event.device is None or not event.readings:
+                    continue
+                key = event.node, event.device
+                if event.kind is EventKind.BIRTH and any(reading.name == RECEIPT for reading in event.readings):
+                    self._receipts.setdefault(key, Spans())
+                elif event.kind is EventKind.DATA and key in self._receipts:
+                    number = next((one.value for one in reversed(event.readings) if one.name == SEQUENCE), None)
+                    if isinstance(number, int):
+                        self._receipts[key].discard(number, number)
+                        self._receipts[key].add(number, number)
 
     def _tidy(self) -> None:
         try:
