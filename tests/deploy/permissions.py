@@ -35,6 +35,7 @@ def barrier(node: str) -> str:
 
 
 ASK_FOR_BIRTHS = frozenset(f"spBv1.0/cnc/NCMD/{node}" for node in NODES)
+RECEIPTS = frozenset(f"spBv1.0/cnc/DCMD/{node}/okuma" for node in NODES)
 SPARKPLUG = frozenset().union(*(said_by(node) | told(node) for node in NODES))
 ALL = sorted(
     {*SPARKPLUG, *map(barrier, NODES), *STATES, SNAPSHOT, LETTER, MARKER, *OUTBOX, ALERTS_STATE, *COMMANDS, *MIRROR, *ELSEWHERE}
@@ -44,6 +45,7 @@ MAY_WRITE: dict[str, frozenset[str]] = {
     **{edge: said_by(edge) | {barrier(edge)} for edge in EDGE_NODES},
     "processors": said_by("twin-mirror")
     | ASK_FOR_BIRTHS
+    | RECEIPTS
     | {STATES[0], SNAPSHOT, LETTER, MARKER, *OUTBOX, ALERTS_STATE, COMMANDS[0], *MIRROR},
     "viewer": frozenset(),
     "operator": ASK_FOR_BIRTHS | set(COMMANDS),
