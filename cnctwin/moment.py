@@ -1,0 +1,31 @@
+"""A moment as people write it on the command line."""
+
+import re
+import time
+from datetime import UTC, datetime
+
+from cnctwin.errors import UsageError
+
+FORMS = "2026-11-22T06:00 (UTC where no zone stands), ms since 1970, or -15m for a quarter of an hour ago (s, m, h, d)"
+_AGO = re.compile(r"-(\d+(?:\.\d+)?)([smhd])")
+_SECONDS = {"s": 1.0, "m": 60.0, "h": 3600.0, "d": 86_400.0}
+
+
+def moment_ms(text: str, option: str = "", now_ms: int | None = None) -> int:
+    """A moment in ms since 1970; `option` is named where it is none. Raises UsageError.
+
+    >>> moment_ms("2026-11-22T06:00"), moment_ms("1970-01-01T01:00+01:00"), moment_ms("1790000000000")
+    (1795327200000, 0, 1790000000000)
+    >>> moment_ms("-15m", now_ms=1_000_000)
+    100000
+    """
+    if match := _AGO.fullmatch(text):
+        now_ms = time.time_ns() // 1_000_000 if now_ms is None else now_ms
+        return now_ms - round(float(match[1]) * _SECONDS[match[2]] * 1000)
+    if text.isdecimal() and text.isascii():
+        return int(text)
+    try:
+        moment = datetime.fromisoformat(text)
+    except ValueError:
+        raise UsageError(f"{f'{option} ' if option else ''}{text!r} is no moment; write {FORMS}") from None
+    return round((moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp() * 1000)
