@@ -25,10 +25,14 @@ from cnctwin.errors import BrokerStartError, ProgramError, UsageError
 from cnctwin.given_broker import address, broker_or_own
 from cnctwin.history_commands import replay_history
 from cnctwin.model_commands import model_app
+from cnctwin.moment import moment_ms
 from cnctwin.page_commands import serve
+from cnctwin.parts_commands import parts_app
 from cnctwin.stopping import stopped_by_signals
+from cnctwin.store_commands import export, store_app
 from cnctwin.train_commands import train_app
 from cnctwin.train_detector_command import train_detector
+from cnctwin.train_residual_command import train_residual
 from cnctwin.validate_command import validate
 from edge.errors import EdgeError
 from edge.state_dir import state_dir as folder_for_state
@@ -46,7 +50,10 @@ app.add_typer(gap_app, name="gap")
 app.add_typer(control_app, name="simulate-control")
 app.add_typer(alerts_app, name="alerts")
 app.add_typer(train_app, name="train")
+app.add_typer(store_app, name="store")
+app.add_typer(parts_app, name="parts")
 train_app.command("detector")(train_detector)
+train_app.command("residual")(train_residual)
 app.add_typer(model_app, name="model")
 
 
@@ -171,18 +178,28 @@ def identify(
 
 @app.command("import")
 def import_(
-    recording: Annotated[Path, typer.Argument(help="time|key|value text of the NIST test bed; or an SHDR log, with --devices")],
+    recording: Annotated[
+        str, typer.Argument(help="time|key|value text of the NIST test bed; an SHDR log, with --devices; a store, with --machine")
+    ],
     out: Annotated[Path, typer.Option(help="The run log, .parquet or .csv; numbered where there are several runs")],
     devices: Annotated[Path | None, typer.Option(help="The Devices.xml of the SHDR log")] = None,
     device: Annotated[str | None, typer.Option(help="Which device of it, where there are several")] = None,
+    machine: Annotated[str | None, typer.Option(help="Which machine of the store")] = None,
+    from_: Annotated[str | None, typer.Option("--from", help="Of the store: UTC, as 2026-11-21T06:00, or ms since 1970")] = None,
+    to: Annotated[str | None, typer.Option(help="Of the store")] = None,
 ) -> None:
-    """Turn a recording into run logs: one for each program execution, or of an SHDR log for each stretch without a gap."""
-    if devices is None:
-        _twin().import_recording(recording, out, _console())
+    """Turn a recording into run logs: one for each program execution or stretch without a gap; or a stretch of a store."""
+    if machine is not None:
+        if from_ is None or to is None:
+            raise UsageError(f"--machine {machine}: say which stretch of the store with --from and --to")
+        rows = export(recording, machine, (moment_ms(from_, "--from"), moment_ms(to, "--to")), out)
+        _console().print(f"{out}: {rows} rows", markup=False, highlight=False)
+    elif devices is None:
+        _twin().import_recording(Path(recording), out, _console())
     else:
         from cnctwin.shdr_import import import_shdr
 
-        import_shdr(recording, devices, device, out, _console())
+        import_shdr(Path(recording), devices, device, out, _console())
 
 
 @gap_app.command("diagnose")

@@ -11,7 +11,8 @@ from rich.console import Console
 from cnctwin.errors import UsageError
 
 train_app = typer.Typer(
-    no_args_is_help=True, help="Models of a machine from its recordings: anomaly scores, the tool-change detector."
+    no_args_is_help=True,
+    help="Models of a machine from its recordings: anomaly scores, tool changes, what the heat model gets wrong.",
 )
 FILES = "Run logs (Parquet or CSV) as [NAME=]FILE; several files of a NAME are one after the other, several NAMEs a cell"
 

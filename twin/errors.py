@@ -8,6 +8,8 @@ TwinError
 ├── EngagementError   a path, tool, stock or limit with which the engagement cannot be computed
 ├── EffectError       an effect that does not exist, or is given what it does not take
 ├── ModelError        an anomaly model that cannot be trained, read or used (twin/anomaly/errors.py)
+├── ResidualError     a residual model that cannot be trained, read or used (twin/residual/errors.py)
+├── PointerError      a current.json that names no model (twin/models/errors.py)
 ├── ForestError       arrays that are no forest, or a row that it cannot score (twin/forest/errors.py)
 └── TransientError    a tool-change detector that cannot be learned, read or used (twin/transient/errors.py)
 """
