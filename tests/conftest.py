@@ -7,11 +7,12 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from tests.depth import EXAMPLES
 from tests.wire.mosquitto import Mosquitto, find_mosquitto
 from tests.wire.proxy import Proxy
 
 # How long an example takes says more of the machine that it runs on than of the code.
-settings.register_profile("house", deadline=None)
+settings.register_profile("house", deadline=None, max_examples=EXAMPLES)
 settings.load_profile("house")
 
 # Our tests start hundreds of processes: each module is compiled once, whatever the caller's environment says of that.
@@ -32,6 +33,9 @@ LONG = (
     "cnctwin/test_train_anomaly.py",
     "processors/courier/test_processor_and_courier_killed.py",
     "processors/courier/test_simulated_crashes.py",
+    "cnctwin/test_historian_killed.py",
+    "cnctwin/store_influx/test_outage.py",
+    "hivemq/test_barrier.py",
 )
 
 

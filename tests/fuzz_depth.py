@@ -1,4 +1,4 @@
-"""How long the fuzz tests try: CNCTWIN_FUZZ_EXAMPLES is the number of examples of each, 60 where nothing is said."""
+"""How long the fuzz tests try: CNCTWIN_FUZZ_EXAMPLES is the number of examples of each, 40 where nothing is said."""
 
 import os
 import time
@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 from hypothesis import HealthCheck, settings
 
-EXAMPLES = int(os.environ.get("CNCTWIN_FUZZ_EXAMPLES", "60"))
+EXAMPLES = int(os.environ.get("CNCTWIN_FUZZ_EXAMPLES", "40"))
 FUZZ = settings(max_examples=EXAMPLES, deadline=None, suppress_health_check=list(HealthCheck))
 
 

@@ -2,15 +2,13 @@
 slow, wrong and partial. In the suite eight minutes of it; the whole hour with CNCTWIN_FULL=1, and in `benchmarks/edge_focas.py`.
 """
 
-import os
-
 import pytest
 
 from cnctwin.simulated_control.state import tool_changes
+from tests.depth import IS_FULL
 from tests.edge.controls.focas import hour_judged as judged
 from tests.edge.controls.focas.machine_hour import CLOCK_OFFSET_S, Hour, run
 
-IS_FULL = bool(os.environ.get("CNCTWIN_FULL"))
 SECONDS = 3600.0 if IS_FULL else 480.0
 
 

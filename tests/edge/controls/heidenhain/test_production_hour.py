@@ -3,17 +3,16 @@
 All is accounted for. In the suite some minutes of it; with CNCTWIN_FULL=1 the hour, at four looks a second.
 """
 
-import os
 from itertools import pairwise
 
 import pytest
 
 from cnctwin.lsv2_server.answers import Model
 from edge.sample import EdgeSample
+from tests.depth import IS_FULL
 from tests.edge.controls.heidenhain.machine_time import SWITCHED_ON_S
 from tests.edge.controls.heidenhain.production import FAULTS, Look, Run, produce
 
-IS_FULL = bool(os.environ.get("CNCTWIN_FULL"))
 SECONDS = 3600.0 if IS_FULL else 270.0
 INTERVAL_MS = 250 if IS_FULL else 500
 PLC = {"tool_number": "W1000", "tool_change": "M4000", "spindle_rpm": "D1004", "spindle_load_pct": "W1008"}

@@ -14,10 +14,11 @@ pytest.importorskip("asyncua")
 
 from cnctwin.simulated_control.state import ControlState
 from edge.sample import EdgeSample
+from tests.depth import IS_FULL
 from tests.edge.controls.opcua.control_process import LOOK_S, SWITCHED_ON_S
 from tests.edge.controls.opcua.hour import Hour
 
-SECONDS = 3600.0 if os.environ.get("CNCTWIN_FULL") else 160.0
+SECONDS = 3600.0 if IS_FULL else 160.0
 SEED = int(os.environ.get("CNCTWIN_SEED", "4"))
 TOLERANCE_S = 0.3  # a look of the server, and the block that commands a change just before the number goes
 _EXEC = {"PROGRAM_COMPLETED": "READY", "FEED_HOLD": "STOPPED"}

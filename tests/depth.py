@@ -1,0 +1,7 @@
+"""How much the suite tries: a slice that is done in a quarter of an hour, or all of it with CNCTWIN_FULL=1."""
+
+import os
+
+IS_FULL = bool(os.environ.get("CNCTWIN_FULL"))
+EXAMPLES = 100 if IS_FULL else 50
+"""Of a law that says nothing else."""
