@@ -1,0 +1,178 @@
+"""Who may ask: decided from the address that asks, the headers, and what the server was started with. No I/O, no clock.
+
+* On loopback, without a token, whoever is on this machine may.
+* With a token, who has it: as `Authorization: Bearer …`, or as the cookie that a log-in sets. Never in an address.
+* Behind a reverse proxy, whom the proxy names in the header that was named, and only in requests that come from its address.
+
+Beside that the Host header has to name this server (a page of somebody else's that has its name resolved to us would have its
+own), and what changes something has to come from a page of ours, or from no page.
+"""
+
+import hashlib
+import hmac
+import ipaddress
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+COOKIE = "cnctwin_session"
+SESSION_S = 12 * 3600
+TOKEN_CHARACTERS_MIN = 16
+LOCAL_NAMES = frozenset({"localhost", "127.0.0.1", "[::1]"})
+OPEN_PATHS = frozenset({"/", "/livez", "/readyz", "/login"})  # the page itself says nothing of the plant, and asks for the token
+OPEN_FOLDER = "/page/"
+SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
+
+
+class Asking(NamedTuple):
+    """What access is decided by. `headers` have lower-case names."""
+
+    method: str
+    path: str
+    peer: str
+    scheme: str
+    headers: Mapping[str, str]
+    cookie: str | None = None
+
+
+class Verdict(NamedTuple):
+    """`status` 0 is yes, with the user that a proxy named; else the refusal."""
+
+    status: int
+    line: str = ""
+    user: str | None = None
+    is_wrong_token: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Access:
+    """The rules as the server was started with. The token appears in no `repr`.
+
+    proxy_header, proxy: the reverse proxy's header with the user, and the address that it asks from
+    hosts: more names that the Host header may have (behind the proxy any name will do: that is the proxy's to check)
+    """
+
+    token: str | None = field(default=None, repr=False)
+    proxy_header: str | None = None
+    proxy: str | None = None
+    hosts: frozenset[str] = frozenset()
+
+    def judge(self, asking: Asking, now_s: float) -> Verdict:
+        """Whether this may be answered."""
+        by_proxy = self.proxy is not None and same_address(asking.peer, self.proxy)
+        host = asking.headers.get("host", "")
+        if not by_proxy and not self._is_ours(host):
+            return Verdict(
+                403, f"Host {host[:80]!r} is not a name of this server; ask for its address, or start it with --allow-host"
+            )
+        if (line := _foreign(asking, host)) is not None:
+            return Verdict(403, line)
+        if asking.path in OPEN_PATHS or asking.path.startswith(OPEN_FOLDER):
+            return Verdict(0)
+        return self._known(asking, now_s, by_proxy=by_proxy)
+
+    def session(self, now_s: float) -> str:
+        """The value of the cookie that a log-in sets: until when, and a proof that only who knows the token can make."""
+        until_s = int(now_s) + SESSION_S
+        return f"{until_s}.{self._proof(until_s)}"
+
+    def is_token(self, given: str) -> bool:
+        """Whether this is the token, in a time that does not tell how much of it is right."""
+        return self.token is not None and hmac.compare_digest(_digest(given), _digest(self.token))
+
+    def _known(self, asking: Asking, now_s: float, *, by_proxy: bool) -> Verdict:
+        given = asking.headers.get("authorization", "")
+        if by_proxy and self.proxy_header is not None and (user := asking.headers.get(self.proxy_header.lower(), "").strip()):
+            return Verdict(0, user=user[:100])
+        if self.token is not None:
+            if given:
+                scheme, _, token = given.partition(" ")
+                if scheme.lower() == "bearer" and self.is_token(token.strip()):
+                    return Verdict(0)
+                return Verdict(401, "Authorization is not Bearer with the token of this server", is_wrong_token=True)
+            if asking.cookie is not None and self._is_session(asking.cookie, now_s):
+                return Verdict(0)
+            return Verdict(401, "no token: log in at /login, or send Authorization: Bearer …")
+        if self.proxy_header is not None:
+            who = "the proxy names nobody" if by_proxy else "this server is asked through its proxy only"
+            return Verdict(401, f"{who}: header {self.proxy_header}, from the proxy's address")
+        return Verdict(0)
+
+    def _is_ours(self, host: str) -> bool:
+        name = host_name(host)
+        return name in LOCAL_NAMES or name in self.hosts or _is_literal(name)
+
+    def _is_session(self, cookie: str, now_s: float) -> bool:
+        until, _, proof = cookie.partition(".")
+        if not (until.isascii() and until.isdigit() and len(until) <= 12):
+            return False
+        return hmac.compare_digest(proof.encode("utf-8", "replace"), self._proof(int(until)).encode()) and now_s < int(until)
+
+    def _proof(self, until_s: int) -> str:
+        return hmac.new(_digest(self.token or ""), f"session {until_s}".encode(), hashlib.sha256).hexdigest()
+
+
+def host_name(host: str) -> str:
+    """The name in a Host header, without its port, in lower case.
+
+    >>> host_name("Twin.shop.example:8080"), host_name("[::1]:8080"), host_name("127.0.0.1")
+    ('twin.shop.example', '[::1]', '127.0.0.1')
+    """
+    name = host.strip().lower()
+    if name.startswith("["):
+        return name[: name.find("]") + 1]
+    return name.rpartition(":")[0] if ":" in name else name
+
+
+def same_address(one: str, other: str) -> bool:
+    """Whether two addresses are one, an IPv4 one that is written as IPv6 included."""
+    try:
+        return _address(one) == _address(other)
+    except ValueError:
+        return False
+
+
+def is_loopback(address: str) -> bool:
+    """Whether only this machine reaches an address.
+
+    >>> is_loopback("127.0.0.1"), is_loopback("::1"), is_loopback("localhost"), is_loopback("0.0.0.0")
+    (True, True, True, False)
+    """
+    try:
+        return _address(address).is_loopback
+    except ValueError:
+        return address == "localhost"
+
+
+def _foreign(asking: Asking, host: str) -> str | None:
+    """Why a request comes from a page that is not ours; None where it does not."""
+    site = asking.headers.get("sec-fetch-site", "none")
+    origin = asking.headers.get("origin")
+    if asking.method in SAFE_METHODS:
+        # A page elsewhere may link to us; it may not have its visitors' browsers hold our streams open.
+        navigates = asking.headers.get("sec-fetch-mode", "navigate") == "navigate"
+        return None if site != "cross-site" or navigates else "this comes from a page of another site"
+    if origin is not None and origin.lower() not in (f"http://{host}".lower(), f"https://{host}".lower()):
+        return f"Origin {origin[:80]!r} is not that of this server; only its own pages may change something"
+    if site not in ("none", "same-origin"):
+        return "this comes from a page of another site; only this server's own pages may change something"
+    if origin is None and asking.cookie is not None:
+        return "a session needs the header Origin to change something; a program sends Authorization: Bearer …"
+    return None
+
+
+def _is_literal(name: str) -> bool:
+    try:
+        _address(name.strip("[]"))
+    except ValueError:
+        return False
+    return True
+
+
+def _address(text: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address:
+    found = ipaddress.ip_address(text)
+    return found.ipv4_mapped or found if isinstance(found, ipaddress.IPv6Address) else found
+
+
+def _digest(secret: str) -> bytes:
+    return hashlib.sha256(secret.encode("utf-8", "surrogatepass")).digest()

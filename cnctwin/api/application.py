@@ -1,0 +1,68 @@
+"""The application: all routes over what it stands on."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from importlib.metadata import version
+
+from fastapi import FastAPI
+
+from cnctwin.api.alert_routes import alert_routes
+from cnctwin.api.errors import handle_errors
+from cnctwin.api.failures import Failures
+from cnctwin.api.fan_out import FanOut
+from cnctwin.api.gap_routes import gap_routes
+from cnctwin.api.guard import Guard
+from cnctwin.api.health_routes import health_routes
+from cnctwin.api.history_routes import history_routes
+from cnctwin.api.metrics_routes import metrics_routes
+from cnctwin.api.page_routes import page_routes, serve_page
+from cnctwin.api.past_routes import past_routes
+from cnctwin.api.plant_routes import plant_routes
+from cnctwin.api.prediction_routes import prediction_routes
+from cnctwin.api.sources import Sources
+
+ABOUT = "A digital twin of CNC machines: state, predictions, history, gaps, alerts. Times are ms since 1970, UTC."
+
+
+def create_app(sources: Sources) -> FastAPI:
+    """The application. It starts no thread: `cnctwin serve` starts the viewer that feeds `sources.live`."""
+    fan_out = FanOut(sources.live)
+    if sources.viewer is not None:
+        sources.viewer.on_batches = fan_out.send
+
+    @asynccontextmanager
+    async def lifespan(_: FastAPI) -> AsyncIterator[None]:
+        fan_out.attach(asyncio.get_running_loop())
+        try:
+            yield
+        finally:
+            fan_out.end()
+
+    app = FastAPI(
+        title="cnctwin",
+        description=ABOUT,
+        version=version("cnctwin"),
+        docs_url=None,
+        redoc_url=None,
+        lifespan=lifespan,
+        redirect_slashes=False,
+    )
+    failures = Failures()
+    app.add_middleware(Guard, access=sources.access, failures=failures)
+    handle_errors(app)
+    for router in (
+        health_routes(sources),
+        plant_routes(sources.live, fan_out),
+        prediction_routes(sources),
+        gap_routes(sources),
+        alert_routes(sources.live, sources.viewer),
+        history_routes(sources.live, sources.store),
+        past_routes(sources),
+        metrics_routes(sources, fan_out),
+        page_routes(sources.access, failures),
+    ):
+        app.include_router(router)
+    serve_page(app)
+    app.state.fan_out, app.state.sources = fan_out, sources
+    return app

@@ -1,0 +1,56 @@
+"""Server-sent events, encoded once for all who read the same thing."""
+
+import json
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+from cnctwin.api.value_object import QUALITY_NAMES, Plain
+
+Row = tuple[int, str, Plain, int, str | None]  # t, signal, value, quality, reason
+ALL = "*"  # readers of the fleet, and of any machine
+
+
+class Batch(NamedTuple):
+    """An event and who is to have it: the readers of a machine, of the fleet (None), or all (`ALL`)."""
+
+    machine: str | None
+    payload: bytes
+
+
+def event(name: str, value: Any) -> bytes:
+    """One event as the wire has it. JSON in one line holds no line break, so no text can end the event early.
+
+    >>> event("rows", {"now": 1})
+    b'event: rows\\ndata: {"now":1}\\n\\n'
+    """
+    return b"event: %s\ndata: %s\n\n" % (name.encode(), json.dumps(value, separators=(",", ":"), allow_nan=False).encode())
+
+
+def state_batch(machine: str, state: dict[str, Any]) -> Batch:
+    """The whole state of a machine."""
+    return Batch(machine, event("state", state))
+
+
+def machine_rows(machine: str, now_ms: int, rows: Sequence[Row], *, online: bool, left_out: int) -> Batch:
+    """What has changed of a machine; `left_out` says how many rows there was no room for."""
+    names = QUALITY_NAMES
+    said: dict[str, Any] = {
+        "now": now_ms,
+        "rows": [(t_ms, name, value, names.get(quality, "bad"), reason) for t_ms, name, value, quality, reason in rows],
+        "online": online,
+    }
+    if left_out:
+        said["left_out"] = left_out
+    return Batch(machine, event("rows", said))
+
+
+def fleet_rows(now_ms: int, rows: Sequence[tuple[str, Row]]) -> Batch:
+    """What has changed of the fleet's key signals."""
+    names = QUALITY_NAMES
+    said = [(machine, row[0], row[1], row[2], names.get(row[3], "bad")) for machine, row in rows]
+    return Batch(None, event("fleet_rows", {"now": now_ms, "rows": said}))
+
+
+def alerts_batch(now_ms: int, alerts: dict[str, Any]) -> Batch:
+    """The state of alerts, for everybody."""
+    return Batch(ALL, event("alerts", {**alerts, "now": now_ms, "available": True, "reason": None}))

@@ -1,0 +1,137 @@
+"""GET /health, /livez, /readyz: which part is missing, and what to do about it."""
+
+import time
+from datetime import UTC, datetime
+from typing import Any
+
+from fastapi import APIRouter
+from fastapi.responses import JSONResponse, Response
+
+from cnctwin.alert_commands import FRESH_S_MAX
+from cnctwin.api.answers import Health, Part, Ready
+from cnctwin.api.errors import ApiError
+from cnctwin.api.live_plant import LivePlant
+from cnctwin.api.residual import models_part
+from cnctwin.api.sources import Sources
+from cnctwin.errors import ProgramError
+from cnctwin.page import WEB
+from sparkplug.connection import now_ms
+
+
+def health_routes(sources: Sources) -> APIRouter:
+    """The routes."""
+    router = APIRouter(tags=["health"])
+
+    @router.get("/livez")
+    async def livez() -> dict[str, bool]:
+        """The process answers."""
+        return {"alive": True}
+
+    @router.get("/readyz", response_model=Ready)
+    async def readyz() -> Response:
+        """It can serve: green without models, store or broker, which are degradations; /health says which are missing."""
+        if sources.viewer is not None and not sources.viewer.alive:
+            return JSONResponse(
+                {"ready": False, "error": "the thread that listens to the broker has ended; restart the server"}, 503
+            )
+        return JSONResponse({"ready": True})
+
+    @router.get("/health", response_model=Health)
+    async def health() -> Any:
+        """Each part with its state, the reason and what to do; 200 also where some are missing."""
+        parts = [_broker(sources), _plant(sources.live), await _store(sources), _constants(sources)]
+        parts += [await sources.store.work(lambda: models_part(sources.models))]
+        parts += [_alerts(sources.live), _diagnoses(sources), _page()]
+        degraded = any(part.state in ("degraded", "missing") for part in parts)
+        return Health(status="degraded" if degraded else "ok", now=now_ms(), parts=parts)
+
+    return router
+
+
+def _broker(sources: Sources) -> Part:
+    viewer = sources.viewer
+    if viewer is None:
+        return Part(part="broker", state="off", reason="no broker is listened to")
+    if not viewer.online:
+        return Part(part="broker", state="missing", reason=viewer.trouble, do="start the broker, or name it with --broker")
+    lost = viewer.counts()["dropped"]
+    if lost:
+        return Part(
+            part="broker", state="degraded", reason=f"{lost} messages came too fast to be read", do="give it more processor"
+        )
+    return Part(part="broker", state="ok", reason=f"{viewer.url}, group {viewer.group}")
+
+
+def _plant(live: LivePlant) -> Part:
+    fleet = live.fleet()
+    if not fleet:
+        return Part(part="machines", state="missing", reason="no machine was heard of", do="cnctwin edge run CONFIG")
+    offline = [item["machine"] for item in fleet if not item["online"]]
+    if offline:
+        names = ", ".join(offline[:10])
+        line = f"{len(offline)} of {len(fleet)} have no connection to their control: {names}"
+        return Part(part="machines", state="degraded", reason=line, do="cnctwin doctor")
+    return Part(part="machines", state="ok", reason=f"{len(fleet)} online")
+
+
+async def _store(sources: Sources) -> Part:
+    if not sources.store.configured:
+        line = "no store: history is that of the last minutes"
+        return Part(part="store", state="missing", reason=line, do="cnctwin process historian, and cnctwin serve --store WHERE")
+    try:
+        status = await sources.store.status()
+    except (ApiError, ProgramError) as error:
+        return Part(part="store", state="missing", reason=str(error), do="cnctwin process historian")
+    if status.trouble:
+        return Part(part="store", state="degraded", reason=status.trouble, do="cnctwin store status")
+    left = "" if status.days_left is None else f", {status.days_left:.0f} days of disk left"
+    return Part(part="store", state="ok", reason=f"{status.samples} samples, {status.bytes} bytes{left}")
+
+
+def _constants(sources: Sources) -> Part:
+    path = sources.constants.path
+    if path is None:
+        line = "predictions rest on default constants, which are good for trends only"
+        return Part(part="constants", state="degraded", reason=line, do="cnctwin serve --config processors.toml")
+    return Part(part="constants", state="ok", reason=str(path))
+
+
+def _alerts(live: LivePlant) -> Part:
+    state = live.alerts()
+    if state is None:
+        return Part(part="alerts", state="missing", reason="nothing was heard of alerts", do="cnctwin process alerts")
+    age_s = state_age_s(state, time.time())
+    if age_s > FRESH_S_MAX:
+        line = f"the state of alerts is {age_s:.0f} s old: the processor does not run any more"
+        return Part(part="alerts", state="degraded", reason=line, do="cnctwin process alerts")
+    return Part(part="alerts", state="ok", reason="the processor keeps its state up")
+
+
+def _diagnoses(sources: Sources) -> Part:
+    folder = sources.diagnoses
+    if folder is None:
+        return Part(part="diagnoses", state="off", reason="no folder of diagnoses was named", do="cnctwin serve --diagnoses DIR")
+    if not folder.is_dir():
+        line = f"{folder} is no folder"
+        return Part(part="diagnoses", state="missing", reason=line, do="cnctwin gap diagnose CASE --out DIR/<machine>")
+    return Part(part="diagnoses", state="ok", reason=str(folder))
+
+
+def _page() -> Part:
+    if not (WEB / "index.html").is_file():
+        return Part(
+            part="page", state="missing", reason="the page's files are not installed", do="install cnctwin from its wheel"
+        )
+    return Part(part="page", state="ok")
+
+
+def state_age_s(state: dict[str, Any], now_s: float) -> float:
+    """How old the alerts processor's state is; for ever, where it does not say.
+
+    >>> state_age_s({"at": "1970-01-01T00:01:00.000Z"}, 90.0)
+    30.0
+    """
+    try:
+        return now_s - datetime.fromisoformat(str(state["at"])).astimezone(UTC).timestamp()
+    except (KeyError, ValueError, OverflowError):
+        return float("inf")

@@ -1,0 +1,369 @@
+"""What the interface knows of the plant: last readings, the last minutes of each signal, what its readers are still to be told.
+
+One thread feeds it (`take`, `flush`); any thread may ask. A lock is held for as long as it takes to read or write tables, never
+over an encoding or a wait. Readings that an edge sends late, as history, are not in it: they are in the store.
+"""
+
+import threading
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from math import isfinite
+from typing import Any, NamedTuple
+
+from cnctwin.api.batches import Batch, Row, alerts_batch, fleet_rows, machine_rows, state_batch
+from cnctwin.api.fleet import fleet_item, is_key_signal
+from cnctwin.api.trace import Sample, Trace
+from cnctwin.api.value_object import plain, value_object
+from cnctwin.plant import TWIN_PREFIX
+from sparkplug.host_session import EventKind, HostEvent
+from sparkplug.metric import NodeId, Reading
+from sparkplug.quality import Quality
+from sparkplug.values import DataSet, PropertySet, Template
+
+MACHINES_MAX = 1000
+SIGNALS_MAX = 2000  # of one device; what is beyond is counted
+ROWS_MAX = 5000  # that wait for one flush, of one machine
+EVENTS_A_LOCK = 50  # so that who asks waits a millisecond or two
+SILENCE_MS_MAX = 2000  # readers hear something at least so often
+MEASURED = "measured"
+_UNSHOWN = (tuple, bytes, DataSet, Template)  # NaN is kept as a null
+Describe = Callable[[NodeId, str | None], Mapping[str, PropertySet]]
+
+
+class Signal:
+    """One metric of one owner: its last reading, its trace, and what the birth says of it."""
+
+    __slots__ = ("is_key", "live_ms", "meaning", "provenance", "reading", "trace", "whole_ms")
+
+    def __init__(self, reading: Reading, provenance: str, meaning: str | None) -> None:
+        self.reading = reading
+        self.provenance = provenance
+        self.meaning = meaning
+        self.trace = Trace()
+        self.is_key = is_key_signal(reading.name)
+        self.live_ms = reading.timestamp_ms  # of the last value that was told, and not only marked stale
+        self.whole_ms = reading.timestamp_ms  # nothing is missing in the trace since then
+
+
+@dataclass(slots=True)
+class Owner:
+    """The metrics of a device, or of a node itself, as one node tells them."""
+
+    online: bool = False
+    is_control: bool = False  # it tells measured values, not only the twin's
+    signals: dict[str, Signal] = field(default_factory=dict)
+
+
+class NodeView(NamedTuple):
+    """A node's own metrics (its ledger and its health)."""
+
+    node: str
+    online: bool
+    values: dict[str, Any]
+
+
+@dataclass(slots=True)
+class _Waiting:
+    """What the readers of a machine have still to be told."""
+
+    rows: list[Row] = field(default_factory=list)
+    left_out: int = 0
+    is_anew: bool = False
+    told_ms: int = 0
+    readers: int = 0
+
+
+class LivePlant:
+    """The plant as it is now. `take` and `flush` belong to one thread."""
+
+    def __init__(self) -> None:
+        self.counts: Counter[str] = Counter()
+        self._lock = threading.Lock()
+        self._machines: dict[str, dict[NodeId, Owner]] = {}
+        self._nodes: dict[NodeId, Owner] = {}
+        self._waiting: dict[str, _Waiting] = {}
+        self._fleet: dict[tuple[str, str], Row] = {}
+        self._fleet_readers = 0
+        self._fleet_told_ms = 0
+        self._alerts: dict[str, Any] | None = None
+        self._alerts_are_new = False
+
+    # What the feeding thread tells.
+
+    def take(self, events: Sequence[HostEvent], now_ms: int, describe: Describe = lambda _node, _device: {}) -> None:
+        """Take over what a host application has heard."""
+        for start in range(0, len(events), EVENTS_A_LOCK):
+            with self._lock:
+                for event in events[start : start + EVENTS_A_LOCK]:
+                    if event.kind is EventKind.DATA:
+                        self._data(event, now_ms)
+                    elif event.kind is EventKind.BIRTH:
+                        self._birth(event, describe(event.node, event.device))
+                    elif event.kind is EventKind.DEATH:
+                        self._death(event)
+                    elif event.kind is EventKind.HOLE:
+                        self._hole(event)
+
+    def take_alerts(self, state: dict[str, Any]) -> None:
+        """The alerts processor's state, as it publishes it."""
+        with self._lock:
+            self._alerts, self._alerts_are_new = state, True
+
+    def flush(self, now_ms: int) -> list[Batch]:
+        """What is to be sent to readers now: each message is encoded once, however many read it."""
+        with self._lock:
+            jobs = [job for machine, waiting in self._waiting.items() if (job := self._job(machine, waiting, now_ms)) is not None]
+            fleet, silent = list(self._fleet.items()), now_ms - self._fleet_told_ms >= SILENCE_MS_MAX
+            self._fleet = {}
+            tell_fleet = bool(self._fleet_readers and (fleet or silent))
+            if tell_fleet:
+                self._fleet_told_ms = now_ms
+            alerts = self._alerts if self._alerts_are_new and (self._fleet_readers or self._waiting) else None
+            self._alerts_are_new = False
+        batches = [job() for job in jobs]
+        if tell_fleet:
+            batches.append(fleet_rows(now_ms, [(machine, row) for (machine, _), row in fleet]))
+        if alerts is not None:
+            batches.append(alerts_batch(now_ms, alerts))
+        return batches
+
+    # What anybody may ask.
+
+    def machines(self) -> list[str]:
+        """All machines, by name."""
+        with self._lock:
+            return sorted(self._machines)
+
+    def fleet(self) -> list[dict[str, Any]]:
+        """Each machine in short."""
+        with self._lock:
+            return [fleet_item(name, *self._merged(name)) for name in sorted(self._machines)]
+
+    def state(self, machine: str, now_ms: int) -> dict[str, Any] | None:
+        """All that is known of a machine now; None where nobody has heard of it."""
+        with self._lock:
+            return self._state(machine, now_ms) if machine in self._machines else None
+
+    def readings(self, machine: str) -> dict[str, Reading]:
+        """The last reading of each signal of a machine, the twin's included."""
+        with self._lock:
+            return {name: signal.reading for name, signal in self._merged(machine)[1].items()}
+
+    def recent(
+        self, machine: str, signals: Sequence[str], from_ms: int, to_ms: int
+    ) -> dict[str, tuple[str | None, list[Sample]]]:
+        """The samples of the last minutes in [from_ms, to_ms), with the unit, for each signal that is known."""
+        with self._lock:
+            known = self._merged(machine)[1]
+        found = {}
+        for name in signals:
+            if (signal := known.get(name)) is not None:
+                with self._lock:  # for each anew: sixty full traces would hold up the feeding thread
+                    found[name] = (signal.reading.unit, signal.trace.since(from_ms, to_ms))
+        return found
+
+    def remembers(self, machine: str, signals: Sequence[str], from_ms: int) -> bool:
+        """Whether the last minutes of these signals reach back to `from_ms`."""
+        with self._lock:
+            known = self._merged(machine)[1]
+            asked = [known.get(name) for name in signals]
+            return all(one is not None and max(one.whole_ms, one.trace.oldest_ms) <= from_ms for one in asked)
+
+    def alerts(self) -> dict[str, Any] | None:
+        """The alerts processor's state; None where it was not heard."""
+        with self._lock:
+            return self._alerts
+
+    def nodes(self) -> list[NodeView]:
+        """Each node with its own metrics."""
+        with self._lock:
+            return [
+                NodeView(node.node, owner.online, {name: one.reading.value for name, one in owner.signals.items()})
+                for node, owner in sorted(self._nodes.items())
+            ]
+
+    def watch(self, machine: str | None) -> None:
+        """Somebody reads a machine (None: the fleet) from now on."""
+        with self._lock:
+            if machine is None:
+                self._fleet_readers += 1
+            else:
+                self._waiting.setdefault(machine, _Waiting()).readers += 1
+
+    def unwatch(self, machine: str | None) -> None:
+        """Somebody does no longer."""
+        with self._lock:
+            if machine is None:
+                self._fleet_readers -= 1
+            else:
+                self._waiting[machine].readers -= 1
+                if not self._waiting[machine].readers:
+                    del self._waiting[machine]
+
+    # How it is done; the lock is held.
+
+    def _owner(self, event: HostEvent) -> Owner | None:
+        if event.device is None:
+            return self._nodes.setdefault(event.node, Owner())
+        owners = self._machines.get(event.device)
+        if owners is None:
+            if len(self._machines) >= MACHINES_MAX:
+                self.counts["machines_over_limit"] += 1
+                return None
+            owners = self._machines[event.device] = {}
+        return owners.setdefault(event.node, Owner())
+
+    def _birth(self, event: HostEvent, properties: Mapping[str, PropertySet]) -> None:
+        owner = self._owner(event)
+        if owner is None:
+            return
+        before, owner.online, owner.signals = owner.signals, True, {}
+        for reading in event.readings:
+            if len(owner.signals) >= SIGNALS_MAX:
+                self.counts["signals_over_limit"] += 1
+                continue
+            told = properties.get(reading.name, {})
+            signal = Signal(reading, _text(told, "provenance") or MEASURED, _text(told, "meaning"))
+            owner.signals[reading.name] = signal
+            if event.device is None:
+                continue
+            if (known := before.get(reading.name)) is not None:
+                signal.trace = known.trace
+                if reading.timestamp_ms <= known.live_ms:
+                    signal.live_ms, signal.whole_ms = known.live_ms, known.whole_ms
+            self._keep(signal, born_ms=event.timestamp_ms)
+        owner.is_control = any(not name.startswith(TWIN_PREFIX) for name in owner.signals)
+        self._anew(event, owner)
+
+    def _data(self, event: HostEvent, now_ms: int) -> None:
+        device = event.device
+        owner = self._nodes.get(event.node) if device is None else self._machines.get(device, {}).get(event.node)
+        if owner is None:
+            return
+        signals = owner.signals
+        waiting = None if device is None else self._waiting.get(device)
+        newest_ms = 0
+        for reading in event.readings:
+            signal = signals.get(reading.name)
+            if signal is None or reading.is_historical:
+                continue
+            signal.reading = reading
+            newest_ms = max(newest_ms, reading.timestamp_ms)
+            if device is None:
+                continue
+            row = self._keep(signal)
+            if waiting is not None:
+                if len(waiting.rows) < ROWS_MAX:
+                    waiting.rows.append(row)
+                else:
+                    waiting.left_out += 1
+            if signal.is_key and self._fleet_readers:
+                self._fleet[device, reading.name] = row
+        if newest_ms and device is not None:
+            self.counts["messages"] += 1
+            self.counts["latency_ms"] += max(now_ms - newest_ms, 0)
+
+    def _death(self, event: HostEvent) -> None:
+        owner = self._owner(event)
+        if owner is None:
+            return
+        for reading in event.readings:
+            signal = owner.signals.get(reading.name)
+            if signal is not None:
+                if owner.online:
+                    signal.live_ms = signal.reading.timestamp_ms
+                signal.reading = reading
+                if event.device is not None:
+                    self._keep(signal)
+        owner.online = False
+        self._anew(event, owner)
+
+    def _hole(self, event: HostEvent) -> None:
+        self.counts["holes"] += 1
+        for owners in self._machines.values():
+            if (owner := owners.get(event.node)) is not None:
+                for signal in owner.signals.values():
+                    signal.whole_ms = max(signal.whole_ms, event.timestamp_ms)
+
+    def _keep(self, signal: Signal, born_ms: int = 0) -> Row:
+        """Put the signal's reading into its trace; the row that readers are told.
+
+        A birth (at `born_ms`) repeats what is known with its old time; where a death had made it stale, it is good again from
+        the birth on.
+        """
+        reading, trace = signal.reading, signal.trace
+        name, value, t_ms, quality, _, reason, _ = reading
+        if not born_ms and reason is None and quality == Quality.GOOD and isinstance(value, float) and isfinite(value):
+            if not trace.add_good(t_ms, value):
+                trace.add(t_ms, value, Quality.GOOD, None)
+            return (t_ms, name, value, Quality.GOOD, None)
+        row = _row(reading)
+        if not isinstance(value, _UNSHOWN):
+            if born_ms and t_ms <= trace.newest_ms:
+                if trace.is_stale:
+                    trace.add(born_ms, *row[2:])
+            else:
+                trace.add(t_ms, *row[2:])
+        return row
+
+    def _anew(self, event: HostEvent, owner: Owner) -> None:
+        """Units, signals or the connection may have changed: readers are told the whole state."""
+        device = event.device
+        if device is None:
+            return
+        if (waiting := self._waiting.get(device)) is not None:
+            waiting.is_anew, waiting.rows = True, []
+        if self._fleet_readers:
+            for name, signal in owner.signals.items():
+                if signal.is_key:
+                    self._fleet[device, name] = _row(signal.reading)
+            self._fleet[device, "online"] = (event.timestamp_ms, "online", self._online(device), Quality.GOOD, None)
+
+    def _job(self, machine: str, waiting: _Waiting, now_ms: int) -> Callable[[], Batch] | None:
+        if not (waiting.rows or waiting.is_anew or now_ms - waiting.told_ms >= SILENCE_MS_MAX):
+            return None
+        waiting.told_ms = now_ms
+        online = self._online(machine)
+        if waiting.is_anew:
+            waiting.is_anew, waiting.rows = False, []
+            state = self._state(machine, now_ms)
+            return lambda: state_batch(machine, state)
+        rows, waiting.rows = waiting.rows, []
+        left_out, waiting.left_out = waiting.left_out, 0
+        return lambda: machine_rows(machine, now_ms, rows, online=online, left_out=left_out)
+
+    def _merged(self, machine: str) -> tuple[bool, dict[str, Signal]]:
+        """Whether the control is connected, and the signals of all nodes that speak of the machine."""
+        signals: dict[str, Signal] = {}
+        for owner in self._machines.get(machine, {}).values():
+            signals.update(owner.signals)
+        return self._online(machine), signals
+
+    def _online(self, machine: str) -> bool:
+        return any(owner.online and owner.is_control for owner in self._machines.get(machine, {}).values())
+
+    def _state(self, machine: str, now_ms: int) -> dict[str, Any]:
+        online, signals = self._merged(machine)
+        measured: dict[str, Any] = {}
+        twin: dict[str, Any] = {}
+        for name, signal in _sorted(signals):
+            side = twin if name.startswith(TWIN_PREFIX) else measured
+            side[name] = value_object(signal.reading, signal.provenance, signal.meaning)
+        return {"machine": machine, "now": now_ms, "online": online, "measured": measured, "twin": twin}
+
+
+def _row(reading: Reading) -> Row:
+    """A reading as readers are told it."""
+    value, trouble = plain(reading.value)
+    quality = Quality.BAD if trouble else reading.quality
+    return (reading.timestamp_ms, reading.name, value, quality, trouble or reading.reason)
+
+
+def _sorted(signals: Mapping[str, Signal]) -> Iterator[tuple[str, Signal]]:
+    yield from sorted(signals.items())
+
+
+def _text(properties: PropertySet, name: str) -> str | None:
+    found = properties.get(name)
+    return found.value if found is not None and isinstance(found.value, str) else None

@@ -1,0 +1,33 @@
+"""GET /metrics: the whole plant for Prometheus, from what the nodes publish of themselves."""
+
+from fastapi import APIRouter
+from fastapi.responses import Response
+
+from cnctwin.api.errors import ApiError
+from cnctwin.api.fan_out import FanOut
+from cnctwin.api.metrics_text import PlantCollector, text
+from cnctwin.api.sources import Sources
+from cnctwin.errors import ProgramError
+from cnctwin.store.contract import Status
+from sparkplug.connection import now_ms
+
+MEDIA_TYPE = "text/plain; version=0.0.4; charset=utf-8"
+
+
+def metrics_routes(sources: Sources, fan_out: FanOut) -> APIRouter:
+    """The route."""
+    router = APIRouter(tags=["health"])
+
+    @router.get("/metrics", response_class=Response, responses={200: {"content": {"text/plain": {}}}})
+    async def metrics() -> Response:
+        """Prometheus text: ages, ledgers, health, alerts, gates, store, and this server's own streams."""
+        status: Status | None = None
+        if sources.store.configured:
+            try:
+                status = await sources.store.status()
+            except (ApiError, ProgramError):
+                status = None
+        collector = PlantCollector(sources, status, len(fan_out), fan_out.dropped, now_ms())
+        return Response(await sources.store.work(lambda: text(collector)), media_type=MEDIA_TYPE)
+
+    return router

@@ -1,0 +1,204 @@
+"""The plant as Prometheus metrics. Each scrape is read from the live plant anew; nothing is counted here."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+from prometheus_client import CollectorRegistry, generate_latest
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
+from prometheus_client.registry import Collector
+
+from cnctwin.api.fleet import GATE, GROWING, is_gap_figure
+from cnctwin.api.live_plant import NodeView
+from cnctwin.api.metrics_validation import validation_metrics
+from cnctwin.api.sources import Sources
+from cnctwin.plant import TWIN_PREFIX
+from cnctwin.store.contract import Status
+from sparkplug.metric import Reading
+from sparkplug.quality import Quality
+
+_LEDGER, _REASON = "ledger/", "ledger/dropped/"
+PHASES = ("pending", "firing", "acknowledged", "resolved")
+NODE_GAUGES = {
+    "twin_processor_lag_seconds": ("health/lag_s", "age of the last message when it was taken"),
+    "twin_processor_lag_events": ("health/queue_depth", "messages behind the network thread"),
+    "twin_processor_queue_depth": ("health/queue_depth", "messages behind the network thread"),
+    "twin_state_checkpoint_age_seconds": ("health/snapshot_age_s", "age of the oldest unsaved state"),
+    "twin_buffer_oldest_age_seconds": ("health/store_age_s", "age of the oldest row that no broker has confirmed"),
+    "twin_buffer_rows": ("health/store_rows", "rows that no broker has confirmed"),
+    "twin_buffer_bytes": ("health/store_bytes", "size of the edge's ring"),
+    "twin_control_online": ("health/control_online", "whether the edge has its control"),
+}
+NODE_COUNTERS = {
+    "twin_late": ("health/late", "messages behind the machine's clock"),
+    "twin_dead_letters": ("health/dead_letters", "samples that a fold could not take"),
+    "twin_reconnects": ("health/reconnects", "connections made again"),
+    "twin_replayed": ("health/store_history_rows", "rows sent as history"),
+    "twin_evicted": ("health/store_evicted_rows", "rows lost to a limit of the edge's ring"),
+}
+MACHINE_GAUGES = {
+    "twin_clock_offset_seconds": ("clock_offset_s", "controller clock minus edge clock"),
+    "twin_gate_active": (GATE, "1 while a tool change and its tail gate the score"),
+    "twin_raw_score": (f"{TWIN_PREFIX}raw_score", "anomaly score before gates"),
+    "twin_adjusted_score": (f"{TWIN_PREFIX}adjusted_score", "anomaly score that alarms are made of"),
+    "twin_spindle_temp_residual_kelvin": (f"{TWIN_PREFIX}spindle_temp_residual_k", "measured minus modelled"),
+    "twin_residual_rmse": (f"{TWIN_PREFIX}residual_rmse_k", "of the corrected temperature"),
+    "twin_gap_growing": (GROWING, "1 where the gap of some signal grows"),
+}
+
+
+class PlantCollector(Collector):
+    """All metrics of one scrape."""
+
+    def __init__(self, sources: Sources, status: Status | None, streams: int, dropped: int, now_ms: int) -> None:
+        self._sources, self._status, self._now_ms = sources, status, now_ms
+        self._streams, self._dropped = streams, dropped
+
+    def collect(self) -> Iterator[Metric]:
+        """The families, in groups: machines, nodes, alerts, store, this server."""
+        live = self._sources.live
+        online = {item["machine"]: bool(item["online"]) for item in live.fleet()}
+        yield from _machines({name: (is_on, live.readings(name)) for name, is_on in online.items()}, self._now_ms)
+        yield from _nodes(live.nodes())
+        yield from _alerts(live.alerts())
+        yield from validation_metrics([told for name in online if (told := self._sources.nights.of(name))["t"] is not None])
+        yield from self._store()
+        yield from self._server()
+
+    def _store(self) -> Iterator[Metric]:
+        store, status = self._sources.store, self._status
+        if not store.configured:
+            return
+        yield GaugeMetricFamily(
+            "twin_store_up", "whether the store answers without trouble", float(bool(status) and not _trouble(status))
+        )
+        if status is None:
+            return
+        yield CounterMetricFamily("twin_store_samples", "samples in the store", status.samples)
+        yield CounterMetricFamily("twin_store_rows", "samples in the store", status.samples)
+        yield GaugeMetricFamily("twin_store_bytes", "bytes on the disk", status.bytes)
+        yield GaugeMetricFamily("twin_store_waiting", "samples that wait to be written", status.waiting)
+        if status.days_left is not None:
+            yield GaugeMetricFamily("twin_store_days_left", "how long the disk lasts at the present rate", status.days_left)
+        if status.newest_ms is not None:
+            age_s = max(self._now_ms - status.newest_ms, 0) / 1000.0
+            yield GaugeMetricFamily("twin_store_age_seconds", "age of the newest sample", age_s)
+
+    def _server(self) -> Iterator[Metric]:
+        viewer, counts = self._sources.viewer, self._sources.live.counts
+        yield GaugeMetricFamily("twin_page_streams", "open streams", self._streams)
+        yield CounterMetricFamily("twin_page_streams_dropped", "streams let go because they did not keep up", self._dropped)
+        yield CounterMetricFamily("twin_page_messages", "messages of machines that this server has heard", counts["messages"])
+        latency = CounterMetricFamily("twin_page_latency_seconds_sum", "sum of event time to arrival, over twin_page_messages")
+        latency.add_metric([], counts["latency_ms"] / 1000.0)
+        yield latency
+        models = self._sources.models
+        missing = GaugeMetricFamily("twin_model_missing", "1 where a model is configured and not there", labels=["model"])
+        missing.add_metric(["residual"], float(models.folder is not None and not models.current()[0]))
+        yield missing
+        versions = GaugeMetricFamily(
+            "twin_model_version_info", "the model of each machine", labels=["model", "machine", "version"]
+        )
+        for machine, model in models.current()[0].items():
+            versions.add_metric(["residual", machine, model.version], 1.0)
+        yield versions
+        if viewer is None:
+            return
+        told = viewer.counts()
+        yield GaugeMetricFamily("twin_broker_up", "whether this server has its broker", float(viewer.online))
+        yield CounterMetricFamily("twin_rebirth_requests", "births asked for by this server", told.get("rebirths_requested", 0))
+        yield CounterMetricFamily("twin_malformed", "messages that could not be read", told.get("malformed", 0))
+        yield CounterMetricFamily("twin_page_dropped", "messages that came too fast for this server", told["dropped"])
+
+
+def text(collector: PlantCollector) -> bytes:
+    """The scrape as text."""
+    registry = CollectorRegistry(auto_describe=False)
+    registry.register(collector)
+    return generate_latest(registry)
+
+
+def _machines(machines: Mapping[str, tuple[bool, Mapping[str, Reading]]], now_ms: int) -> Iterator[Metric]:
+    age = GaugeMetricFamily("twin_source_age_seconds", "event time of the newest measured value to now", labels=["machine"])
+    online = GaugeMetricFamily("twin_source_online", "whether the machine's control is connected", labels=["machine"])
+    gap = GaugeMetricFamily("twin_gap", "standing gap, rms over its floor", labels=["machine", "signal"])
+    for machine, (is_online, readings) in machines.items():
+        newest_ms = max((r.timestamp_ms for name, r in readings.items() if not name.startswith(TWIN_PREFIX)), default=None)
+        online.add_metric([machine], float(is_online))
+        if newest_ms is not None:
+            age.add_metric([machine], max(now_ms - newest_ms, 0) / 1000.0)
+        for name, reading in readings.items():
+            if is_gap_figure(name) and (value := _number(reading)) is not None:
+                gap.add_metric([machine, name.removeprefix(f"{TWIN_PREFIX}gap_")], value)
+    yield from (age, online, gap)
+    for title, (name, meaning) in MACHINE_GAUGES.items():
+        family = GaugeMetricFamily(title, meaning, labels=["machine"])
+        for machine, (_, readings) in machines.items():
+            if (value := _number(readings.get(name))) is not None:
+                family.add_metric([machine], value)
+        yield family
+
+
+def _nodes(nodes: Iterable[NodeView]) -> Iterator[Metric]:
+    told = list(nodes)
+    online = GaugeMetricFamily("twin_node_online", "whether an edge node or processor is born", labels=["node"])
+    ledger = {
+        name: CounterMetricFamily(f"twin_{name}", f"messages {name}, by the node's ledger", labels=["node"])
+        for name in ("received", "emitted")
+    }
+    depth = GaugeMetricFamily("twin_buffer_depth", "what a node holds, by its ledger", labels=["node"])
+    difference = GaugeMetricFamily(
+        "twin_ledger_difference", "received - emitted - dropped - buffered; 0 where it balances", labels=["node"]
+    )
+    dropped = CounterMetricFamily("twin_dropped", "what led to nothing, by reason", labels=["node", "reason"])
+    holes = CounterMetricFamily("twin_seq_gaps", "times that messages were missing", labels=["layer", "node"])
+    for node, is_online, values in told:
+        online.add_metric([node], float(is_online))
+        if (gaps := _count(values.get("health/holes"))) is not None:
+            holes.add_metric(["sparkplug" if node.startswith("twin-") else "mtconnect", node], gaps)
+        sums = {name: _count(values.get(f"{_LEDGER}{name}")) for name in ("received", "emitted", "buffered", "dropped")}
+        if sums["received"] is None:
+            continue
+        for name, family in ledger.items():
+            family.add_metric([node], sums[name] or 0.0)
+        depth.add_metric([node], sums["buffered"] or 0.0)
+        difference.add_metric([node], sums["received"] - sum(sums[name] or 0.0 for name in ("emitted", "buffered", "dropped")))
+        for name, value in values.items():
+            if name.startswith(_REASON) and (count := _count(value)) is not None:
+                dropped.add_metric([node, name.removeprefix(_REASON)], count)
+    yield from (online, *ledger.values(), depth, difference, dropped, holes)
+    yield from _by_table(told, NODE_GAUGES, GaugeMetricFamily)
+    yield from _by_table(told, NODE_COUNTERS, CounterMetricFamily)
+
+
+def _by_table(nodes: Iterable[NodeView], table: Mapping[str, tuple[str, str]], kind: Any) -> Iterator[Metric]:
+    for title, (name, meaning) in table.items():
+        family = kind(title, meaning, labels=["node"])
+        for node, _, values in nodes:
+            if (value := _count(values.get(name))) is not None:
+                family.add_metric([node], value)
+        yield family
+
+
+def _alerts(state: Mapping[str, Any] | None) -> Iterator[Metric]:
+    if state is None:
+        return
+    phases = [alert.get("phase") for alert in state.get("alerts", ()) if isinstance(alert, dict)]
+    for title in ("twin_alerts", "twin_alerts_total"):
+        family = GaugeMetricFamily(title, "alerts by their state", labels=["state"])
+        for phase in PHASES:
+            family.add_metric([phase], phases.count(phase))
+        yield family
+
+
+def _number(reading: Reading | None) -> float | None:
+    if reading is None or reading.quality is not Quality.GOOD:
+        return None
+    return _count(reading.value)
+
+
+def _count(value: object) -> float | None:
+    return float(value) if isinstance(value, bool | int | float) else None
+
+
+def _trouble(status: Status | None) -> bool:
+    return status is None or bool(status.trouble)

@@ -1,0 +1,35 @@
+"""What an application stands on. Each part but the live plant may be missing; /health says which, and what to do."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from cnctwin.api.access import Access
+from cnctwin.api.constants import Constants
+from cnctwin.api.live_plant import LivePlant
+from cnctwin.api.nights import Nights
+from cnctwin.api.residual import Models
+from cnctwin.api.store_reader import StoreReader
+from cnctwin.api.viewer import Viewer
+
+
+@dataclass(frozen=True, slots=True)
+class Sources:
+    """The live plant, and beside it what the command was given.
+
+    viewer: feeds the live plant from a broker; None where somebody else does
+    store: answers questions about the past
+    constants: of the machines, for predictions
+    models: the residual models, for predictions
+    diagnoses: the folder with one folder for each machine, as `cnctwin gap diagnose` writes it
+    nights: in which the twin was judged
+    access: who may ask
+    """
+
+    live: LivePlant
+    viewer: Viewer | None = None
+    store: StoreReader = field(default_factory=StoreReader)
+    constants: Constants = field(default_factory=Constants)
+    models: Models = field(default_factory=lambda: Models(None))
+    diagnoses: Path | None = None
+    nights: Nights = field(default_factory=Nights)
+    access: Access = field(default_factory=Access)

@@ -1,0 +1,121 @@
+"""The interface's ear on the broker: a thread that feeds the live plant and hands on what its readers are to be told."""
+
+import json
+import logging
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from cnctwin.alert_commands import STATE as ALERTS_TOPIC
+from cnctwin.api.batches import Batch
+from cnctwin.api.live_plant import LivePlant
+from cnctwin.watch import viewer
+from sparkplug.broker import BrokerAddress
+from sparkplug.connection import now_ms
+from sparkplug.host_session import EventKind, HostEvent
+from sparkplug.metric import NodeId
+from sparkplug.values import PropertySet
+
+FLUSH_S = 0.1
+POLL_S = 0.05
+ALERTS_BYTES_MAX = 4_000_000
+OUTBOX_MAX = 100
+_log = logging.getLogger(__name__)
+
+
+class Viewer:
+    """Between `start` and `stop` the plant is kept up to date. `on_batches` is called from the thread."""
+
+    def __init__(self, broker: BrokerAddress, group: str, live: LivePlant) -> None:
+        self.url = broker.url
+        self.group = group
+        self.on_batches: Callable[[list[Batch]], None] = lambda _: None
+        self._live = live
+        self._host = viewer(broker, group)
+        self._host.subscribe_plain(ALERTS_TOPIC)
+        self._outbox: deque[tuple[str, bytes]] = deque(maxlen=OUTBOX_MAX)
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="viewer", daemon=True)
+
+    def start(self) -> None:
+        """Begin to connect and to listen; returns at once."""
+        self._host.start()
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Stop listening and disconnect."""
+        self._stop.set()
+        self._thread.join(5.0)
+        self._host.stop()
+
+    @property
+    def alive(self) -> bool:
+        """Whether the thread runs."""
+        return self._thread.is_alive()
+
+    @property
+    def online(self) -> bool:
+        """Whether the broker has accepted us."""
+        return self._host.online
+
+    @property
+    def trouble(self) -> str:
+        """Why there is no connection; empty while there is one."""
+        return "" if self._host.online else self._host.last_error or f"no connection to {self.url} yet"
+
+    def counts(self) -> dict[str, int]:
+        """What the session has counted, with what the inbox dropped, how much waits in it, and connections made again."""
+        host = self._host
+        return {**host.counts, "dropped": host.dropped, "queue": host.queue_depth, "reconnects": host.reconnects}
+
+    def publish(self, topic: str, payload: bytes) -> bool:
+        """Have a plain message sent; False where there is no connection or too much waits."""
+        if not self._host.online or len(self._outbox) >= OUTBOX_MAX:
+            return False
+        self._outbox.append((topic, payload))
+        return True
+
+    def _run(self) -> None:
+        flushed_s = time.monotonic()
+        while not self._stop.is_set():
+            try:
+                self._take(self._host.poll(POLL_S))
+                while self._outbox:
+                    topic, payload = self._outbox.popleft()
+                    self._host.publish_plain(topic, payload, qos=1)
+                now_s = time.monotonic()
+                if now_s - flushed_s >= FLUSH_S:
+                    flushed_s = now_s
+                    if batches := self._live.flush(now_ms()):
+                        self.on_batches(batches)
+            except Exception:
+                # One message that we cannot digest is no reason to show nothing any more.
+                _log.exception("the view failed at a message; it goes on with the next")
+                self._live.counts["failures"] += 1
+                self._stop.wait(POLL_S)
+
+    def _take(self, events: list[HostEvent]) -> None:
+        if not events:
+            return
+        self._live.take(events, now_ms(), self._describe)
+        for event in events:
+            is_state = event.kind is EventKind.PLAIN and event.topic == ALERTS_TOPIC
+            if is_state and (state := _parsed(event.payload)) is not None:
+                self._live.take_alerts(state)
+
+    def _describe(self, node: NodeId, device: str | None) -> Mapping[str, PropertySet]:
+        picture = self._host.picture(node)
+        owner = None if picture is None else picture.owner(device)
+        return {} if owner is None else owner.properties
+
+
+def _parsed(payload: bytes) -> dict[str, Any] | None:
+    if len(payload) > ALERTS_BYTES_MAX:
+        return None
+    try:
+        state = json.loads(payload)
+    except (ValueError, RecursionError):
+        return None
+    return state if isinstance(state, dict) else None

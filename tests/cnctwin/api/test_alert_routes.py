@@ -1,0 +1,132 @@
+"""Alerts over the real processor and a real broker: listed, streamed, acknowledged."""
+
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import httpx
+import pytest
+
+from cnctwin.api import alert_routes
+from cnctwin.api.access import Access
+from cnctwin.api.server import Server
+from processors.runtime import run
+from sparkplug.broker import BrokerAddress
+from sparkplug.datatype import DataType
+from sparkplug.edge_node import EdgeNode
+from sparkplug.metric import Change, MetricSpec, NodeId
+from tests.cnctwin.api.served_plant import Stream, served
+from tests.cnctwin.api.small_plant import client_of, small_plant
+from tests.edge.host_watch import wait
+from tests.processors.courier.alert_shop import VIBRATION
+from tests.wire.mosquitto import Mosquitto
+
+PROXIED = Access(proxy_header="X-Remote-User", proxy="127.0.0.1")
+BEAT = "health/beat"
+NAMED = {"X-Remote-User": "grace"}
+
+
+@pytest.fixture
+def firing(mosquitto: Mosquitto, tmp_path: Path) -> Iterator[Mosquitto]:
+    """A machine whose alarm fires, and the processor that says so."""
+    file, stop = tmp_path / "alerts.toml", threading.Event()
+    file.write_text("[alerts]\ngroup_wait_s = 0.0\n")
+    broker = BrokerAddress(*mosquitto.address)
+    processor = threading.Thread(target=run, args=(("alerts",), broker, file, stop))
+    processor.start()
+    edge = EdgeNode(broker, NodeId("cnc", "edge-vmc"), [MetricSpec(BEAT, DataType.INT64)])
+    edge.declare_device("vmc", [MetricSpec(VIBRATION, DataType.BOOLEAN, value=True)])
+    edge.start()
+    beats = threading.Thread(target=beat, args=(edge, stop))
+    beats.start()
+    yield mosquitto
+    stop.set()
+    beats.join()
+    processor.join(20)
+    edge.stop()
+
+
+def beat(edge: EdgeNode, stop: threading.Event) -> None:
+    """As real edges do: who comes late hears something, and asks for the birth."""
+    while not stop.wait(0.2):
+        edge.publish(None, [Change(BEAT, time.monotonic_ns(), time.time_ns() // 1_000_000)])
+
+
+def alerts(server: Server, **headers: str) -> list[dict[str, object]]:
+    told = httpx.get(f"{server.url}/alerts", headers=headers).json()
+    found: list[dict[str, object]] = [one for one in told["alerts"] if one["labels"]["alertname"] == "rule_vibration"]
+    return found
+
+
+@pytest.mark.broker
+def test_an_alert_is_listed_streamed_and_acknowledged(firing: Mosquitto) -> None:
+    with served(firing) as server:
+        wait(lambda: alerts(server), "the alert")
+        (alert,) = alerts(server)
+        assert alert["phase"] == "firing"
+        told = httpx.get(f"{server.url}/alerts").json()
+        assert (told["available"], told["reason"]) == (True, None)
+        url = f"{server.url}/alerts/{str(alert['fingerprint'])[:8]}/acknowledge"
+        for body, status in (({"by": " "}, 400), ({"by": "ada", "episode": 1}, 409), ({"by": "ada", "episod": 1}, 400)):
+            refused = httpx.post(url, json=body)
+            assert (refused.status_code, list(refused.json())) == (status, ["error"])
+        assert alerts(server)[0]["phase"] == "firing"
+        with Stream(server.url, None) as stream:
+            answer = httpx.post(url, json={"by": "ada", "comment": "on my way", "episode": alert["episode"]})
+            assert (answer.status_code, answer.json()["done"]) == (200, True)
+            wait(lambda: [one for one in stream.last("alerts").get("alerts", ()) if one["acknowledged_by"] == "ada"], "the event")
+        (alert,) = alerts(server)
+        assert (alert["phase"], alert["comment"]) == ("acknowledged", "on my way")
+
+
+@pytest.mark.broker
+def test_behind_a_proxy_it_is_the_proxy_s_user_who_acknowledges(firing: Mosquitto) -> None:
+    with served(firing, access=PROXIED) as server:
+        wait(lambda: alerts(server, **NAMED), "the alert")
+        (alert,) = alerts(server, **NAMED)
+        url = f"{server.url}/alerts/{alert['fingerprint']}/acknowledge"
+        assert httpx.post(url, json={"by": "mallory"}).status_code == 401
+        assert httpx.post(url, json={"by": "mallory"}, headers=NAMED).status_code == 200
+        wait(lambda: alerts(server, **NAMED)[0]["acknowledged_by"] == "grace", "who acknowledged")
+
+
+@pytest.mark.broker
+def test_where_nobody_answers_it_says_so(mosquitto: Mosquitto, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(alert_routes, "ANSWER_S_MAX", 0.3)
+    with served(mosquitto) as server:
+        url = f"{server.url}/alerts/ea33a6/acknowledge"
+        unheard = httpx.post(url, json={"by": "ada"})
+        assert (unheard.status_code, unheard.json()["error"]) == (
+            503,
+            "nothing was heard of alerts; does the processor run? (cnctwin process alerts)",
+        )
+        state = {
+            "at": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
+            "alerts": [{"fingerprint": "ea33a6", "phase": "firing", "episode": 1}],
+        }
+        server._app.state.sources.live.take_alerts(state)
+        wait(lambda: httpx.get(f"{server.url}/health").json()["parts"][0]["state"] == "ok", "the broker")
+        nobody = httpx.post(url, json={"by": "ada"})
+        assert (nobody.status_code, "no answer within 0.3 s" in nobody.json()["error"]) == (504, True)
+
+
+def test_a_fingerprint_that_does_not_fire_is_refused() -> None:
+    live = small_plant()
+    at = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
+    live.take_alerts(
+        {"at": at, "alerts": [{"fingerprint": "ea33a6", "phase": "firing"}, {"fingerprint": "bb", "phase": "resolved"}]}
+    )
+    with client_of(live) as client:
+        for one in ("ffff", "e", "%2e%2e%2f", "EA33A6", "ea33a6%00", "ea33 a6", "*", "ea33a6" * 11):
+            refusal = client.post(f"/alerts/{one}/acknowledge", json={"by": "ada"})
+            assert (refusal.status_code in (400, 404, 503), list(refusal.json())) == (True, ["error"]), one
+
+
+def test_a_state_that_nobody_keeps_up_is_not_available() -> None:
+    live = small_plant()
+    live.take_alerts({"at": "2020-01-01T00:00:00Z", "alerts": []})
+    with client_of(live) as client:
+        told = client.get("/alerts").json()
+    assert told["available"] is False
+    assert "does not run any more" in told["reason"]
