@@ -15,7 +15,7 @@ from cnctwin.store.contract import Message, Pinned, Snapshot, Store, StoreError
 from cnctwin.store.opening import default_place, open_store
 from cnctwin.store.retention import Retention
 from edge.forwarder import SEQUENCE
-from edge.receipts import RECEIPT
+from edge.receipts import RECEIPT, REPEAT_S
 from edge.spans import Spans
 from processors.contract import TWIN_NODE_PREFIX
 from processors.effects import Pin
@@ -28,7 +28,9 @@ QUEUE_MAX = 400_000  # samples
 BATCH_MAX = 20_000  # samples
 GATHER_S = 0.05
 TIDY_S, STATUS_S = 60.0, 5.0
+AGAIN_S = 5.0  # after a `tidy` that sealed something
 RETRY_S_MAX = 10.0
+BEHIND_S, BEHIND_S_MAX = 1.0, REPEAT_S - 1.0  # from when on nobody is told that we are here; nor anything else
 SNAPSHOTS = "cnctwin/snapshot/"
 HOUR_MS = 3_600_000
 MACHINES_MAX = 1_000  # that are given receipts
@@ -111,6 +113,7 @@ class StoreRecorder:
         self._last_snapshots: dict[tuple[str, str], Snapshot] = {}
         self._stored = self._repeated = self._refused = self._dropped = self._pins = 0
         self._writing = 0  # samples in the hands of the thread
+        self._caught_up_s = time.monotonic()  # all that was heard before it is in the store
         self._bytes, self._store_waiting, self._trouble = 0, 0, ""
         self._days_left: float | None = None
         self._failure: BaseException | None = None
@@ -152,10 +155,21 @@ class StoreRecorder:
 
     def receipts(self) -> list[Receipt]:
         """The rows of each edge that the store has taken since this was last asked; of those that are silent none, which says
-        that somebody is here."""
+        that somebody is here. While the store holds things up nothing is said: what was heard and waits here is not missed."""
+        behind_s = self._behind_s()
+        if behind_s > BEHIND_S_MAX:
+            return []
         with self._receipts_lock:
             kept, self._receipts = self._receipts, {key: Spans() for key in list(self._receipts)[-MACHINES_MAX:]}
-        return [Receipt(node, device, RECEIPT, " ".join(f"{a}-{b}" for a, b in spans)) for (node, device), spans in kept.items()]
+        return [
+            Receipt(node, device, RECEIPT, " ".join(f"{a}-{b}" for a, b in spans))
+            for (node, device), spans in kept.items()
+            if spans or behind_s <= BEHIND_S
+        ]
+
+    def _behind_s(self) -> float:
+        """For how long something may have waited for the store; 0 where nothing does."""
+        return time.monotonic() - self._caught_up_s if self._queue.samples or self._writing else 0.0
 
     # Its life.
 
@@ -214,16 +228,22 @@ class StoreRecorder:
             if not self._stopping.is_set():
                 self._queue.filled.wait(1.0)
                 self._stopping.wait(GATHER_S)  # what comes within it goes into the same transaction
+            took_s = time.monotonic()
             batch = self._queue.take()
+            is_all = not self._queue.samples
             self._writing = batch.samples
             if not self._write(batch):
                 _log.warning("%d samples are not written", batch.samples + self._queue.samples)
                 return
             self._writing = 0
+            if is_all:
+                self._caught_up_s = took_s
             now_s = time.monotonic()
             if now_s - tidied_s >= TIDY_S:
                 tidied_s = now_s
-                self._tidy()
+                if self._tidy():  # there may be more: sooner again, but not all the time
+                    done_s = time.monotonic()
+                    tidied_s = done_s - TIDY_S + max(AGAIN_S, 4 * (done_s - now_s))
             if now_s - status_s >= STATUS_S:
                 status_s = now_s
                 self._look()
@@ -274,13 +294,19 @@ class StoreRecorder:
                         self._receipts[key].discard(number, number)
                         self._receipts[key].add(number, number)
 
-    def _tidy(self) -> None:
+    def _tidy(self) -> bool:
+        """Whether hours were sealed."""
         try:
-            self._store.tidy(time.time_ns() // 1_000_000)
+            return self._store.tidy(time.time_ns() // 1_000_000).sealed > 0
         except StoreError as error:
             _log.warning("the store cannot be tidied: %s", error)
+            return False
 
     def _look(self) -> None:
-        status = self._store.status()
+        try:
+            status = self._store.status()
+        except StoreError as error:
+            self._trouble = str(error)
+            return
         self._bytes, self._days_left, self._store_waiting = status.bytes, status.days_left, status.waiting
         self._trouble = status.trouble

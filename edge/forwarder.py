@@ -83,6 +83,7 @@ class Forwarder:
         self._flights: deque[_Flight] = deque()
         self._confirmed: deque[int] = deque(maxlen=1_000)
         self._receipts = Receipts() if limits.await_receipt else None
+        self._kept: deque[tuple[int, int]] = deque()  # by a memory, and to be deleted
         self._token = self._landed = 0
         self._declared: frozenset[str] = frozenset()
         self._budget_rows, self._paid_s = 0.0, clock()
@@ -231,10 +232,12 @@ class Forwarder:
     def _receive(self, receipts: Receipts, now_s: float) -> None:
         """What a memory keeps is done; what it has missed is told again."""
         kept, missed = receipts.settle(now_s)
-        for span in kept:
-            self._emitted += self._ring.forget(*span)
         for span in missed:
             self._waiting.add(*span)
+        self._kept.extend(kept)
+        while self._kept:  # where the disk fails they are forgotten with a later pump
+            self._emitted += self._ring.forget(*self._kept[0])
+            self._kept.popleft()
 
     def _strand(self, session: int) -> None:
         """What was sent in another session, or is not confirmed for long, waits again."""

@@ -12,7 +12,7 @@ nobody is there to miss a row, and it waits.
 
 import math
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from edge.spans import Spans
@@ -21,6 +21,7 @@ RECEIPT = "Device Control/Receipt"
 REPEAT_S = 5.0
 HEARD_MAX = 1_000
 SPANS_MAX = 10_000
+DIGITS_MAX = 18
 
 
 class Settled(NamedTuple):
@@ -43,9 +44,16 @@ class Receipts:
         """A host has written a receipt. From any thread."""
         self._heard.append(text)
 
-    def wait(self, spans: Iterable[tuple[int, int]], now_s: float) -> None:
+    def wait(self, spans: Sequence[tuple[int, int]] | Spans, now_s: float) -> None:
         """The broker has these; a receipt is awaited from now on."""
-        self._waiting.append((now_s, Spans(spans)))
+        awaited = Spans(spans)
+        if (
+            self._waiting and now_s >= self._heard_s + REPEAT_S
+        ):  # nobody is there; a day of that is one entry, not a hundred thousand
+            _, awaited = self._waiting.pop()
+            for span in spans:
+                awaited.add(*span)
+        self._waiting.append((now_s, awaited))
 
     def cut(self, upto: int) -> None:
         """Rows up to this one are gone."""
@@ -76,6 +84,8 @@ def spans_of(text: str) -> list[tuple[int, int]]:
     spans = []
     for part in text.split()[:SPANS_MAX]:
         first, _, last = part.partition("-")
+        if max(len(first), len(last)) > DIGITS_MAX:
+            continue
         if first.isdecimal() and (last.isdecimal() or not last) and int(first) <= int(last or first):
             spans.append((int(first), int(last or first)))
     return spans

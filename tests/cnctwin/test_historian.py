@@ -147,3 +147,41 @@ def test_a_memory_with_a_hole_says_so_at_the_start(memory: Memory) -> None:
     (hole,) = memory.told
     assert (hole.event.kind, hole.event.device) == (EventKind.HOLE, "vmc")
     assert "the newest sample before it is" in hole.event.detail
+
+
+def row_of(number: int, kind: EventKind = EventKind.DATA) -> HostEvent:
+    """What an edge that waits for receipts says."""
+    names: dict[str, Any] = {"Device Control/Receipt": ""} if kind is EventKind.BIRTH else {"edge_sequence": number}
+    readings = tuple(Reading(name, value, number, Quality.GOOD, None, None, False) for name, value in names.items())
+    return HostEvent(kind, EDGE, "vmc", number, readings)
+
+
+def test_while_the_store_is_stuck_no_edge_is_told_that_we_are_here(
+    recorder: StoreRecorder, memory: Memory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(historian, "BEHIND_S", 0.2)
+    monkeypatch.setattr(historian, "BEHIND_S_MAX", 0.3)
+    recorder.keep(row_of(0, EventKind.BIRTH), 0)
+    recorder.keep(row_of(1), 1)
+    until(lambda: [receipt.value for receipt in recorder.receipts()] == ["1-1"])
+    assert [receipt.value for receipt in recorder.receipts()] == [""], "nothing new, but somebody is here"
+    memory.fails = True
+    recorder.keep(row_of(2), 2)
+    until(lambda: not recorder.receipts())
+    time.sleep(0.3)
+    assert recorder.receipts() == [], "or the edge would tell again and again what waits here"
+    memory.fails = False
+    until(lambda: [receipt.value for receipt in recorder.receipts()] == ["2-2"])
+
+
+def test_a_store_that_cannot_say_how_it_is_ends_nothing(
+    recorder: StoreRecorder, memory: Memory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def locked() -> Status:
+        raise StoreError("database is locked")
+
+    monkeypatch.setattr(memory, "status", locked)
+    monkeypatch.setattr(historian, "STATUS_S", 0.0)
+    until(lambda: recorder.health()["store_trouble"] == "database is locked")
+    recorder.keep(data(1), 1)
+    until(lambda: bool(memory.told))

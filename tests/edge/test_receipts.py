@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from edge.config import StoreSection
+from edge.errors import StoreError
 from edge.forwarder import Forwarder
 from edge.receipts import REPEAT_S, Receipts, spans_of
 from edge.ring import Ring
@@ -126,6 +127,45 @@ def test_a_receipt_may_come_before_the_broker_has_acknowledged() -> None:
     assert receipts.settle(REPEAT_S + 0.1) == ([], [(4, 5)])
 
 
-@pytest.mark.parametrize("text", ["", "x", "-5", "9-3", "1e5", "1–2", "1.5"])
+def test_a_day_without_a_memory_is_one_stretch_that_waits() -> None:
+    receipts = Receipts()
+    for number in range(1, 2_001):
+        receipts.wait([(number, number)], number * 0.5)
+        receipts.settle(number * 0.5)
+    assert len(receipts._waiting) == 1
+    receipts.hear("7")
+    assert receipts.settle(1_001.0) == ([(7, 7)], [])
+    receipts.hear("")
+    assert receipts.settle(1_000.0 + REPEAT_S + 0.1) == ([], [(1, 6), (8, 2_000)])
+
+
+def test_a_disk_that_cannot_forget_for_a_while_forgets_later_and_tells_what_was_missed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    world = RememberedWorld(tmp_path / "edge.store", 1)
+    world.wire.lost_acknowledgements = 0.0
+    world.take(10)
+    for _ in range(10):
+        World.pump(world)
+        world.seconds += 0.5
+        world.wire.deliver(1_000)
+
+    def full(*_: object) -> int:
+        raise StoreError("the disk is full")
+
+    with monkeypatch.context() as failing:
+        failing.setattr(world.forwarder._ring, "forget", full)
+        world.forwarder.receipt("1-4 6-10")
+        world.seconds += REPEAT_S
+        World.pump(world)
+    for _ in range(10):
+        World.pump(world)
+        world.seconds += 0.5
+        world.wire.deliver(1_000)
+    assert [message.sequence for message in world.wire.got] == [*range(1, 11), 5]
+    assert world.forwarder._ring.spans() == [(5, 5)]
+
+
+@pytest.mark.parametrize("text", ["", "x", "-5", "9-3", "1e5", "1–2", "1.5", "9" * 5_000, "1-" + "9" * 5_000])
 def test_what_names_no_row_is_no_receipt(text: str) -> None:
     assert spans_of(text) == []
