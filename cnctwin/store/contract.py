@@ -2,8 +2,9 @@
 
 A message is kept whole and in the order in which it came, so that the processors can be run over it again and give what they gave
 then. A sample of it is kept once: what comes again (a birth repeats what is known, an edge sends again what nobody confirmed) is
-told by machine, node, signal and time. Two values of one signal within the same millisecond are two samples: the microseconds of
-a stamp number them.
+told by machine, node, signal, millisecond, value, quality and reason. Two values of one signal within the same millisecond are
+two samples: the microseconds of a stamp number them. Samples are the readings of births, data and deaths of devices; what a birth
+says again after a death is a sample as of the birth, since it holds again.
 
 Raw and derived are apart: what a processor says (`twin/…`, of a node `twin-…`) is `cnc_twin_state`, all else `cnc_raw`.
 """
@@ -78,7 +79,8 @@ class Column:
     t_us: µs since 1970, of a window its beginning; windows without a sample are left out
     value: number, bool, text or None; of a window the time-unweighted mean of its good numbers, of a text or bool the last one
     quality: GOOD, STALE or BAD; of a window that of its worst sample
-    reason: why it is null or not good, else None
+    reason: why it is null or not good, else None; of a window that of the last of its worst samples
+    low, high: of the good, finite numbers of a window; count: of all its samples
     """
 
     signal: str
@@ -139,8 +141,9 @@ class Tidied(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """How the store is: samples and bytes on the disk, oldest and newest sample, how long the disk lasts at the present rate
-    (None: not known yet), samples that wait to be written, and in one line what is wrong ('' = nothing)."""
+    """How the store is: samples and bytes on the disk, oldest and newest sample, for how long nothing has to be swept before its
+    time at the present rate (None: not known yet), samples that wait to be written, and in one line what is wrong ('' = nothing).
+    """
 
     samples: int
     bytes: int

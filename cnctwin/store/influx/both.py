@@ -2,7 +2,8 @@
 
 Messages, snapshots and what was last come from the embedded one, so that a replay works, and the page lives without the server.
 A question about times goes to the embedded store for the last hour (or as far back as samples wait for the server), to the server
-for what lies before, and is put together at the border of a window.
+for what lies before, and is put together at the border of a window. What the server has nothing of, or where it is away, the
+embedded store is asked too.
 """
 
 from collections.abc import Iterator, Sequence
@@ -25,6 +26,7 @@ from cnctwin.store.contract import (
 )
 
 FRESH_MS = 3_600_000
+UNPINNED_MAX = 1_000
 
 
 class WaitingStore(Store, Protocol):
@@ -39,7 +41,8 @@ class Both:
 
     def __init__(self, embedded: Store, server: WaitingStore) -> None:
         self._embedded, self._server = embedded, server
-        self._trouble = ""
+        self._trouble, self._lost = "", 0
+        self._unpinned: list[Pinned] = []
 
     def append(self, messages: Sequence[Message]) -> Appended:
         """Keep messages in both; the account is the embedded store's."""
@@ -49,12 +52,17 @@ class Both:
             self._trouble = ""
         except StoreError as error:
             self._trouble = str(error)
+            self._lost += sum(len(message.event.readings) for message in messages)
         return appended
 
     def pin(self, pinned: Pinned) -> None:
-        """Keep a stretch in both."""
+        """Keep a stretch in both; what the server's ring cannot take now it is given with the next `tidy`."""
         self._embedded.pin(pinned)
-        self._server.pin(pinned)
+        try:
+            self._server.pin(pinned)
+        except StoreError as error:
+            self._trouble = str(error)
+            self._unpinned = [*self._unpinned[1 - UNPINNED_MAX :], pinned]
 
     def pins(self, machine: str | None = None) -> list[Pinned]:
         """All pins, oldest first."""
@@ -95,10 +103,24 @@ class Both:
         if query.from_ms >= border_ms:
             return self._embedded.query(query)
         if query.to_ms <= border_ms:
-            return self._server.query(query)
-        before = self._server.query(Query(query.machine, query.signals, query.from_ms, border_ms, query.every_ms))
+            return self._before(query)
+        before = self._before(Query(query.machine, query.signals, query.from_ms, border_ms, query.every_ms))
         since = self._embedded.query(Query(query.machine, query.signals, border_ms, query.to_ms, query.every_ms))
         return [_joined(first, second) for first, second in zip(before, since, strict=True)]
+
+    def _before(self, query: Query) -> list[Column]:
+        """What the server says; of what it does not keep (arrays, long texts, stamps beyond its retention), and where it is
+        away, what the embedded store has."""
+        try:
+            found = self._server.query(query)
+        except StoreError:
+            return self._embedded.query(query)
+        missing = tuple(dict.fromkeys(column.signal for column in found if not column.t_us))
+        if not missing:
+            return found
+        beside = self._embedded.query(Query(query.machine, missing, query.from_ms, query.to_ms, query.every_ms))
+        of = {column.signal: column for column in beside}
+        return [column if column.t_us else of[column.signal] for column in found]
 
     def _border_ms(self, every_ms: int) -> int:
         newest_ms = self._embedded.status().newest_ms
@@ -116,13 +138,17 @@ class Both:
 
     def tidy(self, now_ms: int) -> Tidied:
         """Tidy both."""
+        unpinned, self._unpinned = self._unpinned, []
+        for pinned in unpinned:
+            self.pin(pinned)
         one, other = self._embedded.tidy(now_ms), self._server.tidy(now_ms)
         return Tidied(*(first + second for first, second in zip(one, other, strict=True)))
 
     def status(self) -> Status:
         """That of the embedded store, with what waits for the server and what is wrong there."""
         embedded, server = self._embedded.status(), self._server.status()
-        troubles = [trouble for trouble in (embedded.trouble, self._trouble, server.trouble) if trouble]
+        lost = f"{self._lost} samples did not come into the server's ring since the start" if self._lost else ""
+        troubles = [trouble for trouble in (embedded.trouble, self._trouble, lost, server.trouble) if trouble]
         return Status(
             embedded.samples,
             embedded.bytes + server.bytes,

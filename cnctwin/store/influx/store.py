@@ -49,6 +49,13 @@ class Reader(Protocol):
     def close(self) -> None: ...
 
 
+def steady_wall_ms() -> Callable[[], int]:
+    """ms since 1970, asked once: the wall's clock may be set while we run (a gateway without a battery starts in 1970), and
+    nothing is to be thrown away for that."""
+    began_ms, began_s = time.time_ns() // 1_000_000, time.monotonic()
+    return lambda: began_ms + round((time.monotonic() - began_s) * 1000)
+
+
 class ReadOnlyServer:
     """What a reader has of a store on a server; `folder` is that of the writer's ring, where that is on the same machine."""
 
@@ -147,14 +154,14 @@ class ServerStore(ReadOnlyServer):
         *,
         knows_texts: bool,
         limits: RingLimits | None = None,
-        wall_ms: Callable[[], int] = lambda: time.time_ns() // 1_000_000,
+        wall_ms: Callable[[], int] | None = None,
         clock: Callable[[], float] = time.monotonic,
         chance: Random | None = None,
         patience: Patience | None = None,
     ) -> None:
         super().__init__(reader, where, folder)
-        self._server, self._knows_texts, self._wall_ms = server, knows_texts, wall_ms
-        self._spool = Spool(folder, limits or RingLimits(), wall_ms=wall_ms)
+        self._server, self._knows_texts = server, knows_texts
+        self._spool = Spool(folder, limits or RingLimits(), wall_ms=wall_ms or steady_wall_ms())
         self._pins = Pins(self._spool)
         self._complaint = ""
         vocabulary = None if knows_texts else Vocabulary(self._spool)

@@ -11,7 +11,7 @@ import pytest
 from cnctwin.store.contract import Pinned, Query, Snapshot, Store, StoreError
 from cnctwin.store.influx.both import Both
 from cnctwin.store.influx.opening import open_influx
-from cnctwin.store.influx.store import ServerStore
+from cnctwin.store.influx.store import ServerStore, steady_wall_ms
 from cnctwin.store.opening import open_store
 from sparkplug.host_session import EventKind
 from tests.cnctwin.store_influx.servers import Influxd
@@ -180,3 +180,44 @@ def test_the_page_lives_on_the_embedded_store_while_the_server_is_down(tmp_path:
     both.close()
     assert open_store(tmp_path / "embedded").machines() == [machine]
     reader.close()
+
+
+def test_a_ring_that_takes_nothing_holds_up_no_pin_of_the_embedded_store(
+    tmp_path: Path, machine: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    where = f"influx1+http://127.0.0.1:1?also={tmp_path / 'embedded'}"
+    both = open_influx(where, writable=True, spool=tmp_path / "ring")
+    said = [told(machine, reading("spindle_rpm", 1.0, 0))]
+
+    def full(*_: object) -> None:
+        raise StoreError("the ring's disk is full")
+
+    with monkeypatch.context() as failing:
+        failing.setattr("cnctwin.store.influx.spool.Spool.write", full)
+        failing.setattr("cnctwin.store.influx.spool.Spool.put", full)
+        both.append(said)
+        both.pin(Pinned(machine, T0_MS, T0_MS + 1000, "score 9.1"))
+    assert both.pins(machine) and "1 samples did not come" in both.status().trouble
+    both.tidy(T0_MS)
+    both.close()
+    ring = open_influx(where.partition("?")[0], writable=True, spool=tmp_path / "ring")
+    assert [pinned.reason for pinned in ring.pins(machine)] == ["score 9.1"], "given to the ring with the next tidy"
+    ring.close()
+
+
+def test_what_a_server_that_is_away_had_is_asked_of_the_embedded_store(tmp_path: Path, machine: str) -> None:
+    where = f"influx1+http://127.0.0.1:1?also={tmp_path / 'embedded'}"
+    both = open_influx(where, writable=True, spool=tmp_path / "ring")
+    both.append([told(machine, reading("spindle_rpm", n, n * 3_600_000), t_ms=n * 3_600_000) for n in range(5)])
+    both.close()
+    reader = open_influx(where, writable=False, spool=tmp_path / "elsewhere")
+    [rpm] = reader.query(Query(machine, ("spindle_rpm",), T0_MS, T0_MS + 5 * 3_600_000))
+    assert rpm.value == list(range(5))
+    reader.close()
+
+
+def test_a_clock_that_is_set_while_we_run_evicts_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("cnctwin.store.influx.store.time.time_ns", lambda: 0)
+    wall_ms = steady_wall_ms()
+    monkeypatch.setattr("cnctwin.store.influx.store.time.time_ns", lambda: 1_790_000_000_000_000_000)
+    assert 0 <= wall_ms() < 60_000
