@@ -13,7 +13,7 @@ from typing import NamedTuple
 from cnctwin.errors import UsageError
 from cnctwin.mtconnect_agent.errors import ReplayError
 from cnctwin.shdr_import import recorded_rows
-from cnctwin.store.contract import Message, Store
+from cnctwin.store.contract import Message, Pinned, Store
 from edge.birth import DATATYPES
 from edge.sample import EdgeSample
 from edge.signals import DERIVED, signal
@@ -59,6 +59,8 @@ def import_recording(
         first_ms, last_ms = first_ms or batch[0].received_ms, batch[-1].received_ms
     if not messages:
         raise UsageError(f"{recording}: no signal is in it; is {devices} the Devices.xml that belongs to it?")
+    # A recording is mostly older than what a store keeps; whoever puts it in wants it kept.
+    store.pin(Pinned(name, first_ms, last_ms + 1, f"imported from {recording.name}"))
     seconds = time.perf_counter() - began_s
     return Imported(name, messages, samples, stored, repeated, refused, first_ms, last_ms, seconds)
 

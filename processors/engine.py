@@ -5,7 +5,7 @@ where two offer it; and keeps the ledger. What has a state, and is saved as one,
 """
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from operator import itemgetter
 
@@ -182,6 +182,26 @@ class Engine:
             self._forget(machine)  # it has been given to another cell since
         return name
 
+    def resume(self, payload: bytes, offers: Mapping[str, Mapping[NodeId, Collection[str]]]) -> str:
+        """As `restore`, to go on at the very message at which the snapshot was taken: a replay's start. A machine that was online
+        still is, by the nodes whose births were heard: `offers` has their signals by machine and node; the first owns."""
+        name = self.restore(payload)
+        for machine in self._units[name].machines.values():
+            machine.live.go_on()
+            if machine.live.ticking:
+                for node, names in offers.get(machine.name, {}).items():
+                    if self._processor.listens_to(node.node) and (not machine.live.births or str(node) in machine.live.births):
+                        machine.online.add(node)
+                        clashing = frozenset(one for one in names if one in machine.owner)
+                        machine.excluded[node] = clashing
+                        machine.owner.update((one, node) for one in names if one in machine.live.row and one not in clashing)
+        return name
+
+    def lane_of(self, machine: str) -> Lane | None:
+        """The live lane of a machine, to look at; None where it is not known."""
+        known = self._machines.get(machine)
+        return None if known is None else known.live
+
     def snapshot(self, name: str) -> bytes:
         """The snapshot of a unit. Raises KeyError where there is none of that name."""
         unit = self._units[name]
@@ -243,8 +263,7 @@ class Engine:
 
     def _joined(self, name: str) -> _Machine:
         """A machine that is new here, in the unit that it belongs to."""
-        unit = self._unit(self._unit_name(name))
-        machine = self._machines[name] = self._restored(unit, name)
+        machine = self._machines[name] = self._restored(self._unit(self._unit_name(name)), name)
         return machine
 
     def _restored(self, unit: _Unit, name: str) -> _Machine:
@@ -267,13 +286,14 @@ class Engine:
 
     def _data(self, machine: _Machine, event: HostEvent, wall_s: float, effects: list[Effect]) -> None:
         readings: tuple[Reading, ...] | list[Reading] = event.readings
+        is_of_twin = self._is_of_twin(event.node)
         excluded = machine.excluded.get(event.node)
         if excluded:
             readings = [reading for reading in readings if reading.name not in excluded]
             if not readings and event.readings:
                 self.ledger.drop(DropReason.NAME_CLASH)
                 return
-        if self._is_of_twin(event.node):
+        if is_of_twin:
             readings = [reading for reading in readings if reading.name in (self._processor.inputs or ())]
             if not readings:
                 self.ledger.emitted += 1  # nothing of it is for this processor
@@ -282,11 +302,11 @@ class Engine:
                 machine.live.note(readings)
                 return
         if True not in map(_IS_HISTORICAL, readings):
-            machine.live.data(readings, wall_s, effects)
+            machine.live.data(readings, wall_s, effects, is_of_twin=is_of_twin)
             return
         live = [reading for reading in readings if not reading.is_historical]
         if live:  # a message with both goes through both lanes, and counts as two
-            machine.live.data(live, wall_s, effects)
+            machine.live.data(live, wall_s, effects, is_of_twin=is_of_twin)
             self.ledger.received += 1
         history = self._history_of(machine.unit, machine.name)
         history.data([reading for reading in readings if reading.is_historical], wall_s, effects)
@@ -303,13 +323,14 @@ class Engine:
         is_of_twin = self._is_of_twin(event.node)
         was_online = machine.is_online
         machine.online.add(event.node)
+        machine.live.born(str(event.node), event.timestamp_ms)
         taken = self._taken(machine, event)
         if not machine.is_online and self._processor.inputs is not None:  # another processor is quicker than the edge
             machine.live.note(taken)
             return
         if not was_online and self._processor.outputs:
             effects.append(Declare(machine.name, machine.live.emission.known(event.timestamp_ms)))
-        machine.live.birth(taken if is_of_twin else event.readings, taken, wall_s, effects)
+        machine.live.birth(taken if is_of_twin else event.readings, taken, wall_s, effects, is_of_twin=is_of_twin)
 
     def _taken(self, machine: _Machine, event: HostEvent) -> list[Reading]:
         """The readings of a birth that this processor takes from this source. A signal belongs to the first source that is

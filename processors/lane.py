@@ -8,7 +8,8 @@ Event time is that of the readings. It only goes forward, in steps that hold on 
 * a message up to late_s_max behind is folded at the present time; a reading older than what is known of its signal is not news;
 * a message further behind is held back. Where the next ones agree with it, the clock was set back: one HOLE, then they are
   folded; where they don't, it was a straggler, and is dropped as late;
-* a death is stamped by the host's clock, so it moves time only within gap_s_max.
+* a death is stamped by the clock of the host that hears it, another one in each process: it moves time only within gap_s_max, and
+  only to the last tick before it, so that all hosts come to the same state.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -31,12 +32,17 @@ _timestamp_ms: Callable[[Reading], int] = itemgetter(Reading._fields.index("time
 
 
 class Lane:
-    """See the module. `ticking`: the machine was online from clock_ms on, so that silence means that nothing changed."""
+    """See the module.
+
+    ticking: the machine was online from clock_ms on, so that silence means that nothing changed
+    births: of each edge node of the machine, the first birth that was heard since the processor was started, by its stamp: what a
+        replay has to know of a life. Restored ones are of the life before, and go with the first of this one.
+    """
 
     __slots__ = (
         "_anchor_ms", "_anchor_wall_s", "_counts", "_fold_in", "_gap_ms", "_held", "_inputs", "_late_ms", "_ledger", "_machine",
         "_tick_ms", "_view",
-        "clock_ms", "emission", "fold", "is_restored", "is_silent", "last_ms", "row", "ticking",
+        "births", "births_are_old", "clock_ms", "emission", "fold", "is_restored", "is_silent", "last_ms", "row", "ticking",
     )  # fmt: skip
 
     def __init__(  # noqa: PLR0917
@@ -50,6 +56,8 @@ class Lane:
         self.ticking = fold.is_history
         self.is_silent = False  # the hole of the present silence has been given
         self.is_restored = False
+        self.births: dict[str, int] = {}
+        self.births_are_old = False
         self._view: Mapping[str, Reading] = MappingProxyType(self.row)
         self._fold_in, self._inputs, self._machine = fold.take, inputs, machine
         self._ledger, self._counts = ledger, counts
@@ -66,8 +74,9 @@ class Lane:
 
     # Messages.
 
-    def data(self, readings: Sequence[Reading], wall_s: float, effects: list[Effect]) -> None:
-        """A message with changes has come; the ledger says what became of it."""
+    def data(self, readings: Sequence[Reading], wall_s: float, effects: list[Effect], *, is_of_twin: bool = False) -> None:
+        """A message with changes has come; the ledger says what became of it. What another processor says never sets the clock
+        back: its figures may be of a while ago, or as old as their last change."""
         if not readings:
             self._ledger.emitted += 1
             return
@@ -75,6 +84,9 @@ class Lane:
             self._show(SampleKind.DATA, readings, effects)
             return
         at_ms = self._time_of(readings)
+        if is_of_twin:
+            self._accept(readings, self._if_news(at_ms), wall_s, effects)
+            return
         if at_ms is not None and self.clock_ms is not None and at_ms < self.last_ms - self._late_ms:
             self._held.append(readings)
             self._ledger.buffered += 1
@@ -85,7 +97,15 @@ class Lane:
             self.drop_held()
         self._accept(readings, at_ms, wall_s, effects)
 
-    def birth(self, readings: Sequence[Reading], taken: Sequence[Reading], wall_s: float, effects: list[Effect]) -> None:
+    def birth(
+        self,
+        readings: Sequence[Reading],
+        taken: Sequence[Reading],
+        wall_s: float,
+        effects: list[Effect],
+        *,
+        is_of_twin: bool = False,
+    ) -> None:
         """A birth has come: the values `taken` of it hold, whatever was known before."""
         self.fold.show(self._machine, self._view)
         if self._inputs is None:
@@ -94,6 +114,8 @@ class Lane:
             return
         self.drop_held()
         at_ms = self._time_of(readings)
+        if is_of_twin:
+            at_ms = self._if_news(at_ms)
         before_ms = self.last_ms if self.clock_ms is not None else None
         if at_ms is not None:
             if before_ms is not None and max(map(_timestamp_ms, readings)) < before_ms - self._late_ms:
@@ -106,6 +128,12 @@ class Lane:
         self.ticking = True
         names = tuple(reading.name for reading in taken)
         self._settle(self._fold(SampleKind.BIRTH, self._now_ms(readings), names, effects))
+
+    def born(self, node: str, stamp_ms: int) -> None:
+        """A birth of this node is heard."""
+        if self.births_are_old:
+            self.births, self.births_are_old = {}, False
+        self.births.setdefault(node, stamp_ms)
 
     def note(self, readings: Sequence[Reading]) -> None:
         """Keep what another processor says of a machine whose edge is offline: nothing is made of it until the edge is back."""
@@ -124,8 +152,7 @@ class Lane:
         """An edge of the machine went offline, and `names` with it. Whether the fold took it."""
         self.drop_held()
         if self.clock_ms is not None and self.clock_ms < at_ms <= self.last_ms + self._gap_ms:
-            self._pass_silence(at_ms, effects)
-            self.clock_ms = at_ms
+            self._pass_silence(at_ms, effects)  # and no further than its last tick: each host stamps a death by its own clock
         self.ticking = self.ticking and not is_last
         for name in names:
             self.row[name] = self.row[name]._replace(quality=Quality.STALE, reason=reason)
@@ -142,6 +169,12 @@ class Lane:
         """Signals that a new birth does not offer any more."""
         for name in names:
             self.row[name] = self.row[name]._replace(quality=Quality.STALE, reason="not offered any more")
+
+    def go_on(self) -> None:
+        """A restored lane, at the very message at which it was saved: nothing was missed, and who was online still is."""
+        self.is_restored = self.births_are_old = False
+        if self.ticking:
+            self.fold.show(self._machine, self._view)
 
     def drop_held(self) -> None:
         """What was held back was a straggler."""
@@ -166,6 +199,10 @@ class Lane:
             return newest_ms
         good = (reading.timestamp_ms for reading in readings if reading.quality is Quality.GOOD and reading.value is not None)
         return max(good, default=None)
+
+    def _if_news(self, at_ms: int | None) -> int | None:
+        """The time of what another processor says, if it is beyond the present."""
+        return at_ms if at_ms is None or self.clock_ms is None or at_ms > self.clock_ms else None
 
     def _now_ms(self, readings: Sequence[Reading]) -> int:
         """The time of the fold, also before any time was believed."""

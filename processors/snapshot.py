@@ -77,11 +77,12 @@ class SnapshotCodec:
             state = decode_state(self._adapter, document["state"])
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise SnapshotError(f"{type(error).__name__}: {error}") from error
-        for lane, (clock_ms, last_ms, ticking, is_silent, row, latest) in lanes:
+        for lane, (clock_ms, last_ms, ticking, is_silent, row, latest, births) in lanes:
             lane.clock_ms, lane.last_ms, lane.ticking, lane.is_silent = clock_ms, last_ms, ticking, is_silent
             lane.row.update(row)
             lane.emission.latest.update(latest)
-            lane.is_restored = True
+            lane.is_restored = lane.births_are_old = True
+            lane.births = births
         fold.state = state
 
     def _part(self, fold: Fold, lanes: Mapping[str, Lane]) -> dict[str, Any]:
@@ -97,6 +98,7 @@ def _lane_document(lane: Lane) -> dict[str, Any]:
         "last_ms": lane.last_ms,
         "ticking": lane.ticking,
         "is_silent": lane.is_silent,
+        "births": lane.births,
         # The broker gives tables, bytes and templates again with the next birth.
         "row": {
             name: [reading.value, reading.timestamp_ms, int(reading.quality), reading.unit, reading.reason]
@@ -110,14 +112,15 @@ def _lane_document(lane: Lane) -> dict[str, Any]:
     }
 
 
-_Values = tuple[int | None, int, bool, bool, dict[str, Reading], dict[str, Change]]
+_Values = tuple[int | None, int, bool, bool, dict[str, Reading], dict[str, Change], dict[str, int]]
 
 
 def _lane_values(entry: Any, is_history: bool) -> _Values:
     row = {name: _reading(name, reading) for name, reading in entry["row"].items()}
     latest = {name: _change(name, change, is_history) for name, change in entry["latest"].items()}
     clock_ms, last_ms = _whole(entry["clock_ms"]), _whole(entry["last_ms"]) or 0
-    return clock_ms, last_ms, entry["ticking"] is True, entry["is_silent"] is True, row, latest
+    births = {str(node): int(stamp_ms) for node, stamp_ms in entry.get("births", {}).items()}
+    return clock_ms, last_ms, entry["ticking"] is True, entry["is_silent"] is True, row, latest, births
 
 
 def _whole(value: Any) -> int | None:

@@ -35,6 +35,7 @@ class Request:
     url: str
     headers: Mapping[str, str]
     json: Any = None
+    content: bytes | None = None
     form: Mapping[str, str] | None = None
     query: Mapping[str, str] | None = None
     secrets: Sequence[str] = ()
@@ -122,6 +123,7 @@ async def _exchange(request: Request, timeout_s: float, begun: list[str]) -> Ans
             request.url,
             headers=dict(request.headers),
             json=request.json,
+            content=request.content,
             data=None if request.form is None else dict(request.form),
             params=None if request.query is None else dict(request.query),
             extensions={"trace": watch},

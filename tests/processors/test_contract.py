@@ -116,8 +116,16 @@ def test_a_snapshot_carries_a_machine_over_to_a_new_process(processor: AnyProces
     (unit,) = first.units
     assert second.restore(first.snapshot(unit)) == unit
     fed(second, birth(10.4, **values | {"spindle_load_pct": 50.0}), *rest)
-    assert json.loads(second.snapshot(unit)) == json.loads(whole.snapshot(unit))
+    assert _without_births(second.snapshot(unit)) == _without_births(whole.snapshot(unit))
     assert second.counts.holes == 0
+
+
+def _without_births(snapshot: bytes) -> Any:
+    """Whose births a process has heard is of its own life."""
+    document = json.loads(snapshot)
+    for lane in document["live"]["machines"].values():
+        del lane["births"]
+    return document
 
 
 @every_processor

@@ -1,0 +1,119 @@
+"""What a machine is doing, in MTConnect's words, and why it stands where it does: only what is known.
+
+`exec_state` of the control is believed. Where a control has none, feed is taken for it: ACTIVE while it feeds, READY else. A
+machine whose edge is offline is OFFLINE; a state that is null is unknown, which is not a state: what comes back after it as it
+was before has not changed.
+"""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from processors.sample import Sample, why_unknown
+from sparkplug.metric import Reading
+from sparkplug.quality import Quality
+
+EXECUTION, FEED, MODE, PROGRAM = "exec_state", "feed_mm_min", "controller_mode", "program"
+ALARM, TOOL, CHANGING = "alarm", "tool_number", "tool_change_active"
+OVERRIDES = ("feed_override_pct", "rapid_override_pct", "spindle_override_pct")
+FEED_OVERRIDE = OVERRIDES[0]
+ACTIVE, READY, COMPLETED, OFFLINE, WAIT = "ACTIVE", "READY", "PROGRAM_COMPLETED", "OFFLINE", "WAIT"
+STATES = frozenset(
+    {ACTIVE, READY, "INTERRUPTED", "FEED_HOLD", "STOPPED", "OPTIONAL_STOP", "PROGRAM_STOPPED", COMPLETED, WAIT, OFFLINE}
+)
+BY_CONTROL, BY_FEED = "told by the control", "taken from the feed: the control tells no execution state"
+NOT_TOLD, NO_STOP = "not told", "none"
+_BY_STATE = {
+    "PROGRAM_STOPPED": "program stop (M0)",
+    "OPTIONAL_STOP": "optional stop (M1)",
+    "FEED_HOLD": "feed hold",
+    WAIT: "waits for an event",
+}
+TEXT_MAX = 80
+
+
+class Execution(NamedTuple):
+    """The state, or None with the reason; and who tells it."""
+
+    state: str | None
+    reason: str = ""
+    basis: str = BY_CONTROL
+
+
+def execution(sample: Sample, feed_mm_min_min: float) -> Execution:
+    """What the row says the machine does.
+
+    >>> from processors.sample import SampleKind
+    >>> execution(Sample("vmc", SampleKind.TICK, 0.0, {}), 1.0)
+    Execution(state=None, reason='exec_state is not offered', basis='told by the control')
+    """
+    reading = sample.row.get(EXECUTION)
+    if reading is None and FEED in sample.row:
+        feed = sample.row[FEED]
+        if feed.quality is Quality.STALE and feed.reason != "not offered any more":
+            return Execution(OFFLINE, basis=BY_FEED)
+        mm_min, unknown = sample.number(FEED)
+        if mm_min is None:
+            return Execution(None, unknown or "", BY_FEED)
+        return Execution(ACTIVE if mm_min >= feed_mm_min_min else READY, basis=BY_FEED)
+    if reading is None:
+        return Execution(None, f"{EXECUTION} is not offered")
+    if reading.quality is Quality.STALE and reading.reason != "not offered any more":
+        return Execution(OFFLINE)
+    if (reason := why_unknown(reading)) is not None:
+        return Execution(None, reason)
+    if not isinstance(reading.value, str) or reading.value not in STATES:
+        return Execution(None, f"{EXECUTION} is no state that is known")
+    return Execution(reading.value)
+
+
+def text(row: Mapping[str, Reading], name: str) -> str | None:
+    """A good text of the row, cut to a length; None where there is none."""
+    reading = row.get(name)
+    if reading is None or reading.quality is not Quality.GOOD or not isinstance(reading.value, str):
+        return None
+    return reading.value[:TEXT_MAX]
+
+
+def tool(row: Mapping[str, Reading]) -> int | None:
+    """The tool in the spindle; None where there is none, or it is not known."""
+    reading = row.get(TOOL)
+    if reading is None or reading.quality is not Quality.GOOD or type(reading.value) is not int:
+        return None
+    return reading.value if abs(reading.value) < 2**31 else None
+
+
+def is_changing_tool(row: Mapping[str, Reading]) -> bool:
+    """Whether a tool change is told."""
+    reading = row.get(CHANGING)
+    return reading is not None and reading.quality is Quality.GOOD and reading.value is True
+
+
+def is_held_by_override(sample: Sample) -> bool:
+    """Whether the feed override stands at nought."""
+    percent, _ = sample.number(FEED_OVERRIDE)
+    return percent is not None and percent <= 0.0
+
+
+def stop_reason(state: str, sample: Sample) -> str:
+    """Why the machine does not work, from what is told now; NOT_TOLD where nothing is.
+
+    An alarm goes before all else; then what the program or the operator commanded; then what can be seen.
+    """
+    row = sample.row
+    if state == OFFLINE:
+        return "offline"
+    alarm = text(row, ALARM)
+    if alarm and state != ACTIVE and (alarm.startswith("FAULT") or state not in _BY_STATE):
+        return f"alarm: {alarm}"
+    if state in _BY_STATE:
+        return _BY_STATE[state]
+    if is_changing_tool(row):
+        return "tool change"
+    if is_held_by_override(sample):
+        return "feed override 0 %"
+    if state == COMPLETED:
+        return "program completed"
+    mode = text(row, MODE)
+    if mode is not None and mode not in {"AUTOMATIC", "SEMI_AUTOMATIC"}:
+        return f"mode {mode}"
+    return NOT_TOLD
