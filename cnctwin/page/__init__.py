@@ -1,0 +1,6 @@
+"""The page: hand-written HTML, CSS and ES modules, uPlot beside its licence. No build step; it loads nothing from elsewhere."""
+
+from pathlib import Path
+
+WEB = Path(__file__).parent / "web"
+"""What is served: `index.html` at `/`, the folder at `/page/`."""

@@ -1,0 +1,120 @@
+// What can be charted of a machine, and which of its signals belong together: measured, its twin, and what is between the two.
+
+import { Ring, Steps } from "./ring.js";
+import { NAMING, TWIN } from "./plant.js";
+import { title } from "./text.js";
+
+export const SCORES = { raw: "twin/raw_score", adjusted: "twin/adjusted_score", threshold: "twin/anomaly_threshold" };
+export const CONTEXT = ["exec_state", "tool_number", "twin/tool_change_gate", "program", "nc_block", "nc_line"];
+
+/** The tiles, in their order; the first signal that the machine has is the one that is shown. */
+export const TILES = [
+  {
+    id: "spindle_temp_c",
+    name: "Spindle temperature",
+    own: ["spindle_temp_c"],
+    twin: "twin/spindle_temp_c",
+    residual: "twin/spindle_temp_residual_k",
+    learned: "twin/spindle_temp_corrected_c",
+  },
+  { id: "spindle_load_pct", name: "Spindle load", own: ["spindle_load_pct"], twin: "twin/spindle_load_pct" },
+  { id: "spindle_rpm", name: "Spindle speed", own: ["spindle_rpm"], twin: "spindle_rpm_cmd", twinIs: "commanded" },
+  { id: "cutting_force", name: "Cutting force", own: ["cutting_force_n", "twin/cutting_force_n"], twin: null },
+  {
+    id: "vibration",
+    name: "Vibration",
+    own: ["vibration_rms_g", "twin/vibration_rms_g", "vibration_velocity_mm_s", "twin/vibration_velocity_mm_s"],
+    twin: null,
+  },
+];
+
+/** A tile as this machine has it, or null where it has none of its signals. */
+export function tileOf(machine, tile) {
+  const own = tile.own.find((signal) => machine.values.has(signal)) ?? null;
+  if (own === null && !(tile.twin && machine.values.has(tile.twin))) return null;
+  const twin = tile.twin && machine.values.has(tile.twin) ? tile.twin : null;
+  return {
+    ...tile,
+    own: own ?? tile.own[0],
+    twin,
+    residual: tile.residual && machine.values.has(tile.residual) ? tile.residual : null,
+    twinIs: tile.twinIs ?? "twin",
+    learned: tile.learned && typeof machine.bare(tile.learned) === "number" ? tile.learned : null,
+  };
+}
+
+/** The same for any signal of the machine. */
+export function chartOf(machine, id) {
+  const tile = TILES.find((one) => one.id === id || one.own[0] === id);
+  const known = tile && tileOf(machine, tile);
+  if (known) return known;
+  const twin = id.startsWith(TWIN) ? null : TWIN + id;
+  return {
+    id,
+    name: title(id),
+    own: id,
+    twin: twin && machine.values.has(twin) ? twin : null,
+    residual: null,
+    twinIs: "twin",
+    learned: null,
+  };
+}
+
+/** All numbers of a machine that can be charted: [measured], [twin]. */
+export function numbers(machine) {
+  const names = [...machine.values]
+    .filter(([signal, held]) => !NAMING.has(signal) && (typeof held.value === "number" || (held.value === null && held.unit)))
+    .map(([signal]) => signal)
+    .sort();
+  return [names.filter((name) => !name.startsWith(TWIN)), names.filter((name) => name.startsWith(TWIN))];
+}
+
+/** [t, v] of a number from `from` to `to`, its first sample moved to `from`, its last value held until `to` where it still holds. */
+export function line(machine, signal, from, to, holds = true) {
+  const ring = signal ? machine.series.get(signal) : null;
+  if (!(ring instanceof Ring) || !ring.length) return [[], []];
+  const [t, v] = ring.since(from, to);
+  if (t.length && t[0] < from) t[0] = from;
+  if (t.length && holds && t[t.length - 1] < to && !Number.isNaN(v[v.length - 1])) {
+    t.push(to);
+    v.push(v[v.length - 1]);
+  }
+  return [t, v];
+}
+
+/** Stretches in which a line is not known, after it once was. */
+export function unknown([t, v], to) {
+  const made = [];
+  for (let i = 0; i < t.length; i++) if (Number.isNaN(v[i])) made.push([t[i], i + 1 < t.length ? t[i + 1] : to]);
+  return made;
+}
+
+/** a − b of two stepped lines, where both are known. */
+export function difference(a, b) {
+  const [t, v] = [[], []];
+  let i = -1,
+    k = -1;
+  while (i + 1 < a[0].length || k + 1 < b[0].length) {
+    const at = Math.min(a[0][i + 1] ?? Infinity, b[0][k + 1] ?? Infinity);
+    if (a[0][i + 1] === at) i += 1;
+    if (b[0][k + 1] === at) k += 1;
+    t.push(at);
+    v.push(i < 0 || k < 0 ? NaN : a[1][i] - b[1][k]);
+  }
+  return [t, v];
+}
+
+export function stretches(machine, signal, from, to) {
+  const series = machine.series.get(signal);
+  return series instanceof Steps ? series.stretches(from, to) : [];
+}
+
+/** Where tools came: {t, text}. */
+export function toolMarks(machine, from, to) {
+  const series = machine.series.get("tool_number");
+  if (!(series instanceof Steps)) return [];
+  return series.items
+    .slice(1)
+    .filter(({ t, value }) => value !== null && t >= from && t <= to)
+    .map(({ t, value }) => ({ t, text: `T${value}` }));
+}

@@ -1,0 +1,251 @@
+// The dialogs: keys and marks, the connection, the log-in, and questions with a name and a comment.
+
+import { get, post } from "./api.js";
+import { clockOffset } from "./clock.js";
+import { el, symbol } from "./dom.js";
+import { lag } from "./lag.js";
+import { age, execution, words } from "./text.js";
+
+const dialog = () => document.getElementById("dialog");
+
+function show(title, ...content) {
+  const open = dialog();
+  open.replaceChildren(
+    el(
+      "div",
+      { class: "inside" },
+      el(
+        "header",
+        {},
+        el("h2", { id: "dialog-title" }, title),
+        el("button", { type: "button", class: "round", "aria-label": "Close", onclick: () => open.close() }, "×"),
+      ),
+      ...content,
+    ),
+  );
+  if (!open.open) open.showModal();
+  return open;
+}
+
+const NAMES = { ArrowUp: "↑", ArrowDown: "↓", ArrowLeft: "←", ArrowRight: "→", " ": "Space" };
+
+export function openHelp(app, everywhere) {
+  const list = (keys) =>
+    el(
+      "dl",
+      { class: "keys" },
+      keys.map(([names, text]) => [
+        el(
+          "dt",
+          {},
+          names.map((name) => el("kbd", {}, NAMES[name] ?? name)),
+        ),
+        el("dd", {}, text),
+      ]),
+    );
+  const from = (where, text) => el("li", {}, el("span", { class: "from", "data-from": where }, where), el("span", {}, text));
+  const own = app.view?.keys ?? [];
+  show(
+    "Keys and marks",
+    own.length ? [el("h3", {}, app.view.title), list(own), el("br")] : null,
+    el("h3", {}, "Everywhere"),
+    list([...everywhere, [["Tab"], "the next thing that can be pressed"], [["Esc"], "closes a dialog, leaves a field"]]),
+    el("br"),
+    el("h3", {}, "Where a figure comes from"),
+    el(
+      "ul",
+      { class: "legend-list" },
+      from("measured", "the machine's control or a sensor says so"),
+      from("modelled", "the twin works it out from physics"),
+      from("inferred", "worked out from what is measured; not measured itself"),
+    ),
+    el("h3", {}, "Marks"),
+    el(
+      "ul",
+      { class: "legend-list" },
+      ["ACTIVE", "READY", "FEED_HOLD", "STOPPED"].map((state) =>
+        el("li", {}, symbol(execution(state)[1], `kind-${execution(state)[2]}`), el("span", {}, execution(state)[0])),
+      ),
+      el("li", {}, symbol("s-offline", "kind-offline"), el("span", {}, "offline: values are the last ones known, hatched")),
+      el(
+        "li",
+        {},
+        el("span", { class: "key gate" }),
+        el("span", {}, "tool change, with its tail: scores are not judged (the gate)"),
+      ),
+      el("li", {}, el("span", { class: "key old" }), el("span", {}, "stale: nothing was heard in this stretch")),
+    ),
+  );
+}
+
+export function openLink(app) {
+  const body = el("dl", { class: "keys" });
+  const parts = el("ul", { class: "legend-list" });
+  const fill = () => {
+    const { stream } = app,
+      behind = lag();
+    const rows = [
+      ["State", document.getElementById("link").textContent.trim()],
+      [
+        "Last heard",
+        stream.heardMs === null
+          ? "never"
+          : `${age(performance.now() - stream.heardMs)}${performance.now() - stream.heardMs < 1500 ? "" : " ago"}`,
+      ],
+      [
+        "Behind",
+        behind
+          ? `${Math.round(behind.median)} ms at the median, ${Math.round(behind.p95)} ms for 95 % (stamp to paint)`
+          : "nothing was painted yet",
+      ],
+      ["Messages", `${stream.messages}, ${stream.reconnects} reconnections`],
+      [
+        "Clock",
+        Math.abs(clockOffset()) > 50
+          ? `this device is ${(clockOffset() / 1000).toFixed(1)} s ${clockOffset() > 0 ? "behind" : "ahead of"} the server`
+          : "agrees with the server's",
+      ],
+    ];
+    body.replaceChildren(...rows.flatMap(([term, text]) => [el("dt", {}, term), el("dd", {}, text)]));
+  };
+  const open = show(
+    "Connection",
+    body,
+    el("br"),
+    el("h3", {}, "Parts of the server"),
+    parts,
+    el(
+      "div",
+      { class: "actions" },
+      el("button", { type: "button", class: "button", onclick: () => app.stream.restart() }, "Connect anew"),
+    ),
+  );
+  fill();
+  const timer = setInterval(() => (open.open ? fill() : clearInterval(timer)), 1000);
+  get("health").then(
+    (health) => parts.replaceChildren(...healthRows(health)),
+    (error) => parts.replaceChildren(el("li", {}, error.message)),
+  );
+}
+
+function healthRows(health) {
+  const parts = health?.parts ?? {};
+  const entries = Array.isArray(parts) ? parts.map((one) => [one.name ?? one.part, one]) : Object.entries(parts);
+  if (!entries.length) return [el("li", {}, String(health?.status ?? "no parts are told"))];
+  return entries.map(([name, part]) => {
+    const state = typeof part === "string" ? part : (part.state ?? part.status ?? (part.ok === false ? "not well" : "ok"));
+    const reason = typeof part === "object" ? (part.reason ?? part.text ?? "") : "";
+    const isWell = ["ok", "up", "ready", "well", "good"].includes(String(state).toLowerCase());
+    return el(
+      "li",
+      {},
+      symbol(isWell ? "s-ack" : "s-alert", isWell ? "kind-active" : "kind-held"),
+      el("span", {}, el("strong", {}, words(name)), ` ${state}${reason ? `: ${reason}` : ""}`),
+    );
+  });
+}
+
+export function openLogin(app) {
+  const open = dialog();
+  if (open.open && open.querySelector("#token")) return;
+  const trouble = el("p", { class: "trouble", role: "alert", hidden: true });
+  const field = el("input", { class: "field", id: "token", type: "password", autocomplete: "current-password", required: true });
+  const submit = async (event) => {
+    event.preventDefault();
+    try {
+      await post("login", { token: field.value });
+      open.close();
+      app.stream.restart();
+      app.reopen();
+    } catch (error) {
+      trouble.hidden = false;
+      trouble.textContent = error.status === 401 || error.status === 403 ? "This is not the token." : error.message;
+      field.select();
+    }
+  };
+  show(
+    "Log in",
+    el(
+      "form",
+      { onsubmit: submit },
+      el(
+        "p",
+        {},
+        "This page asks for a token. Whoever runs it has it: the variable CNCTWIN_PAGE_TOKEN, or the file named in its place.",
+      ),
+      el("label", { class: "named" }, "Token", field),
+      trouble,
+      el("div", { class: "actions" }, el("button", { class: "button main" }, "Log in")),
+    ),
+  );
+  field.focus();
+}
+
+/** A document as it is. */
+export function openDocument(title, value) {
+  show(title, el("pre", { tabindex: "0" }, JSON.stringify(value, null, 2)));
+}
+
+/** Asks for a name and a comment; `act(by, comment)` does it and gives what to say, or throws. */
+export function openSigned(title, about, word, act) {
+  const by = el("input", {
+    class: "field",
+    name: "by",
+    required: true,
+    maxlength: "80",
+    autocomplete: "username",
+    value: remembered(),
+  });
+  const comment = el("textarea", { class: "field", name: "comment", maxlength: "500" });
+  const told = el("p", { role: "alert", hidden: true });
+  const button = el("button", { class: "button main" }, word);
+  const submit = async (event) => {
+    event.preventDefault();
+    button.disabled = true;
+    remember(by.value.trim());
+    told.hidden = true;
+    try {
+      await act(by.value.trim(), comment.value.trim());
+      open.close();
+    } catch (error) {
+      told.hidden = false;
+      told.className = "trouble";
+      told.textContent = error.message;
+      button.disabled = false;
+    }
+  };
+  const open = show(
+    title,
+    el(
+      "form",
+      { onsubmit: submit },
+      about,
+      el("label", { class: "named" }, "Your name", by),
+      el("label", { class: "named" }, "Comment", comment),
+      told,
+      el(
+        "div",
+        { class: "actions" },
+        el("button", { type: "button", class: "button", onclick: () => open.close() }, "Cancel"),
+        button,
+      ),
+    ),
+  );
+  (by.value ? comment : by).focus();
+}
+
+const KEY = "cnctwin-name";
+function remembered() {
+  try {
+    return localStorage.getItem(KEY) ?? "";
+  } catch {
+    return "";
+  }
+}
+function remember(name) {
+  try {
+    localStorage.setItem(KEY, name);
+  } catch {
+    /* a browser that keeps nothing asks again */
+  }
+}

@@ -1,0 +1,200 @@
+// Figures, ages and names as a person reads them.
+
+const TITLES = {
+  spindle_rpm: "Spindle speed",
+  spindle_rpm_cmd: "Commanded speed",
+  spindle_load_pct: "Spindle load",
+  spindle_power_kw: "Spindle power",
+  spindle_current_a: "Spindle current",
+  feed_mm_min: "Feed",
+  feed_override_pct: "Feed override",
+  rapid_override_pct: "Rapid override",
+  spindle_override_pct: "Spindle override",
+  program: "Program",
+  nc_block: "Block",
+  nc_line: "Line",
+  exec_state: "State",
+  controller_mode: "Mode",
+  tool_number: "Tool",
+  tool_change_active: "Tool change",
+  tool_change_source: "Tool change told by",
+  spindle_temp_c: "Spindle temperature",
+  ambient_temp_c: "Ambient",
+  vibration_rms_g: "Vibration",
+  vibration_velocity_mm_s: "Vibration velocity",
+  coolant_on: "Coolant",
+  alarm: "Control alarm",
+  clock_offset_s: "Clock offset",
+  clock_offset_spread_s: "Clock offset, spread",
+  "twin/spindle_temp_c": "Spindle temperature, twin",
+  "twin/spindle_temp_rise_k": "Temperature rise, twin",
+  "twin/spindle_temp_residual_k": "Temperature, measured − twin",
+  "twin/cutting_force_n": "Cutting force",
+  "twin/raw_score": "Raw score",
+  "twin/adjusted_score": "Adjusted score",
+  "twin/tool_change_gate": "Gate",
+  "twin/anomaly_threshold": "Threshold",
+  "twin/anomaly_alarm": "Anomaly alarm",
+  "twin/common_mode": "Common mode",
+  "twin/gap_growing": "Gap growing",
+  "twin/alert_state": "Alert",
+  "twin/vibration_rms_g": "Vibration",
+  "twin/vibration_velocity_mm_s": "Vibration velocity",
+  "twin/score_drift": "Score drift",
+  "twin/spindle_temp_corrected_c": "Spindle temperature, twin with what was learned",
+  "twin/spindle_temp_correction_k": "Temperature, learned correction",
+  "twin/spindle_temp_corrected_residual_k": "Temperature, measured − corrected twin",
+};
+const STATES = {
+  ACTIVE: ["Active", "s-active", "active"],
+  READY: ["Ready", "s-ready", "idle"],
+  INTERRUPTED: ["Interrupted", "s-held", "held"],
+  FEED_HOLD: ["Feed hold", "s-held", "held"],
+  WAIT: ["Waiting", "s-held", "held"],
+  STOPPED: ["Stopped", "s-stopped", "stopped"],
+  OPTIONAL_STOP: ["Optional stop", "s-held", "held"],
+  PROGRAM_STOPPED: ["Program stop", "s-stopped", "stopped"],
+  PROGRAM_COMPLETED: ["Completed", "s-ready", "idle"],
+  PROGRAM_OPTIONAL_STOP: ["Optional stop", "s-held", "held"],
+};
+const ACRONYMS = {
+  nc: "NC",
+  rpm: "speed",
+  pct: "",
+  mm: "",
+  min: "",
+  deg: "",
+  pos: "position",
+  temp: "temperature",
+  c: "",
+  k: "",
+  n: "",
+  g: "",
+  s: "",
+  kw: "",
+  a: "",
+  rms: "rms",
+  cmd: "commanded",
+};
+
+const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
+
+/** A signal's name in words. */
+export function title(signal) {
+  if (TITLES[signal]) return TITLES[signal];
+  const own = signal.replace(/^twin\//, "");
+  const axis = /^axis_([a-z])_(pos|load)_/.exec(own);
+  if (axis) return `${axis[1].toUpperCase()} ${axis[2] === "pos" ? "position" : "load"}`;
+  if (own.startsWith("gap_")) return gapTitle(own.slice(4));
+  if (own.startsWith("rule_")) return `Rule: ${own.slice(5).replaceAll("_", " ")}`;
+  const words = own
+    .split(/[_/]/)
+    .map((word) => ACRONYMS[word] ?? word)
+    .filter(Boolean);
+  return capital(words.join(" ")) || own;
+}
+
+/** `<signal>[/<regime>][/mean]` of a gap metric, in words. */
+export function gapTitle(rest) {
+  const [signal, ...more] = rest.split("/");
+  return [`Gap: ${(TITLES[signal] ?? title(signal)).toLowerCase()}`, ...more.map((word) => word.replaceAll("_", " "))].join(", ");
+}
+
+/** [word, symbol, kind] of an execution state. */
+export function execution(state) {
+  if (state === null || state === undefined) return ["Unknown", "s-unknown", "unknown"];
+  return STATES[state] ?? [capital(String(state).toLowerCase().replaceAll("_", " ")), "s-unknown", "unknown"];
+}
+
+const MINUS = (text) => text.replace("-", "−");
+
+function decimals(unit, size) {
+  if (["°C", "K", "celsius", "%", "degC"].includes(unit)) return 1;
+  if (["rev/min", "rpm", "N", "mm/min"].includes(unit)) return 0;
+  if (["g", "mm", "mm/s"].includes(unit)) return size >= 100 ? 1 : 3;
+  return null;
+}
+
+/** A number for reading: as many digits as its unit wants, else four that count. */
+export function number(value, unit = null) {
+  if (!Number.isFinite(value)) return "–";
+  if (value === 0) return "0";
+  const size = Math.abs(value),
+    places = decimals(unit, size);
+  if (places !== null) return MINUS(value.toFixed(places)).replace(/^−(0(?:\.0+)?)$/, "$1");
+  if (size >= 1e6 || size < 1e-4) return MINUS(value.toExponential(2));
+  return MINUS(String(Number(value.toPrecision(size >= 1000 ? 5 : 4))));
+}
+
+/** Any value without its unit. */
+export function plain(value, unit = null) {
+  if (value === null || value === undefined) return "–";
+  if (typeof value === "number") return Number.isInteger(value) && !unit ? String(value) : number(value, unit);
+  if (typeof value === "boolean") return value ? "yes" : "no";
+  return String(value);
+}
+
+/** A number with its sign. */
+export const signed = (value, unit = null) =>
+  value > 0 && number(value, unit) !== "0" ? `+${number(value, unit)}` : number(value, unit);
+
+/** Two digits that count: of a gap in floors more would be noise. */
+export const coarse = (value) =>
+  !Number.isFinite(value) ? "–" : Math.abs(value) >= 10 ? MINUS(value.toFixed(0)) : MINUS(String(Number(value.toPrecision(2))));
+
+/** How long ago, from a number of ms. */
+export function age(ms) {
+  if (!Number.isFinite(ms)) return "";
+  const s = Math.max(0, ms / 1000);
+  if (s < 1.5) return "now";
+  if (s < 60) return `${Math.floor(s)} s`;
+  if (s < 3600) return `${Math.floor(s / 60)} min`;
+  if (s < 86400) return `${Math.floor(s / 3600)} h ${String(Math.floor((s % 3600) / 60)).padStart(2, "0")} min`;
+  return `${Math.floor(s / 86400)} d ${Math.floor((s % 86400) / 3600)} h`;
+}
+
+/** A stretch of time from a number of ms. */
+export function duration(ms) {
+  const s = ms / 1000;
+  if (s < 60) return `${Number(s.toPrecision(3))} s`;
+  if (s < 3600) return `${Math.floor(s / 60)} min ${Math.round(s % 60)} s`;
+  return `${Math.floor(s / 3600)} h ${String(Math.floor((s % 3600) / 60)).padStart(2, "0")} min`;
+}
+
+const two = (value) => String(value).padStart(2, "0");
+
+/** A moment: time of day, with the date where it is not today. */
+export function moment(t, { seconds = true, now = Date.now() } = {}) {
+  if (!Number.isFinite(t)) return "–";
+  const at = new Date(t),
+    today = new Date(now);
+  const time = `${two(at.getHours())}:${two(at.getMinutes())}${seconds ? `:${two(at.getSeconds())}` : ""}`;
+  return at.toDateString() === today.toDateString()
+    ? time
+    : `${at.getFullYear()}-${two(at.getMonth() + 1)}-${two(at.getDate())} ${time}`;
+}
+
+/** What a `datetime-local` field holds for a moment, and back. */
+export const localField = (t) => {
+  const at = new Date(t);
+  return `${at.getFullYear()}-${two(at.getMonth() + 1)}-${two(at.getDate())}T${two(at.getHours())}:${two(at.getMinutes())}:${two(at.getSeconds())}`;
+};
+export const fromLocalField = (text) => new Date(text).getTime();
+
+/** A share, 0 to 1. */
+export const share = (value) =>
+  !Number.isFinite(value) ? "–" : value > 0 && value < 0.005 ? "under 1 %" : `${Math.round(value * 100)} %`;
+
+const RECORDED = { pos_mm: "position", table_mm: "table position", torque_a: "torque", ref_mm: "reference" };
+
+/** A signal of a recorded run in words: those of the axes are named otherwise than live ones. */
+export function recorded(signal) {
+  const axis = /^([a-z])_(pos_mm|table_mm|torque_a|ref_mm)$/.exec(signal ?? "");
+  return axis ? `${axis[1].toUpperCase()} ${RECORDED[axis[2]]}` : title(String(signal ?? ""));
+}
+
+/** A sentence begins with a capital. */
+export const sentence = (text) => capital(String(text ?? ""));
+
+/** The name of an effect or a part, in words. */
+export const words = (name) => capital(String(name ?? "").replaceAll("_", " "));

@@ -1,0 +1,315 @@
+// The alerts: what fires, by severity; who takes care of it; what is silenced; whether anybody was told.
+
+import { part, post } from "../api.js";
+import { serverNow } from "../clock.js";
+import { openSigned } from "../dialogs.js";
+import { el, say, setText, symbol } from "../dom.js";
+import { age, moment, words } from "../text.js";
+
+const RANK = { high: 0, medium: 1, low: 2 },
+  PHASE = { firing: 0, acknowledged: 1, pending: 2, resolved: 3 };
+const SIGNS = { firing: "s-alert", acknowledged: "s-ack", pending: "s-pending", resolved: "s-ack" };
+const AROUND_MS = 300000;
+const RESOLVED_MAX = 20;
+
+const began = (alert) => Date.parse(alert.startsAt);
+const ended = (alert) => {
+  const at = Date.parse(alert.endsAt);
+  return Number.isFinite(at) && at > 0 && alert.phase === "resolved" ? at : null;
+};
+
+export function open(app) {
+  const body = el("div"),
+    trouble = el("p", { class: "trouble", role: "alert", hidden: true }),
+    counts = el("span", { class: "quiet" });
+  const element = el(
+    "div",
+    { class: "view alerts-view" },
+    el("div", { class: "head" }, el("h1", {}, "Alerts"), counts),
+    trouble,
+    body,
+  );
+  let shown = "",
+    focused = null;
+
+  function acknowledge(alert) {
+    const about = el(
+      "p",
+      {},
+      el("strong", {}, alert.labels?.machine ?? ""),
+      `: ${alert.annotations?.summary ?? ""}. It is not repeated and goes to nobody else. An alert that becomes more severe fires again.`,
+    );
+    openSigned("Acknowledge", about, "Acknowledge", async (by, comment) => {
+      const outcome = await post(`alerts/${part(alert.fingerprint)}/acknowledge`, { by, comment, episode: alert.episode });
+      if (outcome && outcome.done === false) throw new Error(outcome.text);
+      say("Acknowledged");
+      app.askAlerts();
+    });
+  }
+
+  function card(alert) {
+    const { labels = {}, annotations = {} } = alert,
+      machine = labels.machine ?? "",
+      start = began(alert),
+      end = ended(alert);
+    const name = words((labels.alertname ?? "alert").replace(/^rule_/, "").replace(/^twin\//, ""));
+    const facts = [
+      el("span", {}, el("span", { class: "severity" }, alert.severity ?? ""), ` · ${alert.phase}`),
+      el("span", {}, `since ${moment(start)} (${age((end ?? serverNow()) - start)})`),
+      end ? el("span", {}, `over at ${moment(end)}`) : null,
+      alert.acknowledged_by
+        ? el("span", {}, `${alert.acknowledged_by}${alert.comment ? `: “${alert.comment}”` : " takes care of it"}`)
+        : null,
+      alert.silenced_by ? el("span", {}, `silenced (${alert.silenced_by})`) : null,
+      alert.flapping ? el("span", {}, "comes and goes") : null,
+      alert.unknown ? el("span", {}, `cannot be read now: ${alert.unknown}`) : null,
+      Array.isArray(alert.told) && alert.told.length ? el("span", {}, `told: ${alert.told.join(", ")}`) : null,
+      alert.undelivered ? el("span", {}, "not delivered") : null,
+    ];
+    const key = alert.fingerprint;
+    return el(
+      "article",
+      {
+        class: `alarmcard ${alert.phase} ${alert.silenced_by ? "silenced" : ""}`,
+        "data-severity": alert.severity,
+        "data-fingerprint": key,
+        tabindex: "-1",
+      },
+      symbol(SIGNS[alert.phase] ?? "s-alert"),
+      el(
+        "div",
+        {},
+        el("h3", {}, el("a", { href: app.address("machine", machine) }, machine), ` · ${name}`),
+        annotations.description ? el("p", { class: "what" }, annotations.description) : null,
+        el("p", { class: "facts" }, facts),
+      ),
+      el(
+        "div",
+        { class: "acts" },
+        alert.phase === "firing"
+          ? el("button", { type: "button", class: "button main", onclick: () => acknowledge(alert) }, "Acknowledge")
+          : null,
+        machine && Number.isFinite(start)
+          ? el(
+              "a",
+              {
+                class: "button",
+                href: app.address("replay", machine, {
+                  from: start - AROUND_MS,
+                  to: Math.min((end ?? start) + AROUND_MS, serverNow()),
+                  at: start,
+                }),
+              },
+              "Replay",
+            )
+          : null,
+      ),
+    );
+  }
+
+  const block = (title, cards, empty) =>
+    cards.length || empty
+      ? el(
+          "section",
+          {},
+          el("h2", {}, `${title} (${cards.length})`),
+          cards.length ? el("div", { class: "alerts" }, cards) : el("p", { class: "quiet" }, empty),
+        )
+      : null;
+
+  function silences(given) {
+    if (!given.length) return null;
+    const rows = given.map((one) =>
+      el(
+        "tr",
+        {},
+        el(
+          "th",
+          { scope: "row" },
+          Object.entries(one.matchers ?? {})
+            .map(([label, pattern]) => `${label} = ${pattern}`)
+            .join(", "),
+        ),
+        el("td", {}, `${moment(Date.parse(one.starts))} to ${moment(Date.parse(one.ends))}`),
+        el("td", {}, one.by ?? ""),
+        el("td", {}, one.comment ?? ""),
+        el("td", {}, el("code", {}, one.id ?? "")),
+      ),
+    );
+    return el(
+      "section",
+      {},
+      el("h2", {}, "Silenced"),
+      el(
+        "div",
+        { class: "scroll" },
+        el(
+          "table",
+          {},
+          el(
+            "thead",
+            {},
+            el(
+              "tr",
+              {},
+              ["What", "When", "By", "Why", "Id"].map((text) => el("th", { scope: "col" }, text)),
+            ),
+          ),
+          el("tbody", {}, rows),
+        ),
+      ),
+      el("p", { class: "note" }, "cnctwin alerts unsilence ID --by YOU ends one."),
+    );
+  }
+
+  function receivers(given, failures) {
+    const entries = Object.entries(given ?? {});
+    if (!entries.length)
+      return el(
+        "section",
+        {},
+        el("h2", {}, "Who is told"),
+        el("p", { class: "quiet" }, "No receiver is configured: alerts are on the broker and on this page only."),
+      );
+    const rows = entries.map(([name, one]) =>
+      el(
+        "tr",
+        {},
+        el("th", { scope: "row" }, name),
+        el("td", { class: "number" }, String(one.delivered ?? 0)),
+        el("td", { class: "number" }, String(one.failed ?? 0)),
+        el("td", { class: "number" }, String(one.waiting ?? 0)),
+        el(
+          "td",
+          {},
+          one.last_error ? String(one.last_error) : one.last_delivered ? `last at ${moment(Date.parse(one.last_delivered))}` : "",
+        ),
+      ),
+    );
+    return el(
+      "section",
+      {},
+      el("h2", {}, "Who is told"),
+      el(
+        "div",
+        { class: "scroll" },
+        el(
+          "table",
+          {},
+          el(
+            "thead",
+            {},
+            el(
+              "tr",
+              {},
+              ["Receiver", "Delivered", "Failed", "Waiting", ""].map((text, i) =>
+                el("th", { scope: "col", class: i && i < 4 ? "number" : null }, text),
+              ),
+            ),
+          ),
+          el("tbody", {}, rows),
+        ),
+      ),
+      failures?.length
+        ? el(
+            "ul",
+            { class: "plainlist" },
+            failures.slice(-5).map((one) => el("li", {}, `${one.receiver}, ${moment(Date.parse(one.at))}: ${one.reason}`)),
+          )
+        : null,
+    );
+  }
+
+  function write() {
+    const given = app.alerts;
+    if (!given) {
+      body.replaceChildren(el("p", { class: "waiting" }, "Loading …"));
+      return;
+    }
+    trouble.hidden = given.available !== false;
+    setText(
+      trouble,
+      `Alerts are not kept up: ${given.reason ?? "no reason was given"}. What stands here is the last that was heard.`,
+    );
+    const key = JSON.stringify([
+      given.alerts,
+      given.silences,
+      given.receivers,
+      given.failures,
+      given.available,
+      Math.floor(serverNow() / 30000),
+    ]);
+    if (key === shown) return;
+    shown = key;
+    focused = body.contains(document.activeElement)
+      ? (document.activeElement.closest("[data-fingerprint]")?.dataset.fingerprint ?? null)
+      : null;
+    const all = [...(given.alerts ?? [])].sort(
+      (a, b) => PHASE[a.phase] - PHASE[b.phase] || RANK[a.severity] - RANK[b.severity] || began(b) - began(a),
+    );
+    const of = (...phases) => all.filter((one) => phases.includes(one.phase));
+    const firing = of("firing");
+    setText(
+      counts,
+      all.length ? `${firing.length} firing, ${of("acknowledged").length} acknowledged, ${of("pending").length} pending` : "",
+    );
+    const known = given.available !== false || all.length;
+    body.replaceChildren(
+      ...[
+        !known
+          ? el(
+              "div",
+              { class: "empty" },
+              el("h2", {}, "Nobody watches for alerts"),
+              el("p", {}, "The processor that turns alarms into alerts is not heard. Start it:"),
+              el("pre", {}, "cnctwin process rules joint_anomaly alerts --config processors.toml"),
+            )
+          : block("Firing", firing.map(card), "Nothing fires."),
+        block("Acknowledged", of("acknowledged").map(card)),
+        block("Pending", of("pending").map(card)),
+        given.alerts_not_shown ? el("p", { class: "note" }, `${given.alerts_not_shown} more are not shown.`) : null,
+        silences(given.silences ?? []),
+        block("Over", of("resolved").slice(0, RESOLVED_MAX).map(card)),
+        known ? receivers(given.receivers, given.failures) : null,
+      ].filter(Boolean),
+    );
+    if (focused)
+      body
+        .querySelector(`[data-fingerprint="${CSS.escape(focused)}"] button, [data-fingerprint="${CSS.escape(focused)}"] a`)
+        ?.focus();
+  }
+
+  function move(key) {
+    const cards = [...body.querySelectorAll(".alarmcard")],
+      at = cards.findIndex((one) => one.contains(document.activeElement));
+    const to = cards[at < 0 ? 0 : Math.min(Math.max(at + (key === "ArrowDown" ? 1 : -1), 0), cards.length - 1)];
+    to?.querySelector(".acts button, .acts a")?.focus();
+    to?.scrollIntoView({ block: "nearest" });
+  }
+
+  write();
+  app.askAlerts();
+  const timer = setInterval(write, 5000);
+  return {
+    title: "Alerts",
+    element,
+    stream: "stream",
+    machine: null,
+    keys: [
+      [["ArrowDown", "ArrowUp"], "from alert to alert", move],
+      [
+        ["k"],
+        "acknowledge the one that is chosen, else the first",
+        () =>
+          (document.activeElement.closest?.(".alarmcard") ?? body.querySelector(".alarmcard.firing"))
+            ?.querySelector("button")
+            ?.click(),
+      ],
+    ],
+    onAlerts: write,
+    onLink: (state) => {
+      if (state === "live") app.askAlerts();
+    },
+    close: () => clearInterval(timer),
+  };
+}

@@ -1,0 +1,61 @@
+// What was the case at a moment of the past: state, program, tool, gate and figures.
+
+import { SCORES } from "../charted.js";
+import { el, setText } from "../dom.js";
+import { Ring, Steps } from "../ring.js";
+import { execution, number, plain } from "../text.js";
+
+/** The value of a signal that held at t. */
+function valueAt(past, signal, t) {
+  const series = past.series.get(signal);
+  if (series instanceof Steps) return series.at(t) ?? null;
+  if (!(series instanceof Ring)) return null;
+  const i = series.indexAt(t + 1) - 1;
+  return i < 0 || Number.isNaN(series.valueAt(i)) ? null : series.valueAt(i);
+}
+
+export class MomentShown {
+  constructor() {
+    this.parts = {};
+    const named = (key, term, wide = "") => {
+      this.parts[key] = el("dd");
+      return el("div", { class: wide }, el("dt", {}, term), this.parts[key]);
+    };
+    this.element = el(
+      "dl",
+      { class: "then", "aria-live": "off" },
+      named("exec_state", "State"),
+      named("program", "Program", "wide"),
+      named("tool_number", "Tool"),
+      named("nc_line", "Line"),
+      named("nc_block", "Block", "wide"),
+      named("gate", "Gate"),
+      named("spindle_rpm", "Speed"),
+      named("spindle_load_pct", "Load"),
+      named("feed_mm_min", "Feed"),
+      named("score", "Adjusted score"),
+      named("alert", "Alert"),
+    );
+  }
+
+  write(past, t) {
+    const at = (signal) => valueAt(past, signal, t),
+      { parts } = this;
+    const put = (key, text) => {
+      setText(parts[key], text ?? "–");
+      parts[key].classList.toggle("quietly", text === null || text === undefined);
+    };
+    const unit = (signal, name) => (at(signal) === null ? null : `${number(at(signal), name)} ${name}`);
+    put("exec_state", at("exec_state") === null ? null : execution(at("exec_state"))[0]);
+    put("program", at("program"));
+    put("tool_number", at("tool_number") === null ? null : `T${at("tool_number")}`);
+    put("nc_line", at("nc_line") === null ? null : plain(at("nc_line")));
+    put("nc_block", at("nc_block"));
+    put("gate", at("twin/tool_change_gate") === null ? null : at("twin/tool_change_gate") ? "closed" : "open");
+    put("spindle_rpm", unit("spindle_rpm", "rev/min"));
+    put("spindle_load_pct", unit("spindle_load_pct", "%"));
+    put("feed_mm_min", unit("feed_mm_min", "mm/min"));
+    put("score", at(SCORES.adjusted) === null ? null : number(at(SCORES.adjusted)));
+    put("alert", at("alarm") || (at("twin/alert_state") ?? null));
+  }
+}

@@ -1,0 +1,355 @@
+"""What the interface tells beside live values: alerts, a gap with its diagnosis, events, parts, validation, a replay."""
+
+import time
+from datetime import UTC, datetime
+from typing import Any
+
+from tests.cnctwin.page.fake_server import Answer, Shop, now_ms
+from tests.cnctwin.page.simulated_shop import CYCLE_S
+
+
+def iso(t_ms: float) -> str:
+    return datetime.fromtimestamp(t_ms / 1000.0, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
+
+
+def alert(machine: str, name: str, severity: str, phase: str, ago_s: float, **more: Any) -> dict[str, Any]:
+    """An alert as the processor writes it."""
+    began = now_ms() - round(ago_s * 1000)
+    return {
+        "status": "resolved" if phase == "resolved" else "firing",
+        "labels": {"machine": machine, "alertname": name, "severity": severity},
+        "annotations": {"summary": f"{name} on {machine}", "description": more.pop("description", "")},
+        "startsAt": iso(began),
+        "endsAt": iso(began + 90_000) if phase == "resolved" else "0001-01-01T00:00:00Z",
+        "fingerprint": f"{abs(hash((machine, name))):016x}"[:16],
+        "phase": phase,
+        "severity": severity,
+        "severities": [severity],
+        "episode": began,
+        "since": iso(began),
+        "unknown": "",
+        "flapping": False,
+        "acknowledged_by": "",
+        "comment": "",
+        "silenced_by": "",
+        "undelivered": False,
+        "told": ["phone"],
+        **more,
+    }
+
+
+def alerts(machines: list[str]) -> dict[str, Any]:
+    """Some of each phase."""
+    first, other = machines[0], machines[-1]
+    return {
+        "at": iso(now_ms()),
+        "now": now_ms(),
+        "available": True,
+        "reason": None,
+        "alerts": [
+            alert(
+                first,
+                "rule_spindle_overload",
+                "high",
+                "firing",
+                75,
+                description="spindle load 131 % for 4 s while feeding; program BASE-PLATE.NC, tool 5",
+            ),
+            alert(
+                first,
+                "anomaly_alarm",
+                "medium",
+                "firing",
+                320,
+                description="adjusted score 0.27 over 0.12; axis_z_load_pct, vibration_rms_g",
+            ),
+            alert(
+                other,
+                "gap_growing",
+                "medium",
+                "acknowledged",
+                5400,
+                acknowledged_by="ada",
+                comment="spindle bearing ordered",
+                description="spindle_temp_c, steady, risen since 06:00",
+            ),
+            alert(other, "machine_offline", "high", "pending", 12),
+            alert(first, "rule_stuck_feed", "high", "resolved", 9000),
+        ],
+        "alerts_not_shown": 0,
+        "silences": [
+            {
+                "id": "1c2d3e4f",
+                "matchers": {"machine": other, "alertname": "score_drift"},
+                "starts": iso(now_ms() - 3.6e6),
+                "ends": iso(now_ms() + 7.2e6),
+                "by": "ada",
+                "comment": "new tool holder",
+            }
+        ],
+        "receivers": {
+            "phone": {
+                "delivered": 14,
+                "failed": 1,
+                "waiting": 0,
+                "held_back": 0,
+                "muted": False,
+                "last_error": "",
+                "last_delivered": iso(now_ms() - 75_000),
+            }
+        },
+        "failures": [],
+        "commands": [],
+        "malformed": 0,
+        "overflowed": 0,
+    }
+
+
+def diagnosis() -> dict[str, Any]:
+    """A small diagnosis.json: gravity on Z, found."""
+    cell = {"effect_size": 57.0, "significance": 1e-12, "discovered": True}
+    quiet = {"before": 0.00033, "after": 0.00033, "floor": 0.00042, "unit": "mm"}
+    return {
+        "verdict": "explained",
+        "sentence": "Explained: the Z axis carries a constant load of 571 N that the twin does not know: gravity on Z.",
+        "where": [
+            {
+                "signal": "z_torque_a",
+                "regime": "constant speed -",
+                "share": 0.46,
+                "rms": 60.8,
+                "sentence": "46 % of the gap in torque is in the Z torque at constant speed in −, 61 times what repeats",
+                **cell,
+            },
+            {
+                "signal": "z_pos_mm",
+                "regime": "rest",
+                "share": 0.39,
+                "rms": 14.1,
+                "sentence": "39 % of the gap in position is in the Z position at standstill: mean 7.0 µm, 23 times what repeats",
+                **cell,
+            },
+            {
+                "signal": "z_torque_a",
+                "regime": "reversal",
+                "share": 0.05,
+                "rms": 4.4,
+                "sentence": "5 % of the gap in torque is in the Z torque at reversals",
+                **cell,
+            },
+        ],
+        "where_after": [],
+        "patterns": [],
+        "causes": [
+            {
+                "effect": "gravity",
+                "on": "z",
+                "probability": 0.88,
+                "closure": 0.99,
+                "parameters": {"force_n": {"value": 571.3, "low": 556.4, "high": 586.1, "unit": "N"}},
+                "indistinguishable_from": [{"effect": "sensor_bias", "on": "z_torque_a"}],
+            }
+        ],
+        "gap": {
+            "as_stated": 20.8,
+            "before": 19.9,
+            "after": 1.05,
+            "floor": 1.0,
+            "closure": 0.997,
+            "closure_low": 0.991,
+            "closure_high": 1.0,
+            "by_signal": {
+                "x_pos_mm": quiet,
+                "z_pos_mm": {"before": 0.0079, "after": 0.00041, "floor": 0.00039, "unit": "mm"},
+                "z_torque_a": {"before": 0.62, "after": 0.0122, "floor": 0.0119, "unit": "A"},
+            },
+        },
+        "candidates": [],
+        "not_observable": [
+            {"effect": "runout", "why": "no force_x_n, force_y_n in any run"},
+            {"effect": "coolant_cooling", "why": "no spindle_temp_c in any run that is fitted"},
+        ],
+        "not_identifiable": [],
+        "next_experiment": {
+            "why": "separates gravity on z from sensor_bias on z_torque_a: reversals of 2 to 100 µm",
+            "program": "%\nN1 G21 G90\nN2 G4 P10000\nM30\n",
+            "seconds": 38.0,
+            "separation": 57.0,
+        },
+        "notes": [],
+        "seconds": 21.0,
+    }
+
+
+def gap(machine: str, found: dict[str, Any] | None) -> dict[str, Any]:
+    """The standing gap, and a diagnosis where there is one."""
+    now = now_ms()
+
+    def value(number: float | bool | str | None, unit: str | None = "floors", reason: str | None = None) -> dict[str, Any]:
+        return {
+            "value": number,
+            "t": now - 20_000,
+            "unit": unit,
+            "quality": "bad" if reason else "good",
+            "provenance": "inferred",
+            **({"reason": reason} if reason else {}),
+        }
+
+    rows = [
+        ("spindle_temp_c", None, 3.1),
+        ("spindle_temp_c", "warm_up", 4.4),
+        ("spindle_temp_c", "steady", 2.7),
+        ("spindle_temp_c", "cool_down", None),
+        ("spindle_load_pct", None, 1.4),
+        ("spindle_load_pct", "air", 1.1),
+        ("spindle_load_pct", "cutting:BASE-PLATE.NC", 1.9),
+        ("spindle_rpm", None, 0.8),
+    ]
+    means = {"spindle_temp_c": value(-0.9, "K"), "spindle_load_pct": value(0.31, "%"), "spindle_rpm": value(4.0, "rev/min")}
+    standing = [
+        {
+            "signal": signal,
+            "regime": regime,
+            "gap": value(number, reason=None if number else "less than 60 s of this regime seen"),
+            "mean": None if regime else means[signal],
+        }
+        for signal, regime, number in rows
+    ]
+    return {
+        "machine": machine,
+        "now": now,
+        "standing": standing,
+        "growing": value(True, None),
+        "growing_signal": value("spindle_temp_c, steady: risen since 2026-11-19T06:00Z", None),
+        "window": {"from": now - 7_200_000, "to": now},
+        "left_out_pct": value(18.4, "%"),
+        "basis": "spindle_temp_c: thermal network, floor 0.3 K configured. healthy: assumed, the first 336 h that were seen",
+        "diagnosis": found,
+        "diagnosis_reason": None if found else f"no diagnosis of {machine} yet",
+        "report": f"gap/{machine}/report" if found else None,
+    }
+
+
+def part_record(machine: str, number: int, end: int) -> dict[str, Any]:
+    """As the processor `events` writes it, in short."""
+    force = {"mean": 80.0, "max": 301.6}
+    return {
+        "version": 1,
+        "machine": machine,
+        "program": "BASE-PLATE.NC",
+        "part_number": number,
+        "began": iso(end - CYCLE_S * 1000),
+        "ended": iso(end),
+        "ended_by": "completed",
+        "complete": number > 1,
+        "reasons": [] if number > 1 else ["its beginning was not seen"],
+        "cycle": {"cycle_time_s": CYCLE_S if number > 1 else None, "active_s": CYCLE_S, "interruptions": 0},
+        "tools": [{"tool": tool, "changes": 1, "active_s": 9.0, "force_n": force} for tool in (None, 1, 2, 5)],
+        "temperature": {"signal": "spindle_temp_c", "unit": "°C", "min": 23.0, "max": 38.9, "mean": 36.2},
+        "gap": {"gap_spindle_temp_c": {"mean": 3.0, "end": 3.1}},
+        "t": end,
+    }
+
+
+def validation(machine: str) -> dict[str, Any]:
+    """A night: one figure within its budget, one over it, one that could not be judged."""
+    figure = {"on": "", "samples": 86400, "hours": 7.5, "blocks": 60, "basis": ""}
+    figures = [
+        {
+            **figure,
+            "quantity": "temperature",
+            "measure": "mae",
+            "value": 0.84,
+            "low": 0.71,
+            "high": 0.98,
+            "unit": "K",
+            "budget": 2.0,
+            "verdict": "within",
+            "reason": None,
+        },
+        {
+            **figure,
+            "quantity": "force",
+            "measure": "mape",
+            "value": 23.1,
+            "low": 20.4,
+            "high": 26.0,
+            "unit": "%",
+            "budget": 20.0,
+            "verdict": "over",
+            "reason": None,
+        },
+        {
+            **figure,
+            "quantity": "vibration",
+            "measure": "r",
+            "value": None,
+            "low": None,
+            "high": None,
+            "unit": "",
+            "budget": 0.85,
+            "verdict": "not observable",
+            "reason": "the machine offers no vibration_rms_g",
+        },
+    ]
+    nights = [{"night": "2026-11-20", "verdict": "within"}, {"night": "2026-11-21", "verdict": "over"}]
+    return {
+        "machine": machine,
+        "t": now_ms() - 6 * 3_600_000,
+        "verdict": "over",
+        "figures": figures,
+        "nights": nights,
+        "retrain": False,
+        "retrain_reason": None,
+        "over_in_a_row": {"force_mape": 1},
+    }
+
+
+def tell_all(shop: Shop) -> None:
+    """Give the shop all of these."""
+    machines = list(shop.numbers)
+    started = time.time()
+    shop.answers["/alerts"] = lambda _path, _body: (200, alerts(machines))
+    shop.answers["/alerts/[^/]+/acknowledge"] = lambda _path, body: (
+        200,
+        {"done": True, "text": f"acknowledged by {(body or {})['by']}"},
+    )
+    for machine in machines:
+        _tell_machine(shop, machine, machine == machines[0], started)
+    shop.answers["/twin/replay"] = lambda _path, body: (200, _replayed(body or {}))
+
+
+def _tell_machine(shop: Shop, machine: str, is_first: bool, started: float) -> None:
+    def events(_path: str, asked: dict[str, Any] | None) -> Answer:
+        start, end = int((asked or {})["from"]), int((asked or {})["to"])
+        middle = (start + end) // 2
+        found = [
+            {"t": start + 20_000, "until": None, "kind": "tool_change", "text": "T2 in the spindle"},
+            {"t": middle, "until": middle + 4000, "kind": "alert", "text": "spindle overload: load 131 % for 4 s"},
+            {"t": middle + 30_000, "until": middle + 39_000, "kind": "stop", "text": "feed hold, 9 s, by the operator"},
+            {"t": end - 40_000, "until": None, "kind": "hole", "text": "12 messages lost between edge and broker"},
+        ]
+        return 200, {"machine": machine, "from": start, "to": end, "events": found}
+
+    shop.answers[f"/gap/{machine}"] = lambda _path, _body: (200, gap(machine, diagnosis() if is_first else None))
+    shop.answers[f"/events/{machine}"] = events
+    shop.answers[f"/parts/{machine}"] = lambda _path, _body: (
+        200,
+        {"machine": machine, "parts": [part_record(machine, n, round(1000 * (started - 60.0 * n))) for n in range(3, 0, -1)]},
+    )
+    shop.answers[f"/validation/{machine}"] = lambda _path, _body: (
+        (200, validation(machine)) if is_first else (200, {"machine": machine, "t": None, "figures": [], "nights": []})
+    )
+
+
+def _replayed(body: dict[str, Any]) -> dict[str, Any]:
+    return {
+        "machine": body["machine"],
+        "from": body["from"],
+        "to": body["to"],
+        "equal": True,
+        "compared": 18204,
+        "differences": [],
+        "seconds": 1.9,
+        "speed": 157.0,
+    }
