@@ -10,7 +10,6 @@ aims: 1.5 GB, and a third of two cores.
 
 import argparse
 import json
-import os
 import sys
 import tempfile
 import threading
@@ -144,9 +143,7 @@ def told(used: Mapping[str, float], memory: Mapping[str, float], seconds: float)
     for name in (*own, *(name for name in used if name not in own)):
         print(f"{name:16} {used[name] / seconds:6.3f} cores {memory[name]:7.0f} MB")
     cores, gigabytes = sum(used[name] for name in own) / seconds, sum(memory[name] for name in own) / 1000
-    print(
-        f"{'the stack':16} {cores:6.3f} cores (aim {CORES_AIM:.2f}) {gigabytes:.2f} GB (aim {MEMORY_AIM_GB}); {os.cpu_count()} cores"
-    )
+    print(f"{'the stack':16} {cores:6.3f} cores (aim {CORES_AIM:.2f}) {gigabytes:.2f} GB (aim {MEMORY_AIM_GB})")
     return cores <= CORES_AIM and gigabytes <= MEMORY_AIM_GB
 
 

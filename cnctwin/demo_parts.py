@@ -100,7 +100,11 @@ class Demo:
         settings.write_text(f"{told}late_s_max = 60.0\n{_LATE_TOML}{kept}")  # joint_anomaly's table is the last one
         broker = ["--broker", self.broker.address.url]
         state = ["--state-dir", str(self._folder)]
-        self._begin("processors", ["process", *PROCESSORS, "--config", str(settings), *broker, *state])
+        # The memory begins first, so that it hears what the others say from their first word on.
+        self._begin("historian", ["process", "historian", "--config", str(settings), *broker, *state])
+        self._await_historian()
+        others = [name for name in PROCESSORS if name != "historian"]
+        self._begin("processors", ["process", *others, "--config", str(settings), *broker, *state])
         self._begin("edge", ["edge", "run", str(edge)])
         self._serve(["--config", str(settings), "--store", str(self._folder / "store"), *broker])
 
@@ -160,6 +164,12 @@ class Demo:
         child = Child(name, [sys.executable, "-m", "cnctwin", *arguments], self._folder / f"{name}.log")
         self.children.append(child)
         child.start()
+
+    def _await_historian(self) -> None:
+        """Until its store is there, but not for ever: it is started again if it dies."""
+        deadline_s = time.monotonic() + START_S_MAX
+        while time.monotonic() < deadline_s and not (self._folder / "twin-historian.json").exists():
+            time.sleep(0.05)
 
     def _serve(self, arguments: list[str]) -> None:
         """Start the page, on the usual port or a free one, and wait until it says where it is. Without it, the demo goes on."""

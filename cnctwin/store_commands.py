@@ -253,7 +253,7 @@ def _show_plan(made: Plan, console: Console) -> None:
     console.print(f"{made.disk_bytes / 1e9:.1f} GB last {full} with nothing swept{room}.{fits}", soft_wrap=True)
     console.print("[historian]", markup=False)
     console.print(
-        f"raw_days = {proposed.raw_days:g}\nblock_days = {proposed.block_days:g}\ndisk_bytes = {proposed.disk_bytes}",
+        f"raw_days = {proposed.raw_days:g}\nblock_days = {proposed.block_days:g}\ndisk_gb = {made.disk_bytes / 1e9:g}",
         highlight=False,
     )
 

@@ -36,6 +36,7 @@ LONG = (
     "cnctwin/test_historian_killed.py",
     "cnctwin/store_influx/test_outage.py",
     "hivemq/test_barrier.py",
+    "cnctwin/replay/test_replay_of_a_live_plant.py",
 )
 
 

@@ -13,8 +13,10 @@ from cnctwin.api.errors import ApiError
 from cnctwin.api.live_plant import LivePlant
 from cnctwin.api.residual import models_part
 from cnctwin.api.sources import Sources
+from cnctwin.doctor import COME_AND_GO
 from cnctwin.errors import ProgramError
 from cnctwin.page import WEB
+from processors.contract import TWIN_NODE_PREFIX
 from sparkplug.connection import now_ms
 
 
@@ -39,7 +41,7 @@ def health_routes(sources: Sources) -> APIRouter:
     @router.get("/health", response_model=Health)
     async def health() -> Any:
         """Each part with its state, the reason and what to do; 200 also where some are missing."""
-        parts = [_broker(sources), _plant(sources.live), await _store(sources), _constants(sources)]
+        parts = [_broker(sources), _plant(sources.live), _processors(sources.live), await _store(sources), _constants(sources)]
         parts += [await sources.store.work(lambda: models_part(sources.models))]
         parts += [_alerts(sources.live), _diagnoses(sources), _page()]
         degraded = any(part.state in ("degraded", "missing") for part in parts)
@@ -60,6 +62,18 @@ def _broker(sources: Sources) -> Part:
             part="broker", state="degraded", reason=f"{lost} messages came too fast to be read", do="give it more processor"
         )
     return Part(part="broker", state="ok", reason=f"{viewer.url}, group {viewer.group}")
+
+
+def _processors(live: LivePlant) -> Part:
+    """Those that were heard of since the server began; one that ends in its own time, as a nightly check, is not missed."""
+    known = [view for view in live.nodes() if view.node.startswith(TWIN_NODE_PREFIX) and view.node not in COME_AND_GO]
+    if not known:
+        return Part(part="processors", state="missing", reason="no processor was heard of", do="cnctwin process NAME…")
+    dead = [view.node.removeprefix(TWIN_NODE_PREFIX) for view in known if not view.online]
+    if dead:
+        line = f"{len(dead)} of {len(known)} are offline: {', '.join(dead)}; what they said last is not live"
+        return Part(part="processors", state="degraded", reason=line, do=f"cnctwin process {' '.join(dead)}")
+    return Part(part="processors", state="ok", reason=f"{len(known)} online")
 
 
 def _plant(live: LivePlant) -> Part:

@@ -123,7 +123,7 @@ def test_nothing_is_known_and_everything_answers() -> None:
         health = client.get("/health")
         assert health.status_code == 200
         missing = {part["part"]: part for part in health.json()["parts"] if part["state"] == "missing"}
-        assert set(missing) == {"machines", "store", "models", "alerts"}
+        assert set(missing) == {"machines", "processors", "store", "models", "alerts"}
         assert all(part["reason"] and part["do"] for part in missing.values())
         assert health.json()["status"] == "degraded"
         assert client.get("/livez").json() == {"alive": True}

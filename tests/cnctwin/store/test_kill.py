@@ -26,7 +26,7 @@ def test_a_writer_killed_again_and_again_loses_nothing_and_has_nothing_twice(tmp
         for _ in range(KILLS):
             process.stdin.write(f"{said}\n")
             process.stdin.flush()
-            child = 0
+            child, batches = 0, chance.randrange(1, 4)
             for line in process.stdout:
                 if line.startswith("process"):
                     child = int(line.split()[1])
@@ -34,8 +34,9 @@ def test_a_writer_killed_again_and_again_loses_nothing_and_has_nothing_twice(tmp
                     break
                 else:
                     said = int(line)
-                    if child:
-                        time.sleep(chance.uniform(0.0, 0.3))
+                    batches -= 1
+                    if child and batches <= 0:
+                        time.sleep(chance.uniform(0.0, 0.08))
                         os.kill(child, signal.SIGKILL)
                         child = 0
         process.stdin.close()

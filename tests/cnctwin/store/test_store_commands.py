@@ -36,7 +36,7 @@ def test_the_plan_of_figures_and_of_a_store(place: str, tmp_path: Path) -> None:
     told_ = json.loads(done.stdout)
     assert done.exit_code == 0 and told_["fits"] and told_["proposed"]["raw_days"] == 365.0
     done = RUNNER.invoke(store_app, ["plan", "--machines", "8", "--vibration-hz", "2000", "--disk", "40GB"])
-    assert done.exit_code == 1 and "do not fit" in done.stdout and "disk_bytes = 40000000000" in done.stdout
+    assert done.exit_code == 1 and "do not fit" in done.stdout and "disk_gb = 40\n" in done.stdout
     done = RUNNER.invoke(store_app, ["plan", "--store", place, "--disk", "40GB"])
     assert done.exit_code == 0 and "1 machine as measured over 3 min" in done.stdout
     done = RUNNER.invoke(store_app, ["plan", "--store", str(tmp_path / "none"), "--disk", "40GB", "--json"])

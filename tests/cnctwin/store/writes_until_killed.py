@@ -12,7 +12,7 @@ from cnctwin.store import sealed_tier, sealing
 from cnctwin.store.embedded import EmbeddedStore
 from tests.cnctwin.store.told import HOUR_MS, T0_MS, steady
 
-EVERY_MS, BATCH = 5000, 200
+EVERY_MS, BATCH = 10_000, 200
 assert sealed_tier  # imported here, so that no child has to
 
 
