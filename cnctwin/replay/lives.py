@@ -8,6 +8,7 @@ that it had asked for.
 import json
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
 
 from cnctwin.replay.log import HISTORIAN, NODE_OFFLINE, Mark, birth_behind, is_twin
 from cnctwin.store.contract import Series, Store
@@ -17,7 +18,6 @@ from sparkplug.metric import NodeId
 
 SNAPSHOT_MS_MAX = 2 * 3_600_000
 """Older ones are no start: there is one an hour of a processor that works."""
-FOR_EVER_MS = 2**52
 IN_FLIGHT_MS = 10_000
 """Messages that were on their way while the snapshot was saved came so long before it at the most."""
 SAVED_MS_MAX = 10_000
@@ -130,21 +130,25 @@ def restarts(
         for unit in units:
             kept = store.snapshot_before(processor.name, unit, mark.received_ms + 1)
             if kept is None:
-                notes.append(f"restarted at {mark.received_ms}: the snapshot of {unit} that it went on from is not kept")
+                notes.append(f"restarted at {_utc(mark.received_ms)}: the snapshot of {unit} that it went on from is not kept")
                 continue
             snapshots[unit] = kept.payload
             if kept.received_ms < mark.received_ms - SAVED_MS_MAX:
                 older_s = (mark.received_ms - kept.received_ms) / 1000
                 notes.append(
-                    f"restarted at {mark.received_ms}: the last snapshot of {unit} that is kept is {older_s:.0f} s older"
+                    f"restarted at {_utc(mark.received_ms)}: the last snapshot of {unit} that is kept is {older_s:.0f} s older"
                 )
         result[mark.place] = Restart(mark.place, hears_from, snapshots, tuple(units), births, saved_ms)
     notes += [
-        f"the memory has a hole at {mark.received_ms}: {mark.event.detail}"
+        f"the memory has a hole until {_utc(mark.received_ms)}: {mark.event.detail}"
         for mark in found
         if mark.event.kind is EventKind.HOLE and mark.event.node.node == HISTORIAN
     ][:3]
     return result
+
+
+def _utc(at_ms: int) -> str:
+    return datetime.fromtimestamp(at_ms / 1000, UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
 
 
 def _is_of_process(event: HostEvent) -> bool:
@@ -175,7 +179,8 @@ def births_of_life(  # noqa: PLR0917
     store: Store, processor: AnyProcessor, units: Collection[str], found: Sequence[Mark], begin_ms: int, end: int
 ) -> tuple[dict[tuple[str, str], int], int]:
     """What a snapshot that was saved in a life tells, that of its end or the last one that is kept; and when it was saved."""
-    end_ms = next((mark.received_ms for mark in found if mark.place == end), FOR_EVER_MS)
+    # No later than what is at hand: a snapshot that was saved after it may be of a later life.
+    end_ms = next((mark.received_ms for mark in found if mark.place == end), found[-1].received_ms if found else begin_ms)
     result: dict[tuple[str, str], int] = {}
     saved_ms = 0
     for unit in units:
