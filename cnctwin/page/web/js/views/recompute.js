@@ -5,6 +5,7 @@ import { el, symbol, table } from "../dom.js";
 import { moment, number, plain, words } from "../text.js";
 
 const LIMIT_MS = 120000;
+const LONG = 60; // characters of a text that are shown
 const SHOWN_MAX = 20;
 
 export class Recompute {
@@ -77,10 +78,23 @@ function processors(ran) {
     : null;
 }
 
+/** Two texts, long ones only about the place where they first differ. */
+function apart(then, now) {
+  if (Math.max(then.length, now.length) <= LONG) return [then, now];
+  let at = 0;
+  while (at < then.length && then[at] === now[at]) at += 1;
+  const about = (text) => {
+    const from = Math.max(at - LONG / 2, 0),
+      to = from + LONG;
+    return el("span", { title: text }, `${from > 0 ? "…" : ""}${text.slice(from, to)}${to < text.length ? "…" : ""}`);
+  };
+  return [about(then), about(now)];
+}
+
 function differences(found) {
   const rows = found
     .slice(0, SHOWN_MAX)
-    .map((one) => [el("code", {}, one.signal), moment(one.t), plain(one.published), plain(one.recomputed)]);
+    .map((one) => [el("code", {}, one.signal), moment(one.t), ...apart(plain(one.published), plain(one.recomputed))]);
   return rows.length
     ? table(["Signal", "When", "Published then", "Recomputed"], rows, { numbers: [2, 3], label: "Differences" })
     : null;

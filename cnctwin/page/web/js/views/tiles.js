@@ -52,7 +52,8 @@ class Line {
     setTitle(this.figure, held.value === null ? (held.reason ?? "") : (held.meaning ?? ""));
     setData(this.word, "from", provenance ?? held.provenance);
     setText(this.said, provenance ?? this.own);
-    setText(this.more, this.own === "twin" && !provenance ? `(${held.provenance})` : "");
+    const old = held.quality !== "good" && held.value !== null;
+    setText(this.more, old ? `(${held.quality}: not live)` : this.own === "twin" && !provenance ? `(${held.provenance})` : "");
     setClass(this.figure, "old", held.quality !== "good");
   }
 }
