@@ -103,10 +103,11 @@ class Demo:
         # The memory begins first, so that it hears what the others say from their first word on.
         self._begin("historian", ["process", "historian", "--config", str(settings), *broker, *state])
         self._await_historian()
+        self._serve(["--config", str(settings), "--store", str(self._folder / "store"), *broker])
         others = [name for name in PROCESSORS if name != "historian"]
         self._begin("processors", ["process", *others, "--config", str(settings), *broker, *state])
+        # The edge comes last: from its first word on somebody is there to listen.
         self._begin("edge", ["edge", "run", str(edge)])
-        self._serve(["--config", str(settings), "--store", str(self._folder / "store"), *broker])
 
     def watch(self) -> None:
         """Start again what has died."""
@@ -173,16 +174,19 @@ class Demo:
 
     def _serve(self, arguments: list[str]) -> None:
         """Start the page, on the usual port or a free one, and wait until it says where it is. Without it, the demo goes on."""
-        port = PAGE_PORT if is_free(PAGE_PORT) else 0
-        given = [*arguments, "--port", str(port), "--state-file", str(self._page_state), "--no-open"]
-        self._begin("page", ["serve", *given])
+        given = ["serve", *arguments, "--state-file", str(self._page_state), "--no-open", "--port"]
+        self._begin("page", [*given, str(PAGE_PORT if is_free(PAGE_PORT) else 0)])
         page = self.children[-1]
+        command = page.command[:-1]
         deadline_s = time.monotonic() + START_S_MAX
-        while time.monotonic() < deadline_s and page.running and not self.page_url:
+        while time.monotonic() < deadline_s and not self.page_url:
+            if not page.running and page.command[-1] != "0":  # somebody else has taken the port meanwhile
+                page.command = [*command, "0"]
+                page.start()
             self.page_url = str(_read(self._page_state).get("url", ""))
             time.sleep(0.05)
         if self.page_url:  # killed and started again, it has to be where the browser looks for it
-            page.command = [*page.command, "--port", str(urlsplit(self.page_url).port)]
+            page.command = [*command, str(urlsplit(self.page_url).port)]
         else:
             self.page_trouble = f"does not start: {page.last_words()}"
 

@@ -120,9 +120,13 @@ class Lane:
         if at_ms is not None:
             if before_ms is not None and max(map(_timestamp_ms, readings)) < before_ms - self._late_ms:
                 self._jump_back(at_ms, effects)
-            self._reach(at_ms, wall_s, effects)
             if self.is_restored and before_ms is not None and at_ms > before_ms:
+                # Nobody heard what held meanwhile: no ticks, and so no figures, of that time.
+                self.ticking = False
+                self._reach(at_ms, wall_s, effects)
                 self._hole((at_ms - before_ms) / 1000, "restarted: what came in between was not seen", effects)
+            else:
+                self._reach(at_ms, wall_s, effects)
         self.is_restored = False
         self.row.update((reading.name, reading) for reading in taken)
         self.ticking = True

@@ -10,9 +10,10 @@ import os
 import sqlite3
 import threading
 import zlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from enum import IntEnum
+from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
 from urllib.parse import quote
@@ -58,19 +59,25 @@ class File(NamedTuple):
     columns: str
 
     @property
-    def endings(self) -> dict[int, str]:
+    def endings(self) -> Mapping[int, str]:
         """How each series is kept."""
-        return {int(sid): ending for sid, ending in json.loads(self.columns)["endings"].items()}
+        return _columns(self.columns)[0]
 
     @property
-    def nulls(self) -> list[int]:
+    def nulls(self) -> Sequence[int]:
         """The series that have nulls in it."""
-        return list(json.loads(self.columns)["nulls"])
+        return _columns(self.columns)[1]
 
     @property
     def is_odd(self) -> bool:
         """Whether anything in it is not good."""
-        return bool(json.loads(self.columns)["odd"])
+        return _columns(self.columns)[2]
+
+
+@lru_cache(maxsize=1024)
+def _columns(text: str) -> tuple[Mapping[int, str], Sequence[int], bool]:
+    told = json.loads(text)
+    return {int(sid): ending for sid, ending in told["endings"].items()}, tuple(told["nulls"]), bool(told["odd"])
 
 
 def files(db: sqlite3.Connection, machine: int, from_ms: int, to_ms: int) -> list[File]:

@@ -1,6 +1,6 @@
 """Questions to the sealed hours, through DuckDB over the files that the manifest lists."""
 
-import json
+import threading
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import repeat
 from pathlib import Path
@@ -17,22 +17,33 @@ from cnctwin.store.windows import Numbers, Told, Windows
 from sparkplug.values import Value
 
 THREADS, MEMORY = 2, "256MB"
+_SOURCE = "read_parquet($files, hive_partitioning = false)"
+_SOURCE_BY_NAME = "read_parquet($files, union_by_name = true, hive_partitioning = false)"
 _WITHIN = "t >= $from AND t < $to"
 _ODD = " AND (quality <> 0 OR nulls IS NOT NULL)"
 
 
 class SealedAnswers:
-    """One DuckDB in memory; any thread may ask."""
+    """One DuckDB in memory, made with the first question; any thread may ask."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self._duck = duckdb.connect(":memory:", config={"threads": THREADS, "memory_limit": MEMORY})
-        for setting in ("parquet_metadata_cache = true", "temp_directory = ''", "autoinstall_known_extensions = false"):
-            self._duck.execute(f"SET {setting}")
+        self._lock = threading.Lock()
+        self._duck: duckdb.DuckDBPyConnection | None = None
+
+    def _cursor(self) -> duckdb.DuckDBPyConnection:
+        with self._lock:
+            if self._duck is None:
+                self._duck = duckdb.connect(":memory:", config={"threads": THREADS, "memory_limit": MEMORY})
+                for setting in ("parquet_metadata_cache = true", "temp_directory = ''", "autoinstall_known_extensions = false"):
+                    self._duck.execute(f"SET {setting}")
+            return self._duck.cursor()
 
     def close(self) -> None:
         """Give its memory back."""
-        self._duck.close()
+        with self._lock:
+            if self._duck is not None:
+                self._duck.close()
 
     def told(self, files: Sequence[File], series: Iterable[SeriesOf], from_ms: int, to_ms: int) -> dict[int, list[Told]]:
         """The samples of these series in [from_ms, to_ms), by series. FileNotFoundError where a file is gone by now."""
@@ -71,33 +82,33 @@ class SealedAnswers:
         *,
         with_last: bool,
     ) -> None:
-        endings = _endings(files, series)
-        if not endings:
-            return
-        every_ms, having = next(iter(windows.values())).every_us // 1000, _having(files, endings)
-        sums = {sid: _sums(sid, ways, with_last=with_last) for sid, ways in endings.items()}
+        for layout, some in _layouts(files, series).items():
+            self._sum_up_alike(some, windows, layout, span_ms, with_last=with_last)
+
+    def _sum_up_alike(
+        self,
+        files: Sequence[File],
+        windows: Mapping[int, Windows],
+        layout: tuple[tuple[int, str], ...],
+        span_ms: tuple[int, int],
+        *,
+        with_last: bool,
+    ) -> None:
+        """Of files that keep all series that are asked for in the same way, so that they are summed up as they are kept."""
+        every_ms = next(iter(windows.values())).every_us // 1000
+        sums = {sid: _sums(sid, ending, with_last=with_last) for sid, ending in layout}
         wanted = "".join(f", {part} AS {name}{sid}" for sid, some in sums.items() for name, part in some.items())
-        where = _WITHIN + (" AND quality = 0" if any(file.is_odd for file in having) else "")
-        text = f"SELECT t // {every_ms} AS w{wanted} FROM {_source(having)} WHERE {where} GROUP BY w"  # noqa: S608
-        found = self._ask(text, having, *span_ms).fetchnumpy()
+        where = _WITHIN + (" AND quality = 0" if any(file.is_odd for file in files) else "")
+        text = f"SELECT t // {every_ms} AS w{wanted} FROM {_SOURCE} WHERE {where} GROUP BY w"  # noqa: S608
+        found = self._ask(text, files, *span_ms).fetchnumpy()
         numbers = found["w"].tolist()
         starts = [number * every_ms * 1000 for number in numbers]
         for sid, some in sums.items():
             of = {name: found[f"{name}{sid}"].tolist() for name in some}
             last_us = [0 if t is None else t * 1000 for t in of["t"]] if with_last else starts
-            windows[sid].put_all(
-                numbers,
-                map(
-                    Numbers,
-                    of["count"],
-                    of.get("good", of["count"]),
-                    (total or 0.0 for total in of["total"]),
-                    of["low"],
-                    of["high"],
-                    last_us,
-                    of.get("last", repeat(None)),
-                ),
-            )
+            count, good, last = of["count"], of.get("good", of["count"]), of.get("last", repeat(None))
+            total = (one or 0.0 for one in of["total"])
+            windows[sid].put_all(numbers, map(Numbers, count, good, total, of["low"], of["high"], last_us, last))
 
     def _rows(
         self, files: Sequence[File], series: Iterable[SeriesOf], from_ms: int, to_ms: int, where: str = ""
@@ -110,7 +121,7 @@ class SealedAnswers:
         wanted = ", ".join(_value(sid, kept) for sid, kept in endings.items())
         having = _having(files, endings, nulls)
         text = (
-            f"SELECT t, sub, quality, reason, nulls{', ' if wanted else ''}{wanted} FROM {_source(having)} WHERE {_WITHIN}{where}"  # noqa: S608
+            f"SELECT t, sub, quality, reason, nulls{', ' if wanted else ''}{wanted} FROM {_SOURCE_BY_NAME} WHERE {_WITHIN}{where}"  # noqa: S608
         )
         found = list(self._ask(text, having, from_ms, to_ms).fetchnumpy().values())
         t = (np.asarray(found[0], dtype=np.int64) * 1000 + np.asarray(found[1], dtype=np.int64)).tolist()
@@ -132,7 +143,7 @@ class SealedAnswers:
     def _ask(self, text: str, files: Sequence[File], from_ms: int, to_ms: int) -> Any:
         names = [str(self._folder / file.name) for file in files]
         try:
-            return self._duck.cursor().execute(text, {"files": names, "from": from_ms, "to": to_ms})
+            return self._cursor().execute(text, {"files": names, "from": from_ms, "to": to_ms})
         except duckdb.IOException as error:
             missing = [name for name in names if not Path(name).exists()]
             if missing:
@@ -157,12 +168,6 @@ def _having(files: Iterable[File], endings: Mapping[int, Sequence[str]], nulls: 
     return [file for file in files if not endings.keys().isdisjoint(file.endings) or not set(nulls).isdisjoint(file.nulls)]
 
 
-def _source(having: Sequence[File]) -> str:
-    """The files; where their columns differ, by name, which costs something."""
-    by_name = ", union_by_name = true" if len({json.dumps(file.endings) for file in having}) > 1 else ""
-    return f"read_parquet($files{by_name}, hive_partitioning = false)"
-
-
 def _value(sid: int, endings: Sequence[str]) -> str:
     """The value of a series in SQL, to the last bit, from however many columns."""
     parts = [
@@ -172,21 +177,30 @@ def _value(sid: int, endings: Sequence[str]) -> str:
     return parts[0] if len(parts) == 1 else f"coalesce({', '.join(parts)})"
 
 
-def _sums(sid: int, endings: Sequence[str], *, with_last: bool) -> dict[str, str]:
+def _layouts(files: Iterable[File], series: Iterable[SeriesOf]) -> dict[tuple[tuple[int, str], ...], list[File]]:
+    """The files by how they keep these series; those that have none of them are left out."""
+    wanted = {s.sid for s in series}
+    found: dict[tuple[tuple[int, str], ...], list[File]] = {}
+    for file in files:
+        layout = tuple(sorted((sid, ending) for sid, ending in file.endings.items() if sid in wanted))
+        if layout:
+            found.setdefault(layout, []).append(file)
+    return found
+
+
+def _sums(sid: int, ending: str, *, with_last: bool) -> dict[str, str]:
     """What is summed up of a series, by name; as whole numbers where they are kept as such. good: where not all may be finite."""
-    value = _value(sid, endings)
-    kind = endings[0][0] if len(endings) == 1 else ""
-    if kind in ("e", "i"):
-        name, scale = f"s{sid}{endings[0]}", f" / 1e{endings[0][1:]}" if kind == "e" else "::DOUBLE"
-        sums = {"total": f"sum({name}){scale}", "low": f"min({name}){scale}", "high": f"max({name}){scale}"}
-    elif all(ending[0] in "ezi" for ending in endings):
-        sums = {"total": f"sum({value})", "low": f"min({value})", "high": f"max({value})"}
+    name, value, digits = f"s{sid}{ending}", _value(sid, [ending]), ending[1:]
+    if ending[0] in "ezi":
+        whole = f"({name} & -2)" if ending[0] == "z" else name
+        scale = {"e": f" / 1e{digits}", "z": f" / 2e{digits}", "i": "::DOUBLE"}[ending[0]]
+        sums = {"total": f"sum({whole}){scale}", "low": f"min({whole}){scale}", "high": f"max({whole}){scale}"}
     else:
         finite = f"CASE WHEN isfinite({value}) THEN {value} END"
         sums = {"total": f"sum({finite})", "low": f"min({finite})", "high": f"max({finite})", "good": f"count({finite})"}
     if with_last:
-        sums |= {"t": f"max(t) FILTER ({value} IS NOT NULL)", "last": f"arg_max({value}, t)"}
-    return {"count": f"count({value})", **sums}
+        sums |= {"t": f"max(t) FILTER ({name} IS NOT NULL)", "last": f"arg_max({value}, t)"}
+    return {"count": f"count({name})", **sums}
 
 
 _FORMS = {

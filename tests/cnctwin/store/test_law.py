@@ -18,6 +18,7 @@ from sparkplug.host_session import EventKind
 from sparkplug.metric import Reading
 from sparkplug.quality import Quality
 from tests.cnctwin.store.told import EDGE, GOOD, HOUR_MS, STALE, T0_MS, TWIN, Law, told
+from tests.depth import IS_FULL
 
 ODD_NAN = struct.unpack("<d", b"\x01\x00\x00\x00\x00\x00\xf8\xff")[0]
 VALUES: dict[str, Any] = {
@@ -74,7 +75,7 @@ def folder() -> Iterator[Path]:
         shutil.rmtree(place)
 
 
-@settings(max_examples=12, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=150 if IS_FULL else 8, deadline=None, suppress_health_check=list(HealthCheck))
 @given(steps=STEPS)
 def test_each_sample_is_there_once_and_each_message_in_order(steps: list[Any]) -> None:
     law = Law()
