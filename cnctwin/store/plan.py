@@ -39,7 +39,7 @@ def load_of(machines: int, signals: int, rate_hz: float, *, vibration_hz: float 
     """The load of so many machines with so many slow signals each.
 
     >>> round(load_of(1, 10, 10.0).slow / 1e6, 1)
-    14.7
+    11.2
     """
     return Load(
         slow=machines * signals * rate_hz * SECONDS_A_DAY * SLOW_BYTES,
@@ -78,7 +78,7 @@ def plan(load: Load, disk_bytes: int) -> Plan:
     """The proposal: a year of raw and a week of blocks, or what of these fits beside a year of what stays for ever.
 
     >>> plan(load_of(8, 10, 10.0), 40_000_000_000).proposed.raw_days
-    242.0
+    272.0
     """
     a_day = load.slow + load.blocks + load.for_ever
     room = disk_bytes * SPARE - load.for_ever * DAYS_A_YEAR
