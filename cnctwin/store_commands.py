@@ -132,6 +132,32 @@ def export_command(  # noqa: PLR0917
     sys.stdout.write(f"{rows} rows in {out}\n")
 
 
+@store_app.command("import")
+def import_command(
+    recording: Annotated[Path, typer.Argument(help="An SHDR log, or time|key|value text")],
+    devices: Annotated[Path | None, typer.Option(help="The Devices.xml that belongs to it")] = None,
+    machine: Annotated[str | None, typer.Option(help="Under which name; else the device's, else the file's")] = None,
+    device: Annotated[str | None, typer.Option(help="Which device of the model, where there are several")] = None,
+    where: Where = None,
+) -> None:
+    """Put a recording into a store as if an edge had said it, and pin it; then it can be replayed."""
+    for path in (recording, devices):
+        if path is not None and not path.is_file():
+            raise UsageError(f"{path}: no such file; give a recording, and its device model with --devices")
+    try:
+        from cnctwin.store_import import import_recording  # noqa: PLC0415  with the extra that it needs
+    except ModuleNotFoundError as missing:
+        raise UsageError(f"a recording needs the package {missing.name}; pip install 'cnctwin[twin]' brings it") from None
+    store = open_store(where or default_place(), writable=True)
+    try:
+        done = import_recording(store, recording, devices, machine, device)
+    finally:
+        store.close()
+    lost = f", {done.repeated} were there, {done.refused} refused" if done.repeated or done.refused else ""
+    stretch = f"from {done.from_ms} to {done.to_ms} (ms since 1970)"
+    sys.stdout.write(f"{done.machine}: {done.stored} samples of {done.messages} messages stored{lost}, {stretch}\n")
+
+
 @store_app.command("seal")
 def seal_command(where: Where = None) -> None:
     """Seal, roll up and sweep at once what is due, while no historian runs."""

@@ -7,8 +7,10 @@ import pytest
 from typer.testing import CliRunner
 
 from cnctwin.errors import UsageError
+from cnctwin.simulated_machine.description import DEVICES, SPARE_PART
 from cnctwin.store.embedded import EmbeddedStore
-from cnctwin.store_commands import moment_ms, store_app
+from cnctwin.store.opening import open_store
+from cnctwin.store_commands import import_command, moment_ms, store_app
 from tests.cnctwin.store.told import HOUR_MS, T0_MS, reading, told
 from twin.runlog import read_run
 
@@ -90,3 +92,19 @@ def test_moments() -> None:
     assert moment_ms("-2h", now_ms=T0_MS) == T0_MS - 2 * HOUR_MS
     with pytest.raises(UsageError, match="is no moment; write"):
         moment_ms("yesterday")
+
+
+def test_a_recording_goes_into_a_store_is_pinned_and_there_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for _ in range(2):
+        import_command(SPARE_PART, devices=DEVICES, machine="vmc", where=str(tmp_path / "store"))
+    first, second = capsys.readouterr().out.splitlines()
+    assert first.startswith("vmc: ")
+    assert second.startswith("vmc: 0 samples of ")
+    store = open_store(tmp_path / "store")
+    try:
+        assert [pin.reason for pin in store.pins("vmc")] == [f"imported from {SPARE_PART.name}"]
+        assert "spindle_rpm" in store.latest("vmc")
+    finally:
+        store.close()
+    with pytest.raises(UsageError, match="no such file"):
+        import_command(tmp_path / "none.txt", where=str(tmp_path / "store"))
