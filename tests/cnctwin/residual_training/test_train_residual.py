@@ -92,7 +92,7 @@ def test_too_few_hours_are_refused_unless_they_are_allowed(folder: Path, tmp_pat
 
 WRONG = {
     "no file": (("nothing.parquet", "--out", "x"), "there is no such file"),
-    "no time": (("--out", "x", "--store", "s", "--from", "yesterday"), "--from yesterday: it has to be a time"),
+    "no time": (("--out", "x", "--store", "s", "--from", "yesterday"), "--from 'yesterday' is no moment"),
     "all held out": (("nothing.parquet", "--out", "x", "--held-share", "0.9"), "can be held out"),
     "no constants": (("nothing.parquet", "--out", "x", "--config", "nothing.toml"), "nothing.toml"),
 }

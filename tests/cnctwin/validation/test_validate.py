@@ -202,7 +202,7 @@ def test_the_sample_configuration_holds_the_defaults() -> None:
     [
         (["--store", "nowhere/at/all", *DAY], "nowhere/at/all"),
         (["--runs", "none.parquet"], "none.parquet"),
-        (["--from", "yesterday"], "--from yesterday: is no time"),
+        (["--from", "yesterday"], "--from 'yesterday' is no moment"),
         (["--from", "2026-11-22", "--to", "2026-11-21"], "is not before"),
         (["--runs", "a.parquet", "--store", "b"], "give one of them"),
         (["--runs", "a.parquet", "--truth", "b.parquet", "--truth", "c.parquet"], "2 truth files for 1 runs"),
