@@ -6,6 +6,7 @@ name in their description. A machine is written back as the same TOML, so that a
 
 import math
 import tomllib
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any, Self
 
@@ -88,13 +89,26 @@ class Axis(Section):
         return self.torque_constant_nm_per_a * 2.0 * math.pi / (self.screw_lead_mm / 1000.0)
 
 
+class Mode(Section):
+    """[[tool.modes]]: one mode of the tip of the tool in its holder and spindle, as a tap test gives it.
+
+    k G(ω) = 1 / (1 − (ω/ω_n)² + 2 i ζ ω/ω_n) in machine direction x or y; modes of one direction add up.
+    """
+
+    direction: Annotated[str, Field(pattern=r"^[xy]$")]
+    frequency_hz: Positive
+    damping_ratio: Annotated[float, Field(gt=0, lt=1)]
+    stiffness_n_per_mm: Positive
+
+
 class Tool(Section):
-    """[tool]: an end mill without helix; K_t and K_e = F_r / F_t of the material it cuts."""
+    """[tool]: an end mill without helix; K_t and K_e = F_r / F_t of the material it cuts; its modes, where they are known."""
 
     diameter_mm: Positive
     teeth: Annotated[int, Field(ge=1)]
     tangential_coefficient_n_per_mm2: Positive
     radial_ratio: NotNegative
+    modes: tuple[Mode, ...] = ()
 
 
 class SpindleDrive(Section):
@@ -141,15 +155,41 @@ class Program(Section):
 
 
 class Limits(Section):
-    """[limits]: for the optimiser."""
+    """[limits]: for the optimiser. Pairs are [lowest, highest]; what is left out is no limit.
+
+    force_n: greatest resultant over a tooth period; power_kw: electrical, of the spindle drive (else what [spindle] has)
+    torque_nm: on the spindle, mean over a turn; chip_mm: greatest chip thickness on the engaged arc
+    surface_speed_m_min: of the edge
+    """
 
     feed_mm_min: tuple[Positive, Positive]
     spindle_rpm: tuple[Positive, Positive]
     force_n: Positive | None = None
+    power_kw: Positive | None = None
+    torque_nm: Positive | None = None
+    chip_mm: tuple[NotNegative, Positive] | None = None
+    surface_speed_m_min: tuple[NotNegative, Positive] | None = None
+
+    @model_validator(mode="after")
+    def _lowest_is_not_above_highest(self) -> Self:
+        for name in ("feed_mm_min", "spindle_rpm", "chip_mm", "surface_speed_m_min"):
+            pair = getattr(self, name)
+            if pair is not None and pair[0] > pair[1]:
+                raise ValueError(f"{name} {list(pair)} has its lowest above its highest")
+        return self
+
+
+class ToolWears(StrEnum):
+    """While what the tool's life runs."""
+
+    IN_PROGRAM = "in_program"
+    """All the time that the program takes, as in the reference paper (Eq. 20 with T_p)."""
+    IN_CUT = "in_cut"
+    """While the edge cuts."""
 
 
 class Cost(Section):
-    """[cost]: tool life by Taylor, V Tⁿ = C, and what a second costs."""
+    """[cost]: tool life by Taylor, V Tⁿ = C with T in min, and what a second costs."""
 
     currency: str
     tool_price: NotNegative
@@ -158,6 +198,7 @@ class Cost(Section):
     depreciation_per_s: NotNegative
     taylor_c_m_per_min: Positive
     taylor_n: Positive
+    tool_wears: ToolWears = ToolWears.IN_PROGRAM
 
 
 class Stock(Section):
@@ -188,6 +229,7 @@ class MachineFile(Section):
     machine: Machine
     axes: dict[Annotated[str, Field(pattern=r"^[a-z][a-z0-9]?$")], Axis] = Field(default_factory=dict)
     tool: Tool | None = None
+    tools: dict[Annotated[str, Field(pattern=r"^[0-9]{1,8}$")], Tool] = Field(default_factory=dict)
     spindle: SpindleDrive | None = None
     thermal: Thermal | None = None
     program: Program | None = None
