@@ -1,4 +1,4 @@
-"""What the optimiser answers: the program rewritten, each line before and after, what binds, and how far it is from the optimum."""
+"""What the optimiser answers: the program rewritten, each line before and after, what binds, how far the optimum is."""
 
 from dataclasses import asdict, dataclass
 from enum import StrEnum
@@ -105,7 +105,7 @@ class Bound:
 
 @dataclass(frozen=True, slots=True)
 class FrontPoint:
-    """One program of the front: seconds, cost, greatest force and the speeds that it uses (lowest, highest). chosen: written out."""
+    """One program of the front: seconds, cost, greatest force, lowest and highest speed. chosen: it is written out."""
 
     seconds: float
     cost: float
