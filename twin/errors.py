@@ -7,6 +7,7 @@ TwinError
 ├── CaseError         a case folder that is not a case
 ├── EngagementError   a path, tool, stock or limit with which the engagement cannot be computed
 ├── EffectError       an effect that does not exist, or is given what it does not take
+├── OptimisationError a program whose limits cannot be kept, or an optimisation that is asked for what there is not
 ├── ModelError        an anomaly model that cannot be trained, read or used (twin/anomaly/errors.py)
 ├── ResidualError     a residual model that cannot be trained, read or used (twin/residual/errors.py)
 ├── PointerError      a current.json that names no model (twin/models/errors.py)
@@ -37,6 +38,10 @@ class EngagementError(TwinError):
 
 class EffectError(TwinError):
     """An effect, or a parameter of one, that does not exist or is out of its bounds."""
+
+
+class OptimisationError(TwinError):
+    """Limits that leave a line nothing, or a question that cannot be put."""
 
 
 class ProgramError(TwinError):

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.engagement import Workpiece, cut
+from twin.engagement.along_path import Section, engaged_along
 from twin.errors import MachineError
 from twin.gcode import Settings, interpret
 from twin.machine import MachineFile, Program
@@ -27,8 +27,6 @@ IDEAL_TIMES = Program(
     rapid_mm_min=RAPID_MM_MIN, acceleration_mm_s2=2500.0, jerk_mm_s3=60000.0, corner_speed_difference_mm_min=500.0
 )
 """What a program is planned with where neither [program] nor an effect of the machine tells of its control: a middling one."""
-RESOLUTION_MM = 0.25
-ROWS_MAX = 2_000_000
 TICKS_MAX = 8_000_000
 
 
@@ -141,23 +139,12 @@ def _engagement(machine: MachineFile, path: Path, motion: Motion, notes: list[st
         return none
     if len({event.value for event in path.events if event.kind == EventKind.TOOL_CHANGE}) > 1:
         notes.append(f"the program changes tools; all of them are taken to be the {machine.tool.diameter_mm:g} mm one of [tool]")
-    count = np.maximum(1, np.ceil(path.length_mm / RESOLUTION_MM)).astype(np.int64)
-    if count.sum() > ROWS_MAX:
-        raise MachineError(f"the path is {path.length_mm.sum():.0f} mm long, too long to follow in steps of {RESOLUTION_MM} mm")
-    count[(path.sweep_rad == 0.0) | (path.length_mm == 0.0)] = 1  # a line is cut into rows by the engagement itself
-    segment = np.repeat(np.arange(len(path)), count)
-    first = np.concatenate([[0], np.cumsum(count)])
-    part = (np.arange(first[-1]) - first[segment] + 1) / count[segment]
-    points = np.concatenate([path.start_mm[:1], path.at(segment, part * path.length_mm[segment])])[:, :3]
-    workpiece = Workpiece.of(machine.stock, machine.tool.diameter_mm / 16.0)
-    _, rows = cut(workpiece, points, machine.tool.diameter_mm, RESOLUTION_MM, path.kind[segment] != Kind.RAPID)
+    rows = engaged_along(path, machine.stock, [Section(0, len(path), machine.tool.diameter_mm)])
     for hit in rows.collisions[:3]:
-        line = int(path.line[segment[hit.segment]]) + 1
+        line = int(path.line[hit.segment]) + 1
         notes.append(f"line {line}: rapid into material at " + ", ".join(f"{v:.1f}" for v in hit.position_mm) + " mm")
-    whole = np.where(path.length_mm[motion.segment] > 0.0, motion.s_mm / np.maximum(path.length_mm[motion.segment], 1e-12), 0.0)
-    place = whole * count[motion.segment]
-    chord = np.minimum(place.astype(np.int64), count[motion.segment] - 1)
-    row = rows.row_at(first[motion.segment] + chord, np.clip(place - chord, 0.0, 1.0))
+    length_mm = path.length_mm[motion.segment]
+    row = rows.row_at(motion.segment, np.where(length_mm > 0.0, motion.s_mm / np.maximum(length_mm, 1e-12), 0.0))
     feeding = (path.kind[motion.segment] != Kind.RAPID) & (motion.feed_mm_min > 0.0)
     cutting = feeding & (motion.spindle_rpm > 0.0) & (motion.spindle_direction > 0)
     in_material = feeding & (rows.axial_depth_mm[row] > 0.0)

@@ -14,12 +14,11 @@ from twin.gap.diagnosis import Candidate, Cause, Effected, GapNumbers, Interval,
 from twin.gap.evidence import advantage
 from twin.gap.intervals import parameter_intervals
 from twin.gap.null import Null
+from twin.gap.refitted import KNOWN_MIN
 from twin.gap.search import SENSING, Explained
 from twin.gap.verdict import Judged
 from twin.gap.wording import percent
 from twin.runlog import AXIS_COLUMN
-
-KNOWN_MIN = 0.5
 
 
 def found_effects(stages: Sequence[Judged]) -> list[tuple[Effected, dict[str, float]]]:

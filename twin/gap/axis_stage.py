@@ -299,12 +299,17 @@ def axis_constants_free(machine: MachineFile, letter: str) -> tuple[Free, ...]:
     """The constants of an axis that are uncertain, with their priors from `[uncertainty]`."""
     stated = machine.uncertainty
     axis = machine.axes[letter]
-    force = "force_per_command_n" if axis.force_per_command_n is not None else "torque_constant_nm_per_a"
-    keys = dict.fromkeys(FACTORS, "") | {"newton_per_command": force}
     free = []
     for name in FACTORS:
-        path = keys[name] or (name if name == "mass_kg" else f"friction.{name}")
-        sigma = stated.get(f"axes.{letter}.{path}", stated.get("relative", 0.05))
+        sigma = stated.get(axis_constant_path(machine, letter, name), stated.get("relative", 0.05))
         zero = name == "viscous_n_s_per_mm" and not np.any(axis.friction.viscous_n_s_per_mm)
         free += [constant(name, sigma)] if sigma > 0.0 and not zero else []
     return tuple(free)
+
+
+def axis_constant_path(machine: MachineFile, letter: str, name: str) -> str:
+    """The path in machine.toml of a free constant of an axis; what a unit of the command pushes with has one of two names."""
+    stated_as_force = machine.axes[letter].force_per_command_n is not None
+    newton = "force_per_command_n" if stated_as_force else "torque_constant_nm_per_a"
+    keys = {"mass_kg": "mass_kg", "newton_per_command": newton}
+    return f"axes.{letter}.{keys.get(name, f'friction.{name}')}"

@@ -21,7 +21,7 @@ from twin.gap.null import NULL, Null
 from twin.gap.patterns import patterns
 from twin.gap.plan import Ground, SideBySide, explained_stages, ground_of
 from twin.gap.program_time import diagnose_programs
-from twin.gap.refitted import with_constants, with_effects
+from twin.gap.refitted import constant_deviations, with_constants, with_effects, with_uncertainty
 from twin.gap.score import Squares, gap_of, squares_of, traces_of, unit_of
 from twin.gap.shares import shapley
 from twin.gap.shown import shown_by_run
@@ -107,7 +107,10 @@ def _motion(
         notes=notes + _flattering(checked, twins.runs),
         seconds=0.0,
     )
-    return Diagnosed(diagnosis, twins.after, traces)
+    known: dict[str, float] = {}
+    for stage in stages:
+        known |= constant_deviations(twins.after, stage.explained.stage, stage.explained.best)
+    return Diagnosed(diagnosis, with_uncertainty(twins.after, known, named), traces)
 
 
 def _flattering(case: Case, runs: tuple[Run, ...]) -> tuple[str, ...]:

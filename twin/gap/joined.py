@@ -28,7 +28,13 @@ def joined(motion: Diagnosed, programs: Diagnosed) -> Diagnosed:
         notes=one.notes + other.notes,
     )
     added = tuple(e for e in programs.twin.effects if e not in motion.twin.effects)
-    twin = motion.twin.model_copy(update={"program": programs.twin.program, "effects": motion.twin.effects + added})
+    twin = motion.twin.model_copy(
+        update={
+            "program": programs.twin.program,
+            "effects": motion.twin.effects + added,
+            "uncertainty": {**programs.twin.uncertainty, **motion.twin.uncertainty},
+        }
+    )
     return Diagnosed(diagnosis, twin, motion.traces + programs.traces)
 
 

@@ -30,6 +30,7 @@ from twin.gap.program_fit import LONG_WINDOW_S, Model, Values, Watched
 from twin.gap.program_search import Names, Search
 from twin.gap.program_trial import Trial
 from twin.gap.program_where import BLOCK, SECTION, RunGap, Sections, where
+from twin.gap.refitted import with_uncertainty
 from twin.gap.wording import digits, percent
 from twin.machine import AddedEffect, MachineFile, Program
 from twin.motion.limits import ACCELERATION_MAX_MM_S2, Limits
@@ -93,7 +94,8 @@ class Answer:
             notes=(*asked.notes, *self._notes(gaps)),
             seconds=0.0,
         )
-        return Diagnosed(diagnosis, self.twin(), tuple(t for gap in self._all(gaps, before, after) for t in _traces(gap)))
+        twin = with_uncertainty(self.twin(), {}, causes)
+        return Diagnosed(diagnosis, twin, tuple(t for gap in self._all(gaps, before, after) for t in _traces(gap)))
 
     def _all(self, gaps: list[RunGap], before: Model, after: Model) -> list[RunGap]:
         judged = {gap.watched.trial.name for gap in gaps}

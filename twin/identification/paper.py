@@ -20,10 +20,10 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.signal import savgol_filter
 
 from twin.case import Case, RunKind
+from twin.genetic import Evolved, GeneticSettings, Objective, evolve
 from twin.identification.axis_fit import AxisModel, AxisRecording, fit_axis
 from twin.identification.axis_parameters import GAINS, AxisParameter
 from twin.identification.friction_points import FrictionCurve, FrictionPoint, fit_friction_curve, friction_points
-from twin.identification.genetic import Evolved, GeneticSettings, Objective, evolve
 from twin.machine import Axis, Friction, Tool
 from twin.process.milling import Milling, milling_force, tool_constants
 from twin.recorded import told_of

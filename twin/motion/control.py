@@ -6,10 +6,11 @@ everywhere (`twin.effects.effect`); a limit that there is not is infinite. Nothi
 
 import inspect
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from twin.effects.catalogue import effect_named
 from twin.effects.effect import Change, Effect
@@ -54,6 +55,10 @@ class Control:
     def plan(self, path: Path, feed_override: Override = 1.0, rapid_override: Override = 1.0) -> Plan:
         """The plan of `path` with the overrides of a run on top. Raises as `twin.motion.plan.plan` does."""
         return plan(path, self.limits, self.feed_ratio * feed_override, self.rapid_ratio * rapid_override)
+
+    def plan_with(self, path: Path, feed_mm_min: NDArray[np.float64]) -> Plan:
+        """The plan of `path` with other feeds, (segments,)."""
+        return self.plan(replace(path, feed_mm_min=feed_mm_min))
 
 
 def control_of(machine: MachineFile, unstated: Program) -> Control:

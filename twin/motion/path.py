@@ -101,6 +101,14 @@ class Path:
         """Curvature (n,) of each segment, 1/mm: r θ² / L² of an arc (that of the helix), 0 of a line."""
         return curvature_at(self.kind, self.start_mm, self.end_mm, self.centre_mm, self.plane, self.sweep_rad, self.length_mm)
 
+    def commanded_rpm(self) -> Floats:
+        """The speed of the spindle that is commanded on each segment (n,), rev/min; negative = M4."""
+        rpm = np.zeros(len(self))
+        for event in self.events:
+            if event.kind in (EventKind.SPINDLE, EventKind.ORIENT):
+                rpm[event.segment :] = event.value if event.kind == EventKind.SPINDLE else 0.0
+        return rpm
+
 
 @dataclass
 class _Builder:

@@ -1,5 +1,6 @@
 """The plan of a program: the speed along every segment and the time of every event; sampled, the reference of every tick."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +12,7 @@ from twin.machine import Program
 from twin.motion.limits import Bounds, Limits, bounds
 from twin.motion.look_ahead import stretches_with_times
 from twin.motion.motion import Motion, sampled
-from twin.motion.path import Kind, Path
+from twin.motion.path import Event, Kind, Path
 from twin.motion.s_curve import along_profile, ramp_time, time_at_distance
 from twin.motion.timeline import timeline
 
@@ -95,7 +96,7 @@ def plan(path: Path, times: Program | Limits, feed_override: Override = 1.0, rap
     """
     limits = Limits.of(times) if isinstance(times, Program) else times
     allowed = bounds(path, limits)
-    cap = _caps(path, allowed, path.feed_mm_min, feed_override, rapid_override)
+    cap = speed_caps(path, allowed, path.feed_mm_min, feed_override, rapid_override)
     first, length, a, j, v, peak, seconds = stretches_with_times(
         cap, allowed.acceleration_mm_s2, allowed.jerk_mm_s3, allowed.junction_mm_s, path.length_mm
     )
@@ -104,11 +105,11 @@ def plan(path: Path, times: Program | Limits, feed_override: Override = 1.0, rap
         seconds,
         v[1:],
         path.kind,
-        *_event_arrays(path),
+        *event_arrays(path.events),
         path.line,
         limits.tool_change_s,
         limits.spindle_acceleration_rpm_s,
-        _stopping_rpm_s(limits),
+        stopping_rpm_s(limits),
         limits.spindle_base_rpm,
         limits.rapid_waits_for_spindle,
         limits.in_position_s,
@@ -133,7 +134,7 @@ def plan(path: Path, times: Program | Limits, feed_override: Override = 1.0, rap
     )
 
 
-def _caps(path: Path, allowed: Bounds, feed_mm_min: Floats, feed_override: Override, rapid_override: Override) -> Floats:
+def speed_caps(path: Path, allowed: Bounds, feed_mm_min: Floats, feed_override: Override, rapid_override: Override) -> Floats:
     """Highest speed (…, n) of each segment, mm/s."""
     rapid = path.kind == Kind.RAPID
     wanted = np.where(rapid, np.inf, feed_mm_min * feed_override / 60.0)
@@ -145,17 +146,19 @@ def _caps(path: Path, allowed: Bounds, feed_mm_min: Floats, feed_override: Overr
     return np.ascontiguousarray(fastest)
 
 
-def _stopping_rpm_s(limits: Limits) -> float:
+def stopping_rpm_s(limits: Limits) -> float:
+    """The ramp of the spindle downwards, rev/min a second."""
     down = limits.spindle_deceleration_rpm_s
     return limits.spindle_acceleration_rpm_s if down is None else down
 
 
-def _event_arrays(path: Path) -> tuple[Ints, Ints, Floats, Ints]:
+def event_arrays(events: Sequence[Event]) -> tuple[Ints, Ints, Floats, Ints]:
+    """Segment, kind, value and line of each event, (events,)."""
     return (
-        np.array([event.segment for event in path.events], dtype=np.int64),
-        np.array([event.kind for event in path.events], dtype=np.int64),
-        np.array([event.value for event in path.events], dtype=np.float64),
-        np.array([event.line for event in path.events], dtype=np.int64),
+        np.array([event.segment for event in events], dtype=np.int64),
+        np.array([event.kind for event in events], dtype=np.int64),
+        np.array([event.value for event in events], dtype=np.float64),
+        np.array([event.line for event in events], dtype=np.int64),
     )
 
 
@@ -198,69 +201,18 @@ def _by_segment(
     return begin, duration, entry, top, leave
 
 
-def plan_times(path: Path, times: Program | Limits, feed_mm_min: Floats) -> Floats:
-    """Total seconds (candidates,) of the path at each row of `feed_mm_min` (candidates, n): `plan(…).total_s`, nothing else."""
-    limits = Limits.of(times) if isinstance(times, Program) else times
-    allowed = bounds(path, limits)
-    caps = _caps(path, allowed, np.atleast_2d(np.asarray(feed_mm_min, dtype=np.float64)), 1.0, 1.0)
-    return np.asarray(
-        _totals(
-            caps,
-            allowed.acceleration_mm_s2,
-            allowed.jerk_mm_s3,
-            allowed.junction_mm_s,
-            path.length_mm,
-            path.kind,
-            *_event_arrays(path),
-            path.line,
-            limits.tool_change_s,
-            limits.spindle_acceleration_rpm_s,
-            _stopping_rpm_s(limits),
-            limits.spindle_base_rpm,
-            limits.rapid_waits_for_spindle,
-            limits.in_position_s,
-        )
-    )
-
-
 @kernel
-def _totals(
-    caps: Floats,
-    acceleration: Floats,
-    jerk: Floats,
-    junction: Floats,
-    length: Floats,
-    kind: Ints,
-    event_segment: Ints,
-    event_kind: Ints,
-    event_value: Floats,
-    event_line: Ints,
-    segment_line: Ints,
-    tool_change_s: float,
-    spindle_rpm_s: float,
-    stopping_rpm_s: float,
-    base_rpm: float,
-    rapid_waits: bool,
-    in_position_s: float,
+def segment_times(
+    first: Ints, length: Floats, total: Floats, a: Floats, j: Floats, v: Floats, peak: Floats, seconds: Floats
 ) -> Floats:
-    totals = np.empty(len(caps))
-    for c in range(len(caps)):
-        first, _total, _a, _j, v, _peak, seconds = stretches_with_times(caps[c], acceleration, jerk, junction, length)
-        totals[c] = timeline(
-            first,
-            seconds,
-            v[1:],
-            kind,
-            event_segment,
-            event_kind,
-            event_value,
-            event_line,
-            segment_line,
-            tool_change_s,
-            spindle_rpm_s,
-            stopping_rpm_s,
-            base_rpm,
-            rapid_waits,
-            in_position_s,
-        )[-1]
-    return totals
+    """Seconds (n,) on each segment."""
+    duration = np.empty(len(length))
+    for i in range(len(first) - 1):
+        t, done = 0.0, 0.0
+        for k in range(first[i], first[i + 1]):
+            done += length[k]
+            end = seconds[i]
+            if k + 1 < first[i + 1]:
+                end = time_at_distance(done, v[i], peak[i], v[i + 1], total[i], a[i], j[i])
+            duration[k], t = end - t, end
+    return duration

@@ -13,10 +13,11 @@ import twin.motion.plan
 from twin.errors import MachineError, ProgramError
 from twin.gcode import canonical
 from twin.machine import Program
+from twin.motion.candidates import plan_times
 from twin.motion.limits import Limits
 from twin.motion.motion import ExecState
 from twin.motion.path import Path, path_from_moves
-from twin.motion.plan import plan, plan_times
+from twin.motion.plan import plan
 
 LIMITS = Limits(rapid_mm_min=36000.0, acceleration_mm_s2=2500.0, jerk_mm_s3=60000.0, corner_speed_difference_mm_min=500.0)
 TRAPEZOID = LIMITS.with_(jerk_mm_s3=math.inf)

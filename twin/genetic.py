@@ -5,8 +5,10 @@ Tournament selection, simulated binary crossover (Deb, Agrawal 1995, Complex Sys
 replaced at each evolution (generation gap: De Jong 1975), and the best of the rest stay, so the best is never lost.
 """
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,6 +57,42 @@ class GeneticSettings:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Population:
+    """Where a search stands: candidates with their objectives, and the state of its chance. `step` takes it on.
+
+    genes: (population, p); fitness: (population,); history: best objective after each evolution, that of the start first
+    """
+
+    genes: Floats
+    fitness: Floats
+    history: tuple[float, ...]
+    evaluations: int
+    chance: dict[str, Any]
+
+    @property
+    def best(self) -> int:
+        """Number of the best candidate."""
+        return int(np.argmin(self.fitness))
+
+    def to_json(self) -> dict[str, Any]:
+        """Everything, exactly: a population that was read back takes the same course."""
+        return {
+            "genes": self.genes.tolist(),
+            "fitness": [value if math.isfinite(value) else None for value in self.fitness.tolist()],
+            "history": list(self.history),
+            "evaluations": self.evaluations,
+            "chance": self.chance,
+        }
+
+    @classmethod
+    def from_json(cls, values: Mapping[str, Any]) -> Self:
+        """The population that `to_json` wrote."""
+        fitness = np.array([math.inf if value is None else value for value in values["fitness"]], dtype=np.float64)
+        genes = np.array(values["genes"], dtype=np.float64)
+        return cls(genes, fitness, tuple(values["history"]), int(values["evaluations"]), dict(values["chance"]))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Evolved:
     """Where it ended: genes (p,) and objective of the best; history: (evolutions + 1,) best objective after each evolution."""
 
@@ -76,24 +114,47 @@ def evolve(objective: Objective, low: Floats, high: Floats, settings: GeneticSet
 
     Raises TwinError where the bounds leave nothing between them.
     """
+    now = first_population(objective, low, high, settings, seed)
+    while len(now.history) <= settings.evolutions_max and now.history[-1] > settings.fitness_limit:
+        now = step(now, objective, low, high, settings)
+    return Evolved(now.genes[now.best], float(now.fitness[now.best]), np.array(now.history), now.evaluations)
+
+
+def first_population(
+    objective: Objective,
+    low: Floats,
+    high: Floats,
+    settings: GeneticSettings,
+    seed: int | Sequence[int],
+    known: Floats | None = None,
+) -> Population:
+    """The population to begin with: drawn evenly within the bounds, the first of them replaced by `known` candidates (k, p).
+
+    Raises TwinError where the bounds leave nothing between them.
+    """
     if not np.all(low < high):
         k = int(np.argmin(high - low))
         raise TwinError(f"gene {k} has nothing between its bounds {low[k]:g} and {high[k]:g}")
     chance = np.random.default_rng(seed)
     genes = low + (high - low) * chance.random((settings.population, len(low)))
+    if known is not None:
+        seeds = np.clip(known[: settings.population], low, high)
+        genes[: len(seeds)] = seeds
     fitness = _fitness(objective, genes)
-    evaluations, history = len(genes), [float(fitness.min())]
-    kept = settings.population - settings.children
-    while len(history) <= settings.evolutions_max and history[-1] > settings.fitness_limit:
-        parents = genes[_tournaments(fitness, settings, chance)]
-        children = _mutated(_crossed(parents, low, high, settings, chance), low, high, settings, chance)
-        best = np.argsort(fitness, kind="stable")[:kept]
-        genes = np.concatenate([genes[best], children])
-        fitness = np.concatenate([fitness[best], _fitness(objective, children)])
-        evaluations += len(children)
-        history.append(float(fitness.min()))
-    first = int(np.argmin(fitness))
-    return Evolved(genes[first], float(fitness[first]), np.array(history), evaluations)
+    return Population(genes, fitness, (float(fitness.min()),), len(genes), dict(chance.bit_generator.state))
+
+
+def step(now: Population, objective: Objective, low: Floats, high: Floats, settings: GeneticSettings) -> Population:
+    """One evolution: `settings.children` of the candidates are replaced, the best of the rest stay."""
+    chance = np.random.default_rng()
+    chance.bit_generator.state = now.chance
+    parents = now.genes[_tournaments(now.fitness, settings, chance)]
+    children = _mutated(_crossed(parents, low, high, settings, chance), low, high, settings, chance)
+    best = np.argsort(now.fitness, kind="stable")[: settings.population - settings.children]
+    genes = np.concatenate([now.genes[best], children])
+    fitness = np.concatenate([now.fitness[best], _fitness(objective, children)])
+    history = (*now.history, float(fitness.min()))
+    return Population(genes, fitness, history, now.evaluations + len(children), dict(chance.bit_generator.state))
 
 
 def _fitness(objective: Objective, genes: Floats) -> Floats:

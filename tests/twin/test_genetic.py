@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from twin.errors import TwinError
-from twin.identification import genetic
-from twin.identification.genetic import Evolved, GeneticSettings, evolve
+from twin import genetic
+from twin.genetic import Evolved, GeneticSettings, evolve
 
 LOW, HIGH = np.array([-2.0, 0.0, 5.0]), np.array([3.0, 1.0, 6.0])
 

@@ -1,0 +1,200 @@
+"""One path under many feeds and speeds: seconds and wear of each candidate, compiled, nothing sampled.
+
+Everything that neither feed nor speed changes is worked out once. A candidate brings the feed of each segment and the value of
+each spindle event. Some of these events are optional: where the speed is already the one that is asked for, the block is
+none, and the axes do not stop for it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.compiling import kernel
+from twin.machine import Program
+from twin.motion.limits import Bounds, Limits, bounds
+from twin.motion.look_ahead import stretches_with_times
+from twin.motion.path import Event, Path
+from twin.motion.plan import event_arrays, segment_times, speed_caps, stopping_rpm_s
+from twin.motion.timeline import timeline
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+SPINDLE = 2
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Wear:
+    """How the tool wears: `factor` |n|^exponent a second at n rev/min.
+
+    factor: (segments,) on a segment, 0 = nothing is cut there
+    share: (segments,) part of all the time that nothing is cut which wears the tool as this segment does; 0 = that time does not
+    """
+
+    factor: Floats
+    share: Floats
+    exponent: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Candidates:
+    """A path made ready. `optional`: events beyond those of the path, in order of their segments, that change the speed.
+
+    events: of the path and the optional ones, as `seconds_and_wear` wants their values; is_optional: (events,)
+    """
+
+    path: Path
+    limits: Limits
+    allowed: Bounds
+    events: tuple[Event, ...]
+    is_optional: Flags
+    feed_ratio: float
+    rapid_ratio: float
+
+    @classmethod
+    def of(
+        cls, path: Path, limits: Limits, optional: tuple[Event, ...] = (), feed_ratio: float = 1.0, rapid_ratio: float = 1.0
+    ) -> "Candidates":
+        """Made ready under the limits. An optional event comes after those of the path before the same segment."""
+        marked = [(event.segment, 0, k, event) for k, event in enumerate(path.events)]
+        marked += [(event.segment, 1, k, event) for k, event in enumerate(optional)]
+        marked.sort(key=lambda one: one[:3])
+        flags = np.array([bool(kind) for _, kind, _, _ in marked], dtype=np.bool_)
+        events = tuple(event for *_, event in marked)
+        return cls(path, limits, bounds(path, limits), events, flags, feed_ratio, rapid_ratio)
+
+    def seconds_and_wear(self, feed_mm_min: Floats, event_value: Floats, wear: Wear | None = None) -> tuple[Floats, Floats]:
+        """Seconds (candidates,), and the part of a tool's life that the program takes (candidates,).
+
+        feed_mm_min: (candidates, segments), of any value on rapids; event_value: (candidates, events), as `events` has them
+
+        Raises ProgramError where a feed is none.
+        """
+        caps = speed_caps(self.path, self.allowed, np.atleast_2d(feed_mm_min), self.feed_ratio, self.rapid_ratio)
+        segment, kind, _, line = event_arrays(self.events)
+        stated, limits = wear or no_wear(len(self.path)), self.limits
+        return _evaluated(
+            caps,
+            np.ascontiguousarray(np.atleast_2d(event_value)),
+            self.allowed.acceleration_mm_s2,
+            self.allowed.jerk_mm_s3,
+            self.allowed.junction_mm_s,
+            self.path.length_mm,
+            self.path.kind,
+            segment,
+            kind,
+            line,
+            self.is_optional,
+            self.path.line,
+            (
+                limits.tool_change_s,
+                limits.spindle_acceleration_rpm_s,
+                stopping_rpm_s(limits),
+                limits.spindle_base_rpm,
+                limits.in_position_s,
+                stated.exponent,
+            ),
+            limits.rapid_waits_for_spindle,
+            stated.factor,
+            stated.share,
+            wear is not None,
+        )
+
+
+def plan_times(path: Path, times: Program | Limits, feed_mm_min: Floats) -> Floats:
+    """Total seconds (candidates,) of the path at each row of `feed_mm_min` (candidates, n): `plan(…).total_s`, nothing else."""
+    limits = Limits.of(times) if isinstance(times, Program) else times
+    feeds = np.atleast_2d(np.asarray(feed_mm_min, dtype=np.float64))
+    values = event_arrays(path.events)[2]
+    return Candidates.of(path, limits).seconds_and_wear(feeds, np.broadcast_to(values, (len(feeds), len(values))))[0]
+
+
+def no_wear(segments: int) -> Wear:
+    """A tool that never wears."""
+    return Wear(np.zeros(segments), np.zeros(segments), 1.0)
+
+
+@kernel
+def _evaluated(
+    caps: Floats,
+    event_value: Floats,
+    acceleration: Floats,
+    jerk: Floats,
+    junction: Floats,
+    length: Floats,
+    kind: Ints,
+    event_segment: Ints,
+    event_kind: Ints,
+    event_line: Ints,
+    optional: Flags,
+    segment_line: Ints,
+    control: tuple[float, float, float, float, float, float],
+    rapid_waits: bool,
+    factor: Floats,
+    share: Floats,
+    wears: bool,
+) -> tuple[Floats, Floats]:
+    tool_change_s, spindle_rpm_s, stopping_rpm_s, base_rpm, in_position_s, exponent = control
+    count, events = len(caps), len(event_segment)
+    totals, worn = np.empty(count), np.zeros(count)
+    for c in range(count):
+        value, meets, keep, kept = event_value[c].copy(), junction.copy(), np.empty(events, dtype=np.int64), 0
+        rpm = 0.0
+        for e in range(events):
+            if optional[e]:
+                if value[e] == rpm:
+                    continue
+                meets[event_segment[e]] = 0.0
+            if event_kind[e] == SPINDLE:
+                rpm = value[e]
+            keep[kept] = e
+            kept += 1
+        mine = keep[:kept]
+        first, total, a, j, v, peak, seconds = stretches_with_times(caps[c], acceleration, jerk, meets, length)
+        _start, _wait, _event_start, _event_seconds, _ramps, totals[c] = timeline(
+            first,
+            seconds,
+            v[1:],
+            kind,
+            event_segment[mine],
+            event_kind[mine],
+            value[mine],
+            event_line[mine],
+            segment_line,
+            tool_change_s,
+            spindle_rpm_s,
+            stopping_rpm_s,
+            base_rpm,
+            rapid_waits,
+            in_position_s,
+        )
+        if wears:
+            moving = segment_times(first, length, total, a, j, v, peak, seconds)
+            worn[c] = _worn(event_segment[mine], event_kind[mine], value[mine], moving, totals[c], factor, share, exponent)
+    return totals, worn
+
+
+@kernel
+def _worn(
+    event_segment: Ints,
+    event_kind: Ints,
+    value: Floats,
+    moving: Floats,
+    total_s: float,
+    factor: Floats,
+    share: Floats,
+    exponent: float,
+) -> float:
+    """The sum of factor · |n|^exponent · seconds, n the speed that is commanded, and what the rest of the time takes."""
+    worn, rate, cutting_s, power, at = 0.0, 0.0, 0.0, 0.0, 0
+    for k in range(len(moving)):
+        while at < len(event_segment) and event_segment[at] <= k:
+            if event_kind[at] == SPINDLE:
+                power = abs(value[at]) ** exponent
+            at += 1
+        if factor[k] > 0.0:
+            worn += moving[k] * factor[k] * power
+            rate += share[k] * factor[k] * power
+            cutting_s += moving[k]
+    return worn + (total_s - cutting_s) * rate

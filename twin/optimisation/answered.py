@@ -1,0 +1,135 @@
+"""The answer put together: lines, totals, distance to the bound, what the uncertainty makes of it, in words and figures."""
+
+import difflib
+
+from twin.errors import OptimisationError
+from twin.machine import Limits
+from twin.motion.path import Path
+from twin.optimisation.allowed import limits_of
+from twin.optimisation.answer import FrontPoint, LineAnswer, Objective, Optimised, Resimulated, Search, Totals
+from twin.optimisation.bound import bound_of
+from twin.optimisation.forces import CutForces
+from twin.optimisation.margin import margin
+from twin.optimisation.problem import Problem
+from twin.optimisation.question import Question, problem, single
+from twin.optimisation.reasons import what_binds
+from twin.optimisation.rewriting import Rewritten
+from twin.optimisation.seeds import closed_form
+from twin.optimisation.shown import ShownLines, advance_of_cuts, limits_shown, shown_lines, totals
+from twin.optimisation.uncertainty import PRICED, sensitivity
+from twin.optimisation.words import source_lines
+
+
+def answered(
+    question: Question, made: Problem, text: Rewritten, how: Search, front: tuple[FrontPoint, ...], again: Resimulated | None
+) -> Optimised:
+    machine, forces, alone = made.program.machine, CutForces.of(made.program), single(question.objective)
+    limits = limits_of(machine, question.force_limit_n)
+    before, after = (shown_lines(made, forces, path) for path in (made.program.path, text.path))
+    figures = [_totals(made, shown, path, limits) for shown, path in ((before, made.program.path), (after, text.path))]
+    value = figures[1].seconds if alone is Objective.TIME else figures[1].cost
+    assert value is not None
+    bound = bound_of(made, alone, value)
+    known = None
+    if limits.force_n is not None:
+        advance = advance_of_cuts(made, text.path)
+        known = sensitivity(forces, advance, machine, limits.force_n, question.probability, _price(question), question.seed)
+    old, new = source_lines(made.program.text), source_lines(text.text)
+    return Optimised(
+        name=question.name,
+        machine=machine.machine.name,
+        objective=question.objective,
+        currency=made.economy.currency if made.economy is not None else "",
+        sentence=_sentence(question, made, figures, bound.distance, bound.exact, limits),
+        limits=limits_shown(made, limits),
+        before=figures[0],
+        after=figures[1],
+        bound=bound,
+        lines=_lines(made, before, after, text, question.objective),
+        front=front,
+        sensitivity=known,
+        search=how,
+        resimulated=again,
+        notes=_notes(made, question),
+        diff="\n".join(difflib.unified_diff(old, new, question.name, f"{question.name}, optimised", lineterm="", n=1)),
+        program=text.text,
+    )
+
+
+def _totals(made: Problem, shown: ShownLines, path: Path, limits: Limits) -> Totals:
+    seconds, cost = made.evaluate_path(path)
+    return totals(shown, seconds, cost if made.economy is not None else None, limits, made)
+
+
+def _price(question: Question) -> float:
+    """By how many per cent the objective is worse if the limit is kept with a probability, by the closed form."""
+    values = []
+    for asked in (None, question.probability or PRICED):
+        try:
+            one = question.with_(probability=asked, margin=1.0)
+            made = problem(one.with_(margin=margin(one)))
+        except OptimisationError:
+            return float("inf")
+        feed, rpm = closed_form(made, single(question.objective))
+        seconds, cost = made.evaluate_words(feed[None], rpm[None])
+        values.append(float((seconds if question.objective is Objective.TIME else cost)[0]))
+    return 100.0 * (values[1] / values[0] - 1.0)
+
+
+def _lines(made: Problem, before: ShownLines, after: ShownLines, text: Rewritten, objective: Objective) -> tuple[LineAnswer, ...]:
+    old, new = source_lines(made.program.text), source_lines(text.text)
+    rows = {int(k): row for row, k in enumerate(made.allowed.index)}
+    feed, rpm = closed_form(made, single(objective))
+    answers = []
+    for k, line in enumerate(made.program.lines):
+        row = rows.get(k)
+        deepest = float(made.program.cuts.axial_depth_mm[slice(*line.cuts)].max(initial=0.0))
+        answers.append(
+            LineAnswer(
+                line=line.line,
+                text_before=old[line.line],
+                text_after=new[line.line],
+                length_mm=line.length_mm / len(line.executions),
+                cut_mm=line.cut_mm / len(line.executions),
+                times=len(line.executions),
+                axial_depth_mm=deepest,
+                before=before.line(k),
+                after=after.line(k),
+                binds="" if row is None else what_binds(made, row, after.line(k), objective),
+                bound=None if row is None else (float(feed[row]), float(rpm[row])),
+                left_alone=line.left_alone,
+            )
+        )
+    return tuple(answers)
+
+
+def _sentence(question: Question, made: Problem, figures: list[Totals], distance: float, exact: bool, limits: Limits) -> str:
+    before, after = figures
+
+    def change(old: float, new: float) -> str:
+        return f"{100 * (new / old - 1):+.1f} %".replace("-", "−")
+
+    parts = [f"{before.seconds:.2f} s to {after.seconds:.2f} s ({change(before.seconds, after.seconds)})"]
+    if before.cost is not None and after.cost is not None and made.economy is not None:
+        parts.append(f"{before.cost:.4g} to {after.cost:.4g} {made.economy.currency} ({change(before.cost, after.cost)})")
+    force = f"greatest force {after.force_n:.1f} N"
+    parts.append(force + (f" of {limits.force_n:g} N" if limits.force_n is not None else ""))
+    what = "the exact optimum" if exact else "a bound that no program is below"
+    parts.append(f"{single(question.objective)} {100 * distance:.2g} % above {what}")
+    return "; ".join(parts)
+
+
+def _notes(made: Problem, question: Question) -> tuple[str, ...]:
+    notes = list(made.program.notes)
+    if made.program.machine.program is None:
+        notes.append("no [program]: time is length over feed; corners, ramps and changes of speed take none")
+    alone = [line for line in made.program.lines if line.left_alone]
+    if alone:
+        notes.append(f"{len(alone)} of {len(made.program.lines)} feed lines are left alone")
+    if made.economy is not None and not made.economy.wears_in_cut:
+        notes.append('the tool is taken to wear all the time (Eq. 20); [cost] tool_wears = "in_cut" counts cutting only')
+    if question.planned is not None:
+        notes.append("what the lines cut is taken from a run log")
+    if limits_of(made.program.machine, question.force_limit_n).force_n is None:
+        notes.append("no force limit: --force-limit-n, or force_n in [limits]")
+    return tuple(notes)

@@ -1,0 +1,160 @@
+"""What a cut does at an advance c in a tooth period: peak force, mean tangential force, chip. All of them grow with c.
+
+Nothing else of feed and speed goes into the force (formats, section 4), so a limit of force is a limit of c: c_max, from which
+the feed at any speed n is c_max · N · n. Nominally the force is c times a figure, and c_max is exact; with an edge force or a
+size effect it is the root of a growing function, found to 1e-12.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from twin.effects.catalogue import effect_named
+from twin.machine import MachineFile, Tool
+from twin.optimisation.program import Cuts, Programmed
+from twin.process.kernel import process_quantities
+from twin.process.milling import Milling, milling_force, peak_force, tool_constants
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+RPM = 1000.0
+"""Any speed will do: the force depends on the advance."""
+ITERATIONS_MAX = 200
+ADVANCE_MAX_MM = 1e3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CutForces:
+    """The cuts of a program with the tools that make them. Advances c are mm a tooth period, (cuts,) or a number."""
+
+    cuts: Cuts
+    tools: tuple[Tool, ...]
+    tool_of_cut: Ints
+    effects: tuple[str, ...]
+    effect_constants: Mapping[str, float] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, program: Programmed) -> "CutForces":
+        """The forces of a program on its machine, effects included."""
+        added = process_effects(program.machine)
+        constants = {f"{e}__{k}": v for e, given in added.items() for k, v in effect_named(e).checked(given).items()}
+        tool = np.array([program.lines[int(line)].tool for line in program.cuts.line], dtype=np.int64)
+        return cls(program.cuts, tuple(tool for _, tool in program.tools), tool, tuple(added), constants)
+
+    @property
+    def teeth(self) -> Ints:
+        """Of the tool of each cut."""
+        return np.array([tool.teeth for tool in self.tools], dtype=np.int64)[self.tool_of_cut]
+
+    @property
+    def diameter_mm(self) -> Floats:
+        """Of the tool of each cut."""
+        return np.array([tool.diameter_mm for tool in self.tools], dtype=np.float64)[self.tool_of_cut]
+
+    def peak_n(self, advance_mm: ArrayLike) -> Floats:
+        """Greatest resultant of each cut over a tooth period, (cuts,)."""
+        return self._each(advance_mm, self._peak_of_tool)
+
+    def tangential_n(self, advance_mm: ArrayLike) -> Floats:
+        """Mean over a turn of the tangential force of all teeth, (cuts,)."""
+        return self._each(advance_mm, self._tangential_of_tool)
+
+    def chip_ratio(self) -> Floats:
+        """Greatest chip thickness over c: 1 where the arc goes through the middle, else the larger sine of its ends, (cuts,)."""
+        entry, leaving = self.cuts.entry_angle_rad, self.cuts.exit_angle_rad
+        middle = (entry <= np.pi / 2.0) & (leaving >= np.pi / 2.0)
+        return np.where(middle, 1.0, np.maximum(np.sin(entry), np.sin(leaving)))
+
+    def drawn_peaks_n(self, chosen: Ints, advance_mm: Floats, drawn: Mapping[str, Floats]) -> Floats:
+        """Peak force of some cuts under drawn constants, (draws, chosen).
+
+        drawn: path as in [uncertainty] (`tool.radial_ratio`, `effects.edge_force.radial_n_per_mm`) → factor on it, (draws,)
+        """
+        draws = len(next(iter(drawn.values())))
+        out = np.zeros((draws, len(chosen)))
+        for index, tool in enumerate(self.tools):
+            mine = np.flatnonzero(self.tool_of_cut[chosen] == index)
+            if len(mine):
+                constants: dict[str, ArrayLike] = {**tool_constants(tool), **self.effect_constants}
+                for path, factor in drawn.items():
+                    name = constant_name(path)
+                    if name in constants:
+                        constants[name] = np.asarray(constants[name]) * factor
+                out[:, mine] = self._peak(tool, constants, chosen[mine], advance_mm[mine])
+        return out
+
+    def _each(self, advance_mm: ArrayLike, of_tool: Callable[[Tool, Ints, Floats], Floats]) -> Floats:
+        advance = np.broadcast_to(np.asarray(advance_mm, dtype=np.float64), (len(self.cuts),))
+        out = np.zeros(len(self.cuts))
+        for index, tool in enumerate(self.tools):
+            mine = np.flatnonzero(self.tool_of_cut == index)
+            if len(mine):
+                out[mine] = of_tool(tool, mine, advance[mine])
+        return out
+
+    def _peak_of_tool(self, tool: Tool, mine: Ints, advance: Floats) -> Floats:
+        constants: dict[str, ArrayLike] = {**tool_constants(tool), **self.effect_constants}
+        return np.asarray(self._peak(tool, constants, mine, advance)[0])
+
+    def _peak(self, tool: Tool, constants: Mapping[str, ArrayLike], mine: Ints, advance: Floats) -> Floats:
+        cuts, feed = self.cuts, advance * tool.teeth * RPM
+        arcs = (cuts.entry_angle_rad[mine], cuts.exit_angle_rad[mine])
+        return peak_force(constants, tool.teeth, RPM, feed, cuts.axial_depth_mm[mine], *arcs, effects=self.effects)
+
+    def _tangential_of_tool(self, tool: Tool, mine: Ints, advance: Floats) -> Floats:
+        """A tick that lasts a whole turn: at 60 rev/min one of 1 s."""
+        constants: dict[str, ArrayLike] = {**tool_constants(tool), **self.effect_constants}
+        zero = np.zeros(len(mine))
+        cuts = self.cuts
+        arcs = (cuts.axial_depth_mm[mine], cuts.entry_angle_rad[mine], cuts.exit_angle_rad[mine])
+        motion = Milling(zero, np.full(len(mine), 60.0), advance * tool.teeth, zero, *arcs)
+        return np.asarray(milling_force(constants, tool.teeth, motion, period_s=1.0, effects=self.effects).mean_tangential_n[0])
+
+
+def process_effects(machine: MachineFile) -> dict[str, Mapping[str, float]]:
+    """The effects of a machine that act on the cut."""
+    return {e.effect: e.parameters for e in machine.effects if set(effect_named(e.effect).changes) & set(process_quantities())}
+
+
+def constant_name(path: str) -> str:
+    """The constant of the cut that a path of [uncertainty] names.
+
+    >>> constant_name("tool.radial_ratio"), constant_name("effects.edge_force.radial_n_per_mm")
+    ('radial_ratio', 'edge_force__radial_n_per_mm')
+    """
+    first, *rest = path.split(".")
+    return "__".join(rest) if first == "effects" else rest[-1]
+
+
+def advance_at(force: Callable[[Floats], Floats], limit: Floats, count: int) -> Floats:
+    """The greatest c (count,) at which a growing `force` of c is not above `limit`; 0 where it is above it for any chip.
+
+    Regula falsi in the Illinois form between 0 and a c that is too much: superlinear, and it never leaves its bracket.
+    """
+    high = np.full(count, 0.05)
+    over = force(high)
+    for _ in range(60):
+        low_yet = (over <= limit) & (high < ADVANCE_MAX_MM)
+        if not low_yet.any():
+            break
+        high = np.where(low_yet, high * 4.0, high)
+        over = force(high)
+    never = over <= limit
+    low, below = np.full(count, 1e-9), force(np.full(count, 1e-9)) - limit
+    hopeless = below > 0.0
+    above = over - limit
+    for _ in range(ITERATIONS_MAX):
+        with np.errstate(divide="ignore", invalid="ignore"):
+            middle = low - below * (high - low) / (above - below)
+        middle = np.where(np.isfinite(middle) & (middle > low) & (middle < high), middle, 0.5 * (low + high))
+        value = force(middle) - limit
+        is_low = value <= 0.0
+        above = np.where(is_low, 0.5 * above, value)
+        below = np.where(is_low, value, 0.5 * below)
+        low, high = np.where(is_low, middle, low), np.where(is_low, high, middle)
+        if np.all((np.abs(value) <= 1e-13 * np.abs(limit)) | (high - low <= 1e-13 * high) | hopeless | never):
+            low = np.where(np.abs(value) <= 1e-13 * np.abs(limit), middle, low)
+            break
+    return np.where(hopeless, 0.0, np.where(never, ADVANCE_MAX_MM, low))

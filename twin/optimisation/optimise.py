@@ -1,0 +1,182 @@
+"""Optimises a program: reads it, searches, rounds, rewrites, reads the result again, and says what it is worth.
+
+    question → problem (program, cuts, limits) → closed form → islands evolve, epoch by epoch → words → rewritten, read again
+    → answer
+
+Everything is a value, so that a search that was stopped goes on from its last checkpoint and ends where it would have ended.
+"""
+
+import json
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.errors import OptimisationError
+from twin.optimisation.answer import FrontPoint, Objective, Optimised, Search
+from twin.optimisation.answered import answered
+from twin.optimisation.forces import CutForces
+from twin.optimisation.front import knee, not_dominated
+from twin.optimisation.islands import evolve_piece, fitness_of, polished
+from twin.optimisation.margin import advance_of_words, margin
+from twin.optimisation.problem import Problem
+from twin.optimisation.question import Question, problem, single
+from twin.optimisation.resimulation import resimulated
+from twin.optimisation.rewriting import rewritten
+from twin.optimisation.rounding import rounded
+from twin.optimisation.seeds import closed_form, worth_of
+
+Floats = NDArray[np.float64]
+Spread = Callable[[Callable[[str], str], Sequence[str]], Iterable[str]]
+Progress = Callable[[float, str], None]
+EPOCH = 10
+MARGINS_MAX = 5
+FREEZES_MAX = 8
+FRONT_MAX = 60
+
+
+class Stopped(Exception):  # noqa: N818 - no error: the caller asked for it
+    """The search was asked to stop; its checkpoint says where."""
+
+
+@dataclass(frozen=True, slots=True)
+class Hooks:
+    """What surrounds a search.
+
+    spread: as `map`, in order; progress: part done, and what is being done; clock: seconds
+    save: is given a checkpoint, a text, after every epoch; stop: whether it was asked to stop
+    """
+
+    spread: Spread = map
+    progress: Progress = lambda _part, _what: None
+    save: Callable[[str], None] = lambda _text: None
+    stop: Callable[[], bool] = lambda: False
+    clock: Callable[[], float] = lambda: 0.0
+
+
+NO_HOOKS = Hooks()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Searched:
+    """genes: (candidates, p) of the last populations, with values (candidates, 2) of seconds and cost; history as of `Search`"""
+
+    genes: Floats
+    values: Floats
+    history: tuple[float, ...]
+    evaluations: int
+
+
+def optimise(question: Question, hooks: Hooks = NO_HOOKS, checkpoint: str | None = None, *, resimulate: bool = True) -> Optimised:
+    """The answer to a question.
+
+    checkpoint: what `hooks.save` was given last; one of another question is passed over
+    resimulate: run both programs on the whole simulated machine too, where it has axes
+
+    Raises TwinError where program or machine are at fault, OptimisationError where the limits leave a line nothing, Stopped.
+    """
+    began = hooks.clock()
+    hooks.progress(0.0, "reading the program")
+    question = _followed(question.with_(margin=margin(question)))
+    made = problem(question)
+    searched = search(question, hooks, checkpoint)
+    genes, evaluations, chosen = _chosen(made, question, searched)
+    hooks.progress(0.95, "rewriting the program")
+    (feed,), (rpm,) = made.decoded(genes[None])
+    text = rewritten(made, *rounded(made, feed, rpm, worth_of(made, single(question.objective))))
+    if text.not_followed:
+        line, why = next(iter(text.not_followed.items()))
+        raise OptimisationError(f"line {line + 1}: {why}; give it with --leave {line + 1}")
+    again = None
+    if resimulate:
+        hooks.progress(0.97, "simulating the rewritten program")
+        again = resimulated(made.program.machine, made.program.text, text.text, question.planned is not None)
+    front = _front(made, searched, chosen) if question.objective is Objective.PARETO else ()
+    how = Search(
+        method=f"genetic algorithm, {question.islands} islands, seeded with the closed form of each line"
+        if question.objective is not Objective.PARETO
+        else "NSGA-II (pymoo), seeded with the closed form of each line for a sweep of what a second is worth",
+        seed=question.seed,
+        population=question.population,
+        evolutions=question.evolutions,
+        evaluations=searched.evaluations + evaluations,
+        history=searched.history,
+        seconds=hooks.clock() - began,
+    )
+    return answered(question, made, text, how, front, again)
+
+
+def _followed(question: Question) -> Question:
+    """The question with the lines left alone whose words the control would not follow: found out before the search."""
+    for _ in range(FREEZES_MAX):
+        made = problem(question)
+        alone = single(question.objective)
+        feed, rpm = rounded(made, *closed_form(made, alone), worth_of(made, alone))
+        missed = rewritten(made, feed, rpm).not_followed
+        new = {line: why for line, why in missed.items() if line not in question.left_alone}
+        if not new:
+            return question
+        question = question.with_(left_alone={**question.left_alone, **new})
+    count = len(question.left_alone)
+    raise OptimisationError(f"{count} lines do not follow the words that are written for them; is this a macro program?")
+
+
+def search(question: Question, hooks: Hooks, checkpoint: str | None) -> Searched:
+    """The islands, epoch by epoch. The checkpoint of the same question is gone on with, and gives the same answer."""
+    made, digest = problem(question), question.digest()
+    if not made.genes:
+        raise OptimisationError("no line of the program may be changed; the report of `cnctwin simulate` says what is in it")
+    states: list[Any] = [None] * question.islands
+    done = 0
+    if checkpoint is not None and (kept := json.loads(checkpoint)).get("question") == digest:
+        states, done = kept["states"], int(kept["done"])
+    text = question.to_json()
+    while done < question.evolutions or states[0] is None:
+        if hooks.stop():
+            raise Stopped
+        more = min(EPOCH, question.evolutions - done)
+        pieces = [
+            json.dumps({"question": text, "island": k, "state": state, "evolutions": more}) for k, state in enumerate(states)
+        ]
+        states = [json.loads(answer) for answer in hooks.spread(evolve_piece, pieces)]
+        done += more
+        hooks.save(json.dumps({"question": digest, "states": states, "done": done}))
+        hooks.progress(0.05 + 0.9 * done / max(question.evolutions, 1), f"evolution {done} of {question.evolutions}")
+    genes = np.concatenate([np.array(state["genes"], dtype=np.float64) for state in states])
+    histories = [state["history"] for state in states]
+    best = max if question.objective is Objective.PARETO else min
+    history = tuple(float(best(values)) for values in zip(*histories, strict=True))
+    return Searched(genes, np.column_stack(made.evaluate(genes)), history, sum(int(state["evaluations"]) for state in states))
+
+
+def _chosen(made: Problem, question: Question, searched: Searched) -> tuple[Floats, int, int]:
+    """Genes of the candidate that is written, evaluations that choosing it took, and its number in the search."""
+    if question.objective is Objective.PARETO:
+        points = not_dominated(searched.values)
+        pick = knee(searched.values[points]) if question.pick is None else question.pick
+        if not 0 <= pick < len(points):
+            raise OptimisationError(f"--pick {pick}: the front has {len(points)} programs, from 0 to {len(points) - 1}")
+        return searched.genes[points[pick]], 0, int(points[pick])
+    fitness = fitness_of(made, question.objective)
+    at = int(np.argmin(fitness(searched.genes)))
+    genes, evaluations = polished(made, searched.genes[at], fitness)
+    return genes, evaluations, at
+
+
+def _front(made: Problem, searched: Searched, chosen: int) -> tuple[FrontPoint, ...]:
+    points = not_dominated(searched.values)
+    if len(points) > FRONT_MAX:
+        points = np.unique(np.append(points[np.linspace(0, len(points) - 1, FRONT_MAX).round().astype(np.int64)], chosen))
+        points = points[np.argsort(searched.values[points, 0], kind="stable")]
+    forces = CutForces.of(made.program)
+    front = []
+    for k in points.tolist():
+        (feed,), (rpm,) = made.decoded(searched.genes[k : k + 1])
+        own = rpm[made.cutting]
+        peak = float(forces.peak_n(advance_of_words(made, forces, feed, rpm)).max()) if len(forces.cuts) else 0.0
+        span = (float(own.min()), float(own.max())) if len(own) else (0.0, 0.0)
+        seconds, cost = searched.values[k].tolist()
+        front.append(FrontPoint(seconds, cost, peak, span, k == chosen))
+    return tuple(front)

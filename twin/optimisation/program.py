@@ -1,0 +1,254 @@
+"""The program as the optimiser sees it: its source lines that feed, what each cuts, and which of them it may change.
+
+A line is a source line; all its executions share one feed and one speed. What is left alone, and why, stands in `left_alone`:
+
+* its feed does not come from an F word in mm/min: tied to the spindle (G95, tapping), part of a cycle, or an expression
+* it goes down into material: the cutting formula has no end face
+* its tool is not described
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.engagement.along_path import PathRows, Section, engaged_along
+from twin.errors import MachineError
+from twin.gcode import Arc, Linear, interpret
+from twin.machine import MachineFile, Tool
+from twin.motion.path import EventKind, Kind, Path, path_from_moves
+from twin.optimisation.words import find_word, source_lines
+from twin.runlog import RunLog
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+PlannedCuts = Mapping[int, Sequence[Sequence[float]]]
+"""Line → [depth mm, entry rad, exit rad] of each of its cuts."""
+END_FACE_MM2 = 1e-3
+"""An end face that cuts less than this is the rounding of a level move."""
+DIGITS, HEADING_STEPS = 6, 24
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FeedLine:
+    """A source line that feeds. line: 0-based; executions: (first segment, stop) of each; tool: index into `Programmed.tools`, −1
+
+    feed_mm_min, rpm: as programmed at its first execution; length_mm, cut_mm: of all executions together
+    cuts: rows of `Cuts` that belong to it; left_alone: why nothing of it may be changed, empty = both feed and speed are free
+    """
+
+    line: int
+    executions: tuple[tuple[int, int], ...]
+    tool: int
+    feed_mm_min: float
+    rpm: float
+    length_mm: float
+    cut_mm: float
+    cuts: tuple[int, int]
+    left_alone: str = ""
+
+    @property
+    def cutting(self) -> bool:
+        """Whether it meets material."""
+        return self.cuts[1] > self.cuts[0]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cuts:
+    """The different cuts of all lines, each (cuts,): rows of engagement that are alike are one. mm and rad.
+
+    line: index of the feed line; heading_rad: of the feed, in steps of 15°, for chatter
+    """
+
+    line: Ints
+    axial_depth_mm: Floats
+    entry_angle_rad: Floats
+    exit_angle_rad: Floats
+    heading_rad: Floats
+
+    def __len__(self) -> int:
+        return len(self.line)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Programmed:
+    """A program on a machine. moves: canonical; tools: those that it uses, with their numbers (0 = [tool])
+
+    notes: sentences on what the machine description does not say
+    """
+
+    machine: MachineFile
+    text: str
+    path: Path
+    lines: tuple[FeedLine, ...]
+    cuts: Cuts
+    tools: tuple[tuple[int, Tool], ...]
+    notes: tuple[str, ...]
+
+
+def programmed(
+    machine: MachineFile,
+    text: str,
+    *,
+    engagement: PlannedCuts | None = None,
+    left_alone: Mapping[int, str] = MappingProxyType({}),
+) -> Programmed:
+    """Reads a program for a machine.
+
+    engagement: what each line (from 0) cuts, taken in place of [stock]: `planned_cuts`
+    left_alone: lines that may not be changed, and why, beyond those that are found out here
+
+    Raises ProgramError where a control would refuse it, MachineError where nothing is known of what it cuts.
+    """
+    moves = interpret(text)
+    path = path_from_moves(moves)
+    if engagement is None and machine.stock is None:
+        raise MachineError("no [stock]: what a line cuts is not known; write [stock], or give a run log with --engagement")
+    numbers, tools = _tools(machine, path)
+    notes: list[str] = []
+    rows = None
+    if engagement is None and machine.stock is not None:
+        rows = engaged_along(path, machine.stock, _sections(numbers, tools))
+        for hit in rows.collisions[:3]:
+            place = ", ".join(f"{v:.1f}" for v in hit.position_mm)
+            notes.append(f"line {int(path.line[hit.segment]) + 1}: rapid into material at {place} mm")
+    speeds = path.commanded_rpm()
+    tied = {move.line for move in moves if isinstance(move, Linear | Arc) and move.feed_per_rev_mm is not None}
+    source = source_lines(text)
+    lines, groups = [], []
+    for line, executions in _executions(path).items():
+        segments = np.concatenate([np.arange(*span) for span in executions])
+        segments = segments[path.kind[segments] != Kind.RAPID]
+        found = (
+            _cuts_of_segments(path, rows, segments) if rows is not None else _cuts_planned(engagement or {}, line, path, segments)
+        )
+        one = FeedLine(
+            line, executions, int(numbers[segments[0]]), float(path.feed_mm_min[segments[0]]), float(speeds[segments[0]]),
+            float(path.length_mm[segments].sum()), found.cut_mm, (0, 0),
+        )  # fmt: skip
+        why = left_alone.get(line) or _why_not(one, path, tied, numbers[segments], found, speeds[segments])
+        why = why or (_no_plain_words(source[line]) if line < len(source) else "")
+        lines.append(replace(one, left_alone=why))
+        groups.append(found.rows)
+    return _numbered(Programmed(machine, text, path, tuple(lines), _no_cuts(), tuple(tools), tuple(notes)), groups)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Found:
+    """rows: (cuts, 4) depth, entry, exit, heading; cut_mm: way in material; plunges: the end face cuts"""
+
+    rows: Floats
+    cut_mm: float
+    plunges: bool
+
+
+def _tools(machine: MachineFile, path: Path) -> tuple[Ints, list[tuple[int, Tool]]]:
+    """Index of the tool of each segment, −1 where it is not described, and the tools."""
+    number = np.zeros(len(path), dtype=np.int64)
+    for event in path.events:
+        if event.kind == EventKind.TOOL_CHANGE:
+            number[event.segment :] = int(event.value)
+    tools: list[tuple[int, Tool]] = []
+    index = np.full(len(path), -1, dtype=np.int64)
+    for one in dict.fromkeys(number.tolist()):
+        tool = machine.tools.get(str(one), None if machine.tools and one else machine.tool)
+        if tool is not None:
+            index[number == one] = len(tools)
+            tools.append((one, tool))
+    return index, tools
+
+
+def _sections(index: Ints, tools: Sequence[tuple[int, Tool]]) -> list[Section]:
+    edges = np.concatenate([[0], np.flatnonzero(np.diff(index)) + 1, [len(index)]]) if len(index) else np.zeros(1, np.int64)
+    return [Section(int(a), int(b), tools[int(index[a])][1].diameter_mm if index[a] >= 0 else 0.0) for a, b in pairwise(edges)]
+
+
+def _executions(path: Path) -> dict[int, tuple[tuple[int, int], ...]]:
+    """Each source line with a feed move → the runs of segments that it makes, one an execution."""
+    stops = {event.segment for event in path.events}
+    edges = [0, *(k for k in range(1, len(path)) if path.line[k] != path.line[k - 1] or k in stops), len(path)]
+    found: dict[int, list[tuple[int, int]]] = {}
+    for a, b in pairwise(edges):
+        if b > a and (path.kind[a:b] != Kind.RAPID).any():
+            found.setdefault(int(path.line[a]), []).append((a, b))
+    return {line: tuple(spans) for line, spans in found.items()}
+
+
+def _cuts_of_segments(path: Path, rows: PathRows, segments: Ints) -> _Found:
+    mine = np.concatenate([np.arange(rows.first[s], rows.first[s + 1]) for s in segments.tolist()])
+    mine = mine[rows.axial_depth_mm[mine] > 0.0]
+    all_rows = np.concatenate([np.arange(rows.first[s], rows.first[s + 1]) for s in segments.tolist()])
+    plunges = bool((rows.end_face_mm2[all_rows] > END_FACE_MM2).any())
+    heading = _headings(path, rows.segment[mine])
+    columns = np.column_stack([rows.axial_depth_mm[mine], rows.entry_angle_rad[mine], rows.exit_angle_rad[mine], heading])
+    return _Found(_different(columns), float(rows.length_mm[mine].sum()), plunges)
+
+
+def planned_cuts(run: RunLog) -> dict[int, list[list[float]]]:
+    """Line (as the run log counts it: from 0, or by N words that count so) → its different [depth, entry, exit], mm and rad.
+
+    Raises RunLogError where the run log has no engagement.
+    """
+    rows = np.column_stack([np.nan_to_num(run["axial_depth_mm"]), run["entry_angle_rad"], run["exit_angle_rad"]])
+    line = run["line"]
+    found = {int(one): _different(rows[(line == one) & (rows[:, 0] > 0.0)]) for one in np.unique(line[np.isfinite(line)])}
+    return {one: cuts.tolist() for one, cuts in found.items() if len(cuts)}
+
+
+def _cuts_planned(planned: PlannedCuts, line: int, path: Path, segments: Ints) -> _Found:
+    rows = np.array(planned.get(line, []), dtype=np.float64).reshape(-1, 3)
+    heading = np.full((len(rows), 1), _headings(path, segments[:1])[0])
+    return _Found(np.hstack([rows, heading]), float(path.length_mm[segments].sum()) if len(rows) else 0.0, False)
+
+
+def _headings(path: Path, segments: Ints) -> Floats:
+    """Direction of the feed in the middle of each segment, in steps of 15°."""
+    tangent = path.tangents(segments, 0.5 * path.length_mm[segments])
+    step = 2.0 * np.pi / HEADING_STEPS
+    return np.asarray(np.round(np.arctan2(tangent[:, 1], tangent[:, 0]) / step) % HEADING_STEPS * step)
+
+
+def _different(rows: Floats) -> Floats:
+    if not len(rows):
+        return rows
+    return np.asarray(rows[np.unique(np.round(rows, DIGITS), axis=0, return_index=True)[1]])
+
+
+def _why_not(line: FeedLine, path: Path, tied: set[int], tools: Ints, found: _Found, rpm: Floats) -> str:
+    """Why a line is left alone; empty = it is not."""
+    rapid = any((path.kind[a:b] == Kind.RAPID).any() for a, b in line.executions)
+    if line.line in tied:
+        return "its feed is tied to the spindle"
+    if rapid:
+        return "its feed is part of a cycle"
+    if (tools < 0).any() or len(set(tools.tolist())) > 1:
+        return "its tool is not described; write [tools.N]" if (tools < 0).any() else "several tools run it"
+    if found.plunges:
+        return "it goes down into material, and the cutting formula has no end face"
+    if len(found.rows) and (rpm <= 0.0).any():
+        return "it cuts with the spindle at rest or backwards"
+    return ""
+
+
+def _no_plain_words(text: str) -> str:
+    for letter, name in (("F", "feed"), ("S", "speed")):
+        place = find_word(text, letter)
+        if place is not None and not place.plain:
+            return f"its {name} is an expression"
+    return ""
+
+
+def _no_cuts() -> Cuts:
+    return Cuts(np.empty(0, dtype=np.int64), *(np.empty(0) for _ in range(4)))
+
+
+def _numbered(made: Programmed, groups: Sequence[Floats]) -> Programmed:
+    """With the cuts of all lines one after the other."""
+    ends = np.cumsum([0, *(len(rows) for rows in groups)])
+    lines = tuple(replace(line, cuts=(int(ends[k]), int(ends[k + 1]))) for k, line in enumerate(made.lines))
+    table = np.concatenate([np.empty((0, 4)), *groups])
+    owner = np.repeat(np.arange(len(groups)), np.diff(ends))
+    return replace(made, lines=lines, cuts=Cuts(owner, *(np.ascontiguousarray(column) for column in table.T)))

@@ -1,0 +1,180 @@
+"""The program rewritten: F and S words line by line, nothing else; then read again, and compared with what was meant.
+
+A line gets an F word where its feed is another than that of the feed line executed before it, and an S word where its speed
+is. What the modes of the control make of that is not guessed: the text is interpreted, and a line that does not have what it
+should gets its words in any case. Lines for which even that does not help are named; they are to be left alone.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.errors import ProgramError
+from twin.gcode import interpret
+from twin.motion.path import EventKind, Kind, Path, path_from_moves
+from twin.optimisation.problem import Problem
+from twin.optimisation.words import INCH_MM, feed_figure, figure_mm_min, find_word, joined, source_lines, with_word
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+ROUNDS_MAX = 4
+SAME = 1e-9
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rewritten:
+    """text and its path; feed_mm_min, rpm: (lines,) of `Allowed` as the text has them; not_followed: lines (from 0), and why"""
+
+    text: str
+    path: Path
+    not_followed: dict[int, str]
+
+
+@dataclass(frozen=True, slots=True)
+class _Wanted:
+    """What a feed line is to have: figures as text, None = as it is; feed in mm/min to check by"""
+
+    feed: str | None
+    feed_mm_min: float | None
+    speed: str | None
+    rpm: float
+
+
+def is_inch(text: str) -> bool:
+    """Whether feeds are in inch/min: G20 somewhere in the program."""
+    return any("G20" in line.upper().replace(" ", "") for line in source_lines(text))
+
+
+def rewritten(problem: Problem, feed_mm_min: Floats, rpm: Floats) -> Rewritten:
+    """The program with these feed words and speeds, (lines,) of `Allowed`; feeds are rounded down, speeds have to be whole."""
+    program, inch = problem.program, is_inch(problem.program.text)
+    wanted = _wanted(problem, feed_mm_min, rpm, inch)
+    source = source_lines(program.text)
+    forced_feed, forced_speed = _first_choice(problem, wanted, source)
+    speed_lines = _speed_lines(problem, rpm, source)
+    text, path, missed = program.text, program.path, {}
+    for _ in range(ROUNDS_MAX):
+        text = joined(program.text, _changed(source, wanted, forced_feed, forced_speed, speed_lines, problem, inch))
+        try:
+            path = path_from_moves(interpret(text))
+        except ProgramError as error:
+            return Rewritten(text, program.path, {error.line - 1: f"a control would refuse it rewritten: {error.reason}"})
+        missed = _missed(problem, path, wanted)
+        more_feed = {line for line, what in missed.items() if what == "feed"} - forced_feed
+        more_speed = {line for line, what in missed.items() if what == "speed"} - forced_speed
+        if not more_feed and not more_speed:
+            break
+        forced_feed |= more_feed
+        forced_speed |= more_speed
+    return Rewritten(text, path, {line: f"its {what} does not follow the word that was written" for line, what in missed.items()})
+
+
+def _wanted(problem: Problem, feed: Floats, rpm: Floats, inch: bool) -> dict[int, _Wanted]:
+    rows = {int(k): row for row, k in enumerate(problem.allowed.index)}
+    wanted = {}
+    for k, line in enumerate(problem.program.lines):
+        row = rows.get(k)
+        if row is None:
+            speed = f"{line.rpm:g}" if line.rpm > 0.0 else None
+            wanted[line.line] = _Wanted(None, None, speed, line.rpm)
+        else:
+            figure = feed_figure(float(feed[row]), inch)
+            speed = f"{rpm[row]:g}" if problem.allowed.cutting[row] else None
+            wanted[line.line] = _Wanted(figure, figure_mm_min(figure, inch), speed, float(rpm[row]))
+    return wanted
+
+
+def _order(problem: Problem) -> list[int]:
+    """Source lines of all executions of feed lines, in their order."""
+    runs = sorted((a, line.line) for line in problem.program.lines for a, _ in line.executions)
+    return [line for _, line in runs]
+
+
+def _first_choice(problem: Problem, wanted: dict[int, _Wanted], source: list[str]) -> tuple[set[int], set[int]]:
+    """Lines that get an F word, and an S word, by what the feed line before them has."""
+    feeds, speeds = set(), set()
+    feed: float | None = None
+    for number in _order(problem):
+        one = wanted[number]
+        if one.feed is not None and (one.feed_mm_min != feed or find_word(source[number], "F") is not None):
+            feeds.add(number)
+        feed = one.feed_mm_min
+        if one.speed is not None and find_word(source[number], "S") is not None:
+            speeds.add(number)
+    return feeds, speeds
+
+
+def _speed_lines(problem: Problem, rpm: Floats, source: list[str]) -> dict[int, str]:
+    """Lines whose S word sets the speed of a later line: line → figure."""
+    found: dict[int, str] = {}
+    speeds = problem.speeds
+    for e, event in enumerate(speeds.candidates.events):
+        if event.kind != EventKind.SPINDLE or speeds.candidates.is_optional[e] or speeds.owner[e] < 0:
+            continue
+        for number in range(event.line, -1, -1):
+            place = find_word(source[number], "S")
+            if place is not None:
+                if place.plain:
+                    found[number] = f"{rpm[speeds.owner[e]]:g}"
+                break
+    return found
+
+
+def _changed(
+    source: list[str], wanted: dict[int, _Wanted], feeds: set[int], speeds: set[int], speed_lines: dict[int, str],
+    problem: Problem, inch: bool,
+) -> dict[int, str]:  # fmt: skip
+    changed: dict[int, str] = {}
+    for number, figure in speed_lines.items():
+        changed[number] = with_word(source[number], "S", figure)
+    programmed = {line.line: line.feed_mm_min for line in problem.program.lines}
+    for number, one in wanted.items():
+        text = changed.get(number, source[number])
+        if number in feeds:
+            # a line that is left alone gets the feed it was written for, which its modes would no longer give it
+            text = with_word(text, "F", one.feed if one.feed is not None else _exact(programmed[number], inch))
+        if number in speeds and one.speed is not None:
+            text = with_word(text, "S", one.speed)
+        if text != source[number]:
+            changed[number] = text
+    return changed
+
+
+def _exact(feed_mm_min: float, inch: bool) -> str:
+    text = f"{feed_mm_min / INCH_MM if inch else feed_mm_min:.6f}".rstrip("0")
+    return text if inch else text.rstrip(".")
+
+
+def _missed(problem: Problem, path: Path, wanted: dict[int, _Wanted]) -> dict[int, str]:
+    """Lines that do not have what they should: line → feed, speed, or way."""
+    before = problem.program.path
+    if len(path) != len(before) or not _same_way(before, path):
+        moved = _first_difference(before, path)
+        return {moved: "way"}
+    missed: dict[int, str] = {}
+    speed = path.commanded_rpm()
+    for line in problem.program.lines:
+        one = wanted[line.line]
+        for a, b in line.executions:
+            feeding = np.arange(a, b)[path.kind[a:b] != Kind.RAPID]
+            meant = before.feed_mm_min[feeding] if one.feed_mm_min is None else np.full(len(feeding), one.feed_mm_min)
+            if np.any(np.abs(path.feed_mm_min[feeding] - meant) > SAME * meant):
+                missed[line.line] = "feed"
+            elif one.speed is not None and np.any(np.abs(speed[feeding] - one.rpm) > SAME * one.rpm):
+                missed[line.line] = "speed"
+    return missed
+
+
+def _same_way(one: Path, other: Path) -> bool:
+    fields = ("kind", "line", "start_mm", "end_mm", "centre_mm", "sweep_rad", "exact_stop")
+    still = [[(e.segment, e.kind, e.value) for e in p.events if e.kind != EventKind.SPINDLE] for p in (one, other)]
+    return still[0] == still[1] and all(np.array_equal(getattr(one, name), getattr(other, name)) for name in fields)
+
+
+def _first_difference(one: Path, other: Path) -> int:
+    count = min(len(one), len(other))
+    differs = np.flatnonzero(
+        (one.line[:count] != other.line[:count]) | np.any(one.end_mm[:count] != other.end_mm[:count], axis=1)
+    )
+    return int(one.line[differs[0] if len(differs) else max(count - 1, 0)])

@@ -1,0 +1,113 @@
+"""F and S words in the text of a block: found, replaced, added. Nothing else of the line changes, not even its spaces.
+
+Figures are written so that a limit that was kept stays kept: a feed is rounded down to a ten-thousandth of itself, a speed to 1
+rev/min.
+"""
+
+import math
+import re
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from twin.gcode.text import CAPITALS
+from twin.gcode.tokens import TOKEN
+
+INCH_MM = 25.4
+DIGITS = 4
+LINE_END = re.compile(r"\r\n|\r|\n")
+
+
+class WordPlace(NamedTuple):
+    """Where a word stands in the text of a block: begin, end; plain: its value is a number, no expression."""
+
+    begin: int
+    end: int
+    plain: bool
+
+
+def find_word(text: str, letter: str) -> WordPlace | None:
+    """The last word with that letter in a block, outside comments; None where there is none.
+
+    >>> find_word("N10 G1 X4. F400 (F1)", "F")
+    WordPlace(begin=11, end=15, plain=True)
+    >>> find_word("G1 X4. F#1", "F").plain
+    False
+    """
+    found, depth = None, 0
+    for match in TOKEN.finditer(text.translate(CAPITALS)):
+        index = match.lastindex
+        if index == 5 and match.group(5) in "[]":
+            depth += 1 if match.group(5) == "[" else -1
+        if index == 2 and match.group(1) == letter:
+            found = WordPlace(match.start(1), match.end(2), True)
+        elif index == 4 and match.group(4) == letter and depth == 0:
+            found = WordPlace(match.start(4), match.end(4), False)
+    return found
+
+
+def with_word(text: str, letter: str, figure: str) -> str:
+    """The block with this word: in place of the one that is there, else behind the last word.
+
+    >>> with_word("N10 G1 X4. F400 (finish)", "F", "500"), with_word("N10 G1 X4. (finish) ", "F", "500")
+    ('N10 G1 X4. F500 (finish)', 'N10 G1 X4. F500 (finish) ')
+    >>> with_word("g1x5f40", "S", "4584")
+    'g1x5f40S4584'
+    """
+    place = find_word(text, letter)
+    if place is not None:
+        written = text[place.begin]
+        return text[: place.begin] + written + figure + text[place.end :]
+    end = last_word_end(text)
+    gap = " " if " " in text[:end].strip() else ""
+    return text[:end] + gap + letter + figure + text[end:]
+
+
+def last_word_end(text: str) -> int:
+    """Where the last word of a block ends: before comments and spaces behind it."""
+    end = 0
+    for match in TOKEN.finditer(text.translate(CAPITALS)):
+        if match.lastindex is not None and match.lastindex < 6:
+            end = match.end()
+    return end
+
+
+def source_lines(text: str) -> list[str]:
+    """The lines of a program without their ends, counted as the interpreter counts.
+
+    >>> source_lines("G0\\r\\nG1\\n")
+    ['G0', 'G1', '']
+    """
+    return LINE_END.split(text)
+
+
+def joined(text: str, changed: Mapping[int, str]) -> str:
+    """The program with some lines (from 0) replaced, every end of a line as it was.
+
+    >>> joined("G0\\r\\nG1\\n", {1: "G1 F5"})
+    'G0\\r\\nG1 F5\\n'
+    """
+    ends = [*LINE_END.findall(text), ""]
+    return "".join(changed.get(k, line) + end for k, (line, end) in enumerate(zip(source_lines(text), ends, strict=True)))
+
+
+def feed_figure(feed_mm_min: float, inch: bool) -> str:
+    """A feed, rounded down.
+
+    >>> feed_figure(500.0, False), feed_figure(437.26, False), feed_figure(1270.0, True), feed_figure(83.333, False)
+    ('500', '437.2', '50.', '83.33')
+    """
+    value = feed_mm_min / INCH_MM if inch else feed_mm_min
+    value *= 1.0 + 1e-12
+    places = max(0, DIGITS - 1 - math.floor(math.log10(value)))
+    text = f"{math.floor(value * 10**places) / 10**places:.{places}f}"
+    text = text.rstrip("0").rstrip(".") if "." in text else text
+    return text + "." if inch and "." not in text else text
+
+
+def figure_mm_min(figure: str, inch: bool) -> float:
+    """The feed that a control reads.
+
+    >>> figure_mm_min("50.", True)
+    1270.0
+    """
+    return float(figure) * (INCH_MM if inch else 1.0)
