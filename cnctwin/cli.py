@@ -26,6 +26,7 @@ from cnctwin.given_broker import address, broker_or_own
 from cnctwin.history_commands import replay_history
 from cnctwin.model_commands import model_app
 from cnctwin.moment import moment_ms
+from cnctwin.optimise_command import optimise
 from cnctwin.page_commands import serve
 from cnctwin.parts_commands import parts_app
 from cnctwin.stopping import stopped_by_signals
@@ -274,6 +275,7 @@ def edge_discover(
 
 
 app.command()(serve)
+app.command()(optimise)
 app.command("replay")(replay_history)
 app.command()(validate)
 

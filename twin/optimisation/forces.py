@@ -57,6 +57,17 @@ class CutForces:
         """Greatest resultant of each cut over a tooth period, (cuts,)."""
         return self._each(advance_mm, self._peak_of_tool)
 
+    def peaks_n(self, chosen: Ints, advance_mm: Floats) -> Floats:
+        """Greatest resultant of some cuts at many advances in one batch, (candidates, chosen)."""
+        out = np.zeros(advance_mm.shape)
+        for index, tool in enumerate(self.tools):
+            mine = np.flatnonzero(self.tool_of_cut[chosen] == index)
+            if len(mine):
+                constants: dict[str, ArrayLike] = {**tool_constants(tool), **self.effect_constants}
+                cuts = np.tile(chosen[mine], len(advance_mm))
+                out[:, mine] = self._peak(tool, constants, cuts, advance_mm[:, mine].ravel())[0].reshape(len(advance_mm), -1)
+        return out
+
     def tangential_n(self, advance_mm: ArrayLike) -> Floats:
         """Mean over a turn of the tangential force of all teeth, (cuts,)."""
         return self._each(advance_mm, self._tangential_of_tool)

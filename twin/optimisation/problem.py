@@ -47,7 +47,7 @@ class Speeds:
 
 
 class Beside(NamedTuple):
-    """seconds: (lines,) share of each line; nobody_s: what no line has a share in; nobody_worn: tools that lines left alone take."""
+    """seconds: (lines,) share of each; nobody_s: what no line has a share in; nobody_worn: tools that lines left alone take."""
 
     seconds: Floats
     nobody_s: float
@@ -161,7 +161,7 @@ class Problem:
 
     @cached_property
     def wear(self) -> Wear | None:
-        """How the tools wear along the path. In cut only; or all the time (Eq. 20), which lines share by the way that they cut."""
+        """How the tools wear. In cut only; or all the time (Eq. 20), which lines share by the way that they cut."""
         if self.economy is None:
             return None
         path, economy = self.program.path, self.economy
