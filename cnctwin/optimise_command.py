@@ -76,9 +76,8 @@ def optimise(
     )
     if out.suffix in (".json", ".html") or out.resolve() == program.resolve():
         raise UsageError(f"{out}: write the program under another name, as optimised.nc; .json and .html are beside it")
-    raise typer.Exit(
-        _run(question, out, workers, dask, fresh=fresh, resimulate=not no_resimulation, paper=paper, as_json=as_json)
-    )
+    how = Run(out, workers, dask, fresh=fresh, resimulate=not no_resimulation, paper=paper, as_json=as_json)
+    raise typer.Exit(_run(question, how))
 
 
 @dataclass(frozen=True, slots=True)

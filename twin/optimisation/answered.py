@@ -114,6 +114,8 @@ def _sentence(question: Question, made: Problem, figures: list[Totals], distance
         parts.append(f"{before.cost:.4g} to {after.cost:.4g} {made.economy.currency} ({change(before.cost, after.cost)})")
     force = f"greatest force {after.force_n:.1f} N"
     parts.append(force + (f" of {limits.force_n:g} N" if limits.force_n is not None else ""))
+    if before.over:
+        parts.append(f"{before.over} lines were above a limit, now {after.over or 'none'}")
     what = "the exact optimum" if exact else "a bound that no program is below"
     parts.append(f"{single(question.objective)} {100 * distance:.2g} % above {what}")
     return "; ".join(parts)
@@ -128,6 +130,8 @@ def _notes(made: Problem, question: Question) -> tuple[str, ...]:
         notes.append(f"{len(alone)} of {len(made.program.lines)} feed lines are left alone")
     if made.economy is not None and not made.economy.wears_in_cut:
         notes.append('the tool is taken to wear all the time (Eq. 20); [cost] tool_wears = "in_cut" counts cutting only')
+    if limits_of(made.program.machine, question.force_limit_n).chip_mm is None:
+        notes.append("no limit of the chip: look at the greatest one, or write chip_mm in [limits]")
     if question.planned is not None:
         notes.append("what the lines cut is taken from a run log")
     if limits_of(made.program.machine, question.force_limit_n).force_n is None:

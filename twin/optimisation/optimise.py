@@ -80,13 +80,17 @@ def optimise(question: Question, hooks: Hooks = NO_HOOKS, checkpoint: str | None
     began = hooks.clock()
     hooks.progress(0.0, "reading the program")
     question = _followed(question.with_(margin=margin(question)))
-    made = problem(question)
-    searched = search(question, hooks, checkpoint)
-    genes, evaluations, chosen = _chosen(made, question, searched)
-    hooks.progress(0.95, "rewriting the program")
-    (feed,), (rpm,) = made.decoded(genes[None])
-    text = rewritten(made, *rounded(made, feed, rpm, worth_of(made, single(question.objective))))
-    if text.not_followed:
+    for _ in range(FREEZES_MAX):
+        made = problem(question)
+        searched = search(question, hooks, checkpoint)
+        genes, evaluations, chosen = _chosen(made, question, searched)
+        hooks.progress(0.95, "rewriting the program")
+        (feed,), (rpm,) = made.decoded(genes[None])
+        text = rewritten(made, *rounded(made, feed, rpm, worth_of(made, single(question.objective))))
+        if not text.not_followed:
+            break
+        question = question.with_(left_alone={**question.left_alone, **text.not_followed})
+    else:
         line, why = next(iter(text.not_followed.items()))
         raise OptimisationError(f"line {line + 1}: {why}; give it with --leave {line + 1}")
     again = None

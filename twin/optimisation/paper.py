@@ -2,8 +2,9 @@
 
     J_mt = T + w Σ max(0, F − F_lim),     J_pc = C_p + w Σ max(0, F − F_lim),     genes: feed and speed of each line
 
-The paper states 10 evolutions and a fitness limit of 10 for the time, which is never reached, and nothing for the cost. Assumed here:
-the same for the cost, a population of 64, w = 1 for each newton of each line, a random start, the operators of `twin.genetic`.
+The paper states 10 evolutions and a fitness limit of 10 for the time, which is never reached, and nothing for the cost.
+Assumed here: the same for the cost, a population of 64, w = 1 for each newton of each line, a random start, the operators of
+`twin.genetic`.
 """
 
 from collections.abc import Callable

@@ -238,11 +238,12 @@ def problem_of(program: Programmed, allowed: Allowed, economy: Economy | None) -
 def _speeds(problem: Problem) -> Speeds:
     """Walks over the events and the lines that need a speed."""
     program, rows = problem.program, {int(k): row for row, k in enumerate(problem.allowed.index)}
+    programmed_rpm = program.path.commanded_rpm()
     needs: list[tuple[int, int, float, int]] = []  # segment, owner, speed of its own, line
     for k, line in enumerate(program.lines):
         row = rows.get(k, NOBODY)
-        if row == NOBODY or problem.allowed.cutting[row]:
-            needs += [(a, row, line.rpm, line.line) for a, _ in line.executions if line.rpm > 0.0]
+        if line.needs_speed if row == NOBODY else problem.allowed.cutting[row]:
+            needs += [(a, row, float(programmed_rpm[a]), line.line) for a, _ in line.executions if programmed_rpm[a] > 0.0]
     needs.sort()
     optional = tuple(Event(segment, EventKind.SPINDLE, rpm, line) for segment, _, rpm, line in needs)
     made = Candidates.of(program.path, problem.limits(), optional, problem.control.feed_ratio, problem.control.rapid_ratio)

@@ -38,6 +38,7 @@ class FeedLine:
 
     feed_mm_min, rpm: as programmed at its first execution; length_mm, cut_mm: of all executions together
     cuts: rows of `Cuts` that belong to it; left_alone: why nothing of it may be changed, empty = both feed and speed are free
+    needs_speed: it is left alone, and needs the speed that it was written for
     """
 
     line: int
@@ -49,6 +50,7 @@ class FeedLine:
     cut_mm: float
     cuts: tuple[int, int]
     left_alone: str = ""
+    needs_speed: bool = False
 
     @property
     def cutting(self) -> bool:
@@ -108,7 +110,7 @@ def programmed(
     if engagement is None and machine.stock is None:
         raise MachineError("no [stock]: what a line cuts is not known; write [stock], or give a run log with --engagement")
     numbers, tools = _tools(machine, path)
-    notes: list[str] = []
+    notes = _tool_notes(machine, path)
     rows = None
     if engagement is None and machine.stock is not None:
         rows = engaged_along(path, machine.stock, _sections(numbers, tools))
@@ -131,7 +133,8 @@ def programmed(
         )  # fmt: skip
         why = left_alone.get(line) or _why_not(one, path, tied, numbers[segments], found, speeds[segments])
         why = why or (_no_plain_words(source[line]) if line < len(source) else "")
-        lines.append(replace(one, left_alone=why))
+        in_air = not len(found.rows) and not found.plunges and not path_is_cycle(path, executions) and line not in tied
+        lines.append(replace(one, left_alone=why, needs_speed=bool(why) and not in_air))
         groups.append(found.rows)
     return _numbered(Programmed(machine, text, path, tuple(lines), _no_cuts(), tuple(tools), tuple(notes)), groups)
 
@@ -159,6 +162,15 @@ def _tools(machine: MachineFile, path: Path) -> tuple[Ints, list[tuple[int, Tool
             index[number == one] = len(tools)
             tools.append((one, tool))
     return index, tools
+
+
+def _tool_notes(machine: MachineFile, path: Path) -> list[str]:
+    """Says it where several tools of the program are taken to be one."""
+    numbers = {int(event.value) for event in path.events if event.kind == EventKind.TOOL_CHANGE and event.value}
+    if len(numbers) < 2 or machine.tools or machine.tool is None:
+        return []
+    taken = f"all are taken to be the {machine.tool.diameter_mm:g} mm one of [tool]"
+    return [f"the program has {len(numbers)} tools; {taken}: write [tools.N]"]
 
 
 def _sections(index: Ints, tools: Sequence[tuple[int, Tool]]) -> list[Section]:
@@ -219,10 +231,9 @@ def _different(rows: Floats) -> Floats:
 
 def _why_not(line: FeedLine, path: Path, tied: set[int], tools: Ints, found: _Found, rpm: Floats) -> str:
     """Why a line is left alone; empty = it is not."""
-    rapid = any((path.kind[a:b] == Kind.RAPID).any() for a, b in line.executions)
     if line.line in tied:
         return "its feed is tied to the spindle"
-    if rapid:
+    if path_is_cycle(path, line.executions):
         return "its feed is part of a cycle"
     if (tools < 0).any() or len(set(tools.tolist())) > 1:
         return "its tool is not described; write [tools.N]" if (tools < 0).any() else "several tools run it"
@@ -230,7 +241,13 @@ def _why_not(line: FeedLine, path: Path, tied: set[int], tools: Ints, found: _Fo
         return "it goes down into material, and the cutting formula has no end face"
     if len(found.rows) and (rpm <= 0.0).any():
         return "it cuts with the spindle at rest or backwards"
-    return ""
+    down = any((path.end_mm[a:b, 2] < path.start_mm[a:b, 2]).any() for a, b in line.executions)
+    return "it feeds down towards the work through air" if not len(found.rows) and down else ""
+
+
+def path_is_cycle(path: Path, executions: Sequence[tuple[int, int]]) -> bool:
+    """Whether one block makes rapids and feeds: only a cycle does."""
+    return any((path.kind[a:b] == Kind.RAPID).any() for a, b in executions)
 
 
 def _no_plain_words(text: str) -> str:

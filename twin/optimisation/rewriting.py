@@ -51,8 +51,9 @@ def rewritten(problem: Problem, feed_mm_min: Floats, rpm: Floats) -> Rewritten:
     program, inch = problem.program, is_inch(problem.program.text)
     wanted = _wanted(problem, feed_mm_min, rpm, inch)
     source = source_lines(program.text)
-    forced_feed, forced_speed = _first_choice(problem, wanted, source)
+    forced_feed, forced_speed = _first_choice(problem, wanted, rpm, source)
     speed_lines = _speed_lines(problem, rpm, source)
+    own_speed = _of_one_speed(problem)
     text, path, missed = program.text, program.path, {}
     for _ in range(ROUNDS_MAX):
         text = joined(program.text, _changed(source, wanted, forced_feed, forced_speed, speed_lines, problem, inch))
@@ -62,7 +63,7 @@ def rewritten(problem: Problem, feed_mm_min: Floats, rpm: Floats) -> Rewritten:
             return Rewritten(text, program.path, {error.line - 1: f"a control would refuse it rewritten: {error.reason}"})
         missed = _missed(problem, path, wanted)
         more_feed = {line for line, what in missed.items() if what == "feed"} - forced_feed
-        more_speed = {line for line, what in missed.items() if what == "speed"} - forced_speed
+        more_speed = {line for line, what in missed.items() if what == "speed" and line in own_speed} - forced_speed
         if not more_feed and not more_speed:
             break
         forced_feed |= more_feed
@@ -76,7 +77,7 @@ def _wanted(problem: Problem, feed: Floats, rpm: Floats, inch: bool) -> dict[int
     for k, line in enumerate(problem.program.lines):
         row = rows.get(k)
         if row is None:
-            speed = f"{line.rpm:g}" if line.rpm > 0.0 else None
+            speed = f"{line.rpm:g}" if line.needs_speed and line.rpm > 0.0 else None
             wanted[line.line] = _Wanted(None, None, speed, line.rpm)
         else:
             figure = feed_figure(float(feed[row]), inch)
@@ -91,8 +92,8 @@ def _order(problem: Problem) -> list[int]:
     return [line for _, line in runs]
 
 
-def _first_choice(problem: Problem, wanted: dict[int, _Wanted], source: list[str]) -> tuple[set[int], set[int]]:
-    """Lines that get an F word, and an S word, by what the feed line before them has."""
+def _first_choice(problem: Problem, wanted: dict[int, _Wanted], rpm: Floats, source: list[str]) -> tuple[set[int], set[int]]:
+    """Lines that get an F word, and an S word, by what is in force before them."""
     feeds, speeds = set(), set()
     feed: float | None = None
     for number in _order(problem):
@@ -102,7 +103,26 @@ def _first_choice(problem: Problem, wanted: dict[int, _Wanted], source: list[str
         feed = one.feed_mm_min
         if one.speed is not None and find_word(source[number], "S") is not None:
             speeds.add(number)
+    now = 0.0
+    made = problem.speeds
+    for e, event in enumerate(made.candidates.events):
+        if event.kind == EventKind.SPINDLE:
+            value = float(rpm[made.owner[e]]) if made.owner[e] >= 0 else event.value
+            if made.candidates.is_optional[e] and value != now:
+                speeds.add(event.line)
+            now = value
     return feeds, speeds
+
+
+def _of_one_speed(problem: Problem) -> set[int]:
+    """Lines that have the same speed whenever they are executed, so that an S word of their own cannot be wrong."""
+    rpm = problem.program.path.commanded_rpm()
+    changed = {int(k) for k in problem.allowed.index[problem.allowed.cutting]}
+    return {
+        line.line
+        for k, line in enumerate(problem.program.lines)
+        if k in changed or len({float(rpm[a]) for a, _ in line.executions}) == 1
+    }
 
 
 def _speed_lines(problem: Problem, rpm: Floats, source: list[str]) -> dict[int, str]:
@@ -153,15 +173,16 @@ def _missed(problem: Problem, path: Path, wanted: dict[int, _Wanted]) -> dict[in
         moved = _first_difference(before, path)
         return {moved: "way"}
     missed: dict[int, str] = {}
-    speed = path.commanded_rpm()
+    speed, programmed = path.commanded_rpm(), before.commanded_rpm()
     for line in problem.program.lines:
         one = wanted[line.line]
         for a, b in line.executions:
             feeding = np.arange(a, b)[path.kind[a:b] != Kind.RAPID]
-            meant = before.feed_mm_min[feeding] if one.feed_mm_min is None else np.full(len(feeding), one.feed_mm_min)
-            if np.any(np.abs(path.feed_mm_min[feeding] - meant) > SAME * meant):
+            feed = before.feed_mm_min[feeding] if one.feed_mm_min is None else one.feed_mm_min
+            rpm = programmed[feeding] if one.feed is None else one.rpm
+            if np.any(np.abs(path.feed_mm_min[feeding] - feed) > SAME * feed):
                 missed[line.line] = "feed"
-            elif one.speed is not None and np.any(np.abs(speed[feeding] - one.rpm) > SAME * one.rpm):
+            elif one.speed is not None and np.any(np.abs(speed[feeding] - rpm) > SAME * np.abs(rpm)):
                 missed[line.line] = "speed"
     return missed
 

@@ -14,6 +14,7 @@ from twin.gcode.tokens import TOKEN
 
 INCH_MM = 25.4
 DIGITS = 4
+WORDS = re.compile(r"[A-Za-z]\s*[-+.0-9#\[]")
 LINE_END = re.compile(r"\r\n|\r|\n")
 
 
@@ -58,7 +59,8 @@ def with_word(text: str, letter: str, figure: str) -> str:
         written = text[place.begin]
         return text[: place.begin] + written + figure + text[place.end :]
     end = last_word_end(text)
-    gap = " " if " " in text[:end].strip() else ""
+    dense = len(WORDS.findall(text[:end])) > 1 and " " not in text[:end].strip()
+    gap = "" if dense or not end else " "
     return text[:end] + gap + letter + figure + text[end:]
 
 

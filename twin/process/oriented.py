@@ -135,8 +135,11 @@ class Oriented(NamedTuple):
     def exact(self, branch: int | Ints, frequency_rad_s: Floats) -> Complexes:
         """The eigenvalue of the branch (0 or 1, of each frequency or of all) between its nodes."""
         both = eigenvalues(self.matrix, tip_response(self.modes, frequency_rad_s))
-        first, second = (np.interp(frequency_rad_s, self.frequency_rad_s, values) for values in self.eigenvalue)
-        near = np.where(np.asarray(branch) == 0, first, second)
+        nodes, (first, second) = self.frequency_rad_s, self.eigenvalue
+        if isinstance(branch, int):
+            near = np.interp(frequency_rad_s, nodes, self.eigenvalue[branch])
+        else:
+            near = np.where(branch == 0, np.interp(frequency_rad_s, nodes, first), np.interp(frequency_rad_s, nodes, second))
         values: Complexes = np.where(np.abs(both[0] - near) <= np.abs(both[1] - near), both[0], both[1])
         return values
 

@@ -26,12 +26,12 @@ __all__ = ["ChatterCut", "depth_limit_mm", "stable_speeds"]
 PERIODS_AT_A_TIME = 32
 CORRECTIONS = 4
 FINER = 4
-HALVINGS = 24
+FALSI = 8
 LOBES_AT_A_TIME = 2000
 
 
 def depth_limit_mm(modes: Sequence[Mode], cut: ChatterCut, spindle_rpm: ArrayLike) -> Floats:
-    """Largest axial depth that is stable at each of the speeds, (speeds,) mm; inf where no depth is unstable.
+    """Axial depth up to which every cut is stable at each of the speeds, (speeds,) mm; inf where no depth is unstable.
 
     One mode, across the feed of a slot with 4 teeth of K_e = 0.4 (A0 = −0.8 there): at no speed less than
     4 ζ (1 + ζ) k / (0.8 K_t) = 0.9067 mm, and far more in the pocket where a tooth follows at each wave (7500 rev/min: 500 Hz).
@@ -61,7 +61,9 @@ def depth_limit_mm(modes: Sequence[Mode], cut: ChatterCut, spindle_rpm: ArrayLik
 def stable_speeds(
     modes: Sequence[Mode], cut: ChatterCut, depth_mm: float, low_rpm: float, high_rpm: float
 ) -> tuple[tuple[float, float], ...]:
-    """The intervals of speed from low to high in which this depth is stable, upwards, their ends good to 0.1 rev/min.
+    """The intervals of speed from low to high in which this depth and any smaller one is stable, upwards; ends good to 0.1 rev/min.
+
+    Two modes may leave a depth stable above one that chatters; it does not count, for a tool goes through the smaller one first.
 
     >>> mode = Mode(direction="y", frequency_hz=500.0, damping_ratio=0.02, stiffness_n_per_mm=8000.0)
     >>> cut = ChatterCut(4, 900.0, 0.4, 0.0, math.pi)
@@ -154,17 +156,32 @@ def _ranges(oriented: Oriented, branch: int, level: float) -> Iterator[Floats]:
     nodes = oriented.frequency_rad_s
     above = np.concatenate([[False], oriented.eigenvalue[branch].real >= level, [False]])
     begins, ends = np.flatnonzero(~above[:-1] & above[1:]), np.flatnonzero(above[:-1] & ~above[1:]) - 1
-    below = np.concatenate([np.maximum(begins - 1, 0), np.minimum(ends + 1, len(nodes) - 1)])
-    outer, inner = nodes[below], nodes[np.concatenate([begins, ends])]
-    for _ in range(HALVINGS):
-        middle = 0.5 * (outer + inner)
-        high = oriented.exact(branch, middle).real >= level
-        outer, inner = np.where(high, outer, middle), np.where(high, middle, inner)
-    for begin, end, low, high_end in zip(begins, ends, inner[: len(begins)], inner[len(begins) :], strict=True):
+    inside = np.concatenate([begins, ends])
+    outside = np.clip(np.concatenate([begins - 1, ends + 1]), 0, len(nodes) - 1)
+    edges = _crossings(oriented, branch, level, nodes[outside], nodes[inside])
+    for begin, end, low, high_end in zip(begins, ends, edges[: len(begins)], edges[len(begins) :], strict=True):
         coarse = np.concatenate([[low], nodes[begin : end + 1], [high_end]])
         places = np.linspace(0.0, len(coarse) - 1.0, FINER * (len(coarse) - 1) + 1)
         fine = np.interp(places, np.arange(len(coarse)), coarse)
         yield fine[fine > 0.0]
+
+
+def _crossings(oriented: Oriented, branch: int, level: float, below: Floats, above: Floats) -> Floats:
+    """Where Re λ = level between each pair of frequencies, by regula falsi in the Illinois form; `above` where both are above."""
+    under, over = (oriented.exact(branch, ends).real - level for ends in (below, above))
+    place, was_high = above, np.zeros(len(above), dtype=np.int8)
+    between = (under < 0.0) & (over > 0.0)
+    for _ in range(FALSI):
+        share = np.divide(over, over - under, out=np.zeros_like(over), where=between)
+        place = above + share * (below - above)
+        value = oriented.exact(branch, place).real - level
+        high = value >= 0.0
+        # an end that stays for the second time counts half
+        under = np.where(high, np.where(was_high == 1, 0.5 * under, under), value)
+        over = np.where(high, value, np.where(was_high == -1, 0.5 * over, over))
+        below, above = np.where(high, below, place), np.where(high, place, above)
+        was_high = np.where(high, 1, -1).astype(np.int8)
+    return place
 
 
 def _unstable_periods(frequency: Floats, phase: Floats, longest_s: float) -> Iterator[tuple[float, float]]:
@@ -188,6 +205,8 @@ def _left_over(unstable: list[tuple[float, float]], low: float, high: float) -> 
     """What the unstable intervals leave of the range from low to high."""
     stable: list[tuple[float, float]] = []
     for begin, end in sorted(unstable):
+        if end <= low:
+            continue
         if begin > low:
             stable.append((low, min(begin, high)))
         low = max(low, end)
