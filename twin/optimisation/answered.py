@@ -6,7 +6,7 @@ from twin.errors import OptimisationError
 from twin.machine import Limits
 from twin.motion.path import Path
 from twin.optimisation.allowed import limits_of
-from twin.optimisation.answer import FrontPoint, LineAnswer, Objective, Optimised, Resimulated, Search, Totals
+from twin.optimisation.answer import Bound, FrontPoint, LineAnswer, Objective, Optimised, Resimulated, Search, Totals
 from twin.optimisation.bound import bound_of
 from twin.optimisation.forces import CutForces
 from twin.optimisation.margin import margin
@@ -29,7 +29,7 @@ def answered(
     figures = [_totals(made, shown, path, limits) for shown, path in ((before, made.program.path), (after, text.path))]
     value = figures[1].seconds if alone is Objective.TIME else figures[1].cost
     assert value is not None
-    bound = bound_of(made, alone, value)
+    bound = bound_of(made, alone, value) if not front else _bound_of_front(made, front)
     known = None
     if limits.force_n is not None:
         advance = advance_of_cuts(made, text.path)
@@ -40,7 +40,7 @@ def answered(
         machine=machine.machine.name,
         objective=question.objective,
         currency=made.economy.currency if made.economy is not None else "",
-        sentence=_sentence(question, made, figures, bound.distance, bound.exact, limits),
+        sentence=_sentence(question, made, figures, bound, limits),
         limits=limits_shown(made, limits),
         before=figures[0],
         after=figures[1],
@@ -54,6 +54,18 @@ def answered(
         diff="\n".join(difflib.unified_diff(old, new, question.name, f"{question.name}, optimised", lineterm="", n=1)),
         program=text.text,
     )
+
+
+def _bound_of_front(made: Problem, front: tuple[FrontPoint, ...]) -> Bound:
+    """Of its two ends: the least cost, and in words the least time."""
+    cheapest = bound_of(made, Objective.COST, min(point.cost for point in front))
+    fastest = bound_of(made, Objective.TIME, min(point.seconds for point in front))
+    how = f"of the cheapest program; the fastest is {_part(fastest.distance)} above the least time of {fastest.value:.2f} s"
+    return Bound(cheapest.value, cheapest.distance, cheapest.exact and fastest.exact, f"{how}; {cheapest.how}")
+
+
+def _part(part: float) -> str:
+    return f"{100 * part:.2g} %"
 
 
 def _totals(made: Problem, shown: ShownLines, path: Path, limits: Limits) -> Totals:
@@ -103,7 +115,7 @@ def _lines(made: Problem, before: ShownLines, after: ShownLines, text: Rewritten
     return tuple(answers)
 
 
-def _sentence(question: Question, made: Problem, figures: list[Totals], distance: float, exact: bool, limits: Limits) -> str:
+def _sentence(question: Question, made: Problem, figures: list[Totals], bound: Bound, limits: Limits) -> str:
     before, after = figures
 
     def change(old: float, new: float) -> str:
@@ -116,8 +128,13 @@ def _sentence(question: Question, made: Problem, figures: list[Totals], distance
     parts.append(force + (f" of {limits.force_n:g} N" if limits.force_n is not None else ""))
     if before.over:
         parts.append(f"{before.over} lines were above a limit, now {after.over or 'none'}")
-    what = "the exact optimum" if exact else "a bound that no program is below"
-    parts.append(f"{single(question.objective)} {100 * distance:.2g} % above {what}")
+    what = "the exact optimum" if bound.exact else "a bound that no program is below"
+    which = (
+        f"the front's cheapest {_part(bound.distance)}"
+        if question.objective is Objective.PARETO
+        else f"{question.objective} {_part(bound.distance)}"
+    )
+    parts.append(f"{which} above {what}")
     return "; ".join(parts)
 
 

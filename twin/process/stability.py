@@ -61,7 +61,7 @@ def depth_limit_mm(modes: Sequence[Mode], cut: ChatterCut, spindle_rpm: ArrayLik
 def stable_speeds(
     modes: Sequence[Mode], cut: ChatterCut, depth_mm: float, low_rpm: float, high_rpm: float
 ) -> tuple[tuple[float, float], ...]:
-    """The intervals of speed from low to high in which this depth and any smaller one is stable, upwards; ends good to 0.1 rev/min.
+    """The intervals of speed from low to high in which this depth and any smaller one is stable; ends good to 0.1 rev/min.
 
     Two modes may leave a depth stable above one that chatters; it does not count, for a tool goes through the smaller one first.
 
