@@ -20,6 +20,7 @@ from cnctwin.stopping import stopped_by_signals
 
 if TYPE_CHECKING:
     import twin.optimisation.question as asked
+    from twin.machine import MachineFile
     from twin.optimisation.answer import Objective, Optimised
 
 BINDS_SHOWN = 6
@@ -31,6 +32,8 @@ def optimise(
     out: Annotated[Path, typer.Option(help="Write the program there; its report beside it as .html, everything as .json")],
     objective: Annotated[str, typer.Option(help="time, cost or pareto")] = "time",
     force_limit_n: Annotated[float | None, typer.Option(help="Greatest cutting force, N; else that of [limits]")] = None,
+    feed_range: Annotated[str | None, typer.Option(help="LOW:HIGH, mm/min; else that of [limits]")] = None,
+    speed_range: Annotated[str | None, typer.Option(help="LOW:HIGH, rev/min; else that of [limits]")] = None,
     probability: Annotated[
         float | None, typer.Option(help="Keep the force limit with this probability, as 0.95; else by the mean twin")
     ] = None,
@@ -56,12 +59,12 @@ def optimise(
         from cnctwin import twin_commands as files
     except ModuleNotFoundError as missing:
         raise UsageError(f"the optimiser needs the package {missing.name}; pip install 'cnctwin[twin]' brings it") from None
-    from twin.machine import read_machine
+    from twin.machine import machine_to_toml, read_machine
 
-    read_machine(machine)  # a fault in it is told with its name
+    described = _with_ranges(read_machine(machine), feed_range, speed_range)
     question = asked.Question(
         program_text=files.read_text(program),
-        machine_toml=files.read_text(machine),
+        machine_toml=machine_to_toml(described),
         name=program.name,
         objective=_objective(objective),
         force_limit_n=force_limit_n,
@@ -132,6 +135,34 @@ def _run(question: "asked.Question", how: Run) -> int:
         console.print(line, markup=False, highlight=False, soft_wrap=True)
     console.print(f"{files.program}, {files.report}, {files.answer}", markup=False, highlight=False, soft_wrap=True)
     return 0
+
+
+def _with_ranges(machine: "MachineFile", feed: str | None, speed: str | None) -> "MachineFile":
+    """The machine with other ranges of feed and speed. Raises UsageError."""
+    if feed is None and speed is None:
+        return machine
+    from twin.machine import Limits
+
+    given = {
+        name: _pair(option, text)
+        for name, option, text in (("feed_mm_min", "--feed-range", feed), ("spindle_rpm", "--speed-range", speed))
+        if text is not None
+    }
+    stated = machine.limits.model_dump() if machine.limits is not None else {}
+    if missing := {"feed_mm_min", "spindle_rpm"} - {**stated, **given}.keys():
+        raise UsageError(f"no [limits] in the machine: --{'feed' if 'feed_mm_min' in missing else 'speed'}-range is needed too")
+    return machine.model_copy(update={"limits": Limits.model_validate(stated | given)})
+
+
+def _pair(option: str, text: str) -> tuple[float, float]:
+    low, colon, high = text.partition(":")
+    try:
+        pair = float(low), float(high)
+    except ValueError:
+        pair = 0.0, 0.0
+    if not colon or not 0.0 < pair[0] <= pair[1] < float("inf"):
+        raise UsageError(f"{option} {text}: is no range; write it as 100:3000")
+    return pair
 
 
 def _objective(text: str) -> "Objective":

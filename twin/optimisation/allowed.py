@@ -299,6 +299,6 @@ def limits_of(machine: MachineFile, force_limit_n: float | None) -> Limits:
     """[limits] of a machine, with the force limit that was asked for. Raises MachineError where there is none."""
     if machine.limits is None:
         raise MachineError(
-            "no [limits]: write feed_mm_min and spindle_rpm, the ranges that machine and tool allow (docs/optimise.md)"
+            "no [limits]: write feed_mm_min and spindle_rpm, what machine and tool allow, or give --feed-range and --speed-range"
         )
     return machine.limits if force_limit_n is None else machine.limits.model_copy(update={"force_n": force_limit_n})
