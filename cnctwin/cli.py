@@ -24,6 +24,7 @@ from cnctwin.demo_parts import DemoOptions
 from cnctwin.errors import BrokerStartError, ProgramError, UsageError
 from cnctwin.given_broker import address, broker_or_own
 from cnctwin.history_commands import replay_history
+from cnctwin.jobs_commands import jobs_app
 from cnctwin.model_commands import model_app
 from cnctwin.moment import moment_ms
 from cnctwin.optimise_command import optimise
@@ -53,6 +54,7 @@ app.add_typer(alerts_app, name="alerts")
 app.add_typer(train_app, name="train")
 app.add_typer(store_app, name="store")
 app.add_typer(parts_app, name="parts")
+app.add_typer(jobs_app, name="jobs")
 train_app.command("detector")(train_detector)
 train_app.command("residual")(train_residual)
 app.add_typer(model_app, name="model")

@@ -2,7 +2,8 @@
 
 ProgramError
 ├── UsageError         wrong input: exit code 2
-└── BrokerStartError   the private broker cannot be started
+├── BrokerStartError   the private broker cannot be started
+└── SpreadError        pieces of a job that are lost: nobody is there to compute them, or each who tried was killed
 """
 
 
@@ -16,3 +17,7 @@ class UsageError(ProgramError):
 
 class BrokerStartError(ProgramError):
     """The private broker cannot be started."""
+
+
+class SpreadError(ProgramError):
+    """Pieces of a job that are lost: nobody is there to compute them, or each who tried was killed."""

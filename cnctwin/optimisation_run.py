@@ -18,7 +18,10 @@ DEFAULTS = Question("", "")
 
 @dataclass(frozen=True, slots=True)
 class OptimiseRequest:
-    """What a job or a command asks for; None = the default of `twin.optimisation.question.Question`."""
+    """What a job or a command asks for; None = the default of `twin.optimisation.question.Question`.
+
+    encoding: of the program's file, in which it is written again
+    """
 
     program_text: str
     machine_toml: str
@@ -29,6 +32,7 @@ class OptimiseRequest:
     seed: int = 1
     evolutions: int | None = None
     population: int | None = None
+    encoding: str = "utf-8"
 
     def question(self) -> Question:
         """The question. Raises OptimisationError where a figure is out of its range."""
@@ -52,11 +56,12 @@ class Files:
     program: Path
     answer: Path
     report: Path
+    encoding: str = "utf-8"
 
     @classmethod
-    def beside(cls, program: Path) -> "Files":
+    def beside(cls, program: Path, encoding: str = "utf-8") -> "Files":
         """optimised.nc, optimised.json and optimised.html."""
-        return cls(program, program.with_suffix(".json"), program.with_suffix(".html"))
+        return cls(program, program.with_suffix(".json"), program.with_suffix(".html"), encoding)
 
 
 def optimise_request(
@@ -76,7 +81,7 @@ def optimise_request(
     Stopped.
     """
     write(lambda: out.mkdir(parents=True, exist_ok=True), out)
-    files = Files(out / "optimised.nc", out / "optimisation.json", out / "report.html")
+    files = Files(out / "optimised.nc", out / "optimisation.json", out / "report.html", request.encoding)
     return run(request.question(), files, progress=progress, spread=spread, checkpoint=checkpoint, stop=stop)
 
 
@@ -101,7 +106,7 @@ def run(
     hooks = Hooks(spread=spread, progress=progress, save=save, stop=stop, clock=time.monotonic)
     answer = optimise(question, hooks, _kept(checkpoint), resimulate=resimulate)
     # newline: the ends of lines stay as they are in the program
-    write(partial(files.program.write_text, answer.program, encoding="utf-8", newline=""), files.program)
+    write(partial(files.program.write_text, answer.program, encoding=files.encoding, newline=""), files.program)
     write(partial(files.answer.write_text, json.dumps(answer.as_json()) + "\n", encoding="utf-8"), files.answer)
     write(partial(files.report.write_text, report_html(answer), encoding="utf-8"), files.report)
     if checkpoint is not None:

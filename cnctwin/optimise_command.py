@@ -62,8 +62,9 @@ def optimise(
     from twin.machine import machine_to_toml, read_machine
 
     described = _with_ranges(read_machine(machine), feed_range, speed_range)
+    text, encoding = files.read_encoded(program)
     question = asked.Question(
-        program_text=files.read_text(program),
+        program_text=text,
         machine_toml=machine_to_toml(described),
         name=program.name,
         objective=_objective(objective),
@@ -79,7 +80,7 @@ def optimise(
     )
     if out.suffix in (".json", ".html") or out.resolve() == program.resolve():
         raise UsageError(f"{out}: write the program under another name, as optimised.nc; .json and .html are beside it")
-    how = Run(out, workers, dask, fresh=fresh, resimulate=not no_resimulation, paper=paper, as_json=as_json)
+    how = Run(out, encoding, workers, dask, fresh=fresh, resimulate=not no_resimulation, paper=paper, as_json=as_json)
     raise typer.Exit(_run(question, how))
 
 
@@ -88,6 +89,7 @@ class Run:
     """How a question is worked out and shown: the options that are not part of it."""
 
     out: Path
+    encoding: str
     workers: int
     dask: str | None
     fresh: bool
@@ -104,7 +106,7 @@ def _run(question: "asked.Question", how: Run) -> int:
     from twin.optimisation.optimise import Stopped
     from twin.optimisation.paper import paper_search
 
-    files, kept = Files.beside(how.out), how.out.with_suffix(".checkpoint.json")
+    files, kept = Files.beside(how.out, how.encoding), how.out.with_suffix(".checkpoint.json")
     if how.fresh:
         kept.unlink(missing_ok=True)
     cluster = DaskCluster.from_text(how.dask) if how.dask is not None else None

@@ -28,6 +28,7 @@ class ServeOptions:
     config: Path | None = None
     models: Path | None = None
     diagnoses: Path | None = None
+    jobs: Path | None = None
     host: str = "127.0.0.1"
     port: int = DEFAULT_PORT
     token_file: Path | None = None
@@ -58,7 +59,7 @@ def serve(options: ServeOptions, broker: BrokerAddress, stop: Event) -> None:
     live = LivePlant()
     viewer = Viewer(broker, options.group, live)
     store = StoreReader(options.store)
-    sources = Sources(live, viewer, store, constants, Models(options.models), options.diagnoses, Nights(), access)
+    sources = Sources(live, viewer, store, constants, Models(options.models), options.diagnoses, Nights(), options.jobs, access)
     app = create_app(sources)
     server = Server(app, options.host, options.port)
     logging.getLogger("sparkplug").setLevel(logging.ERROR)  # what is wrong with the connection stands in /health

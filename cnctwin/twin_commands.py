@@ -3,6 +3,7 @@
 import json
 import sys
 import time
+from codecs import BOM_UTF8
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
@@ -32,14 +33,20 @@ from twin.simulation import simulate as simulated
 
 def read_text(path: Path) -> str:
     """The text of a file that the user named; what is not UTF-8 is read as Latin-1, as controls write it."""
+    return read_encoded(path)[0]
+
+
+def read_encoded(path: Path) -> tuple[str, str]:
+    """The text of a file, and the encoding in which it is written again byte for byte. Raises UsageError."""
     try:
         raw = path.read_bytes()
     except OSError as error:
         raise UsageError(f"{path}: cannot be read: {error.strerror}") from None
+    encoding = "utf-8-sig" if raw.startswith(BOM_UTF8) else "utf-8"
     try:
-        return raw.decode("utf-8-sig")
+        return raw.decode(encoding), encoding
     except UnicodeDecodeError:
-        return raw.decode("latin-1")
+        return raw.decode("latin-1"), "latin-1"
 
 
 def check_suffix(out: Path | None) -> None:

@@ -5,3 +5,8 @@ import os
 IS_FULL = bool(os.environ.get("CNCTWIN_FULL"))
 EXAMPLES = 100 if IS_FULL else 50
 """Of a law that says nothing else."""
+
+
+def examples(most: int, few: int = EXAMPLES) -> int:
+    """Of a law that asks for `most`: all of them with CNCTWIN_FULL=1, else no more than `few`."""
+    return most if IS_FULL else min(most, few)

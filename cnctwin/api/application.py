@@ -15,6 +15,7 @@ from cnctwin.api.gap_routes import gap_routes
 from cnctwin.api.guard import Guard
 from cnctwin.api.health_routes import health_routes
 from cnctwin.api.history_routes import history_routes
+from cnctwin.api.job_routes import job_routes
 from cnctwin.api.metrics_routes import metrics_routes
 from cnctwin.api.page_routes import page_routes, serve_page
 from cnctwin.api.past_routes import past_routes
@@ -57,6 +58,7 @@ def create_app(sources: Sources) -> FastAPI:
         prediction_routes(sources),
         gap_routes(sources),
         alert_routes(sources.live, sources.viewer),
+        job_routes(sources),
         history_routes(sources.live, sources.store),
         past_routes(sources),
         metrics_routes(sources, fan_out),

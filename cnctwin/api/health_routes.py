@@ -15,9 +15,12 @@ from cnctwin.api.residual import models_part
 from cnctwin.api.sources import Sources
 from cnctwin.doctor import COME_AND_GO
 from cnctwin.errors import ProgramError
+from cnctwin.jobs.client import FRESH_S_MAX as JOBS_FRESH_S_MAX
 from cnctwin.page import WEB
 from processors.contract import TWIN_NODE_PREFIX
 from sparkplug.connection import now_ms
+
+JOBS_NODE = "twin-jobs"
 
 
 def health_routes(sources: Sources) -> APIRouter:
@@ -43,7 +46,7 @@ def health_routes(sources: Sources) -> APIRouter:
         """Each part with its state, the reason and what to do; 200 also where some are missing."""
         parts = [_broker(sources), _plant(sources.live), _processors(sources.live), await _store(sources), _constants(sources)]
         parts += [await sources.store.work(lambda: models_part(sources.models))]
-        parts += [_alerts(sources.live), _diagnoses(sources), _page()]
+        parts += [_alerts(sources.live), _jobs(sources), _diagnoses(sources), _page()]
         degraded = any(part.state in ("degraded", "missing") for part in parts)
         return Health(status="degraded" if degraded else "ok", now=now_ms(), parts=parts)
 
@@ -66,7 +69,8 @@ def _broker(sources: Sources) -> Part:
 
 def _processors(live: LivePlant) -> Part:
     """Those that were heard of since the server began; one that ends in its own time, as a nightly check, is not missed."""
-    known = [view for view in live.nodes() if view.node.startswith(TWIN_NODE_PREFIX) and view.node not in COME_AND_GO]
+    others = (*COME_AND_GO, JOBS_NODE)
+    known = [view for view in live.nodes() if view.node.startswith(TWIN_NODE_PREFIX) and view.node not in others]
     if not known:
         return Part(part="processors", state="missing", reason="no processor was heard of", do="cnctwin process NAME…")
     dead = [view.node.removeprefix(TWIN_NODE_PREFIX) for view in known if not view.online]
@@ -121,6 +125,27 @@ def _alerts(live: LivePlant) -> Part:
     return Part(part="alerts", state="ok", reason="the processor keeps its state up")
 
 
+def _jobs(sources: Sources) -> Part:
+    """A plant need not have a consumer, so one that was never heard of is not missed."""
+    state = None if sources.viewer is None else sources.viewer.jobs.all()
+    reason = jobs_trouble(state)
+    if state is None:
+        return Part(part="jobs", state="off", reason=reason or "", do="cnctwin jobs run")
+    if reason is not None or state.get("disk_trouble"):
+        return Part(part="jobs", state="degraded", reason=reason or str(state["disk_trouble"]), do="cnctwin jobs run")
+    return Part(part="jobs", state="ok", reason=f"{state.get('queued', 0)} wait, {1 if state.get('running') else 0} runs")
+
+
+def jobs_trouble(state: dict[str, Any] | None) -> str | None:
+    """Why the state of jobs cannot be relied on; None where it can."""
+    if state is None:
+        return "nothing was heard of jobs; does the batch consumer run? (cnctwin jobs run)"
+    age_s = state_age_s(state, time.time())
+    if age_s > JOBS_FRESH_S_MAX:
+        return f"the state of jobs is {age_s:.0f} s old: the batch consumer does not run any more (cnctwin jobs run)"
+    return None
+
+
 def _diagnoses(sources: Sources) -> Part:
     folder = sources.diagnoses
     if folder is None:
@@ -140,7 +165,7 @@ def _page() -> Part:
 
 
 def state_age_s(state: dict[str, Any], now_s: float) -> float:
-    """How old the alerts processor's state is; for ever, where it does not say.
+    """How old a state is that says when it was written; for ever, where it does not say.
 
     >>> state_age_s({"at": "1970-01-01T00:01:00.000Z"}, 90.0)
     30.0

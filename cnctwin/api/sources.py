@@ -22,6 +22,7 @@ class Sources:
     models: the residual models, for predictions
     diagnoses: the folder with one folder for each machine, as `cnctwin gap diagnose` writes it
     nights: in which the twin was judged
+    jobs: the batch consumer's folder, for the files of results
     access: who may ask
     """
 
@@ -32,4 +33,5 @@ class Sources:
     models: Models = field(default_factory=lambda: Models(None))
     diagnoses: Path | None = None
     nights: Nights = field(default_factory=Nights)
+    jobs: Path | None = None
     access: Access = field(default_factory=Access)

@@ -10,6 +10,7 @@ from typing import Any
 
 from cnctwin.alert_commands import STATE as ALERTS_TOPIC
 from cnctwin.api.batches import Batch
+from cnctwin.api.live_jobs import LiveJobs
 from cnctwin.api.live_plant import LivePlant
 from cnctwin.watch import viewer
 from sparkplug.broker import BrokerAddress
@@ -26,15 +27,17 @@ _log = logging.getLogger(__name__)
 
 
 class Viewer:
-    """Between `start` and `stop` the plant is kept up to date. `on_batches` is called from the thread."""
+    """Between `start` and `stop` the plant and the jobs are kept up to date. `on_batches` is called from the thread."""
 
     def __init__(self, broker: BrokerAddress, group: str, live: LivePlant) -> None:
         self.url = broker.url
         self.group = group
         self.on_batches: Callable[[list[Batch]], None] = lambda _: None
+        self.jobs = LiveJobs()
         self._live = live
         self._host = viewer(broker, group)
-        self._host.subscribe_plain(ALERTS_TOPIC)
+        for topic in (ALERTS_TOPIC, *LiveJobs.filters):
+            self._host.subscribe_plain(topic)
         self._outbox: deque[tuple[str, bytes]] = deque(maxlen=OUTBOX_MAX)
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="viewer", daemon=True)
@@ -100,9 +103,10 @@ class Viewer:
         if not events:
             return
         self._live.take(events, now_ms(), self._describe)
-        for event in events:
-            is_state = event.kind is EventKind.PLAIN and event.topic == ALERTS_TOPIC
-            if is_state and (state := _parsed(event.payload)) is not None:
+        for event in (one for one in events if one.kind is EventKind.PLAIN):
+            if event.topic != ALERTS_TOPIC:
+                self.jobs.take(event.topic, event.payload)
+            elif (state := _parsed(event.payload)) is not None:
                 self._live.take_alerts(state)
 
     def _describe(self, node: NodeId, device: str | None) -> Mapping[str, PropertySet]:

@@ -127,12 +127,12 @@ def row_count(frame: Frame) -> int:
     return max(2, frame.height // 30)
 
 
-def y_axis(frame: Frame) -> Markup:
-    """The labels to the left of a plot."""
+def y_axis(frame: Frame, digits: int = 3) -> Markup:
+    """The labels to the left of a plot, with so many significant digits."""
     at = ticks(frame.bottom, frame.top, row_count(frame))
     places = frame.y(np.array(at)).tolist()
     texts = [
-        tag("text", figure(value), x="100%", dx=-8, y=round(min(max(y + 4, 10), frame.height - 1), 1), text_anchor="end")
+        tag("text", figure(value, digits), x="100%", dx=-8, y=round(min(max(y + 4, 10), frame.height - 1), 1), text_anchor="end")
         for value, y in zip(at, places, strict=True)
     ]
     return tag("svg", *texts, class_="y", width=64, height=frame.height, aria_hidden="true", focusable="false")
@@ -154,6 +154,6 @@ def anchor(place: float) -> str:
     return "start" if place < 15 else "end" if place > 985 else "middle"
 
 
-def panel(frame: Frame, label: str, inside: str, **attributes: str) -> Markup:
+def panel(frame: Frame, label: str, inside: str, /, digits: int = 3, **attributes: str) -> Markup:
     """A plot with its labels and what it shows."""
-    return tag("div", tag("p", label, class_="label"), y_axis(frame), plot(frame, inside), class_="panel", **attributes)
+    return tag("div", tag("p", label, class_="label"), y_axis(frame, digits), plot(frame, inside), class_="panel", **attributes)

@@ -2,7 +2,7 @@
 
 USERS = ("edge-okuma", "edge-other", "edge-mill", "processors", "viewer", "operator")
 EDGE_NODES = ("edge-okuma", "edge-other", "edge-mill")
-NODES = (*EDGE_NODES, "twin-mirror", "viewer", "operator", "processors")
+NODES = (*EDGE_NODES, "twin-mirror", "twin-jobs", "viewer", "operator", "processors")
 NODE_VERBS, DEVICE_VERBS = ("NBIRTH", "NDATA", "NDEATH"), ("DBIRTH", "DDATA", "DDEATH")
 STATES = ("spBv1.0/STATE/twin-mirror", "spBv1.0/STATE/scada")
 SNAPSHOT, LETTER, MARKER = "cnctwin/snapshot/mirror/okuma", "cnctwin/deadletter/mirror/okuma", "cnctwin/marker/mirror"
@@ -10,6 +10,9 @@ OUTBOX = tuple(f"cnctwin/alerts/{kind}/a1" for kind in ("outbox", "claim", "deli
 ALERTS_STATE = "cnctwin/alerts/state"
 COMMANDS = tuple(f"cnctwin/alerts/command/{name}" for name in ("ack", "silence", "unsilence", "test"))
 MIRROR = ("cnc/okuma/spindle_rpm", "cnc/okuma/twin/raw_score")
+ASK_FOR_JOBS = ("cnc/jobs/request", "cnc/jobs/cancel")
+JOB = "cnc/jobs/night-7/state"
+JOBS = ("cnc/jobs/state", "cnc/jobs/reply/night-7")
 ELSEWHERE = (
     "anything",
     "spBv1.0/other/NDATA/edge-okuma",
@@ -38,22 +41,39 @@ ASK_FOR_BIRTHS = frozenset(f"spBv1.0/cnc/NCMD/{node}" for node in NODES)
 RECEIPTS = frozenset(f"spBv1.0/cnc/DCMD/{node}/okuma" for node in NODES)
 SPARKPLUG = frozenset().union(*(said_by(node) | told(node) for node in NODES))
 ALL = sorted(
-    {*SPARKPLUG, *map(barrier, NODES), *STATES, SNAPSHOT, LETTER, MARKER, *OUTBOX, ALERTS_STATE, *COMMANDS, *MIRROR, *ELSEWHERE}
+    {
+        *SPARKPLUG,
+        *map(barrier, NODES),
+        *STATES,
+        SNAPSHOT,
+        LETTER,
+        MARKER,
+        *OUTBOX,
+        ALERTS_STATE,
+        *COMMANDS,
+        *MIRROR,
+        *ASK_FOR_JOBS,
+        JOB,
+    }
+    | {*JOBS, *ELSEWHERE}
 )
 
 MAY_WRITE: dict[str, frozenset[str]] = {
     **{edge: said_by(edge) | {barrier(edge)} for edge in EDGE_NODES},
     "processors": said_by("twin-mirror")
+    | said_by("twin-jobs")
     | ASK_FOR_BIRTHS
     | RECEIPTS
-    | {STATES[0], SNAPSHOT, LETTER, MARKER, *OUTBOX, ALERTS_STATE, COMMANDS[0], *MIRROR},
+    | {STATES[0], SNAPSHOT, LETTER, MARKER, *OUTBOX, ALERTS_STATE, COMMANDS[0], *MIRROR}
+    | {*ASK_FOR_JOBS, JOB, *JOBS},
     "viewer": frozenset(),
-    "operator": ASK_FOR_BIRTHS | set(COMMANDS),
+    "operator": ASK_FOR_BIRTHS | set(COMMANDS) | set(ASK_FOR_JOBS),
 }
-READERS = SPARKPLUG | {*STATES, ALERTS_STATE, LETTER, *MIRROR, ELSEWHERE[2]}
+READERS = SPARKPLUG | {*STATES, ALERTS_STATE, LETTER, *MIRROR, *ASK_FOR_JOBS, JOB, *JOBS, ELSEWHERE[2]}
 MAY_READ: dict[str, frozenset[str]] = {
     **{edge: told(edge) | set(STATES) for edge in EDGE_NODES},
-    "processors": SPARKPLUG | {*STATES, SNAPSHOT, LETTER, MARKER, *OUTBOX, ALERTS_STATE, *COMMANDS, ELSEWHERE[2]},
+    "processors": SPARKPLUG
+    | {*STATES, SNAPSHOT, LETTER, MARKER, *OUTBOX, ALERTS_STATE, *COMMANDS, *ASK_FOR_JOBS, JOB, ELSEWHERE[2]},
     "viewer": READERS,
     "operator": READERS,
 }

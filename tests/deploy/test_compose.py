@@ -247,7 +247,12 @@ def test_the_user_of_the_page_may_do_the_same_on_both_brokers() -> None:
     mosquitto = (DEPLOY / "mosquitto" / "people.acl").read_text().partition("user page\n")[2].strip().splitlines()
     writes = {line.removeprefix("topic write ") for line in mosquitto}
     hivemq = (DEPLOY / "hivemq" / "credentials.xml").read_text().partition("<id>page</id>\n            <permissions>")[2]
-    assert writes == set(re.findall(r"<topic>([^<]+)</topic>", hivemq)) == {"cnctwin/alerts/command/ack", "spBv1.0/cnc/NCMD/+"}
+    asks = {"cnc/jobs/request", "cnc/jobs/cancel"}
+    assert (
+        writes
+        == set(re.findall(r"<topic>([^<]+)</topic>", hivemq))
+        == {"cnctwin/alerts/command/ack", "spBv1.0/cnc/NCMD/+"} | asks
+    )
 
 
 def test_with_influxdb_the_store_has_its_token_and_no_other_service_has(tmp_path: Path) -> None:

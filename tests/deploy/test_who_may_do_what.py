@@ -96,7 +96,7 @@ def test_the_certificate_of_an_edge_gives_no_rights_of_a_processor(plant: Plant)
 
 def test_each_processor_that_there_is_has_its_lines() -> None:
     lines = set((DEPLOY / "mosquitto" / "processors.acl").read_text().split("\n"))
-    for name in discover():
+    for name in (*discover(), "jobs"):
         node = f"twin-{name}"
         wanted = {f"topic write spBv1.0/cnc/{verb}/{node}" for verb in NODE_VERBS}
         wanted |= {f"topic write spBv1.0/cnc/{verb}/{node}/+" for verb in DEVICE_VERBS} | {f"topic write spBv1.0/STATE/{node}"}

@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sparkplug.quality import Quality
+from tests.depth import examples
 from tests.processors.courier.alert_shop import DESK, DRIFT, PHONE, SCORE, VIBRATION, Shop
 
 # A receiver with room for everything, so that the laws are those of grouping; the rate limit has a law of its own.
@@ -67,7 +68,7 @@ def live(shop: Shop, happenings: list[tuple[Any, ...]], without: tuple[str, ...]
 
 
 @given(happenings=_happenings)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60, 30), deadline=None)
 def test_nothing_is_told_twice_and_every_notification_says_something_new(happenings: list[tuple[Any, ...]]) -> None:
     shop = Shop(receivers=ROOMY)
     live(shop, happenings)
@@ -79,7 +80,7 @@ def test_nothing_is_told_twice_and_every_notification_says_something_new(happeni
 
 
 @given(happenings=_happenings)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60, 30), deadline=None)
 def test_a_group_is_told_at_most_once_an_interval_but_for_high_alerts_that_begin(happenings: list[tuple[Any, ...]]) -> None:
     """No storm: of what is not high, one notification for each machine and receiver in five minutes."""
     shop = Shop(receivers=ROOMY)
@@ -95,7 +96,7 @@ def test_a_group_is_told_at_most_once_an_interval_but_for_high_alerts_that_begin
 
 
 @given(happenings=_happenings)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60, 30), deadline=None)
 def test_every_firing_that_nobody_silenced_or_acknowledged_is_told_to_everybody(happenings: list[tuple[Any, ...]]) -> None:
     brief = {"keep_firing_for_s": 0.0}  # so that some are over before anybody was told
     signals = {
@@ -113,7 +114,7 @@ def test_every_firing_that_nobody_silenced_or_acknowledged_is_told_to_everybody(
 
 
 @given(happenings=_happenings)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60, 30), deadline=None)
 def test_in_quiet_hours_every_high_alert_is_told_and_nothing_else_begins(happenings: list[tuple[Any, ...]]) -> None:
     shop = Shop(receivers={"desk": ROOMY["desk"]}, quiet_hours=NIGHT)
     live(shop, happenings, without=("ack", "silence", "clock"))
@@ -125,7 +126,7 @@ def test_in_quiet_hours_every_high_alert_is_told_and_nothing_else_begins(happeni
 
 
 @given(happenings=_happenings, rate=st.integers(1, 5))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=examples(40, 25), deadline=None)
 def test_the_rate_limit_holds_for_whatever_happens(happenings: list[tuple[Any, ...]], rate: int) -> None:
     shop = Shop(receivers={"desk": DESK["desk"] | {"rate_per_hour": rate, "rate_high_per_hour": 10}})
     live(shop, happenings, without=("clock",))
@@ -139,7 +140,7 @@ def test_the_rate_limit_holds_for_whatever_happens(happenings: list[tuple[Any, .
 
 
 @given(happenings=_happenings)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=examples(40, 25), deadline=None)
 def test_a_restart_anywhere_changes_nothing(happenings: list[tuple[Any, ...]]) -> None:
     restarted, whole = Shop(receivers=ROOMY), Shop(receivers=ROOMY)
     live(restarted, happenings)
@@ -149,7 +150,7 @@ def test_a_restart_anywhere_changes_nothing(happenings: list[tuple[Any, ...]]) -
 
 
 @given(happenings=_happenings)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=examples(40, 25), deadline=None)
 def test_what_cannot_be_delivered_is_said_to_have_failed(happenings: list[tuple[Any, ...]]) -> None:
     shop = Shop(receivers=ROOMY)
     shop.fails["desk"] = "no"

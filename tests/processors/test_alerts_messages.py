@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from processors.alerts_messages import COMMAND, DELIVERY, OUTBOX
 from processors.alerts_report import STATE_TOPIC
+from tests.depth import examples
 from tests.processors.courier.alert_shop import DESK, Shop
 
 
@@ -220,7 +221,7 @@ _texts = st.one_of(
 
 @given(messages=st.lists(st.tuples(st.sampled_from([f"{COMMAND}ack", f"{COMMAND}silence", f"{COMMAND}unsilence", f"{COMMAND}test",
     f"{COMMAND}", f"{DELIVERY}x", f"{OUTBOX}x"]), _texts), max_size=12))  # fmt: skip
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(150), deadline=None)
 def test_no_message_crashes_it_and_its_state_stays_one_that_can_be_saved(messages: list[tuple[str, str]]) -> None:
     shop = Shop()
     shop.set(vibration=True)

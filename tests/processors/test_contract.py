@@ -14,10 +14,13 @@ from processors.discovery import AnyProcessor, discover, sample_configuration
 from processors.effects import DeadLetter, Effect, Publish, PublishPlain, Remove
 from processors.snapshot import decode_state, encode_state
 from sparkplug.host_session import HostEvent
+from tests.depth import examples
 from tests.processors.streams import birth, data, death, engine_of, fed, wild_streams
 
 every_processor = pytest.mark.parametrize("processor", discover().values(), ids=discover().keys())
-quickly = settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
+quickly = settings(
+    max_examples=examples(40, 25), deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large]
+)
 
 
 def _day() -> list[HostEvent]:

@@ -18,6 +18,7 @@ from processors.joint_anomaly import RAW
 from processors.joint_member import ADJUSTED, ALARM, COMMON, GATE
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId
+from tests.depth import examples
 from tests.processors.streams import T0_MS, birth, death, event, reading
 from tests.processors.test_joint_anomaly import PlainModel, born, cell, fed, metric, says
 from twin.anomaly.alarm import AlarmRule, is_alarm
@@ -27,7 +28,7 @@ from twin.anomaly.gate import gate
 UNTIL_S = 60
 FINE = 10  # edges fall on tenths of a tick
 LOADS = (30.0, 45.0, 55.0, 62.0, 70.0, 80.0, 95.0, None)
-quickly = settings(max_examples=60, deadline=None)
+quickly = settings(max_examples=examples(60, 30), deadline=None)
 
 
 @dataclass(frozen=True)

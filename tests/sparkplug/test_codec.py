@@ -15,6 +15,7 @@ from sparkplug.datatype import FIELD, PROPERTY_ONLY, DataType
 from sparkplug.errors import MetricValueError, PayloadError
 from sparkplug.schema import PayloadMessage
 from sparkplug.values import DataSet, Metric, Payload, PropertyValue, Template
+from tests.depth import examples
 from tests.sparkplug.everything import (
     ALL_VALUES,
     EDGES,
@@ -154,7 +155,7 @@ def test_random_bytes_raise_nothing_but_payload_error(data: bytes) -> None:
     _try_all(data)
 
 
-@settings(deadline=None, max_examples=200, suppress_health_check=[HealthCheck.too_slow])
+@settings(deadline=None, max_examples=examples(200), suppress_health_check=[HealthCheck.too_slow])
 @given(st.integers(0, 10_000), st.integers(0, 255), st.integers(0, 2))
 def test_a_damaged_payload_raises_nothing_but_payload_error(place: int, byte: int, kind: int) -> None:
     data = bytearray(_EVERYTHING_BYTES)

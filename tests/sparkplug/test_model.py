@@ -12,6 +12,7 @@ from sparkplug.edge_session import REBIRTH
 from sparkplug.metric import Change, MetricSpec
 from sparkplug.quality import Quality
 from sparkplug.values import Metric, Payload
+from tests.depth import examples
 from tests.sparkplug.simulated_edge import Edge
 from tests.sparkplug.world import World
 
@@ -220,7 +221,7 @@ class Plant(RuleBasedStateMachine):
 
 TestPlant = Plant.TestCase
 TestPlant.settings = settings(
-    max_examples=150,
+    max_examples=examples(150),
     stateful_step_count=50,
     deadline=None,
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large],

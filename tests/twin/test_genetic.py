@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from twin.errors import TwinError
 from twin import genetic
+from twin.errors import TwinError
 from twin.genetic import Evolved, GeneticSettings, evolve
 
 LOW, HIGH = np.array([-2.0, 0.0, 5.0]), np.array([3.0, 1.0, 6.0])

@@ -8,13 +8,14 @@ which the power of the cut is what the spindle leaves at this speed. A feed may 
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from twin.errors import MachineError
-from twin.machine import Limits, MachineFile
+from twin.machine import Limits, MachineFile, Tool
 from twin.optimisation.answer import Binds
 from twin.optimisation.forces import ADVANCE_MAX_MM, CutForces, advance_at
 from twin.optimisation.program import FeedLine, Programmed
@@ -26,6 +27,9 @@ Ints = NDArray[np.int64]
 Span = tuple[float, float]
 NODES = 17
 HAIR = 1e-9
+STEADY_TEETH = 4
+INTERRUPTED = 2.0
+"""Depth that has to be stable over the programmed one, where teeth come one by one: zero order promises too much."""
 ADVANCE_REASONS = (Binds.FORCE, Binds.TORQUE, Binds.CHIP)
 
 
@@ -204,19 +208,25 @@ def _spans(program: Programmed, line: FeedLine, limits: Limits) -> tuple[tuple[S
             return (), f"no speed of the spindle gives {asked} m/min on {tool.diameter_mm:g} mm"
     spans: tuple[Span, ...] = ((low, high),)
     if tool.modes:
-        cuts = program.cuts
-        hardness = _hardness(program.machine)
-        for k in range(*line.cuts):
-            cut = ChatterCut(
-                tool.teeth, hardness * tool.tangential_coefficient_n_per_mm2, tool.radial_ratio, float(cuts.entry_angle_rad[k]),
-                float(cuts.exit_angle_rad[k]), float(cuts.heading_rad[k]),
-            )  # fmt: skip
-            stable = tuple(s for a, b in spans for s in stable_speeds(tool.modes, cut, float(cuts.axial_depth_mm[k]), a, b))
-            if not stable:
-                deep = f"a cut {cuts.axial_depth_mm[k]:g} mm deep chatters at every speed from {low:.0f} to {high:.0f} rev/min"
-                return (), deep
-            spans = stable
+        hardness, cuts = _hardness(program.machine), program.cuts
+        arcs = np.round(np.column_stack([cuts.entry_angle_rad, cuts.exit_angle_rad, cuts.heading_rad]), 2)[slice(*line.cuts)]
+        for entry, leaving, heading in np.unique(arcs, axis=0).tolist():
+            same = (arcs == (entry, leaving, heading)).all(axis=1)
+            depth = float(cuts.axial_depth_mm[slice(*line.cuts)][same].max())
+            spans = tuple(s for a, b in spans for s in _stable(tool, hardness, entry, leaving, heading, depth, a, b))
+            if not spans:
+                return (), f"a cut {depth:.3g} mm deep chatters at every speed from {low:.0f} to {high:.0f} rev/min"
     return spans, ""
+
+
+@lru_cache(maxsize=4096)
+def _stable(
+    tool: Tool, hardness: float, entry: float, leaving: float, heading: float, depth_mm: float, low: float, high: float
+) -> tuple[Span, ...]:
+    """Stable speeds of a cut, with the margin that zero order needs where the cut is interrupted."""
+    cut = ChatterCut(tool.teeth, hardness * tool.tangential_coefficient_n_per_mm2, tool.radial_ratio, entry, leaving, heading)
+    steady = tool.teeth >= STEADY_TEETH and leaving - entry >= np.pi - 0.02
+    return stable_speeds(tool.modes, cut, depth_mm * (1.0 if steady else INTERRUPTED), low, high)
 
 
 def _hardness(machine: MachineFile) -> float:

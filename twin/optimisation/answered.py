@@ -149,6 +149,8 @@ def _notes(made: Problem, question: Question) -> tuple[str, ...]:
         notes.append('the tool is taken to wear all the time (Eq. 20); [cost] tool_wears = "in_cut" counts cutting only')
     if limits_of(made.program.machine, question.force_limit_n).chip_mm is None:
         notes.append("no limit of the chip: look at the greatest one, or write chip_mm in [limits]")
+    if any(tool.modes for _, tool in made.program.tools):
+        notes.append("chatter by zero order: where teeth cut one by one a pocket can hold less than it promises; try it before")
     if question.planned is not None:
         notes.append("what the lines cut is taken from a run log")
     if limits_of(made.program.machine, question.force_limit_n).force_n is None:

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from twin.machine import MachineFile
 from twin.motion.candidates import Candidates, Wear, no_wear
 from twin.motion.control import LENGTH_OVER_FEED, Control, changed, program_effects
 from twin.motion.limits import ACCELERATION_MAX_MM_S2, Limits
@@ -228,11 +229,10 @@ class Problem:
         return Beside(seconds, float(made.duration_s[fixed].sum() + rest_s - seconds.sum()), worn)
 
 
-def problem_of(program: Programmed, allowed: Allowed, economy: Economy | None) -> Problem:
-    """The problem on the control that the machine states, as its effects change it; without [program], length over feed."""
-    machine = program.machine
+def control_of(machine: MachineFile) -> Control:
+    """The control that the machine states, as its effects change it; without [program], length over feed."""
     stated = LENGTH_OVER_FEED if machine.program is None else Limits.of(machine.program)
-    return Problem(program, allowed, economy, changed(stated, program_effects(machine)))
+    return changed(stated, program_effects(machine))
 
 
 def _speeds(problem: Problem) -> Speeds:

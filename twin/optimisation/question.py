@@ -13,7 +13,7 @@ from twin.optimisation.allowed import Impossible, allowed, limits_of
 from twin.optimisation.answer import Objective
 from twin.optimisation.economy import Economy
 from twin.optimisation.forces import CutForces
-from twin.optimisation.problem import Problem, problem_of
+from twin.optimisation.problem import Problem, control_of
 from twin.optimisation.program import programmed
 from twin.response import check_effects
 
@@ -111,9 +111,9 @@ def _made(text: str) -> tuple[Problem, tuple[Impossible, ...]]:
         )
     read = programmed(machine, question.program_text, engagement=question.planned, left_alone=question.left_alone)
     economy = Economy.of(machine.cost) if machine.cost is not None else None
-    first = problem_of(read, allowed(read, CutForces.of(read), limits)[0], economy)
-    left, impossible = allowed(read, CutForces.of(read), limits, first.control.feed_ratio)
-    return problem_of(read, left, economy), impossible
+    control = control_of(machine)
+    left, impossible = allowed(read, CutForces.of(read), limits, control.feed_ratio)
+    return Problem(read, left, economy, control), impossible
 
 
 def single(objective: Objective) -> Objective:

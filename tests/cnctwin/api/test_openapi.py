@@ -8,10 +8,12 @@ import pytest
 from tests.cnctwin.api.small_plant import client_of, small_plant
 
 OF_THE_PLANT = ("/machines", "/state/{machine}", "/stream", "/gap/{machine}", "/gap/{machine}/report", "/alerts")
+OF_JOBS = ("/jobs", "/jobs/{job_id}", "/jobs/{job_id}/files/{name}")
 OF_THE_PAST = ("/history/{machine}", "/events/{machine}", "/parts/{machine}", "/validation/{machine}")
 OF_THE_SERVER = ("/health", "/livez", "/readyz", "/metrics")
-POSTS = ("/predict", "/twin/replay", "/alerts/{fingerprint}/acknowledge", "/login", "/logout")
-ROUTES = {f"GET {path}" for path in (*OF_THE_PLANT, *OF_THE_PAST, *OF_THE_SERVER)} | {f"POST {path}" for path in POSTS}
+ASKED = ("/predict", "/twin/replay", "/alerts/{fingerprint}/acknowledge", "/jobs")
+POSTS = (*ASKED, "/jobs/{job_id}/cancel", "/login", "/logout")
+ROUTES = {f"GET {path}" for path in (*OF_THE_PLANT, *OF_JOBS, *OF_THE_PAST, *OF_THE_SERVER)} | {f"POST {path}" for path in POSTS}
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +36,7 @@ def test_all_routes_are_in_it_and_say_what_they_are(document: dict[str, Any]) ->
 def test_what_is_posted_has_an_example_that_is_taken(document: dict[str, Any]) -> None:
     told = routes(document)
     with client_of(small_plant()) as client:
-        for name in ("POST /predict", "POST /twin/replay", "POST /alerts/{fingerprint}/acknowledge"):
+        for name in (f"POST {path}" for path in ASKED):
             reference = told[name]["requestBody"]["content"]["application/json"]["schema"]["$ref"].rpartition("/")[2]
             (example,) = document["components"]["schemas"][reference]["examples"]
             answer = client.post(name.split()[1].replace("{fingerprint}", "ea33a6"), json=example)

@@ -305,6 +305,39 @@ def validation(machine: str) -> dict[str, Any]:
     }
 
 
+RESULT = {
+    "sentence": "29.5 s become 24.5 s, 16.9 % less",
+    "seconds": {"before": 29.48, "after": 24.51},
+    "files": {"optimised.nc": 812, "report.html": 90_000},
+}
+
+
+def job(name: str, kind: str, state: str, **more: Any) -> dict[str, Any]:
+    """A job in short, as the consumer tells it."""
+    times = {"accepted_ms": now_ms() - 90_000, "changed_ms": now_ms(), "started_ms": now_ms() - 60_000, "ended_ms": None}
+    told = {"attempt": 1, "progress_pct": 0.0, "doing": "", "reason": "", "sentence": "", "place": None}
+    return {"id": name, "kind": kind, "machine": "vmc", "state": state, **times, **told, **more}
+
+
+def jobs() -> dict[str, Any]:
+    """One that runs, one that waits, one of each end."""
+    over = {"ended_ms": now_ms() - 20_000, "progress_pct": 100.0}
+    running = job("optimise-2", "optimise", "running", progress_pct=42.0, doing="evolution 42 of 100", attempt=2, place=0)
+    return {
+        "now": now_ms(),
+        "available": True,
+        "reason": None,
+        "offers_files": True,
+        "disk_trouble": "",
+        "jobs": [
+            running,
+            job("diagnose-1", "diagnose", "queued", place=1, started_ms=None),
+            job("optimise-1", "optimise", "done", sentence=RESULT["sentence"], **over),
+            job("identify-1", "identify", "failed", reason="case = 'vmc': its process was killed 3 times", **over),
+        ],
+    }
+
+
 def tell_all(shop: Shop) -> None:
     """Give the shop all of these."""
     machines = list(shop.numbers)
@@ -316,6 +349,12 @@ def tell_all(shop: Shop) -> None:
     )
     for machine in machines:
         _tell_machine(shop, machine, machine == machines[0], started)
+    shop.answers["/jobs"] = lambda _path, body: (
+        200,
+        jobs() if "job" not in (body or {}) else {"id": "new-1", "answer": "accepted"},
+    )
+    shop.answers["/jobs/optimise-1"] = lambda _path, _body: (200, {**jobs()["jobs"][2], "result": RESULT})
+    shop.answers["/jobs/[^/]+/cancel"] = lambda _path, _body: (200, {"id": "optimise-2", "answer": "cancelled"})
     shop.answers["/twin/replay"] = lambda _path, body: (200, _replayed(body or {}))
 
 

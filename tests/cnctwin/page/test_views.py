@@ -5,11 +5,11 @@ import re
 from playwright.sync_api import Browser, expect
 
 from tests.cnctwin.page.conftest import SIZES, Visit
-from tests.cnctwin.page.documents import alerts
+from tests.cnctwin.page.documents import alerts, job
 from tests.cnctwin.page.fake_server import FakeServer, Shop, now_ms
 from tests.cnctwin.page.simulated_shop import Told
 
-VIEWS = ("fleet", "machine/vmc", "gap/vmc", "gap/mill-01", "alerts", "replay/vmc", "validation/vmc")
+VIEWS = ("fleet", "machine/vmc", "gap/vmc", "gap/mill-01", "alerts", "replay/vmc", "validation/vmc", "jobs")
 HOSTILE = '<img src=x onerror="window.hacked=1">'
 NUMBER = re.compile(r"[−+]?\d")
 INK = """async (selector) => {
@@ -194,6 +194,56 @@ def test_what_is_recomputed_is_said_to_be_equal_or_not(visit: Visit, shop: Shop)
     expect(page.locator(".recompute")).to_contain_text("twin/raw_score")
 
 
+def test_jobs_are_shown_asked_for_and_cancelled(visit: Visit, shop: Shop) -> None:
+    page = visit.open("#/jobs")
+    cards = page.locator(".jobcard")
+    expect(cards).to_have_count(4)
+    expect(cards.first).to_contain_text("evolution 42 of 100")
+    assert page.get_by_label("Progress of optimise-2").evaluate("(bar) => bar.value") == 42
+    expect(cards.last).to_contain_text("its process was killed 3 times")
+    cards.nth(2).get_by_text("Result").click()
+    expect(cards.nth(2)).to_contain_text("Seconds after")
+    expect(cards.nth(2).get_by_role("link", name="report.html")).to_have_attribute("href", "jobs/optimise-1/files/report.html")
+    cards.first.get_by_role("button", name="Cancel").click()
+    page.get_by_role("dialog").get_by_role("button", name="Cancel the job").click()
+    expect(page.get_by_role("dialog")).to_be_hidden()
+    page.get_by_role("button", name="New job").click()
+    dialog = page.get_by_role("dialog")
+    dialog.get_by_label("below the consumer's folder").first.fill("plate.nc")
+    dialog.get_by_label("or a file of this device").last.set_input_files(
+        {"name": "vmc.toml", "mimeType": "text/plain", "buffer": "name = 'Fräse'".encode("latin-1")}
+    )
+    dialog.get_by_label("Wanted").select_option("cost")
+    dialog.get_by_label("Cutting force").fill("60")
+    dialog.get_by_role("button", name="Start").click()
+    expect(dialog).to_be_hidden()
+    wanted = {
+        "job": "optimise",
+        "objective": "cost",
+        "program": "plate.nc",
+        "machine_toml": "name = 'Fräse'",
+        "force_limit_n": 60,
+    }
+    assert shop.posted == [("/jobs/optimise-2/cancel", {}), ("/jobs", wanted)]
+
+
+def test_a_refused_job_says_why_and_without_a_consumer_none_is_asked_for(visit: Visit, shop: Shop) -> None:
+    page = visit.open("#/jobs")
+    page.locator("main").press("n")
+    shop.answers["/jobs"] = lambda _path, body: (
+        (400, {"error": "request: case = '': too short"})
+        if "job" in (body or {})
+        else (200, {"available": False, "reason": "old"})
+    )
+    page.get_by_label("What").select_option("diagnose")
+    page.get_by_role("dialog").get_by_role("button", name="Start").click()
+    expect(page.get_by_role("dialog")).to_contain_text("too short")
+    page.keyboard.press("Escape")
+    expect(page.locator(".trouble").first).to_contain_text("Jobs are not kept up: old")
+    expect(page.get_by_role("button", name="New job")).to_be_disabled()
+    visit.errors.clear()  # the browser itself writes a line for a 400
+
+
 def test_parts_and_validation_are_shown(visit: Visit) -> None:
     page = visit.open("#/validation/vmc")
     main = page.locator("main")
@@ -225,7 +275,7 @@ def test_the_whole_page_can_be_gone_through_by_keyboard(visit: Visit) -> None:
     expect(page).to_have_url(re.compile("#/machine/vmc"))
     page.keyboard.press("3")
     expect(page.locator(".panel.own .name")).to_have_text("Spindle speed, rev/min")
-    for key, view in (("g", "gap"), ("a", "alerts"), ("r", "replay"), ("p", "validation"), ("f", "fleet")):
+    for key, view in (("g", "gap"), ("a", "alerts"), ("r", "replay"), ("p", "validation"), ("j", "jobs"), ("f", "fleet")):
         page.keyboard.press(key)
         expect(page.locator(f"body[data-view={view}]")).to_be_visible()
     page.keyboard.press("/")
@@ -255,7 +305,11 @@ def test_text_from_a_machine_stays_text(visit: Visit, shop: Shop) -> None:
         200,
         {"parts": [{"program": HOSTILE, "tools": [HOSTILE], "ended_by": HOSTILE, "reasons": [HOSTILE], "complete": False}]},
     )
-    for place in ("fleet", "machine/vmc", "alerts", "replay/vmc", "validation/vmc", "gap/vmc"):
+    shop.answers["/jobs"] = lambda _path, _body: (
+        200,
+        {"jobs": [job(HOSTILE, HOSTILE, HOSTILE, reason=HOSTILE, sentence=HOSTILE)]},
+    )
+    for place in ("fleet", "machine/vmc", "alerts", "replay/vmc", "validation/vmc", "jobs", "gap/vmc"):
         page = visit.open(f"#/{place}")
         expect(page.locator("main")).to_contain_text("<img src=x" if place != "gap/vmc" else "Standing")
         page.wait_for_timeout(150)

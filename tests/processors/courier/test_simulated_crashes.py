@@ -26,6 +26,7 @@ from processors.courier.service import Message
 from processors.snapshot import decode_state, encode_state
 from sparkplug.metric import Reading
 from sparkplug.quality import Quality
+from tests.depth import examples
 from tests.processors.courier.alert_shop import DESK, PHONE, T0_S, VIBRATION
 
 MACHINES = ("okuma", "mazak", "haas", "dmg")
@@ -240,7 +241,7 @@ def believed_to_fire(plant: Plant) -> list[tuple[str, str]]:
 
 
 @given(seed=st.integers(0, 2**32))
-@settings(max_examples=20, deadline=None, derandomize=True)
+@settings(max_examples=examples(20, 10), deadline=None, derandomize=True)
 def test_killed_anywhere_nothing_arrives_twice_and_what_is_missing_is_said_to_have_failed(seed: int) -> None:
     plant = lived(seed)
     twice = [item for item, count in Counter(plant.arrived).items() if count > 1]

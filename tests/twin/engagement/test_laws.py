@@ -9,6 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from tests.depth import examples
 from twin.engagement import Engagement, Workpiece, cut, engagement
 from twin.machine import Stock
 
@@ -17,7 +18,7 @@ PLATE = Stock(min_mm=(-20.0, -20.0, -8.0), max_mm=(20.0, 20.0, 0.0))
 PHI = (np.arange(3600) + 0.5) * math.pi / 3600
 
 Points = list[tuple[float, float, float]]
-some = settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+some = settings(max_examples=examples(25, 15), deadline=None, suppress_health_check=[HealthCheck.too_slow])
 
 
 @st.composite

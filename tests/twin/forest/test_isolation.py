@@ -12,6 +12,7 @@ from sklearn.ensemble import IsolationForest, RandomForestClassifier
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
+from tests.depth import examples
 from tests.twin.forest.forests import SPREAD, isolation, machine_rows, same_bits
 from twin.forest import ForestError, IsolationScorer, flatten_isolation
 
@@ -45,7 +46,7 @@ def test_any_number_of_rows_scores_the_same(count: int) -> None:
 
 
 @given(st.lists(NUMBERS, min_size=5, max_size=5))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(200), deadline=None)
 def test_any_row_scores_the_same(row: list[float]) -> None:
     model, scorer = model_and_scorer()
     assert same_bits(scorer.score_one(row), -model.decision_function([row])[0])

@@ -17,6 +17,7 @@ from twin.effects.catalogue import catalogue
 from twin.errors import TwinError
 from twin.gap.diagnose import diagnose
 from twin.gap.diagnosis import Diagnosed, Verdict, closure_of
+from twin.gap.experiment_run import with_constant
 from twin.gap.score_of import score_of
 from twin.machine import AddedEffect, machine_from_toml, machine_to_toml
 from twin.runlog import RunLog
@@ -104,6 +105,22 @@ def test_the_twin_that_comes_out_is_a_machine_file_that_explains_the_runs(
     case = made()
     assert score_of(twin, case).gap < 0.3 * score_of(case.machine, case).gap
     assert diagnose(replace(case, machine=twin)).diagnosis.verdict is Verdict.HEALTHY
+
+
+@pytest.mark.parametrize("of", [heavy, warm])
+def test_the_twin_knows_how_well_its_causes_and_constants_are_known(of: Callable[[], Diagnosed]) -> None:
+    twin, found = of().twin, of().diagnosis
+    told = {path: value for path, value in twin.uncertainty.items() if path != "relative"}
+    (cause,) = found.causes
+    for name, interval in cause.parameters.items():
+        path = ".".join(filter(None, ("effects", cause.effect, cause.on, name)))
+        half = told.pop(path) * 1.645 * abs(interval.value)
+        assert half == pytest.approx((interval.high - interval.low) / 2.0, rel=0.01)
+    assert told
+    for path, deviation in told.items():
+        assert with_constant(twin, path, 1.1) != twin
+        assert 0.0 < deviation < 0.05
+        assert not any(path.removeprefix("axes.z.") in said for said in found.not_identifiable)
 
 
 def test_asking_again_gives_the_same_answer_and_side_by_side_too() -> None:

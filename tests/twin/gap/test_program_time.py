@@ -84,6 +84,8 @@ def test_what_was_withheld_is_named_and_found_again(tmp_path: Path, withheld: di
         for name, value in withheld[cause.effect].items():
             assert cause.parameters[name].value == pytest.approx(value, rel=0.1)
     assert {effect.effect for effect in found.twin.effects} == set(withheld)
+    told = {path for path in found.twin.uncertainty if path.startswith("effects.")}
+    assert told == {f"effects.{effect.effect}.{name}" for effect in found.twin.effects for name in effect.parameters}
 
 
 def test_an_effect_that_is_left_out_of_the_catalogue_is_not_named_and_leaves_a_remainder(tmp_path: Path) -> None:

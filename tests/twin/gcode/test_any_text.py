@@ -6,6 +6,7 @@ from dataclasses import replace
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.depth import examples
 from twin.errors import ProgramError
 from twin.gcode import Arc, IntegerWords, Linear, Rapid, Settings, ToolOffset, interpret
 
@@ -109,19 +110,19 @@ def survives(text: str, chosen: Settings) -> None:
             assert 0.0 < move.feed_mm_min < math.inf
 
 
-@settings(max_examples=500)
+@settings(max_examples=examples(500, 150))
 @given(st.lists(SOUP, max_size=40).map("".join), st.sampled_from(IntegerWords))
 def test_a_soup_of_tokens_is_moves_or_an_error(text: str, integers: IntegerWords) -> None:
     survives(text, replace(BOUNDED, integer_words=integers))
 
 
-@settings(max_examples=500)
+@settings(max_examples=examples(500, 150))
 @given(st.lists(SENSE, max_size=30).map("\n".join))
 def test_blocks_that_make_sense_in_an_order_that_does_not_are_moves_or_an_error(text: str) -> None:
     survives(text, BOUNDED)
 
 
-@settings(max_examples=200)
+@settings(max_examples=examples(200, 100))
 @given(st.text(max_size=80))
 def test_any_characters_are_moves_or_an_error(text: str) -> None:
     survives(text, BOUNDED)

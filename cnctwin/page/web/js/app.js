@@ -12,11 +12,12 @@ import { age, moment } from "./text.js";
 import * as alerts from "./views/alerts.js";
 import * as fleet from "./views/fleet.js";
 import * as gap from "./views/gap.js";
+import * as jobs from "./views/jobs.js";
 import * as machine from "./views/machine.js";
 import * as replay from "./views/replay.js";
 import * as validation from "./views/validation.js";
 
-const VIEWS = { fleet, machine, gap, alerts, replay, validation };
+const VIEWS = { fleet, machine, gap, alerts, replay, validation, jobs };
 const TABS = [
   ["fleet", "Fleet", "f"],
   ["machine", "Machine", "m"],
@@ -24,6 +25,7 @@ const TABS = [
   ["alerts", "Alerts", "a"],
   ["replay", "Replay", "r"],
   ["validation", "Parts", "p"],
+  ["jobs", "Jobs", "j"],
 ];
 const ALERTS_MS = 5000;
 

@@ -186,6 +186,27 @@ export function openDocument(title, value) {
   show(title, el("pre", { tabindex: "0" }, JSON.stringify(value, null, 2)));
 }
 
+/** Asks before something is done; `act()` does it, or throws why not. */
+export function openAsked(title, content, word, act, back = "Cancel") {
+  const told = el("p", { role: "alert", class: "trouble", hidden: true });
+  const button = el("button", { class: "button main" }, word);
+  const submit = async (event) => {
+    event.preventDefault();
+    button.disabled = true;
+    told.hidden = true;
+    try {
+      await act();
+      open.close();
+    } catch (error) {
+      told.hidden = false;
+      told.textContent = error.message;
+      button.disabled = false;
+    }
+  };
+  const leave = el("button", { type: "button", class: "button", onclick: () => open.close() }, back);
+  const open = show(title, el("form", { onsubmit: submit }, content, told, el("div", { class: "actions" }, leave, button)));
+}
+
 /** Asks for a name and a comment; `act(by, comment)` does it and gives what to say, or throws. */
 export function openSigned(title, about, word, act) {
   const by = el("input", {
@@ -197,40 +218,11 @@ export function openSigned(title, about, word, act) {
     value: remembered(),
   });
   const comment = el("textarea", { class: "field", name: "comment", maxlength: "500" });
-  const told = el("p", { role: "alert", hidden: true });
-  const button = el("button", { class: "button main" }, word);
-  const submit = async (event) => {
-    event.preventDefault();
-    button.disabled = true;
+  const content = [about, el("label", { class: "named" }, "Your name", by), el("label", { class: "named" }, "Comment", comment)];
+  openAsked(title, content, word, async () => {
     remember(by.value.trim());
-    told.hidden = true;
-    try {
-      await act(by.value.trim(), comment.value.trim());
-      open.close();
-    } catch (error) {
-      told.hidden = false;
-      told.className = "trouble";
-      told.textContent = error.message;
-      button.disabled = false;
-    }
-  };
-  const open = show(
-    title,
-    el(
-      "form",
-      { onsubmit: submit },
-      about,
-      el("label", { class: "named" }, "Your name", by),
-      el("label", { class: "named" }, "Comment", comment),
-      told,
-      el(
-        "div",
-        { class: "actions" },
-        el("button", { type: "button", class: "button", onclick: () => open.close() }, "Cancel"),
-        button,
-      ),
-    ),
-  );
+    await act(by.value.trim(), comment.value.trim());
+  });
   (by.value ? comment : by).focus();
 }
 

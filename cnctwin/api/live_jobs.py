@@ -1,0 +1,84 @@
+"""What the batch consumer says of its jobs, as it was heard last: all in short, each in full, and answers to what we asked."""
+
+import json
+import re
+import threading
+from typing import Any
+from uuid import uuid4
+
+from cnctwin.jobs.topics import REPLY, STATE, STATES
+
+JOBS_MAX = 1000
+WAITING_MAX = 100
+BYTES_MAX = 4_000_000
+_OWN = f"{REPLY}page-{uuid4().hex[:8]}/"
+_ONE = re.compile(r"cnc/jobs/([^/]+)/state")
+
+
+class LiveJobs:
+    """Fed by the viewer's thread, asked by the server's. `filters`: the topics to listen to."""
+
+    filters = (STATE, STATES, f"{_OWN}+")
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._all: dict[str, Any] | None = None
+        self._each: dict[str, dict[str, Any]] = {}
+        self._answers: dict[str, dict[str, Any] | None] = {}
+
+    def take(self, topic: str, payload: bytes) -> None:
+        """A message of those topics; of others, nothing happens."""
+        document = _parsed(payload)
+        with self._lock:
+            if topic == STATE:
+                self._all = document
+            elif found := _ONE.fullmatch(topic):
+                self._take_one(found[1], document)
+            elif document is not None and self._answers.get(topic, document) is None:
+                self._answers[topic] = document
+
+    def _take_one(self, job_id: str, document: dict[str, Any] | None) -> None:
+        if document is None:
+            self._each.pop(job_id, None)
+        elif job_id in self._each or len(self._each) < JOBS_MAX:
+            self._each[job_id] = document
+
+    def all(self) -> dict[str, Any] | None:
+        """The consumer's state; None where none was heard."""
+        with self._lock:
+            return self._all
+
+    def one(self, job_id: str) -> dict[str, Any] | None:
+        """A job in full, with its result."""
+        with self._lock:
+            return self._each.get(job_id)
+
+    def await_answer(self) -> str | None:
+        """A topic of our own, on which an answer is kept until it is taken; None where too many are awaited."""
+        topic = f"{_OWN}{uuid4().hex[:8]}"
+        with self._lock:
+            if len(self._answers) >= WAITING_MAX:
+                return None
+            self._answers[topic] = None
+        return topic
+
+    def answer(self, topic: str) -> dict[str, Any] | None:
+        """The first answer on that topic; None while there is none."""
+        with self._lock:
+            return self._answers.get(topic)
+
+    def forget(self, topic: str) -> None:
+        """No answer is awaited there any more."""
+        with self._lock:
+            self._answers.pop(topic, None)
+
+
+def _parsed(payload: bytes) -> dict[str, Any] | None:
+    """A document; None for an empty payload, by which a retained one is taken away, and for what is none."""
+    if not payload or len(payload) > BYTES_MAX:
+        return None
+    try:
+        document = json.loads(payload)
+    except (ValueError, RecursionError):
+        return None
+    return document if isinstance(document, dict) else None

@@ -1,0 +1,92 @@
+"""Limits: whatever candidate is drawn keeps all of them, and a program that cannot keep them is refused in one line."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.depth import examples
+from tests.twin.optimisation.benchmark import machine_with, second, text
+from twin.errors import MachineError, OptimisationError
+from twin.optimisation.answer import Objective
+from twin.optimisation.forces import CutForces, advance_at
+from twin.optimisation.optimise import optimise
+from twin.optimisation.paper import forces_of_lines
+from twin.optimisation.question import Question, problem
+
+EDGE = [{"effect": "edge_force", "on": "", "parameters": {"tangential_n_per_mm": 8.0, "radial_n_per_mm": 12.0}}]
+SIZE = [{"effect": "size_effect", "on": "", "parameters": {"exponent": 0.3}}]
+ALL = {"power_kw": 0.2, "torque_nm": 0.08, "chip_mm": [0.002, 0.05], "surface_speed_m_min": [30.0, 140.0]}
+SPINDLE = {"rated_power_kw": 1.0, "efficiency": 0.8, "idle_power_kw": 0.1}
+
+
+def limited(effects: object = (), limits: object = ALL) -> Question:
+    return second(machine_toml=machine_with(text("second.toml"), limits=limits, spindle=SPINDLE, effects=effects))
+
+
+@pytest.mark.parametrize("effects", [(), EDGE, SIZE], ids=["nominal", "edge force", "size effect"])
+@settings(max_examples=examples(20), deadline=None)
+@given(st.integers(0, 2**32))
+def test_every_candidate_keeps_every_limit(effects: object, seed: int) -> None:
+    made = problem(limited(effects))
+    genes = np.random.default_rng(seed).random((8, made.genes))
+    feed, rpm = made.decoded(genes)
+    forces = CutForces.of(made.program)
+    assert forces_of_lines(made, forces, feed, rpm).max() <= 60.0 * (1.0 + 1e-9)
+    assert (rpm >= 30.0 / (np.pi * 0.006) - 1e-6).all()
+    assert (rpm <= 140.0 / (np.pi * 0.006) + 1e-6).all()
+    assert (feed >= 50.0 - 1e-9).all()
+    assert (feed <= 3000.0 + 1e-9).all()
+    advance = (feed / (2 * rpm))[:, made.program.cuts.line]
+    for one, speed in zip(advance, rpm[:, made.program.cuts.line], strict=True):
+        assert (one <= 0.05 * (1.0 + 1e-9)).all()
+        torque_nm = forces.tangential_n(one) * 0.003
+        assert (torque_nm <= 0.08 * (1.0 + 1e-6)).all()
+        power_kw = torque_nm * speed * 2 * np.pi / 60 / 1000 / 0.8 + 0.1
+        assert (power_kw <= 0.2 * (1.0 + 1e-4)).all()
+
+
+def test_the_force_limit_is_met_and_not_only_kept() -> None:
+    made = problem(second())
+    forces = CutForces.of(made.program)
+    advance = advance_at(forces.peak_n, np.full(len(forces.cuts), 60.0), len(forces.cuts))
+    assert forces.peak_n(advance).max() == pytest.approx(60.0, rel=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("limits", "says"),
+    [
+        ({"force_n": 2.0, "feed_mm_min": [500.0, 3000.0]}, "even 500 mm/min at 8000 rev/min give"),
+        ({"surface_speed_m_min": [400.0, 500.0]}, "no speed of the spindle gives 400 to 500 m/min on 6 mm"),
+        ({"chip_mm": [0.2, 0.3]}, "that cutting force allows is below the lowest of 200.0 µm"),
+    ],
+)
+def test_what_cannot_be_kept_is_said_in_one_line(limits: dict[str, object], says: str) -> None:
+    with pytest.raises(OptimisationError, match="line 8: ") as refused:
+        problem(second(machine_toml=machine_with(text("second.toml"), limits=limits)))
+    assert says in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("sections", "says"), [({"limits": None}, "no \\[limits\\]"), ({"stock": None}, "no \\[stock\\]")], ids=["limits", "stock"]
+)
+def test_what_the_machine_does_not_say_is_asked_for(sections: dict[str, None], says: str) -> None:
+    with pytest.raises(MachineError, match=says):
+        problem(second(machine_toml=machine_with(text("second.toml"), **sections)))
+    with pytest.raises(OptimisationError, match="no \\[cost\\]"):
+        problem(second(machine_toml=machine_with(text("second.toml"), cost=None), objective=Objective.COST))
+
+
+def test_a_chattering_speed_is_not_chosen() -> None:
+    """A tool whose first mode makes most speeds chatter at these depths: what is chosen lies in the lobes."""
+    mode = {"direction": "y", "frequency_hz": 900.0, "damping_ratio": 0.03, "stiffness_n_per_mm": 24000.0}
+    tool = {"modes": [mode, mode | {"direction": "x"}]}
+    question = second(machine_toml=machine_with(text("second.toml"), tool=tool), evolutions=10, islands=1)
+    made = problem(question)
+    assert any(len(spans) > 1 or spans[0] != (1000.0, 8000.0) for spans in made.allowed.spans)
+    answer = optimise(question)
+    for row, spans in enumerate(made.allowed.spans):
+        rpm = answer.lines[int(made.allowed.index[row])].after.spindle_rpm
+        assert any(low - 0.01 <= rpm <= high + 0.01 for low, high in spans)
+    assert answer.after.seconds >= optimise(second(evolutions=10, islands=1)).after.seconds
