@@ -266,23 +266,20 @@ def shown(result: dict[str, Any]) -> None:
     """The figures as tables."""
     print("reference paper's benchmark, by reconstruction constants")
     for row in result["paper"]:
-        before, after = row["before"], row["after"]
+        before, after, change = row["before"], row["after"], row["change_pct"]
+        optimum = f"{row['distance_pct']:.4f} % above the {'exact optimum' if row['exact'] else 'bound'} {row['optimum']:.3f}"
+        print(f"  {row['objective']:5}  {before[0]:.2f} s to {after[0]:.2f} s ({change[0]:+.1f} %)", end=", ")
         print(
-            f"  {row['objective']:5}  {before[0]:.2f} s to {after[0]:.2f} s ({row['change_pct'][0]:+.1f} %), {before[1]:.1f} to "
-            f"{after[1]:.2f} KRW ({row['change_pct'][1]:+.1f} %), {row['force_n']:.2f} N, {row['distance_pct']:.4f} % above the "
-            f"{'exact optimum' if row['exact'] else 'bound'} {row['optimum']:.3f}, in {row['seconds']:.2f} s"
+            f"{before[1]:.1f} to {after[1]:.2f} KRW ({change[1]:+.1f} %), {row['force_n']:.2f} N, {optimum}, in {row['seconds']:.2f} s"
         )
-        print(
-            f"         the paper's settings: {row['paper_median']:.2f} (median of {len(SEEDS)} seeds),
-            {row['paper_distance_pct']:.0f} % " f"above the optimum, up to {row['paper_force_n']:.1f} N"
-        )
+        print(f"         the paper's settings: {row['paper_median']:.2f} (median of {len(SEEDS)} seeds)", end=", ")
+        print(f"{row['paper_distance_pct']:.0f} % above the optimum, up to {row['paper_force_n']:.1f} N")
     f = result["front"]
-    print(
-        f"front, three slots: {f['points']} programs from {f['evaluations']} evaluations in {f['seconds']:.1f} s, beside
-        {f['grid_points']} " f"of {f['grid']} on a grid ({f['grid_seconds']:.1f} s)\n  hypervolume over the grid's
-        {f['hypervolume_ratio']:.5f}; least time " f"{f['least_seconds'][0]:.3f} s (grid {f['least_seconds'][1]:.3f}), least
-        cost {f['least_cost'][0]:.3f} (grid {f['least_cost'][1]:.3f})"
-    )
+    print(f"front, three slots: {f['points']} programs from {f['evaluations']} evaluations in {f['seconds']:.1f} s", end=", ")
+    print(f"beside {f['grid_points']} of {f['grid']} on a grid ({f['grid_seconds']:.1f} s)")
+    ours, grid = zip(f["least_seconds"], f["least_cost"], strict=True)
+    print(f"  hypervolume over the grid's {f['hypervolume_ratio']:.5f}", end="; ")
+    print(f"least time {ours[0]:.3f} s (grid {grid[0]:.3f}), least cost {ours[1]:.3f} (grid {grid[1]:.3f})")
     print("evaluations a second")
     for row in result["speed"]:
         own = next(r for r in result["speed"] if r["program"] == row["program"])
@@ -291,14 +288,13 @@ def shown(result: dict[str, Any]) -> None:
     if (found := result["case"]) is not None:
         print(f"{found['case']}: {found['diagnosis']}")
         for line in found["lines"]:
-            print(
-                f"  {line['line']:28} {line['depth_mm']:.1f} mm  {line['as_stated']:6.0f} mm/min as stated,
-                {line['diagnosed']:6.0f} as diagnosed"
-            )
+            feeds = f"{line['as_stated']:6.0f} mm/min as stated, {line['diagnosed']:6.0f} as diagnosed"
+            print(f"  {line['line']:28} {line['depth_mm']:.1f} mm  {feeds}")
         print(
-            f"  the program of the stated twin reaches {found['force_n_of_the_blind_program']:.0f} N on the diagnosed one, limit "
-            f"{found['limit_n']:.0f} N; its own program {found['force_n']:.1f} N"
+            f"  the program of the stated twin reaches {found['force_n_of_the_blind_program']:.0f} N on the diagnosed one",
+            end=", ",
         )
+        print(f"limit {found['limit_n']:.0f} N; its own program {found['force_n']:.1f} N")
 
 
 def main() -> int:

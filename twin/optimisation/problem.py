@@ -92,6 +92,11 @@ class Problem:
         """Of the control, effects of the machine included."""
         return self.control.limits
 
+    def ideal_control(self) -> Control:
+        """The control with a spindle that takes no time."""
+        ideal = self.limits().with_(spindle_acceleration_rpm_s=np.inf, spindle_deceleration_rpm_s=None)
+        return Control(ideal, self.control.feed_ratio, self.control.rapid_ratio)
+
     def decoded(self, genes: Floats) -> tuple[Floats, Floats]:
         """Feed word and speed of each line, (candidates, lines) each; the speed of a line in air is 0."""
         allowed = self.allowed
@@ -216,9 +221,8 @@ class Problem:
         Of a spindle that takes no time to change: the least there can be.
         """
         path, wear = self.program.path, self.wear or no_wear(len(self.program.path))
-        ideal = self.limits().with_(spindle_acceleration_rpm_s=np.inf, spindle_deceleration_rpm_s=None)
         at_best = np.where(self.row_of_segment >= 0, self.allowed.feed_high, path.feed_mm_min)
-        made = Control(ideal, self.control.feed_ratio, self.control.rapid_ratio).plan_with(path, at_best)
+        made = self.ideal_control().plan_with(path, at_best)
         own = np.isin(self.row_of_segment, self.cutting)
         fixed = ~own & (wear.factor > 0.0)
         rest_s = made.total_s - float(made.duration_s[own | fixed].sum())
