@@ -14,6 +14,7 @@ from tests.twin.optimisation.benchmark import second
 from twin.errors import OptimisationError
 from twin.motion.candidates import Candidates
 from twin.optimisation.answer import Objective
+from twin.optimisation.bound import bound_of
 from twin.optimisation.islands import fitness_of
 from twin.optimisation.optimise import Hooks, Stopped, optimise
 from twin.optimisation.question import Question, problem
@@ -81,6 +82,18 @@ def test_what_the_batch_says_of_a_candidate_is_what_the_rewritten_program_takes(
     seconds, cost = made.evaluate_words(words[0][None], words[1][None])
     assert made.evaluate_path(text.path) == (pytest.approx(seconds[0], rel=1e-9), pytest.approx(cost[0], rel=1e-9))
     assert made.control.plan(text.path).total_s == pytest.approx(seconds[0], rel=1e-9)
+
+
+@pytest.mark.parametrize("objective", [Objective.TIME, Objective.COST])
+@settings(max_examples=examples(20), deadline=None)
+@given(st.integers(0, 2**32))
+def test_no_candidate_is_below_the_bound(objective: Objective, seed: int) -> None:
+    made = problem(second(objective=objective))
+    genes = np.random.default_rng(seed).random((64, made.genes))
+    genes[:32, : len(made.allowed)] = 1.0
+    seconds, cost = made.evaluate(genes)
+    values = seconds if objective is Objective.TIME else cost
+    assert bound_of(made, objective, float(values.min())).value <= values.min() * (1.0 + 1e-9)
 
 
 def test_a_change_to_the_speed_in_force_is_none() -> None:

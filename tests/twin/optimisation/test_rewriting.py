@@ -1,0 +1,117 @@
+"""The program rewritten: feeds and speeds, and nothing else."""
+
+import numpy as np
+import pytest
+
+from tests.twin.optimisation.benchmark import machine_with, text
+from twin.gcode import interpret
+from twin.motion.path import path_from_moves
+from twin.optimisation.optimise import optimise
+from twin.optimisation.question import Question, problem
+from twin.optimisation.rewriting import rewritten
+from twin.optimisation.words import find_word, source_lines
+
+SHORT = {"evolutions": 5, "population": 8, "islands": 1}
+HEAD = "%\r\nO7 (SLOT F1 S1)\r\nG21 G90 G94\r\nS8000\r\nM3\r\nG0 Z10.\r\nX-10. Y0.\r\nZ-0.4\r\n"
+TAIL = "G0 Z10.\r\nM5\r\nM30\r\n%\r\n"
+
+
+def asked(body: str, head: str = HEAD, tail: str = TAIL, **changes: object) -> Question:
+    return Question(head + body.replace("\n", "\r\n") + tail, text("second.toml")).with_(**SHORT, **changes)
+
+
+def without_words(line: str) -> str:
+    for letter in "FS":
+        if (place := find_word(line, letter)) is not None:
+            line = line[: place.begin] + line[place.end :]
+    return line.replace(" ", "")
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        "N1 G1 X30. F400 (FAST F9999)\nN2 X60.\n",
+        "g1x30f400 ; slow\nx60f300\n",
+        "/N1 G1 X30. F400\nG1X60.\n",
+        "#1=30.\nWHILE[#1 LE 60.]DO1\nG1 X#1 F400\n#1=#1+15.\nEND1\n",
+        "G1 X30. F400\nG4 P100\nX60.\n",
+        "G1 X10. F400\nG2 X20. Y10. R10.\nG3 X30. Y20. J10. I0. F200\n",
+        "G20\nG1 X1.2 F15.\nG21\n",
+    ],
+    ids=["comment", "dense", "skip", "loop", "dwell", "arcs", "inch"],
+)
+def test_nothing_but_feeds_and_speeds_changes(body: str) -> None:
+    question = asked(body)
+    answer = optimise(question)
+    before, after = source_lines(question.program_text), source_lines(answer.program)
+    assert [without_words(line) for line in after] == [without_words(line) for line in before]
+    assert answer.program.count("\r\n") == question.program_text.count("\r\n")
+    assert "(SLOT F1 S1)" in answer.program
+    one, other = (path_from_moves(interpret(program)) for program in (question.program_text, answer.program))
+    assert np.array_equal(one.end_mm, other.end_mm)
+    assert answer.after.force_n <= 60.0
+    assert answer.after.seconds < answer.before.seconds
+
+
+def test_a_speed_word_apart_from_its_m3_is_found() -> None:
+    answer = optimise(asked("G1 X60. F400\n"))
+    changed = [line for line in answer.program.split("\r\n") if line.startswith("S")]
+    assert changed == [f"S{answer.lines[0].after.spindle_rpm:.0f}"]
+
+
+@pytest.mark.parametrize(
+    ("body", "line", "why"),
+    [
+        ("G1 X30. F[100.+300.]\nX60. F400\n", 8, "its feed is an expression"),
+        ("G1 X30. F400\nG95 G1 X60. F0.05\nG94\n", 9, "its feed is tied to the spindle"),
+        ("G1 X20. F400\nX30. Z-0.8\nX60.\n", 9, "it goes down into material"),
+        ("G1 X30. F400\nG99 G81 X40. Z-2. R12. F100\nG80\nG1 Z-0.4 F300\nX60.\n", 9, "its feed is part of a cycle"),
+        ("G1 Z-0.3 F200\nX30. F400\nX30. Y0.1 Z-0.4\n", 10, "it goes down into material"),
+    ],
+    ids=["expression", "feed per turn", "ramp", "cycle", "plunge"],
+)
+def test_what_is_left_alone_keeps_its_feed_and_speed(body: str, line: int, why: str) -> None:
+    answer = optimise(asked(body))
+    alone = next(one for one in answer.lines if one.line == line)
+    assert why in alone.left_alone
+    assert alone.after.feed_mm_min == pytest.approx(alone.before.feed_mm_min, rel=1e-9)
+    assert alone.after.spindle_rpm == pytest.approx(alone.before.spindle_rpm, rel=1e-9)
+
+
+def test_a_line_that_is_asked_to_be_left_alone_is() -> None:
+    answer = optimise(asked("G1 X30. F400\nX60. F300\n", left_alone={8: "it was to be left alone"}))
+    assert "G1 X30. F400" in answer.program
+    assert answer.lines[0].after.feed_mm_min == 400.0
+    assert answer.lines[1].after.feed_mm_min > 300.0
+
+
+def test_tools_by_their_numbers_cut_by_their_own_constants() -> None:
+    tools = {
+        "2": {"diameter_mm": 6.0, "teeth": 2, "tangential_coefficient_n_per_mm2": 1230.0, "radial_ratio": 0.5},
+        "3": {"diameter_mm": 10.0, "teeth": 4, "tangential_coefficient_n_per_mm2": 2460.0, "radial_ratio": 0.5},
+    }
+    first_cut = "T2 M6\nS8000 M3\nG1 X60. F400\nG0 Z10.\nX-10. Y30.\n"
+    body = first_cut + "T3 M6\nS8000 M3\nZ-0.4\nG1 X60. F400\nG0 Z10.\nX-10. Y-30.\nT4 M6\nG1 X-5.\n"
+    question = asked(body).with_(machine_toml=machine_with(text("second.toml"), tools=tools, tool=None))
+    answer = optimise(question)
+    first, second, third = answer.lines
+    assert first.before.chip_mm == 400.0 / (2 * 8000.0)
+    assert second.before.chip_mm == 400.0 / (4 * 8000.0)
+    # half the chip at twice the coefficient, two teeth at a time: the same peak, and more than twice the power at 10 mm
+    assert second.before.force_n == pytest.approx(first.before.force_n, rel=1e-9)
+    assert second.before.power_kw == pytest.approx(first.before.power_kw * 2.0 * 10.0 / 6.0, rel=1e-6)
+    assert "write [tools.N]" in third.left_alone
+    assert max(first.after.force_n, second.after.force_n) <= 60.0
+
+
+def test_a_line_that_does_not_follow_its_words_is_named_and_not_written_over() -> None:
+    """The feed of a subprogram's line is that of its caller; two callers want two feeds, one line has one."""
+    body = "G1 X20. F400\nM98 P9\nG1 F300\nM98 P9\n"
+    tail = "G0 Z10.\r\nM5\r\nM30\r\nO9\r\nG91 G1 X10.\r\nG90\r\nM99\r\n%\r\n"
+    answer = optimise(asked(body, tail=tail))
+    assert "G91 G1 X10. F" in answer.program
+    shared = next(one for one in answer.lines if one.text_before == "G91 G1 X10.")
+    assert shared.after.feed_mm_min > 400.0
+    made = problem(asked(body, tail=tail))
+    text_ = rewritten(made, np.full(len(made.allowed), 500.0), np.where(made.allowed.cutting, 8000.0, 0.0))
+    assert text_.not_followed == {}
