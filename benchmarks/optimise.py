@@ -269,9 +269,8 @@ def shown(result: dict[str, Any]) -> None:
         before, after, change = row["before"], row["after"], row["change_pct"]
         optimum = f"{row['distance_pct']:.4f} % above the {'exact optimum' if row['exact'] else 'bound'} {row['optimum']:.3f}"
         print(f"  {row['objective']:5}  {before[0]:.2f} s to {after[0]:.2f} s ({change[0]:+.1f} %)", end=", ")
-        print(
-            f"{before[1]:.1f} to {after[1]:.2f} KRW ({change[1]:+.1f} %), {row['force_n']:.2f} N, {optimum}, in {row['seconds']:.2f} s"
-        )
+        cost = f"{before[1]:.1f} to {after[1]:.2f} KRW ({change[1]:+.1f} %)"
+        print(f"{cost}, {row['force_n']:.2f} N, {optimum}, in {row['seconds']:.2f} s")
         print(f"         the paper's settings: {row['paper_median']:.2f} (median of {len(SEEDS)} seeds)", end=", ")
         print(f"{row['paper_distance_pct']:.0f} % above the optimum, up to {row['paper_force_n']:.1f} N")
     f = result["front"]

@@ -11,7 +11,7 @@ from collections import deque
 from datetime import UTC, datetime
 from typing import Any
 
-from cnctwin.jobs.job import Job
+from cnctwin.jobs.job import Job, JobState
 from cnctwin.jobs.job_queue import JobQueue
 from cnctwin.jobs.topics import STATE, state_topic
 from processors.contract import Provenance
@@ -25,7 +25,7 @@ from sparkplug.quality import Quality
 NODE = "twin-jobs"
 DEVICE = "jobs"
 REQUEST, CANCEL, ANSWER = "Job/Request", "Job/Cancel", "Job/Answer"
-STATE_S_MIN, STATE_S_MAX = 0.25, 10.0
+STATE_S_MIN, STATE_S_MAX = 0.25, 10.0  # of progress only; how jobs stand is told at once
 OVER_SHOWN_MAX = 100
 REPLIES_MAX = 1000
 DEVICES_MAX = 200
@@ -70,6 +70,7 @@ class Announcer:
         self._replies: deque[tuple[str, bytes]] = deque()
         self._devices: dict[str, dict[str, tuple[str | float | None, str | None]]] = {}
         self._state_is_due, self._state_s, self._reconnects = True, 0.0, 0
+        self._states_told: dict[str, JobState] = {}
         self._told_health: dict[str, Any] = {}
         edge.declare_device(DEVICE, (*_COMMANDS, *METRICS))
         self._devices[DEVICE] = {}
@@ -110,8 +111,6 @@ class Announcer:
             self._reconnects = self._host.reconnects
             self._due |= {job.id for job in queue}  # a broker that was killed may have forgotten what it retained
             self._state_is_due = True
-        while self._replies and self._host.publish_plain(*self._replies[0], qos=1):
-            self._replies.popleft()
         while queue.gone:
             self.clear(queue.gone.pop())
             for machine in self._devices.keys() - {job.machine for job in queue} - {DEVICE}:
@@ -119,6 +118,8 @@ class Announcer:
                 self._edge.remove_device(machine)
         self._tell_jobs()
         self._tell_state()
+        while self._replies and self._host.publish_plain(*self._replies[0], qos=1):
+            self._replies.popleft()  # after the state: who has his answer finds his job in it
 
     def _tell_jobs(self) -> None:
         for job_id in sorted(self._due):
@@ -133,11 +134,12 @@ class Announcer:
             self._due.discard(job_id)
 
     def _tell_state(self) -> None:
-        now_s = time.monotonic()
-        if now_s - self._state_s < (STATE_S_MIN if self._state_is_due else STATE_S_MAX):
+        now_s, states = time.monotonic(), {job.id: job.state for job in self._queue}
+        age_s = now_s - self._state_s
+        if states == self._states_told and age_s < (STATE_S_MIN if self._state_is_due else STATE_S_MAX):
             return
         if self._host.publish_plain(STATE, _payload(state_of(self._queue)), qos=1, retain=True):
-            self._state_s, self._state_is_due = now_s, False
+            self._state_s, self._state_is_due, self._states_told = now_s, False, states
 
     def _tell_plant(self, job: Job) -> None:
         result = json.dumps(job.result, ensure_ascii=False) if job.result else None

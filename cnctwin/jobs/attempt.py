@@ -1,7 +1,6 @@
 """One attempt at a job: a process of its own, with all that it starts, so that what becomes of it harms nobody else.
 
-Its standard input is a pipe from us: when that closes, because we ended in whatever way, it ends with all its own processes. What
-should be left of an earlier one all the same is found by a variable of its environment, which its processes inherit.
+Its standard input is a pipe from us: when that closes, because we ended in whatever way, it ends with all its own processes.
 """
 
 import os
@@ -13,9 +12,10 @@ from contextlib import suppress
 from pathlib import Path
 
 from cnctwin.given_broker import PASSWORD_VARIABLE
+from cnctwin.jobs.left_over import JOB_VARIABLE, end_left_over
 
-JOB_VARIABLE = "CNCTWIN_JOB"
-LEFT_OVER_S_MAX = 10.0
+ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+"""Small matrices: threads of linear algebra would only fight for the cores, with those that are live too."""
 
 
 class Attempt:
@@ -24,7 +24,7 @@ class Attempt:
     def __init__(self, command: Sequence[str], folder: Path, attempt: int) -> None:
         self._folder = folder
         self._began_s = time.monotonic()
-        environment = {key: value for key, value in os.environ.items() if key != PASSWORD_VARIABLE}
+        environment = {**ONE_THREAD, **{key: value for key, value in os.environ.items() if key != PASSWORD_VARIABLE}}
         with (folder / "child.log").open("ab" if attempt > 1 else "wb") as log:
             self._process = subprocess.Popen(
                 [*command, str(folder), "--attempt", str(attempt)],
@@ -59,9 +59,7 @@ class Attempt:
 
     def kill(self) -> None:
         """End it and all that it started."""
-        with suppress(ProcessLookupError, PermissionError):
-            if self._process.poll() is None:
-                os.killpg(self._process.pid, signal.SIGKILL)
+        self._process.kill()
         self._process.wait()
         if self._process.stdin is not None:
             self._process.stdin.close()
@@ -75,27 +73,3 @@ def how_ended(code: int) -> str:
     with suppress(ValueError):
         return f"killed by {signal.Signals(-code).name}"
     return f"killed by signal {-code}"
-
-
-def left_over(folder: Path) -> list[int]:
-    """Processes of attempts at the job in this folder (Linux; elsewhere none is found)."""
-    mark = f"{JOB_VARIABLE}={folder}".encode()
-    found = []
-    for process in Path("/proc").glob("[0-9]*"):
-        with suppress(OSError):
-            if mark in (process / "environ").read_bytes().split(b"\0") and int(process.name) != os.getpid():
-                found.append(int(process.name))
-    return found
-
-
-def end_left_over(folder: Path) -> int:
-    """End them; how many there were."""
-    first = left = left_over(folder)
-    deadline_s = time.monotonic() + LEFT_OVER_S_MAX
-    while left and time.monotonic() < deadline_s:
-        for pid in left:
-            with suppress(ProcessLookupError, PermissionError):
-                os.kill(pid, signal.SIGKILL)
-        time.sleep(0.01)
-        left = left_over(folder)
-    return len(first)

@@ -22,6 +22,7 @@ from typing import Any
 from cnctwin.errors import ProgramError, SpreadError
 from cnctwin.jobs.durable import EXIT_DISK, settle, write_json
 from cnctwin.jobs.files_root import FilesRoot
+from cnctwin.jobs.left_over import JOB_VARIABLE, kill, left_over
 from cnctwin.jobs.request import read_request
 from cnctwin.jobs.work import Bench
 from twin.errors import TwinError
@@ -102,7 +103,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _be_modest() -> None:
     """What is live goes first; where memory is short, this process is the one to go. Whoever started it says when it ends."""
-    os.nice(NICE)
+    with suppress(OSError):  # a supervisor may forbid it
+        os.nice(NICE)
     with suppress(OSError):
         Path("/proc/self/oom_score_adj").write_text(str(OUT_OF_MEMORY_SCORE), encoding="ascii")
     for number in (signal.SIGTERM, signal.SIGINT):
@@ -112,8 +114,7 @@ def _be_modest() -> None:
 def _end_with_parent() -> None:
     while os.read(0, 1):
         pass
-    if os.getpgrp() == os.getpid():
-        os.killpg(os.getpid(), signal.SIGKILL)
+    kill(left_over(Path(os.environ.get(JOB_VARIABLE, "/"))), trackers=False)  # those end with us, and clear away
     os._exit(1)
 
 

@@ -17,12 +17,13 @@ from typing import Any
 
 from cnctwin.jobs import topics
 from cnctwin.jobs.announcer import CANCEL, NODE, NODE_METRICS, REQUEST, Announcer
-from cnctwin.jobs.attempt import Attempt, end_left_over, how_ended
+from cnctwin.jobs.attempt import Attempt, how_ended
 from cnctwin.jobs.durable import EXIT_DISK
 from cnctwin.jobs.files_root import FilesRoot
 from cnctwin.jobs.job import Job, JobState
 from cnctwin.jobs.job_queue import Answer, JobQueue, Limits
 from cnctwin.jobs.jobs_folder import JobsFolder, clean
+from cnctwin.jobs.left_over import end_left_over
 from cnctwin.jobs.request import RequestError, is_id, read_cancel, read_request
 from sparkplug.broker import BrokerAddress
 from sparkplug.edge_node import EdgeNode

@@ -56,9 +56,7 @@ class FilesRoot:
 
     def _inside(self, name: str, key: str) -> Path:
         if self.folder is None:
-            raise UsageError(
-                f"{key} = {name!r}: this consumer was given no --files folder; send the text itself, or start it with one"
-            )
+            raise UsageError(f"{key} = {name!r}: this consumer knows no files; start it with --files DIR, or send texts")
         root = self.folder.resolve()
         try:
             path = (root / name).resolve()

@@ -9,10 +9,14 @@ A worker that is killed loses nothing but time: its piece runs again on another.
 SpreadError. docs/decisions/0014-spread.md says what goes over the wire, and why joblib, which pickles, is let in here only.
 """
 
+import os
+import signal
+import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from threading import Event
+from functools import cache
+from threading import Event, Thread
 from typing import Any
 
 from cnctwin.errors import SpreadError, UsageError
@@ -23,8 +27,10 @@ Spread = Callable[[Callable[[str], str], Sequence[str]], Iterable[str]]
 """Runs a function on texts; the answers come in their order."""
 DEATHS_MAX = 3
 """A piece at which workers were killed more often than this is given up: it is probably why."""
-IDLE_S = 20
-"""So long a worker process waits for another piece. It is also how long one is left over when we are killed."""
+IDLE_S = 60
+"""So long a worker process waits for another piece."""
+LOOK_S = 1.0
+"""How often one looks whether we are still there: it ends so long after us, also where we are killed."""
 
 
 @contextmanager
@@ -60,7 +66,7 @@ def _processes(workers: int, packages: tuple[str, ...]) -> Iterator[Spread]:
         for text in texts:
             if enough.is_set():
                 return
-            yield joblib.delayed(run_piece)(name, text)
+            yield joblib.delayed(_in_a_process)(os.getpid(), name, text)
 
     def spread(function: Callable[[str], str], texts: Sequence[str]) -> Iterator[str]:
         name, done, deaths, enough = name_of(function, packages), 0, 0, Event()
@@ -87,3 +93,22 @@ def _processes(workers: int, packages: tuple[str, ...]) -> Iterator[Spread]:
         yield spread
     finally:
         loky.get_reusable_executor(reuse=True).shutdown(wait=True, kill_workers=True)
+
+
+def _in_a_process(parent: int, name: str, text: str) -> str:
+    """As `run_piece`, in a process that belongs to the one that started it."""
+    _belong_to(parent)
+    return run_piece(name, text)
+
+
+@cache
+def _belong_to(parent: int) -> None:
+    """Do not outlive it, and leave it to it what Ctrl-C, of which a terminal tells us both, is to do."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(LOOK_S)
+        os._exit(1)
+
+    Thread(target=watch, name="parent", daemon=True).start()

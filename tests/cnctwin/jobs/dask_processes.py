@@ -42,7 +42,7 @@ class DaskProcesses:
         return self.workers[-1]
 
     def _start(self, kind: str, *options: str) -> subprocess.Popen[bytes]:
-        environment = os.environ | {"PYTHONPATH": str(PROJECT), "PYTHONDONTWRITEBYTECODE": ""}
+        environment = os.environ | {"PYTHONPATH": str(PROJECT), "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
         command = [sys.executable, "-m", f"distributed.cli.dask_{kind}", *options, "--no-dashboard", *self.tls]
         with (self.folder / "dask.log").open("ab") as log:
             return subprocess.Popen(command, env=environment, stdout=log, stderr=subprocess.STDOUT)

@@ -12,11 +12,11 @@ import pytest
 
 from cnctwin.errors import UsageError
 from cnctwin.jobs import topics
-from cnctwin.jobs.attempt import left_over
 from cnctwin.jobs.client import JobsClient
 from cnctwin.jobs.consumer import Consumer, Setting
 from cnctwin.jobs.job import Job, JobState
 from cnctwin.jobs.job_queue import Limits
+from cnctwin.jobs.left_over import left_over
 from sparkplug.broker import BrokerAddress
 from sparkplug.host import HostApplication
 from sparkplug.host_session import EventKind

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from cnctwin.jobs.attempt import left_over
 from cnctwin.jobs.client import JobsClient
+from cnctwin.jobs.left_over import left_over
 from sparkplug.broker import BrokerAddress
 from tests.cnctwin.jobs.conftest import ROOT, over
 from tests.cnctwin.jobs.counting import chain_to, checkpoint_of, written

@@ -87,5 +87,5 @@ def test_a_case_toml_of_any_shape_is_refused_in_one_line(root: FilesRoot, text: 
 
 
 def test_without_a_folder_no_file_can_be_named() -> None:
-    with pytest.raises(UsageError, match="this consumer was given no --files folder"):
+    with pytest.raises(UsageError, match="this consumer knows no files; start it with --files"):
         FilesRoot().file("part.nc", "program")

@@ -2,6 +2,10 @@
 
 import doctest
 import json
+import os
+import signal
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -13,6 +17,8 @@ from cnctwin.jobs import spread as spreading
 from cnctwin.jobs.piece import name_of, opened, run_piece
 from cnctwin.jobs.spread import spread_over
 from tests.cnctwin.jobs import pieces
+from tests.cnctwin.program import is_alive, until
+from tests.recordings import PROJECT
 from twin.errors import TwinError
 
 TESTS = ("tests",)
@@ -52,6 +58,24 @@ def test_a_piece_that_kills_each_process_is_given_up_and_said(tmp_path: Path, mo
     with spread_over(workers=2, packages=TESTS) as spread, pytest.raises(SpreadError, match=lost):
         list(spread(pieces.deadly, [json.dumps([str(tmp_path), 99])]))
     assert time.monotonic() - begun_s < 20
+
+
+def test_processes_do_not_outlive_who_is_killed(tmp_path: Path) -> None:
+    program = (
+        "import json; from tests.cnctwin.jobs import pieces; from cnctwin.jobs.spread import spread_over\n"
+        f"texts = [json.dumps([number, {str(tmp_path)!r}, 30.0]) for number in range(2)]\n"
+        "with spread_over(workers=2, packages=('tests',)) as spread: list(spread(pieces.squared, texts))"
+    )
+    starter = subprocess.Popen([sys.executable, "-c", program], cwd=PROJECT, stderr=subprocess.DEVNULL)
+    until(lambda: len(list(tmp_path.iterdir())) == 2, "both have begun")
+    begun = {int(mark.name.partition("-")[2]) for mark in tmp_path.iterdir()}
+    for process in begun:
+        os.kill(process, signal.SIGINT)  # as Ctrl-C in a terminal does
+    time.sleep(0.1)
+    assert all(map(is_alive, begun)), "what Ctrl-C does is for the one that started them to say"
+    starter.kill()
+    starter.wait()
+    until(lambda: not any(map(is_alive, begun)), "both have ended")
 
 
 @pytest.mark.parametrize("function", [pieces.refused, pieces.unknown_machine])
