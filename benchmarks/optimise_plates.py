@@ -80,11 +80,12 @@ def print_claim(found: Study) -> None:
         range_s = f"{saved - half:6.0f} to {saved + half:5.0f}"
         print(f"{name:11} {was:9.1f} {own:10.1f} {pick:11.1f} {saved:7.1f} {range_s:>16}   {was - reference:7.1f}{beyond}")
     print("\nleft out: sections whose own choice is what the others' proven choices make best, so that its recording checks it")
-    same = [one for one in found.checks if one.same]
-    for one in same:
-        print(f"    {one.run:10} T{one.tool:<3} {one.pick!s:16} predicted {one.pick_s:6.1f}, recorded {one.recorded_s:6.1f}")
-    off = [one.pick_s - one.recorded_s for one in same]
-    mean, apart = statistics.mean(off), statistics.mean(abs(one) for one in off)
+    same = [check for check in found.checks if check.same]
+    for check in same:
+        seconds = f"predicted {check.pick_s:6.1f}, recorded {check.recorded_s:6.1f}"
+        print(f"    {check.run:10} T{check.tool:<3} {check.pick!s:16} {seconds}")
+    off = [check.pick_s - check.recorded_s for check in same]
+    mean, apart = statistics.mean(off), statistics.mean(abs(error) for error in off)
     print(f"    {len(same)} of {len(found.checks)}: mean error {mean:+.1f} s, absolute {apart:.1f} s")
 
 
@@ -98,9 +99,12 @@ def main() -> None:
     programs = [one for one in plates(data_folder()) if not one.refusal()]
     found = study(programs, cover_ramp(data_folder()).base_rpm)
     if arguments.json:
-        savings_of = [*found.tools, found.whole]
-        told = {"sections": found.rows, "savings": savings_of, "untouched": found.untouched, "left_out": found.checks}
-        figures_of = {name: [asdict(one) for one in values] for name, values in told.items()}
+        figures_of = {
+            "sections": [asdict(row) for row in found.rows],
+            "savings": [asdict(pairs) for pairs in (*found.tools, found.whole)],
+            "untouched": [asdict(pairs) for pairs in found.untouched],
+            "left_out": [asdict(check) for check in found.checks],
+        }
         print(json.dumps(figures_of | {"error": found.error, "saved_error": found.saved_error, "best_s": found.best_s}, indent=1))
         return
     print_times(found)

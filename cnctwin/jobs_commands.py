@@ -21,8 +21,8 @@ from cnctwin.given_broker import address, broker_or_own
 from cnctwin.jobs.client import JobsClient, NoAnswerError
 from cnctwin.jobs.consumer import Consumer, Setting
 from cnctwin.jobs.dask_cluster import DaskCluster
-from cnctwin.jobs.files_root import decoded
 from cnctwin.jobs.job_queue import Limits
+from cnctwin.program_text import decoded
 from cnctwin.stopping import stopped_by_signals
 from edge.state_dir import state_dir
 from sparkplug.broker import BrokerAddress
@@ -227,7 +227,7 @@ def _document(file: Path) -> dict[str, Any]:
 
 def _text(file: Path | None) -> str | None:
     try:
-        return None if file is None else decoded(file.read_bytes())
+        return None if file is None else decoded(file.read_bytes())[0]
     except OSError as error:
         raise UsageError(f"{file}: cannot be read: {error.strerror}") from None
 

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Protocol
 
+from cnctwin.jobs.announcer import NODE as JOBS_NODE
 from sparkplug.metric import NodeId, Reading
 from sparkplug.node_picture import NodePicture
 from sparkplug.quality import Quality
@@ -61,6 +62,8 @@ def machines(pictures: Pictures) -> list[MachineView]:
     measured: dict[str, dict[str, Reading]] = {}
     twin: dict[str, dict[str, Reading]] = {}
     for picture in _pictures(pictures):
+        if picture.node.node == JOBS_NODE:
+            continue  # a job is no machine, nor is each machine that a job is about one of the plant
         for device, owner in picture.devices.items():
             for name, reading in owner.readings.items():
                 side = twin if name.startswith(TWIN_PREFIX) else measured

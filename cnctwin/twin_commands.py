@@ -3,7 +3,6 @@
 import json
 import sys
 import time
-from codecs import BOM_UTF8
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
@@ -16,6 +15,7 @@ from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from cnctwin.errors import UsageError
+from cnctwin.program_text import decoded
 from twin.case import read_case
 from twin.errors import EffectError, ProgramError
 from twin.gap_table import GapRow
@@ -42,11 +42,7 @@ def read_encoded(path: Path) -> tuple[str, str]:
         raw = path.read_bytes()
     except OSError as error:
         raise UsageError(f"{path}: cannot be read: {error.strerror}") from None
-    encoding = "utf-8-sig" if raw.startswith(BOM_UTF8) else "utf-8"
-    try:
-        return raw.decode(encoding), encoding
-    except UnicodeDecodeError:
-        return raw.decode("latin-1"), "latin-1"
+    return decoded(raw)
 
 
 def check_suffix(out: Path | None) -> None:

@@ -15,12 +15,11 @@ from cnctwin.api.residual import models_part
 from cnctwin.api.sources import Sources
 from cnctwin.doctor import COME_AND_GO
 from cnctwin.errors import ProgramError
+from cnctwin.jobs.announcer import NODE as JOBS_NODE
 from cnctwin.jobs.client import FRESH_S_MAX as JOBS_FRESH_S_MAX
 from cnctwin.page import WEB
 from processors.contract import TWIN_NODE_PREFIX
 from sparkplug.connection import now_ms
-
-JOBS_NODE = "twin-jobs"
 
 
 def health_routes(sources: Sources) -> APIRouter:

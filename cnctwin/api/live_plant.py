@@ -15,6 +15,7 @@ from cnctwin.api.batches import Batch, Row, alerts_batch, fleet_rows, machine_ro
 from cnctwin.api.fleet import fleet_item, is_key_signal
 from cnctwin.api.trace import Sample, Trace
 from cnctwin.api.value_object import plain, value_object
+from cnctwin.jobs.announcer import NODE as JOBS_NODE
 from cnctwin.plant import TWIN_PREFIX
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId, Reading
@@ -96,6 +97,8 @@ class LivePlant:
         for start in range(0, len(events), EVENTS_A_LOCK):
             with self._lock:
                 for event in events[start : start + EVENTS_A_LOCK]:
+                    if event.device is not None and event.node.node == JOBS_NODE:
+                        continue  # a job is no machine, nor is each machine that a job is about one of the plant
                     if event.kind is EventKind.DATA:
                         self._data(event, now_ms)
                     elif event.kind is EventKind.BIRTH:

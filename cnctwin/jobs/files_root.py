@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from cnctwin.errors import UsageError
+from cnctwin.program_text import decoded
 
 TEXT_BYTES_MAX = 20_000_000
 TOML_BYTES_MAX = 1_000_000
@@ -26,6 +27,10 @@ class FilesRoot:
 
     def text(self, name: str, key: str, bytes_max: int = TEXT_BYTES_MAX) -> str:
         """What stands in it."""
+        return self.encoded_text(name, key, bytes_max)[0]
+
+    def encoded_text(self, name: str, key: str, bytes_max: int = TEXT_BYTES_MAX) -> tuple[str, str]:
+        """What stands in it, and in which encoding."""
         path = self.file(name, key)
         try:
             with path.open("rb") as source:
@@ -65,14 +70,6 @@ class FilesRoot:
         if Path(name).is_absolute() or not path.is_relative_to(root):
             raise UsageError(f"{key} = {name!r}: leads out of the consumer's files folder; name a file below it")
         return path
-
-
-def decoded(raw: bytes) -> str:
-    """A text; what is not UTF-8 is Latin-1, as controls write it."""
-    try:
-        return raw.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return raw.decode("latin-1")
 
 
 def machine_name(toml: str, key: str) -> str:

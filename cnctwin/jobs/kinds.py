@@ -67,6 +67,10 @@ class OptimiseParameters(Parameters):
         """The text of the program."""
         return self.program_text or files.text(self.program or "", "program")
 
+    def encoding_of(self, files: FilesRoot) -> str:
+        """In which its file is written, and so is the rewritten one."""
+        return "utf-8" if self.program_text else files.encoded_text(self.program or "", "program")[1]
+
     def toml_of(self, files: FilesRoot) -> str:
         """The text of the machine.toml."""
         return self.machine_toml or files.text(self.machine or "", "machine", TOML_BYTES_MAX)

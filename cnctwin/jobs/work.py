@@ -65,9 +65,10 @@ def optimise(parameters: "OptimiseParameters", bench: Bench) -> dict[str, Any]:
 
     asked = parameters.model_dump(exclude={"program", "program_text", "machine", "machine_toml"})
     program = bench.as_taken("program.nc", lambda: parameters.program_of(bench.files))
+    encoding = bench.as_taken("program.encoding", lambda: parameters.encoding_of(bench.files))
     machine = bench.as_taken("machine.toml", lambda: parameters.toml_of(bench.files))
     name = "program.nc" if parameters.program is None else Path(parameters.program).name
-    request = OptimiseRequest(name=name, program_text=program, machine_toml=machine, **asked)
+    request = OptimiseRequest(name=name, program_text=program, machine_toml=machine, encoding=encoding, **asked)
     cluster = None if bench.dask is None else DaskCluster.from_text(bench.dask)
     with spread_over(bench.workers, cluster) as spread:
         found = optimise_request(request, bench.out, progress=bench.progress, spread=spread, checkpoint=bench.checkpoint)

@@ -50,7 +50,7 @@ def state_of(server: Server, job_id: str) -> str | None:
 def test_a_job_is_asked_for_shown_and_its_files_are_had(mosquitto: Mosquitto, folder: Path) -> None:
     with served(mosquitto, jobs=folder) as server:
         wait(lambda: jobs(server)["available"], "the consumer")
-        asked = {"job": "count", "id": "ten", "to": 10}
+        asked = {"job": "count", "id": "ten", "to": 10, "machine": "mill"}
         told = [httpx.post(f"{server.url}/jobs", json=asked).json() for _ in range(2)]
         assert [(one["id"], one["answer"]) for one in told] == [("ten", "accepted"), ("ten", "known")]
         wait(lambda: state_of(server, "ten") == "done", "its end", 30)
@@ -58,6 +58,7 @@ def test_a_job_is_asked_for_shown_and_its_files_are_had(mosquitto: Mosquitto, fo
         assert (short["kind"], short["progress_pct"], short["sentence"]) == ("count", 100.0, "counted to 10")
         wait(lambda: httpx.get(f"{server.url}/jobs/ten").json().get("result"), "its result")
         assert httpx.get(f"{server.url}/jobs/ten").json()["result"]["chain"] == chain_to(10)
+        assert httpx.get(f"{server.url}/machines").json() == [], "neither a job nor what it is about is a machine of the plant"
         file = httpx.get(f"{server.url}/jobs/ten/files/chain.txt")
         assert (file.text, file.headers["content-disposition"]) == (chain_to(10), 'attachment; filename="ten-chain.txt"')
         for place in (
@@ -86,7 +87,7 @@ def test_a_job_is_cancelled_and_what_is_wrong_is_refused(mosquitto: Mosquitto, f
             ({"job": "bake"}, 400, "job = 'bake': is none of"),
             ({"job": "count"}, 400, "to"),
             ({"job": "diagnose", "case": "x", "reply_to": "a/b"}, 400, "reply_to"),
-            ({"job": "diagnose", "case": "../x"}, 409, "was given no --files folder"),
+            ({"job": "diagnose", "case": "../x"}, 409, "--files"),
             ({"job": "count", "to": 3, "id": long["id"]}, 409, "is that of another request"),
         ):
             refused = httpx.post(f"{server.url}/jobs", json=body)

@@ -1,0 +1,16 @@
+"""The text of a part program, and the encoding in which it goes back to the control byte for byte."""
+
+from codecs import BOM_UTF8
+
+
+def decoded(raw: bytes) -> tuple[str, str]:
+    """Text and encoding; what is not UTF-8 is Latin-1, as controls write it.
+
+    >>> decoded(b"(\\xd8 6)"), decoded(b"\\xef\\xbb\\xbfG0")
+    (('(Ø 6)', 'latin-1'), ('G0', 'utf-8-sig'))
+    """
+    encoding = "utf-8-sig" if raw.startswith(BOM_UTF8) else "utf-8"
+    try:
+        return raw.decode(encoding), encoding
+    except UnicodeDecodeError:
+        return raw.decode("latin-1"), "latin-1"

@@ -1,0 +1,87 @@
+"""`cnctwin optimise` as a user types it."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from tests.twin.optimisation.benchmark import FOLDER, text
+from twin.machine import machine_from_toml, machine_to_toml
+
+PROGRAM, MACHINE = FOLDER / "optimise_paper.nc", FOLDER / "optimise_paper.toml"
+QUICK = ("--evolutions", "4", "--population", "8", "--islands", "1")
+
+
+def optimise(*options: str | Path, program: Path = PROGRAM, machine: Path = MACHINE) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "cnctwin", "optimise", program, "--machine", machine, *QUICK, *options]
+    return subprocess.run([str(one) for one in command], capture_output=True, text=True, timeout=300, check=False)
+
+
+def test_it_writes_program_report_and_answer_and_says_what_they_are_worth(tmp_path: Path) -> None:
+    done = optimise("--objective", "cost", "--force-limit-n", "60", "--out", tmp_path / "optimised.nc", "--paper")
+    assert done.returncode == 0, done.stderr
+    for said in ("29.48 s to 24.51 s (−16.9 %)", "120.1 to 76.39 KRW (−36.4 %)", "above the exact optimum", "60.0 N of 60 N"):
+        assert said in done.stdout
+    assert "the reference paper's own search" in done.stdout
+    assert "S4584 M3" in (tmp_path / "optimised.nc").read_text()
+    assert "<script" not in (tmp_path / "optimised.html").read_text()
+    answer = json.loads((tmp_path / "optimised.json").read_text())
+    assert answer["after"]["force_n"] <= 60.0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["optimised.html", "optimised.json", "optimised.nc"]
+
+
+def test_a_program_may_read_the_answer_and_bytes_of_comments_stay(tmp_path: Path) -> None:
+    program = tmp_path / "latin.nc"
+    program.write_bytes(PROGRAM.read_bytes().replace(b"(BENCHMARK", b"(\xd8 6 BENCHMARK").replace(b"\n", b"\r\n"))
+    done = optimise("--json", "--out", tmp_path / "out.nc", program=program)
+    assert json.loads(done.stdout)["after"]["seconds"] == pytest.approx(24.51, abs=0.005)
+    written = (tmp_path / "out.nc").read_bytes()
+    assert b"(\xd8 6 BENCHMARK" in written
+    assert written.count(b"\r\n") == program.read_bytes().count(b"\r\n")
+
+
+@pytest.mark.parametrize(
+    ("options", "code", "says"),
+    [
+        (("--objective", "speed"), 2, "--objective speed: is not known; it is time, cost or pareto"),
+        (("--force-limit-n", "0"), 2, "the force limit is 0.0 N"),
+        (("--force-limit-n", "1"), 1, "line 7: even 100 mm/min at 8000 rev/min give 6.9 N, more than 1 N"),
+        (("--feed-range", "500"), 2, "--feed-range 500: is no range; write it as 100:3000"),
+        (("--population", "5"), 2, "population is 5; it has to be even"),
+        (("--probability", "2"), 2, "the probability is 2.0"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, tuple) else None,
+)
+def test_what_is_wrong_is_one_line(tmp_path: Path, options: tuple[str, ...], code: int, says: str) -> None:
+    done = optimise(*options, "--out", tmp_path / "out.nc")
+    assert says in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert done.returncode == code
+    assert not (tmp_path / "out.nc").exists()
+
+
+def test_a_search_that_was_interrupted_goes_on(tmp_path: Path) -> None:
+    """Ctrl-C in the middle of a long search leaves a checkpoint; the same command ends it."""
+    out, kept = tmp_path / "out.nc", tmp_path / "out.checkpoint.json"
+    machine = machine_from_toml(text("second.toml"))
+    (tmp_path / "machine.toml").write_text(machine_to_toml(machine))
+    command = [sys.executable, "-m", "cnctwin", "optimise", FOLDER / "optimise_second.nc", "--machine", tmp_path / "machine.toml"]
+    options = ["--objective", "cost", "--evolutions", "80", "--out", out, "--no-resimulation"]
+    process = subprocess.Popen([str(one) for one in [*command, *options]], stderr=subprocess.PIPE, text=True)
+    deadline = time.monotonic() + 120.0
+    while not kept.exists() and time.monotonic() < deadline:
+        time.sleep(0.02)
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert "the same command goes on where it was" in said
+    done = json.loads(kept.read_text())["done"]
+    assert 0 < done < 80
+    again = subprocess.run([str(one) for one in [*command, *options]], capture_output=True, text=True, timeout=300, check=False)
+    assert again.returncode == 0, again.stderr
+    assert out.exists()
+    assert not kept.exists()
