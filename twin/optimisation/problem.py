@@ -247,7 +247,7 @@ def _speeds(problem: Problem) -> Speeds:
     for k, line in enumerate(program.lines):
         row = rows.get(k, NOBODY)
         if line.needs_speed if row == NOBODY else problem.allowed.cutting[row]:
-            needs += [(a, row, float(programmed_rpm[a]), line.line) for a, _ in line.executions if programmed_rpm[a] > 0.0]
+            needs += [(a, row, float(programmed_rpm[a]), line.line) for a, _ in line.executions if programmed_rpm[a] != 0.0]
     needs.sort()
     optional = tuple(Event(segment, EventKind.SPINDLE, rpm, line) for segment, _, rpm, line in needs)
     made = Candidates.of(program.path, problem.limits(), optional, problem.control.feed_ratio, problem.control.rapid_ratio)

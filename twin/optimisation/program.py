@@ -20,7 +20,7 @@ from twin.errors import MachineError
 from twin.gcode import Arc, Linear, interpret
 from twin.machine import MachineFile, Tool
 from twin.motion.path import EventKind, Kind, Path, path_from_moves
-from twin.optimisation.words import find_word, source_lines
+from twin.optimisation.words import codes, find_word, inch_lines, source_lines
 from twin.runlog import RunLog
 
 Floats = NDArray[np.float64]
@@ -30,6 +30,8 @@ PlannedCuts = Mapping[int, Sequence[Sequence[float]]]
 END_FACE_MM2 = 1e-3
 """An end face that cuts less than this is the rounding of a level move."""
 DIGITS, HEADING_STEPS = 6, 24
+PROBING = frozenset({310, 311, 312, 313, 314, 370, 380, 382, 383, 384, 385})
+"""G31 and its kin, G37, G38.2 to G38.5, in tenths."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,6 +41,7 @@ class FeedLine:
     feed_mm_min, rpm: as programmed at its first execution; length_mm, cut_mm: of all executions together
     cuts: rows of `Cuts` that belong to it; left_alone: why nothing of it may be changed, empty = both feed and speed are free
     needs_speed: it is left alone, and needs the speed that it was written for
+    inch: its F word counts inch/min
     """
 
     line: int
@@ -51,6 +54,7 @@ class FeedLine:
     cuts: tuple[int, int]
     left_alone: str = ""
     needs_speed: bool = False
+    inch: bool = False
 
     @property
     def cutting(self) -> bool:
@@ -120,6 +124,7 @@ def programmed(
     speeds = path.commanded_rpm()
     tied = {move.line for move in moves if isinstance(move, Linear | Arc) and move.feed_per_rev_mm is not None}
     source = source_lines(text)
+    inch = inch_lines(source)
     lines, groups = [], []
     for line, executions in _executions(path).items():
         segments = np.concatenate([np.arange(*span) for span in executions])
@@ -132,9 +137,9 @@ def programmed(
             float(path.length_mm[segments].sum()), found.cut_mm, (0, 0),
         )  # fmt: skip
         why = left_alone.get(line) or _why_not(one, path, tied, numbers[segments], found, speeds[segments])
-        why = why or (_no_plain_words(source[line]) if line < len(source) else "")
+        why = why or _no_plain_words(source[line]) or _still(source[line], speeds[segments], len(found.rows) > 0)
         in_air = not len(found.rows) and not found.plunges and not path_is_cycle(path, executions) and line not in tied
-        lines.append(replace(one, left_alone=why, needs_speed=bool(why) and not in_air))
+        lines.append(replace(one, left_alone=why, needs_speed=bool(why) and not in_air, inch=inch[line]))
         groups.append(found.rows)
     return _numbered(Programmed(machine, text, path, tuple(lines), _no_cuts(), tuple(tools), tuple(notes)), groups)
 
@@ -256,6 +261,13 @@ def _no_plain_words(text: str) -> str:
         if place is not None and not place.plain:
             return f"its {name} is an expression"
     return ""
+
+
+def _still(text: str, rpm: Floats, cuts: bool) -> str:
+    """A feed that is no cut, and has a speed of its own for a reason: probing, a bar puller, a touch-off."""
+    if codes(text).g & PROBING:
+        return "it is a probing move"
+    return "it feeds with the spindle at rest" if not cuts and (rpm == 0.0).any() else ""
 
 
 def _no_cuts() -> Cuts:

@@ -14,12 +14,15 @@ from twin.errors import ProgramError
 from twin.gcode import interpret
 from twin.motion.path import EventKind, Kind, Path, path_from_moves
 from twin.optimisation.problem import Problem
-from twin.optimisation.words import INCH_MM, feed_figure, figure_mm_min, find_word, joined, source_lines, with_word
+from twin.optimisation.words import INCH_MM, codes, feed_figure, figure_mm_min, find_word, joined, source_lines, with_word
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 ROUNDS_MAX = 4
 SAME = 1e-9
+S_IS_NO_SPEED_G = frozenset({100, 500, 650, 660, 670, 920, 960})
+S_IS_NO_SPEED_M = frozenset({19, 29, 98, 198})
+"""Codes in whose block S is something else: an argument, a clamp, a surface speed, an angle, the speed of a tap."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,22 +44,17 @@ class _Wanted:
     rpm: float
 
 
-def is_inch(text: str) -> bool:
-    """Whether feeds are in inch/min: G20 somewhere in the program."""
-    return any("G20" in line.upper().replace(" ", "") for line in source_lines(text))
-
-
 def rewritten(problem: Problem, feed_mm_min: Floats, rpm: Floats) -> Rewritten:
     """The program with these feed words and speeds, (lines,) of `Allowed`; feeds are rounded down, speeds have to be whole."""
-    program, inch = problem.program, is_inch(problem.program.text)
-    wanted = _wanted(problem, feed_mm_min, rpm, inch)
+    program = problem.program
+    wanted = _wanted(problem, feed_mm_min, rpm)
     source = source_lines(program.text)
     forced_feed, forced_speed = _first_choice(problem, wanted, rpm, source)
     speed_lines = _speed_lines(problem, rpm, source)
     own_speed = _of_one_speed(problem)
     text, path, missed = program.text, program.path, {}
     for _ in range(ROUNDS_MAX):
-        text = joined(program.text, _changed(source, wanted, forced_feed, forced_speed, speed_lines, problem, inch))
+        text = joined(program.text, _changed(source, wanted, forced_feed, forced_speed, speed_lines, problem))
         try:
             path = path_from_moves(interpret(text))
         except ProgramError as error:
@@ -71,18 +69,18 @@ def rewritten(problem: Problem, feed_mm_min: Floats, rpm: Floats) -> Rewritten:
     return Rewritten(text, path, {line: f"its {what} does not follow the word that was written" for line, what in missed.items()})
 
 
-def _wanted(problem: Problem, feed: Floats, rpm: Floats, inch: bool) -> dict[int, _Wanted]:
+def _wanted(problem: Problem, feed: Floats, rpm: Floats) -> dict[int, _Wanted]:
     rows = {int(k): row for row, k in enumerate(problem.allowed.index)}
     wanted = {}
     for k, line in enumerate(problem.program.lines):
         row = rows.get(k)
         if row is None:
-            speed = f"{line.rpm:g}" if line.needs_speed and line.rpm > 0.0 else None
+            speed = f"{abs(line.rpm):.9g}" if line.needs_speed and line.rpm else None
             wanted[line.line] = _Wanted(None, None, speed, line.rpm)
         else:
-            figure = feed_figure(float(feed[row]), inch)
-            speed = f"{rpm[row]:g}" if problem.allowed.cutting[row] else None
-            wanted[line.line] = _Wanted(figure, figure_mm_min(figure, inch), speed, float(rpm[row]))
+            figure = feed_figure(float(feed[row]), line.inch)
+            speed = f"{rpm[row]:.9g}" if problem.allowed.cutting[row] else None
+            wanted[line.line] = _Wanted(figure, figure_mm_min(figure, line.inch), speed, float(rpm[row]))
     return wanted
 
 
@@ -115,13 +113,13 @@ def _first_choice(problem: Problem, wanted: dict[int, _Wanted], rpm: Floats, sou
 
 
 def _of_one_speed(problem: Problem) -> set[int]:
-    """Lines that have the same speed whenever they are executed, so that an S word of their own cannot be wrong."""
+    """Lines that have the same speed, in either direction, whenever they are executed: an S word of theirs cannot be wrong."""
     rpm = problem.program.path.commanded_rpm()
     changed = {int(k) for k in problem.allowed.index[problem.allowed.cutting]}
     return {
         line.line
         for k, line in enumerate(problem.program.lines)
-        if k in changed or len({float(rpm[a]) for a, _ in line.executions}) == 1
+        if k in changed or len({abs(float(rpm[a])) for a, _ in line.executions}) == 1
     }
 
 
@@ -135,25 +133,28 @@ def _speed_lines(problem: Problem, rpm: Floats, source: list[str]) -> dict[int, 
         for number in range(event.line, -1, -1):
             place = find_word(source[number], "S")
             if place is not None:
-                if place.plain:
-                    found[number] = f"{rpm[speeds.owner[e]]:g}"
+                of_block = codes(source[number])
+                if place.plain and not of_block.g & S_IS_NO_SPEED_G and not of_block.m & S_IS_NO_SPEED_M:
+                    found[number] = f"{rpm[speeds.owner[e]]:.9g}"
                 break
     return found
 
 
 def _changed(
     source: list[str], wanted: dict[int, _Wanted], feeds: set[int], speeds: set[int], speed_lines: dict[int, str],
-    problem: Problem, inch: bool,
+    problem: Problem,
 ) -> dict[int, str]:  # fmt: skip
     changed: dict[int, str] = {}
     for number, figure in speed_lines.items():
         changed[number] = with_word(source[number], "S", figure)
-    programmed = {line.line: line.feed_mm_min for line in problem.program.lines}
+    programmed = {line.line: line for line in problem.program.lines}
     for number, one in wanted.items():
         text = changed.get(number, source[number])
         if number in feeds:
             # a line that is left alone gets the feed it was written for, which its modes would no longer give it
-            text = with_word(text, "F", one.feed if one.feed is not None else _exact(programmed[number], inch))
+            text = with_word(
+                text, "F", one.feed if one.feed is not None else _exact(programmed[number].feed_mm_min, programmed[number].inch)
+            )
         if number in speeds and one.speed is not None:
             text = with_word(text, "S", one.speed)
         if text != source[number]:

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from twin.optimisation.closed_form import Worth
 from twin.optimisation.problem import Problem
-from twin.optimisation.rewriting import is_inch
 from twin.optimisation.words import feed_figure, figure_mm_min
 
 Floats = NDArray[np.float64]
@@ -32,8 +31,8 @@ def rounded(problem: Problem, feed: Floats, rpm: Floats, worth: Worth) -> tuple[
         _round_group(problem, group, speeds, worth)
     most = allowed.feed_max(speeds[None])[0]
     chosen = np.where(full, most, np.minimum(feed, most))
-    inch = is_inch(problem.program.text)
-    written = np.array([figure_mm_min(feed_figure(float(one), inch), inch) for one in chosen], dtype=np.float64)
+    inch = [problem.program.lines[int(k)].inch for k in allowed.index]
+    written = np.array([figure_mm_min(feed_figure(float(f), i), i) for f, i in zip(chosen, inch, strict=True)], dtype=np.float64)
     return written.reshape(len(chosen)), speeds
 
 

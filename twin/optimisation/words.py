@@ -92,6 +92,41 @@ def joined(text: str, changed: Mapping[int, str]) -> str:
     return "".join(changed.get(k, line) + end for k, (line, end) in enumerate(zip(source_lines(text), ends, strict=True)))
 
 
+class Codes(NamedTuple):
+    """The codes of a block: G in tenths (G54.1 is 541), and M."""
+
+    g: frozenset[int]
+    m: frozenset[int]
+
+
+def codes(text: str) -> Codes:
+    """The G and M codes of a block that stand there as plain words, outside comments.
+
+    >>> codes("G1 X3. M8 (NOT G20)")
+    Codes(g=frozenset({10}), m=frozenset({8}))
+    """
+    found: dict[str, set[int]] = {"G": set(), "M": set()}
+    for match in TOKEN.finditer(text.translate(CAPITALS)):
+        if match.lastindex == 2 and match.group(1) in found:
+            value = float(match.group(2).replace(" ", "").replace("\t", ""))
+            found[match.group(1)].add(round(10.0 * value) if match.group(1) == "G" else round(value))
+    return Codes(frozenset(found["G"]), frozenset(found["M"]))
+
+
+def inch_lines(lines: list[str]) -> list[bool]:
+    """Of each line, whether G20 stands in it or in the last line before it that has G20 or G21.
+
+    >>> inch_lines(["G1 F3", "G20", "G1 F3 (G21)", "G21 G1 F3"])
+    [False, True, True, False]
+    """
+    inch, found = False, []
+    for line in lines:
+        of_line = codes(line).g if "2" in line else frozenset()
+        inch = 200 in of_line or (inch and 210 not in of_line)
+        found.append(inch)
+    return found
+
+
 def feed_figure(feed_mm_min: float, inch: bool) -> str:
     """A feed, rounded down.
 

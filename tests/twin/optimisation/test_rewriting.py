@@ -78,6 +78,30 @@ def test_what_is_left_alone_keeps_its_feed_and_speed(body: str, line: int, why: 
     assert alone.after.spindle_rpm == pytest.approx(alone.before.spindle_rpm, rel=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("body", "tail", "stays"),
+    [
+        ("G1 X30. F400\nM4\nG98 G74 X40. Y30. Z-5. R2. F800.\nG80\n", TAIL, "-8000"),
+        ("G1 X30. F400\nM5\nG31 X35. F50.\n", TAIL, "F50."),
+        ("G1 X30. F400\nM5\nG1 Y30. F60.\n", TAIL, "F60."),
+        ("M5\nS8000\nG65 P9 S30.\nM3\nG1 X30. F400\n", "G0 Z10.\r\nM5\r\nM30\r\nO9\r\n#100=#19\r\nM99\r\n%\r\n", "G65 P9 S30."),
+        ("(NOT G20)\nG1 X30. F400\n", TAIL, "(NOT G20)"),
+    ],
+    ids=["left-hand tap", "probe", "spindle at rest", "argument of a macro", "G20 in a comment"],
+)
+def test_what_is_no_cut_keeps_its_words(body: str, tail: str, stays: str) -> None:
+    question = asked(body, tail=tail)
+    answer = optimise(question)
+    assert "G1 X30. F400" not in answer.program, "the cut is another one"
+    before, after = (path_from_moves(interpret(program)) for program in (question.program_text, answer.program))
+    if stays == "-8000":
+        tap = [k for k in range(len(before)) if before.commanded_rpm()[k] < 0.0]
+        assert tap
+        assert after.commanded_rpm()[tap].tolist() == before.commanded_rpm()[tap].tolist()
+    else:
+        assert stays in answer.program
+
+
 def test_a_line_that_is_asked_to_be_left_alone_is() -> None:
     answer = optimise(asked("G1 X30. F400\nX60. F300\n", left_alone={8: "it was to be left alone"}))
     assert "G1 X30. F400" in answer.program
