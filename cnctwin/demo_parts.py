@@ -1,6 +1,7 @@
 """The processes of the demo, each of them a part that a plant has too, started in order and again when they die."""
 
 import json
+import shutil
 import sys
 import time
 from dataclasses import dataclass
@@ -103,9 +104,11 @@ class Demo:
         # The memory begins first, so that it hears what the others say from their first word on.
         self._begin("historian", ["process", "historian", "--config", str(settings), *broker, *state])
         self._await_historian()
-        self._serve(["--config", str(settings), "--store", str(self._folder / "store"), *broker])
+        jobs = str(self._folder / "jobs")
+        self._serve(["--config", str(settings), "--store", str(self._folder / "store"), "--jobs", jobs, *broker])
         others = [name for name in PROCESSORS if name != "historian"]
         self._begin("processors", ["process", *others, "--config", str(settings), *broker, *state])
+        self._begin("jobs", ["jobs", "run", "--dir", jobs, "--files", str(self._files()), *broker])
         # The edge comes last: from its first word on somebody is there to listen.
         self._begin("edge", ["edge", "run", str(edge)])
 
@@ -149,6 +152,15 @@ class Demo:
         """How often each part was started again."""
         parts = [self.broker.child, *self.children]
         return {child.name: child.restarts for child in parts if child.restarts}
+
+    def _files(self) -> Path:
+        """The folder of what a job may read: the simulated machine and its program, to optimise on the page."""
+        folder = self._folder / "files"
+        folder.mkdir()
+        if self.options.recording is None:
+            for file in (description.PROGRAM, description.TOLD):
+                shutil.copy(file, folder)
+        return folder
 
     def _as_described(self) -> str:
         """What the processors are told of the simulated machine, and of the model of its scores."""

@@ -71,7 +71,7 @@ class Allowed:
 
     def advance_by_power_mm(self, rpm: Floats) -> Floats:
         """c_P(n), (…, lines): infinite where power is no limit."""
-        if self.spindle is None:
+        if self.spindle is None or not len(self):
             return np.full(np.shape(rpm), np.inf)
         speed_m_s = np.pi * self.diameter_mm * rpm / 60_000.0
         with np.errstate(divide="ignore"):

@@ -7,6 +7,7 @@ Everything is a value, so that a search that was stopped goes on from its last c
 """
 
 import json
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -131,7 +132,7 @@ def search(question: Question, hooks: Hooks, checkpoint: str | None) -> Searched
     """The islands, epoch by epoch. The checkpoint of the same question is gone on with, and gives the same answer."""
     made, digest = problem(question), question.digest()
     if not made.genes:
-        raise OptimisationError("no line of the program may be changed; the report of `cnctwin simulate` says what is in it")
+        raise OptimisationError(_nothing_free(made))
     states: list[Any] = [None] * question.islands
     done = 0
     if checkpoint is not None and (kept := json.loads(checkpoint)).get("question") == digest:
@@ -153,6 +154,15 @@ def search(question: Question, hooks: Hooks, checkpoint: str | None) -> Searched
     best = max if question.objective is Objective.PARETO else min
     history = tuple(float(best(values)) for values in zip(*histories, strict=True))
     return Searched(genes, np.column_stack(made.evaluate(genes)), history, sum(int(state["evaluations"]) for state in states))
+
+
+def _nothing_free(made: Problem) -> str:
+    """Why no line may be changed: the reason that most of them have."""
+    reasons = Counter(line.left_alone for line in made.program.lines)
+    if not reasons:
+        return "the program has no feed move"
+    why, count = reasons.most_common(1)[0]
+    return f"none of the {len(made.program.lines)} feed lines may be changed; {count} of them: {why}"
 
 
 def _chosen(made: Problem, question: Question, searched: Searched) -> tuple[Floats, int, int]:

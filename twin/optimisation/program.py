@@ -20,7 +20,7 @@ from twin.errors import MachineError
 from twin.gcode import Arc, Linear, interpret
 from twin.machine import MachineFile, Tool
 from twin.motion.path import EventKind, Kind, Path, path_from_moves
-from twin.optimisation.words import codes, find_word, inch_lines, source_lines
+from twin.optimisation.words import codes, figure_mm_min, find_word, inch_lines, source_lines
 from twin.runlog import RunLog
 
 Floats = NDArray[np.float64]
@@ -41,7 +41,7 @@ class FeedLine:
     feed_mm_min, rpm: as programmed at its first execution; length_mm, cut_mm: of all executions together
     cuts: rows of `Cuts` that belong to it; left_alone: why nothing of it may be changed, empty = both feed and speed are free
     needs_speed: it is left alone, and needs the speed that it was written for
-    inch: its F word counts inch/min
+    inch: its F word counts inch/min; plain_feed: its feed is a length a minute, so that an F word of its own says the same
     """
 
     line: int
@@ -55,6 +55,7 @@ class FeedLine:
     left_alone: str = ""
     needs_speed: bool = False
     inch: bool = False
+    plain_feed: bool = True
 
     @property
     def cutting(self) -> bool:
@@ -139,7 +140,15 @@ def programmed(
         why = left_alone.get(line) or _why_not(one, path, tied, numbers[segments], found, speeds[segments])
         why = why or _no_plain_words(source[line]) or _still(source[line], speeds[segments], len(found.rows) > 0)
         in_air = not len(found.rows) and not found.plunges and not path_is_cycle(path, executions) and line not in tied
-        lines.append(replace(one, left_alone=why, needs_speed=bool(why) and not in_air, inch=inch[line]))
+        lines.append(
+            replace(
+                one,
+                left_alone=why,
+                needs_speed=bool(why) and not in_air,
+                inch=inch[line],
+                plain_feed=_is_plain_feed(source[line], one.feed_mm_min, inch[line], line in tied),
+            )
+        )
         groups.append(found.rows)
     return _numbered(Programmed(machine, text, path, tuple(lines), _no_cuts(), tuple(tools), tuple(notes)), groups)
 
@@ -261,6 +270,17 @@ def _no_plain_words(text: str) -> str:
         if place is not None and not place.plain:
             return f"its {name} is an expression"
     return ""
+
+
+def _is_plain_feed(text: str, feed_mm_min: float, inch: bool, tied: bool) -> bool:
+    """Whether the feed of a line is what an F word says, in mm or inch a minute: not so in G93 and G95, nor by an expression."""
+    place = find_word(text, "F")
+    if tied or (place is not None and not place.plain):
+        return False
+    if place is None:
+        return True
+    said = figure_mm_min(text[place.begin + 1 : place.end].replace(" ", ""), inch)
+    return abs(said - feed_mm_min) <= 1e-6 * feed_mm_min
 
 
 def _still(text: str, rpm: Floats, cuts: bool) -> str:

@@ -14,7 +14,17 @@ from twin.errors import ProgramError
 from twin.gcode import interpret
 from twin.motion.path import EventKind, Kind, Path, path_from_moves
 from twin.optimisation.problem import Problem
-from twin.optimisation.words import INCH_MM, codes, feed_figure, figure_mm_min, find_word, joined, source_lines, with_word
+from twin.optimisation.words import (
+    INCH_MM,
+    branches,
+    codes,
+    feed_figure,
+    figure_mm_min,
+    find_word,
+    joined,
+    source_lines,
+    with_word,
+)
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -91,8 +101,12 @@ def _order(problem: Problem) -> list[int]:
 
 
 def _first_choice(problem: Problem, wanted: dict[int, _Wanted], rpm: Floats, source: list[str]) -> tuple[set[int], set[int]]:
-    """Lines that get an F word, and an S word, by what is in force before them."""
+    """Lines that get an F word, and an S word, by what is in force before them; all of them in a program that may branch."""
     feeds, speeds = set(), set()
+    if branches(source):
+        feeds = {line.line for line in problem.program.lines if line.plain_feed}
+        same = _of_one_speed(problem)
+        speeds = {number for number, one in wanted.items() if one.speed is not None and number in same}
     feed: float | None = None
     for number in _order(problem):
         one = wanted[number]

@@ -15,6 +15,7 @@ from twin.gcode.tokens import TOKEN
 INCH_MM = 25.4
 DIGITS = 4
 WORDS = re.compile(r"[A-Za-z]\s*[-+.0-9#\[]")
+BLOCK_SKIP = re.compile(r"[ \t]*(?:[O:][ \t]*[0-9]+[ \t]*)?(?:N[ \t]*[0-9]+[ \t]*)?/")
 LINE_END = re.compile(r"\r\n|\r|\n")
 
 
@@ -90,6 +91,21 @@ def joined(text: str, changed: Mapping[int, str]) -> str:
     """
     ends = [*LINE_END.findall(text), ""]
     return "".join(changed.get(k, line) + end for k, (line, end) in enumerate(zip(source_lines(text), ends, strict=True)))
+
+
+def branches(lines: list[str]) -> bool:
+    """Whether a program may run another way than the one that was interpreted: block skips, jumps, loops, calls.
+
+    >>> branches(["G1 X3.", "/N20 G1 X4."]), branches(["G1 X3. (IF IT FITS)"])
+    (True, False)
+    """
+    for line in lines:
+        upper = line.translate(CAPITALS)
+        if BLOCK_SKIP.match(upper):
+            return True
+        if any(match.lastindex == 4 and len(match.group(4)) > 1 for match in TOKEN.finditer(upper)) or codes(line).m & {98, 198}:
+            return True
+    return False
 
 
 class Codes(NamedTuple):

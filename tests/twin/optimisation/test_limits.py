@@ -78,6 +78,23 @@ def test_what_the_machine_does_not_say_is_asked_for(sections: dict[str, None], s
         problem(second(machine_toml=machine_with(text("second.toml"), cost=None), objective=Objective.COST))
 
 
+@pytest.mark.parametrize(
+    ("sections", "says"),
+    [
+        ({"tool": None}, "none of the 3 feed lines may be changed; 3 of them: its tool is not described; write \\[tools.N\\]"),
+        ({"tool": None, "spindle": SPINDLE}, "its tool is not described"),
+    ],
+)
+def test_a_program_in_which_nothing_may_be_changed_says_why(sections: dict[str, object], says: str) -> None:
+    with pytest.raises(OptimisationError, match=says):
+        optimise(second(machine_toml=machine_with(text("second.toml"), **sections)))
+
+
+def test_a_program_without_a_feed_move_says_so() -> None:
+    with pytest.raises(OptimisationError, match="the program has no feed move"):
+        optimise(second(program_text="G0 X10.\nM30\n"))
+
+
 def test_a_chattering_speed_is_not_chosen() -> None:
     """A tool whose first mode makes most speeds chatter at these depths: what is chosen lies in the lobes."""
     mode = {"direction": "y", "frequency_hz": 900.0, "damping_ratio": 0.03, "stiffness_n_per_mm": 24000.0}

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.twin.optimisation.benchmark import machine_with, text
-from twin.gcode import interpret
+from twin.gcode import Settings, interpret
 from twin.motion.path import path_from_moves
 from twin.optimisation.optimise import optimise
 from twin.optimisation.question import Question, problem
@@ -100,6 +100,20 @@ def test_what_is_no_cut_keeps_its_words(body: str, tail: str, stays: str) -> Non
         assert after.commanded_rpm()[tap].tolist() == before.commanded_rpm()[tap].tolist()
     else:
         assert stays in answer.program
+
+
+@pytest.mark.parametrize("skip", [frozenset(), frozenset({1})], ids=["run", "skipped"])
+def test_a_block_that_is_skipped_takes_no_feed_or_speed_with_it(skip: frozenset[int]) -> None:
+    question = asked("G1 X-8. F400\n/X30. F300 S7000\nX60.\nY5. Z-0.4\n")
+    answer = optimise(question)
+    path = path_from_moves(interpret(answer.program, Settings(block_skip=skip)))
+    feeds = {int(line): float(feed) for line, feed in zip(path.line, path.feed_mm_min, strict=True)}
+    for line in answer.lines:
+        if line.line in feeds and not line.left_alone:
+            assert feeds[line.line] == pytest.approx(line.after.feed_mm_min)
+    assert float(path.commanded_rpm()[path.line == 10][0]) == next(
+        one.after.spindle_rpm for one in answer.lines if one.line == 10
+    )
 
 
 def test_a_line_that_is_asked_to_be_left_alone_is() -> None:
