@@ -101,14 +101,14 @@ def main() -> None:
     if arguments.json:
         figures_of = {
             "sections": [asdict(row) for row in found.rows],
-            "savings": [asdict(pairs) for pairs in (*found.tools, found.whole)],
+            "savings": [asdict(pairs) for pairs in (*found.tools, found.whole, found.held_out)],
             "untouched": [asdict(pairs) for pairs in found.untouched],
             "left_out": [asdict(check) for check in found.checks],
         }
         print(json.dumps(figures_of | {"error": found.error, "saved_error": found.saved_error, "best_s": found.best_s}, indent=1))
         return
     print_times(found)
-    print_savings("savings between all pairs of runs", [*found.tools, found.whole])
+    print_savings("savings between all pairs of runs", [*found.tools, found.whole, found.held_out])
     print_savings("savings between sections in which no knob was turned", found.untouched)
     print_claim(found)
 

@@ -277,6 +277,7 @@ class Study:
     tools: tuple[Savings, ...]
     untouched: tuple[Savings, ...]
     whole: Savings
+    held_out: Savings
     options: dict[int, list[Proven]]
     best_s: float
     faster_s: dict[int, float]
@@ -331,6 +332,7 @@ def study(programs: Sequence[RecordedProgram], base_rpm: float) -> Study:
         tuple(savings(f"T{tool}", [figures([row]) for row in of[tool]]) for tool in of),
         tuple(savings(f"T{tool}", [figures([row]) for row in calm[tool]]) for tool in calm),
         savings("whole", [figures(each) for each in wholes(rows).values()]),
+        savings("held out", [figures(each) for each in wholes(rows).values() if each[0].held_out]),
         options,
         sum(slower.values()),
         {tool: slower[tool] - quicker[tool] for tool in slower},

@@ -39,6 +39,7 @@ __all__ = [
 
 TWIN_PREFIX = "twin/"  # of the metrics
 TWIN_NODE_PREFIX = "twin-"  # of the edge nodes that publish them
+JOBS_NODE = "twin-jobs"  # of the jobs consumer: what it says is of jobs, and no processor's input
 
 
 class Provenance(Enum):
@@ -175,9 +176,11 @@ class _Declaration(Generic[C, S]):
         return TWIN_NODE_PREFIX + self.name
 
     def listens_to(self, node: str) -> bool:
-        """Whether it reads what the edge node `node` says: never itself, and other processors only where an input is theirs."""
+        """Whether it reads what the node `node` says: never itself or jobs, other processors only where an input is theirs."""
         if not node.startswith(TWIN_NODE_PREFIX):
             return True
+        if node == JOBS_NODE:
+            return False
         reads_twins = self.inputs is None or any(name.startswith(TWIN_PREFIX) for name in self.inputs)
         return reads_twins and node != self.node
 

@@ -21,9 +21,9 @@ settings.load_profile("house")
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 os.environ.setdefault("PYTHONPYCACHEPREFIX", str(Path(__file__).parents[1] / ".cache" / "bytecode"))
 
-# The workers have all cores. Where each solves its small systems with a thread for each core as well, half of the time goes into
-# threads that wait for each other: tests/twin/gap/test_diagnose.py takes 67 s of processor time instead of 41. numpy reads this
-# when it is first imported, which is later.
+# The workers have all cores. Where each solves its small systems with a thread for each core as well, they wait for each other:
+# tests/twin/identification/test_identify.py then takes 16 s of processor time in place of 11. numpy reads this when it is first
+# imported, which is later.
 for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
     os.environ.setdefault(name, "1")
 

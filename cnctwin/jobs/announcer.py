@@ -14,7 +14,7 @@ from typing import Any
 from cnctwin.jobs.job import Job, JobState
 from cnctwin.jobs.job_queue import JobQueue
 from cnctwin.jobs.topics import STATE, state_topic
-from processors.contract import Provenance
+from processors.contract import JOBS_NODE, Provenance
 from sparkplug.datatype import DataType
 from sparkplug.edge_node import EdgeNode
 from sparkplug.errors import SparkplugError
@@ -22,7 +22,7 @@ from sparkplug.host import HostApplication
 from sparkplug.metric import Change, MetricSpec
 from sparkplug.quality import Quality
 
-NODE = "twin-jobs"
+NODE = JOBS_NODE
 DEVICE = "jobs"
 REQUEST, CANCEL, ANSWER = "Job/Request", "Job/Cancel", "Job/Answer"
 STATE_S_MIN, STATE_S_MAX = 0.25, 10.0  # of progress only; how jobs stand is told at once

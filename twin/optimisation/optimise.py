@@ -168,7 +168,7 @@ def _nothing_free(made: Problem) -> str:
 def _chosen(made: Problem, question: Question, searched: Searched) -> tuple[Floats, int, int]:
     """Genes of the candidate that is written, evaluations that choosing it took, and its number in the search."""
     if question.objective is Objective.PARETO:
-        points = not_dominated(searched.values)
+        points = _front_points(searched)
         pick = knee(searched.values[points]) if question.pick is None else question.pick
         if not 0 <= pick < len(points):
             raise OptimisationError(f"--pick {pick}: the front has {len(points)} programs, from 0 to {len(points) - 1}")
@@ -179,11 +179,16 @@ def _chosen(made: Problem, question: Question, searched: Searched) -> tuple[Floa
     return genes, evaluations, at
 
 
-def _front(made: Problem, searched: Searched, chosen: int) -> tuple[FrontPoint, ...]:
+def _front_points(searched: Searched) -> NDArray[np.int64]:
+    """Numbers of the candidates that are the front, the fastest first; of very many some, evenly."""
     points = not_dominated(searched.values)
     if len(points) > FRONT_MAX:
-        points = np.unique(np.append(points[np.linspace(0, len(points) - 1, FRONT_MAX).round().astype(np.int64)], chosen))
-        points = points[np.argsort(searched.values[points, 0], kind="stable")]
+        points = points[np.linspace(0, len(points) - 1, FRONT_MAX).round().astype(np.int64)]
+    return points
+
+
+def _front(made: Problem, searched: Searched, chosen: int) -> tuple[FrontPoint, ...]:
+    points = _front_points(searched)
     forces = CutForces.of(made.program)
     front = []
     for k in points.tolist():

@@ -1,8 +1,10 @@
 """The front of time and cost, beside an exhaustive search over all speeds."""
 
 import numpy as np
+import pytest
 
 from tests.twin.optimisation.benchmark import second
+from twin.errors import OptimisationError
 from twin.optimisation.answer import Objective
 from twin.optimisation.front import hypervolume, not_dominated
 from twin.optimisation.optimise import optimise
@@ -39,10 +41,14 @@ def test_time_and_cost_disagree_there() -> None:
     assert cheap.cost < 0.95 * fast.cost
 
 
-def test_the_chosen_program_of_the_front_is_the_one_that_is_written() -> None:
-    question = second(objective=Objective.PARETO, evolutions=10, population=24, islands=1)
-    first, last = (optimise(question.with_(pick=pick)) for pick in (0, None))
-    assert first.front[0].chosen
-    for answer in (first, last):
-        chosen = next(point for point in answer.front if point.chosen)
-        assert abs(answer.after.seconds / chosen.seconds - 1.0) < 1e-3
+def test_the_program_that_is_picked_is_the_one_of_that_number() -> None:
+    question = second(objective=Objective.PARETO, evolutions=10, population=80, islands=2)
+    whole = optimise(question)
+    assert len(whole.front) == 60, "of more programs than a table holds, some"
+    for pick in (0, 41, 59):
+        answer = optimise(question.with_(pick=pick))
+        assert [point.chosen for point in answer.front].index(True) == pick
+        assert answer.after.seconds == pytest.approx(whole.front[pick].seconds, rel=1e-3)
+        assert answer.after.cost == pytest.approx(whole.front[pick].cost, rel=1e-3)
+    with pytest.raises(OptimisationError, match="--pick 60: the front has 60 programs, from 0 to 59"):
+        optimise(question.with_(pick=60))
