@@ -85,7 +85,7 @@ def _price(question: Question) -> float:
         feed, rpm = closed_form(made, single(question.objective))
         seconds, cost = made.evaluate_words(feed[None], rpm[None])
         values.append(float((seconds if question.objective is Objective.TIME else cost)[0]))
-    return 100.0 * (values[1] / values[0] - 1.0)
+    return max(100.0 * (values[1] / values[0] - 1.0), 0.0)
 
 
 def _lines(made: Problem, before: ShownLines, after: ShownLines, text: Rewritten, objective: Objective) -> tuple[LineAnswer, ...]:

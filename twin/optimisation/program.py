@@ -29,6 +29,8 @@ PlannedCuts = Mapping[int, Sequence[Sequence[float]]]
 """Line → [depth mm, entry rad, exit rad] of each of its cuts."""
 END_FACE_MM2 = 1e-3
 """An end face that cuts less than this is the rounding of a level move."""
+SHALLOW = 0.02
+"""Down to this slope, 1.1°, a ramp is taken for a level cut: its end face takes a fiftieth of the feed."""
 DIGITS, HEADING_STEPS = 6, 24
 PROBING = frozenset({310, 311, 312, 313, 314, 370, 380, 382, 383, 384, 385})
 """G31 and its kin, G37, G38.2 to G38.5, in tenths."""
@@ -207,7 +209,9 @@ def _cuts_of_segments(path: Path, rows: PathRows, segments: Ints) -> _Found:
     mine = np.concatenate([np.arange(rows.first[s], rows.first[s + 1]) for s in segments.tolist()])
     mine = mine[rows.axial_depth_mm[mine] > 0.0]
     all_rows = np.concatenate([np.arange(rows.first[s], rows.first[s + 1]) for s in segments.tolist()])
-    plunges = bool((rows.end_face_mm2[all_rows] > END_FACE_MM2).any())
+    fall = np.maximum(path.start_mm[:, 2] - path.end_mm[:, 2], 0.0)[rows.segment[all_rows]]
+    steep = fall > SHALLOW * path.length_mm[rows.segment[all_rows]]
+    plunges = bool((steep & (rows.end_face_mm2[all_rows] > END_FACE_MM2)).any())
     heading = _headings(path, rows.segment[mine])
     columns = np.column_stack([rows.axial_depth_mm[mine], rows.entry_angle_rad[mine], rows.exit_angle_rad[mine], heading])
     return _Found(_different(columns), float(rows.length_mm[mine].sum()), plunges)
