@@ -99,19 +99,23 @@ def run(
 
     def save(text: str) -> None:
         if checkpoint is not None:
-            half = checkpoint.with_name(checkpoint.name + ".part")
-            write(lambda: half.write_text(text, encoding="utf-8"), half)
-            write(lambda: half.replace(checkpoint), checkpoint)
+            _write_whole(checkpoint, text)
 
     hooks = Hooks(spread=spread, progress=progress, save=save, stop=stop, clock=time.monotonic)
     answer = optimise(question, hooks, _kept(checkpoint), resimulate=resimulate)
-    # newline: the ends of lines stay as they are in the program
-    write(partial(files.program.write_text, answer.program, encoding=files.encoding, newline=""), files.program)
-    write(partial(files.answer.write_text, json.dumps(answer.as_json()) + "\n", encoding="utf-8"), files.answer)
-    write(partial(files.report.write_text, report_html(answer), encoding="utf-8"), files.report)
+    _write_whole(files.answer, json.dumps(answer.as_json()) + "\n")
+    _write_whole(files.report, report_html(answer))
+    _write_whole(files.program, answer.program, files.encoding)
     if checkpoint is not None:
         checkpoint.unlink(missing_ok=True)
     return answer
+
+
+def _write_whole(path: Path, text: str, encoding: str = "utf-8") -> None:
+    """Writes a file whole or not at all, the ends of its lines as they are."""
+    half = path.with_name(path.name + ".part")
+    write(partial(half.write_text, text, encoding=encoding, newline=""), half)
+    write(partial(half.replace, path), path)
 
 
 def _kept(checkpoint: Path | None) -> str | None:

@@ -78,10 +78,19 @@ def optimise(
         left_alone={line - 1: "it was to be left alone" for line in leave or ()},
         pick=pick,
     )
-    if out.suffix in (".json", ".html") or out.resolve() == program.resolve():
-        raise UsageError(f"{out}: write the program under another name, as optimised.nc; .json and .html are beside it")
+    _check_out(out, program, machine)
     how = Run(out, encoding, workers, dask, fresh=fresh, resimulate=not no_resimulation, paper=paper, as_json=as_json)
     raise typer.Exit(_run(question, how))
+
+
+def _check_out(out: Path, *inputs: Path) -> None:
+    """Raises UsageError where the answer cannot go there, before anything is worked out."""
+    if not out.name or out.is_dir():
+        raise UsageError(f"{out}: is a folder; name the file of the program, as {out / 'optimised.nc'}")
+    if out.suffix in (".json", ".html", ".toml") or out.resolve() in {path.resolve() for path in inputs}:
+        raise UsageError(f"{out}: write the program under another name, as optimised.nc; its .json and .html go beside it")
+    if not out.parent.is_dir():
+        raise UsageError(f"{out.parent}: there is no such folder")
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +111,7 @@ def _run(question: "asked.Question", how: Run) -> int:
     from cnctwin.jobs.dask_cluster import DaskCluster
     from cnctwin.jobs.spread import spread_over
     from cnctwin.optimisation_run import Files, run
-    from twin.errors import OptimisationError
+    from twin.errors import LimitsError
     from twin.optimisation.optimise import Stopped
     from twin.optimisation.paper import paper_search
 
@@ -118,7 +127,7 @@ def _run(question: "asked.Question", how: Run) -> int:
     except Stopped:
         print(f"cnctwin: stopped; the same command goes on where it was ({kept})", file=sys.stderr)
         return 1
-    except OptimisationError as error:
+    except LimitsError as error:
         print(f"cnctwin: {question.name}: {error}", file=sys.stderr)
         return 1
     beside = paper_search(question, time.perf_counter) if how.paper else None

@@ -7,7 +7,8 @@ TwinError
 ├── CaseError         a case folder that is not a case
 ├── EngagementError   a path, tool, stock or limit with which the engagement cannot be computed
 ├── EffectError       an effect that does not exist, or is given what it does not take
-├── OptimisationError a program whose limits cannot be kept, or an optimisation that is asked for what there is not
+├── OptimisationError a program in which nothing may be changed, or an optimisation that is asked for what there is not
+│   └── LimitsError   a program whose limits no feed and speed can keep
 ├── ModelError        an anomaly model that cannot be trained, read or used (twin/anomaly/errors.py)
 ├── ResidualError     a residual model that cannot be trained, read or used (twin/residual/errors.py)
 ├── PointerError      a current.json that names no model (twin/models/errors.py)
@@ -41,7 +42,11 @@ class EffectError(TwinError):
 
 
 class OptimisationError(TwinError):
-    """Limits that leave a line nothing, or a question that cannot be put."""
+    """A program in which nothing may be changed, or a question that cannot be put."""
+
+
+class LimitsError(OptimisationError):
+    """Limits that leave a line nothing: the answer is bad news, the question was not wrong."""
 
 
 class ProgramError(TwinError):

@@ -10,8 +10,10 @@ _WARNING = "M16 8.5v10M16 22.6v.4"
 
 def headline(answer: Optimised) -> Markup:
     """What was optimised, whether every limit is kept, and the sentence."""
-    kept = answer.after.over == 0
+    kept = answer.after.over == 0 and not answer.collisions
     word = "All limits kept" if kept else f"{counted(answer.after.over, 'line')} above a limit"
+    if answer.collisions:
+        word = f"A rapid goes into material in line {answer.collisions[0]:,}"
     machine = f"by the twin of {shortened(answer.machine)}" if answer.machine else ""
     return tag(
         "header",

@@ -105,7 +105,7 @@ def _row(line: LineAnswer, over: Sequence[str], *, with_cost: bool) -> Markup:
             tag("span", " becomes ", class_="unseen"),
             tag("code", arrow, shortened(line.text_after.strip()), class_="became"),
         ]
-    force = [to(column(before.force_n, 3), column(after.force_n, 3))]
+    force = [to(column(before.force_n, 3), column(after.force_n, 3)) if line.force_known else Markup("–")]
     if FORCE in over:
         force.append(tag("span", " ▲", class_="above", title="above the limit"))
     cells = [

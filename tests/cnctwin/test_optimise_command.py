@@ -51,6 +51,8 @@ def test_a_program_may_read_the_answer_and_bytes_of_comments_stay(tmp_path: Path
         (("--force-limit-n", "0"), 2, "the force limit is 0.0 N"),
         (("--force-limit-n", "1"), 1, "line 7: even 100 mm/min at 8000 rev/min give 6.9 N, more than 1 N"),
         (("--feed-range", "500"), 2, "--feed-range 500: is no range; write it as 100:3000"),
+        (("--pick", "1"), 2, "pick is 1, and the objective time; only a front has programs to pick from"),
+        (("--leave", "9999"), 2, "line 9999 is to be left alone, and is no line that feeds"),
         (("--population", "5"), 2, "population is 5; it has to be even"),
         (("--probability", "2"), 2, "the probability is 2.0"),
     ],
@@ -62,6 +64,20 @@ def test_what_is_wrong_is_one_line(tmp_path: Path, options: tuple[str, ...], cod
     assert done.stderr.count("\n") == 1
     assert done.returncode == code
     assert not (tmp_path / "out.nc").exists()
+
+
+@pytest.mark.parametrize(
+    ("out", "says"),
+    [(".", "is a folder"), ("m.toml", "write the program under another name"), ("nowhere/o.nc", "there is no such folder")],
+)
+def test_a_place_where_the_answer_cannot_go_is_refused_at_once(tmp_path: Path, out: str, says: str) -> None:
+    machine = tmp_path / "m.toml"
+    machine.write_bytes(MACHINE.read_bytes())
+    done = optimise("--out", tmp_path / out, machine=machine)
+    assert done.returncode == 2
+    assert says in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert machine.read_bytes() == MACHINE.read_bytes()
 
 
 def test_a_search_that_was_interrupted_goes_on(tmp_path: Path) -> None:

@@ -57,7 +57,8 @@ class LineAnswer:
     """One source line of the program that cuts or feeds (0-based `line`; people and controls count from 1).
 
     text_before, text_after: of the line; cut_mm: way in material, length_mm: way in all, of one execution; times: executions
-    axial_depth_mm: greatest; before, after: None where the line is left alone; binds: empty = left alone, then `left_alone` why
+    axial_depth_mm: greatest; binds: empty where nothing does, or where the line is left alone: `left_alone` then says why
+    force_known: not where its end face cuts: force, power, torque and chip are then not those of the cut
     bound: feed, mm/min, and speed, rev/min, that would be best for this line if changes of speed were free and axes ideal
     """
 
@@ -73,6 +74,7 @@ class LineAnswer:
     binds: str
     bound: tuple[float, float] | None = None
     left_alone: str = ""
+    force_known: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,6 +179,7 @@ class Optimised:
     """The answer. `program` is the whole text; `diff` unified; `sentence` says it in one.
 
     objective: as asked; currency: empty without [cost]; limits: name → figure with its unit, as they were kept
+    collisions: lines (from 1) with a rapid into material, of the program as it came too
     """
 
     name: str
@@ -196,6 +199,7 @@ class Optimised:
     notes: tuple[str, ...]
     diff: str
     program: str
+    collisions: tuple[int, ...] = ()
 
     def as_json(self) -> dict[str, Any]:
         """Everything but the program's text, for a program to read; infinities become null."""

@@ -53,6 +53,7 @@ def answered(
         notes=_notes(made, question),
         diff="\n".join(difflib.unified_diff(old, new, question.name, f"{question.name}, optimised", lineterm="", n=1)),
         program=text.text,
+        collisions=made.program.collisions,
     )
 
 
@@ -110,6 +111,7 @@ def _lines(made: Problem, before: ShownLines, after: ShownLines, text: Rewritten
                 binds="" if row is None else what_binds(made, row, after.line(k), objective),
                 bound=None if row is None else (float(feed[row]), float(rpm[row])),
                 left_alone=line.left_alone,
+                force_known=not line.plunges,
             )
         )
     return tuple(answers)
@@ -126,6 +128,8 @@ def _sentence(question: Question, made: Problem, figures: list[Totals], bound: B
         parts.append(f"{before.cost:.4g} to {after.cost:.4g} {made.economy.currency} ({change(before.cost, after.cost)})")
     force = f"greatest force {after.force_n:.1f} N"
     parts.append(force + (f" of {limits.force_n:g} N" if limits.force_n is not None else ""))
+    if made.program.collisions:
+        parts.append(f"a RAPID GOES INTO MATERIAL in line {made.program.collisions[0]}")
     if before.over:
         parts.append(f"{before.over} lines were above a limit, now {after.over or 'none'}")
     what = "the exact optimum" if bound.exact else "a bound that no program is below"
@@ -143,6 +147,8 @@ def _notes(made: Problem, question: Question) -> tuple[str, ...]:
     if made.program.machine.program is None:
         notes.append("no [program]: time is length over feed; corners, ramps and changes of speed take none")
     alone = [line for line in made.program.lines if line.left_alone]
+    if plunging := sum(line.plunges for line in made.program.lines):
+        notes.append(f"the force of {plunging} lines that go down into material is not modelled: it is in no figure and no limit")
     if alone:
         notes.append(f"{len(alone)} of {len(made.program.lines)} feed lines are left alone")
     if made.economy is not None and not made.economy.wears_in_cut:

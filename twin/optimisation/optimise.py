@@ -80,6 +80,7 @@ def optimise(question: Question, hooks: Hooks = NO_HOOKS, checkpoint: str | None
     """
     began = hooks.clock()
     hooks.progress(0.0, "reading the program")
+    _check_lines(question)
     question = _followed(question.with_(margin=margin(question)))
     for _ in range(FREEZES_MAX):
         made = problem(question)
@@ -113,6 +114,14 @@ def optimise(question: Question, hooks: Hooks = NO_HOOKS, checkpoint: str | None
     return answered(question, made, text, how, front, again)
 
 
+def _check_lines(question: Question) -> None:
+    """Raises OptimisationError where a line that is to be left alone is no line that feeds."""
+    feeding = {line.line for line in problem(question).program.lines}
+    for line in question.left_alone:
+        if line not in feeding:
+            raise OptimisationError(f"line {line + 1} is to be left alone, and is no line that feeds")
+
+
 def _followed(question: Question) -> Question:
     """The question with the lines left alone whose words the control would not follow: found out before the search."""
     for _ in range(FREEZES_MAX):
@@ -130,7 +139,7 @@ def _followed(question: Question) -> Question:
 
 def search(question: Question, hooks: Hooks, checkpoint: str | None) -> Searched:
     """The islands, epoch by epoch. The checkpoint of the same question is gone on with, and gives the same answer."""
-    made, digest = problem(question), question.digest()
+    made, digest = problem(question), question.with_(pick=None).digest()
     if not made.genes:
         raise OptimisationError(_nothing_free(made))
     states: list[Any] = [None] * question.islands

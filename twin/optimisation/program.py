@@ -43,6 +43,7 @@ class FeedLine:
     feed_mm_min, rpm: as programmed at its first execution; length_mm, cut_mm: of all executions together
     cuts: rows of `Cuts` that belong to it; left_alone: why nothing of it may be changed, empty = both feed and speed are free
     needs_speed: it is left alone, and needs the speed that it was written for
+    plunges: its end face cuts
     inch: its F word counts inch/min; plain_feed: its feed is a length a minute, so that an F word of its own says the same
     """
 
@@ -56,6 +57,7 @@ class FeedLine:
     cuts: tuple[int, int]
     left_alone: str = ""
     needs_speed: bool = False
+    plunges: bool = False
     inch: bool = False
     plain_feed: bool = True
 
@@ -86,7 +88,7 @@ class Cuts:
 class Programmed:
     """A program on a machine. moves: canonical; tools: those that it uses, with their numbers (0 = [tool])
 
-    notes: sentences on what the machine description does not say
+    notes: sentences on what the machine description does not say; collisions: lines (from 1) with a rapid into material
     """
 
     machine: MachineFile
@@ -96,6 +98,7 @@ class Programmed:
     cuts: Cuts
     tools: tuple[tuple[int, Tool], ...]
     notes: tuple[str, ...]
+    collisions: tuple[int, ...] = ()
 
 
 def programmed(
@@ -118,12 +121,12 @@ def programmed(
         raise MachineError("no [stock]: what a line cuts is not known; write [stock], or give a run log with --engagement")
     numbers, tools = _tools(machine, path)
     notes = _tool_notes(machine, path)
-    rows = None
+    rows: PathRows | None = None
+    collisions: tuple[int, ...] = ()
     if engagement is None and machine.stock is not None:
-        rows = engaged_along(path, machine.stock, _sections(numbers, tools))
-        for hit in rows.collisions[:3]:
-            place = ", ".join(f"{v:.1f}" for v in hit.position_mm)
-            notes.append(f"line {int(path.line[hit.segment]) + 1}: rapid into material at {place} mm")
+        rows = engaged_along(path, machine.stock, _sections(numbers, tools, _unknown_start(path)))
+        notes += _collision_notes(path, rows)
+        collisions = tuple(sorted({int(path.line[hit.segment]) + 1 for hit in rows.collisions}))
     speeds = path.commanded_rpm()
     tied = {move.line for move in moves if isinstance(move, Linear | Arc) and move.feed_per_rev_mm is not None}
     source = source_lines(text)
@@ -152,7 +155,7 @@ def programmed(
             )
         )
         groups.append(found.rows)
-    return _numbered(Programmed(machine, text, path, tuple(lines), _no_cuts(), tuple(tools), tuple(notes)), groups)
+    return _numbered(Programmed(machine, text, path, tuple(lines), _no_cuts(), tuple(tools), tuple(notes), collisions), groups)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -189,9 +192,31 @@ def _tool_notes(machine: MachineFile, path: Path) -> list[str]:
     return [f"the program has {len(numbers)} tools; {taken}: write [tools.N]"]
 
 
-def _sections(index: Ints, tools: Sequence[tuple[int, Tool]]) -> list[Section]:
-    edges = np.concatenate([[0], np.flatnonzero(np.diff(index)) + 1, [len(index)]]) if len(index) else np.zeros(1, np.int64)
-    return [Section(int(a), int(b), tools[int(index[a])][1].diameter_mm if index[a] >= 0 else 0.0) for a, b in pairwise(edges)]
+def _collision_notes(path: Path, rows: PathRows) -> list[str]:
+    """Where rapids go into material, the first three."""
+    said = []
+    for hit in rows.collisions[:3]:
+        place = ", ".join(f"{v:.1f}" for v in hit.position_mm)
+        said.append(f"line {int(path.line[hit.segment]) + 1}: rapid into material at {place} mm")
+    return said
+
+
+def _unknown_start(path: Path) -> int:
+    """How many rapids come before the first motion of Z: where they go from is not known, so they meet nothing."""
+    level = (path.kind == Kind.RAPID) & (path.start_mm[:, 2] == path.end_mm[:, 2])
+    count = int(np.argmin(level)) if not level.all() else len(path)
+    leaves_z = count < len(path) and path.kind[count] == Kind.RAPID
+    return count + leaves_z if count or leaves_z else 0
+
+
+def _sections(index: Ints, tools: Sequence[tuple[int, Tool]], unknown: int) -> list[Section]:
+    if not len(index):
+        return []
+    edges = np.unique(np.concatenate([[0, unknown], np.flatnonzero(np.diff(index)) + 1, [len(index)]]))
+    return [
+        Section(int(a), int(b), tools[int(index[a])][1].diameter_mm if index[a] >= 0 and a >= unknown else 0.0)
+        for a, b in pairwise(edges)
+    ]
 
 
 def _executions(path: Path) -> dict[int, tuple[tuple[int, int], ...]]:

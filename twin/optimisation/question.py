@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, field, replace
 from functools import lru_cache
 from typing import Any, Self
 
-from twin.errors import OptimisationError
+from twin.errors import LimitsError, OptimisationError
 from twin.machine import machine_from_toml
 from twin.optimisation.allowed import Impossible, allowed, limits_of
 from twin.optimisation.answer import Objective
@@ -59,6 +59,10 @@ class Question:
             raise OptimisationError(f"population is {self.population}; it has to be even")
         if self.force_limit_n is not None and not 0.0 < self.force_limit_n < float("inf"):
             raise OptimisationError(f"the force limit is {self.force_limit_n} N; it has to be more than 0")
+        if self.pick is not None and self.objective is not Objective.PARETO:
+            raise OptimisationError(
+                f"pick is {self.pick}, and the objective {self.objective}; only a front has programs to pick from"
+            )
         if self.probability is not None and not 0.5 <= self.probability <= 0.9999:
             raise OptimisationError(f"the probability is {self.probability}; it has to be from 0.5 to 0.9999")
 
@@ -87,13 +91,13 @@ class Question:
 def problem(question: Question) -> Problem:
     """The problem that a question makes; worked out once for the same question.
 
-    Raises TwinError where program or machine are at fault, OptimisationError where the limits leave a line nothing.
+    Raises TwinError where program or machine are at fault, LimitsError where the limits leave a line nothing.
     """
     made, impossible = _made(question.to_json())
     if impossible:
         first, more = impossible[0], len(impossible) - 1
         line = made.program.lines[first.at].line + 1
-        raise OptimisationError(f"line {line}: {first.why}" + (f" (and {more} more lines)" if more else ""))
+        raise LimitsError(f"line {line}: {first.why}" + (f" (and {more} more lines)" if more else ""))
     return made
 
 

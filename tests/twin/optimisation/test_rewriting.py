@@ -116,6 +116,22 @@ def test_a_block_that_is_skipped_takes_no_feed_or_speed_with_it(skip: frozenset[
     )
 
 
+@pytest.mark.parametrize(
+    ("head", "lines"),
+    [
+        ("G21 G90\nS8000 M3\nG0 X30. Y5.\nG0 Z10.\nX-10.\nZ-0.4\nG1 X60. F400\n", ()),
+        ("G21 G90\nS8000 M3\nG0 Z10.\nX-10. Y30.\nZ-2.\nX30.\nG1 X60. F400\n", (6,)),
+    ],
+    ids=["from where nobody knows", "through the stock"],
+)
+def test_a_rapid_into_material_is_said_first(head: str, lines: tuple[int, ...]) -> None:
+    stock = machine_with(text("second.toml"), stock={"min_mm": [0.0, -10.0, -10.0], "max_mm": [50.0, 50.0, 0.5]})
+    answer = optimise(Question(head + "G0 Z10.\nM30\n", stock).with_(**SHORT))
+    assert answer.collisions == lines
+    assert ("a RAPID GOES INTO MATERIAL in line 6" in answer.sentence) == bool(lines)
+    assert any("rapid into material" in note for note in answer.notes) == bool(lines)
+
+
 def test_a_line_that_is_asked_to_be_left_alone_is() -> None:
     answer = optimise(asked("G1 X30. F400\nX60. F300\n", left_alone={8: "it was to be left alone"}))
     assert "G1 X30. F400" in answer.program
