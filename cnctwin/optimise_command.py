@@ -130,10 +130,11 @@ def _run(question: "asked.Question", how: Run) -> int:
     except LimitsError as error:
         print(f"cnctwin: {question.name}: {error}", file=sys.stderr)
         return 1
+    code = 1 if found.after.over or found.collisions else 0
     beside = paper_search(question, time.perf_counter) if how.paper else None
     if how.as_json:
         sys.stdout.write(json.dumps(found.as_json() | {"out": str(how.out)}) + "\n")
-        return 0
+        return code
     console = Console(width=None if sys.stdout.isatty() else 120)
     _show(found, console)
     if beside is not None:
@@ -145,7 +146,7 @@ def _run(question: "asked.Question", how: Run) -> int:
         )
         console.print(line, markup=False, highlight=False, soft_wrap=True)
     console.print(f"{files.program}, {files.report}, {files.answer}", markup=False, highlight=False, soft_wrap=True)
-    return 0
+    return code
 
 
 def _with_ranges(machine: "MachineFile", feed: str | None, speed: str | None) -> "MachineFile":

@@ -11,7 +11,9 @@ _WARNING = "M16 8.5v10M16 22.6v.4"
 def headline(answer: Optimised) -> Markup:
     """What was optimised, whether every limit is kept, and the sentence."""
     kept = answer.after.over == 0 and not answer.collisions
-    word = "All limits kept" if kept else f"{counted(answer.after.over, 'line')} above a limit"
+    mean = answer.sensitivity is not None and answer.sensitivity.asked is None
+    sure = f" by the mean twin, that of force with {probability(answer.sensitivity.kept)}" if mean and answer.sensitivity else ""
+    word = f"All limits kept{sure}" if kept else f"{counted(answer.after.over, 'line')} above a limit"
     if answer.collisions:
         word = f"A rapid goes into material in line {answer.collisions[0]:,}"
     machine = f"by the twin of {shortened(answer.machine)}" if answer.machine else ""

@@ -7,6 +7,7 @@ which the power of the cut is what the spindle leaves at this speed. A feed may 
 """
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
@@ -25,7 +26,7 @@ from twin.process.stability import ChatterCut, stable_speeds
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Span = tuple[float, float]
-NODES = 17
+NODES, NODES_FROM, ADVANCE_TOP_MM, SPEEDS = 129, 1e-5, 10.0, 33
 HAIR = 1e-9
 STEADY_TEETH = 4
 INTERRUPTED = 2.0
@@ -48,7 +49,7 @@ class Allowed:
     teeth: of its tool, 1 where it has none; advance_max_mm with its reason; feed_low, feed_high: range of the feed word
     feed_ratio: real feed over the programmed one; spans: speeds that each may have
     nodes_mm, nodes_n: (lines, NODES) greatest mean tangential force at advances; power_w(n) from `spindle`, None = no limit
-    diameter_mm, chip_low_mm: lowest advance for the lowest chip
+    diameter_mm: of its tool; advance_low_mm: the advance that makes the lowest chip
     """
 
     index: Ints
@@ -80,7 +81,8 @@ class Allowed:
         may_bind = self.cutting & (force < self.nodes_n[:, -1])
         for line in np.flatnonzero(may_bind.reshape(-1, len(self)).any(axis=0)):
             wanted = force[..., line]
-            inside = np.interp(wanted, self.nodes_n[line], self.nodes_mm[line], left=0.0)
+            with np.errstate(divide="ignore"):
+                inside = np.exp(np.interp(np.log(wanted), np.log(self.nodes_n[line]), np.log(self.nodes_mm[line]), left=-np.inf))
             out[..., line] = np.where(wanted >= self.nodes_n[line, -1], np.inf, inside)
         return out
 
@@ -133,7 +135,7 @@ def _allowed(
 ) -> Allowed:  # fmt: skip
     lines = [program.lines[k] for k in kept]
     tools = [program.tools[line.tool][1] if line.tool >= 0 else None for line in lines]
-    nodes_mm, nodes_n = _nodes(lines, forces, advance)
+    nodes_mm, nodes_n = _nodes(lines, forces, advance, spindle, limits.spindle_rpm[1])
     return Allowed(
         index=np.array(kept, dtype=np.int64),
         cutting=np.array([line.cutting for line in lines], dtype=np.bool_),
@@ -171,25 +173,41 @@ def _advances(program: Programmed, forces: CutForces, limits: Limits) -> tuple[F
     return advance, reasons
 
 
-def _nodes(lines: list[FeedLine], forces: CutForces, advance: Floats) -> tuple[Floats, Floats]:
-    """The mean tangential force of the worst cut of each line, at advances from nearly 0 to its greatest."""
-    part = np.linspace(0.0, 1.0, NODES) ** 2
-    part[0] = 1e-4
+def _nodes(
+    lines: list[FeedLine], forces: CutForces, advance: Floats, spindle: SpindlePower | None, high_rpm: float
+) -> tuple[Floats, Floats]:
+    """The mean tangential force of the worst cut of each line at advances up to its greatest, evenly in their logarithm.
+
+    Where power cannot bind, at no speed and at the greatest advance, the greatest alone is worked out.
+    """
     # without a limit of the advance, power alone is one: the table then ends at a chip that no tool takes
-    top = np.minimum(np.where(advance > 0.0, advance, 1.0), 10.0)
-    nodes_mm = np.ascontiguousarray(top[:, None] * part)
+    top = np.minimum(np.where(advance > 0.0, advance, 1.0), ADVANCE_TOP_MM)
+    nodes_mm = np.ascontiguousarray(top[:, None] * np.geomspace(NODES_FROM, 1.0, NODES))
     nodes_n = np.zeros((len(lines), NODES))
-    owner = {k: i for i, k in enumerate(lines)}
-    for node in range(NODES):
-        advances = np.zeros(len(forces.cuts))
-        for line, i in owner.items():
-            advances[slice(*line.cuts)] = nodes_mm[i, node]
-        if len(forces.cuts):
-            force = forces.tangential_n(advances)
-            for line, i in owner.items():
-                if line.cutting:
-                    nodes_n[i, node] = force[slice(*line.cuts)].max()
+    nodes_n[:, -1] = _worst_tangential(lines, forces, top, range(len(lines)))
+    grid = np.linspace(high_rpm / SPEEDS, high_rpm, SPEEDS)
+    for k, line in enumerate(lines):
+        if spindle is None or not line.cutting:
+            continue
+        speed_m_s = np.pi * forces.diameter_mm[line.cuts[0]] * grid / 60_000.0
+        if (nodes_n[k, -1] * speed_m_s > spindle.allowed_cutting_w(grid)).any():
+            for node in range(NODES - 1):
+                nodes_n[k, node] = _worst_tangential(lines, forces, nodes_mm[:, node], [k])[k]
     return nodes_mm, nodes_n
+
+
+def _worst_tangential(lines: list[FeedLine], forces: CutForces, advance: Floats, which: Iterable[int]) -> Floats:
+    out = np.zeros(len(lines))
+    chosen = [k for k in which if lines[k].cutting]
+    if chosen:
+        rows = np.concatenate([np.arange(*lines[k].cuts) for k in chosen])
+        force = forces.tangential_n(
+            np.concatenate([np.full(lines[k].cuts[1] - lines[k].cuts[0], advance[k]) for k in chosen]), rows
+        )
+        ends = np.cumsum([lines[k].cuts[1] - lines[k].cuts[0] for k in chosen])
+        for k, part in zip(chosen, np.split(force, ends[:-1]), strict=True):
+            out[k] = part.max()
+    return out
 
 
 def _range(limits: Limits) -> Span:

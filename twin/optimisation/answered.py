@@ -4,7 +4,7 @@ import difflib
 
 from twin.errors import OptimisationError
 from twin.machine import Limits
-from twin.motion.path import Path
+from twin.motion.path import Kind, Path
 from twin.optimisation.allowed import limits_of
 from twin.optimisation.answer import Bound, FrontPoint, LineAnswer, Objective, Optimised, Resimulated, Search, Totals
 from twin.optimisation.bound import bound_of
@@ -50,7 +50,7 @@ def answered(
         sensitivity=known,
         search=how,
         resimulated=again,
-        notes=_notes(made, question),
+        notes=_notes(made, question, text.path),
         diff="\n".join(difflib.unified_diff(old, new, question.name, f"{question.name}, optimised", lineterm="", n=1)),
         program=text.text,
         collisions=made.program.collisions,
@@ -63,6 +63,10 @@ def _bound_of_front(made: Problem, front: tuple[FrontPoint, ...]) -> Bound:
     fastest = bound_of(made, Objective.TIME, min(point.seconds for point in front))
     how = f"of the cheapest program; the fastest is {_part(fastest.distance)} above the least time of {fastest.value:.2f} s"
     return Bound(cheapest.value, cheapest.distance, cheapest.exact and fastest.exact, f"{how}; {cheapest.how}")
+
+
+def _lines_of(count: int) -> str:
+    return f"{count} line{'' if count == 1 else 's'}"
 
 
 def _part(part: float) -> str:
@@ -123,15 +127,18 @@ def _sentence(question: Question, made: Problem, figures: list[Totals], bound: B
     def change(old: float, new: float) -> str:
         return f"{100 * (new / old - 1):+.1f} %".replace("-", "−")
 
-    parts = [f"{before.seconds:.2f} s to {after.seconds:.2f} s ({change(before.seconds, after.seconds)})"]
+    parts = []
+    if made.program.collisions:
+        parts.append(f"a RAPID GOES INTO MATERIAL in line {made.program.collisions[0]}")
+    if after.over:
+        parts.append(f"{_lines_of(after.over)} left alone ABOVE A LIMIT")
+    parts.append(f"{before.seconds:.2f} s to {after.seconds:.2f} s ({change(before.seconds, after.seconds)})")
     if before.cost is not None and after.cost is not None and made.economy is not None:
         parts.append(f"{before.cost:.4g} to {after.cost:.4g} {made.economy.currency} ({change(before.cost, after.cost)})")
     force = f"greatest force {after.force_n:.1f} N"
     parts.append(force + (f" of {limits.force_n:g} N" if limits.force_n is not None else ""))
-    if made.program.collisions:
-        parts.append(f"a RAPID GOES INTO MATERIAL in line {made.program.collisions[0]}")
     if before.over:
-        parts.append(f"{before.over} lines were above a limit, now {after.over or 'none'}")
+        parts.append(f"{_lines_of(before.over)} above a limit before, now {after.over or 'none'}")
     what = "the exact optimum" if bound.exact else "a bound that no program is below"
     which = (
         f"the front's cheapest {_part(bound.distance)}"
@@ -142,8 +149,31 @@ def _sentence(question: Question, made: Problem, figures: list[Totals], bound: B
     return "; ".join(parts)
 
 
-def _notes(made: Problem, question: Question) -> tuple[str, ...]:
+def _changes_in_material(made: Problem, path: Path) -> int:
+    """How often the spindle changes its speed between two cuts that no rapid parts: the tool stands in the material meanwhile."""
+    rpm = path.commanded_rpm()
+    begins = {a: line for line in made.program.lines for a, _ in line.executions}
+    count, last = 0, -1.0
+    for k in range(len(path)):
+        if path.kind[k] == Kind.RAPID:
+            last = -1.0
+        elif (line := begins.get(k)) is not None:
+            cuts = line.cutting or line.plunges
+            count += cuts and last > 0.0 and rpm[k] != last
+            last = float(rpm[k]) if cuts else -1.0
+    return count
+
+
+def _notes(made: Problem, question: Question, path: Path) -> tuple[str, ...]:
     notes = list(made.program.notes)
+    if changes := _changes_in_material(made, path):
+        times = "once" if changes == 1 else f"{changes} times"
+        waits = (
+            "the control is taken to wait there until the speed is reached; if yours does not, the chip is another one meanwhile"
+        )
+        notes.append(
+            f"the spindle changes its speed {times} while the tool is in the material: {waits} (--speed-range holds one speed)"
+        )
     if made.program.machine.program is None:
         notes.append("no [program]: time is length over feed; corners, ramps and changes of speed take none")
     alone = [line for line in made.program.lines if line.left_alone]

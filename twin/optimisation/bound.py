@@ -6,7 +6,8 @@ the sum of what each line costs by itself at its best, or what that time costs b
 whichever is more. Where the control is ideal (length over feed, speeds that change for nothing) a program reaches it.
 """
 
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,9 +22,7 @@ from twin.optimisation.seeds import closed_form
 
 Floats = NDArray[np.float64]
 REACHED = 1e-9
-SPEEDS = 513
-GRID_IS_SHORT = 0.999
-"""The least of a grid is above the least there is; a bound has to be below it."""
+CELLS = 1024
 
 
 class Ramp(NamedTuple):
@@ -45,6 +44,7 @@ def bound_of(problem: Problem, objective: Objective, value: float) -> Bound:
     else:
         least, here = _least_cost(problem, feed, rpm, seconds, ramps), float(reached.cost[0])
     exact = here <= least * (1.0 + REACHED)
+    least = min(least, here)  # a program is there, so it is no bound that is above it
     how = (
         "each line at its own best, which a program reaches: the control is ideal, and speeds change for nothing"
         if exact
@@ -96,11 +96,28 @@ def _waits_s(problem: Problem, ramps: tuple[Ramp, ...], row: int, rpm: Floats) -
     return waits
 
 
-def _grid(problem: Problem, row: int) -> tuple[Floats, Floats]:
-    """Speeds of a line, and the real feed that each allows."""
-    allowed = problem.allowed
-    speeds = np.concatenate([np.linspace(a, b, SPEEDS) for a, b in allowed.spans[row]])
-    return speeds, allowed.line(row).feed_max(speeds[:, None])[:, 0] * allowed.feed_ratio
+@dataclass(frozen=True, slots=True, eq=False)
+class Cells:
+    """Pieces of the speeds of a line, each (cells,): no speed in a piece allows more real feed than `feed`, nor is below `rpm`.
+
+    Where f / n does not grow (a greatest advance, a constant feed or power), f ≤ f(n₀) n₁ / n₀ in [n₀, n₁]; where it
+    grows (a power that grows with the speed), f grows too, and f ≤ f(n₁).
+    """
+
+    rpm: Floats
+    feed: Floats
+
+    @classmethod
+    def of(cls, problem: Problem, row: int) -> Self:
+        """Of one line."""
+        allowed, rpm, feed = problem.allowed, [], []
+        for a, b in allowed.spans[row]:
+            edges = np.geomspace(a, b, CELLS + 1) if b > a else np.array([a, a])
+            at = allowed.line(row).feed_max(edges[:, None])[:, 0] * allowed.feed_ratio
+            rpm.append(edges[:-1])
+            most = np.maximum(at[:-1] * edges[1:] / edges[:-1], at[1:])
+            feed.append(np.minimum(most, allowed.feed_high * allowed.feed_ratio))
+        return cls(np.concatenate(rpm), np.concatenate(feed))
 
 
 def _least_seconds(problem: Problem, ideal: Plan, ramps: tuple[Ramp, ...]) -> float:
@@ -109,9 +126,9 @@ def _least_seconds(problem: Problem, ideal: Plan, ramps: tuple[Ramp, ...]) -> fl
     for row in sorted({ramp.row for ramp in ramps}):
         line = problem.program.lines[int(problem.allowed.index[row])]
         at_best = sum(float(ideal.duration_s[a:b].sum()) for a, b in line.executions)
-        speeds, feeds = _grid(problem, row)
-        slower = np.maximum(60.0 * line.length_mm / feeds - at_best, 0.0)
-        seconds += float((slower + _waits_s(problem, ramps, row, speeds)).min()) * GRID_IS_SHORT
+        cells = Cells.of(problem, row)
+        slower = np.maximum(60.0 * line.length_mm / cells.feed - at_best, 0.0)
+        seconds += float((slower + _waits_s(problem, ramps, row, cells.rpm)).min())
     return seconds
 
 
@@ -123,12 +140,12 @@ def _least_cost(problem: Problem, feed: Floats, rpm: Floats, seconds: float, ram
     starting = {ramp.row for ramp in ramps}
     own, tools, real = 0.0, 0.0, feed * problem.allowed.feed_ratio
     for row in problem.cutting.tolist():
-        speeds, feeds = _grid(problem, row)
-        tools += float(wear.of_line(row, feeds, speeds).min()) * GRID_IS_SHORT
+        cells = Cells.of(problem, row)
+        tools += float(wear.of_line(row, cells.feed, cells.rpm).min())
         alone = float(worth.of_line(row, real[row : row + 1], rpm[row : row + 1])[0])
         if row in starting:
-            waits = economy.per_second * _waits_s(problem, ramps, row, speeds)
-            alone = max(alone, float((worth.of_line(row, feeds, speeds) + waits).min()) * GRID_IS_SHORT)
+            waits = economy.per_second * _waits_s(problem, ramps, row, cells.rpm)
+            alone = max(alone, float((worth.of_line(row, cells.feed, cells.rpm) + waits).min()))
         own += alone
     separate = own + beside.nobody_s * economy.per_second + beside.nobody_worn * economy.per_tool
     together = seconds * economy.per_second + tools + beside.nobody_worn * economy.per_tool

@@ -27,10 +27,14 @@ ADVANCE_MAX_MM = 1e3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CutForces:
-    """The cuts of a program with the tools that make them. Advances c are mm a tooth period, (cuts,) or a number."""
+    """The cuts of a program with the tools that make them. Advances c are mm a tooth period, (cuts,) or a number.
+
+    numbers: where each tool is described: `tool`, or `tools.7`
+    """
 
     cuts: Cuts
     tools: tuple[Tool, ...]
+    numbers: tuple[str, ...]
     tool_of_cut: Ints
     effects: tuple[str, ...]
     effect_constants: Mapping[str, float] = field(default_factory=dict)
@@ -41,7 +45,8 @@ class CutForces:
         added = process_effects(program.machine)
         constants = {f"{e}__{k}": v for e, given in added.items() for k, v in effect_named(e).checked(given).items()}
         tool = np.array([program.lines[int(line)].tool for line in program.cuts.line], dtype=np.int64)
-        return cls(program.cuts, tuple(tool for _, tool in program.tools), tool, tuple(added), constants)
+        named = tuple(f"tools.{n}" if str(n) in program.machine.tools else "tool" for n, _ in program.tools)
+        return cls(program.cuts, tuple(tool for _, tool in program.tools), named, tool, tuple(added), constants)
 
     @property
     def teeth(self) -> Ints:
@@ -55,7 +60,8 @@ class CutForces:
 
     def peak_n(self, advance_mm: ArrayLike) -> Floats:
         """Greatest resultant of each cut over a tooth period, (cuts,)."""
-        return self._each(advance_mm, self._peak_of_tool)
+        every = np.arange(len(self.cuts))
+        return np.asarray(self.peaks_n(every, np.broadcast_to(np.asarray(advance_mm, dtype=np.float64), every.shape)[None])[0])
 
     def peaks_n(self, chosen: Ints, advance_mm: Floats) -> Floats:
         """Greatest resultant of some cuts at many advances in one batch, (candidates, chosen)."""
@@ -68,9 +74,16 @@ class CutForces:
                 out[:, mine] = self._peak(tool, constants, cuts, advance_mm[:, mine].ravel())[0].reshape(len(advance_mm), -1)
         return out
 
-    def tangential_n(self, advance_mm: ArrayLike) -> Floats:
-        """Mean over a turn of the tangential force of all teeth, (cuts,)."""
-        return self._each(advance_mm, self._tangential_of_tool)
+    def tangential_n(self, advance_mm: ArrayLike, chosen: Ints | None = None) -> Floats:
+        """Mean over a turn of the tangential force of all teeth, of all cuts or of the chosen ones."""
+        rows = np.arange(len(self.cuts)) if chosen is None else chosen
+        advance = np.broadcast_to(np.asarray(advance_mm, dtype=np.float64), rows.shape)
+        out = np.zeros(len(rows))
+        for index, tool in enumerate(self.tools):
+            mine = np.flatnonzero(self.tool_of_cut[rows] == index)
+            if len(mine):
+                out[mine] = self._tangential_of_tool(tool, rows[mine], advance[mine])
+        return out
 
     def chip_ratio(self) -> Floats:
         """Greatest chip thickness over c: 1 where the arc goes through the middle, else the larger sine of its ends, (cuts,)."""
@@ -90,24 +103,11 @@ class CutForces:
             if len(mine):
                 constants: dict[str, ArrayLike] = {**tool_constants(tool), **self.effect_constants}
                 for path, factor in drawn.items():
-                    name = constant_name(path)
-                    if name in constants:
+                    where, name = constant_name(path)
+                    if name in constants and where in ("", self.numbers[index]):
                         constants[name] = np.asarray(constants[name]) * factor
                 out[:, mine] = self._peak(tool, constants, chosen[mine], advance_mm[mine])
         return out
-
-    def _each(self, advance_mm: ArrayLike, of_tool: Callable[[Tool, Ints, Floats], Floats]) -> Floats:
-        advance = np.broadcast_to(np.asarray(advance_mm, dtype=np.float64), (len(self.cuts),))
-        out = np.zeros(len(self.cuts))
-        for index, tool in enumerate(self.tools):
-            mine = np.flatnonzero(self.tool_of_cut == index)
-            if len(mine):
-                out[mine] = of_tool(tool, mine, advance[mine])
-        return out
-
-    def _peak_of_tool(self, tool: Tool, mine: Ints, advance: Floats) -> Floats:
-        constants: dict[str, ArrayLike] = {**tool_constants(tool), **self.effect_constants}
-        return np.asarray(self._peak(tool, constants, mine, advance)[0])
 
     def _peak(self, tool: Tool, constants: Mapping[str, ArrayLike], mine: Ints, advance: Floats) -> Floats:
         cuts, feed = self.cuts, advance * tool.teeth * RPM
@@ -129,14 +129,14 @@ def process_effects(machine: MachineFile) -> dict[str, Mapping[str, float]]:
     return {e.effect: e.parameters for e in machine.effects if set(effect_named(e.effect).changes) & set(process_quantities())}
 
 
-def constant_name(path: str) -> str:
-    """The constant of the cut that a path of [uncertainty] names.
+def constant_name(path: str) -> tuple[str, str]:
+    """Whose constant of the cut a path of [uncertainty] names (of all tools: empty), and which.
 
-    >>> constant_name("tool.radial_ratio"), constant_name("effects.edge_force.radial_n_per_mm")
-    ('radial_ratio', 'edge_force__radial_n_per_mm')
+    >>> constant_name("tools.7.radial_ratio"), constant_name("effects.edge_force.radial_n_per_mm")
+    (('tools.7', 'radial_ratio'), ('', 'edge_force__radial_n_per_mm'))
     """
     first, *rest = path.split(".")
-    return "__".join(rest) if first == "effects" else rest[-1]
+    return ("", "__".join(rest)) if first == "effects" else (".".join([first, *rest[:-1]]), rest[-1])
 
 
 def advance_at(force: Callable[[Floats], Floats], limit: Floats, count: int) -> Floats:

@@ -20,20 +20,19 @@ from twin.optimisation.answer import FrontPoint, Objective, Optimised, Search
 from twin.optimisation.answered import answered
 from twin.optimisation.forces import CutForces
 from twin.optimisation.front import knee, not_dominated
-from twin.optimisation.islands import evolve_piece, fitness_of, polished
+from twin.optimisation.islands import TIE, evolve_piece, fitness_of, polished
 from twin.optimisation.margin import advance_of_words, margin
 from twin.optimisation.problem import Problem
 from twin.optimisation.question import Question, problem, single
 from twin.optimisation.resimulation import resimulated
 from twin.optimisation.rewriting import rewritten
 from twin.optimisation.rounding import rounded
-from twin.optimisation.seeds import closed_form, worth_of
+from twin.optimisation.seeds import closed_form, sequence, worth_of
 
 Floats = NDArray[np.float64]
 Spread = Callable[[Callable[[str], str], Sequence[str]], Iterable[str]]
 Progress = Callable[[float, str], None]
 EPOCH = 10
-MARGINS_MAX = 5
 FREEZES_MAX = 8
 FRONT_MAX = 60
 
@@ -86,8 +85,8 @@ def optimise(question: Question, hooks: Hooks = NO_HOOKS, checkpoint: str | None
         made = problem(question)
         searched = search(question, hooks, checkpoint)
         genes, evaluations, chosen = _chosen(made, question, searched)
-        hooks.progress(0.95, "rewriting the program")
-        (feed,), (rpm,) = made.decoded(genes[None])
+        _go_on(hooks, 0.95, "rewriting the program")
+        feed, rpm = _words(made, question, genes)
         text = rewritten(made, *rounded(made, feed, rpm, worth_of(made, single(question.objective))))
         if not text.not_followed:
             break
@@ -97,7 +96,7 @@ def optimise(question: Question, hooks: Hooks = NO_HOOKS, checkpoint: str | None
         raise OptimisationError(f"line {line + 1}: {why}; give it with --leave {line + 1}")
     again = None
     if resimulate:
-        hooks.progress(0.97, "simulating the rewritten program")
+        _go_on(hooks, 0.97, "simulating the rewritten program")
         again = resimulated(made.program.machine, made.program.text, text.text, question.planned is not None)
     front = _front(made, searched, chosen) if question.objective is Objective.PARETO else ()
     how = Search(
@@ -111,7 +110,31 @@ def optimise(question: Question, hooks: Hooks = NO_HOOKS, checkpoint: str | None
         history=searched.history,
         seconds=hooks.clock() - began,
     )
+    _go_on(hooks, 0.99, "what it is worth")
     return answered(question, made, text, how, front, again)
+
+
+def _go_on(hooks: Hooks, part: float, what: str) -> None:
+    """Says what comes next. Raises Stopped where it was asked to stop; the checkpoint of the search is there."""
+    if hooks.stop():
+        raise Stopped
+    hooks.progress(part, what)
+
+
+def _words(made: Problem, question: Question, genes: Floats) -> tuple[Floats, Floats]:
+    """Feeds and speeds of the candidate; or of the closed form or the best sequence, which genes can miss by a hair."""
+    (feed,), (rpm,) = made.decoded(genes[None])
+    if question.objective is Objective.PARETO:
+        return feed, rpm
+    alone = closed_form(made, question.objective)
+    known = [(feed, rpm), alone]
+    if len(made.cutting) > 1:
+        speeds = sequence(made, worth_of(made, question.objective), alone[1])
+        known.append((made.allowed.feed_max(speeds[None])[0], speeds))
+    seconds, cost = made.evaluate_words(np.array([one for one, _ in known]), np.array([one for _, one in known]))
+    value = seconds if question.objective is Objective.TIME else cost
+    best = int(np.argmin(value))
+    return known[best] if value[best] < value[0] * (1.0 - TIE) else known[0]
 
 
 def _check_lines(question: Question) -> None:
@@ -162,7 +185,21 @@ def search(question: Question, hooks: Hooks, checkpoint: str | None) -> Searched
     histories = [state["history"] for state in states]
     best = max if question.objective is Objective.PARETO else min
     history = tuple(float(best(values)) for values in zip(*histories, strict=True))
-    return Searched(genes, np.column_stack(made.evaluate(genes)), history, sum(int(state["evaluations"]) for state in states))
+    evaluations = sum(int(state["evaluations"]) for state in states)
+    if question.objective is Objective.PARETO:
+        genes, more = _with_polished_ends(made, genes)
+        evaluations += more
+    return Searched(genes, np.column_stack(made.evaluate(genes)), history, evaluations)
+
+
+def _with_polished_ends(made: Problem, genes: Floats) -> tuple[Floats, int]:
+    """The candidates, and the fastest and the cheapest of them polished as a search for one of both does it."""
+    evaluations = 0
+    for objective in (Objective.TIME, Objective.COST):
+        fitness = fitness_of(made, objective)
+        better, more = polished(made, genes[int(np.argmin(fitness(genes)))], fitness)
+        genes, evaluations = np.concatenate([genes, better[None]]), evaluations + more + len(genes)
+    return genes, evaluations
 
 
 def _nothing_free(made: Problem) -> str:

@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.engagement.along_path import PathRows, Section, engaged_along
-from twin.errors import MachineError
+from twin.errors import MachineError, OptimisationError
 from twin.gcode import Arc, Linear, interpret
 from twin.machine import MachineFile, Tool
 from twin.motion.path import EventKind, Kind, Path, path_from_moves
-from twin.optimisation.words import codes, figure_mm_min, find_word, inch_lines, source_lines
+from twin.optimisation.words import branches, codes, figure_mm_min, find_word, inch_lines, source_lines
 from twin.runlog import RunLog
 
 Floats = NDArray[np.float64]
@@ -29,9 +29,12 @@ PlannedCuts = Mapping[int, Sequence[Sequence[float]]]
 """Line → [depth mm, entry rad, exit rad] of each of its cuts."""
 END_FACE_MM2 = 1e-3
 """An end face that cuts less than this is the rounding of a level move."""
+CLEARANCE_MM = 1.0
 SHALLOW = 0.02
 """Down to this slope, 1.1°, a ramp is taken for a level cut: its end face takes a fiftieth of the feed."""
 DIGITS, HEADING_STEPS = 6, 24
+NO_FEED = frozenset({0, 100, 280, 300, 520, 530, 650, 920, 921})
+"""Codes whose axis words are no feed, in tenths."""
 PROBING = frozenset({310, 311, 312, 313, 314, 370, 380, 382, 383, 384, 385})
 """G31 and its kin, G37, G38.2 to G38.5, in tenths."""
 
@@ -86,7 +89,7 @@ class Cuts:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Programmed:
-    """A program on a machine. moves: canonical; tools: those that it uses, with their numbers (0 = [tool])
+    """A program on a machine. tools: those that it uses, with their numbers (0 = [tool])
 
     notes: sentences on what the machine description does not say; collisions: lines (from 1) with a rapid into material
     """
@@ -130,6 +133,7 @@ def programmed(
     speeds = path.commanded_rpm()
     tied = {move.line for move in moves if isinstance(move, Linear | Arc) and move.feed_per_rev_mm is not None}
     source = source_lines(text)
+    _check_branches(source, {move.line for move in moves})
     inch = inch_lines(source)
     lines, groups = [], []
     for line, executions in _executions(path).items():
@@ -144,6 +148,8 @@ def programmed(
         )  # fmt: skip
         why = left_alone.get(line) or _why_not(one, path, tied, numbers[segments], found, speeds[segments])
         why = why or _no_plain_words(source[line]) or _still(source[line], speeds[segments], len(found.rows) > 0)
+        if not len(found.rows) and not _is_clear(machine, path, segments, tools, int(numbers[segments[0]])):
+            why = why or "it feeds close to the work without cutting: an approach, a spring pass"
         in_air = not len(found.rows) and not found.plunges and not path_is_cycle(path, executions) and line not in tied
         lines.append(
             replace(
@@ -284,8 +290,7 @@ def _why_not(line: FeedLine, path: Path, tied: set[int], tools: Ints, found: _Fo
         return "it goes down into material, and the cutting formula has no end face"
     if len(found.rows) and (rpm <= 0.0).any():
         return "it cuts with the spindle at rest or backwards"
-    down = any((path.end_mm[a:b, 2] < path.start_mm[a:b, 2]).any() for a, b in line.executions)
-    return "it feeds down towards the work through air" if not len(found.rows) and down else ""
+    return ""
 
 
 def path_is_cycle(path: Path, executions: Sequence[tuple[int, int]]) -> bool:
@@ -310,6 +315,39 @@ def _is_plain_feed(text: str, feed_mm_min: float, inch: bool, tied: bool) -> boo
         return True
     said = figure_mm_min(text[place.begin + 1 : place.end].replace(" ", ""), inch)
     return abs(said - feed_mm_min) <= 1e-6 * feed_mm_min
+
+
+def _check_branches(source: list[str], run: set[int]) -> None:
+    """Raises OptimisationError where a line that was not run would take the feed of a line that is to be changed."""
+    if not any(branches(source)):
+        return
+    for number, line in enumerate(source):
+        moves = any(find_word(line, letter) is not None for letter in "XYZ") and not codes(line).g & NO_FEED
+        if number not in run and moves and find_word(line, "F") is None:
+            why = "was not run (a branch, a block skip or a loop), and has no F of its own"
+            raise OptimisationError(
+                f"line {number + 1} {why}: it would take a feed that is changed before it; write its F, and again"
+            )
+
+
+def _is_clear(machine: MachineFile, path: Path, segments: Ints, tools: Sequence[tuple[int, Tool]], tool: int) -> bool:
+    """Whether a feed in air stays clear of the stock as it was: above it, or beside it by more than the tool and a clearance.
+
+    What is left of the stock would be more exact, and a spring pass along a finished wall is air to it.
+    """
+    stock = machine.stock
+    if stock is None or tool < 0:
+        return False
+    ends = np.stack([path.start_mm[segments, :3], path.end_mm[segments, :3]])
+    bulge = np.where(
+        path.sweep_rad[segments] != 0.0, path.length_mm[segments], 0.0
+    )  # an arc stays within its own length of its ends
+    low, high = ends.min(axis=0), ends.max(axis=0)
+    reach = tools[tool][1].diameter_mm / 2.0 + CLEARANCE_MM + bulge
+    if (low[:, 2] >= stock.max_mm[2] + CLEARANCE_MM).all():
+        return True
+    beside = [(low[:, k] - reach >= stock.max_mm[k]) | (high[:, k] + reach <= stock.min_mm[k]) for k in (0, 1)]
+    return bool((beside[0] | beside[1]).all())
 
 
 def _still(text: str, rpm: Floats, cuts: bool) -> str:

@@ -37,7 +37,7 @@ S_IS_NO_SPEED_M = frozenset({19, 29, 98, 198})
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rewritten:
-    """text and its path; feed_mm_min, rpm: (lines,) of `Allowed` as the text has them; not_followed: lines (from 0), and why"""
+    """text and its path; not_followed: lines (from 0), and why"""
 
     text: str
     path: Path
@@ -101,12 +101,11 @@ def _order(problem: Problem) -> list[int]:
 
 
 def _first_choice(problem: Problem, wanted: dict[int, _Wanted], rpm: Floats, source: list[str]) -> tuple[set[int], set[int]]:
-    """Lines that get an F word, and an S word, by what is in force before them; all of them in a program that may branch."""
+    """Lines that get an F word, and an S word, by what is in force before them; those that may be come to otherwise get both."""
     feeds, speeds = set(), set()
-    if branches(source):
-        feeds = {line.line for line in problem.program.lines if line.plain_feed}
-        same = _of_one_speed(problem)
-        speeds = {number for number, one in wanted.items() if one.speed is not None and number in same}
+    apart = _apart(problem, source)
+    feeds |= {line.line for line in problem.program.lines if line.plain_feed and line.line in apart}
+    speeds |= {number for number in apart & _of_one_speed(problem) if wanted[number].speed is not None}
     feed: float | None = None
     for number in _order(problem):
         one = wanted[number]
@@ -124,6 +123,16 @@ def _first_choice(problem: Problem, wanted: dict[int, _Wanted], rpm: Floats, sou
                 speeds.add(event.line)
             now = value
     return feeds, speeds
+
+
+def _apart(problem: Problem, source: list[str]) -> set[int]:
+    """Feed lines to which the control may come another way than from the feed line before them in the text."""
+    marks, found, last = branches(source), set(), -1
+    for number in sorted(line.line for line in problem.program.lines):
+        if any(marks[max(last, 0) : number + 1]):
+            found.add(number)
+        last = number
+    return found
 
 
 def _of_one_speed(problem: Problem) -> set[int]:

@@ -7,12 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.optimisation.closed_form import Worth
+from twin.optimisation.forces import CutForces
 from twin.optimisation.problem import Problem
 from twin.optimisation.words import feed_figure, figure_mm_min
 
 Floats = NDArray[np.float64]
 SAME_RPM = 0.5
 FULL = 1e-6
+TRIMS_MAX = 200
 
 
 def rounded(problem: Problem, feed: Floats, rpm: Floats, worth: Worth) -> tuple[Floats, Floats]:
@@ -30,10 +32,34 @@ def rounded(problem: Problem, feed: Floats, rpm: Floats, worth: Worth) -> tuple[
     if group:
         _round_group(problem, group, speeds, worth)
     most = allowed.feed_max(speeds[None])[0]
-    chosen = np.where(full, most, np.minimum(feed, most))
+    chosen = _within_power(problem, np.where(full, most, np.minimum(feed, most)), speeds)
     inch = [problem.program.lines[int(k)].inch for k in allowed.index]
     written = np.array([figure_mm_min(feed_figure(float(f), i), i) for f, i in zip(chosen, inch, strict=True)], dtype=np.float64)
     return written.reshape(len(chosen)), speeds
+
+
+def _within_power(problem: Problem, feed: Floats, rpm: Floats) -> Floats:
+    """Feeds that keep the power by the force itself, where the table of `Allowed` was a little too kind."""
+    allowed, forces = problem.allowed, CutForces.of(problem.program)
+    if allowed.spindle is None or not len(forces.cuts):
+        return feed
+    rows = {int(k): row for row, k in enumerate(allowed.index)}
+    own = np.array([rows.get(int(line), -1) for line in problem.program.cuts.line], dtype=np.int64)
+    mine = np.flatnonzero(own >= 0)
+    row = own[mine]
+    allowed_w = allowed.spindle.allowed_cutting_w(rpm)
+    chosen = feed.copy()
+    for _ in range(TRIMS_MAX):
+        advance = chosen[row] * allowed.feed_ratio / (allowed.teeth[row] * rpm[row])
+        power_w = forces.tangential_n(advance, mine) * np.pi * forces.diameter_mm[mine] * rpm[row] / 60_000.0
+        worst = np.zeros(len(feed))
+        np.maximum.at(worst, row, power_w)
+        over = allowed.cutting & (worst > allowed_w)
+        if not over.any():
+            break
+        part = np.where(over, allowed_w / np.maximum(worst, 1e-12), 1.0)
+        chosen = np.where(over, np.maximum(chosen * np.minimum(part, 1.0 - 1e-6), allowed.feed_low), chosen)
+    return chosen
 
 
 def _round_group(problem: Problem, group: list[int], speeds: Floats, worth: Worth) -> None:

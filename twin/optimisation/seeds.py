@@ -48,8 +48,8 @@ def seeds(problem: Problem, objective: Objective) -> Floats:
         found.append(problem.encoded(feed, rpm))
         if len(problem.cutting) > 1:
             found.append(problem.encoded(feed, sequence(problem, worth_of(problem, single, more), rpm)))
-    if objective is Objective.PARETO:
-        found.append(problem.encoded(*closed_form(problem, Objective.TIME)))
+    if objective is Objective.PARETO:  # both ends first: a small population takes no more
+        found.insert(0, problem.encoded(*closed_form(problem, Objective.TIME)))
     lines = [problem.program.lines[int(k)] for k in problem.allowed.index]
     as_is = np.array([line.feed_mm_min for line in lines]), np.array([line.rpm for line in lines])
     found.append(problem.encoded(*as_is))

@@ -108,6 +108,7 @@ def totals(shown: ShownLines, seconds: float, cost: float | None, limits: Limits
     """Of the whole program; `over` counts lines above a limit."""
     over = np.zeros(len(shown.rpm), dtype=np.bool_)
     cutting = shown.force_n > 0.0
+    kept = np.array([line.needs_speed for line in problem.program.lines], dtype=np.bool_)
     for values, limit in ((shown.force_n, limits.force_n), (shown.torque_nm, limits.torque_nm)):
         if limit is not None:
             over |= values > limit * (1.0 + HAIR)
@@ -121,7 +122,7 @@ def totals(shown: ShownLines, seconds: float, cost: float | None, limits: Limits
         (shown.surface_speed_m_min, limits.surface_speed_m_min),
     ):
         if pair is not None:
-            over |= cutting & (values > pair[1] * (1.0 + HAIR))
+            over |= (cutting | kept) & (values > pair[1] * (1.0 + HAIR))
     return Totals(
         seconds=seconds,
         cost=cost,

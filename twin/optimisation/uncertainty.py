@@ -34,10 +34,10 @@ class Uncertain(NamedTuple):
     identified: bool
 
 
-def uncertain_constants(machine: MachineFile) -> tuple[Uncertain, ...]:
-    """The constants of the cut with their uncertainty, those left out that are exact."""
+def uncertain_constants(machine: MachineFile, tools: tuple[str, ...] = ("tool",)) -> tuple[Uncertain, ...]:
+    """The constants of the cut with their uncertainty, those left out that are exact. tools: where each is described."""
     stated = machine.uncertainty
-    paths = [f"tool.{name}" for name in TOOL_CONSTANTS]
+    paths = [f"{tool}.{name}" for tool in dict.fromkeys(tools) for name in TOOL_CONSTANTS]
     for name, given in process_effects(machine).items():
         effect = effect_named(name)
         paths += [
@@ -73,7 +73,7 @@ def greatest_forces_n(forces: CutForces, advance_mm: Floats, factors: Mapping[st
 
 def margin_for(forces: CutForces, advance_mm: Floats, machine: MachineFile, probability: float, seed: int) -> float:
     """What the limit is to be divided by: the quantile of the greatest force over that of the mean twin, at least 1."""
-    constants = uncertain_constants(machine)
+    constants = uncertain_constants(machine, forces.numbers)
     if not constants or not len(forces.cuts):
         return 1.0
     greatest = greatest_forces_n(forces, advance_mm, drawn(constants, 2 * DRAWS, seed))
@@ -85,7 +85,7 @@ def sensitivity(
     forces: CutForces, advance_mm: Floats, machine: MachineFile, limit_n: float, asked: float | None, price_pct: float, seed: int
 ) -> Sensitivity | None:
     """The force limit under the twin's uncertainty; None where nothing is uncertain or nothing is cut. On draws of its own."""
-    constants = uncertain_constants(machine)
+    constants = uncertain_constants(machine, forces.numbers)
     if not constants or not len(forces.cuts):
         return None
     greatest = greatest_forces_n(forces, advance_mm, drawn(constants, DRAWS, seed + 1_000_003))

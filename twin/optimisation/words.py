@@ -15,6 +15,8 @@ from twin.gcode.tokens import TOKEN
 INCH_MM = 25.4
 DIGITS = 4
 WORDS = re.compile(r"[A-Za-z]\s*[-+.0-9#\[]")
+FLOW = frozenset({"IF", "GOTO", "WHILE", "DO", "END", "THEN"})
+LABEL = re.compile(r"[ \t]*[NO:][ \t]*[0-9]")
 BLOCK_SKIP = re.compile(r"[ \t]*(?:[O:][ \t]*[0-9]+[ \t]*)?(?:N[ \t]*[0-9]+[ \t]*)?/")
 LINE_END = re.compile(r"\r\n|\r|\n")
 
@@ -93,19 +95,25 @@ def joined(text: str, changed: Mapping[int, str]) -> str:
     return "".join(changed.get(k, line) + end for k, (line, end) in enumerate(zip(source_lines(text), ends, strict=True)))
 
 
-def branches(lines: list[str]) -> bool:
-    """Whether a program may run another way than the one that was interpreted: block skips, jumps, loops, calls.
+def branches(lines: list[str]) -> list[bool]:
+    """Of each line, whether the control may come to it, or go on from it, another way than from line to line.
 
-    >>> branches(["G1 X3.", "/N20 G1 X4."]), branches(["G1 X3. (IF IT FITS)"])
-    (True, False)
+    Block skips, jumps and the N words that they may aim at, loops, calls, and the O words of what is called.
+
+    >>> branches(["G1 X3.", "/N20 G1 X4.", "X5. (IF IT FITS)"]), branches(["N1 G1 X3.", "GOTO 1"]), branches(["N1 G1 X3."])
+    ([False, True, False], [True, True], [False])
     """
+    found, jumps, calls = [], False, False
     for line in lines:
         upper = line.translate(CAPITALS)
-        if BLOCK_SKIP.match(upper):
-            return True
-        if any(match.lastindex == 4 and len(match.group(4)) > 1 for match in TOKEN.finditer(upper)) or codes(line).m & {98, 198}:
-            return True
-    return False
+        keyword = any(match.lastindex == 4 and match.group(4) in FLOW for match in TOKEN.finditer(upper))
+        jumps = jumps or (keyword and "GOTO" in upper)
+        of_line = codes(line)
+        called = bool(of_line.m & {98, 99, 198} or of_line.g & {650, 660, 670})
+        calls = calls or called
+        found.append(bool(BLOCK_SKIP.match(upper)) or keyword or called)
+    aims = [bool(LABEL.match(line.translate(CAPITALS))) and (calls if line.lstrip()[:1] in "Oo:" else jumps) for line in lines]
+    return [one or aim for one, aim in zip(found, aims, strict=True)]
 
 
 class Codes(NamedTuple):

@@ -95,6 +95,26 @@ def test_a_program_without_a_feed_move_says_so() -> None:
         optimise(second(program_text="G0 X10.\nM30\n"))
 
 
+@pytest.mark.parametrize("effects", [(), EDGE, SIZE], ids=["nominal", "edge force", "size effect"])
+@pytest.mark.parametrize("force_n", [None, 60.0])
+def test_the_power_that_was_left_is_not_exceeded_by_what_is_written(effects: object, force_n: float | None) -> None:
+    toml = machine_with(text("second.toml"), limits={"force_n": force_n, "power_kw": 0.15}, spindle=SPINDLE, effects=effects)
+    answer = optimise(second(machine_toml=toml, evolutions=5, islands=1, population=16))
+    assert answer.after.over == 0
+    assert 0.14 < answer.after.power_kw <= 0.15 * (1.0 + 1e-9)
+
+
+def test_the_uncertainty_of_a_tool_by_its_number_counts() -> None:
+    tools = {"2": {"diameter_mm": 6.0, "teeth": 2, "tangential_coefficient_n_per_mm2": 1230.0, "radial_ratio": 0.5}}
+    uncertainty = {"relative": 0.01, "tools.2.tangential_coefficient_n_per_mm2": 0.3}
+    toml = machine_with(text("second.toml"), tools=tools, tool=None, uncertainty=uncertainty)
+    program = text("second.nc").replace("S8000 M3", "T2 M6\nS8000 M3")
+    answer = optimise(second(machine_toml=toml, program_text=program, evolutions=5, islands=1))
+    assert answer.sensitivity is not None
+    assert answer.sensitivity.parts[0].path == "tools.2.tangential_coefficient_n_per_mm2"
+    assert answer.sensitivity.parts[0].force_pct > 30.0
+
+
 def test_a_chattering_speed_is_not_chosen() -> None:
     """A tool whose first mode makes most speeds chatter at these depths: what is chosen lies in the lobes."""
     mode = {"direction": "y", "frequency_hz": 900.0, "damping_ratio": 0.03, "stiffness_n_per_mm": 24000.0}

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from tests.twin.optimisation.benchmark import machine_with, text
+from twin.errors import OptimisationError
 from twin.gcode import Settings, interpret
 from twin.motion.path import path_from_moves
 from twin.optimisation.optimise import optimise
@@ -132,6 +133,14 @@ def test_a_rapid_into_material_is_said_first(head: str, lines: tuple[int, ...]) 
     assert any("rapid into material" in note for note in answer.notes) == bool(lines)
 
 
+def test_a_macro_somewhere_does_not_put_words_on_every_line() -> None:
+    loop = "#1=0\nWHILE[#1 LT 2]DO1\nG0 Z10.\n#1=#1+1\nEND1\n"
+    straight = "G1 X20. F400\nX30.\nX40.\nX50.\nX60.\n"
+    plain, with_loop = (optimise(asked(body)).program for body in (straight, straight + loop))
+    assert with_loop.replace(loop.replace("\n", "\r\n"), "") == plain
+    assert plain.count("F") == 3, "one feed, and two in the name of the program"
+
+
 def test_a_line_that_is_asked_to_be_left_alone_is() -> None:
     answer = optimise(asked("G1 X30. F400\nX60. F300\n", left_alone={8: "it was to be left alone"}))
     assert "G1 X30. F400" in answer.program
@@ -169,3 +178,25 @@ def test_a_line_that_does_not_follow_its_words_is_named_and_not_written_over() -
     made = problem(asked(body, tail=tail))
     text_ = rewritten(made, np.full(len(made.allowed), 500.0), np.where(made.allowed.cutting, 8000.0, 0.0))
     assert text_.not_followed == {}
+
+
+def test_a_spring_pass_and_a_feed_out_of_the_material_are_no_air() -> None:
+    answer = optimise(asked("G1 X40. F400\nX10. F200 (SPRING PASS)\nG1 Z5. F100\n"))
+    assert "X10. F200 (SPRING PASS)" in answer.program
+    assert "G1 Z5. F100" in answer.program
+    clear = optimise(asked("G1 X40. F400\nG0 Z20.\nG1 X10. F200\n"))
+    assert "G1 X10. F3000" in clear.program
+
+
+def test_a_line_that_was_not_run_and_has_no_feed_of_its_own_stops_it() -> None:
+    body = "#500=0\nG1 X20. F400\nIF[#500 EQ 1]GOTO 9\nX60. F300\nGOTO 10\nN9 X30.\nN10 G0 Z10.\n"
+    with pytest.raises(OptimisationError, match=r"line 14 was not run .* has no F of its own"):
+        optimise(asked(body))
+    answer = optimise(asked(body.replace("N9 X30.", "N9 X30. F250")))
+    assert "N9 X30. F250" in answer.program
+
+
+def test_a_line_that_is_left_alone_above_a_limit_is_said_first() -> None:
+    answer = optimise(asked("G1 X30. F400\nX60.\n", left_alone={9: "it was to be left alone"}, force_limit_n=10.0))
+    assert answer.after.over == 1
+    assert answer.sentence.startswith("1 line left alone ABOVE A LIMIT")
