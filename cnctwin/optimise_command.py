@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from twin.machine import MachineFile
     from twin.optimisation.answer import Objective, Optimised
 
-BINDS_SHOWN = 6
+BINDS_SHOWN, FRONT_SHOWN = 6, 20
 
 
 def optimise(
@@ -257,7 +257,10 @@ def _front_table(found: "Optimised") -> Table:
     table = Table(title=f"{len(found.front)} programs of the front; --pick writes another one", title_justify="left")
     for column in ("", "time, s", f"cost, {found.currency}", "force, N", "speed, rev/min"):
         table.add_column(column, justify="right")
+    step = -(-len(found.front) // FRONT_SHOWN)
     for number, point in enumerate(found.front):
+        if number % step and not point.chosen and number != len(found.front) - 1:
+            continue
         speed = " to ".join(dict.fromkeys(f"{v:.0f}" for v in point.spindle_rpm))
         mark = f"{number} *" if point.chosen else str(number)
         table.add_row(mark, f"{point.seconds:.2f}", f"{point.cost:.2f}", f"{point.force_n:.1f}", speed)

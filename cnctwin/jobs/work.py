@@ -73,7 +73,8 @@ def optimise(parameters: "OptimiseParameters", bench: Bench) -> dict[str, Any]:
     with spread_over(bench.workers, cluster) as spread:
         found = optimise_request(request, bench.out, progress=bench.progress, spread=spread, checkpoint=bench.checkpoint)
     before, after = ({"seconds": one.seconds, "cost": one.cost} for one in (found.before, found.after))
-    return {"sentence": found.sentence, "before": before, "after": after, "distance": found.bound.distance}
+    wrong = {"lines_over": found.after.over, "collisions": list(found.collisions)}
+    return {"sentence": f"{name}: {found.sentence}", "before": before, "after": after, "distance": found.bound.distance, **wrong}
 
 
 def identify(parameters: "IdentifyParameters", bench: Bench) -> dict[str, Any]:

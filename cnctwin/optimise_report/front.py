@@ -153,11 +153,12 @@ def _table(answer: Optimised, points: Sequence[FrontPoint]) -> Markup:
             tag("td", change(answer.before.cost, p.cost), class_="number"),
             tag("td", column(p.force_n, 3), class_="number"),
             tag("td", _range(p.spindle_rpm), class_="number"),
+            tag("td", answer.front.index(p), class_="number"),
             class_="named" if p.chosen else None,
         )
         for p in shown
     ]
-    head = ("Time, s", "Change", f"Cost, {answer.currency}", "Change", "Greatest force, N", "Speeds, rev/min")
+    head = ("Time, s", "Change", f"Cost, {answer.currency}", "Change", "Greatest force, N", "Speeds, rev/min", "--pick")
     table = tag(
         "table", tag("thead", tag("tr", each("th", head, scope="col"))), tag("tbody", *rows), class_="data front candidates"
     )

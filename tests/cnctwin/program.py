@@ -38,7 +38,7 @@ def is_alive(pid: int) -> bool:
 
 def children(pid: int) -> dict[str, int]:
     """The processes that one has started, by a word of their command line that tells which they are."""
-    words = ("mosquitto", "simulate-control", "historian", "process", "serve", "edge")
+    words = ("mosquitto", "simulate-control", "historian", "process", "serve", "jobs", "edge")
     found = {}
     for folder in Path("/proc").iterdir():
         try:

@@ -31,7 +31,7 @@ LINES_OF_OUR_RECORDING = len(SPARE_PART.read_text(encoding="utf-8").splitlines()
 SECONDS = 13.0  # enough for it at fifteen times its pace, with time to start
 STAGES = ["edge-vmc", *sorted(f"twin-{name}" for name in PROCESSORS)]
 START_S_MAX = 60.0  # with the kernels of the scores to compile, on a computer that has other things to do
-PARTS = ["edge", "historian", "mosquitto", "process", "serve", "simulate-control"]
+PARTS = ["edge", "historian", "jobs", "mosquitto", "process", "serve", "simulate-control"]
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -92,7 +92,7 @@ def test_whatever_is_killed_comes_back_and_ctrl_c_ends_it_with_a_ledger_that_bal
         assert program.ask_to_end(signal.SIGINT) == 0, program.err
         summary = json.loads(program.out)
     assert summary["balances"] is True
-    assert summary["restarts"] == dict.fromkeys(("mosquitto", "agent", "historian", "processors", "edge", "page"), 1)
+    assert summary["restarts"] == dict.fromkeys(("mosquitto", "agent", "historian", "processors", "edge", "page", "jobs"), 1)
     assert [pid for pid in last.values() if is_alive(pid)] == []
     assert not answers("127.0.0.1", port)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["err", "out"], "the temporary folder is removed"
@@ -101,7 +101,7 @@ def test_whatever_is_killed_comes_back_and_ctrl_c_ends_it_with_a_ledger_that_bal
 def test_a_demo_that_is_killed_leaves_nothing_running(tmp_path: Path) -> None:
     port = free_port()
     with Program(tmp_path, "demo", "--port", str(port)) as program:
-        until(lambda: sorted(children(program.process.pid)) == PARTS, "every part to be started")
+        until(lambda: sorted(children(program.process.pid)) == PARTS, "every part to be started", START_S_MAX)
         parts = children(program.process.pid)
         program.process.kill()
         program.wait()

@@ -78,9 +78,12 @@ def _come_to_harm(how: str) -> None:
         raise OSError(28, os.strerror(28))
 
 
+COUNT = Kind("count", CountParameters, "tests.cnctwin.jobs.counting:count")
+
+
 def register() -> None:
     """Have this process know the kind."""
-    KINDS["count"] = Kind("count", CountParameters, "tests.cnctwin.jobs.counting:count")
+    KINDS["count"] = COUNT
 
 
 def chain_to(number: int) -> str:

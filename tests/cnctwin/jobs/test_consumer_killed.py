@@ -12,14 +12,21 @@ from pathlib import Path
 import pytest
 
 from cnctwin.jobs.client import JobsClient
+from cnctwin.jobs.kinds import KINDS
 from cnctwin.jobs.left_over import left_over
 from sparkplug.broker import BrokerAddress
 from tests.cnctwin.jobs.conftest import ROOT, over
-from tests.cnctwin.jobs.counting import chain_to, checkpoint_of, written
+from tests.cnctwin.jobs.counting import COUNT, chain_to, checkpoint_of, written
 from tests.cnctwin.program import is_alive, until
 
 pytestmark = pytest.mark.broker
 Process = subprocess.Popen[str]
+
+
+@pytest.fixture(autouse=True)
+def counting(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Who asks has to know the kind too, whichever tests this process has run before."""
+    monkeypatch.setitem(KINDS, "count", COUNT)
 
 
 @pytest.fixture

@@ -99,9 +99,9 @@ def test_optimise_leaves_program_answer_and_page_of_what_it_read_first(tmp_path:
     assert isinstance(summary, dict)
     assert set(summary["files"]) == {"optimised.nc", "optimisation.json", "report.html"}
     answer = json.loads((tmp_path / "job/result/optimisation.json").read_text())
-    assert answer["sentence"] == summary["sentence"]
+    assert summary["sentence"] == f"slot.nc: {answer['sentence']}"
     assert summary["after"]["seconds"] == answer["after"]["seconds"] < summary["before"]["seconds"]
-    assert (tmp_path / "job/result/optimised.nc").read_bytes().decode().startswith("G21 G90 (Nürnberg)\r\n")
+    assert (tmp_path / "job/result/optimised.nc").read_bytes().startswith(b"G21 G90 (N\xfcrnberg)\r\n")
     (root / "slot.nc").write_text("G1 X9 F100")  # edited while an attempt was killed
     assert (again := done(tmp_path / "job", FilesRoot(root), **asked)["result"])
     assert again["after"] == summary["after"]  # type: ignore[index]
