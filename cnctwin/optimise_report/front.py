@@ -153,7 +153,7 @@ def _table(answer: Optimised, points: Sequence[FrontPoint]) -> Markup:
             tag("td", change(answer.before.cost, p.cost), class_="number"),
             tag("td", column(p.force_n, 3), class_="number"),
             tag("td", _range(p.spindle_rpm), class_="number"),
-            tag("td", answer.front.index(p), class_="number"),
+            tag("td", str(answer.front.index(p)), class_="number"),
             class_="named" if p.chosen else None,
         )
         for p in shown
