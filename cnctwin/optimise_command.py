@@ -130,7 +130,7 @@ def _run(question: "asked.Question", how: Run) -> int:
     except LimitsError as error:
         print(f"cnctwin: {question.name}: {error}", file=sys.stderr)
         return 1
-    code = 1 if found.after.over or found.collisions else 0
+    code = 1 if found.after.over else 0
     beside = paper_search(question, time.perf_counter) if how.paper else None
     if how.as_json:
         sys.stdout.write(json.dumps(found.as_json() | {"out": str(how.out)}) + "\n")
