@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from cnctwin.store.contract import Query
+from cnctwin.store.contract import Query, StoreError
 from cnctwin.store.opening import open_store
 from edge.config import StoreSection
 from edge.forwarder import SEQUENCE, Forwarder
@@ -118,7 +118,11 @@ def test_every_row_is_in_the_store_once(tmp_path: Path, mosquitto: Mosquitto) ->
 
 
 def stored(folder: Path) -> int:
-    return len(values(folder))
+    """How many rows; none while the historian is still making its tables."""
+    try:
+        return len(values(folder))
+    except StoreError:
+        return 0
 
 
 def values(folder: Path) -> list[object]:
