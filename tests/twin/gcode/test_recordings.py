@@ -53,7 +53,7 @@ def test_a_shop_program_runs_whole(name: str) -> None:
 
 def test_the_length_of_plate_1_is_the_measured_one() -> None:
     cutting, drilling, rapid = lengths_inch(interpret(text_of("NIST_MTC_CRADA_PLATE-1")))
-    # The 563.7 inch of the fact sheet leave out the drill cycle: four holes of 0.27 inch each.
+    # The 563.7 inch that are stated of it leave out the drill cycle: four holes of 0.27 inch each.
     assert drilling == pytest.approx(4 * 0.27, abs=1e-9)
     assert cutting - drilling == pytest.approx(563.7, abs=0.06)
     # From machine zero, with home at zero; agreed move by move with rs274.
