@@ -23,6 +23,10 @@ from twin.optimisation.words import source_lines
 def answered(
     question: Question, made: Problem, text: Rewritten, how: Search, front: tuple[FrontPoint, ...], again: Resimulated | None
 ) -> Optimised:
+    """The answer: both programs as they are cut, and what is known of the difference.
+
+    text: the rewritten program; how: the search; front: empty where one objective was asked for; again: of the whole machine
+    """
     machine, forces, alone = made.program.machine, CutForces.of(made.program), single(question.objective)
     limits = limits_of(machine, question.force_limit_n)
     before, after = (shown_lines(made, forces, path) for path in (made.program.path, text.path))

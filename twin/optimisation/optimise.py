@@ -75,7 +75,7 @@ def optimise(question: Question, hooks: Hooks = NO_HOOKS, checkpoint: str | None
     checkpoint: what `hooks.save` was given last; one of another question is passed over
     resimulate: run both programs on the whole simulated machine too, where it has axes
 
-    Raises TwinError where program or machine are at fault, OptimisationError where the limits leave a line nothing, Stopped.
+    Raises TwinError where program or machine are at fault, LimitsError where the limits leave a line nothing, Stopped.
     """
     began = hooks.clock()
     hooks.progress(0.0, "reading the program")

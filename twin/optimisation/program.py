@@ -212,7 +212,7 @@ def _unknown_start(path: Path) -> int:
     level = (path.kind == Kind.RAPID) & (path.start_mm[:, 2] == path.end_mm[:, 2])
     count = int(np.argmin(level)) if not level.all() else len(path)
     leaves_z = count < len(path) and path.kind[count] == Kind.RAPID
-    return count + leaves_z if count or leaves_z else 0
+    return count + int(leaves_z)
 
 
 def _sections(index: Ints, tools: Sequence[tuple[int, Tool]], unknown: int) -> list[Section]:

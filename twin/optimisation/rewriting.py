@@ -1,8 +1,9 @@
 """The program rewritten: F and S words line by line, nothing else; then read again, and compared with what was meant.
 
 A line gets an F word where its feed is another than that of the feed line executed before it, and an S word where its speed
-is. What the modes of the control make of that is not guessed: the text is interpreted, and a line that does not have what it
-should gets its words in any case. Lines for which even that does not help are named; they are to be left alone.
+is. A line that may be come to another way (block skip, jumps, loops, calls) has both in any case, so that no other course of the
+program takes a feed with it. What the modes of the control make of the words is not guessed: the text is interpreted, and a line
+that does not have what it should gets its words too. Lines for which even that does not help are to be left alone.
 """
 
 from dataclasses import dataclass
