@@ -35,10 +35,7 @@ def create_app(sources: Sources) -> FastAPI:
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
         fan_out.attach(asyncio.get_running_loop())
-        try:
-            yield
-        finally:
-            fan_out.end()
+        yield
 
     app = FastAPI(
         title="cnctwin",

@@ -47,6 +47,7 @@ class FanOut:
         self._readers_max = readers_max
         self._readers: dict[str | None, set[Reader]] = {}
         self._loop: asyncio.AbstractEventLoop | None = None
+        self._is_over = False
 
     def __len__(self) -> int:
         return sum(len(readers) for readers in self._readers.values())
@@ -67,6 +68,8 @@ class FanOut:
         reader = Reader(machine)
         self._readers.setdefault(machine, set()).add(reader)
         self._live.watch(machine)
+        if self._is_over:
+            reader.end()
         return reader
 
     def close(self, reader: Reader) -> None:
@@ -78,14 +81,10 @@ class FanOut:
                 del self._readers[reader.machine]
             self._live.unwatch(reader.machine)
 
-    def end_soon(self) -> None:
-        """Have all streams end, from any thread."""
-        if (loop := self._loop) is not None and not loop.is_closed():
-            loop.call_soon_threadsafe(self.end)
-
     def end(self) -> None:
-        """End all streams: the server stops."""
+        """End all streams, and at once those that a request under way still opens: the server stops."""
         self._loop = None
+        self._is_over = True
         for reader in [one for readers in self._readers.values() for one in readers]:
             reader.end()
 

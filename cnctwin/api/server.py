@@ -9,6 +9,7 @@ from typing import Self
 import uvicorn
 from fastapi import FastAPI
 
+from cnctwin.api.fan_out import FanOut
 from cnctwin.errors import ProgramError, UsageError
 
 CONNECTIONS_MAX = 300
@@ -18,11 +19,25 @@ START_S_MAX = 10.0
 UNACKNOWLEDGED_MS_MAX = 30_000
 
 
+class _StreamServer(uvicorn.Server):
+    """Listens no more before it ends the streams: their clients come back at once, and would be let in by the one that stops."""
+
+    def __init__(self, config: uvicorn.Config, streams: FanOut) -> None:
+        super().__init__(config)
+        self._streams = streams
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """Stop, within `STOP_S_MAX` for what is under way."""
+        for listener in self.servers:
+            listener.close()
+        self._streams.end()
+        await super().shutdown(sockets)
+
+
 class Server:
     """Serves an application between `start` and `stop`. `port` 0 takes a free one."""
 
     def __init__(self, app: FastAPI, host: str = "127.0.0.1", port: int = 0) -> None:
-        self._app = app
         self._socket = _bound(host, port)
         self.host, self.port = host, self._socket.getsockname()[1]
         config = uvicorn.Config(
@@ -36,7 +51,7 @@ class Server:
             timeout_keep_alive=KEEP_ALIVE_S,
             timeout_graceful_shutdown=STOP_S_MAX,
         )
-        self._server = uvicorn.Server(config)
+        self._server = _StreamServer(config, app.state.fan_out)
         self._thread = threading.Thread(target=self._server.run, args=([self._socket],), name="http", daemon=True)
 
     @property
@@ -60,8 +75,7 @@ class Server:
             time.sleep(0.01)
 
     def stop(self) -> None:
-        """End open streams, then the server."""
-        self._app.state.fan_out.end_soon()
+        """End the server and its open streams."""
         self._server.should_exit = True
         self._thread.join(STOP_S_MAX + 5.0)
         self._socket.close()

@@ -84,6 +84,7 @@ class Stream:
     def __init__(self, url: str, machine: str | None = "vmc") -> None:
         self.events: list[Event] = []
         self.connections = 0
+        self.is_open = False
         self._url = f"{url}/stream" + ("" if machine is None else f"?machine={machine}")
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._read, daemon=True)
@@ -109,9 +110,12 @@ class Stream:
             try:
                 with httpx.stream("GET", self._url, timeout=5.0) as answer:
                     self.connections += 1
+                    self.is_open = True
                     self._take(answer)
             except httpx.HTTPError:
                 self._stop.wait(0.1)
+            finally:
+                self.is_open = False
 
     def _take(self, answer: httpx.Response) -> None:
         name = ""

@@ -1,7 +1,6 @@
 """Streams over a real broker and a real server: complete, shared, bounded, and back after anything was killed."""
 
 import socket
-import threading
 import time
 
 import httpx
@@ -10,6 +9,8 @@ import pytest
 from cnctwin.api import event_stream, fan_out
 from cnctwin.api.application import create_app
 from cnctwin.api.batches import machine_rows
+from cnctwin.api.fan_out import FanOut
+from cnctwin.api.live_plant import LivePlant
 from cnctwin.api.server import Server
 from cnctwin.api.sources import Sources
 from tests.cnctwin.api.served_plant import LOAD, Stream, machine, served, tell, wait_until_known
@@ -170,20 +171,18 @@ def test_rows_that_wait_are_bounded_and_what_is_left_out_is_said(monkeypatch: py
     assert b'"left_out":15' in batch.payload
 
 
-def test_the_server_stops_with_streams_open() -> None:
+def test_a_server_that_stops_ends_its_streams_and_lets_nobody_in_again() -> None:
     server = Server(create_app(Sources(small_plant())))
     server.start()
-    ended = threading.Event()
+    with Stream(server.url) as machine_stream, Stream(server.url, None) as fleet:
+        begun_s = time.monotonic()
+        server.stop()
+        assert time.monotonic() - begun_s < 3.0
+        wait(lambda: not (machine_stream.is_open or fleet.is_open), "both streams to end")
+        assert machine_stream.connections == fleet.connections == 1
 
-    def read() -> None:
-        with httpx.stream("GET", f"{server.url}/stream?machine=vmc") as answer:
-            for _ in answer.iter_lines():
-                pass
-        ended.set()
 
-    threading.Thread(target=read, daemon=True).start()
-    wait(lambda: httpx.get(f"{server.url}/metrics").text.count("twin_page_streams 1.0") == 1, "the stream")
-    begun_s = time.monotonic()
-    server.stop()
-    assert time.monotonic() - begun_s < 3.0
-    assert ended.wait(2.0)
+def test_a_stream_that_a_request_under_way_opens_while_the_server_stops_ends_at_once() -> None:
+    streams = FanOut(LivePlant())
+    streams.end()
+    assert streams.open(None).messages.get_nowait() is None
