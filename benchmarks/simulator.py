@@ -14,7 +14,7 @@ ever.
 * batch, sums: the same without traces, only root mean squares and peaks, beside C that keeps only these
 * limit: the same C with -march=native -ffast-math, which is free to compute something else
 * axis effects: batches with and without all effects of the catalogue that act on an axis; the table is kept too, since some show
-  there only. One of them (presliding) asks for two steps a tick, so the batch without it is shown beside it
+  there only
 * chain, batch: 64 machines with a cut: force, the axes under it, load, temperature, each by its batch call, one after another;
   sensors and clock have no batch. Each candidate has a cutting force of its own, so no two lanes share an input
 * chain, single: `respond`, everything that a machine records, with every effect of the catalogue on every axis, and those of
@@ -23,28 +23,23 @@ ever.
 """
 
 import argparse
-import ctypes
 import json
 import math
 import shutil
-import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from plain_loop import PERIOD_S, Motion, PlainLoop, Run, motion_of
 
 from twin.effects.catalogue import catalogue, effect_named
 from twin.effects.effect import Effect, On
-from twin.gcode import interpret
 from twin.heat.run import Warming, spindle_temperature_c, thermal_constants, thermal_quantities
 from twin.machine import AddedEffect, MachineFile, machine_from_toml
-from twin.motion.path import Path as ToolPath
-from twin.motion.path import path_from_moves
 from twin.motion.plan import plan
 from twin.process.kernel import process_quantities
 from twin.process.milling import milling_force, tool_constants
@@ -55,79 +50,17 @@ from twin.servo.run import AxisInput, AxisRun, run_axes
 from twin.spindle.load import spindle_constants, spindle_load_pct, spindle_quantities
 
 Floats = NDArray[np.float64]
-Run = Callable[[], object]
-PERIOD_S = 0.001
 BATCH = 64
-SOURCE = Path(__file__).with_suffix(".c")
 PLAIN = ("-O3",)
 LIMIT = ("-O3", "-march=native", "-ffast-math")
 TRACES = ("position_mm", "torque_a")
 AGREEMENT_MM = 1e-9
 
-MACHINE = SOURCE.with_name("simulator_machine.toml").read_text(encoding="utf-8")
-CONTOUR = SOURCE.with_name("contour.nc").read_text(encoding="utf-8")
-AXIS_BY_AXIS = SOURCE.with_name("axis_by_axis.nc").read_text(encoding="utf-8")
+HERE = Path(__file__)
+MACHINE = HERE.with_name("simulator_machine.toml").read_text(encoding="utf-8")
+CONTOUR = HERE.with_name("contour.nc").read_text(encoding="utf-8")
+AXIS_BY_AXIS = HERE.with_name("axis_by_axis.nc").read_text(encoding="utf-8")
 MOTIONS = {"contour": CONTOUR, "axis by axis": AXIS_BY_AXIS}
-
-
-@dataclass(frozen=True, slots=True)
-class Motion:
-    """A program run over and over for so many ticks.
-
-    reference_mm: axis → (ticks,); path: with its geometry; ticks
-    """
-
-    path: ToolPath
-    reference_mm: Mapping[str, Floats]
-    ticks: int
-
-
-def motion_of(machine: MachineFile, text: str, ticks: int) -> Motion:
-    """The motion of a program, repeated until it is long enough, and then cut off."""
-    assert machine.program is not None
-    repeats = 1
-    while True:
-        path = path_from_moves(interpret("G90 G54\n" + text * repeats + "M30\n"))
-        planned = plan(path, machine.program)
-        if planned.total_s >= ticks * PERIOD_S:
-            break
-        repeats = max(repeats + 1, math.ceil(repeats * ticks * PERIOD_S / planned.total_s))
-    reference = planned.sample(PERIOD_S).reference_mm[:ticks]
-    return Motion(path, {a: np.ascontiguousarray(reference[:, i]) for i, a in enumerate("xyz")}, ticks)
-
-
-class PlainLoop:
-    """benchmarks/simulator.c, compiled with these options of gcc."""
-
-    def __init__(self, folder: Path, options: tuple[str, ...]) -> None:
-        library = folder / f"simulator{''.join(options)}.so".replace("=", "-")
-        subprocess.run(["gcc", *options, "-shared", "-fPIC", "-o", str(library), str(SOURCE), "-lm"], check=True)
-        self._library = ctypes.CDLL(str(library))
-
-    def bound(self, machine: MachineFile, motion: Motion, traces: bool) -> tuple[Run, dict[str, Floats]]:
-        """A call that runs all axes, and what it fills: axis → (2, ticks) position and torque, or (4,) sums and peaks."""
-        out = {a: np.zeros((2, motion.ticks) if traces else (1, 4)) for a in machine.axes}
-        calls: list[list[object]] = []
-        kept: list[object] = [out]  # what the pointers point to
-        for letter, axis in machine.axes.items():
-            c = axis_constants(axis)
-            names = ["mass_kg", "newton_per_command", "position_gain_per_s", "velocity_gain_a_s_per_mm"]
-            names += ["velocity_integral_gain_a_per_mm", "torque_limit_a"]
-            for name in ("coulomb_{}_n", "static_{}_n", "stribeck_{}_s_per_mm", "viscous_{}_n_s_per_mm"):
-                names += [name.format("minus"), name.format("plus")]
-            constants = np.array([c[name] for name in names])
-            arrays = [constants, motion.reference_mm[letter], *out[letter]]
-            kept.append(arrays)
-            pointers = [ctypes.c_void_p(array.ctypes.data) for array in arrays]
-            calls.append([pointers[0], ctypes.c_long(motion.ticks), ctypes.c_double(PERIOD_S), *pointers[1:]])
-        function = self._library.with_traces if traces else self._library.with_sums
-
-        def call() -> list[object]:
-            for arguments in calls:
-                function(*arguments)
-            return kept
-
-        return call, out
 
 
 def interleaved(runs: Mapping[str, Run], repeats: int) -> dict[str, float]:
@@ -291,10 +224,9 @@ def servo_rows(machine: MachineFile, motion: Motion, loops: Mapping[str, PlainLo
 def effect_rows(machine: MachineFile, motion: Motion, repeats: int) -> dict[str, float]:
     """Batches without and with effects, ms for one machine."""
     effects = tuple(e.name for e in acting_on(axis_quantities()))
-    rigid = tuple(name for name in effects if effect_named(name).steps == 1)
     kept = (*TRACES, "table_mm")
     runs: dict[str, Run] = {}
-    for name, some in (("bare", ()), ("all", effects), ("all but presliding", rigid)):
+    for name, some in (("bare", ()), ("all", effects)):
         runs[f"{name}, traces"] = axes_call(machine, motion, BATCH, effects=some, outputs=kept)
         runs[f"{name}, sums"] = axes_call(machine, motion, BATCH, effects=some, outputs=(), measured=True)
     ms = interleaved(runs, repeats)
@@ -381,7 +313,6 @@ def report(name: str, groups: Mapping[str, Mapping[str, float]]) -> list[str]:
     for kept in ("traces", "sums"):
         bare = effects[f"bare, {kept}"]
         lines += [line(f"bare, {kept}", bare, bare), line(f"all, {kept}", effects[f"all, {kept}"], bare, "3")]
-        lines.append(line(f"all but presliding, {kept}", effects[f"all but presliding, {kept}"], bare))
     lines.append(" whole chain with a cut, every effect of the catalogue, beside the bare chain")
     for kind, label in (("batch", f"batch of {BATCH}: force, axes, load, heat"), ("single", "single: respond")):
         bare = chain[f"{kind}, bare"]

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from tests.twin.transient.synthetic import benchmark, small
+from tests.twin.transient.synthetic import drive, small
 from twin.transient.capture import parts_of
 from twin.transient.errors import TransientError
 from twin.transient.learning import learned
 from twin.transient.template import resampled
 
-B = benchmark()
+B = drive()
 
 
 def captures(count: int, snr_db: float, seed: int, **how: bool) -> list[np.ndarray]:  # type: ignore[type-arg]

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from tests.twin.transient.synthetic import benchmark
+from tests.twin.transient.synthetic import drive
 from twin.transient.warping import BAND, shape_of, warped_distance
 
-B = benchmark()
+B = drive()
 
 
 def brute(left: np.ndarray, right: np.ndarray) -> float:  # type: ignore[type-arg]
