@@ -89,9 +89,11 @@ def _section(path: Path, chords: Ints, workpiece: Workpiece, section: Section) -
     segment = np.repeat(np.arange(section.first, section.stop), count)
     before = np.concatenate([[0], np.cumsum(count)])
     part = (np.arange(len(segment)) - before[segment - section.first] + 1) / count[segment - section.first]
-    points = np.concatenate([path.start_mm[section.first : section.first + 1], path.at(segment, part * path.length_mm[segment])])
+    points = np.concatenate(
+        [path.tip_start_mm[section.first : section.first + 1], path.tip_at(segment, part * path.length_mm[segment])]
+    )
     feeding = path.kind[segment] != Kind.RAPID
-    left, rows = cut(workpiece, points[:, :3], section.tool_diameter_mm, RESOLUTION_MM, feeding)
+    left, rows = cut(workpiece, points, section.tool_diameter_mm, RESOLUTION_MM, feeding)
     own = segment[rows.segment]
     hits = tuple(Collision(int(segment[hit.segment]), hit.path_mm, hit.position_mm) for hit in rows.collisions)
     return left, _rows(own, rows, hits)

@@ -15,6 +15,7 @@ from twin.gcode.canonical import (
     Spindle,
     SpindleOrient,
     ToolChange,
+    ToolLength,
 )
 from twin.gcode.interpreter import interpret
 from twin.gcode.settings import DwellUnit, IntegerWords, LeadIn, OffsetLookup, OutsideCorner, Settings, ToolOffset
@@ -40,6 +41,7 @@ __all__ = [
     "Spindle",
     "SpindleOrient",
     "ToolChange",
+    "ToolLength",
     "ToolOffset",
     "interpret",
 ]

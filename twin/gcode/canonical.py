@@ -117,6 +117,14 @@ class ExactStop(NamedTuple):
     program: str | None = None
 
 
+class ToolLength(NamedTuple):
+    """The length in force along z, mm (negative: G44): from the end of the next move on, which contains it."""
+
+    line: int
+    length_mm: float
+    program: str | None = None
+
+
 class LookAhead(NamedTuple):
     """G5.1 Q1 and G8 P1 (on), G5.1 Q0 and G8 P0 (off)."""
 
@@ -138,5 +146,6 @@ Move = (
     | ProgramEnd
     | ExactStop
     | LookAhead
+    | ToolLength
 )
 """Any canonical move."""

@@ -46,6 +46,7 @@ def run(state: State, words: Words, named: list[int]) -> None:
     for letter in "KL":
         if letter in words.values:
             repeats = words.integer(letter, 0, state.settings.repeats_max)
+    state.take_length()
     across = [axis for axis in named if axis != normal]
     for _ in range(repeats):
         position = list(motion.target(state, words, across))

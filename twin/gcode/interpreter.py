@@ -95,6 +95,7 @@ class Interpreter:
             and modal.plane == 170
             and state.compensation is None
             and state.corner is None
+            and not state.length_is_due
             and not self.flow.modal_calls
             and len(state.axes) == 3
         )

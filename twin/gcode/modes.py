@@ -242,6 +242,8 @@ def machine_position(state: State, words: Words, named: list[int]) -> None:
     """G53: rapid in machine coordinates, whatever the offsets."""
     if state.modal.distance == 910:
         raise RefusedError(words.written["machine"], "works with G90 only")
+    if motion.Z in named:
+        state.take_length()
     moved = list(state.position)
     for axis in named:
         moved[axis] = state.length(words, state.axes[axis].upper())

@@ -14,6 +14,8 @@ from twin.gcode.spindle import follow_surface_speed
 from twin.gcode.state import Motion, PolarPole, State
 
 CENTRE_LETTERS: Final = "IJK"
+Z: Final = 2
+"""The axis that the length of the tool is in."""
 
 
 def axis_letters(state: State, words: Words) -> list[int]:
@@ -30,6 +32,8 @@ def axis_letters(state: State, words: Words) -> list[int]:
 def target(state: State, words: Words, named: list[int]) -> Position:
     """Machine position that the axis words ask for; an axis that is not named stays."""
     coordinates, absolute = state.coordinates, state.modal.distance == 900
+    if Z in named:
+        state.take_length()
     if state.modal.polar == 160 and any(axis in PLANES[state.plane][:2] for axis in named):
         return state.checked(coordinates.to_machine(polar_target(state, words, named)))
     if coordinates.plain:

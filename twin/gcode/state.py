@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from twin.gcode.block import Words
-from twin.gcode.canonical import Arc, Linear, Move, Position, Rapid
+from twin.gcode.canonical import Arc, Linear, Move, Position, Rapid, ToolLength
 from twin.gcode.coordinates import Coordinates
 from twin.gcode.refusal import RefusedError
 from twin.gcode.settings import IntegerWords, Settings, ToolOffset
@@ -96,6 +96,7 @@ class State:
         "cycle",
         "feed_per_rev_mm",
         "feed_word",
+        "length_is_due",
         "length_number",
         "line",
         "modal",
@@ -143,6 +144,7 @@ class State:
         self.tool = 0
         self.preselected: int | None = None
         self.length_number: int | None = None
+        self.length_is_due = False
         self.radius_number: int | None = None
         self.tool_offsets: dict[int, ToolOffset] = dict(settings.tool_offsets)
 
@@ -179,6 +181,12 @@ class State:
         self.out.append(move)
         if len(self.out) > self.settings.moves_max:
             raise RefusedError("", f"the program makes more than {self.settings.moves_max} moves; Settings.moves_max")
+
+    def take_length(self) -> None:
+        """Say the tool length before the first move that is told where z goes since it changed: that move contains it."""
+        if self.length_is_due:
+            self.length_is_due = False
+            self.emit(ToolLength(self.line, self.coordinates.tool[2], self.program))
 
     def feed(self, length_mm: float) -> tuple[float, float | None]:
         """Feed of the next cut of that length: mm/min, and mm/rev where it hangs on the spindle. RefusedError without one."""

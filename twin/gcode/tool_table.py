@@ -27,8 +27,12 @@ def set_length(state: State, text: str) -> None:
     if state.modal.length != 490:
         offset = tool_offset(state, state.length_number, text) if state.tool_offsets else ToolOffset()
         length = offset.length_mm + offset.length_wear_mm
-    state.coordinates.tool[2] = -length if state.modal.length == 440 else length
-    state.coordinates.refresh()
+    if state.modal.length == 440:
+        length = -length
+    if length != state.coordinates.tool[2]:
+        state.coordinates.tool[2] = length
+        state.coordinates.refresh()
+        state.length_is_due = True
 
 
 def change_tool(state: State, number: int, column: str, value: float, adds: bool = False) -> None:

@@ -22,6 +22,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 PLANE_AXES = {17: (0, 1), 18: (2, 0), 19: (1, 2)}
 LINEAR_AXES = 3
+UP = np.array([0.0, 0.0, 1.0])
 SHORTEST_MM = 1e-9
 """A move shorter than this does not move: the rounding of a block, not a segment."""
 
@@ -66,6 +67,8 @@ class Path:
     start_mm, end_mm: (n, axes); centre_mm: (n, axes), of use for arcs only
     plane: 17, 18, 19; sweep_rad: 0 for what is no arc
     exact_stop: (n,) the segment ends at rest (G61, G9)
+    tool_mm: (n, 2) length of the tool in z, as the control counts it, at the start and at the end of each segment; they differ
+        where the segment takes up another one
     line: (n,) source line
     """
 
@@ -80,6 +83,7 @@ class Path:
     length_mm: Floats
     feed_mm_min: Floats
     exact_stop: NDArray[np.bool_]
+    tool_mm: Floats
     events: tuple[Event, ...]
 
     def __len__(self) -> int:
@@ -90,6 +94,23 @@ class Path:
         return points_at(
             segment, s_mm, self.kind, self.start_mm, self.end_mm, self.centre_mm, self.plane, self.sweep_rad, self.length_mm
         )
+
+    def tip_at(self, segment: Ints, s_mm: Floats) -> Floats:
+        """x, y, z of the tool's tip (n, 3) at these distances: the axes stand higher by the length of the tool."""
+        tip = self.at(segment, s_mm)[:, :LINEAR_AXES].copy()
+        start, end = self.tool_mm[segment, 0], self.tool_mm[segment, 1]
+        tip[:, 2] -= start + (end - start) * s_mm / np.where(self.length_mm[segment] > 0.0, self.length_mm[segment], 1.0)
+        return tip
+
+    @property
+    def tip_start_mm(self) -> Floats:
+        """x, y, z of the tip at the start of each segment, (n, 3)."""
+        return np.asarray(self.start_mm[:, :LINEAR_AXES] - self.tool_mm[:, :1] * UP)
+
+    @property
+    def tip_end_mm(self) -> Floats:
+        """x, y, z of the tip at the end of each segment, (n, 3)."""
+        return np.asarray(self.end_mm[:, :LINEAR_AXES] - self.tool_mm[:, 1:] * UP)
 
     def tangents(self, segment: Ints, s_mm: Floats) -> Floats:
         """dp/ds (n, axes): of length 1 in the axes that the feed counts."""
@@ -122,6 +143,7 @@ class _Builder:
         self.points: list[tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]] = []
         self.events: list[Event] = []
         self.exact_stop = False
+        self.tool_mm = self.tool_before_mm = 0.0
 
     def event(self, kind: EventKind, value: float, line: int) -> None:
         self.events.append(Event(len(self.rows), kind, float(value), line))
@@ -137,10 +159,11 @@ class _Builder:
         sweep: float = 0.0,
     ) -> None:
         start, self.position = self.position, end
+        tool_before, self.tool_before_mm = self.tool_before_mm, self.tool_mm
         length = _length(start, end, centre, plane, sweep)
         if length < SHORTEST_MM:
             return
-        self.rows.append((line, kind, plane, sweep, length, feed, self.exact_stop))
+        self.rows.append((line, kind, plane, sweep, length, feed, self.exact_stop, tool_before, self.tool_mm))
         self.points.append((start, end, centre or start))
 
 
@@ -179,7 +202,7 @@ def path_from_moves(
     builder = _Builder(start_mm if start_mm is not None else (0.0,) * len(axes), tool_change_mm)
     for move in moves:
         _add(builder, move)
-    rows = np.array(builder.rows, dtype=np.float64).reshape(-1, 7)
+    rows = np.array(builder.rows, dtype=np.float64).reshape(-1, 9)
     points = np.array(builder.points, dtype=np.float64).reshape(-1, 3, len(axes))
     return Path(
         axes=axes,
@@ -193,6 +216,7 @@ def path_from_moves(
         length_mm=rows[:, 4].copy(),
         feed_mm_min=rows[:, 5].copy(),
         exact_stop=rows[:, 6].astype(np.bool_),
+        tool_mm=rows[:, 7:].copy(),
         events=tuple(builder.events),
     )
 
@@ -222,6 +246,8 @@ def _add(builder: _Builder, move: canonical.Move) -> None:
             builder.event(EventKind.PROGRAM_STOP, move.optional, move.line)
         case canonical.ProgramEnd():
             builder.event(EventKind.PROGRAM_END, 0.0, move.line)
+        case canonical.ToolLength():
+            builder.tool_mm = move.length_mm
         case canonical.ExactStop():
             builder.exact_stop = move.on
         case canonical.LookAhead():

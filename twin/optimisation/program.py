@@ -74,7 +74,7 @@ class FeedLine:
 class Cuts:
     """The different cuts of all lines, each (cuts,): rows of engagement that are alike are one. mm and rad.
 
-    line: index of the feed line; heading_rad: of the feed, in steps of 15°, for chatter
+    line: index of the feed line; heading_rad: of the feed, in steps of 15°, for chatter; 0 where no tool has modes
     """
 
     line: Ints
@@ -135,12 +135,15 @@ def programmed(
     source = source_lines(text)
     _check_branches(source, {move.line for move in moves})
     inch = inch_lines(source)
+    headed = any(tool.modes for _, tool in tools)
     lines, groups = [], []
     for line, executions in _executions(path).items():
         segments = np.concatenate([np.arange(*span) for span in executions])
         segments = segments[path.kind[segments] != Kind.RAPID]
         found = (
-            _cuts_of_segments(path, rows, segments) if rows is not None else _cuts_planned(engagement or {}, line, path, segments)
+            _cuts_of_segments(path, rows, segments, headed)
+            if rows is not None
+            else _cuts_planned((engagement or {}).get(line, ()), path, segments, headed)
         )
         one = FeedLine(
             line, executions, int(numbers[segments[0]]), float(path.feed_mm_min[segments[0]]), float(speeds[segments[0]]),
@@ -173,12 +176,18 @@ class _Found:
     plunges: bool
 
 
-def _tools(machine: MachineFile, path: Path) -> tuple[Ints, list[tuple[int, Tool]]]:
-    """Index of the tool of each segment, −1 where it is not described, and the tools."""
+def tool_numbers(path: Path) -> Ints:
+    """The number of the tool in the spindle on each segment (n,); 0 before the first change."""
     number = np.zeros(len(path), dtype=np.int64)
     for event in path.events:
         if event.kind == EventKind.TOOL_CHANGE:
             number[event.segment :] = int(event.value)
+    return number
+
+
+def _tools(machine: MachineFile, path: Path) -> tuple[Ints, list[tuple[int, Tool]]]:
+    """Index of the tool of each segment, −1 where it is not described, and the tools."""
+    number = tool_numbers(path)
     tools: list[tuple[int, Tool]] = []
     index = np.full(len(path), -1, dtype=np.int64)
     for one in dict.fromkeys(number.tolist()):
@@ -236,14 +245,16 @@ def _executions(path: Path) -> dict[int, tuple[tuple[int, int], ...]]:
     return {line: tuple(spans) for line, spans in found.items()}
 
 
-def _cuts_of_segments(path: Path, rows: PathRows, segments: Ints) -> _Found:
+def _cuts_of_segments(path: Path, rows: PathRows, segments: Ints, headed: bool) -> _Found:
+    """headed: whether the heading of the feed matters: to chatter only."""
     mine = np.concatenate([np.arange(rows.first[s], rows.first[s + 1]) for s in segments.tolist()])
     mine = mine[rows.axial_depth_mm[mine] > 0.0]
     all_rows = np.concatenate([np.arange(rows.first[s], rows.first[s + 1]) for s in segments.tolist()])
-    fall = np.maximum(path.start_mm[:, 2] - path.end_mm[:, 2], 0.0)[rows.segment[all_rows]]
+    fall = np.maximum(path.tip_start_mm[:, 2] - path.tip_end_mm[:, 2], 0.0)[rows.segment[all_rows]]
     steep = fall > SHALLOW * path.length_mm[rows.segment[all_rows]]
     plunges = bool((steep & (rows.end_face_mm2[all_rows] > END_FACE_MM2)).any())
-    heading = _headings(path, rows.segment[mine])
+    within = (mine - rows.first[rows.segment[mine]] + 0.5) / np.diff(rows.first)[rows.segment[mine]]
+    heading = _headings(path, rows.segment[mine], within) if headed else np.zeros(len(mine))
     columns = np.column_stack([rows.axial_depth_mm[mine], rows.entry_angle_rad[mine], rows.exit_angle_rad[mine], heading])
     return _Found(_different(columns), float(rows.length_mm[mine].sum()), plunges)
 
@@ -259,15 +270,23 @@ def planned_cuts(run: RunLog) -> dict[int, list[list[float]]]:
     return {one: cuts.tolist() for one, cuts in found.items() if len(cuts)}
 
 
-def _cuts_planned(planned: PlannedCuts, line: int, path: Path, segments: Ints) -> _Found:
-    rows = np.array(planned.get(line, []), dtype=np.float64).reshape(-1, 3)
-    heading = np.full((len(rows), 1), _headings(path, segments[:1])[0])
-    return _Found(np.hstack([rows, heading]), float(path.length_mm[segments].sum()) if len(rows) else 0.0, False)
+def _cuts_planned(planned: Sequence[Sequence[float]], path: Path, segments: Ints, headed: bool) -> _Found:
+    rows = np.array(planned, dtype=np.float64).reshape(-1, 3)
+    heading = _headings_of(path, segments) if headed else np.zeros(1)
+    each = np.hstack([np.repeat(rows, len(heading), axis=0), np.tile(heading, len(rows))[:, None]])
+    return _Found(each, float(path.length_mm[segments].sum()) if len(rows) else 0.0, False)
 
 
-def _headings(path: Path, segments: Ints) -> Floats:
-    """Direction of the feed in the middle of each segment, in steps of 15°."""
-    tangent = path.tangents(segments, 0.5 * path.length_mm[segments])
+def _headings_of(path: Path, segments: Ints) -> Floats:
+    """All directions of the feed on these segments, in steps of 15°: of an arc those that it sweeps over."""
+    count = 1 + 2 * np.ceil(np.abs(path.sweep_rad[segments]) * HEADING_STEPS / (2.0 * np.pi)).astype(np.int64)
+    part = (np.concatenate([np.arange(n) for n in count.tolist()]) + 0.5) / np.repeat(count, count)
+    return np.unique(_headings(path, np.repeat(segments, count), part))
+
+
+def _headings(path: Path, segments: Ints, part: Floats) -> Floats:
+    """Direction of the feed at a part (0 … 1) of each segment, in steps of 15°."""
+    tangent = path.tangents(segments, part * path.length_mm[segments])
     step = 2.0 * np.pi / HEADING_STEPS
     return np.asarray(np.round(np.arctan2(tangent[:, 1], tangent[:, 0]) / step) % HEADING_STEPS * step)
 
@@ -338,7 +357,7 @@ def _is_clear(machine: MachineFile, path: Path, segments: Ints, tools: Sequence[
     stock = machine.stock
     if stock is None or tool < 0:
         return False
-    ends = np.stack([path.start_mm[segments, :3], path.end_mm[segments, :3]])
+    ends = np.stack([path.tip_start_mm[segments], path.tip_end_mm[segments]])
     bulge = np.where(
         path.sweep_rad[segments] != 0.0, path.length_mm[segments], 0.0
     )  # an arc stays within its own length of its ends

@@ -127,3 +127,27 @@ def test_a_chattering_speed_is_not_chosen() -> None:
         rpm = answer.lines[int(made.allowed.index[row])].after.spindle_rpm
         assert any(low - 0.01 <= rpm <= high + 0.01 for low, high in spans)
     assert answer.after.seconds >= optimise(second(evolutions=10, islands=1)).after.seconds
+
+
+def spans_of_a_circle(start_deg: float, planned: bool) -> tuple[tuple[float, float], ...]:
+    """The speeds that a circle of radius 21 mm around a pillar may have, 1 mm off it, whose tool gives way in y."""
+    mode = {"direction": "y", "frequency_hz": 900.0, "damping_ratio": 0.03, "stiffness_n_per_mm": 9000.0}
+    box = {"min_mm": [0.0, -30.0, -10.0], "max_mm": [60.0, 30.0, 0.0]}
+    toml = machine_with(text("second.toml"), tool={"modes": [mode]}, stock=box)
+    x, y = np.cos(np.radians(start_deg)), np.sin(np.radians(start_deg))
+    circle = "G21 G90\nS8000 M3\nG0 Z10.\nX{0:.6f} Y{1:.6f}\nG1 Z-1.5 F200\nG2 I{2:.6f} J{3:.6f}\n"
+    inner = circle.format(30.0 + 20.0 * x, 20.0 * y, -20.0 * x, -20.0 * y)
+    outer = f"G1 X{30.0 + 21.0 * x:.6f} Y{21.0 * y:.6f}\nG2 I{-21.0 * x:.6f} J{-21.0 * y:.6f}\nG0 Z10.\nM30\n"
+    cut = {7: [[1.5, np.pi - np.arccos(1.0 - 1.0 / 3.0), np.pi]]} if planned else None
+    question = second(program_text=inner + outer, machine_toml=toml, planned=cut, left_alone={5: "slot", 6: "approach"})
+    made = problem(question)
+    (row,) = np.flatnonzero([made.program.lines[int(k)].line == 7 for k in made.allowed.index])
+    return made.allowed.spans[row]
+
+
+@pytest.mark.parametrize("planned", [False, True], ids=["from the stock", "from a run log"])
+def test_on_an_arc_every_heading_of_it_has_to_be_stable(planned: bool) -> None:
+    spans = [spans_of_a_circle(start_deg, planned) for start_deg in (0.0, 90.0, 150.0)]
+    assert spans[0] != ((1000.0, 8000.0),)
+    for other in spans[1:]:
+        np.testing.assert_allclose(other, spans[0], rtol=1e-3)
