@@ -13,6 +13,8 @@ from typing import Annotated, Any, Self
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from twin.errors import MachineError
+from twin.gcode import Settings
+from twin.machine_control import ControlSection
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
@@ -233,12 +235,18 @@ class MachineFile(Section):
     spindle: SpindleDrive | None = None
     thermal: Thermal | None = None
     program: Program | None = None
+    control: ControlSection = ControlSection()
     limits: Limits | None = None
     cost: Cost | None = None
     stock: Stock | None = None
     uncertainty: dict[str, NotNegative] = Field(default_factory=lambda: {"relative": 0.05})
     noise: dict[str, NotNegative] = Field(default_factory=dict)
     effects: tuple[AddedEffect, ...] = ()
+
+    @property
+    def settings(self) -> Settings:
+        """What the control makes of a program: [control]."""
+        return self.control.settings()
 
 
 def machine_from_toml(text: str, source: str = "machine.toml") -> MachineFile:
@@ -285,4 +293,5 @@ def machine_to_toml(machine: MachineFile) -> str:
     import tomli_w  # noqa: PLC0415 - an extra; reading a machine needs nothing of it
 
     values = machine.model_dump(mode="json", exclude_none=True)
+    values["control"] = {key: value for key, value in values["control"].items() if value not in ({}, [])}
     return tomli_w.dumps({key: value for key, value in values.items() if value not in ({}, [])}, multiline_strings=False)

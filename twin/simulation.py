@@ -74,7 +74,8 @@ def simulate(
     would be longer than 8 million ticks, EffectError where its effects do not fit.
     """
     notes: list[str] = []
-    path = path_from_moves(interpret(text, settings))
+    settings = machine.settings if settings is None else settings
+    path = path_from_moves(interpret(text, settings), settings.start_mm or None)
     moving = [a for column, a in enumerate(path.axes) if np.any(path.start_mm[:, column] != path.end_mm[:, column])]
     missing = [a for a in moving if a not in machine.axes]
     if missing:

@@ -5,7 +5,7 @@ control told its lines; a run that was broken off, or is of another program than
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -76,22 +76,21 @@ def judged_cycle_time(twin: Twin, given: Cycles, budgets: Budgets) -> list[Figur
             why = f"ran {len(own)} times; its text is not among the programs given"
             figures += unseen(QUANTITY, measure, why, program[:TITLE_MAX])
             continue
-        figures.append(_of_program(model, program, own, path, budgets))
+        figures.append(_of_program(model, replace(twin.file.settings, optional_stop=True), program, own, path, budgets))
     return figures
 
 
-def _of_program(model: Model, program: str, cycles: Sequence[Cycle], path: Path, budgets: Budgets) -> Figure:
+def _of_program(model: Model, settings: Settings, program: str, cycles: Sequence[Cycle], path: Path, budgets: Budgets) -> Figure:
     timed: list[Timed] = []
     refused: list[str] = []
     references = False
     for cycle in cycles:
-        trial = trial_of(
-            RunAtHand(RunEntry(file=program, kind=RunKind.PROGRAM, role="check", program=path.name), path.parent, cycle.log)
-        )
+        entry = RunEntry(file=program, kind=RunKind.PROGRAM, role="check", program=path.name)
+        trial = trial_of(RunAtHand(entry, path.parent, cycle.log), settings)
         if isinstance(trial, Trial):
             references |= trial.references
             timed.append(_timed(model, trial))
-        elif isinstance(whole := whole_of(cycle.log, path, model), Timed):
+        elif isinstance(whole := whole_of(cycle.log, path, model, settings), Timed):
             timed.append(whole)
         else:
             refused.append(f"{trial.why}; {whole}")
@@ -117,7 +116,7 @@ def _timed(model: Model, trial: Trial) -> Timed:
     return Timed(float(plan.total_s), float(trial.recorded.run.active_s))
 
 
-def whole_of(log: RunLog, path: Path, model: Model) -> Timed | str:
+def whole_of(log: RunLog, path: Path, model: Model, settings: Settings) -> Timed | str:
     """A run as a whole, where its lines do not ascend to the end of the text, as with subprograms below M30; else why not.
 
     It has to have told the lines on which the twin says that most time is spent, and overrides of 100 %.
@@ -127,7 +126,8 @@ def whole_of(log: RunLog, path: Path, model: Model) -> Timed | str:
     if any(log.has(name) and float(np.nanmax(np.abs(log[name] - 100.0))) > 0.5 for name in OVERRIDES.values()):
         return "an override was turned"
     try:
-        planned = model.control.plan(path_from_moves(interpret(path.read_text(encoding="utf-8"), Settings(optional_stop=True))))
+        moves = interpret(path.read_text(encoding="utf-8"), settings)
+        planned = model.control.plan(path_from_moves(moves, settings.start_mm or None))
     except (TwinError, OSError, UnicodeDecodeError) as error:
         return str(error)
     seconds = planned.seconds_by_line()

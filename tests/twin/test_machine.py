@@ -7,6 +7,7 @@ import pytest
 from tests.twin.axes import AXIS
 from twin.case import read_case
 from twin.errors import CaseError, MachineError
+from twin.gcode import IntegerWords, Settings, ToolOffset
 from twin.machine import machine_from_toml, machine_to_toml, read_machine
 from twin.response import check_effects
 
@@ -92,3 +93,39 @@ def test_a_case_whose_run_is_missing_is_refused(tmp_path: Path) -> None:
 def test_a_folder_without_a_case_says_what_a_case_is(tmp_path: Path) -> None:
     with pytest.raises(CaseError, match=r"a case is a folder with a case\.toml"):
         read_case(tmp_path)
+
+
+def test_a_control_is_told_in_the_words_of_the_interpreter() -> None:
+    """[control] has every setting but the axes, texts beside the program, and the bounds."""
+    text = """
+[control]
+start_mm = [0.0, 0.0, 400.0]
+inch = true
+work_offsets_mm = { G55 = [1.0, 2.0, 3.0] }
+references_mm = [[0.0, 0.0, 400.0]]
+integer_words = "increments"
+builder_m_codes = [13]
+variables = { 500 = 2.5 }
+block_skip = [1]
+tool_offsets = { 7 = { length_mm = 100.0, length_wear_mm = -0.1 } }
+"""
+    machine = machine_from_toml(HEAD + text)
+    assert machine.settings == Settings(
+        start_mm=(0.0, 0.0, 400.0),
+        inch=True,
+        work_offsets_mm={"G55": (1.0, 2.0, 3.0)},
+        references_mm=((0.0, 0.0, 400.0),),
+        integer_words=IntegerWords.INCREMENTS,
+        builder_m_codes=frozenset({13}),
+        variables={500: 2.5},
+        block_skip=frozenset({1}),
+        tool_offsets={7: ToolOffset(length_mm=100.0, length_wear_mm=-0.1)},
+    )
+    assert machine_from_toml(machine_to_toml(machine)) == machine
+    without = {"axes", "subprograms"} | {name for name in Settings.__dataclass_fields__ if name.endswith("s_max")}
+    without |= {"call_depth_max", "bracket_depth_max"}
+    assert set(type(machine.control).model_fields) == set(Settings.__dataclass_fields__) - without
+
+
+def test_a_machine_without_a_control_reads_as_the_interpreter_does_by_itself() -> None:
+    assert machine_from_toml(HEAD).settings == Settings()

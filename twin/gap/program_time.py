@@ -56,7 +56,7 @@ def diagnose_programs(
 
 def _asked(case: Case) -> Asked:
     """The runs that can be compared, and the limits to start from."""
-    read = [trial_of(run) for run in case.of(RunKind.PROGRAM)]
+    read = [trial_of(run, case.machine.settings) for run in case.of(RunKind.PROGRAM)]
     trials = tuple(one for one in read if isinstance(one, Trial))
     refused = tuple(f"{one.name} {one.why}" for one in read if isinstance(one, Refused))
     if not trials:

@@ -84,26 +84,26 @@ class Refused:
     why: str
 
 
-def trial_of(run: Run) -> Trial | Refused:
-    """The run beside its program, or why there is nothing to compare."""
+def trial_of(run: Run, settings: Settings) -> Trial | Refused:
+    """The run beside its program as the control reads it, or why there is nothing to compare."""
     if run.entry.program is None:
         return Refused(run.name, "the case names no program for it; `program` of [[runs]] is the NC file that it ran")
     try:
         text = (run.folder / run.entry.program).read_text(encoding="utf-8")
         log = run.log
-        return _compared(run.name, log, text, run.entry.role == "fit")
+        return _compared(run.name, log, text, run.entry.role == "fit", settings)
     except ProgramError as error:
         return Refused(run.name, f"cannot be compared: the program given is refused, {error}")
     except (TwinError, OSError, UnicodeDecodeError) as error:
         return Refused(run.name, str(error))
 
 
-def _compared(name: str, log: RunLog, text: str, fitted: bool) -> Trial | Refused:
+def _compared(name: str, log: RunLog, text: str, fitted: bool, settings: Settings) -> Trial | Refused:
     if not log.has("line"):
         return Refused(name, "has no column line, so that nothing says what was executed when")
     if len(log) < 2:
         return Refused(name, "has a single row")
-    path, references = _path(text)
+    path, references = _path(text, settings)
     if not len(path):
         return Refused(name, "its program moves nothing")
     if not np.all(path.feed_mm_min > 0.0):
@@ -124,14 +124,15 @@ def _compared(name: str, log: RunLog, text: str, fitted: bool) -> Trial | Refuse
     return Trial(recorded, text, fitted, float(np.median(np.diff(log.t_s))), told, references, remarks)
 
 
-def _path(text: str) -> tuple[Path, bool]:
-    """The path, and whether it goes to a reference position; then it starts there too."""
-    place = (0.0, 0.0, NOMINAL.reference_z)
-    settings = Settings(start_mm=place, references_mm=(place,), optional_stop=True)
-    path = path_from_moves(interpret(text, settings), place)
-    if bool(np.any(path.end_mm[:, 2] == NOMINAL.reference_z)):
-        return path, True
-    return path_from_moves(interpret(text, Settings(optional_stop=True))), False
+def _path(text: str, settings: Settings) -> tuple[Path, bool]:
+    """The path, and whether it goes to a reference position that nobody has stated; then it starts there too."""
+    settings = replace(settings, optional_stop=True)
+    if not settings.references_mm:
+        place = (0.0, 0.0, NOMINAL.reference_z)
+        path = path_from_moves(interpret(text, replace(settings, start_mm=place, references_mm=(place,))), place)
+        if bool(np.any(path.end_mm[:, 2] == NOMINAL.reference_z)):
+            return path, True
+    return path_from_moves(interpret(text, settings), settings.start_mm or None), False
 
 
 def _run(log: RunLog, text: str, path: Path) -> ProgramRun:

@@ -107,7 +107,7 @@ class Flow:
             if section is not None:
                 return text, section
         if number not in self.settings.subprograms:
-            raise RefusedError(word, f"there is no program O{number:04}, neither in this text nor in Settings.subprograms")
+            raise RefusedError(word, f"there is no program O{number:04}, neither in this text nor with it")
         if number not in self.texts:
             self.texts[number] = Text(self.settings.subprograms[number], f"O{number:04}")
         text = self.texts[number]

@@ -27,7 +27,7 @@ def execute(state: State, words: Words) -> None:
     for code in words.m:
         if code not in M_CODES and code not in state.settings.builder_m_codes:
             raise RefusedError(
-                f"M{code}", "is not known; if it is the machine builder's, Settings.builder_m_codes passes it over"
+                f"M{code}", "is not known; if it is the machine builder's, [control] builder_m_codes passes it over"
             )
     set_modes(state, words)
     spindle_and_tool(state, words)

@@ -24,7 +24,7 @@ def axis_letters(state: State, words: Words) -> list[int]:
     for letter in words.values:
         if letter in "XYZABC":
             if letter.lower() not in state.axes:
-                raise RefusedError(words.texts[letter], f"the machine has no axis {letter}; Settings.axes names them")
+                raise RefusedError(words.texts[letter], f"the machine has no axis {letter}; it has {', '.join(state.axes)}")
             named.append(state.axes.index(letter.lower()))
     return named
 

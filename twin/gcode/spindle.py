@@ -56,7 +56,7 @@ def follow_surface_speed(state: State, end: Position) -> None:
     radius_mm = abs(state.coordinates.to_program(end)[state.spindle_axis])
     clamp = state.speed_max
     if speed_mm_min > 0.0 and radius_mm < 1e-9 and clamp is None:
-        raise RefusedError("", "G96 at radius 0 is an endless speed; write G92 S before, or Settings.spindle_rpm_max")
+        raise RefusedError("", "G96 at radius 0 is an endless speed; write G92 S before, or [control] spindle_rpm_max")
     rpm = speed_mm_min / (math.tau * radius_mm) if radius_mm >= 1e-9 else math.inf
     rpm = 0.0 if speed_mm_min == 0.0 else min(rpm, clamp if clamp is not None else RPM_MAX)
     if rpm != state.rpm:

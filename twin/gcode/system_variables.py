@@ -59,7 +59,7 @@ class SystemVariables:
             return self.mode(number)
         if 5001 <= number <= 5089:
             return self.position(number)
-        raise RefusedError(f"#{number}", "this system variable is not known here; Settings.variables may give its value")
+        raise RefusedError(f"#{number}", "this system variable is not known here; [control] variables may give its value")
 
     def in_units(self, value: float) -> float:
         return value / self.state.unit_mm

@@ -18,7 +18,7 @@ def tool_offset(state: State, number: int | None, text: str) -> ToolOffset:
         return ToolOffset()
     found = state.tool_offsets.get(number)
     if found is None:
-        raise RefusedError(text, f"the offset table has no number {number}; Settings.tool_offsets or G10 L10 to L13 sets it")
+        raise RefusedError(text, f"the offset table has no number {number}; [control] tool_offsets or G10 L10 to L13 sets it")
     return found
 
 

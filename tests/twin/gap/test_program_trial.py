@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from tests.recordings import recording
 from tests.twin.gap.programs import PERIOD_S, case_of, made, plate_runs, shop_program, whole_program
 from twin.gap.program_trial import Refused, Trial, section_feed_ratios, trial_of
+from twin.gcode import Settings
 from twin.recording.observations import read_observations
 from twin.recording.program_run import program_runs
 from twin.runlog import run_log
@@ -24,7 +25,7 @@ def columns(feed: float = 2000.0, tools: tuple[int, ...] = TOOLS) -> Columns:
 
 def read(folder: Path, recorded: Columns, program: str = shop_program(2000.0, TOOLS)) -> Trial | Refused:
     (run,) = case_of(folder, {"run": ("fit", run_log(recorded), program)}).runs
-    return trial_of(run)
+    return trial_of(run, Settings())
 
 
 def standing(recorded: Columns, row: int, seconds: float, state: str = "ACTIVE") -> Columns:

@@ -213,7 +213,7 @@ def test_system_variables_show_the_control(before: str, expression: str, expecte
         ("#1=1.5AND1", 1, "AND", "integer"),
         ("#1=BIN[26]", 1, "BIN", "BCD"),
         ("#50=1", 1, "#50", "cannot be set"),
-        ("#1=#3011", 1, "#3011", "Settings.variables"),
+        ("#1=#3011", 1, "#3011", "[control] variables"),
         ("#3000=12 (TOOL BROKEN)", 1, "#3000", "alarm 12"),
         ("#1=[1+", 1, "+", "ends inside"),
         ("#1=[1 2]", 1, "2", "']'"),
