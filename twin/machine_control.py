@@ -66,7 +66,8 @@ class ControlSection(BaseModel):
     def settings(self) -> Settings:
         """What the interpreter is to be told.
 
-        >>> ControlSection(tool_offsets={"1": OffsetRow(length_mm=100.0)}, builder_m_codes=(13,)).settings().tool_offsets[1].length_mm
+        >>> section = ControlSection(tool_offsets={"1": OffsetRow(length_mm=100.0)}, builder_m_codes=(13,))
+        >>> section.settings().tool_offsets[1].length_mm
         100.0
         """
         given: dict[str, Any] = {

@@ -64,6 +64,9 @@ class JobInShort(Answer):
     progress_pct: float = 0.0
     doing: str = ""
     reason: str = ""
+    caution: str = Field(
+        "", description="what its result exceeds; empty = nothing that is known", examples=["2 lines are above a limit"]
+    )
 
 
 class JobInFull(JobInShort):
@@ -94,14 +97,15 @@ def job_routes(sources: Sources) -> APIRouter:
         """All jobs; `available` false, with the reason, where no consumer keeps them up."""
         state = None if viewer is None else viewer.jobs.all()
         reason = jobs_trouble(state)
-        offers_files = sources.jobs is not None
-        return {"jobs": [], **(state or {}), "now": now_ms(), "available": reason is None, "reason": reason,
-                "offers_files": offers_files}  # fmt: skip
+        known = [] if viewer is None else [_cautioned(viewer, job) for job in (state or {}).get("jobs", [])]
+        told = {"available": reason is None, "reason": reason, "offers_files": sources.jobs is not None}
+        return {**(state or {}), "jobs": known, "now": now_ms(), **told}
 
     @router.get("/jobs/{job_id}", response_model=JobInFull, responses=missing)
     async def job(job_id: JobId) -> Any:
         """One job in full."""
-        return _known(viewer, job_id)
+        found = _known(viewer, job_id)
+        return {**found, "caution": caution_of(found)}
 
     @router.get("/jobs/{job_id}/files/{name}", responses={200: {"content": {"*/*": {}}}, **missing}, response_class=Response)
     async def file(
@@ -139,6 +143,27 @@ def job_routes(sources: Sources) -> APIRouter:
         return await _answer(viewer, CANCEL, {"id": job_id})
 
     return router
+
+
+def caution_of(job: dict[str, Any]) -> str:
+    """What the result of a job in full exceeds, in words; such a job is done all the same.
+
+    >>> caution_of({"result": {"lines_over": 2, "collisions": []}})
+    '2 lines are above a limit'
+    >>> caution_of({"result": {"lines_over": 1, "collisions": [12, 14]}})
+    'a rapid goes into material in line 12; 1 line is above a limit'
+    """
+    result = job.get("result") or {}
+    over, collisions = result.get("lines_over"), result.get("collisions")
+    said = [f"a rapid goes into material in line {collisions[0]}"] if isinstance(collisions, list) and collisions else []
+    if isinstance(over, int) and over:
+        said.append(f"{over} line{' is' if over == 1 else 's are'} above a limit")
+    return "; ".join(said)
+
+
+def _cautioned(viewer: Viewer, job: dict[str, Any]) -> dict[str, Any]:
+    """A job in short, with what only the one in full tells."""
+    return {**job, "caution": caution_of(viewer.jobs.one(str(job.get("id"))) or {})}
 
 
 def _known(viewer: Viewer | None, job_id: str) -> dict[str, Any]:

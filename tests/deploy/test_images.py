@@ -105,6 +105,14 @@ def test_the_health_of_a_container_is_its_connection_to_the_broker() -> None:
             assert healthy(port)
 
 
+def test_what_numba_keeps_has_a_place_in_the_image_and_in_the_unit_of_jobs() -> None:
+    """A diagnosis imports functions that numba keeps compiled; where it finds no place for that, it refuses the import."""
+    (place,) = re.findall(r"NUMBA_CACHE_DIR=(\S+)", DOCKERFILE.read_text())
+    unit = (DEPLOY / "systemd" / "cnctwin-jobs.service").read_text()
+    assert place.startswith("/tmp/") and "\nPrivateTmp=yes\n" in unit
+    assert f"\nEnvironment=NUMBA_CACHE_DIR={place}\n" in unit
+
+
 def test_shellcheck_finds_nothing() -> None:
     scripts = [DEPLOY / "compose" / "prepare", DEPLOY / "compose" / "influxdb-buckets.sh", DEPLOY / "certificates"]
     checked = subprocess.run([installed("shellcheck"), *map(str, scripts)], capture_output=True, text=True, check=False)

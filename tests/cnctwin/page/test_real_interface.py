@@ -86,10 +86,10 @@ def test_the_page_and_the_interface_understand_each_other(
     for view in ("gap", "alerts", "replay", "validation"):
         visit.open(f"#/{view}" if view == "alerts" else f"#/{view}/vmc")
         page.wait_for_timeout(400)
-    visit.errors.clear()  # parts without a store are a 503, of which the browser writes a line
     visit.open("#/machine/vmc")
     died.set()
     expect(page.locator(".machine-head")).to_contain_text("stale since")
     expect(tile).to_have_class(re.compile("stale"))
     visit.context.close()
-    assert visit.errors == []
+    # Parts without a store are a 503, of which the browser writes a line, whenever it comes.
+    assert [error for error in visit.errors if "503 (Service Unavailable)" not in error] == []

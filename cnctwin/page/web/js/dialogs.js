@@ -148,36 +148,20 @@ function healthRows(health) {
 export function openLogin(app) {
   const open = dialog();
   if (open.open && open.querySelector("#token")) return;
-  const trouble = el("p", { class: "trouble", role: "alert", hidden: true });
   const field = el("input", { class: "field", id: "token", type: "password", autocomplete: "current-password", required: true });
-  const submit = async (event) => {
-    event.preventDefault();
+  const act = async () => {
     try {
       await post("login", { token: field.value });
-      open.close();
-      app.stream.restart();
-      app.reopen();
     } catch (error) {
-      trouble.hidden = false;
-      trouble.textContent = error.status === 401 || error.status === 403 ? "This is not the token." : error.message;
       field.select();
+      throw error.status === 401 || error.status === 403 ? new Error("This is not the token.") : error;
     }
+    app.stream.restart();
+    app.reopen();
   };
-  show(
-    "Log in",
-    el(
-      "form",
-      { onsubmit: submit },
-      el(
-        "p",
-        {},
-        "This page asks for a token. Whoever runs it has it: the variable CNCTWIN_PAGE_TOKEN, or the file named in its place.",
-      ),
-      el("label", { class: "named" }, "Token", field),
-      trouble,
-      el("div", { class: "actions" }, el("button", { class: "button main" }, "Log in")),
-    ),
-  );
+  const where = "Whoever runs it has it: the variable CNCTWIN_PAGE_TOKEN, or the file named in its place.";
+  const about = el("p", {}, `This page asks for a token. ${where}`);
+  openAsked("Log in", [about, el("label", { class: "named" }, "Token", field)], "Log in", act, null);
   field.focus();
 }
 
@@ -186,7 +170,7 @@ export function openDocument(title, value) {
   show(title, el("pre", { tabindex: "0" }, JSON.stringify(value, null, 2)));
 }
 
-/** Asks before something is done; `act()` does it, or throws why not. */
+/** Asks before something is done; `act()` does it, or throws why not. back: the word for leaving it be; null = none is offered. */
 export function openAsked(title, content, word, act, back = "Cancel") {
   const told = el("p", { role: "alert", class: "trouble", hidden: true });
   const button = el("button", { class: "button main" }, word);
@@ -203,7 +187,7 @@ export function openAsked(title, content, word, act, back = "Cancel") {
       button.disabled = false;
     }
   };
-  const leave = el("button", { type: "button", class: "button", onclick: () => open.close() }, back);
+  const leave = back && el("button", { type: "button", class: "button", onclick: () => open.close() }, back);
   const open = show(title, el("form", { onsubmit: submit }, content, told, el("div", { class: "actions" }, leave, button)));
 }
 

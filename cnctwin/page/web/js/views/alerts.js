@@ -3,7 +3,7 @@
 import { part, post } from "../api.js";
 import { serverNow } from "../clock.js";
 import { openSigned } from "../dialogs.js";
-import { el, say, setText, symbol } from "../dom.js";
+import { el, say, setText, symbol, table } from "../dom.js";
 import { age, moment, words } from "../text.js";
 
 const RANK = { high: 0, medium: 1, low: 2 },
@@ -119,45 +119,19 @@ export function open(app) {
 
   function silences(given) {
     if (!given.length) return null;
-    const rows = given.map((one) =>
-      el(
-        "tr",
-        {},
-        el(
-          "th",
-          { scope: "row" },
-          Object.entries(one.matchers ?? {})
-            .map(([label, pattern]) => `${label} = ${pattern}`)
-            .join(", "),
-        ),
-        el("td", {}, `${moment(Date.parse(one.starts))} to ${moment(Date.parse(one.ends))}`),
-        el("td", {}, one.by ?? ""),
-        el("td", {}, one.comment ?? ""),
-        el("td", {}, el("code", {}, one.id ?? "")),
-      ),
-    );
+    const matchers = (one) => Object.entries(one.matchers ?? {}).map(([label, pattern]) => `${label} = ${pattern}`);
+    const rows = given.map((one) => [
+      matchers(one).join(", "),
+      `${moment(Date.parse(one.starts))} to ${moment(Date.parse(one.ends))}`,
+      one.by ?? "",
+      one.comment ?? "",
+      el("code", {}, one.id ?? ""),
+    ]);
     return el(
       "section",
       {},
       el("h2", {}, "Silenced"),
-      el(
-        "div",
-        { class: "scroll" },
-        el(
-          "table",
-          {},
-          el(
-            "thead",
-            {},
-            el(
-              "tr",
-              {},
-              ["What", "When", "By", "Why", "Id"].map((text) => el("th", { scope: "col" }, text)),
-            ),
-          ),
-          el("tbody", {}, rows),
-        ),
-      ),
+      table(["What", "When", "By", "Why", "Id"], rows, { label: "Silenced" }),
       el("p", { class: "note" }, "cnctwin alerts unsilence ID --by YOU ends one."),
     );
   }
@@ -171,45 +145,15 @@ export function open(app) {
         el("h2", {}, "Who is told"),
         el("p", { class: "quiet" }, "No receiver is configured: alerts are on the broker and on this page only."),
       );
-    const rows = entries.map(([name, one]) =>
-      el(
-        "tr",
-        {},
-        el("th", { scope: "row" }, name),
-        el("td", { class: "number" }, String(one.delivered ?? 0)),
-        el("td", { class: "number" }, String(one.failed ?? 0)),
-        el("td", { class: "number" }, String(one.waiting ?? 0)),
-        el(
-          "td",
-          {},
-          one.last_error ? String(one.last_error) : one.last_delivered ? `last at ${moment(Date.parse(one.last_delivered))}` : "",
-        ),
-      ),
-    );
+    const last = (one) =>
+      one.last_error ? String(one.last_error) : one.last_delivered ? `last at ${moment(Date.parse(one.last_delivered))}` : "";
+    const count = (number) => String(number ?? 0);
+    const rows = entries.map(([name, one]) => [name, count(one.delivered), count(one.failed), count(one.waiting), last(one)]);
     return el(
       "section",
       {},
       el("h2", {}, "Who is told"),
-      el(
-        "div",
-        { class: "scroll" },
-        el(
-          "table",
-          {},
-          el(
-            "thead",
-            {},
-            el(
-              "tr",
-              {},
-              ["Receiver", "Delivered", "Failed", "Waiting", ""].map((text, i) =>
-                el("th", { scope: "col", class: i && i < 4 ? "number" : null }, text),
-              ),
-            ),
-          ),
-          el("tbody", {}, rows),
-        ),
-      ),
+      table(["Receiver", "Delivered", "Failed", "Waiting", ""], rows, { numbers: [1, 2, 3], label: "Who is told" }),
       failures?.length
         ? el(
             "ul",

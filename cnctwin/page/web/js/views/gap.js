@@ -7,6 +7,7 @@ import { serverNow } from "../clock.js";
 import { TILES, tileOf } from "../charted.js";
 import { diagnosisSections } from "./diagnosis.js";
 import { machineHead } from "./machine_head.js";
+import { noMachine } from "./no_machine.js";
 
 const AGAIN_MS = 15000;
 const REGIMES = ["warm_up", "steady", "cool_down", "air"];
@@ -229,30 +230,10 @@ function nowOf(machine) {
 }
 
 export function open(app, { machine: named }) {
-  const name = app.pick(named),
-    element = el("div", { class: "view gap-view" });
-  if (name === null) {
-    element.append(
-      el("div", { class: "head" }, el("h1", {}, "Gap")),
-      el(
-        "div",
-        { class: "empty" },
-        el("h2", {}, "No machine yet"),
-        el("p", {}, "The gap is that of a machine; there is none so far."),
-      ),
-    );
-    return {
-      title: "Gap",
-      element,
-      machine: null,
-      keys: [],
-      stream: "stream",
-      update: () => {
-        if (app.pick(null)) app.reopen();
-      },
-    };
-  }
-  const stop = new AbortController(),
+  const name = app.pick(named);
+  if (name === null) return noMachine(app, "Gap", "The gap is that of a machine; there is none so far.");
+  const element = el("div", { class: "view gap-view" }),
+    stop = new AbortController(),
     head = machineHead(app, app.plant.machine(name), "gap");
   const body = el("div", {}, el("p", { class: "waiting" }, "Loading …")),
     trouble = el("p", { class: "trouble", role: "alert", hidden: true }),

@@ -14,9 +14,15 @@ const OBJECTIVES = [
   ["cost", "the lowest cost"],
   ["pareto", "both: the front"],
 ];
+const SPEED_CHANGES = [
+  ["anywhere", "at any line"],
+  ["in_air", "only outside of the material"],
+  ["per_tool", "with the tool only: one speed for each"],
+];
 
 const named = (text, field) => el("label", { class: "named" }, text, field);
 const line = (name, about = {}) => el("input", { class: "field", name, maxlength: "300", ...about });
+const number = (name, min, max, step, placeholder) => line(name, { type: "number", min, max, step, placeholder });
 const choice = (name, options) =>
   el(
     "select",
@@ -30,8 +36,12 @@ export function openNewJob(accepted) {
   const program = fileOrName("program", ".nc,.txt,.tap,.mpf,.h,.eia,.min"),
     machine = fileOrName("machine", ".toml");
   const objective = choice("objective", OBJECTIVES);
-  const force = line("force_limit_n", { type: "number", min: "0", step: "any", placeholder: "as in machine.toml" });
-  const probability = line("probability", { type: "number", min: "0", max: "1", step: "any", placeholder: "by the mean twin" });
+  const changes = choice("speed_changes", SPEED_CHANGES);
+  const force = number("force_limit_n", "0", null, "any", "as in machine.toml"),
+    probability = number("probability", "0", "1", "any", "by the mean twin"),
+    seed = number("seed", "0", String(2 ** 32 - 1), "1", "1"),
+    evolutions = number("evolutions", "1", "100000", "1", "60"),
+    population = number("population", "4", "100000", "2", "64");
   const folder = line("case", { placeholder: "vmc/november" });
   const gains = el("input", { type: "checkbox", name: "free_gains" });
   const optimise = [
@@ -40,6 +50,8 @@ export function openNewJob(accepted) {
     named("Wanted", objective),
     named("Cutting force at most, N", force),
     named("The limit is kept with the probability", probability),
+    named("The spindle may change its speed", changes),
+    el("div", { class: "search" }, named("Seed", seed), named("Evolutions", evolutions), named("Population", population)),
   ];
   const parts = {
     optimise,
@@ -53,13 +65,14 @@ export function openNewJob(accepted) {
   async function asked() {
     const job = kind.value;
     if (job !== "optimise") return { job, case: folder.value.trim(), ...(job === "identify" ? { free_gains: gains.checked } : {}) };
-    const numbers = [force, probability].filter((one) => one.value !== "").map((one) => [one.name, Number(one.value)]);
+    const figures = [force, probability, seed, evolutions, population].filter((one) => one.value !== "");
     return {
       job,
       objective: objective.value,
-      ...(await program.given("program_text")),
+      speed_changes: changes.value,
+      ...(await program.given("program_text", "encoding")),
       ...(await machine.given("machine_toml")),
-      ...Object.fromEntries(numbers),
+      ...Object.fromEntries(figures.map((one) => [one.name, Number(one.value)])),
     };
   }
 
@@ -79,16 +92,20 @@ function fileOrName(name, accept) {
     named(`${title}: below the consumer's folder`, own),
     named(`${title}: or a file of this device`, file),
   );
-  const given = async (textKey) =>
-    file.files.length ? { [textKey]: decoded(await file.files[0].arrayBuffer()) } : { [name]: own.value.trim() };
+  const given = async (textKey, encodingKey) => {
+    if (!file.files.length) return { [name]: own.value.trim() };
+    const { text, encoding } = decoded(new Uint8Array(await file.files[0].arrayBuffer()));
+    return { [textKey]: text, ...(encodingKey && encoding !== "utf-8" ? { [encodingKey]: encoding } : {}) };
+  };
   return { element, given };
 }
 
-/** What is not UTF-8 is read as Latin-1, as controls write it. */
+/** Text and encoding of a file. What is not UTF-8 is Latin-1, as controls write it; to a browser that word is windows-1252. */
 function decoded(bytes) {
+  const marked = bytes[0] === 0xef && bytes[1] === 0xbb && bytes[2] === 0xbf;
   try {
-    return new TextDecoder("utf-8", { fatal: true }).decode(bytes);
+    return { text: new TextDecoder("utf-8", { fatal: true }).decode(bytes), encoding: marked ? "utf-8-sig" : "utf-8" };
   } catch {
-    return new TextDecoder("iso-8859-1").decode(bytes);
+    return { text: Array.from(bytes, (byte) => String.fromCharCode(byte)).join(""), encoding: "latin-1" };
   }
 }

@@ -3,7 +3,7 @@
 import { get, part, post } from "../api.js";
 import { serverNow } from "../clock.js";
 import { openAsked } from "../dialogs.js";
-import { el, say, setHidden, setSymbol, setText, symbol } from "../dom.js";
+import { el, say, setData, setHidden, setSymbol, setText, symbol } from "../dom.js";
 import { age, duration, moment, plain, words } from "../text.js";
 import { openNewJob } from "./job_form.js";
 
@@ -95,7 +95,8 @@ export function open(app) {
 class Card {
   constructor(app, job, changed) {
     Object.assign(this, { app, id: job.id, changed, shown: "", loaded: false });
-    this.sign = symbol(SIGNS[job.state] ?? "s-unknown");
+    this.sign = symbol("s-unknown");
+    this.caution = el("p", { class: "caution", hidden: true });
     this.what = el("p", { class: "what" });
     this.facts = el("p", { class: "facts" });
     this.bar = el("progress", { max: "100", value: 0, "aria-label": `Progress of ${job.id}` });
@@ -107,7 +108,7 @@ class Card {
       "article",
       { class: "jobcard", "data-job": job.id },
       this.sign,
-      el("div", {}, el("h3", {}, title), this.what, this.bar, this.facts, this.details),
+      el("div", {}, el("h3", {}, title), this.caution, this.what, this.bar, this.facts, this.details),
       el("div", { class: "acts" }, this.button),
     );
   }
@@ -118,7 +119,10 @@ class Card {
     if (key === this.shown) return;
     this.shown = key;
     this.element.dataset.state = job.state;
-    setSymbol(this.sign, SIGNS[job.state] ?? "s-unknown");
+    setData(this.element, "caution", job.caution ? "" : null);
+    setSymbol(this.sign, job.caution ? "s-alert" : (SIGNS[job.state] ?? "s-unknown"));
+    setHidden(this.caution, !job.caution);
+    setText(this.caution, `Done, but ${job.caution}`);
     setText(this.what, [job.sentence, isOver(job) ? "" : job.doing, job.reason].filter(Boolean).join(" · "));
     setHidden(this.bar, job.state !== "running");
     this.bar.value = job.progress_pct ?? 0;

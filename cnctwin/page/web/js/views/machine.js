@@ -8,6 +8,7 @@ import { Panels } from "../panels.js";
 import { addBefore } from "../past.js";
 import { title } from "../text.js";
 import { machineHead } from "./machine_head.js";
+import { noMachine } from "./no_machine.js";
 import { SignalTable } from "./signal_table.js";
 import { ScoreTile, Tile } from "./tiles.js";
 
@@ -18,31 +19,9 @@ const WINDOWS = [
 ];
 
 export function open(app, { machine: named, search }) {
-  const name = app.pick(named),
-    element = el("div", { class: "view machine-view" });
-  const view = {
-    title: name ?? "Machine",
-    element,
-    machine: name,
-    keys: [],
-    stream: name ? query("stream", { machine: name }) : "stream",
-    update: () => {
-      if (app.pick(null)) app.reopen();
-    },
-    close() {},
-  };
-  if (name === null) {
-    element.append(
-      el("div", { class: "head" }, el("h1", {}, "Machine")),
-      el(
-        "div",
-        { class: "empty" },
-        el("h2", {}, "No machine yet"),
-        el("p", {}, "A machine appears as soon as its edge says that it is there."),
-      ),
-    );
-    return view;
-  }
+  const name = app.pick(named);
+  if (name === null) return noMachine(app, "Machine", "A machine appears as soon as its edge says that it is there.");
+  const element = el("div", { class: "view machine-view" });
   const machine = app.plant.machine(name);
   machine.series.clear(); // what was kept for the fleet has holes: it is filled up anew
   const head = machineHead(app, machine, "machine");
@@ -199,7 +178,17 @@ export function open(app, { machine: named, search }) {
     table.write();
   }, 1000);
 
-  Object.assign(view, {
+  requestAnimationFrame(() => {
+    if (element.isConnected) {
+      write();
+      redraw();
+    }
+  });
+  return {
+    title: name,
+    element,
+    machine: name,
+    stream: query("stream", { machine: name }),
     update() {
       write();
       redraw();
@@ -238,12 +227,5 @@ export function open(app, { machine: named, search }) {
       offFrame(write);
       panels.destroy();
     },
-  });
-  requestAnimationFrame(() => {
-    if (element.isConnected) {
-      write();
-      redraw();
-    }
-  });
-  return view;
+  };
 }

@@ -12,6 +12,7 @@ import { Ring } from "../ring.js";
 import { duration, fromLocalField, localField, moment, title } from "../text.js";
 import { Happenings } from "./happenings.js";
 import { MomentShown } from "./moment_shown.js";
+import { noMachine } from "./no_machine.js";
 import { Recompute } from "./recompute.js";
 
 const LATELY = [
@@ -21,30 +22,10 @@ const LATELY = [
 ];
 const SPEEDS = [1, 4, 16, 60, 240];
 export function open(app, { machine: named, search }) {
-  const name = app.pick(named),
-    element = el("div", { class: "view replay-view" });
-  if (name === null) {
-    element.append(
-      el("div", { class: "head" }, el("h1", {}, "Replay")),
-      el(
-        "div",
-        { class: "empty" },
-        el("h2", {}, "No machine yet"),
-        el("p", {}, "What is replayed is the past of a machine; there is none so far."),
-      ),
-    );
-    return {
-      title: "Replay",
-      element,
-      machine: null,
-      keys: [],
-      stream: "stream",
-      update: () => {
-        if (app.pick(null)) app.reopen();
-      },
-    };
-  }
-  const known = app.plant.machine(name),
+  const name = app.pick(named);
+  if (name === null) return noMachine(app, "Replay", "What is replayed is the past of a machine; there is none so far.");
+  const element = el("div", { class: "view replay-view" }),
+    known = app.plant.machine(name),
     stop = new AbortController();
   let past = null,
     panels = null,

@@ -6,6 +6,7 @@ import { openDocument } from "../dialogs.js";
 import { el, symbol } from "../dom.js";
 import { age, coarse, duration, moment, number, plain, words } from "../text.js";
 import { machineHead } from "./machine_head.js";
+import { noMachine } from "./no_machine.js";
 
 const VERDICTS = { within: "s-ack", over: "s-alert", "not enough data": "s-pending", "not observable": "s-unknown" };
 const MEASURES = {
@@ -168,25 +169,11 @@ function parts(found) {
 }
 
 export function open(app, { machine: named }) {
-  const name = app.pick(named),
-    element = el("div", { class: "view validation-view" });
-  if (name === null) {
-    element.append(
-      el("div", { class: "head" }, el("h1", {}, "Parts and validation")),
-      el("div", { class: "empty" }, el("h2", {}, "No machine yet")),
-    );
-    return {
-      title: "Parts and validation",
-      element,
-      machine: null,
-      keys: [],
-      stream: "stream",
-      update: () => {
-        if (app.pick(null)) app.reopen();
-      },
-    };
-  }
-  const stop = new AbortController(),
+  const name = app.pick(named);
+  if (name === null)
+    return noMachine(app, "Parts and validation", "Parts are made by a machine, and its twin is validated; there is none so far.");
+  const element = el("div", { class: "view validation-view" }),
+    stop = new AbortController(),
     head = machineHead(app, app.plant.machine(name), "validation");
   const made = el("div", {}, el("p", { class: "waiting" }, "Loading …")),
     proof = el("div", {}, el("p", { class: "waiting" }, "Loading …"));
