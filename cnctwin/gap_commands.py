@@ -12,8 +12,6 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from cnctwin.blind_check.check import run_check
-from cnctwin.blind_check.table import check_json, missed, table
 from cnctwin.errors import UsageError
 from cnctwin.gap_report.page import report_html
 from cnctwin.twin_commands import working, write
@@ -126,6 +124,9 @@ def diagnosed_alone(case: Case) -> Diagnosed:
 
 def check(cases: int, seed: int, *, workers: int, as_json: bool, console: Console) -> int:
     """The blind check: cases of an independent plant whose effects are withheld; exit code 1 where a target is missed."""
+    from cnctwin.blind_check.check import run_check  # noqa: PLC0415 - its plant needs a place for numba's own cache
+    from cnctwin.blind_check.table import check_json, missed, table  # noqa: PLC0415
+
     if cases < 1:
         raise UsageError(f"--cases {cases}: at least one")
     with working("blind check") as say:

@@ -99,7 +99,7 @@ def submit(  # noqa: PLR0917
     """Ask for a job. Exit code 0: it was accepted (with --follow: it is done); 1: it was not, or nobody answers."""
     given: dict[str, Any] = {"case": case, "objective": objective, "force_limit_n": force_limit_n, "probability": probability}
     given |= {"seed": seed, "evolutions": evolutions, "population": population, "free_gains": free_gains or None}
-    given |= {"program_text": _text(program), "machine_toml": _text(machine), "job": job and str(job)}
+    given |= {**_program(program), "machine_toml": _text(machine), "job": job and str(job)}
     document = {key: value for key, value in given.items() if value is not None}
     if request is not None and document:
         raise UsageError(f"{request}: give either a request or options (--{next(iter(document)).replace('_', '-')})")
@@ -225,9 +225,21 @@ def _document(file: Path) -> dict[str, Any]:
     return document
 
 
+def _program(file: Path | None) -> dict[str, str]:
+    """Its text, and its encoding where that is not the one which is taken without a word."""
+    if file is None:
+        return {}
+    text, encoding = decoded(_bytes(file))
+    return {"program_text": text} | ({} if encoding == "utf-8" else {"encoding": encoding})
+
+
 def _text(file: Path | None) -> str | None:
+    return None if file is None else decoded(_bytes(file))[0]
+
+
+def _bytes(file: Path) -> bytes:
     try:
-        return None if file is None else decoded(file.read_bytes())[0]
+        return file.read_bytes()
     except OSError as error:
         raise UsageError(f"{file}: cannot be read: {error.strerror}") from None
 

@@ -5,7 +5,10 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from cnctwin.errors import UsageError
 from cnctwin.jobs.files_root import TOML_BYTES_MAX, FilesRoot, machine_name
+from twin.errors import MachineError
+from twin.machine import machine_from_toml
 
 Text = Annotated[str, Field(min_length=1)]
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
@@ -38,30 +41,52 @@ class IdentifyParameters(CaseParameters):
 
 
 class OptimiseParameters(Parameters):
-    """As `cnctwin optimise`: a program and a machine, each as a file or as its text."""
+    """As `cnctwin optimise`: a program and a machine, each as a file or as its text.
+
+    encoding: of the file that program_text came from, in which the answer is written
+    """
 
     program: Text | None = None
     program_text: Text | None = None
+    encoding: Literal["utf-8", "utf-8-sig", "latin-1"] | None = None
     machine: Text | None = None
     machine_toml: Text | None = None
     objective: Literal["time", "cost", "pareto"] = "time"
     force_limit_n: Positive | None = None
-    probability: Annotated[float, Field(gt=0.0, lt=1.0)] | None = None
+    probability: Annotated[float, Field(ge=0.5, le=0.9999)] | None = None
     seed: Annotated[int, Field(ge=0, lt=2**32)] = 1
     evolutions: Annotated[int, Field(ge=1, le=100_000)] | None = None
-    population: Annotated[int, Field(ge=4, le=100_000)] | None = None
+    population: Annotated[int, Field(ge=4, le=10_000, multiple_of=2)] | None = None
+    speed_changes: Literal["anywhere", "in_air", "per_tool"] | None = None
 
     @model_validator(mode="after")
     def _one_of_each(self) -> "OptimiseParameters":
         for file, text in (("program", "program_text"), ("machine", "machine_toml")):
             if (getattr(self, file) is None) == (getattr(self, text) is None):
                 raise ValueError(f"give either {file} (a file) or {text}")
+        if self.encoding is not None:
+            if self.program_text is None:
+                raise ValueError("encoding is that of program_text; a file has its own")
+            try:
+                self.program_text.encode(self.encoding)
+            except UnicodeEncodeError as error:
+                sign = self.program_text[error.start]
+                raise ValueError(f"program_text has the sign {sign!r}, which {self.encoding} has not got") from None
         return self
 
     def machine_of(self, files: FilesRoot) -> str:
-        """That of the machine.toml; the program is looked at too."""
+        """That of the machine.toml; the program is looked at too, and whether the machine states what is chosen between."""
         self.program_of(files)
-        return machine_name(self.toml_of(files), "machine_toml" if self.machine is None else f"machine = {self.machine!r}")
+        where = "machine_toml" if self.machine is None else f"machine = {self.machine!r}"
+        try:
+            machine = machine_from_toml(self.toml_of(files), where)
+        except MachineError as error:
+            raise UsageError(str(error)) from None
+        if machine.limits is None:
+            raise UsageError(f"{where}: no [limits]; write feed_mm_min and spindle_rpm, what machine and tool allow")
+        if machine.cost is None and self.objective != "time":
+            raise UsageError(f"{where}: no [cost], which objective = {self.objective!r} needs")
+        return machine.machine.name
 
     def program_of(self, files: FilesRoot) -> str:
         """The text of the program."""
@@ -69,7 +94,7 @@ class OptimiseParameters(Parameters):
 
     def encoding_of(self, files: FilesRoot) -> str:
         """In which its file is written, and so is the rewritten one."""
-        return "utf-8" if self.program_text else files.encoded_text(self.program or "", "program")[1]
+        return self.encoding or "utf-8" if self.program_text else files.encoded_text(self.program or "", "program")[1]
 
     def toml_of(self, files: FilesRoot) -> str:
         """The text of the machine.toml."""

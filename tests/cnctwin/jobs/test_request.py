@@ -6,9 +6,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from cnctwin.errors import UsageError
+from cnctwin.jobs.files_root import FilesRoot
 from cnctwin.jobs.request import REQUEST_BYTES_MAX, RequestError, read_cancel, read_request
 
 MACHINE = "[machine]\nname = 'vmc'"
+LIMITED = MACHINE + "\n[limits]\nfeed_mm_min = [1.0, 2.0]\nspindle_rpm = [1.0, 2.0]"
 GOOD = {"job": "optimise", "program_text": "G1 X1", "machine_toml": MACHINE}
 JSON = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=12),
@@ -33,8 +36,17 @@ KEYS = st.sampled_from(["job", "id", "reply_to", "case", "program", "program_tex
         ({"force_limit_n": -1.0}, "force_limit_n = -1.0: Input should be greater than 0"),
         ({"force_limit_n": "60"}, "force_limit_n = '60': Input should be a valid number"),
         ({"seed": True}, "seed = True: Input should be a valid integer"),
-        ({"probability": 1.0}, "probability = 1.0: Input should be less than 1"),
+        ({"probability": 1.0}, "probability = 1.0: Input should be less than or equal to 0.9999"),
+        ({"probability": 0.3}, "probability = 0.3: Input should be greater than or equal to 0.5"),
+        ({"population": 7}, "population = 7: Input should be a multiple of 2"),
+        ({"encoding": "cp437"}, "encoding = 'cp437': Input should be 'utf-8', 'utf-8-sig' or 'latin-1'"),
+        ({"encoding": "latin-1", "program_text": "(⌀ 6)"}, "program_text has the sign '⌀', which latin-1 has not got"),
+        (
+            {"encoding": "latin-1", "program": "a.nc", "program_text": None},
+            "encoding is that of program_text; a file has its own",
+        ),
         ({"objective": "fun"}, "objective = 'fun': Input should be 'time', 'cost' or 'pareto'"),
+        ({"speed_changes": "never"}, "speed_changes = 'never': Input should be 'anywhere', 'in_air' or 'per_tool'"),
         ({"feed": 3}, "feed: no such key for optimise; there are program, program_text"),
         ({"\x1b[2J\nfake": 3}, "?[2J fake: no such key"),
         ({"program": "a.nc"}, "give either program (a file) or program_text"),
@@ -100,3 +112,26 @@ def test_a_refusal_goes_where_the_request_says_as_far_as_it_can_be_read() -> Non
         with pytest.raises(RequestError) as refused:
             read_request(json.dumps(asked).encode())
         assert refused.value.reply_topic == topic
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({}, "machine_toml: no [limits]; write feed_mm_min and spindle_rpm"),
+        ({"machine_toml": LIMITED, "objective": "cost"}, "machine_toml: no [cost], which objective = 'cost' needs"),
+        ({"machine_toml": "[machine"}, "machine_toml: is not TOML"),
+        ({"machine_toml": LIMITED + "\n[tool]\nteeth = 2"}, "machine_toml: tool.diameter_mm: Field required"),
+    ],
+)
+def test_a_machine_that_nothing_can_be_chosen_on_is_refused_before_it_waits_in_the_queue(
+    change: dict[str, str], said: str
+) -> None:
+    request = read_request(json.dumps(GOOD | change).encode())
+    with pytest.raises(UsageError) as refused:
+        request.parameters.machine_of(FilesRoot())
+    assert said in str(refused.value)
+
+
+def test_a_machine_that_can_is_called_by_its_name() -> None:
+    request = read_request(json.dumps(GOOD | {"machine_toml": LIMITED}).encode())
+    assert request.parameters.machine_of(FilesRoot()) == "vmc"

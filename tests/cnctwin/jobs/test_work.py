@@ -92,6 +92,7 @@ def test_optimise_leaves_program_answer_and_page_of_what_it_read_first(tmp_path:
         "force_limit_n": 60.0,
         "evolutions": 2,
         "population": 8,
+        "speed_changes": "in_air",
     }
     told = done(tmp_path / "job", FilesRoot(root), **asked)
     assert told["state"] == "done", told
@@ -100,11 +101,19 @@ def test_optimise_leaves_program_answer_and_page_of_what_it_read_first(tmp_path:
     assert set(summary["files"]) == {"optimised.nc", "optimisation.json", "report.html"}
     answer = json.loads((tmp_path / "job/result/optimisation.json").read_text())
     assert summary["sentence"] == f"slot.nc: {answer['sentence']}"
+    assert answer["speed_changes"] == "in_air"
     assert summary["after"]["seconds"] == answer["after"]["seconds"] < summary["before"]["seconds"]
     assert (tmp_path / "job/result/optimised.nc").read_bytes().startswith(b"G21 G90 (N\xfcrnberg)\r\n")
     (root / "slot.nc").write_text("G1 X9 F100")  # edited while an attempt was killed
     assert (again := done(tmp_path / "job", FilesRoot(root), **asked)["result"])
     assert again["after"] == summary["after"]  # type: ignore[index]
+
+
+def test_a_text_goes_back_in_the_encoding_of_the_file_that_it_came_from(tmp_path: Path) -> None:
+    text = "G21 G90 (Nürnberg)\r\nS6000 M3\r\nG1 X5 F300\r\nG1 X40\r\nM30\r\n"
+    asked = {"job": "optimise", "program_text": text, "encoding": "latin-1", "machine_toml": MACHINE, "force_limit_n": 60.0}
+    assert done(tmp_path, FilesRoot(), evolutions=2, population=8, **asked)["state"] == "done"
+    assert (tmp_path / "result/optimised.nc").read_bytes().startswith(b"G21 G90 (N\xfcrnberg)\r\n")
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """The synthetic drive of `benchmarks/tool_change_detector.py`, and a small detector that was learned from it."""
 
 import importlib
+import sys
 from functools import cache
 from pathlib import Path
 from types import ModuleType
@@ -34,5 +35,5 @@ def small() -> Trained:
 
 def _script(name: str) -> ModuleType:
     with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(BENCHMARKS))
+        patch.setattr("sys.path", [*sys.path, str(BENCHMARKS)])  # last: a benchmark is called edge.py
         return importlib.import_module(name)
