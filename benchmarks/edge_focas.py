@@ -13,8 +13,9 @@ from collections import Counter
 from collections.abc import Callable, Iterable
 
 from cnctwin.simulated_control.state import tool_changes
+from tests.edge.controls.changes_told import changes_told
 from tests.edge.controls.focas import hour_judged as judged
-from tests.edge.controls.focas.machine_hour import Hour, run
+from tests.edge.controls.focas.machine_hour import SWITCHED_ON_S, Hour, run
 
 CHECKS: tuple[Callable[[Hour], Iterable[str]], ...] = (
     judged.looks_outside_of_holes,
@@ -48,7 +49,9 @@ def _told(hour: Hour, seed: int) -> int:
     faults = ", ".join(f"{number} {kind}" for kind, number in sorted(hour.kinds().items()))
     print(f"seed {seed}: {len(hour.sweep_s)} looks in {hour.sweep_s[-1]:.0f} s, {hour.reconnects} reconnects; {faults}")
     print(f"  {len(hour.gaps)} holes of {away_s:.0f} s: {_by_reason(hour)}")
-    print(f"  {len(true)} tool changes, {len(seen)} of them outside of holes; told {len(judged.changes_told(hour))}")
+    print(
+        f"  {len(true)} tool changes, {len(seen)} of them outside of holes; told {len(changes_told(hour.samples, SWITCHED_ON_S))}"
+    )
     received, difference = hour.ledger["ledger/received"], max(hour.differences, key=abs)
     print(f"  {received} observations received, difference {difference}; server: {hour.server['asked']} blocks asked")
     print(f"  with faults: {_cost(hour)}")

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Where recorded parts take longer than length over feed, which effects cause it, and how far the gap shrinks on other parts.
 
-    .venv/bin/python benchmarks/gap_program_time.py [--withheld] [--json]
+    .venv/bin/python benchmarks/gap_program_time.py [--without-overrides] [--withheld] [--json]
 
 Recordings: ten plates of the NIST Smart Manufacturing Systems Test Bed (CNCTWIN_DATA or ../shared/data), imported as run logs
 into a case. The twin knows nothing of the control; effects are fitted on plates 13, 14 and 15 and judged on all other runs of the
@@ -29,7 +29,7 @@ from twin.gcode import interpret
 from twin.motion.control import LENGTH_OVER_FEED, changed
 from twin.motion.path import path_from_moves
 from twin.recording.observations import last_values, read_observations
-from twin.recording.program_run import program_runs
+from twin.recording.program_run import OVERRIDES, program_runs
 from twin.runlog import run_log, write_run
 
 PLATES = ("01", "02", "03", "04", "10", "11", "13", "14", "15", "19")
@@ -55,8 +55,13 @@ def data_folder() -> Path:
     return Path(os.environ.get("CNCTWIN_DATA") or Path(__file__).resolve().parent.parent.parent / "shared" / "data")
 
 
-def plates_case(data: Path, folder: Path, names: Sequence[str] = PLATES, fitted: Sequence[str] = FITTED) -> Case:
-    """Every run in the recordings of the plates, imported into a case in `folder`, each beside the program of its plate."""
+def plates_case(
+    data: Path, folder: Path, names: Sequence[str] = PLATES, fitted: Sequence[str] = FITTED, *, overrides: bool = True
+) -> Case:
+    """Every run in the recordings of the plates, imported into a case in `folder`, each beside the program of its plate.
+
+    overrides: keep what the knobs stood at
+    """
     entries, before = [], {}
     for name in names:
         observed = read_observations(
@@ -66,7 +71,8 @@ def plates_case(data: Path, folder: Path, names: Sequence[str] = PLATES, fitted:
         (folder / f"plate_{name}.nc").write_text(program.read_text(encoding="utf-8"), encoding="utf-8")
         for number, run in enumerate(program_runs(observed, before), start=1):
             file = f"plate_{name}_{number}.parquet"
-            write_run(run_log(run.columns, file), folder / file)
+            columns = {name: values for name, values in run.columns.items() if overrides or name not in OVERRIDES.values()}
+            write_run(run_log(columns, file), folder / file)
             entries.append(RUN.format(file, "fit" if name in fitted else "check", f"plate_{name}.nc"))
         before |= last_values(observed.rows)
     return _case(folder, "plates", entries)
@@ -154,6 +160,7 @@ def withheld(as_json: bool) -> list[dict[str, object]]:
 def main() -> None:
     """Print the diagnosis, or its JSON."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--without-overrides", action="store_true", help="as if nobody had recorded what the knobs stood at")
     parser.add_argument("--withheld", action="store_true")
     parser.add_argument("--json", action="store_true")
     arguments = parser.parse_args()
@@ -165,7 +172,7 @@ def main() -> None:
         sys.exit(f"no recordings in {data_folder()}/nist; CNCTWIN_DATA names the folder that holds nist/")
     with tempfile.TemporaryDirectory() as made:
         begun = perf_counter()
-        case = plates_case(data_folder(), Path(made))
+        case = plates_case(data_folder(), Path(made), overrides=not arguments.without_overrides)
         imported = perf_counter()
         found = diagnose_programs(case)
     if arguments.json:

@@ -37,7 +37,7 @@ from processors.config import Configuration, ProcessorConfig
 from processors.contract import NoState, Output, OutputSpec, Processor, Provenance, Sample, SampleKind
 from processors.effects import Publish as PublishEffect
 from processors.engine import Engine
-from processors.runtime import node_metrics
+from processors.health import node_metrics
 from processors.worker import Worker
 from sparkplug.actions import Publish
 from sparkplug.broker import BrokerAddress

@@ -22,6 +22,7 @@ import argparse
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,12 +101,15 @@ def framed(cell: Cell, days: tuple[int, int, int]) -> Frames:
     ends = np.cumsum(days) * DAY_S // FRAME_S
     train, calibrate, judge = (slice(start, end) for start, end in zip([0, *ends[:-1]], ends, strict=True))
     machines = [_machine(cell, place, days[0] * DAY_S) for place in range(len(cell.machines))]
-    arrays = [np.stack(column, axis=1) for column in list(zip(*machines, strict=True))[:-1]]
-    ticks = np.arange(len(arrays[0]), dtype=np.int64) * FRAME_S + FRAME_S - 1
-    return Frames(cell, *arrays, ticks, tuple(one[-1] for one in machines), train, calibrate, judge)
+    columns = (np.stack(column, axis=1) for column in zip(*(arrays for arrays, _ in machines), strict=True))
+    plain, usual, vibration, smooth, last, shut, judged = columns
+    ticks = np.arange(len(plain), dtype=np.int64) * FRAME_S + FRAME_S - 1
+    preparations = tuple(preparation for _, preparation in machines)
+    return Frames(cell, plain, usual, vibration, smooth, last, shut, judged, ticks, preparations, train, calibrate, judge)
 
 
-def _machine(cell: Cell, place: int, train_s: int) -> tuple[Floats, ...]:
+def _machine(cell: Cell, place: int, train_s: int) -> tuple[list[NDArray[Any]], Preparation]:
+    """The arrays of `Frames` from `plain` to `judged` for one machine, in this order; what is usual for it."""
     rows, schedule = machine_signals(cell, place), cell.schedules[place]
     look_back_s = LATE_LOOK_BACK_S if cell.machines[place].label_late_s else 0.0
     shut = gate(schedule.tool_change_active, TICK_S, TAIL_S, look_back_s)
@@ -122,7 +126,7 @@ def _machine(cell: Cell, place: int, train_s: int) -> tuple[Floats, ...]:
         for part, mask in ((plain, ~shut), (beside, ~shut & judged))
     ]
     vibration = one_feature_score(plain[:, 4], plain[learned, 4])
-    return *scores, vibration, smooth[at], last[at], shut[at], (judged & ~shut)[at], usual
+    return [*scores, vibration, smooth[at], last[at], shut[at], (judged & ~shut)[at]], usual
 
 
 def regimes(schedule: Schedule, rows: Floats) -> tuple[NDArray[np.int64], list[str]]:

@@ -166,8 +166,8 @@ def told(found: Optimised) -> str:
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    for name, value in (("levels", 5), ("islands", 4), ("evolutions", 50), ("population", 96), ("repeats", 3)):
-        parser.add_argument(f"--{name}", type=int, default=value)
+    for option, value in (("--levels", 5), ("--islands", 4), ("--evolutions", 50), ("--population", 96), ("--repeats", 3)):
+        parser.add_argument(option, type=int, default=value)
     parser.add_argument("--json", action="store_true")
     given = vars(parser.parse_args())
     as_json, repeats = given.pop("json"), given.pop("repeats")

@@ -1,4 +1,4 @@
-"""The canonical signals: one name, one unit, one meaning, wherever a value travels (docs/formats.md, section 1).
+"""The canonical signals: one name, one unit, one meaning, wherever a value travels.
 
 A value outside the range that is physically possible becomes null with quality BAD and a reason that keeps the figure, for
 instance "outside 0 to 200 %: 950". The figure is not clipped, because that would change raw data, and not passed on as the value
