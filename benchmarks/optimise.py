@@ -39,7 +39,7 @@ from twin.optimisation.islands import fitness_of
 from twin.optimisation.optimise import Hooks, optimise
 from twin.optimisation.paper import paper_search
 from twin.optimisation.problem import Problem
-from twin.optimisation.program import planned_cuts
+from twin.optimisation.planned import planned_cuts
 from twin.optimisation.question import Question, problem
 from twin.runlog import read_run
 
@@ -230,7 +230,7 @@ def case(folder: Path) -> dict[str, Any]:
     found = in_threads(read)
     run = next(run for run in read.runs if run.entry.role == "check" and run.entry.program)
     text = (folder / str(run.entry.program)).read_text()
-    planned = planned_cuts(read_run(folder / run.entry.file))
+    planned = planned_cuts(read_run(folder / run.entry.file), text, read.machine.settings)
     limits = Limits(feed_mm_min=(50.0, 6000.0), spindle_rpm=(1000.0, 6000.0), force_n=400.0)
     twins = {"as stated": read.machine, "diagnosed": found.twin}
     tomls = {name: machine_to_toml(twin.model_copy(update={"limits": limits})) for name, twin in twins.items()}

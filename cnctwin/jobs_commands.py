@@ -90,6 +90,7 @@ def submit(  # noqa: PLR0917
     seed: Annotated[int | None, typer.Option(help="optimise: of the search")] = None,
     evolutions: Annotated[int | None, typer.Option(help="optimise: how many")] = None,
     population: Annotated[int | None, typer.Option(help="optimise: how many in each")] = None,
+    speed_changes: Annotated[str | None, typer.Option(help="optimise: anywhere, in_air or per_tool")] = None,
     job_id: Annotated[str | None, typer.Option("--id", help="The same id twice is the same job")] = None,
     follow: Annotated[bool, typer.Option("--follow", help="Stay until it is over")] = False,
     broker: Broker = None,
@@ -98,7 +99,13 @@ def submit(  # noqa: PLR0917
 ) -> None:
     """Ask for a job. Exit code 0: it was accepted (with --follow: it is done); 1: it was not, or nobody answers."""
     given: dict[str, Any] = {"case": case, "objective": objective, "force_limit_n": force_limit_n, "probability": probability}
-    given |= {"seed": seed, "evolutions": evolutions, "population": population, "free_gains": free_gains or None}
+    given |= {
+        "seed": seed,
+        "evolutions": evolutions,
+        "population": population,
+        "speed_changes": speed_changes,
+        "free_gains": free_gains or None,
+    }
     given |= {**_program(program), "machine_toml": _text(machine), "job": job and str(job)}
     document = {key: value for key, value in given.items() if value is not None}
     if request is not None and document:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from cnctwin.optimise_report.page import report_html
 from cnctwin.twin_commands import write
-from twin.optimisation.answer import Objective, Optimised
+from twin.optimisation.answer import Objective, Optimised, SpeedChanges
 from twin.optimisation.optimise import Hooks, Progress, Spread, optimise
 from twin.optimisation.question import Question
 
@@ -32,6 +32,7 @@ class OptimiseRequest:
     seed: int = 1
     evolutions: int | None = None
     population: int | None = None
+    speed_changes: str | None = None
     encoding: str = "utf-8"
 
     def question(self) -> Question:
@@ -46,6 +47,7 @@ class OptimiseRequest:
             seed=self.seed,
             evolutions=DEFAULTS.evolutions if self.evolutions is None else self.evolutions,
             population=DEFAULTS.population if self.population is None else self.population,
+            speed_changes=DEFAULTS.speed_changes if self.speed_changes is None else SpeedChanges(self.speed_changes),
         )
 
 

@@ -20,8 +20,9 @@ from cnctwin.stopping import stopped_by_signals
 
 if TYPE_CHECKING:
     import twin.optimisation.question as asked
+    from twin.gcode import Settings
     from twin.machine import MachineFile
-    from twin.optimisation.answer import Objective, Optimised
+    from twin.optimisation.answer import Objective, Optimised, SpeedChanges
 
 BINDS_SHOWN, FRONT_SHOWN = 6, 20
 
@@ -37,6 +38,9 @@ def optimise(
     probability: Annotated[
         float | None, typer.Option(help="Keep the force limit with this probability, as 0.95; else by the mean twin")
     ] = None,
+    speed_changes: Annotated[
+        str, typer.Option(help="Where the spindle may change its speed: anywhere, in_air (never in the material) or per_tool")
+    ] = "anywhere",
     pick: Annotated[int | None, typer.Option(help="pareto: which program of the front, from 0; else its knee", min=0)] = None,
     leave: Annotated[list[int] | None, typer.Option(help="Leave this line alone (from 1); may be given again")] = None,
     engagement: Annotated[Path | None, typer.Option(help="Run log of this program: take what it cuts, not \\[stock]")] = None,
@@ -74,9 +78,10 @@ def optimise(
         evolutions=evolutions,
         population=population,
         islands=islands,
-        planned=_planned(engagement),
+        planned=_planned(engagement, text, described.settings),
         left_alone={line - 1: "it was to be left alone" for line in leave or ()},
         pick=pick,
+        speed_changes=_speed_changes(speed_changes),
     )
     _check_out(out, program, machine)
     how = Run(out, encoding, workers, dask, fresh=fresh, resimulate=not no_resimulation, paper=paper, as_json=as_json)
@@ -186,13 +191,22 @@ def _objective(text: str) -> "Objective":
         raise UsageError(f"--objective {text}: is not known; it is time, cost or pareto") from None
 
 
-def _planned(run: Path | None) -> dict[int, list[list[float]]] | None:
+def _speed_changes(text: str) -> "SpeedChanges":
+    from twin.optimisation.answer import SpeedChanges
+
+    try:
+        return SpeedChanges(text)
+    except ValueError:
+        raise UsageError(f"--speed-changes {text}: is not known; it is anywhere, in_air or per_tool") from None
+
+
+def _planned(run: Path | None, text: str, settings: "Settings") -> dict[int, list[list[float]]] | None:
     if run is None:
         return None
-    from twin.optimisation.program import planned_cuts
+    from twin.optimisation.planned import planned_cuts
     from twin.runlog import read_run
 
-    found = planned_cuts(read_run(run))
+    found = planned_cuts(read_run(run), text, settings)
     if not found:
         raise UsageError(f"{run}: no line of it cuts; axial_depth_mm is 0 or missing all along")
     return found

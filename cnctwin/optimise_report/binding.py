@@ -23,6 +23,7 @@ MEANING: dict[str, str] = {
     Binds.CHATTER: "beyond it the cut is unstable, by the tool's dynamics",
     Binds.TOOL_LIFE: "a faster spindle would cost more in tools than it saves",
     Binds.SPEED_CHANGE: "another speed would be better, but the change of it takes longer than it saves",
+    Binds.SHARED_SPEED: "another speed would be better for the line, but not for all that have to have the same",
     Binds.DYNAMICS: "the line is too short for the axes to reach its feed",
     NOTHING: "at none of them; the speed of its neighbours or the search decides",
     LEFT_ALONE: "feed and speed as programmed; the reasons are below",

@@ -44,10 +44,21 @@ def test_a_program_may_read_the_answer_and_bytes_of_comments_stay(tmp_path: Path
     assert written.count(b"\r\n") == program.read_bytes().count(b"\r\n")
 
 
+def test_one_speed_for_a_tool_is_asked_for_and_told(tmp_path: Path) -> None:
+    done = optimise("--speed-changes", "per_tool", "--out", tmp_path / "out.nc", "--no-resimulation")
+    assert done.returncode == 0, done.stderr
+    assert "29.48 s to 24.51 s" in done.stdout
+    assert "note: one speed for each tool: 4584 rev/min" in done.stdout
+    answer = json.loads((tmp_path / "out.json").read_text())
+    assert (answer["speed_changes"], answer["changes_in_material"]) == ("per_tool", 0)
+    assert "one speed for each tool number" in (tmp_path / "out.html").read_text()
+
+
 @pytest.mark.parametrize(
     ("options", "code", "says"),
     [
         (("--objective", "speed"), 2, "--objective speed: is not known; it is time, cost or pareto"),
+        (("--speed-changes", "never"), 2, "--speed-changes never: is not known; it is anywhere, in_air or per_tool"),
         (("--force-limit-n", "0"), 2, "the force limit is 0.0 N"),
         (("--force-limit-n", "1"), 1, "line 7: even 100 mm/min at 8000 rev/min give 6.9 N, more than 1 N"),
         (("--feed-range", "500"), 2, "--feed-range 500: is no range; write it as 100:3000"),

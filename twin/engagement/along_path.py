@@ -90,7 +90,7 @@ def _section(path: Path, chords: Ints, workpiece: Workpiece, section: Section) -
     before = np.concatenate([[0], np.cumsum(count)])
     part = (np.arange(len(segment)) - before[segment - section.first] + 1) / count[segment - section.first]
     points = np.concatenate(
-        [path.tip_start_mm[section.first : section.first + 1], path.tip_at(segment, part * path.length_mm[segment])]
+        [path.tip_ends_mm(np.array([section.first]))[0], path.tip_at(segment, part * path.length_mm[segment])]
     )
     feeding = path.kind[segment] != Kind.RAPID
     left, rows = cut(workpiece, points, section.tool_diameter_mm, RESOLUTION_MM, feeding)

@@ -102,15 +102,10 @@ class Path:
         tip[:, 2] -= start + (end - start) * s_mm / np.where(self.length_mm[segment] > 0.0, self.length_mm[segment], 1.0)
         return tip
 
-    @property
-    def tip_start_mm(self) -> Floats:
-        """x, y, z of the tip at the start of each segment, (n, 3)."""
-        return np.asarray(self.start_mm[:, :LINEAR_AXES] - self.tool_mm[:, :1] * UP)
-
-    @property
-    def tip_end_mm(self) -> Floats:
-        """x, y, z of the tip at the end of each segment, (n, 3)."""
-        return np.asarray(self.end_mm[:, :LINEAR_AXES] - self.tool_mm[:, 1:] * UP)
+    def tip_ends_mm(self, segments: Ints) -> tuple[Floats, Floats]:
+        """x, y, z of the tip at the start and at the end of these segments, (n, 3) each."""
+        start, end = self.start_mm[segments, :LINEAR_AXES], self.end_mm[segments, :LINEAR_AXES]
+        return start - self.tool_mm[segments, :1] * UP, end - self.tool_mm[segments, 1:] * UP
 
     def tangents(self, segment: Ints, s_mm: Floats) -> Floats:
         """dp/ds (n, axes): of length 1 in the axes that the feed counts."""

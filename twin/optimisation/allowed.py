@@ -7,7 +7,7 @@ which the power of the cut is what the spindle leaves at this speed. A feed may 
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
@@ -99,7 +99,15 @@ class Allowed:
 
     def line(self, line: int) -> "Allowed":
         """One line by itself."""
-        return _with_spans(self, np.array([line]), [self.spans[line]])
+        return self.lines(np.array([line]))
+
+    def lines(self, chosen: Ints) -> "Allowed":
+        """Some lines; each as often as it is named."""
+        return _with_spans(self, chosen, [self.spans[int(k)] for k in chosen])
+
+    def with_spans(self, spans: Sequence[tuple[Span, ...]]) -> "Allowed":
+        """The same lines with other speeds."""
+        return _with_spans(self, np.arange(len(self)), list(spans))
 
 
 def allowed(

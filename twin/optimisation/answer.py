@@ -13,6 +13,16 @@ class Objective(StrEnum):
     PARETO = "pareto"
 
 
+class SpeedChanges(StrEnum):
+    """Where the spindle may change its speed between two lines (`twin.optimisation.speed_groups`)."""
+
+    ANYWHERE = "anywhere"
+    IN_AIR = "in_air"
+    """Never while the tool is in the material: what is cut without leaving it is cut at one speed."""
+    PER_TOOL = "per_tool"
+    """One speed for each tool number, throughout the program."""
+
+
 class Binds(StrEnum):
     """What keeps a line from being better."""
 
@@ -28,6 +38,8 @@ class Binds(StrEnum):
     """Inside all limits: faster would cost more in tools than it saves."""
     SPEED_CHANGE = "a change of speed"
     """Another speed would be better for this line, but the spindle would take longer to change than it saves."""
+    SHARED_SPEED = "a speed it shares"
+    """Another speed would be better for this line, but not for all lines that have to have the same one."""
     DYNAMICS = "axis dynamics"
     """The line is too short to reach its feed."""
 
@@ -180,6 +192,7 @@ class Optimised:
 
     objective: as asked; currency: empty without [cost]; limits: name → figure with its unit, as they were kept
     collisions: lines (from 1) with a rapid into material, of the program as it came too
+    speed_changes: as asked; changes_in_material: how often the speed changes in the material, counted on the program read again
     """
 
     name: str
@@ -200,6 +213,8 @@ class Optimised:
     diff: str
     program: str
     collisions: tuple[int, ...] = ()
+    speed_changes: SpeedChanges = SpeedChanges.ANYWHERE
+    changes_in_material: int = 0
 
     def as_json(self) -> dict[str, Any]:
         """Everything but the program's text, for a program to read; infinities become null."""

@@ -4,7 +4,7 @@ import difflib
 
 from twin.errors import OptimisationError
 from twin.machine import Limits
-from twin.motion.path import Kind, Path
+from twin.motion.path import Path
 from twin.optimisation.allowed import limits_of
 from twin.optimisation.answer import Bound, FrontPoint, LineAnswer, Objective, Optimised, Resimulated, Search, Totals
 from twin.optimisation.bound import bound_of
@@ -14,8 +14,10 @@ from twin.optimisation.problem import Problem
 from twin.optimisation.question import Question, problem, single
 from twin.optimisation.reasons import what_binds
 from twin.optimisation.rewriting import Rewritten
-from twin.optimisation.seeds import closed_form
+from twin.optimisation.seeds import by_itself, closed_form
 from twin.optimisation.shown import ShownLines, advance_of_cuts, limits_shown, shown_lines, totals
+from twin.optimisation.speed_notes import speed_notes
+from twin.optimisation.stretches import changes_in_material
 from twin.optimisation.uncertainty import PRICED, sensitivity
 from twin.optimisation.words import source_lines
 
@@ -54,10 +56,12 @@ def answered(
         sensitivity=known,
         search=how,
         resimulated=again,
-        notes=_notes(made, question, text.path),
+        notes=_notes(made, question, text.path, value),
         diff="\n".join(difflib.unified_diff(old, new, question.name, f"{question.name}, optimised", lineterm="", n=1)),
         program=text.text,
         collisions=made.program.collisions,
+        speed_changes=question.speed_changes,
+        changes_in_material=len(changes_in_material(made.program, text.path)),
     )
 
 
@@ -100,7 +104,7 @@ def _price(question: Question) -> float:
 def _lines(made: Problem, before: ShownLines, after: ShownLines, text: Rewritten, objective: Objective) -> tuple[LineAnswer, ...]:
     old, new = source_lines(made.program.text), source_lines(text.text)
     rows = {int(k): row for row, k in enumerate(made.allowed.index)}
-    feed, rpm = closed_form(made, single(objective))
+    feed, rpm = by_itself(made, single(objective))
     answers = []
     for k, line in enumerate(made.program.lines):
         row = rows.get(k)
@@ -116,7 +120,7 @@ def _lines(made: Problem, before: ShownLines, after: ShownLines, text: Rewritten
                 axial_depth_mm=deepest,
                 before=before.line(k),
                 after=after.line(k),
-                binds="" if row is None else what_binds(made, row, after.line(k), objective),
+                binds="" if row is None else what_binds(made, row, after.line(k), objective, float(rpm[row])),
                 bound=None if row is None else (float(feed[row]), float(rpm[row])),
                 left_alone=line.left_alone,
                 force_known=not line.plunges,
@@ -153,31 +157,8 @@ def _sentence(question: Question, made: Problem, figures: list[Totals], bound: B
     return "; ".join(parts)
 
 
-def _changes_in_material(made: Problem, path: Path) -> int:
-    """How often the spindle changes its speed between two cuts that no rapid parts: the tool stands in the material meanwhile."""
-    rpm = path.commanded_rpm()
-    begins = {a: line for line in made.program.lines for a, _ in line.executions}
-    count, last = 0, -1.0
-    for k in range(len(path)):
-        if path.kind[k] == Kind.RAPID:
-            last = -1.0
-        elif (line := begins.get(k)) is not None:
-            cuts = line.cutting or line.plunges
-            count += cuts and last > 0.0 and rpm[k] != last
-            last = float(rpm[k]) if cuts else -1.0
-    return count
-
-
-def _notes(made: Problem, question: Question, path: Path) -> tuple[str, ...]:
-    notes = list(made.program.notes)
-    if changes := _changes_in_material(made, path):
-        times = "once" if changes == 1 else f"{changes} times"
-        waits = (
-            "the control is taken to wait there until the speed is reached; if yours does not, the chip is another one meanwhile"
-        )
-        notes.append(
-            f"the spindle changes its speed {times} while the tool is in the material: {waits} (--speed-range holds one speed)"
-        )
+def _notes(made: Problem, question: Question, path: Path, value: float) -> tuple[str, ...]:
+    notes = [*made.program.notes, *speed_notes(made, question, path, value)]
     if made.program.machine.program is None:
         notes.append("no [program]: time is length over feed; corners, ramps and changes of speed take none")
     alone = [line for line in made.program.lines if line.left_alone]

@@ -1,12 +1,14 @@
 """What no program within the limits can be better than, so that an answer states its distance to it and not only its gain.
 
-Time: every line at the highest feed of any speed it may have, on axes with their limits, while speeds change for nothing; but a
-spindle that starts from rest has to ramp up to the speed of the line that it starts for, which may then choose a lower one. Cost:
-the sum of what each line costs by itself at its best, or what that time costs by labour and the tools of each line at their best,
-whichever is more. Where the control is ideal (length over feed, speeds that change for nothing) a program reaches it.
+Time: every line at the highest feed of any speed it may have, on axes with their limits, while speeds change for nothing; but
+lines that share a speed have one, and a spindle that starts from rest has to ramp up to that of the line it starts for. Cost:
+the sum of what each group of lines costs by itself at its best, or what that time costs by labour and the tools of each group at
+their best, whichever is more. Where the control is ideal (length over feed, speeds that change for nothing) a program reaches it.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -15,14 +17,18 @@ from numpy.typing import NDArray
 from twin.motion.path import EventKind, Kind
 from twin.motion.plan import Plan
 from twin.motion.timeline import effort
+from twin.optimisation.allowed import Allowed
 from twin.optimisation.answer import Bound, Objective
-from twin.optimisation.closed_form import Worth
+from twin.optimisation.closed_form import Worth, best_together
 from twin.optimisation.problem import Problem
 from twin.optimisation.seeds import closed_form
 
 Floats = NDArray[np.float64]
-REACHED = 1e-9
-CELLS = 1024
+Ints = NDArray[np.int64]
+REACHED = 1e-7
+"""Nearer than this is there: length over feed is an acceleration that is very high, not endless."""
+CELLS, BLOCK = 1024, 256
+"""Pieces of a span, and lines that are worked out at a time."""
 
 
 class Ramp(NamedTuple):
@@ -45,20 +51,21 @@ def bound_of(problem: Problem, objective: Objective, value: float) -> Bound:
         least, here = _least_cost(problem, feed, rpm, seconds, ramps), float(reached.cost[0])
     exact = here <= least * (1.0 + REACHED)
     least = min(least, here)  # a program is there, so it is no bound that is above it
+    each = "each line" if all(len(rows) == 1 for rows in problem.groups.rows) else "each group of lines that share a speed"
     how = (
-        "each line at its own best, which a program reaches: the control is ideal, and speeds change for nothing"
+        f"{each} at its own best, which a program reaches: the control is ideal, and speeds change for nothing"
         if exact
-        else "each line at its own best while speeds change for nothing; changes and corners take a program more"
+        else f"{each} at its own best while speeds change for nothing; changes and corners take a program more"
     )
     return Bound(value=least, distance=max(value / least - 1.0, 0.0), exact=exact, how=how)
 
 
 def _ideal_plan(problem: Problem) -> Plan:
-    """The program at the highest feeds, with a spindle that is always at speed."""
-    path, rows = problem.program.path, problem.row_of_segment
-    feed, _ = closed_form(problem, Objective.TIME)
+    """The program with every line at the highest feed of any speed it may have, and a spindle that is always at speed."""
+    path, rows, allowed = problem.program.path, problem.row_of_segment, problem.allowed
+    feed, _ = best_together(allowed, problem.groups.apart(), problem.worth(1.0, 0.0))
     own = np.where(path.kind == Kind.RAPID, 1.0, path.feed_mm_min)
-    feeds = np.where(rows >= 0, feed[np.maximum(rows, 0)], own) if len(problem.allowed) else own
+    feeds = np.where(rows >= 0, feed[np.maximum(rows, 0)], own) if len(allowed) else own
     return problem.ideal_control().plan_with(path, feeds)
 
 
@@ -85,51 +92,73 @@ def _ramps(problem: Problem, ideal: Plan) -> tuple[Ramp, ...]:
     return tuple(found)
 
 
-def _waits_s(problem: Problem, ramps: tuple[Ramp, ...], row: int, rpm: Floats) -> Floats:
-    """For how long the starts of a line keep the axes waiting, at these speeds."""
-    limits = problem.limits()
+def _waits_s(problem: Problem, ramps: tuple[Ramp, ...], group: int, rpm: Floats) -> Floats:
+    """For how long the starts of a group keep the axes waiting, at these speeds."""
+    limits, waits = problem.limits(), np.zeros(len(rpm))
+    mine = [ramp for ramp in ramps if problem.groups.of_row[ramp.row] == group]
+    if not mine:
+        return waits
     ramp_s = np.array([effort(float(n), limits.spindle_base_rpm) for n in rpm]) / limits.spindle_acceleration_rpm_s
-    waits = np.zeros(len(rpm))
-    for ramp in ramps:
-        if ramp.row == row:
-            waits += np.maximum(ramp_s - ramp.meanwhile_s, 0.0)
+    for ramp in mine:
+        waits += np.maximum(ramp_s - ramp.meanwhile_s, 0.0)
     return waits
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cells:
-    """Pieces of the speeds of a line, each (cells,): no speed in a piece allows more real feed than `feed`, nor is below `rpm`.
+    """Pieces of the speeds of a group, (cells,): no speed in a piece is below `rpm`, nor allows a line more than `feed_of`.
 
     Where f / n does not grow (a greatest advance, a constant feed or power), f ≤ f(n₀) n₁ / n₀ in [n₀, n₁]; where it
     grows (a power that grows with the speed), f grows too, and f ≤ f(n₁).
     """
 
+    allowed: Allowed
     rpm: Floats
-    feed: Floats
+    until: Floats
 
     @classmethod
-    def of(cls, problem: Problem, row: int) -> Self:
-        """Of one line."""
-        allowed, rpm, feed = problem.allowed, [], []
-        for a, b in allowed.spans[row]:
-            edges = np.geomspace(a, b, CELLS + 1) if b > a else np.array([a, a])
-            at = allowed.line(row).feed_max(edges[:, None])[:, 0] * allowed.feed_ratio
-            rpm.append(edges[:-1])
-            most = np.maximum(at[:-1] * edges[1:] / edges[:-1], at[1:])
-            feed.append(np.minimum(most, allowed.feed_high * allowed.feed_ratio))
-        return cls(np.concatenate(rpm), np.concatenate(feed))
+    def of(cls, problem: Problem, group: int) -> Self:
+        """Of one group."""
+        edges = [np.geomspace(a, b, CELLS + 1) if b > a else np.array([a, a]) for a, b in problem.spans[group]]
+        return cls(problem.allowed, np.concatenate([e[:-1] for e in edges]), np.concatenate([e[1:] for e in edges]))
+
+    def feed_of(self, rows: Ints) -> Floats:
+        """Real feeds of some lines of the group, (cells, rows)."""
+        one = self.allowed.lines(rows)
+        first, last = (one.feed_max(np.repeat(n[:, None], len(rows), axis=1)) * one.feed_ratio for n in (self.rpm, self.until))
+        most = np.maximum(first * (self.until / self.rpm)[:, None], last)
+        return np.minimum(most, one.feed_high * one.feed_ratio)
+
+    def sums(self, rows: Ints, of: Callable[[Ints, Floats], Floats]) -> Floats:
+        """The sum over the lines of the group of what `of` makes of some rows and their feeds (cells, rows) → (cells,)."""
+        parts = [rows[k : k + BLOCK] for k in range(0, len(rows), BLOCK)]
+        return np.asarray(sum(of(part, self.feed_of(part)) for part in parts))
 
 
 def _least_seconds(problem: Problem, ideal: Plan, ramps: tuple[Ramp, ...]) -> float:
-    """No line is faster than in the ideal plan, nor than its length over its feed; and its starts take their ramps."""
+    """No line is faster than in the ideal plan, nor than its length over its feed at the speed of its group; and starts ramp."""
+    lines = [problem.program.lines[int(k)] for k in problem.allowed.index]
+    at_best = np.array([sum(float(ideal.duration_s[a:b].sum()) for a, b in line.executions) for line in lines])
+    length = np.array([line.length_mm for line in lines])
+    feed, _ = closed_form(problem, Objective.TIME)
+    together = 60.0 * length / (feed * problem.allowed.feed_ratio)
+    starting = {int(problem.groups.of_row[ramp.row]) for ramp in ramps}
+
+    def slower(rows: Ints, most: Floats) -> Floats:
+        return np.asarray(np.maximum(60.0 * length[rows] / most - at_best[rows], 0.0).sum(axis=1))
+
     seconds = ideal.total_s
-    for row in sorted({ramp.row for ramp in ramps}):
-        line = problem.program.lines[int(problem.allowed.index[row])]
-        at_best = sum(float(ideal.duration_s[a:b].sum()) for a, b in line.executions)
-        cells = Cells.of(problem, row)
-        slower = np.maximum(60.0 * line.length_mm / cells.feed - at_best, 0.0)
-        seconds += float((slower + _waits_s(problem, ramps, row, cells.rpm)).min())
+    for group, rows in enumerate(problem.groups.rows):
+        if len(rows) == 1 and group not in starting:
+            continue  # the ideal plan has it at its best
+        cells = Cells.of(problem, group)
+        least = float((cells.sums(rows, slower) + _waits_s(problem, ramps, group, cells.rpm)).min())
+        seconds += max(least, float((together[rows] - at_best[rows]).sum()))
     return seconds
+
+
+def _weighed(worth: Worth, rpm: Floats, rows: Ints, most: Floats) -> Floats:
+    return worth.of(rows, most, rpm)
 
 
 def _least_cost(problem: Problem, feed: Floats, rpm: Floats, seconds: float, ramps: tuple[Ramp, ...]) -> float:
@@ -137,15 +166,15 @@ def _least_cost(problem: Problem, feed: Floats, rpm: Floats, seconds: float, ram
     assert economy is not None
     worth, beside = problem.worth(economy.per_second, economy.per_tool), problem.beside
     wear = Worth(worth.length_mm, worth.beside_s, worth.wear, worth.wear_beside, 0.0, worth.exponent)
-    starting = {ramp.row for ramp in ramps}
+    starting = {int(problem.groups.of_row[ramp.row]) for ramp in ramps}
     own, tools, real = 0.0, 0.0, feed * problem.allowed.feed_ratio
-    for row in problem.cutting.tolist():
-        cells = Cells.of(problem, row)
-        tools += float(wear.of_line(row, cells.feed, cells.rpm).min())
-        alone = float(worth.of_line(row, real[row : row + 1], rpm[row : row + 1])[0])
-        if row in starting:
-            waits = economy.per_second * _waits_s(problem, ramps, row, cells.rpm)
-            alone = max(alone, float((worth.of_line(row, cells.feed, cells.rpm) + waits).min()))
+    for group, rows in enumerate(problem.groups.rows):
+        cells = Cells.of(problem, group)
+        tools += float(cells.sums(rows, partial(_weighed, wear, cells.rpm)).min())
+        alone = float(worth.of(rows, real[rows], rpm[rows[0]]))
+        if group in starting:
+            waits = economy.per_second * _waits_s(problem, ramps, group, cells.rpm)
+            alone = max(alone, float((cells.sums(rows, partial(_weighed, worth, cells.rpm)) + waits).min()))
         own += alone
     separate = own + beside.nobody_s * economy.per_second + beside.nobody_worn * economy.per_tool
     together = seconds * economy.per_second + tools + beside.nobody_worn * economy.per_tool

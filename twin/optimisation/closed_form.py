@@ -1,28 +1,39 @@
-"""The best speed and feed of each line by itself, exactly. Where lines do not depend on each other, that is the best program.
+"""The best speed of each group of lines and the feeds with it, exactly. Where groups do not depend on each other, that is the
+best program. A line that shares its speed with no other is a group of one.
 
 A line of length L, with its share t of the time that nothing is cut, costs at the speed n, with f(n) = f_max(n),
 
     g(n) = (L / f(n)) (R + w n^m) + t (R + v n^m)
 
 R: worth of a second; w n^m, v n^m: worth of the tool life that a second takes. For time alone w = v = 0. f(n) is k n up to a
-speed at which the feed range (constant) or the power (falling, or constant) takes over. On k n, g has one minimum, at the root of
+corner at which the feed range takes over, f(n) = F. For a group G(n) is the sum of its lines, and
 
-    −R / n² + (m − 1) w n^(m−2) + (t k / L) m v n^(m−1) = 0
+    n² G'(n) = Σ before their corners (L/k) ((m − 1) w n^m − R)  +  Σ beyond (L/F) m w n^(m+1)  +  Σ t m v n^(m+1)
 
-whose left side grows; beyond the corner g grows. So the best n is a corner, that root, or an end of a span: a few candidates.
+which grows with n, also where a line passes its corner. So G has one minimum in a span: the root, found by bisection, or an end.
+For one line that is its corner, the root before it, or an end of the span.
+
+Where power binds, f(n) falls or stays beyond a corner of its own: these corners, found by a grid and bisection, are candidates
+too, and so is the grid where power binds; about the best of all a golden section ends it.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.optimisation.allowed import Allowed, Span
+from twin.optimisation.allowed import Allowed
+from twin.optimisation.speed_groups import SpeedGroups
 
 Floats = NDArray[np.float64]
-BISECTIONS = 80
+Ints = NDArray[np.int64]
+BISECTIONS, SECTIONS = 80, 60
+GOLDEN = 0.5 * (5.0**0.5 - 1.0)
+GRID = 65
 TIE = 1e-12
+BLOCK = 1_000_000
+"""Figures that are worked out at a time: speeds times lines."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,83 +47,208 @@ class Worth:
     per_second: float
     exponent: float
 
-    def of_line(self, line: int, feed: Floats, rpm: Floats) -> Floats:
-        """g of one line at feeds (mm/min of real feed) and speeds."""
+    def each(self, feed: Floats, rpm: Floats) -> Floats:
+        """g of each line at feeds (mm/min of real feed) and speeds, both (…, lines)."""
         power = rpm**self.exponent
-        first = 60.0 * self.length_mm[line] / feed * (self.per_second + self.wear[line] * power)
-        return np.asarray(first + self.beside_s[line] * (self.per_second + self.wear_beside[line] * power))
+        first = 60.0 * self.length_mm / feed * (self.per_second + self.wear * power)
+        return np.asarray(first + self.beside_s * (self.per_second + self.wear_beside * power))
+
+    def of(self, rows: Ints, feed: Floats, rpm: Floats) -> Floats:
+        """Of some lines that share their speed: feeds (…, rows), speeds (…)."""
+        return np.asarray(self.lines(rows).each(feed, np.asarray(rpm)[..., None]).sum(axis=-1))
+
+    def lines(self, rows: Ints) -> "Worth":
+        """Some lines; each as often as it is named."""
+        return Worth(
+            self.length_mm[rows], self.beside_s[rows], self.wear[rows], self.wear_beside[rows], self.per_second, self.exponent
+        )
 
 
-def best_alone(allowed: Allowed, worth: Worth, tie: Worth | None = None, near_rpm: Floats | None = None) -> tuple[Floats, Floats]:
-    """Feed word and speed of each line by itself, (lines,) each.
+@dataclass(frozen=True, slots=True, eq=False)
+class _Pieces:
+    """Every span of every group, (pieces,), with the lines that share it, (elements,): a line is in each span of its group.
 
-    tie: among speeds that are equally good, the one that is best by this; near_rpm: else the one nearest to these. Lines in air
-    have no speed of their own: theirs is 0.
+    first: the first element of each piece; piece: (elements,); row: (elements,) line of `Allowed`; group: (pieces,)
+    lines: what is allowed of each element; low, high: of each span
+    """
+
+    lines: Allowed
+    row: Ints
+    piece: Ints
+    first: Ints
+    group: Ints
+    low: Floats
+    high: Floats
+
+    @classmethod
+    def of(cls, allowed: Allowed, groups: SpeedGroups) -> Self:
+        spans = [(k, span) for k, rows in enumerate(groups.rows) for span in allowed.spans[int(rows[0])]]
+        count = np.array([len(groups.rows[k]) for k, _ in spans], dtype=np.int64)
+        row = np.concatenate([np.empty(0, dtype=np.int64), *(groups.rows[k] for k, _ in spans)])
+        edges = np.array([span for _, span in spans], dtype=np.float64).reshape(-1, 2)
+        return cls(
+            allowed.lines(row),
+            row,
+            np.repeat(np.arange(len(spans)), count),
+            np.concatenate([[0], np.cumsum(count)[:-1]]).astype(np.int64),
+            np.array([k for k, _ in spans], dtype=np.int64),
+            edges[:, 0],
+            edges[:, 1],
+        )
+
+    def sums(self, values: Floats) -> Floats:
+        """Of the elements of each piece, (…, pieces)."""
+        return np.asarray(np.add.reduceat(values, self.first, axis=-1))
+
+    def corner_rpm(self) -> Floats:
+        """Where the feed range takes over from the chip, (elements,)."""
+        one = self.lines
+        return np.asarray(one.feed_high * one.feed_ratio / (one.advance_max_mm * one.teeth))
+
+    def value(self, worth: Worth, speeds: Floats) -> Floats:
+        """G at speeds (candidates, pieces); worth: of the elements."""
+        step = max(1, BLOCK // max(len(self.row), 1))
+        parts = []
+        for k in range(0, len(speeds), step):
+            rpm = speeds[k : k + step, self.piece]
+            parts.append(self.sums(worth.each(self.lines.feed_max(rpm) * self.lines.feed_ratio, rpm)))
+        return np.concatenate(parts)
+
+
+def best_together(
+    allowed: Allowed, groups: SpeedGroups, worth: Worth, tie: Worth | None = None, near_rpm: Floats | None = None
+) -> tuple[Floats, Floats]:
+    """Feed word and speed of each line, (lines,) each, at the best speed of its group.
+
+    tie: among speeds that are equally good, the one that is best by this; near_rpm: else the one nearest to these, (lines,).
+    Lines in air have no speed of their own: theirs is 0.
     """
     feed, rpm = np.full(len(allowed), allowed.feed_high), np.zeros(len(allowed))
-    for line in np.flatnonzero(allowed.cutting).tolist():
-        one = allowed.line(line)
-        speeds = np.unique(np.concatenate([np.array(list(_candidates(one, worth, line, span))) for span in allowed.spans[line]]))
-        if tie is not None:
-            more = [np.array(list(_candidates(one, tie, line, span))) for span in allowed.spans[line]]
-            speeds = np.unique(np.concatenate([speeds, *more]))
-        if near_rpm is not None:
-            inside = [min(max(near_rpm[line], a), b) for a, b in allowed.spans[line]]
-            speeds = np.unique(np.concatenate([speeds, inside]))
-        feeds = one.feed_max(speeds[:, None])[:, 0]
-        value = worth.of_line(line, feeds * allowed.feed_ratio, speeds)
-        good = np.flatnonzero(value <= value.min() * (1.0 + TIE))
-        if tie is not None:
-            good = good[np.argsort(tie.of_line(line, feeds[good] * allowed.feed_ratio, speeds[good]), kind="stable")]
-        elif near_rpm is not None:
-            good = good[np.argsort(np.abs(speeds[good] - near_rpm[line]), kind="stable")]
-        rpm[line], feed[line] = speeds[good[0]], feeds[good[0]]
+    if not len(groups):
+        return feed, rpm
+    made = _Pieces.of(allowed, groups)
+    speeds = [made.low, made.high, *_stationary(made, worth.lines(made.row))]
+    if tie is not None:
+        speeds += _stationary(made, tie.lines(made.row))
+    near = near_rpm[groups.lead][made.group] if near_rpm is not None else made.low
+    speeds.append(np.clip(near, made.low, made.high))
+    candidates, binds = np.array(speeds), np.zeros(len(made.group), dtype=np.bool_)
+    if allowed.spindle is not None:
+        candidates, binds = _with_power(made, candidates)
+    candidates = np.sort(candidates, axis=0)
+    own = worth.lines(made.row)
+    value = made.value(own, candidates)
+    if binds.any():
+        best = _sectioned(made, own, candidates, value)
+        candidates = np.concatenate([candidates, best[None]])
+        value = np.concatenate([value, made.value(own, best[None])])
+    second = np.abs(candidates - near) if tie is None else made.value(tie.lines(made.row), candidates)
+    chosen = _chosen(made, value, second, len(groups))
+    for k, (candidate, piece) in enumerate(chosen):
+        rpm[groups.rows[k]] = candidates[candidate, piece]
+    own_speed = groups.of_row >= 0
+    feed[own_speed] = allowed.feed_max(rpm)[own_speed]
     return feed, rpm
 
 
-def _candidates(one: Allowed, worth: Worth, line: int, span: Span) -> Iterator[float]:
-    """The speeds of a span of which one is the best."""
-    low, high = span
-    yield from span
-    chip = float(one.advance_max_mm[0] * one.teeth[0] / one.feed_ratio)  # k, of the feed word
-    corner = one.feed_high / chip
-    yield min(max(corner, low), high)
-    if one.spindle is not None:
-        yield from _power_corners(one, low, high)
-    root = _stationary(worth, line, chip * one.feed_ratio, low, high)
-    yield root
+def _chosen(made: _Pieces, value: Floats, second: Floats, groups: int) -> list[tuple[int, int]]:
+    """Candidate and piece of each group: the least value, among equal ones the least `second`, then the first."""
+    least = np.full(groups, np.inf)
+    np.minimum.at(least, made.group, value.min(axis=0))
+    second = np.where(value <= least[made.group] * (1.0 + TIE), second, np.inf)
+    at = np.argmin(second, axis=0)
+    of_piece = second[at, np.arange(len(made.group))]
+    edges = np.searchsorted(made.group, np.arange(groups + 1))
+    pieces = [a + int(np.argmin(of_piece[a:b])) for a, b in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True)]
+    return [(int(at[piece]), piece) for piece in pieces]
 
 
-def _power_corners(one: Allowed, low: float, high: float) -> Iterator[float]:
-    """Where the power begins or ends to be the limit, and the speeds with the highest feed: by a grid, then by bisection."""
-    grid = np.linspace(low, high, 65)
-    by_power = one.advance_by_power_mm(grid[:, None])[:, 0] * float(one.teeth[0]) * grid / one.feed_ratio
-    others = np.minimum(one.feed_high, float(one.advance_max_mm[0]) * float(one.teeth[0]) * grid / one.feed_ratio)
-    binds = by_power < others
-    for k in np.flatnonzero(binds[1:] != binds[:-1]).tolist():
-        a, b = float(grid[k]), float(grid[k + 1])
-        for _ in range(BISECTIONS):
-            middle = np.array([[0.5 * (a + b)]])
-            power = one.advance_by_power_mm(middle)[0, 0] * one.teeth[0] * middle[0, 0] / one.feed_ratio
-            other = min(one.feed_high, float(one.advance_max_mm[0] * one.teeth[0] * middle[0, 0] / one.feed_ratio))
-            same = (power < other) == binds[k]
-            a, b = (float(middle[0, 0]), b) if same else (a, float(middle[0, 0]))
-        yield a
-        yield b
-    yield from grid[binds].tolist()
+def _stationary(made: _Pieces, worth: Worth) -> list[Floats]:
+    """Of each piece the speed at which n² G' comes to zero, or the end that is nearer, and the corner that is nearest to it."""
+    corner, m = made.corner_rpm(), worth.exponent
+    before_s = 60.0 * worth.length_mm * corner / (made.lines.feed_high * made.lines.feed_ratio)  # 60 L / k
+    beyond_s = 60.0 * worth.length_mm / (made.lines.feed_high * made.lines.feed_ratio)
 
+    def slope(speed: Floats) -> Floats:
+        n = speed[made.piece]
+        power = n**m
+        before = before_s * ((m - 1.0) * worth.wear * power - worth.per_second)
+        beyond = beyond_s * m * worth.wear * power * n
+        return made.sums(np.where(n < corner, before, beyond) + worth.beside_s * m * worth.wear_beside * power * n)
 
-def _stationary(worth: Worth, line: int, chip: float, low: float, high: float) -> float:
-    """The root of g' on k n within the span, or the end of it that is nearer."""
-    wear, beside, length = worth.wear[line], worth.wear_beside[line], worth.length_mm[line]
-    m, share = worth.exponent, worth.beside_s[line] * chip / (60.0 * length)
-
-    def slope(n: float) -> float:
-        return float(-worth.per_second / n**2 + (m - 1.0) * wear * n ** (m - 2.0) + share * m * beside * n ** (m - 1.0))
-
-    if slope(low) >= 0.0 or slope(high) <= 0.0:
-        return low if slope(low) >= 0.0 else high
+    low, high = made.low.copy(), made.high.copy()
+    rises = slope(low) >= 0.0
+    falls = slope(high) < 0.0
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if slope(middle) < 0.0 else (low, middle)
-    return 0.5 * (low + high)
+        below = slope(middle) < 0.0
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    root = np.where(rises, made.low, np.where(falls, made.high, high))
+    far = np.abs(corner - root[made.piece])
+    order = np.lexsort((far, made.piece))
+    nearest = corner[order[made.first]]
+    return [root, np.clip(nearest, made.low, made.high)]
+
+
+def _with_power(made: _Pieces, candidates: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    """The candidates, with the speeds at which power begins or ends to bind and the grid where it binds; and in which pieces."""
+    grid = np.linspace(made.low, made.high, GRID)
+    binds = _power_binds(made, grid[:, made.piece])
+    if not binds.any():
+        return candidates, np.zeros(len(made.group), dtype=np.bool_)
+    more: list[tuple[int, float]] = []
+    where, cell = np.nonzero((binds[1:] != binds[:-1]).T)
+    place = np.arange(len(where)) - np.searchsorted(where, where)
+    for turn in range(int(place.max(initial=-1)) + 1):
+        mine = place == turn
+        low, high = made.low[made.piece].copy(), made.low[made.piece].copy()
+        low[where[mine]] = grid[cell[mine], made.piece[where[mine]]]
+        high[where[mine]] = grid[cell[mine] + 1, made.piece[where[mine]]]
+        at_low = binds[0].copy()
+        at_low[where[mine]] = binds[cell[mine], where[mine]]
+        for _ in range(BISECTIONS):
+            middle = 0.5 * (low + high)
+            same = _power_binds(made, middle[None])[0] == at_low
+            low, high = np.where(same, middle, low), np.where(same, high, middle)
+        for edge in (low, high):
+            more += zip(made.piece[where[mine]].tolist(), edge[where[mine]].tolist(), strict=True)
+    any_binds = made.sums(binds.astype(np.float64)) > 0.0
+    for k, piece in np.argwhere(any_binds).tolist():
+        more.append((piece, float(grid[k, piece])))
+    return np.concatenate([candidates, _layers(more, made.low)]), np.asarray(any_binds.any(axis=0))
+
+
+def _power_binds(made: _Pieces, rpm: Floats) -> NDArray[np.bool_]:
+    """Whether the power allows less feed than chip and range do, (…, elements)."""
+    one = made.lines
+    per_chip = one.teeth * rpm / one.feed_ratio
+    return np.asarray(one.advance_by_power_mm(rpm) * per_chip < np.minimum(one.feed_high, one.advance_max_mm * per_chip))
+
+
+def _layers(pairs: list[tuple[int, float]], fill: Floats) -> Floats:
+    """Speeds of pieces as a table (candidates, pieces), `fill` where a piece has fewer."""
+    piece = np.array([k for k, _ in pairs], dtype=np.int64)
+    order = np.argsort(piece, kind="stable")
+    piece, speed = piece[order], np.array([n for _, n in pairs], dtype=np.float64)[order]
+    place = np.arange(len(piece)) - np.searchsorted(piece, piece)
+    table = np.tile(fill, (int(place.max()) + 1, 1))
+    table[place, piece] = speed
+    return table
+
+
+def _sectioned(made: _Pieces, worth: Worth, candidates: Floats, value: Floats) -> Floats:
+    """The best speed between the neighbours of the best candidate of each piece, by golden section."""
+    at, every = np.argmin(value, axis=0), np.arange(len(made.group))
+    best = candidates[at, every]
+    low = np.where(candidates < best, candidates, made.low).max(axis=0)
+    high = np.where(candidates > best, candidates, made.high).min(axis=0)
+    a, b = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
+    at_a, at_b = (made.value(worth, one[None])[0] for one in (a, b))
+    for _ in range(SECTIONS):
+        left = at_a <= at_b
+        low, high = np.where(left, low, a), np.where(left, b, high)
+        new = np.where(left, high - GOLDEN * (high - low), low + GOLDEN * (high - low))
+        at_new = made.value(worth, new[None])[0]
+        a, b = np.where(left, new, b), np.where(left, a, new)
+        at_a, at_b = np.where(left, at_new, at_b), np.where(left, at_a, at_new)
+    return np.asarray(np.where(at_a <= at_b, a, b))

@@ -65,11 +65,11 @@ def fitness_of(made: Problem, objective: Objective) -> Fitness:
 
 
 def polished(made: Problem, genes: Floats, fitness: Fitness) -> tuple[Floats, int]:
-    """The candidate (p,) with every feed at its highest, and single lines at the speed of a neighbour, where that is better.
+    """The candidate (p,) with every feed at its highest, and single groups at the speed of a neighbour, where that is better.
 
     Also says how many evaluations that took.
     """
-    lines, places = len(made.allowed), len(made.cutting)
+    lines, groups, places = len(made.allowed), made.groups, len(made.groups)
     full = genes.copy()
     full[:lines] = 1.0
     value = fitness(np.array([genes, full]))
@@ -82,7 +82,7 @@ def polished(made: Problem, genes: Floats, fitness: Fitness) -> tuple[Floats, in
             for other in (place - 1, place + 1):
                 if 0 <= other < places:
                     changed = rpm[0].copy()
-                    changed[made.cutting[place]] = rpm[0, made.cutting[other]]
+                    changed[groups.rows[place]] = rpm[0, groups.lead[other]]
                     one = best.copy()
                     one[lines + place] = made.encoded(made.allowed.feed_max(changed[None])[0], changed)[lines + place]
                     tried.append(one)

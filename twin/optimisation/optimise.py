@@ -27,7 +27,7 @@ from twin.optimisation.question import Question, problem, single
 from twin.optimisation.resimulation import resimulated
 from twin.optimisation.rewriting import rewritten
 from twin.optimisation.rounding import rounded
-from twin.optimisation.seeds import closed_form, sequence, worth_of
+from twin.optimisation.seeds import closed_form, coarser, in_sequence, worth_of
 
 Floats = NDArray[np.float64]
 Spread = Callable[[Callable[[str], str], Sequence[str]], Iterable[str]]
@@ -126,11 +126,9 @@ def _words(made: Problem, question: Question, genes: Floats) -> tuple[Floats, Fl
     (feed,), (rpm,) = made.decoded(genes[None])
     if question.objective is Objective.PARETO:
         return feed, rpm
-    alone = closed_form(made, question.objective)
-    known = [(feed, rpm), alone]
-    if len(made.cutting) > 1:
-        speeds = sequence(made, worth_of(made, question.objective), alone[1])
-        known.append((made.allowed.feed_max(speeds[None])[0], speeds))
+    known = [(feed, rpm), *in_sequence(made, question.objective)]
+    for other in coarser(made):
+        known += in_sequence(other, question.objective)
     seconds, cost = made.evaluate_words(np.array([one for one, _ in known]), np.array([one for _, one in known]))
     value = seconds if question.objective is Objective.TIME else cost
     best = int(np.argmin(value))

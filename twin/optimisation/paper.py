@@ -45,14 +45,12 @@ def paper_search(question: Question, clock: Callable[[], float] = lambda: 0.0, e
     forces = CutForces.of(made.program)
     limits = limits_of(made.program.machine, question.force_limit_n)
     limit_n = np.inf if limits.force_n is None else limits.force_n
-    lines, cutting = len(made.allowed), len(made.cutting)
-    low = np.concatenate([np.full(lines, limits.feed_mm_min[0]), np.full(cutting, limits.spindle_rpm[0])])
-    high = np.concatenate([np.full(lines, limits.feed_mm_min[1]), np.full(cutting, limits.spindle_rpm[1])])
+    lines, groups = len(made.allowed), len(made.groups)
+    low = np.concatenate([np.full(lines, limits.feed_mm_min[0]), np.full(groups, limits.spindle_rpm[0])])
+    high = np.concatenate([np.full(lines, limits.feed_mm_min[1]), np.full(groups, limits.spindle_rpm[1])])
 
     def words(genes: Floats) -> tuple[Floats, Floats]:
-        rpm = np.zeros((len(genes), lines))
-        rpm[:, made.cutting] = genes[:, lines:]
-        return genes[:, :lines], rpm
+        return genes[:, :lines], made.each_of(genes[:, lines:])
 
     def fitness(genes: Floats) -> Floats:
         feed, rpm = words(genes)

@@ -1,12 +1,12 @@
 """The problem: genes in, seconds and cost out, for many candidates in one batch.
 
-A candidate has two genes for a line that cuts and one for a line in air, each from 0 to 1. The first is the feed, between the
-lowest and the highest that the limits allow at the speed; the second is the speed, on the spans that the line may have. So
-every candidate keeps every limit: the force limit is a bound of a gene, and no penalty is needed.
+A candidate has a gene for each line and one for each group of lines that share a speed, each from 0 to 1. The first is the feed,
+between the lowest and the highest that the limits allow at the speed; the second is the speed, on the spans that the group may
+have. So every candidate keeps every limit: the force limit is a bound of a gene, and no penalty is needed.
 
-A spindle event of the program takes the speed of the first line after it that has a speed of its own. Beyond these events a
-line that has another speed than the one in force gets one, and so does a line that is left alone, which needs the speed it
-was written for.
+A spindle event of the program takes the speed of the stretch that it is in, else that of the first line after it that has a speed
+of its own. Beyond these events a line that has another speed than the one in force gets one, and so does a line that is left
+alone, which needs the speed it was written for.
 """
 
 from dataclasses import dataclass
@@ -21,14 +21,14 @@ from twin.motion.candidates import Candidates, Wear, no_wear
 from twin.motion.control import LENGTH_OVER_FEED, Control, changed, program_effects
 from twin.motion.limits import ACCELERATION_MAX_MM_S2, Limits
 from twin.motion.path import Event, EventKind, Kind, Path
-from twin.optimisation.allowed import Allowed
+from twin.optimisation.allowed import Allowed, Span
 from twin.optimisation.closed_form import Worth
 from twin.optimisation.economy import Economy
 from twin.optimisation.program import Programmed
+from twin.optimisation.speed_groups import NOBODY, SpeedGroups
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-NOBODY = -1
 SNAP = 0.03
 
 
@@ -57,10 +57,14 @@ class Beside(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """A program, what the limits leave its lines, and what a second costs; economy: None where only time counts."""
+    """A program, what the limits leave its lines, and what a second costs.
+
+    allowed: with the speeds that the groups leave each line; economy: None where only time counts
+    """
 
     program: Programmed
     allowed: Allowed
+    groups: SpeedGroups
     economy: Economy | None
     control: Control
 
@@ -72,7 +76,28 @@ class Problem:
     @property
     def genes(self) -> int:
         """How many genes a candidate has."""
-        return len(self.allowed) + len(self.cutting)
+        return len(self.allowed) + len(self.groups)
+
+    @cached_property
+    def _group_of_cutting(self) -> Ints:
+        return self.groups.of_row[self.cutting]
+
+    def each_of(self, speeds: Floats) -> Floats:
+        """The speed of each line (…, lines) by those of the groups (…, groups); of a line in air 0."""
+        rpm = np.zeros((*speeds.shape[:-1], len(self.allowed)))
+        rpm[..., self.cutting] = speeds[..., self._group_of_cutting]
+        return rpm
+
+    @cached_property
+    def spans(self) -> tuple[tuple[Span, ...], ...]:
+        """The speeds that each group may have."""
+        return tuple(self.allowed.spans[row] for row in self.groups.lead.tolist())
+
+    @cached_property
+    def _edges(self) -> tuple[Floats, Floats, list[int]]:
+        """Lowest and highest speed of each group, and the groups of several spans."""
+        low, high = (np.array([spans[k][k] for spans in self.spans], dtype=np.float64) for k in (0, -1))
+        return low, high, [group for group, spans in enumerate(self.spans) if len(spans) > 1]
 
     @cached_property
     def row_of_segment(self) -> Ints:
@@ -100,13 +125,16 @@ class Problem:
     def decoded(self, genes: Floats) -> tuple[Floats, Floats]:
         """Feed word and speed of each line, (candidates, lines) each; the speed of a line in air is 0."""
         allowed = self.allowed
-        rpm = np.zeros((len(genes), len(allowed)))
-        for place, row in enumerate(self.cutting.tolist()):
-            rpm[:, row] = _on_spans(allowed.spans[row], genes[:, len(allowed) + place])
+        low, high, several = self._edges
+        part = genes[:, len(allowed) :]
+        speeds = np.minimum(low + part * (high - low), high)
+        for group in several:
+            speeds[:, group] = _on_spans(self.spans[group], part[:, group])
         if self.changes_cost:
-            self._snap(rpm)
-        low, high = allowed.feed_min(rpm), allowed.feed_max(rpm)
-        return low + genes[:, : len(allowed)] * (high - low), rpm
+            self._snap(speeds)
+        rpm = self.each_of(speeds)
+        least, most = allowed.feed_min(rpm), allowed.feed_max(rpm)
+        return least + genes[:, : len(allowed)] * (most - least), rpm
 
     @cached_property
     def changes_cost(self) -> bool:
@@ -115,30 +143,25 @@ class Problem:
         ideal = np.min(np.asarray(limits.acceleration_mm_s2)) >= ACCELERATION_MAX_MM_S2
         return bool(np.isfinite(limits.spindle_acceleration_rpm_s) or limits.in_position_s > 0.0 or not ideal)
 
-    @cached_property
-    def _cutting_in_order(self) -> list[int]:
-        return sorted(self.cutting.tolist(), key=lambda row: self.program.lines[int(self.allowed.index[row])].executions[0][0])
-
-    def _snap(self, rpm: Floats) -> None:
-        """A speed that is nearly that of the line before becomes it, where it may: genes alone would never meet."""
+    def _snap(self, speeds: Floats) -> None:
+        """A speed that is nearly that of the group before becomes it, where it may: genes alone would never meet."""
         before: Floats | None = None
-        for row in self._cutting_in_order:
+        for group, spans in enumerate(self.spans):
             if before is not None:
-                fits = np.zeros(len(rpm), dtype=np.bool_)
-                for a, b in self.allowed.spans[row]:
+                fits = np.zeros(len(speeds), dtype=np.bool_)
+                for a, b in spans:
                     fits |= (before >= a) & (before <= b)
-                near = fits & (np.abs(rpm[:, row] - before) <= SNAP * before)
-                rpm[:, row] = np.where(near, before, rpm[:, row])
-            before = rpm[:, row]
+                near = fits & (np.abs(speeds[:, group] - before) <= SNAP * before)
+                speeds[:, group] = np.where(near, before, speeds[:, group])
+            before = speeds[:, group]
 
     def encoded(self, feed: Floats, rpm: Floats) -> Floats:
-        """Genes (p,) of feeds and speeds (lines,), brought within the limits."""
+        """Genes (p,) of feeds and speeds (lines,), brought within the limits; of lines that share a speed the longest one's."""
         allowed = self.allowed
-        speed = np.zeros(len(allowed))
-        second = np.zeros(len(self.cutting))
-        for place, row in enumerate(self.cutting.tolist()):
-            second[place] = _place_on_spans(allowed.spans[row], float(rpm[row]))
-            speed[row] = _on_spans(allowed.spans[row], second[place : place + 1])[0]
+        wanted = rpm[self.groups.lead]
+        second = np.array([_place_on_spans(*pair) for pair in zip(self.spans, wanted.tolist(), strict=True)], dtype=np.float64)
+        speeds = [_on_spans(spans, second[k : k + 1])[0] for k, spans in enumerate(self.spans)]
+        speed = self.each_of(np.array(speeds, dtype=np.float64))
         low, high = allowed.feed_min(speed[None])[0], allowed.feed_max(speed[None])[0]
         room = np.maximum(high - low, 1e-12)
         return np.concatenate([np.clip((feed - low) / room, 0.0, 1.0), second])
@@ -241,11 +264,11 @@ def control_of(machine: MachineFile) -> Control:
 
 def _speeds(problem: Problem) -> Speeds:
     """Walks over the events and the lines that need a speed."""
-    program, rows = problem.program, {int(k): row for row, k in enumerate(problem.allowed.index)}
+    program, groups, rows = problem.program, problem.groups, {int(k): row for row, k in enumerate(problem.allowed.index)}
     programmed_rpm = program.path.commanded_rpm()
     needs: list[tuple[int, int, float, int]] = []  # segment, owner, speed of its own, line
     for k, line in enumerate(program.lines):
-        row = rows.get(k, NOBODY)
+        row = groups.carriers.get(k, rows.get(k, NOBODY))
         if line.needs_speed if row == NOBODY else problem.allowed.cutting[row]:
             needs += [(a, row, float(programmed_rpm[a]), line.line) for a, _ in line.executions if programmed_rpm[a] != 0.0]
     needs.sort()
@@ -260,8 +283,12 @@ def _speeds(problem: Problem) -> Speeds:
             segment, row, _, _ = next(coming)
             owner[e], following = row, (segment, row)
         elif event.kind in (EventKind.SPINDLE, EventKind.ORIENT, EventKind.TOOL_CHANGE):
-            if event.kind == EventKind.SPINDLE and event.value > 0.0 and following is not None:
-                owner[e] = following[1]
+            if event.kind == EventKind.SPINDLE and event.value > 0.0:
+                inside = groups.row_inside(event.segment)
+                if inside != NOBODY:
+                    owner[e] = inside
+                elif following is not None:
+                    owner[e] = following[1]
             following = None
     return Speeds(made, owner)
 

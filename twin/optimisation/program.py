@@ -21,7 +21,6 @@ from twin.gcode import Arc, Linear, interpret
 from twin.machine import MachineFile, Tool
 from twin.motion.path import EventKind, Kind, Path, path_from_moves
 from twin.optimisation.words import branches, codes, figure_mm_min, find_word, inch_lines, source_lines
-from twin.runlog import RunLog
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -113,13 +112,13 @@ def programmed(
 ) -> Programmed:
     """Reads a program for a machine.
 
-    engagement: what each line (from 0) cuts, taken in place of [stock]: `planned_cuts`
+    engagement: what each line (from 0) cuts, taken in place of [stock]: `twin.optimisation.planned`
     left_alone: lines that may not be changed, and why, beyond those that are found out here
 
     Raises ProgramError where a control would refuse it, MachineError where nothing is known of what it cuts.
     """
-    moves = interpret(text)
-    path = path_from_moves(moves)
+    moves = interpret(text, machine.settings)
+    path = path_from_moves(moves, machine.settings.start_mm or None)
     if engagement is None and machine.stock is None:
         raise MachineError("no [stock]: what a line cuts is not known; write [stock], or give a run log with --engagement")
     numbers, tools = _tools(machine, path)
@@ -134,7 +133,7 @@ def programmed(
     tied = {move.line for move in moves if isinstance(move, Linear | Arc) and move.feed_per_rev_mm is not None}
     source = source_lines(text)
     _check_branches(source, {move.line for move in moves})
-    inch = inch_lines(source)
+    inch = inch_lines(source, machine.settings.inch)
     headed = any(tool.modes for _, tool in tools)
     lines, groups = [], []
     for line, executions in _executions(path).items():
@@ -247,27 +246,17 @@ def _executions(path: Path) -> dict[int, tuple[tuple[int, int], ...]]:
 
 def _cuts_of_segments(path: Path, rows: PathRows, segments: Ints, headed: bool) -> _Found:
     """headed: whether the heading of the feed matters: to chatter only."""
-    mine = np.concatenate([np.arange(rows.first[s], rows.first[s + 1]) for s in segments.tolist()])
-    mine = mine[rows.axial_depth_mm[mine] > 0.0]
-    all_rows = np.concatenate([np.arange(rows.first[s], rows.first[s + 1]) for s in segments.tolist()])
-    fall = np.maximum(path.tip_start_mm[:, 2] - path.tip_end_mm[:, 2], 0.0)[rows.segment[all_rows]]
-    steep = fall > SHALLOW * path.length_mm[rows.segment[all_rows]]
-    plunges = bool((steep & (rows.end_face_mm2[all_rows] > END_FACE_MM2)).any())
-    within = (mine - rows.first[rows.segment[mine]] + 0.5) / np.diff(rows.first)[rows.segment[mine]]
-    heading = _headings(path, rows.segment[mine], within) if headed else np.zeros(len(mine))
+    every = np.concatenate([np.arange(rows.first[s], rows.first[s + 1]) for s in segments.tolist()])
+    segment, mine = rows.segment[every], every[rows.axial_depth_mm[every] > 0.0]
+    start, end = path.tip_ends_mm(segment)
+    steep = np.maximum(start[:, 2] - end[:, 2], 0.0) > SHALLOW * path.length_mm[segment]
+    plunges = bool((steep & (rows.end_face_mm2[every] > END_FACE_MM2)).any())
+    heading = np.zeros(len(mine))
+    if headed:
+        own = rows.segment[mine]
+        heading = _headings(path, own, (mine - rows.first[own] + 0.5) / (rows.first[own + 1] - rows.first[own]))
     columns = np.column_stack([rows.axial_depth_mm[mine], rows.entry_angle_rad[mine], rows.exit_angle_rad[mine], heading])
     return _Found(_different(columns), float(rows.length_mm[mine].sum()), plunges)
-
-
-def planned_cuts(run: RunLog) -> dict[int, list[list[float]]]:
-    """Line (as the run log counts it: from 0, or by N words that count so) → its different [depth, entry, exit], mm and rad.
-
-    Raises RunLogError where the run log has no engagement.
-    """
-    rows = np.column_stack([np.nan_to_num(run["axial_depth_mm"]), run["entry_angle_rad"], run["exit_angle_rad"]])
-    line = run["line"]
-    found = {int(one): _different(rows[(line == one) & (rows[:, 0] > 0.0)]) for one in np.unique(line[np.isfinite(line)])}
-    return {one: cuts.tolist() for one, cuts in found.items() if len(cuts)}
 
 
 def _cuts_planned(planned: Sequence[Sequence[float]], path: Path, segments: Ints, headed: bool) -> _Found:
@@ -292,7 +281,7 @@ def _headings(path: Path, segments: Ints, part: Floats) -> Floats:
 
 
 def _different(rows: Floats) -> Floats:
-    if not len(rows):
+    if len(rows) <= 1:
         return rows
     return np.asarray(rows[np.unique(np.round(rows, DIGITS), axis=0, return_index=True)[1]])
 
@@ -357,7 +346,7 @@ def _is_clear(machine: MachineFile, path: Path, segments: Ints, tools: Sequence[
     stock = machine.stock
     if stock is None or tool < 0:
         return False
-    ends = np.stack([path.tip_start_mm[segments], path.tip_end_mm[segments]])
+    ends = np.stack(path.tip_ends_mm(segments))
     bulge = np.where(
         path.sweep_rad[segments] != 0.0, path.length_mm[segments], 0.0
     )  # an arc stays within its own length of its ends

@@ -10,11 +10,12 @@ from typing import Any, Self
 from twin.errors import LimitsError, OptimisationError
 from twin.machine import machine_from_toml
 from twin.optimisation.allowed import Impossible, allowed, limits_of
-from twin.optimisation.answer import Objective
+from twin.optimisation.answer import Objective, SpeedChanges
 from twin.optimisation.economy import Economy
 from twin.optimisation.forces import CutForces
 from twin.optimisation.problem import Problem, control_of
 from twin.optimisation.program import programmed
+from twin.optimisation.speed_groups import speed_groups
 from twin.response import check_effects
 
 POPULATION_MAX, EVOLUTIONS_MAX, ISLANDS_MAX = 10_000, 100_000, 64
@@ -30,6 +31,7 @@ class Question:
     planned: what each line (from 0) cuts, where it is not taken from [stock]: line → [depth mm, entry rad, exit rad]
     left_alone: lines that may not be changed, and why
     pick: which program of the front is written, by its number; None = the one farthest from the line between its ends
+    speed_changes: where the spindle may change its speed
     """
 
     program_text: str
@@ -46,6 +48,7 @@ class Question:
     planned: Mapping[int, Sequence[Sequence[float]]] | None = None
     left_alone: Mapping[int, str] = field(default_factory=dict)
     pick: int | None = None
+    speed_changes: SpeedChanges = SpeedChanges.ANYWHERE
 
     def __post_init__(self) -> None:
         for name, value, low, high in (
@@ -77,7 +80,8 @@ class Question:
         for name in ("planned", "left_alone"):
             if values[name] is not None:
                 values[name] = {int(line): value for line, value in values[name].items()}
-        return cls(**values | {"objective": Objective(values["objective"])})
+        known = {"objective": Objective(values["objective"]), "speed_changes": SpeedChanges(values["speed_changes"])}
+        return cls(**values | known)
 
     def digest(self) -> str:
         """What tells one question from another."""
@@ -91,18 +95,21 @@ class Question:
 def problem(question: Question) -> Problem:
     """The problem that a question makes; worked out once for the same question.
 
-    Raises TwinError where program or machine are at fault, LimitsError where the limits leave a line nothing.
+    Raises TwinError where program or machine are at fault, LimitsError where the limits leave a line nothing, or lines
+    that have to share a speed none.
     """
-    made, impossible = _made(question.to_json())
+    made, impossible, unshared = _made(question.to_json())
     if impossible:
         first, more = impossible[0], len(impossible) - 1
         line = made.program.lines[first.at].line + 1
         raise LimitsError(f"line {line}: {first.why}" + (f" (and {more} more lines)" if more else ""))
+    if unshared:
+        raise LimitsError(unshared)
     return made
 
 
 @lru_cache(maxsize=4)
-def _made(text: str) -> tuple[Problem, tuple[Impossible, ...]]:
+def _made(text: str) -> tuple[Problem, tuple[Impossible, ...], str]:
     question = Question.from_json(text)
     machine = machine_from_toml(question.machine_toml)
     check_effects(machine)
@@ -117,7 +124,8 @@ def _made(text: str) -> tuple[Problem, tuple[Impossible, ...]]:
     economy = Economy.of(machine.cost) if machine.cost is not None else None
     control = control_of(machine)
     left, impossible = allowed(read, CutForces.of(read), limits, control.feed_ratio)
-    return Problem(read, left, economy, control), impossible
+    left, groups, unshared = speed_groups(read, left, question.speed_changes)
+    return Problem(read, left, groups, economy, control), impossible, unshared
 
 
 def single(objective: Objective) -> Objective:

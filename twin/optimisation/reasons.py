@@ -10,8 +10,8 @@ SLOW = 1.25
 EDGE_RPM = 1.5
 
 
-def what_binds(made: Problem, row: int, line: Cutting, objective: Objective) -> str:
-    """The limits that a line is at, joined by `and`; where none holds the speed, what else does."""
+def what_binds(made: Problem, row: int, line: Cutting, objective: Objective, own_rpm: float) -> str:
+    """The limits that a line is at, joined by `and`; where none holds the speed, what else does. own_rpm: best by itself."""
     allowed = made.allowed
     reasons: list[Binds] = []
     full = line.feed_mm_min >= (1.0 - NEAR) * allowed.feed_high
@@ -23,7 +23,7 @@ def what_binds(made: Problem, row: int, line: Cutting, objective: Objective) -> 
         elif advance >= (1.0 - NEAR) * allowed.advance_by_power_mm(at)[row]:
             reasons.append(Binds.POWER)
         if not full:
-            reasons += _why_no_faster(made, row, line.spindle_rpm, objective)
+            reasons += _why_no_faster(made, row, line.spindle_rpm, objective, own_rpm)
     if full:
         reasons.append(Binds.FEED)
     source = made.program.lines[int(allowed.index[row])]
@@ -32,9 +32,9 @@ def what_binds(made: Problem, row: int, line: Cutting, objective: Objective) -> 
     return " and ".join(dict.fromkeys(reasons))
 
 
-def _why_no_faster(made: Problem, row: int, rpm: float, objective: Objective) -> list[Binds]:
+def _why_no_faster(made: Problem, row: int, rpm: float, objective: Objective, own_rpm: float) -> list[Binds]:
     """Why the spindle does not turn faster, which would allow more feed."""
-    spans = made.allowed.spans[row]
+    spans = made.groups.own_spans[row]
     program = made.program
     limits = program.machine.limits
     assert limits is not None
@@ -45,4 +45,8 @@ def _why_no_faster(made: Problem, row: int, rpm: float, objective: Objective) ->
         if limits.surface_speed_m_min is not None and surface >= (1.0 - NEAR) * limits.surface_speed_m_min[1]:
             return [Binds.SURFACE_SPEED]
         return [Binds.CHATTER] if program.tools[program.lines[int(made.allowed.index[row])].tool][1].modes else [Binds.POWER]
+    group = made.groups.of_row[row]
+    shares = len(made.groups.rows[group]) > 1 or made.groups.kept[group] is not None
+    if shares and abs(rpm - own_rpm) > max(EDGE_RPM, NEAR * own_rpm):
+        return [Binds.SHARED_SPEED]
     return [Binds.TOOL_LIFE] if objective is not Objective.TIME else [Binds.SPEED_CHANGE]

@@ -1,9 +1,10 @@
 """The program rewritten: F and S words line by line, nothing else; then read again, and compared with what was meant.
 
 A line gets an F word where its feed is another than that of the feed line executed before it, and an S word where its speed
-is. A line that may be come to another way (block skip, jumps, loops, calls) has both in any case, so that no other course of the
-program takes a feed with it. What the modes of the control make of the words is not guessed: the text is interpreted, and a line
-that does not have what it should gets its words too. Lines for which even that does not help are to be left alone.
+is: of a stretch that has one speed, its first line. A line that may be come to another way (block skip, jumps, loops, calls) has
+both in any case, so that no other course of the program takes a feed with it; in a stretch of one speed that S word says again
+what is in force. What the modes of the control make of the words is not guessed: the text is interpreted, and a line that does
+not have what it should gets its words too. Lines for which even that does not help are to be left alone.
 """
 
 from dataclasses import dataclass
@@ -14,7 +15,9 @@ from numpy.typing import NDArray
 from twin.errors import ProgramError
 from twin.gcode import interpret
 from twin.motion.path import EventKind, Kind, Path, path_from_moves
+from twin.optimisation.answer import SpeedChanges
 from twin.optimisation.problem import Problem
+from twin.optimisation.stretches import changes_in_material
 from twin.optimisation.words import (
     INCH_MM,
     branches,
@@ -47,12 +50,12 @@ class Rewritten:
 
 @dataclass(frozen=True, slots=True)
 class _Wanted:
-    """What a feed line is to have: figures as text, None = as it is; feed in mm/min to check by"""
+    """What a feed line is to have: figures as text, None = as it is; feed in mm/min and speed to check by, None = as before"""
 
     feed: str | None
     feed_mm_min: float | None
     speed: str | None
-    rpm: float
+    rpm: float | None
 
 
 def rewritten(problem: Problem, feed_mm_min: Floats, rpm: Floats) -> Rewritten:
@@ -63,11 +66,12 @@ def rewritten(problem: Problem, feed_mm_min: Floats, rpm: Floats) -> Rewritten:
     forced_feed, forced_speed = _first_choice(problem, wanted, rpm, source)
     speed_lines = _speed_lines(problem, rpm, source)
     own_speed = _of_one_speed(problem)
+    settings = program.machine.settings
     text, path, missed = program.text, program.path, {}
     for _ in range(ROUNDS_MAX):
         text = joined(program.text, _changed(source, wanted, forced_feed, forced_speed, speed_lines, problem))
         try:
-            path = path_from_moves(interpret(text))
+            path = path_from_moves(interpret(text, settings), settings.start_mm or None)
         except ProgramError as error:
             return Rewritten(text, program.path, {error.line - 1: f"a control would refuse it rewritten: {error.reason}"})
         missed = _missed(problem, path, wanted)
@@ -77,7 +81,17 @@ def rewritten(problem: Problem, feed_mm_min: Floats, rpm: Floats) -> Rewritten:
             break
         forced_feed |= more_feed
         forced_speed |= more_speed
-    return Rewritten(text, path, {line: f"its {what} does not follow the word that was written" for line, what in missed.items()})
+    carriers = {program.lines[k].line for k in problem.groups.carriers}
+    why = {line: f"its {what} does not follow the word that was written" for line, what in missed.items() if line not in carriers}
+    return Rewritten(text, path, why or _changed_between(problem, path))
+
+
+def _changed_between(problem: Problem, path: Path) -> dict[int, str]:
+    """Lines before which the speed changes in the material, and may not: left alone, they hold their group at their speed."""
+    if problem.groups.changes is SpeedChanges.ANYWHERE:
+        return {}
+    lines = [problem.program.lines[k] for k in changes_in_material(problem.program, path)]
+    return {line.line: "a word that cannot be changed sets the speed before it" for line in lines if not line.left_alone}
 
 
 def _wanted(problem: Problem, feed: Floats, rpm: Floats) -> dict[int, _Wanted]:
@@ -85,9 +99,12 @@ def _wanted(problem: Problem, feed: Floats, rpm: Floats) -> dict[int, _Wanted]:
     wanted = {}
     for k, line in enumerate(problem.program.lines):
         row = rows.get(k)
-        if row is None:
+        if k in problem.groups.carriers:
+            own = float(rpm[problem.groups.carriers[k]])
+            wanted[line.line] = _Wanted(None, None, f"{own:.9g}", own)
+        elif row is None:
             speed = f"{abs(line.rpm):.9g}" if line.needs_speed and line.rpm else None
-            wanted[line.line] = _Wanted(None, None, speed, line.rpm)
+            wanted[line.line] = _Wanted(None, None, speed, None)
         else:
             figure = feed_figure(float(feed[row]), line.inch)
             speed = f"{rpm[row]:.9g}" if problem.allowed.cutting[row] else None
@@ -139,7 +156,7 @@ def _apart(problem: Problem, source: list[str]) -> set[int]:
 def _of_one_speed(problem: Problem) -> set[int]:
     """Lines that have the same speed, in either direction, whenever they are executed: an S word of theirs cannot be wrong."""
     rpm = problem.program.path.commanded_rpm()
-    changed = {int(k) for k in problem.allowed.index[problem.allowed.cutting]}
+    changed = {int(k) for k in problem.allowed.index[problem.allowed.cutting]} | problem.groups.carriers.keys()
     return {
         line.line
         for k, line in enumerate(problem.program.lines)
@@ -204,7 +221,7 @@ def _missed(problem: Problem, path: Path, wanted: dict[int, _Wanted]) -> dict[in
         for a, b in line.executions:
             feeding = np.arange(a, b)[path.kind[a:b] != Kind.RAPID]
             feed = before.feed_mm_min[feeding] if one.feed_mm_min is None else one.feed_mm_min
-            rpm = programmed[feeding] if one.feed is None else one.rpm
+            rpm = programmed[feeding] if one.rpm is None else one.rpm
             if np.any(np.abs(path.feed_mm_min[feeding] - feed) > SAME * feed):
                 missed[line.line] = "feed"
             elif one.speed is not None and np.any(np.abs(speed[feeding] - rpm) > SAME * np.abs(rpm)):

@@ -1,6 +1,6 @@
 """Feeds and speeds as a program can hold them: whole rev/min, feeds rounded down; every limit that was kept stays kept.
 
-Lines that share a speed go on to share it, since a change would cost time.
+Groups that have the same speed go on to have it, since a change would cost time.
 """
 
 import numpy as np
@@ -22,15 +22,15 @@ def rounded(problem: Problem, feed: Floats, rpm: Floats, worth: Worth) -> tuple[
     allowed = problem.allowed
     speeds = rpm.copy()
     full = feed >= allowed.feed_max(rpm[None])[0] * (1.0 - FULL)
-    rows = problem.cutting[np.argsort(rpm[problem.cutting], kind="stable")]
-    group: list[int] = []
-    for row in rows.tolist():
-        if group and rpm[row] - rpm[group[0]] > SAME_RPM:
-            _round_group(problem, group, speeds, worth)
-            group = []
-        group.append(row)
-    if group:
-        _round_group(problem, group, speeds, worth)
+    own = rpm[problem.groups.lead]
+    same: list[int] = []
+    for group in np.argsort(own, kind="stable").tolist():
+        if same and own[group] - own[same[0]] > SAME_RPM:
+            _round_speed(problem, same, speeds, worth)
+            same = []
+        same.append(group)
+    if same:
+        _round_speed(problem, same, speeds, worth)
     most = allowed.feed_max(speeds[None])[0]
     chosen = _within_power(problem, np.where(full, most, np.minimum(feed, most)), speeds)
     inch = [problem.program.lines[int(k)].inch for k in allowed.index]
@@ -62,27 +62,22 @@ def _within_power(problem: Problem, feed: Floats, rpm: Floats) -> Floats:
     return chosen
 
 
-def _round_group(problem: Problem, group: list[int], speeds: Floats, worth: Worth) -> None:
-    """One speed for lines that share one; each its own where no whole one suits all; to a hundredth where none suits a line."""
-    allowed = problem.allowed
-    middle = float(speeds[group].mean())
-    whole = [n for n in (np.floor(middle), np.ceil(middle)) if all(_fits(problem, row, n) for row in group)]
+def _round_speed(problem: Problem, same: list[int], speeds: Floats, worth: Worth) -> None:
+    """One speed for groups that have the same; each its own where no whole one suits all; to a hundredth where none suits one."""
+    allowed, rows = problem.allowed, np.concatenate([problem.groups.rows[group] for group in same])
+    middle = float(speeds[rows].mean())
+    whole = [n for n in (np.floor(middle), np.ceil(middle)) if all(_fits(problem, group, n) for group in same)]
     if whole:
         at = np.array([[n] * len(allowed) for n in whole])
-        feeds = allowed.feed_max(at)
-        value = [
-            sum(float(worth.of_line(row, feeds[k, row : row + 1], at[k, row : row + 1])[0]) for row in group)
-            for k in range(len(whole))
-        ]
-        speeds[group] = whole[int(np.argmin(value))]
-    elif len(group) > 1:
-        for row in group:
-            _round_group(problem, [row], speeds, worth)
+        value = worth.of(rows, allowed.feed_max(at)[:, rows] * allowed.feed_ratio, np.array(whole))
+        speeds[rows] = whole[int(np.argmin(value))]
+    elif len(same) > 1:
+        for group in same:
+            _round_speed(problem, [group], speeds, worth)
     else:
-        row = group[0]
-        near = [n for n in (np.floor(middle * 100) / 100, np.ceil(middle * 100) / 100) if _fits(problem, row, n)]
-        speeds[row] = near[0] if near else middle
+        near = [n for n in (np.floor(middle * 100) / 100, np.ceil(middle * 100) / 100) if _fits(problem, same[0], n)]
+        speeds[rows] = near[0] if near else middle
 
 
-def _fits(problem: Problem, row: int, rpm: float) -> bool:
-    return any(a - 1e-9 <= rpm <= b + 1e-9 for a, b in problem.allowed.spans[row])
+def _fits(problem: Problem, group: int, rpm: float) -> bool:
+    return any(a - 1e-9 <= rpm <= b + 1e-9 for a, b in problem.spans[group])

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from twin.machine import Limits
 from twin.motion.path import Kind, Path
-from twin.optimisation.answer import Cutting, Totals
+from twin.optimisation.answer import Cutting, SpeedChanges, Totals
 from twin.optimisation.forces import CutForces
 from twin.optimisation.problem import Problem
 
@@ -151,6 +151,9 @@ def limits_shown(problem: Problem, limits: Limits) -> dict[str, str]:
         shown["chip thickness"] = f"{1000 * limits.chip_mm[0]:g} to {1000 * limits.chip_mm[1]:g} µm"
     if limits.surface_speed_m_min is not None:
         shown["surface speed"] = "{:g} to {:g} m/min".format(*limits.surface_speed_m_min)
+    if problem.groups.changes is not SpeedChanges.ANYWHERE:
+        in_air = problem.groups.changes is SpeedChanges.IN_AIR
+        shown["changes of speed"] = "only where the tool is clear of the material" if in_air else "one speed for each tool number"
     if any(tool.modes for _, tool in problem.program.tools):
         shown["chatter"] = "stability lobes, zero order"
     return shown

@@ -137,13 +137,13 @@ def codes(text: str) -> Codes:
     return Codes(frozenset(found["G"]), frozenset(found["M"]))
 
 
-def inch_lines(lines: list[str]) -> list[bool]:
-    """Of each line, whether G20 stands in it or in the last line before it that has G20 or G21.
+def inch_lines(lines: list[str], inch: bool = False) -> list[bool]:
+    """Of each line, whether G20 stands in it or in the last line before it that has G20 or G21; `inch`: at the start.
 
     >>> inch_lines(["G1 F3", "G20", "G1 F3 (G21)", "G21 G1 F3"])
     [False, True, True, False]
     """
-    inch, found = False, []
+    found = []
     for line in lines:
         of_line = codes(line).g if "2" in line else frozenset()
         inch = 200 in of_line or (inch and 210 not in of_line)

@@ -37,7 +37,7 @@ def test_a_slot_is_as_deep_with_any_length(length_mm: float, way: str) -> None:
 def test_axes_go_where_they_have_to_and_the_tip_where_it_was_told() -> None:
     made = path("G10 L10 P1 R100.\nG43 H1\nG0 X5.\nZ10.\nG2 X15. I5. J0. Z4. F100\nG0 G49 Z30.\n")
     assert made.end_mm[:, 2].tolist() == [0.0, 110.0, 104.0, 30.0]
-    assert made.tip_end_mm.tolist() == [[5.0, 0.0, 0.0], [5.0, 0.0, 10.0], [15.0, 0.0, 4.0], [15.0, 0.0, 30.0]]
+    assert made.tip_ends_mm(np.arange(4))[1].tolist() == [[5.0, 0.0, 0.0], [5.0, 0.0, 10.0], [15.0, 0.0, 4.0], [15.0, 0.0, 30.0]]
     half = made.tip_at(np.arange(4), made.length_mm / 2.0)
     assert half[:, 2] == pytest.approx([0.0, 5.0, 7.0, 17.0])  # a tip is never where nobody sent it
 
@@ -46,7 +46,7 @@ def test_a_wear_offset_counts_and_a_length_that_moves_nothing_counts_too() -> No
     deeper = cut("G10 L10 P1 R100.\nG43 H1 G0 Z10.\nG10 L11 P1 R-0.1\n" + SLOT)
     assert deeper.axial_depth_mm.max() == pytest.approx(0.4)  # the control takes the wear up as well: the tip is where it is told
     made = path("G0 Z100.\nG10 L10 P1 R100.\nG43 H1 G0 X9. Z0.\nG1 X20. F100\n")  # the axes stand at 100 already
-    assert made.tip_start_mm[:, 2].tolist() == [0.0, 100.0, 0.0]
+    assert made.tip_ends_mm(np.arange(3))[0][:, 2].tolist() == [0.0, 100.0, 0.0]
 
 
 @pytest.mark.parametrize(

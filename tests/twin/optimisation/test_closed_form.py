@@ -26,11 +26,12 @@ def grid_best(question: Question, objective: Objective, line: int) -> tuple[floa
     made = problem(question)
     feed, rpm = closed_form(made, objective)
     worth = worth_of(made, objective)
-    own = float(worth.of_line(line, feed[line : line + 1], rpm[line : line + 1])[0])
+    row = np.array([line])
+    own = float(worth.of(row, feed[row], rpm[line]))
     speeds = np.concatenate([np.linspace(a, b, 400) for a, b in made.allowed.spans[line]])
     one = made.allowed.line(line)
     most = one.feed_max(speeds[:, None])[:, 0]
-    best = min(float(worth.of_line(line, most * part, speeds).min()) for part in (1.0, 0.9, 0.5))
+    best = min(float(worth.of(row, most[:, None] * part, speeds).min()) for part in (1.0, 0.9, 0.5))
     return own, best
 
 
