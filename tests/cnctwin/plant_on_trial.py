@@ -15,6 +15,8 @@ from typing import Any
 from cnctwin.mtconnect_agent.replay_agent import ReplayAgent
 from cnctwin.plant import StageLedger, ledgers
 from cnctwin.simulated_machine.description import DEVICES, SPARE_PART
+from edge.config_file import load
+from edge.controls.mtconnect.check import describe
 from sparkplug.broker import BrokerAddress
 from sparkplug.host import EventKind, HostApplication
 from tests.wire.mosquitto import Mosquitto
@@ -79,7 +81,12 @@ class Plant:
                 if event.kind is EventKind.PLAIN and event.payload:
                     self.mirror[event.topic] = json.loads(event.payload)
 
-    def wait(self, condition: Callable[[], bool], what: str, seconds: float = 25.0) -> None:
+    def _unlike(self, ends: dict[str, object]) -> dict[str, tuple[object, object]]:
+        """What the mirror shows otherwise."""
+        shown = {topic: self.mirror.get(topic, {}).get("value") for topic in ends}
+        return {topic: (shown[topic], value) for topic, value in ends.items() if shown[topic] != value}
+
+    def wait(self, condition: Callable[[], bool], what: str, seconds: float = 120.0) -> None:
         """Look until something is the case."""
         until_s = time.monotonic() + seconds
         while not condition():
@@ -87,7 +94,12 @@ class Plant:
             self.look(0.05)
 
     def settle(self) -> None:
-        """Look until nothing moves any more."""
+        """Look until the mirror shows what the control ends with, and nothing moves any more."""
+        ends = {f"cnc/vmc/{row.signal}": row.value for row in describe(load(self._folder / "edge.toml"))}
+        until_s = time.monotonic() + 120.0
+        while unlike := self._unlike(ends):
+            assert time.monotonic() < until_s, f"shown and right: {unlike}; {self._logs()}"
+            self.look(0.05)
         quiet_s, before = time.monotonic(), ()
         while time.monotonic() - quiet_s < 2.5:
             self.look(0.1)
@@ -115,7 +127,9 @@ class Plant:
     def kill(self, name: str) -> None:
         """kill -9."""
         if name == "mosquitto":
+            self.proxy.refuse()  # as where no broker is: who got as far as a CONNECT would rightly use up a bdSeq
             self.mosquitto.kill()
+            self.wait(lambda: not self.viewer.online, "the viewer to notice")
             return
         process = self._processes.pop(name)
         os.kill(process.pid, signal.SIGKILL)
@@ -125,6 +139,7 @@ class Plant:
         """Start what was killed."""
         if name == "mosquitto":
             self.mosquitto.start()
+            self.proxy.accept()
         else:
             self.start(name)
 
@@ -135,7 +150,7 @@ class Plant:
             return
         process.terminate()
         try:
-            process.wait(10)
+            process.wait(60)
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()

@@ -1,7 +1,6 @@
 """The command as a user starts it: a process of its own, with what it said and which processes it has."""
 
 import os
-import socket
 import subprocess
 import sys
 import time
@@ -9,15 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
 
-WAIT_S_MAX = 20.0
-
-
-def free_port() -> int:
-    """A loopback port that nobody listens on at this moment."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
+WAIT_S_MAX = 60.0  # the tests run beside others
 
 
 def until(condition: Callable[[], bool], what: str, seconds: float = WAIT_S_MAX) -> None:
@@ -86,6 +77,6 @@ class Program:
         self.process.send_signal(number)
         return self.wait()
 
-    def wait(self, seconds: float = 30.0) -> int:
+    def wait(self, seconds: float = WAIT_S_MAX) -> int:
         """The exit code, when it has ended."""
         return self.process.wait(seconds)

@@ -62,7 +62,7 @@ def played(folder: Path, lines: Iterable[str], **options: object) -> ReplayAgent
 
 def ask(agent: ReplayAgent, path: str, method: str = "GET", body: bytes | None = None) -> tuple[int, str]:
     """Send a request as it is, nothing in the path quoted but spaces; return status and document."""
-    connection = http.client.HTTPConnection(urlsplit(agent.url).netloc, timeout=10.0)
+    connection = http.client.HTTPConnection(urlsplit(agent.url).netloc, timeout=60.0)
     try:
         connection.request(method, path.replace(" ", "%20"), body)
         response = connection.getresponse()

@@ -19,8 +19,8 @@ from cnctwin.simulated_machine.description import DEVICES
 from cnctwin.simulated_machine.description import SPARE_PART as RECORDING
 from sparkplug.broker import BrokerAddress
 from sparkplug.host import HostApplication
-from tests.cnctwin.program import free_port, until
-from tests.wire.mosquitto import Mosquitto
+from tests.cnctwin.program import until
+from tests.wire.mosquitto import Mosquitto, free_port
 
 LINES = len(RECORDING.read_text(encoding="utf-8").splitlines())
 
@@ -73,7 +73,7 @@ def test_the_replay_serves_the_recording_and_keeps_its_state_for_whoever_started
     with until_stopped(replay, RECORDING, DEVICES, speed=float("inf"), state_file=file):
         until(lambda: bool(state().get("finished")), "the recording to end")
         assert state()["device"] == "VMC"
-        with urllib.request.urlopen(state()["url"] + "/probe", timeout=5) as answer:
+        with urllib.request.urlopen(state()["url"] + "/probe", timeout=60) as answer:
             assert b"MTConnectDevices" in answer.read()
     first, last = capfd.readouterr().out.splitlines()
     assert first == f"{state()['url']} serves {RECORDING.name} as VMC; Ctrl-C ends it"

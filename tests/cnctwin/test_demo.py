@@ -23,14 +23,17 @@ from sparkplug.broker import BrokerAddress
 from sparkplug.host import EventKind, HostApplication, HostEvent
 from sparkplug.metric import NodeId, Reading
 from sparkplug.quality import Quality
-from tests.cnctwin.program import Program, children, free_port, is_alive, until
+from tests.cnctwin.program import Program, children, is_alive, until
+from tests.wire.mosquitto import free_port
 
 pytestmark = [pytest.mark.broker, pytest.mark.usefixtures("mosquitto_program")]
 OWN = ["--recording", str(SPARE_PART), "--devices", str(DEVICES)]
 LINES_OF_OUR_RECORDING = len(SPARE_PART.read_text(encoding="utf-8").splitlines())
-SECONDS = 13.0  # enough for it at fifteen times its pace, with time to start
+SECONDS = 25.0  # enough for it at fifteen times its pace, with time to start; the other tests go on meanwhile
 STAGES = ["edge-vmc", *sorted(f"twin-{name}" for name in PROCESSORS)]
-START_S_MAX = 60.0  # with the kernels of the scores to compile, on a computer that has other things to do
+START_S_MAX = 150.0  # with the kernels of the scores to compile, on a computer that has other things to do
+WITH_A_GIVEN_PORT = {"agent", "page"}
+"""Their ports are the system's choice, which gives one to somebody else too while they are dead; then they are started again."""
 PARTS = ["edge", "historian", "jobs", "mosquitto", "process", "serve", "simulate-control"]
 
 
@@ -92,7 +95,8 @@ def test_whatever_is_killed_comes_back_and_ctrl_c_ends_it_with_a_ledger_that_bal
         assert program.ask_to_end(signal.SIGINT) == 0, program.err
         summary = json.loads(program.out)
     assert summary["balances"] is True
-    assert summary["restarts"] == dict.fromkeys(("mosquitto", "agent", "historian", "processors", "edge", "page", "jobs"), 1)
+    assert summary["restarts"].keys() == {"mosquitto", *WITH_A_GIVEN_PORT, "historian", "processors", "edge", "jobs"}
+    assert {part for part, count in summary["restarts"].items() if count > 1} <= WITH_A_GIVEN_PORT
     assert [pid for pid in last.values() if is_alive(pid)] == []
     assert not answers("127.0.0.1", port)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["err", "out"], "the temporary folder is removed"
@@ -105,7 +109,7 @@ def test_a_demo_that_is_killed_leaves_nothing_running(tmp_path: Path) -> None:
         parts = children(program.process.pid)
         program.process.kill()
         program.wait()
-        until(lambda: not any(is_alive(pid) for pid in parts.values()), "every part to end", 10.0)
+        until(lambda: not any(is_alive(pid) for pid in parts.values()), "every part to end")
     assert not answers("127.0.0.1", port)
 
 
@@ -205,7 +209,7 @@ def test_the_summary_tells_what_the_machine_did(whole: dict[str, Any]) -> None:
     assert whole["agent"]["lines"] == LINES_OF_OUR_RECORDING
     assert (whole["tool_changes"], whole["last_tool"]) == (5, "5")
     assert whole["restarts"] == {}
-    assert SECONDS <= whole["seconds"] < SECONDS + demo_module.SETTLE_S_MAX + 10.0  # and it takes time to end
+    assert SECONDS <= whole["seconds"] < SECONDS + demo_module.SETTLE_S_MAX + 60.0  # and it takes time to end
 
 
 @pytest.mark.usefixtures("whole")

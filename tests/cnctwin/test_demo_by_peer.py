@@ -25,7 +25,7 @@ def recorded_demo(port: int) -> tuple[list[tuple[str, bytes]], str]:
     client.on_message = lambda _c, _u, message: messages.append((message.topic, bytes(message.payload)))
     client.on_connect = lambda c, *_: c.subscribe("spBv1.0/#")
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as demo:
-        deadline_s = time.monotonic() + 10.0
+        deadline_s = time.monotonic() + 60.0
         while time.monotonic() < deadline_s:
             try:
                 client.connect("127.0.0.1", port)
@@ -33,7 +33,7 @@ def recorded_demo(port: int) -> tuple[list[tuple[str, bytes]], str]:
             except OSError:
                 time.sleep(0.05)
         client.loop_start()
-        said, _ = demo.communicate(timeout=60)
+        said, _ = demo.communicate(timeout=300)
         client.loop_stop()
         client.disconnect()
     assert demo.returncode == 0, said

@@ -16,8 +16,8 @@ from sparkplug.datatype import DataType
 from sparkplug.edge_node import EdgeNode
 from sparkplug.metric import Change, MetricSpec, NodeId, Reading
 from sparkplug.quality import Quality
-from tests.cnctwin.program import free_port, until
-from tests.wire.mosquitto import Mosquitto
+from tests.cnctwin.program import until
+from tests.wire.mosquitto import Mosquitto, free_port
 
 pytestmark = pytest.mark.broker
 HEALTHY = {"received": 10, "emitted": 7, "buffered": 1, "dropped": 2, "dropped/unmapped": 2}

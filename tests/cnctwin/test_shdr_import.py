@@ -16,7 +16,7 @@ from twin.runlog import read_run
 
 def imported(*arguments: object) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "cnctwin", "import", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    return subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
 
 
 def test_the_recording_that_ships_with_the_project_has_its_tool_changes() -> None:

@@ -21,7 +21,7 @@ DEPLOY = PROJECT / "deploy"
 EDGES, PROCESSORS, PEOPLE, PASSWORD_EDGES, EAR = 8883, 8884, 8885, 8886, 0
 BY_CERTIFICATE = ("edge-okuma", "edge-other")
 BY_PASSWORD = {"people": ("viewer", "operator", "edge-okuma"), "edges": ("edge-mill", "edge-okuma")}
-STARTUP_S_MAX = 10.0
+STARTUP_S_MAX = 60.0
 
 
 def certificates(*arguments: object) -> str:

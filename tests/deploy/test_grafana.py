@@ -48,7 +48,7 @@ class Asked:
     """A server that is asked over HTTP."""
 
     def __init__(self, server: ServerProcess) -> None:
-        self.http = httpx.Client(base_url=f"http://127.0.0.1:{server.port}", timeout=10.0)
+        self.http = httpx.Client(base_url=f"http://127.0.0.1:{server.port}", timeout=60.0)
 
     def get(self, path: str, **parameters: Any) -> Any:
         """The JSON of an answer that is no error."""

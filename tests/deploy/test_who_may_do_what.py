@@ -9,7 +9,7 @@ import pytest
 from processors.discovery import discover
 from tests.deploy.permissions import ALL, DEVICE_VERBS, MAY_READ, MAY_WRITE, NODE_VERBS, STATES, USERS, barrier, said_by
 from tests.deploy.plant import DEPLOY, EAR, EDGES, PROCESSORS, Plant, with_version
-from tests.deploy.wire_client import WireClient
+from tests.deploy.wire_client import PATIENCE_S, WireClient
 
 pytestmark = pytest.mark.broker
 
@@ -118,7 +118,7 @@ def test_no_rule_has_a_wildcard_where_the_verb_stands(path: Path) -> None:
 def test_what_is_too_large_ends_the_connection_and_is_not_lost_in_silence(plant: Plant) -> None:
     with WireClient(plant.of("edge-okuma")) as client:
         client.publish("spBv1.0/cnc/NDATA/edge-okuma", bytes(5_000_000))
-        assert client.lost.wait(5.0)
+        assert client.lost.wait(PATIENCE_S)
 
 
 @pytest.mark.parametrize(("qos", "count"), [(0, 10_000), (1, 2000)])

@@ -14,7 +14,7 @@ from paho.mqtt.enums import CallbackAPIVersion, MQTTProtocolVersion
 
 from sparkplug.broker import BrokerAddress
 
-PATIENCE_S = 10.0
+PATIENCE_S = 60.0
 DENIED = 0x87
 Will = tuple[str, bytes, bool]  # topic, payload, retained
 

@@ -82,7 +82,7 @@ def running(config: EdgeConfig[MtconnectConfig]) -> Iterator[EdgeRuntime]:
         yield runtime
     finally:
         runtime.stop.set()
-        thread.join(10)
+        thread.join(60)
         assert not thread.is_alive()
 
 
@@ -173,6 +173,6 @@ def test_a_killed_edge_that_is_started_again_changes_nothing_in_the_end_state(mo
         play(agent, 1000)
         wait(lambda: end_state_is_told(agent, config, onlooker), "the end state")
         second.terminate()
-        assert second.wait(10) == 0, "SIGTERM is a clean end"
+        assert second.wait(60) == 0, "SIGTERM is a clean end"
         wait(lambda: onlooker.count("health/ledger_difference") == 0, "a ledger that balances")
         assert replace(config).node == "edge-okuma"

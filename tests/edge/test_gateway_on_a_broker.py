@@ -15,6 +15,7 @@ from cnctwin.mtconnect_agent.replay_agent import ReplayAgent
 from cnctwin.simulated_control.state import production_moments
 from cnctwin.simulated_machine.description import DEVICES
 from cnctwin.simulated_machine.moment import Adapter
+from edge.controls.mtconnect.config import MtconnectConfig
 from sparkplug.broker import BrokerAddress
 from sparkplug.host import EventKind
 from sparkplug.host_session import HostEvent
@@ -105,7 +106,7 @@ def gateway(folder: Path) -> Iterator[subprocess.Popen[str]]:
         yield process
     finally:
         process.terminate()
-        process.communicate(timeout=30)
+        process.communicate(timeout=60)
 
 
 def test_one_machine_that_hangs_floods_or_talks_nonsense_does_not_touch_the_others(
@@ -125,13 +126,16 @@ def test_one_machine_that_hangs_floods_or_talks_nonsense_does_not_touch_the_othe
         wait(lambda: {"good1", "good2", "flood"} <= seen.messages.keys(), "the births of the machines that are well")
         before = dict(seen.messages)
         slowest_s = 0.0
-        until_s = time.monotonic() + 4.0
-        while time.monotonic() < until_s:
-            time.sleep(0.05)
+
+        def have_told() -> bool:
+            nonlocal slowest_s
             slowest_s = max(slowest_s, *(time.monotonic() - seen.heard_s[name] for name in ("good1", "good2")))
-        assert slowest_s < 3.0, "a machine that is well is never silent for long"
-        for name in ("good1", "good2"):
-            assert seen.messages[name] - before[name] > 40
+            return all(seen.messages[name] - before[name] > 40 for name in ("good1", "good2"))
+
+        wait(have_told, "forty messages of each")
+        assert slowest_s < MtconnectConfig(url="http://x").timeout_s, (
+            "a machine that is well is never silent for as long as one that hangs is waited for"
+        )
         assert {"hangs", "talks"}.isdisjoint(seen.messages)
 
         write(tmp_path, "good2", agents["good2"].url, broker, more="lost_after_s = 20\n")
@@ -145,4 +149,4 @@ def test_one_machine_that_hangs_floods_or_talks_nonsense_does_not_touch_the_othe
         wait(lambda: seen.messages["good1"] > told + 20, "the edge whose file was broken to go on as it was")
         assert "good1" not in seen.deaths
         process.terminate()
-        assert process.wait(30) == 0
+        assert process.wait(60) == 0

@@ -110,10 +110,10 @@ def played(
     runtime = EdgeRuntime(config, replace(ADAPTER, connect=lambda _: script), notebook, place_file=place_file)
     thread = threading.Thread(target=runtime.run)
     thread.start()
-    assert script.done.wait(10)
+    assert script.done.wait(60)
     time.sleep(0.05)
     runtime.stop.set()
-    thread.join(10)
+    thread.join(60)
     assert not thread.is_alive()
     assert notebook.stopped
     for ledger in (*notebook.ledgers(), runtime.ledger.snapshot()):

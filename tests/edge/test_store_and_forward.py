@@ -29,6 +29,7 @@ from tests.wire.mosquitto import Mosquitto
 pytestmark = pytest.mark.broker
 PROJECT = Path(__file__).parents[2]
 SECONDS = 600.0
+CLOCKS = {"clock_offset_s", "clock_offset_spread_s", "stamp_clock"}
 ORIGIN_MS = 1_772_438_400_000
 Told = tuple[str, int, object]
 
@@ -41,13 +42,13 @@ class Reader(HostWatch):
         self.rows: dict[int, tuple[Reading, ...]] = {}
         self.history: list[int] = []
         self.live: list[int] = []
-        self.first_live_s: float | None = None
+        self.history_at_birth: int | None = None
 
     def take(self, event: HostEvent) -> None:
         if event.kind is EventKind.DATA and event.device == "vmc":
             self._take(event.readings)
-        elif event.kind is EventKind.BIRTH and event.device == "vmc" and self.first_live_s is None:
-            self.first_live_s = time.monotonic()
+        elif event.kind is EventKind.BIRTH and event.device == "vmc" and self.history_at_birth is None:
+            self.history_at_birth = len(self.history)
 
     def _take(self, readings: Sequence[Reading]) -> None:
         number = next(int(str(reading.value)) for reading in readings if reading.name == "edge_sequence")
@@ -127,7 +128,7 @@ def uninterrupted(recorded: Path, mosquitto: Mosquitto, folder: Path) -> list[To
             agent.step(200)
         wait(lambda: runtime.health.backlog == 0 and caught_up(runtime, agent), "the end of the recording")
         runtime.stop.set()
-        thread.join(10)
+        thread.join(60)
     return notebook.told
 
 
@@ -162,8 +163,11 @@ def each_once(rows: dict[int, tuple[Reading, ...]]) -> list[Told]:
 
 
 def by_signal(told: Sequence[Told]) -> dict[str, list[Told]]:
-    """What the machine told; what its agent says before has the stamp of the test's own day."""
-    machine = [one for one in dict.fromkeys(told) if ORIGIN_MS <= one[1] <= ORIGIN_MS + SECONDS * 1000]
+    """What the machine told; what its agent says before has the stamp of the test's own day.
+
+    How the clocks compare is the edge's own finding, which takes it some seconds of ours.
+    """
+    machine = [one for one in dict.fromkeys(told) if ORIGIN_MS <= one[1] <= ORIGIN_MS + SECONDS * 1000 and one[0] not in CLOCKS]
     return {name: [one for one in machine if one[0] == name] for name in sorted({one[0] for one in machine})}
 
 
@@ -186,10 +190,8 @@ def test_no_broker_and_an_edge_that_is_killed_lose_nothing_and_tell_nothing_twic
                     time.sleep(0.01)
             agent.step(chance.randint(0, 100))  # and while nobody is there
         with Reader(BrokerAddress(*mosquitto.address)) as reader, edge_process(file) as last:
-            agent.step(50)
-            time.sleep(1.0)
+            wait(lambda: agent.step(2) >= 0 and stored_rows(folder) > len(expected) / 20, "a good part of it in the store")
             mosquitto.restart()
-            back_s = time.monotonic()
             while not agent.finished:
                 agent.step(50)
                 time.sleep(0.01)
@@ -198,9 +200,8 @@ def test_no_broker_and_an_edge_that_is_killed_lose_nothing_and_tell_nothing_twic
             wait(lambda: not stored_rows(folder), "the end of the history")
             time.sleep(0.5)
             last.terminate()
-            assert last.wait(10) == 0
-        assert reader.first_live_s is not None
-        assert reader.first_live_s - back_s < 10.0, "the birth with the present values does not wait for the history"
+            assert last.wait(60) == 0
+        assert reader.history_at_birth == 0, "the birth with the present values does not wait for the history"
     assert sorted(reader.rows) == list(range(1, max(reader.rows) + 1)), "no row is missing"
     assert reader.live == sorted(set(reader.live))
     assert len(reader.history) > len(expected) / 20

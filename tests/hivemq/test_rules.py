@@ -16,7 +16,7 @@ from sparkplug.edge_node import EdgeNode
 from sparkplug.host import HostApplication
 from sparkplug.metric import MetricSpec, NodeId
 from tests.deploy.permissions import ALL, DEVICE_VERBS, MAY_READ, MAY_WRITE, NODE_VERBS, barrier
-from tests.deploy.wire_client import WireClient
+from tests.deploy.wire_client import PATIENCE_S, WireClient
 from tests.hivemq.hivemq import DEPLOY, USERS, HiveMQ
 
 pytestmark = pytest.mark.broker
@@ -33,7 +33,7 @@ def test_each_publishes_what_it_may_and_nothing_else(hivemq: HiveMQ, who: str) -
         for topic in set(TOPICS) - MAY_WRITE[who]:
             with WireClient(hivemq.on_loopback(who)) as client:
                 client.publish(topic, who.encode())
-                assert client.lost.wait(5.0), topic
+                assert client.lost.wait(PATIENCE_S), topic
         ear.settle(ear.publish("over", b""))
         ear.hear("over", b"")
         ear.until(
@@ -60,7 +60,7 @@ def test_an_edge_cannot_have_anything_retained(hivemq: HiveMQ) -> None:
         birth = "spBv1.0/cnc/NBIRTH/edge-okuma"
         client.settle(client.publish(birth, b"x"))
         client.publish(birth, b"x", retain=True)
-        assert client.lost.wait(5.0)
+        assert client.lost.wait(PATIENCE_S)
 
 
 def test_a_will_is_no_way_around_the_rules(hivemq: HiveMQ) -> None:
@@ -86,7 +86,7 @@ def test_who_has_the_wrong_papers_stays_outside(hivemq: HiveMQ, wrong: str) -> N
     }[wrong]
     edge = EdgeNode(address, NodeId("cnc", "edge-okuma"))
     edge.start()
-    deadline_s = time.monotonic() + 5.0
+    deadline_s = time.monotonic() + PATIENCE_S
     while not edge.last_error and time.monotonic() < deadline_s:
         time.sleep(0.01)
     online, error = edge.online, edge.last_error
@@ -101,7 +101,7 @@ def test_our_edge_node_and_host_application_work_under_these_rules(hivemq: HiveM
     edge.declare_device("okuma", [MetricSpec("load", DataType.DOUBLE, value=37.5)])
     edge.start()
     try:
-        deadline_s = time.monotonic() + 15.0
+        deadline_s = time.monotonic() + PATIENCE_S
         while not edge.online:
             assert time.monotonic() < deadline_s, edge.last_error
             time.sleep(0.01)

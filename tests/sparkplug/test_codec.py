@@ -25,7 +25,7 @@ from tests.sparkplug.everything import (
     same,
 )
 
-HURRY_S = 2.0
+HURRY_S = 2.0  # of this process's own time: others may be at work on the machine
 QUICK = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
 
 
@@ -250,9 +250,9 @@ def test_a_payload_above_the_limit_is_refused_unread() -> None:
 
 
 def test_a_payload_of_many_empty_metrics_takes_bounded_time() -> None:
-    began_s = time.monotonic()
+    began_s = time.process_time()
     assert len(decode(b"\x12\x00" * 50_000).metrics) == 50_000
-    assert time.monotonic() - began_s < HURRY_S
+    assert time.process_time() - began_s < HURRY_S
 
 
 @pytest.mark.parametrize(
@@ -311,10 +311,10 @@ def _try_all(data: bytes) -> None:
 
 
 def _refused_quickly(data: bytes) -> None:
-    began_s = time.monotonic()
+    began_s = time.process_time()
     with pytest.raises(PayloadError):
         decode(data)
-    assert time.monotonic() - began_s < HURRY_S
+    assert time.process_time() - began_s < HURRY_S
 
 
 def _nested_template(depth: int) -> Payload:

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import getpass
+import random
 import shutil
 import socket
 import subprocess
 import tempfile
 import time
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 
-STARTUP_S_MAX = 10.0
+STARTUP_S_MAX = 30.0
 START_ATTEMPTS_MAX = 5
+PORT_ATTEMPTS_MAX = 100
 
 
 def find_mosquitto() -> str | None:
@@ -21,11 +24,17 @@ def find_mosquitto() -> str | None:
 
 
 def free_port() -> int:
-    """A loopback port that nobody listens on at this moment."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
+    """A loopback port that nobody has at this moment, and that no system gives away by itself.
+
+    Of those that a system gives to whoever connects (above 32767 on Linux), one that is free for the moment of a restart may be
+    another connection's when it is wanted again.
+    """
+    for _ in range(PORT_ATTEMPTS_MAX):
+        port = random.randrange(10_000, 32_768)
+        with socket.socket() as probe, suppress(OSError):
+            probe.bind(("127.0.0.1", port))
+            return port
+    raise RuntimeError("no port is free")
 
 
 class Mosquitto:

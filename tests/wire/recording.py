@@ -94,7 +94,7 @@ class Recording:
         ]
 
     def wait_for(
-        self, matches: Callable[[Packet], bool], *, timeout_s: float = 5.0, count: int = 1, after: int = 0
+        self, matches: Callable[[Packet], bool], *, timeout_s: float = 60.0, count: int = 1, after: int = 0
     ) -> list[Recorded]:
         """The first `count` packets that match, past the first `after` packets; raises TimeoutError."""
         deadline = time.monotonic() + timeout_s

@@ -63,7 +63,7 @@ def _born_ms(host: HostApplication) -> int:
 
 
 def _poll_until(host: HostApplication, ready: Callable[[], Any]) -> None:
-    deadline_s = time.monotonic() + 10.0
+    deadline_s = time.monotonic() + 60.0
     while not ready():
         assert time.monotonic() < deadline_s
         host.poll(0.05)

@@ -5,6 +5,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from typing import Any, NamedTuple
 
 import httpx
@@ -22,6 +23,8 @@ from tests.edge.host_watch import wait
 from tests.wire.mosquitto import Mosquitto
 
 LOAD, STATE = "spindle_load_pct", "exec_state"
+PATIENCE_S = 60.0  # the tests run beside others
+get, post, streamed = (partial(one, timeout=PATIENCE_S) for one in (httpx.get, httpx.post, httpx.stream))
 
 
 class Event(NamedTuple):
@@ -31,14 +34,22 @@ class Event(NamedTuple):
     data: dict[str, Any]
 
 
+class PlantServer(Server):
+    """A server, with what it serves from."""
+
+    def __init__(self, sources: Sources) -> None:
+        super().__init__(create_app(sources))
+        self.sources = sources
+
+
 @contextmanager
-def served(broker: Mosquitto, **parts: Any) -> Iterator[Server]:
+def served(broker: Mosquitto, **parts: Any) -> Iterator[PlantServer]:
     """A server that looks at the broker."""
     live = LivePlant()
     viewer = Viewer(BrokerAddress(*broker.address), "cnc", live)
     viewer.start()
     try:
-        with Server(create_app(Sources(live, viewer, **parts))) as server:
+        with PlantServer(Sources(live, viewer, **parts)) as server:
             yield server
     finally:
         viewer.stop()
@@ -73,7 +84,7 @@ def wait_until_known(server: Server, edge: EdgeNode, name: str = "vmc") -> None:
 
     def known() -> bool:
         tell(edge, 0.0, name)
-        return any(item["machine"] == name and item["online"] for item in httpx.get(f"{server.url}/machines").json())
+        return any(item["machine"] == name and item["online"] for item in get(f"{server.url}/machines").json())
 
     wait(known, f"machine {name} to be known")
 
@@ -91,7 +102,7 @@ class Stream:
 
     def __enter__(self) -> "Stream":
         self._thread.start()
-        wait(lambda: self.events, "the first event", 10.0)
+        wait(lambda: self.events, "the first event")
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -108,7 +119,7 @@ class Stream:
     def _read(self) -> None:
         while not self._stop.is_set():
             try:
-                with httpx.stream("GET", self._url, timeout=5.0) as answer:
+                with streamed("GET", self._url) as answer:
                     self.connections += 1
                     self.is_open = True
                     self._take(answer)

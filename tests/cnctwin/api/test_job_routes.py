@@ -5,7 +5,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import httpx
 import pytest
 
 from cnctwin.api import job_routes
@@ -14,7 +13,7 @@ from cnctwin.api.server import Server
 from cnctwin.jobs.consumer import Consumer
 from cnctwin.jobs.topics import STATE
 from sparkplug.broker import BrokerAddress
-from tests.cnctwin.api.served_plant import served
+from tests.cnctwin.api.served_plant import PATIENCE_S, get, post, served
 from tests.cnctwin.api.small_plant import client_of
 from tests.cnctwin.jobs.consumer_on_trial import setting
 from tests.cnctwin.jobs.counting import chain_to
@@ -29,6 +28,7 @@ PROXIED = Access(proxy_header="X-Remote-User", proxy="127.0.0.1")
 def folder(mosquitto: Mosquitto, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """Of a consumer that runs, and whose jobs count."""
     monkeypatch.setenv("PYTHONPATH", str(PROJECT))
+    monkeypatch.setattr(job_routes, "ANSWER_S_MAX", PATIENCE_S)
     consumer, stop = Consumer(tmp_path / "jobs", BrokerAddress(*mosquitto.address), setting()), threading.Event()
     thread = threading.Thread(target=consumer.run, args=(stop,))
     thread.start()
@@ -38,7 +38,7 @@ def folder(mosquitto: Mosquitto, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
 
 def jobs(server: Server) -> dict[str, Any]:
-    told: dict[str, Any] = httpx.get(f"{server.url}/jobs").json()
+    told: dict[str, Any] = get(f"{server.url}/jobs").json()
     return told
 
 
@@ -51,15 +51,15 @@ def test_a_job_is_asked_for_shown_and_its_files_are_had(mosquitto: Mosquitto, fo
     with served(mosquitto, jobs=folder) as server:
         wait(lambda: jobs(server)["available"], "the consumer")
         asked = {"job": "count", "id": "ten", "to": 10, "machine": "mill"}
-        told = [httpx.post(f"{server.url}/jobs", json=asked).json() for _ in range(2)]
+        told = [post(f"{server.url}/jobs", json=asked).json() for _ in range(2)]
         assert [(one["id"], one["answer"]) for one in told] == [("ten", "accepted"), ("ten", "known")]
-        wait(lambda: state_of(server, "ten") == "done", "its end", 30)
+        wait(lambda: state_of(server, "ten") == "done", "its end")
         (short,) = jobs(server)["jobs"]
         assert (short["kind"], short["progress_pct"], short["sentence"]) == ("count", 100.0, "counted to 10")
-        wait(lambda: httpx.get(f"{server.url}/jobs/ten").json().get("result"), "its result")
-        assert httpx.get(f"{server.url}/jobs/ten").json()["result"]["chain"] == chain_to(10)
-        assert httpx.get(f"{server.url}/machines").json() == [], "neither a job nor what it is about is a machine of the plant"
-        file = httpx.get(f"{server.url}/jobs/ten/files/chain.txt")
+        wait(lambda: get(f"{server.url}/jobs/ten").json().get("result"), "its result")
+        assert get(f"{server.url}/jobs/ten").json()["result"]["chain"] == chain_to(10)
+        assert get(f"{server.url}/machines").json() == [], "neither a job nor what it is about is a machine of the plant"
+        file = get(f"{server.url}/jobs/ten/files/chain.txt")
         assert (file.text, file.headers["content-disposition"]) == (chain_to(10), 'attachment; filename="ten-chain.txt"')
         for place in (
             "ten/files/state.json",
@@ -68,7 +68,7 @@ def test_a_job_is_asked_for_shown_and_its_files_are_had(mosquitto: Mosquitto, fo
             "..%2Fjobs/files/x",
             "eleven",
         ):
-            refused = httpx.get(f"{server.url}/jobs/{place}")
+            refused = get(f"{server.url}/jobs/{place}")
             assert (refused.status_code, list(refused.json())) == (404, ["error"]), place
 
 
@@ -76,13 +76,13 @@ def test_a_job_is_asked_for_shown_and_its_files_are_had(mosquitto: Mosquitto, fo
 def test_a_job_is_cancelled_and_what_is_wrong_is_refused(mosquitto: Mosquitto, folder: Path) -> None:
     with served(mosquitto) as server:
         wait(lambda: jobs(server)["available"], "the consumer")
-        long = httpx.post(f"{server.url}/jobs", json={"job": "count", "to": 1000, "pause_s": 0.05}).json()
+        long = post(f"{server.url}/jobs", json={"job": "count", "to": 10_000, "pause_s": 0.05}).json()
         assert long["id"].startswith("count-")
-        wait(lambda: state_of(server, long["id"]) == "running", "its start", 30)
-        told = httpx.post(f"{server.url}/jobs/{long['id']}/cancel")
+        wait(lambda: state_of(server, long["id"]) == "running", "its start")
+        told = post(f"{server.url}/jobs/{long['id']}/cancel")
         assert (told.status_code, told.json()["answer"]) == (200, "cancelled")
         wait(lambda: state_of(server, long["id"]) == "cancelled", "its end")
-        assert httpx.post(f"{server.url}/jobs/nobody/cancel").status_code == 404
+        assert post(f"{server.url}/jobs/nobody/cancel").status_code == 404
         for body, status, said in (
             ({"job": "bake"}, 400, "job = 'bake': is none of"),
             ({"job": "count"}, 400, "to"),
@@ -90,9 +90,9 @@ def test_a_job_is_cancelled_and_what_is_wrong_is_refused(mosquitto: Mosquitto, f
             ({"job": "diagnose", "case": "../x"}, 409, "--files"),
             ({"job": "count", "to": 3, "id": long["id"]}, 409, "is that of another request"),
         ):
-            refused = httpx.post(f"{server.url}/jobs", json=body)
+            refused = post(f"{server.url}/jobs", json=body)
             assert (refused.status_code, said in refused.json()["error"]) == (status, True), refused.text
-        foreign = httpx.post(f"{server.url}/jobs", json={"job": "count", "to": 1}, headers={"Origin": "http://elsewhere.example"})
+        foreign = post(f"{server.url}/jobs", json={"job": "count", "to": 1}, headers={"Origin": "http://elsewhere.example"})
         assert foreign.status_code == 403
 
 
@@ -101,16 +101,16 @@ def test_where_no_consumer_is_it_says_so(mosquitto: Mosquitto, monkeypatch: pyte
     monkeypatch.setattr(job_routes, "ANSWER_S_MAX", 0.3)
     asked = {"job": "diagnose", "case": "vmc"}
     with served(mosquitto) as server:
-        wait(lambda: httpx.get(f"{server.url}/health").json()["parts"][0]["state"] == "ok", "the broker")
+        wait(lambda: get(f"{server.url}/health").json()["parts"][0]["state"] == "ok", "the broker")
         assert "nothing was heard of jobs" in jobs(server)["reason"]
-        unheard = httpx.post(f"{server.url}/jobs", json=asked)
+        unheard = post(f"{server.url}/jobs", json=asked)
         assert (unheard.status_code, "cnctwin jobs run" in unheard.json()["error"]) == (503, True)
-        heard = server._app.state.sources.viewer.jobs.take
+        heard = server.sources.viewer.jobs.take
         heard(STATE, b'{"at": "2020-01-01T00:00:00Z", "jobs": []}')
         assert "does not run any more" in jobs(server)["reason"]
         heard(STATE, b'{"at": "2999-01-01T00:00:00Z", "jobs": []}')
         assert jobs(server)["available"]
-        nobody = httpx.post(f"{server.url}/jobs", json=asked)
+        nobody = post(f"{server.url}/jobs", json=asked)
         assert (nobody.status_code, "no answer within 0.3 s" in nobody.json()["error"]) == (504, True)
 
 

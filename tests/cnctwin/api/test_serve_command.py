@@ -17,14 +17,14 @@ from cnctwin.store.contract import Message
 from cnctwin.store.opening import open_store
 from processors.errors import ConfigurationError
 from sparkplug.broker import BrokerAddress
-from tests.cnctwin.api.served_plant import LOAD, machine, tell
+from tests.cnctwin.api.served_plant import LOAD, PATIENCE_S, get, machine, tell
 from tests.cnctwin.api.small_plant import birth, data, small_plant
-from tests.cnctwin.program import Program, free_port, until
+from tests.cnctwin.program import Program, until
 from tests.wire.mosquitto import Mosquitto
 
 TOKEN = "a-token-of-more-than-sixteen"
 T0 = 1_760_000_000_000
-DEAD = f"mqtt://127.0.0.1:{free_port()}"
+DEAD = "mqtt://127.0.0.1:1"  # a port that no test is given
 
 
 def told(file: Path) -> dict[str, object]:
@@ -40,7 +40,7 @@ def test_it_serves_a_plant_keeps_its_state_file_and_ends_when_it_is_asked(mosqui
         until(lambda: bool(tell(edge, 12.5)) and told(file).get("machines") == 1, "the state file to have the machine", 60.0)
         state = told(file)
         assert state["pid"] == program.process.pid
-        assert httpx.get(f"{state['url']}/state/vmc").json()["measured"][LOAD]["value"] == 12.5
+        assert get(f"{state['url']}/state/vmc").json()["measured"][LOAD]["value"] == 12.5
         assert f"{state['url']} shows the plant of {url}" in program.out
         assert program.ask_to_end(signal.SIGTERM) == 0
         assert program.err == ""
@@ -60,7 +60,8 @@ def test_it_starts_green_without_a_broker_gives_the_same_answers_after_a_kill_an
         file.unlink(missing_ok=True)
         with Program(tmp_path, "serve", *options) as program:
             until(lambda: "url" in told(file), "the state file", 60.0)
-            with httpx.Client(base_url=str(told(file)["url"]), headers={"Authorization": f"Bearer {TOKEN}"}) as client:
+            bearer = {"Authorization": f"Bearer {TOKEN}"}
+            with httpx.Client(base_url=str(told(file)["url"]), headers=bearer, timeout=PATIENCE_S) as client:
                 assert client.get("/readyz").json() == {"ready": True}
                 parts = client.get("/health").json()["parts"]
                 assert {"broker", "machines", "models", "alerts", "diagnoses"} <= {
@@ -69,7 +70,7 @@ def test_it_starts_green_without_a_broker_gives_the_same_answers_after_a_kill_an
                 assert client.post("/login", json={"token": TOKEN}).status_code == 204
                 assert client.get(f"/machines?token={TOKEN}").status_code == 200
                 answers.append(client.get(query).json())
-            assert httpx.get(f"{told(file)['url']}/machines").status_code == 401
+            assert get(f"{told(file)['url']}/machines").status_code == 401
             code = program.ask_to_end(number)
             said = program.out + program.err + (file.read_text() if file.exists() else "")
             assert TOKEN not in said

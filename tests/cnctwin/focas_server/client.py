@@ -22,7 +22,7 @@ class Block:
 class RawClient:
     """A connection; open for commands unless told otherwise."""
 
-    def __init__(self, port: int, *, is_opened: bool = True, timeout_s: float = 5.0) -> None:
+    def __init__(self, port: int, *, is_opened: bool = True, timeout_s: float = 30.0) -> None:
         self.socket = socket.create_connection(("127.0.0.1", port), timeout=timeout_s)
         try:
             self.opened = self.exchange(captured.OPEN_FOR_COMMANDS) if is_opened else b""

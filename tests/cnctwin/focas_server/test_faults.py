@@ -12,13 +12,14 @@ from tests.cnctwin.focas_server.moments import Serve
 
 def test_while_it_hangs_nothing_comes_and_afterwards_the_late_answer(serve: Serve) -> None:
     server = serve()
-    with RawClient(server.port, timeout_s=0.1) as client:
+    with RawClient(server.port) as client:
         server.faults.hang = True
+        client.socket.settimeout(0.1)
         client.socket.sendall(command((1, 0x1D)))
         with pytest.raises(TimeoutError):
             client.take()
         server.faults.hang = False
-        client.socket.settimeout(5.0)
+        client.socket.settimeout(30.0)
         assert len(client.take()) == 10 + 2 + 16 + 4
 
 
@@ -29,7 +30,7 @@ def test_clients_that_gave_up_while_it_hung_do_not_keep_their_sessions(serve: Se
         with pytest.raises(TimeoutError):
             RawClient(server.port, timeout_s=0.02)
     server.faults.hang = False
-    until_s = time.monotonic() + 2.0
+    until_s = time.monotonic() + 30.0
     while server.clients and time.monotonic() < until_s:
         time.sleep(0.005)
     with RawClient(server.port) as client:
@@ -82,7 +83,7 @@ def test_some_functions_can_fail_with_a_code_and_the_others_not(serve: Serve) ->
 @pytest.mark.parametrize("wrong", Wrong)
 def test_wrong_answers_come_while_the_switch_is_on_only(serve: Serve, wrong: Wrong) -> None:
     server = serve()
-    with RawClient(server.port, timeout_s=0.1) as client:
+    with RawClient(server.port) as client:
         right = client.exchange(command((1, 0x1D), (1, 0x1C)))
         server.faults.wrong = wrong
         client.socket.sendall(command((1, 0x1D), (1, 0x1C)))

@@ -18,7 +18,7 @@ from tests.cnctwin.focas_server.client import RawClient, ask, blocks, command
 from tests.cnctwin.focas_server.moments import CHANGING, DESCRIPTION, Serve, control_at
 
 
-def soon(condition: object, timeout_s: float = 2.0) -> bool:
+def soon(condition: object, timeout_s: float = 30.0) -> bool:
     """Whether this comes true."""
     assert callable(condition)
     until_s = time.monotonic() + timeout_s
@@ -143,7 +143,7 @@ def test_it_stops_at_once_with_clients_that_wait_and_leaves_no_thread() -> None:
         hanging.socket.sendall(command((1, 0x18)))
         began_s = time.monotonic()
         server.stop()
-        assert time.monotonic() - began_s < 1.0
+        assert time.monotonic() - began_s < 5.0
         assert idle.is_hung_up()
         assert hanging.is_hung_up()
     assert not [thread.name for thread in threading.enumerate() if thread.name.startswith("focas-")]

@@ -4,6 +4,7 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -15,6 +16,27 @@ from tests.wire.mosquitto import Mosquitto
 
 Start = Callable[..., Consumer]
 ROOT = Path(__file__).parents[3]
+PATIENCE_S = 60.0  # the tests run beside others
+
+
+class PatientClient(JobsClient):
+    """It waits for a consumer whose process is still to start beside many others."""
+
+    def submit(self, document: dict[str, Any], wait_s: float = PATIENCE_S) -> dict[str, Any]:
+        """As it is."""
+        return super().submit(document, wait_s)
+
+    def cancel(self, job_id: str, wait_s: float = PATIENCE_S) -> dict[str, Any]:
+        """As it is."""
+        return super().cancel(job_id, wait_s)
+
+    def state(self, wait_s: float = PATIENCE_S) -> dict[str, Any]:
+        """As it is."""
+        return super().state(wait_s)
+
+    def job(self, job_id: str, wait_s: float = PATIENCE_S) -> dict[str, Any]:
+        """As it is."""
+        return super().job(job_id, wait_s)
 
 
 @pytest.fixture
@@ -50,11 +72,11 @@ def start(address: BrokerAddress, jobs: Path) -> Iterator[Start]:
 @pytest.fixture
 def client(address: BrokerAddress) -> Iterator[JobsClient]:
     """Somebody who asks."""
-    with JobsClient(address) as asking:
+    with PatientClient(address) as asking:
         yield asking
 
 
-def over(client: JobsClient, job_id: str, seconds: float = 20.0) -> dict[str, object]:
+def over(client: JobsClient, job_id: str, seconds: float = PATIENCE_S) -> dict[str, object]:
     """The job when nothing more becomes of it."""
     found = client.until(lambda: (job := client.job(job_id, seconds))["state"] not in {"queued", "running"} and job, seconds)
     assert found, client.job(job_id)

@@ -8,16 +8,23 @@ from pathlib import Path
 
 from twin.errors import MachineError, ProgramError
 
+TOGETHER_S_MAX = 60.0
+
 
 def squared(text: str) -> str:
-    """`[3]` → `{"square": 9, "process": …}`; `[3, folder, 0.2]` leaves a mark there and works for so many seconds."""
+    """`[3]` → `{"square": 9, "process": …}`; `[3, folder, 0.2]` leaves a mark there and works for so many seconds.
+
+    `[3, folder, 0.2, 2]`: and until two processes have left marks; one may be there long before the other.
+    """
     number, *more = json.loads(text)
     if more:
-        folder, seconds = more
+        folder, seconds, processes = (*more, 1)[:3]
         Path(folder, f"{number}-{os.getpid()}").touch()
-        end_s = time.process_time() + seconds
+        end_s, give_up_s = time.process_time() + seconds, time.monotonic() + TOGETHER_S_MAX
         while time.process_time() < end_s:
             pass
+        while len({mark.name.partition("-")[2] for mark in Path(folder).iterdir()}) < processes and time.monotonic() < give_up_s:
+            time.sleep(0.01)
     return json.dumps({"square": number**2, "process": os.getpid()})
 
 

@@ -21,7 +21,7 @@ from sparkplug.broker import BrokerAddress
 from sparkplug.host import HostApplication
 from sparkplug.host_session import EventKind
 from sparkplug.metric import Change, NodeId
-from tests.cnctwin.jobs.conftest import Start, over
+from tests.cnctwin.jobs.conftest import PATIENCE_S, PatientClient, Start, over
 from tests.cnctwin.jobs.consumer_on_trial import COUNTING, setting
 from tests.cnctwin.jobs.counting import chain_to, checkpoint_of, written
 from tests.cnctwin.program import until
@@ -43,7 +43,7 @@ class Plant:
         self.host.start()
         self.until(lambda: self.host.online)
 
-    def until(self, true: object, seconds: float = 15.0) -> None:
+    def until(self, true: object, seconds: float = PATIENCE_S) -> None:
         """Listen until something is so."""
         deadline_s = time.monotonic() + seconds
         while not true():  # type: ignore[operator]
@@ -54,6 +54,10 @@ class Plant:
                 for reading in event.readings:
                     self.shown.setdefault((event.device or "", reading.name), []).append(reading.value)
 
+    def is_heard(self) -> bool:
+        """Whether a consumer listens: it says how jobs stand when it has subscribed, and on the same connection."""
+        return any(topic == topics.STATE for topic, _ in self.plain)
+
     def said(self, device: str, name: str) -> list[object]:
         """All values of a metric, in their order."""
         return self.shown.get((device, name), [])
@@ -62,9 +66,12 @@ class Plant:
 def test_a_plain_request_is_accepted_done_and_answered(start: Start, address: BrokerAddress, jobs: Path) -> None:
     start()
     plant = Plant(address, "cell/answers", "cnc/jobs/#")
-    asked = {"job": "count", "to": 30, "id": "night-7", "reply_to": "cell/answers", "machine": "vmc", "pause_s": 0.01}
-    plant.until(lambda: plant.said("jobs", "Job/Request"))
+    asked = {"job": "count", "to": 30, "id": "night-7", "reply_to": "cell/answers", "machine": "vmc", "hold_at": 15}
+    plant.until(plant.is_heard)
     plant.host.publish_plain(topics.REQUEST, json.dumps(asked).encode(), qos=1)
+    for device in ("vmc", "jobs"):
+        plant.until(lambda device=device: any(plant.said(device, "twin/job_progress_pct")))  # more than none
+    (jobs / "night-7/go").touch()
     answers: list[dict[str, object]] = []
 
     def answered() -> bool:
@@ -157,7 +164,7 @@ def test_jobs_that_are_over_too_long_go_from_disk_and_broker(start: Start, clien
     for name in ("a", "b"):
         client.submit({"job": "count", "to": 1, "id": name, "machine": f"machine of {name}"})
         assert over(client, name)["state"] == "done"
-    assert client.until(lambda: [one["id"] for one in client.state()["jobs"]] == ["b"], 5)
+    assert client.until(lambda: [one["id"] for one in client.state()["jobs"]] == ["b"], PATIENCE_S)
     assert not (jobs / "a").exists()
     with pytest.raises(UsageError, match="knows no job 'a'"), JobsClient(client.broker) as later:
         later.job("a", 0.5)
@@ -170,11 +177,11 @@ def test_jobs_that_wait_and_one_that_runs_are_cancelled(start: Start, client: Jo
     until(lambda: checkpoint_of(jobs / "a") > 0, "the job to run")
     assert [client.submit({**long, "id": one})["place"] for one in ("b", "c")] == [1, 2]
     assert client.cancel("b")["answer"] == "cancelled"
-    assert client.until(lambda: client.job("c")["place"] == 1, 5)
+    assert client.until(lambda: client.job("c")["place"] == 1, PATIENCE_S)
     assert client.cancel("a")["answer"] == "cancelled"
     assert left_over(jobs / "a") == []
     assert over(client, "a")["state"] == over(client, "b")["state"] == "cancelled"
-    assert client.until(lambda: client.job("c")["state"] == "running", 5)
+    assert client.until(lambda: client.job("c")["state"] == "running", PATIENCE_S)
     assert client.cancel("a")["reason"] == "job a is cancelled already"
     assert "no job" in client.cancel("never")["reason"]
     client.cancel("c")
@@ -238,10 +245,13 @@ def test_no_payload_ends_the_consumer(start: Start, client: JobsClient, address:
         b'"x"',
     ]
     nasty += [chance.randbytes(chance.randrange(300)) for _ in range(60)]
-    plant = Plant(address)
-    for payload in nasty:
+    plant = Plant(address, topics.STATE)
+    plant.until(plant.is_heard)
+    for number, payload in enumerate(nasty, start=1):
         for topic in (topics.REQUEST, topics.CANCEL, topics.state_topic("x"), topics.state_topic("%")):
             plant.host.publish_plain(topic, payload, qos=1)
+        if number % 20 == 0:  # its inbox has room for 200 messages
+            until(lambda number=number: consumer.announcer.counts["requests_refused"] == number, "it to have read them")
     client.submit({"job": "count", "to": 1, "id": "good"})
     assert over(client, "good")["state"] == "done"
     assert consumer.announcer.counts["requests_refused"] == len(nasty)
@@ -258,11 +268,11 @@ def test_after_the_broker_was_away_what_it_retains_is_right_again(
     (jobs / "a/go").touch()
     until((jobs / "a/outcome.json").exists, "its end")
     mosquitto.start()
-    with JobsClient(address) as later:
+    with PatientClient(address) as later:
         assert over(later, "a")["state"] == "done"
-        state = later.state(10)
+        state = later.state()
         assert [one["id"] for one in state["jobs"]] == ["a"]
-        assert later.until(lambda: later.state()["jobs"][0]["state"] == "done", 5)
+        assert later.until(lambda: later.state()["jobs"][0]["state"] == "done", PATIENCE_S)
 
 
 def test_a_file_outside_the_files_folder_is_refused_with_its_name(start: Start, client: JobsClient, tmp_path: Path) -> None:
@@ -286,7 +296,7 @@ def test_the_password_of_the_broker_goes_to_no_job(monkeypatch: pytest.MonkeyPat
     if sys.platform != "linux":
         pytest.skip("looks into /proc")
     consumer = start()
-    with JobsClient(BrokerAddress(port=consumer.broker.port)) as client:
+    with PatientClient(BrokerAddress(port=consumer.broker.port)) as client:
         client.submit({"job": "count", "to": 2, "hold_at": 1, "id": "a"})
         until(lambda: bool(left_over(jobs / "a")), "the job to run")
         assert b"hunter2" not in Path(f"/proc/{left_over(jobs / 'a')[0]}/environ").read_bytes()

@@ -15,7 +15,7 @@ from cnctwin.jobs.client import JobsClient
 from cnctwin.jobs.kinds import KINDS
 from cnctwin.jobs.left_over import left_over
 from sparkplug.broker import BrokerAddress
-from tests.cnctwin.jobs.conftest import ROOT, over
+from tests.cnctwin.jobs.conftest import PATIENCE_S, ROOT, over
 from tests.cnctwin.jobs.counting import COUNT, chain_to, checkpoint_of, written
 from tests.cnctwin.program import is_alive, until
 
@@ -59,7 +59,7 @@ def test_a_killed_consumer_loses_nothing(begin: Callable[[], Process], client: J
     assert written(jobs / "a") == chain_to(40)
     assert written(jobs / "b") == chain_to(5)
     second.send_signal(signal.SIGTERM)
-    assert second.wait(20) == 0
+    assert second.wait(60) == 0
     assert "cut short, since the consumer ended; it goes on" in (second.stderr.read() if second.stderr else "")
 
 
@@ -70,11 +70,11 @@ def test_an_ordered_end_counts_as_no_attempt(begin: Callable[[], Process], clien
     at_work = left_over(jobs / "a")
     os.kill(at_work[0], signal.SIGTERM)  # as a supervisor does that asks all of a group
     first.send_signal(signal.SIGTERM)
-    assert first.wait(20) == 0
+    assert first.wait(60) == 0
     assert not any(map(is_alive, at_work))
     kept = json.loads((jobs / "a/state.json").read_text())
     assert (kept["state"], kept["attempt"]) == ("queued", 0)
-    assert client.job("a")["reason"].startswith("the consumer was ended")
+    assert client.until(lambda: str(client.job("a")["reason"]).startswith("the consumer was ended"), PATIENCE_S)
     (jobs / "a/go").touch()
     begin()
     found = over(client, "a")

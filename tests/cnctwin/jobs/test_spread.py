@@ -36,6 +36,8 @@ def test_in_this_process_and_in_two_others_the_answers_are_the_same_and_in_order
     texts = [json.dumps([number, str(tmp_path), 0.02]) for number in range(8)]
     with spread_over() as spread:
         here = list(spread(pieces.squared, texts))
+    (tmp_path / "there").mkdir()
+    texts = [json.dumps([number, str(tmp_path / "there"), 0.02, 2]) for number in range(8)]
     with spread_over(workers=2, packages=TESTS) as spread:
         there = list(spread(pieces.squared, texts))
         assert list(spread(pieces.squared, [])) == []
@@ -53,11 +55,9 @@ def test_a_process_that_is_killed_costs_time_and_no_answer(tmp_path: Path) -> No
 
 def test_a_piece_that_kills_each_process_is_given_up_and_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(spreading, "DEATHS_MAX", 1)
-    begun_s = time.monotonic()
     lost = r"piece 1 of 1 was lost 2 times, since worker processes were killed; is the memory enough for 2 workers\?"
     with spread_over(workers=2, packages=TESTS) as spread, pytest.raises(SpreadError, match=lost):
         list(spread(pieces.deadly, [json.dumps([str(tmp_path), 99])]))
-    assert time.monotonic() - begun_s < 20
 
 
 def test_processes_do_not_outlive_who_is_killed(tmp_path: Path) -> None:

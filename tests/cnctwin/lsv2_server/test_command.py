@@ -21,12 +21,12 @@ def test_it_serves_until_it_is_stopped_and_says_where(tmp_path: Path, capsys: py
         assert thread.is_alive()
         stop.wait(0.05)
     url = json.loads(state.read_text())["url"]
-    client = pyLSV2.LSV2("127.0.0.1", port=int(url.rpartition(":")[2]), timeout=2.0, safe_mode=False)
+    client = pyLSV2.LSV2("127.0.0.1", port=int(url.rpartition(":")[2]), timeout=30.0, safe_mode=False)
     client.connect()
     assert client.versions.control == "iTNC530"
     client.disconnect()
     stop.set()
-    thread.join(5)
+    thread.join(60)
     assert not thread.is_alive()
     out = capsys.readouterr().out
     assert out.startswith("lsv2://127.0.0.1:")

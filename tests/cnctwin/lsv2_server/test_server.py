@@ -42,7 +42,7 @@ def control() -> SimulatedControl:
 def connected(model: Model = Model.ITNC530, **options: Any) -> Iterator[tuple[pyLSV2.LSV2, Lsv2Server]]:
     """A client as anybody would write it."""
     with Lsv2Server(control(), model=model, **options) as server:
-        client = pyLSV2.LSV2("127.0.0.1", port=server.port, timeout=1.0, safe_mode=False)
+        client = pyLSV2.LSV2("127.0.0.1", port=server.port, timeout=30.0, safe_mode=False)
         client.connect()
         try:
             yield client, server
@@ -140,10 +140,10 @@ def test_it_is_restarted_on_the_same_port_and_the_control_goes_on() -> None:
     port = server.port
     server.stop()
     with pytest.raises(ConnectionRefusedError):
-        socket.create_connection(("127.0.0.1", port), timeout=1.0)
+        socket.create_connection(("127.0.0.1", port), timeout=30.0)
     with server:
         assert server.port == port
-        socket.create_connection(("127.0.0.1", port), timeout=1.0).close()
+        socket.create_connection(("127.0.0.1", port), timeout=30.0).close()
     assert not [thread for thread in threading.enumerate() if thread.name.startswith("lsv2")]
 
 
@@ -154,7 +154,7 @@ def test_a_port_that_is_taken_is_said() -> None:
 
 def test_there_are_no_more_clients_than_it_can_bear() -> None:
     with Lsv2Server(control()) as server:
-        clients = [socket.create_connection(("127.0.0.1", server.port), timeout=2.0) for _ in range(CLIENTS_MAX + 1)]
+        clients = [socket.create_connection(("127.0.0.1", server.port), timeout=30.0) for _ in range(CLIENTS_MAX + 1)]
         try:
             assert clients[-1].recv(1) == b""
         finally:
@@ -178,7 +178,7 @@ def test_faults_can_be_switched_on(fault: Fault, expected: bytes) -> None:
     waited: list[float] = []
     with Lsv2Server(control(), pause=waited.append) as server:
         server.fault = fault
-        with socket.create_connection(("127.0.0.1", server.port), timeout=2.0) as client:
+        with socket.create_connection(("127.0.0.1", server.port), timeout=30.0) as client:
             client.sendall(encode("A_LG", b"INSPECT\x00"))
             found = b""
             while len(found) < len(expected) and (part := client.recv(100)):
@@ -192,7 +192,7 @@ def test_faults_can_be_switched_on(fault: Fault, expected: bytes) -> None:
 def test_a_control_that_refuses_closes_each_connection_at_once() -> None:
     with Lsv2Server(control()) as server:
         server.fault = Fault.REFUSE
-        with socket.create_connection(("127.0.0.1", server.port), timeout=2.0) as client:
+        with socket.create_connection(("127.0.0.1", server.port), timeout=30.0) as client:
             assert client.recv(1) == b""
 
 
@@ -242,9 +242,9 @@ _ANSWERS = Answers(control(), Model.ITNC530)
 
 def test_a_client_that_sends_rubbish_is_dropped_and_others_are_served() -> None:
     with Lsv2Server(control()) as server:
-        with socket.create_connection(("127.0.0.1", server.port), timeout=2.0) as client:
+        with socket.create_connection(("127.0.0.1", server.port), timeout=30.0) as client:
             client.sendall(struct.pack("!L", 2**31) + b"R_VR")
             assert client.recv(1) == b""
-        with socket.create_connection(("127.0.0.1", server.port), timeout=2.0) as client:
+        with socket.create_connection(("127.0.0.1", server.port), timeout=30.0) as client:
             client.sendall(encode("A_LG", b"INSPECT\x00"))
             assert client.recv(100) == encode("T_OK")

@@ -39,13 +39,13 @@ def state(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         time.sleep(0.05)
     yield file
     stop.set()
-    program.join(timeout=15.0)
+    program.join(timeout=60.0)
     assert not program.is_alive()
 
 
 def written(file: Path, count: int) -> bool:
     """Whether so many writes of clients have been counted, in a while."""
-    deadline_s = time.monotonic() + 10.0
+    deadline_s = time.monotonic() + 60.0
     while json.loads(file.read_text())["writes"] != count:
         if time.monotonic() > deadline_s:
             return False
@@ -64,7 +64,7 @@ def test_it_shows_the_tool_with_the_controls_own_time_and_all_models(state: Path
                 await asyncio.sleep(0.02)
             return namespaces, seen
 
-    namespaces, seen = asyncio.run(asyncio.wait_for(look(), 30.0))
+    namespaces, seen = asyncio.run(asyncio.wait_for(look(), 120.0))
     assert set(MODELS.values()) <= set(namespaces)
     stamps = [value.SourceTimestamp for value in seen]
     assert all(stamp is not None for stamp in stamps)

@@ -46,8 +46,8 @@ def test_a_store_gives_each_part_once_and_in_order(store) -> None:
 
 def test_a_receiver_that_fails_hangs_and_returns_is_given_each_part_in_order(store, tmp_path: Path) -> None:
     with ReceivingServer() as server:
-        server.answers.extend([Answer(503), Answer(wait_s=1.0), Answer(drop=True), Answer(201), Answer(400)])
-        receiver = Receiver(f"{server.url}/parts", "token", "shared", timeout_s=0.4)
+        server.answers.extend([Answer(503), Answer(wait_s=6.0), Answer(drop=True), Answer(201), Answer(400)])
+        receiver = Receiver(f"{server.url}/parts", "token", "shared", timeout_s=1.5)
         delivery = Delivery(store, receiver, Journal.read(tmp_path / "journal.json"))
         rounds = [delivery.round(["vmc"], T0_MS + 200_000 + 1000 * number) for number in range(4)]
         ids = [one.id for one in server.received]

@@ -67,4 +67,4 @@ class TestInfluxDb2(StoreSuite):
 
 def _drained(store: Store) -> None:
     assert isinstance(store, ServerStore)
-    assert store.drain(20.0), store.status()
+    assert store.drain(60.0), store.status()

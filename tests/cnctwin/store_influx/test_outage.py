@@ -61,7 +61,7 @@ def opened(server: ServerProcess, port: int, ring: Path) -> ServerStore:
     )
 
 
-def until(condition: Callable[[], bool], timeout_s: float = 40.0) -> None:
+def until(condition: Callable[[], bool], timeout_s: float = 90.0) -> None:
     end_s = time.monotonic() + timeout_s
     while not condition():
         assert time.monotonic() < end_s, "did not happen"
@@ -137,7 +137,7 @@ def test_a_writer_that_is_killed_loses_nothing_of_what_it_acknowledged(server: S
             acknowledged = max([acknowledged, *(int(line) for line in writer.stdout if line.endswith("\n"))])
     assert acknowledged == samples and kills == 1
     store = opened(server, server.port, tmp_path / "ring")
-    assert store.drain(20.0)
+    assert store.drain(60.0)
     if isinstance(server, VictoriaMetrics):
         server.flush()
     assert numbers_kept(store, machine, samples) == list(range(samples))
@@ -172,4 +172,4 @@ def test_a_store_opens_and_takes_samples_while_its_server_is_down(tmp_path: Path
     assert store.status().waiting == 1
     begun_s = time.monotonic()
     store.close()
-    assert time.monotonic() - begun_s < 3.0
+    assert time.monotonic() - begun_s < 10.0

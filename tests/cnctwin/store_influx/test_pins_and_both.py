@@ -53,12 +53,12 @@ def test_a_pinned_stretch_outlives_its_bucket(influxd: Influxd, tmp_path: Path, 
     store.append(
         [*before, told(machine, reading("twin/raw_score", 9.5, 61_500), reading("spindle_rpm", None, 61_500, BAD, "why"))]
     )
-    assert store.drain(10.0)
+    assert store.drain(60.0)
     store.pin(Pinned(machine, T0_MS + 60_000, T0_MS + 180_000, "gap grows"))
     store.append([told(machine, reading("spindle_rpm", n, n * 1000), t_ms=n * 1000) for n in range(120, 240)])
-    assert store.drain(10.0)
+    assert store.drain(60.0)
     assert tidied(store, T0_MS + 240_000) == 1
-    assert store.drain(10.0)
+    assert store.drain(60.0)
     query = Query(machine, ("spindle_rpm", "twin/raw_score"), T0_MS, T0_MS + 300_000)
     both_there = store.query(query)
     assert len(both_there[0].t_us) == 241, "what lies in both buckets is told once"
@@ -79,12 +79,12 @@ def test_what_comes_late_into_a_pinned_stretch_is_pinned_too(influxd: Influxd, t
     assert isinstance(store, ServerStore)
     store.append([told(machine, reading("spindle_rpm", 1, 0))])
     store.pin(Pinned(machine, T0_MS, T0_MS + 60_000, "score"))
-    assert store.drain(10.0) and tidied(store, T0_MS + 3_600_000) == 1
+    assert store.drain(60.0) and tidied(store, T0_MS + 3_600_000) == 1
     store.close()
     store = open_influx(influxd.url(), writable=True, spool=tmp_path)
     assert isinstance(store, ServerStore)
     store.append([told(machine, reading("spindle_rpm", 2, 30_000, history=True), t_ms=3_600_000)])
-    assert store.drain(10.0)
+    assert store.drain(60.0)
     asked(influxd, "cnc_raw", f"DELETE FROM cnc_raw WHERE machine = '{machine}'")
     [rpm] = store.query(Query(machine, ("spindle_rpm",), T0_MS, T0_MS + 60_000))
     assert points(rpm) == [(0, 1), (30_000, 2)]
@@ -100,7 +100,7 @@ def test_a_real_server_refuses_what_does_not_fit_and_takes_the_rest(influxd: Inf
     address = f"http://127.0.0.1:{influxd.port}/write"
     httpx.post(address, params={"db": f"{prefix}cnc_raw"}, content=somebodys, verify=False).raise_for_status()
     store.append([told(machine, reading("spindle_rpm", n, n), reading("program", f"O{n}", n), t_ms=n) for n in range(20)])
-    assert store.drain(10.0)
+    assert store.drain(60.0)
     assert store.account()["refused by the server"] == 20 and store.account()["sent"] == 20
     assert "field type conflict" in store.status().trouble and "the first line refused: cnc_raw" in store.status().trouble
     [program] = store.query(Query(machine, ("program",), T0_MS, T0_MS + 1000))
@@ -115,7 +115,7 @@ def test_samples_older_than_a_real_server_keeps_are_counted(influxd: Influxd, tm
     assert isinstance(store, ServerStore)
     now_ms = int(time.time() * 1000) - T0_MS
     store.append([told(machine, reading("spindle_rpm", 1, 0), reading("spindle_rpm", 2, now_ms))])
-    assert store.drain(10.0)
+    assert store.drain(60.0)
     assert (store.account()["sent"], store.account()["refused by the server"]) == (1, 1)
     assert "beyond retention policy" in store.status().trouble
     store.close()
@@ -160,7 +160,7 @@ def test_a_question_is_put_together_at_the_border(both: Store, machine: str) -> 
     assert isinstance(server, ServerStore)
     whole = Query(machine, ("spindle_rpm",), T0_MS, T0_MS + 180 * 60_000)
     assert points(both.query(whole)[0]) == [(n * 60_000, n) for n in range(180)]
-    assert server.drain(10.0)
+    assert server.drain(60.0)
     assert points(both.query(whole)[0]) == [(n * 60_000, n) for n in range(180)]
     windows = Query(machine, ("spindle_rpm",), T0_MS, T0_MS + 180 * 60_000, 7 * 60_000)
     [column] = both.query(windows)

@@ -27,7 +27,7 @@ def batch(first: int, samples: int = 10, bucket: str = "cnc_raw") -> Batch:
     )
 
 
-def until(condition: Callable[[], bool], timeout_s: float = 10.0) -> None:
+def until(condition: Callable[[], bool], timeout_s: float = 60.0) -> None:
     end_s = time.monotonic() + timeout_s
     while not condition():
         assert time.monotonic() < end_s, "did not happen"
@@ -67,7 +67,7 @@ def sending(spool: Spool) -> Iterator[Callable[..., Sender]]:
 def test_all_batches_arrive_in_their_buckets(spool: Spool, sending: Callable[..., Sender]) -> None:
     server = MemoryServer()
     spool.put([batch(0), batch(10, bucket="cnc_twin_state"), batch(20)])
-    assert sending(server).drain(5.0)
+    assert sending(server).drain(60.0)
     assert server.distinct() == 30 and {bucket for bucket, _ in server.kept} == {"cnc_raw", "cnc_twin_state"}
     assert balanced(spool) == {"taken": 30, "sent": 30, "held": 0, "refused by the server": 0}
     assert spool.ask("SELECT count(*) FROM rows") == [(0,)]
@@ -87,7 +87,7 @@ def test_what_could_not_be_sent_is_sent_after_a_restart(tmp_path: Path) -> None:
     spool, server = Spool(tmp_path, ROOM, wall_ms=lambda: 1_000_000), MemoryServer()
     sender = Sender(spool, server, clock=time.monotonic, chance=Random(1), patience=QUICK)
     sender.start()
-    assert sender.drain(5.0) and server.distinct() == 30 and sender.trouble == ""
+    assert sender.drain(60.0) and server.distinct() == 30 and sender.trouble == ""
     sender.stop()
     spool.close()
 
@@ -95,7 +95,7 @@ def test_what_could_not_be_sent_is_sent_after_a_restart(tmp_path: Path) -> None:
 def test_a_request_never_holds_much_more_than_it_may(spool: Spool, sending: Callable[..., Sender]) -> None:
     server = MemoryServer()
     spool.put([batch(n * 10) for n in range(200)])
-    assert sending(server).drain(5.0)
+    assert sending(server).drain(60.0)
     assert max(server.writes) <= QUICK.samples_at_once and server.distinct() == 2000
 
 
@@ -119,7 +119,7 @@ def test_lines_at_fault_are_left_out_and_all_others_go_through(bad: set[int], tm
     server = MemoryServer(judge)
     sender = Sender(spool, server, clock=time.monotonic, chance=Random(1), patience=QUICK)
     sender.start()
-    assert sender.drain(5.0)
+    assert sender.drain(60.0)
     sender.stop()
     assert server.distinct() == 60 - len(bad)
     assert balanced(spool).get("refused by the server", 0) == len(bad)
@@ -134,20 +134,20 @@ def test_a_refusal_that_hits_every_line_and_names_no_fault_loses_nothing(spool: 
     until(lambda: "HTTPS port" in sender.trouble)
     assert balanced(spool)["held"] == 8
     server.trouble = lambda lines: None
-    assert sender.drain(5.0) and server.distinct() == 8
+    assert sender.drain(60.0) and server.distinct() == 8
 
 
 def test_a_batch_that_is_too_large_is_halved(spool: Spool, sending: Callable[..., Sender]) -> None:
     server = MemoryServer(lambda lines: TooLargeError("413") if len(lines) > 4 else None)
     spool.put([batch(0, 50)])
-    assert sending(server).drain(5.0) and server.distinct() == 50
+    assert sending(server).drain(60.0) and server.distinct() == 50
     assert balanced(spool)["sent"] == 50
 
 
 def test_what_the_server_itself_left_out_is_counted(spool: Spool, sending: Callable[..., Sender]) -> None:
     server = MemoryServer(lambda lines: RefusedError("partial write: points beyond retention policy dropped=3", dropped=3))
     spool.put([batch(0, 10)])
-    assert sending(server).drain(5.0)
+    assert sending(server).drain(60.0)
     assert len(server.writes) == 1 and balanced(spool)["refused by the server"] == 3
 
 
@@ -162,7 +162,7 @@ def test_a_batch_on_which_the_server_breaks_does_not_hold_up_the_next(spool: Spo
     assert balanced(spool)["held"] == 10, "as long as nothing else passes, the server is at fault"
     spool.put([batch(100, 100)])
     sender.wake()
-    assert sender.drain(5.0)
+    assert sender.drain(60.0)
     assert server.distinct() == 109 and balanced(spool)["refused by the server"] == 1 and "500: panic" in sender.refused
 
 
@@ -172,7 +172,7 @@ def test_what_a_server_had_not_settled_is_sent_again_when_it_was_started_anew(
     server = MemoryServer(settle_s=0.3)
     spool.put([batch(0)])
     sender = sending(server)
-    assert sender.drain(5.0) and spool.held == 10, "acknowledged, and kept until it is settled"
+    assert sender.drain(60.0) and spool.held == 10, "acknowledged, and kept until it is settled"
     server.kept.clear()
     server.started = 2
     until(lambda: server.distinct() == 10)
@@ -225,7 +225,7 @@ def test_appending_goes_on_while_the_server_hangs(spool: Spool, sending: Callabl
     hangs = threading.Event()
 
     def judge(lines: list[str]) -> None:
-        hangs.wait(5.0)
+        hangs.wait(60.0)
 
     server = MemoryServer(judge)
     sender = sending(server)
@@ -235,9 +235,9 @@ def test_appending_goes_on_while_the_server_hangs(spool: Spool, sending: Callabl
     begun_s = time.monotonic()
     for number in range(1, 50):
         spool.put([batch(number * 10)])
-    assert time.monotonic() - begun_s < 2.0 and sender.waiting == 500
+    assert time.monotonic() - begun_s < 30.0 and sender.waiting == 500
     hangs.set()
-    assert sender.drain(5.0) and server.distinct() == 500
+    assert sender.drain(60.0) and server.distinct() == 500
 
 
 def test_a_defect_does_not_end_the_sending(spool: Spool, sending: Callable[..., Sender]) -> None:
@@ -249,15 +249,15 @@ def test_a_defect_does_not_end_the_sending(spool: Spool, sending: Callable[..., 
 
     server = MemoryServer(judge)
     spool.put([batch(0)])
-    assert sending(server).drain(5.0) and server.distinct() == 10
+    assert sending(server).drain(60.0) and server.distinct() == 10
 
 
 def test_refused_lines_are_said_once(spool: Spool, sending: Callable[..., Sender], caplog: pytest.LogCaptureFixture) -> None:
     server = MemoryServer(refuses("value=3 "))
     spool.put([batch(0)])
     sender = sending(server)
-    assert sender.drain(5.0)
+    assert sender.drain(60.0)
     spool.put([batch(0)])
     sender.wake()
-    assert sender.drain(5.0)
+    assert sender.drain(60.0)
     assert len([record for record in caplog.records if "value=3" in record.getMessage()]) == 1

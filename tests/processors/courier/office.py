@@ -11,7 +11,7 @@ from sparkplug.broker import BrokerAddress
 from sparkplug.host import HostApplication
 from sparkplug.host_session import EventKind
 
-PATIENCE_S = 30.0
+PATIENCE_S = 60.0
 ROOT = Path(__file__).parents[3]
 OUTBOX, CLAIM, DELIVERY, RECEIPT = (f"cnctwin/alerts/{name}/" for name in ("outbox", "claim", "delivery", "receipt"))
 STATE = "cnctwin/alerts/state"
@@ -57,6 +57,15 @@ class Office:
                     if event.topic.startswith(DELIVERY):
                         said = json.loads(event.payload)
                         self.deliveries.setdefault(said["id"], []).append(said)
+
+    @property
+    def online(self) -> bool:
+        return self._host.online
+
+    def outbox(self) -> dict[str, bytes]:
+        """What is in the outbox now."""
+        topics = self.topics.copy()  # the thread goes on reading
+        return {topic: payload for topic, payload in topics.items() if topic.startswith(OUTBOX)}
 
     def close(self) -> None:
         self._stop.set()

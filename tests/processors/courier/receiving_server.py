@@ -108,7 +108,7 @@ class ReceivingServer:
             answer = self.by_path.get(parts.path) or (self.answers.popleft() if self.answers else self.usual)
         time.sleep(answer.wait_s)
         if answer.hold is not None:
-            answer.hold.wait(10)
+            answer.hold.wait(60)
         if answer.drop:
             handler.connection.shutdown(socket.SHUT_RDWR)
             handler.close_connection = True

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from tests.twin.optimisation.benchmark import machine_with, text
+from tests.twin.optimisation.benchmark import machine_with, second, text
 from twin.errors import OptimisationError
 from twin.gcode import Settings, interpret
 from twin.motion.path import path_from_moves
+from twin.optimisation.answer import Objective
 from twin.optimisation.optimise import optimise
 from twin.optimisation.question import Question, problem
 from twin.optimisation.rewriting import rewritten
@@ -200,3 +201,37 @@ def test_a_line_that_is_left_alone_above_a_limit_is_said_first() -> None:
     answer = optimise(asked("G1 X30. F400\nX60.\n", left_alone={9: "it was to be left alone"}, force_limit_n=10.0))
     assert answer.after.over == 1
     assert answer.sentence.startswith("1 line left alone ABOVE A LIMIT")
+
+
+TWICE = (
+    "G21 G90\nS8000\n{start}\nG0 Z10.\nX-10. Y0.\nZ-0.4\nG1 X60. F400\nM5\n{start}\n"
+    "G0 Z10.\nX-10. Y20.\nZ-1.2\nG1 X60.\nG0 Z10.\nM30\n"
+)
+
+
+@pytest.mark.parametrize("text_of_start", ["M3", "M98 P7"], ids=["two starts", "one start called twice"])
+@pytest.mark.parametrize("objective", [Objective.TIME, Objective.COST])
+def test_two_starts_by_one_s_word_are_no_slower_than_the_same_program_at_one_speed(
+    text_of_start: str, objective: Objective
+) -> None:
+    program = TWICE.format(start=text_of_start) + ("" if text_of_start == "M3" else "O7\nM3\nM99\n")
+    question = second(program_text=program, objective=objective, evolutions=10, islands=1)
+    plain = problem(
+        question.with_(program_text=program.replace("F400", "F1745").replace("Z-1.2\nG1 X60.", "Z-1.2\nG1 X60. F581.7"))
+    )
+    seconds, cost = plain.evaluate_path(plain.program.path)
+    answer = optimise(question)
+    assert answer.after.over == 0
+    if objective is Objective.TIME:
+        assert answer.after.seconds <= seconds
+    else:
+        assert answer.after.cost is not None
+        assert answer.after.cost <= cost
+
+
+def test_the_second_of_two_starts_gets_an_s_word_of_its_own() -> None:
+    answer = optimise(second(program_text=TWICE.format(start="M3"), evolutions=10, islands=1))
+    lines = answer.program.splitlines()
+    assert lines[2] == "M3"
+    assert lines[8].startswith("M3 S")
+    assert lines[8][3:] != lines[1]

@@ -19,7 +19,7 @@ from edge.controls.focas.ethernet import EthernetBackend
 from edge.controls.focas.policy import CODES, HANDLE, NUMBER, PROTOCOL, SOCKET, Policy, policy_of
 from tests.edge.controls.focas import captured_frames as captured
 
-TIMEOUT_S = 0.2
+TIMEOUT_S = 1.0
 STATE = ControlState(exec_state="ACTIVE", program="O1701", line=12, spindle_rpm=3500.0, axis_pos_mm=(1.5, -2.25, 3.0))
 STATUS, LOAD = Request(Call.STATUS), Request(Call.SPINDLE_LOAD)
 
@@ -77,7 +77,7 @@ def test_a_control_that_hangs_costs_its_timeout_and_the_handle(server: FocasServ
     server.faults.hang = True
     began_s = time.monotonic()
     assert {answer.code for answer in backend.ask([STATUS, LOAD])} == {SOCKET}
-    assert time.monotonic() - began_s < TIMEOUT_S + 0.5
+    assert time.monotonic() - began_s < TIMEOUT_S + 5.0
     server.faults.clear()
     assert backend.ask([STATUS])[0].code == SOCKET
     assert backend.open().code == 0

@@ -52,7 +52,7 @@ class Bench:
             "server_fingerprint": self.server.fingerprint,
             "certificate_folder": str(self.folder / "edge"),
         }
-        more = {"publishing_ms": 20, "sampling_ms": 20, "timeout_s": 5.0}
+        more = {"publishing_ms": 20, "sampling_ms": 20, "timeout_s": 20.0}
         return EdgeConfig(source=OpcUaConfig.model_validate(given | more | source))
 
 

@@ -18,6 +18,7 @@ from edge.controls.opcua.connection import OpcUaConnection
 from edge.controls.opcua.cursor import parse, start
 from edge.sample import EdgeSample, SampleSet
 from tests.edge.controls.opcua.conftest import NOW_S, Bench
+from tests.edge.host_watch import wait
 
 
 class Reader:
@@ -29,7 +30,7 @@ class Reader:
         self._frames = self.connection.frames()
         self.seen: list[SampleSet] = []
 
-    def until(self, told: Callable[[SampleSet], bool], wait_s: float = 15.0) -> SampleSet:
+    def until(self, told: Callable[[SampleSet], bool], wait_s: float = 60.0) -> SampleSet:
         watchdog = threading.Timer(wait_s, self.connection.close)
         watchdog.start()
         try:
@@ -54,10 +55,8 @@ def reading(config: Config, **more: Any) -> Iterator[Reader]:
     try:
         yield reader
     finally:
-        begun_s = time.monotonic()
         reader._frames.close()  # type: ignore[attr-defined]
-        assert time.monotonic() - begun_s < 2.5
-        assert not any(thread.name == "opcua" for thread in threading.enumerate())
+        wait(lambda: not any(thread.name == "opcua" for thread in threading.enumerate()), "the connection's thread to end")
 
 
 def test_first_the_state_as_found_then_each_change_with_the_controls_own_time(bench: Bench) -> None:
@@ -93,7 +92,7 @@ def test_time_goes_on_and_the_clock_is_read_while_nothing_happens(bench: Bench) 
         assert quiet.clock.control_ms == round((NOW_S + bench.machine_s) * 1000)
         assert quiet.clock.stamps_samples
         assert quiet.available is True
-        assert reader.connection.silent_s() < 1.0
+        assert reader.connection.silent_s() < 5.0
 
 
 def test_bad_and_wrong_values_are_nulls_with_a_reason_and_the_others_go_on(bench: Bench) -> None:
@@ -150,15 +149,16 @@ def test_an_edge_that_reads_too_slowly_states_what_it_missed(bench: Bench) -> No
             time.sleep(0.06)
         bench.show(ControlState(line=500))
         time.sleep(0.06)
-        reader.until(lambda one: any(gap.reason == "this edge was too slow" for gap in one.gaps))
-        got = [
-            s.value
-            for one in reader.seen
-            for s in one.samples
-            if s.signal == "nc_line" and isinstance(s.value, int) and s.value >= 100
-        ]
-        lost = sum(gap.lost for one in reader.seen for gap in one.gaps)
-        assert lost >= 11 - len(got) > 0
+
+        def missed() -> int:
+            samples = [s for one in reader.seen for s in one.samples if s.signal == "nc_line"]
+            return 11 - len([s for s in samples if isinstance(s.value, int) and s.value >= 100])
+
+        def stated() -> int:
+            return sum(gap.lost for one in reader.seen for gap in one.gaps if gap.reason == "this edge was too slow")
+
+        reader.until(lambda _: stated() > 0 and stated() >= missed())
+        assert missed() > 0
 
 
 def test_an_open_connection_is_said_to_be_open_for_as_long_as_it_lasts(bench: Bench) -> None:
@@ -169,10 +169,17 @@ def test_an_open_connection_is_said_to_be_open_for_as_long_as_it_lasts(bench: Be
 
 def test_a_server_that_is_not_there_is_tried_again_with_pauses_and_close_ends_it_at_once(bench: Bench) -> None:
     connection = OpcUaConnection(bench.config(url="opc.tcp://127.0.0.1:1"))
-    threading.Timer(1.0, connection.close).start()
-    begun_s = time.monotonic()
+    closed_s: list[float] = []
+
+    def close() -> None:
+        wait(lambda: connection.reconnects > 0, "the first failure")
+        time.sleep(0.7)
+        closed_s.append(time.monotonic())
+        connection.close()
+
+    threading.Thread(target=close).start()
     assert list(connection.frames()) == []
-    assert time.monotonic() - begun_s < 3.0
+    assert time.monotonic() - closed_s[0] < 5.0
     assert 1 <= connection.reconnects <= 5
     assert "is the server running, and the address right?" in connection.last_error
 
@@ -180,12 +187,12 @@ def test_a_server_that_is_not_there_is_tried_again_with_pauses_and_close_ends_it
 def test_while_the_server_hangs_it_can_be_closed_and_leaves_no_socket_behind(bench: Bench) -> None:
     with reading(bench.config()) as reader:
         reader.until(lambda one: bool(one.samples))
-        bench.server.slow_s = 1.5
+        bench.server.slow_s = 6.0
         time.sleep(0.5)
         begun_s = time.monotonic()
         reader.connection.close()
         time.sleep(0.1)
         assert list(reader._frames) == []  # which closes it once more
-        assert time.monotonic() - begun_s < 1.2
-    bench.server.slow_s = 0.0
+        assert time.monotonic() - begun_s < 5.0
+        bench.server.slow_s = 0.0
     gc.collect()  # a socket that was left open would be told of now, which is an error here
