@@ -38,8 +38,8 @@ from twin.optimisation.front import hypervolume, not_dominated
 from twin.optimisation.islands import fitness_of
 from twin.optimisation.optimise import Hooks, optimise
 from twin.optimisation.paper import paper_search
-from twin.optimisation.problem import Problem
 from twin.optimisation.planned import planned_cuts
+from twin.optimisation.problem import Problem
 from twin.optimisation.question import Question, problem
 from twin.runlog import read_run
 

@@ -274,7 +274,7 @@ def _too_much(
     if advance < least and reason is Binds.FORCE:
         force = forces.peak_n(np.full(len(forces.cuts), least))[mine].max()
         slowest = f"{limits.feed_mm_min[0]:g} mm/min at {limits.spindle_rpm[1]:g} rev/min"
-        return f"even {slowest} give {force:.1f} N, more than {limits.force_n:g} N; a cut less deep, or another limit"
+        return f"even {slowest} give {force:.1f} N, more than {limits.force_n:.4g} N; a cut less deep, or another limit"
     what = f"the greatest chip {advance * 1000:.1f} µm that {reason} allows is below "
     return what + (
         f"the lowest of {lowest * 1000:.1f} µm" if advance < lowest else "what the slowest feed at the highest speed makes"

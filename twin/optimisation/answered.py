@@ -78,7 +78,7 @@ def _lines_of(count: int) -> str:
 
 
 def _part(part: float) -> str:
-    return f"{100 * part:.2g} %"
+    return f"{100 * part:.2g} %" if part < 1.0 else f"{100 * part:.0f} %"
 
 
 def _totals(made: Problem, shown: ShownLines, path: Path, limits: Limits) -> Totals:

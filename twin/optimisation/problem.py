@@ -159,9 +159,14 @@ class Problem:
         """Genes (p,) of feeds and speeds (lines,), brought within the limits; of lines that share a speed the longest one's."""
         allowed = self.allowed
         wanted = rpm[self.groups.lead]
-        second = np.array([_place_on_spans(*pair) for pair in zip(self.spans, wanted.tolist(), strict=True)], dtype=np.float64)
-        speeds = [_on_spans(spans, second[k : k + 1])[0] for k, spans in enumerate(self.spans)]
-        speed = self.each_of(np.array(speeds, dtype=np.float64))
+        slowest, fastest, several = self._edges
+        width = fastest - slowest
+        second = np.where(width > 0.0, np.clip((wanted - slowest) / np.where(width > 0.0, width, 1.0), 0.0, 1.0), 0.0)
+        speeds = np.minimum(slowest + second * width, fastest)
+        for group in several:
+            second[group] = _place_on_spans(self.spans[group], float(wanted[group]))
+            speeds[group] = _on_spans(self.spans[group], second[group : group + 1])[0]
+        speed = self.each_of(speeds)
         low, high = allowed.feed_min(speed[None])[0], allowed.feed_max(speed[None])[0]
         room = np.maximum(high - low, 1e-12)
         return np.concatenate([np.clip((feed - low) / room, 0.0, 1.0), second])
@@ -290,6 +295,10 @@ def _speeds(problem: Problem) -> Speeds:
                 elif following is not None:
                     owner[e] = following[1]
             following = None
+    first: dict[int, int] = {}  # a block that is run again has one S word for all its runs
+    for e, event in enumerate(made.events):
+        if owner[e] != NOBODY and not made.is_optional[e]:
+            owner[e] = first.setdefault(event.line, int(owner[e]))
     return Speeds(made, owner)
 
 

@@ -14,7 +14,7 @@ from twin.optimisation.answer import Objective, SpeedChanges
 from twin.optimisation.economy import Economy
 from twin.optimisation.forces import CutForces
 from twin.optimisation.problem import Problem, control_of
-from twin.optimisation.program import programmed
+from twin.optimisation.program import Programmed, programmed
 from twin.optimisation.speed_groups import speed_groups
 from twin.response import check_effects
 
@@ -102,10 +102,19 @@ def problem(question: Question) -> Problem:
     if impossible:
         first, more = impossible[0], len(impossible) - 1
         line = made.program.lines[first.at].line + 1
-        raise LimitsError(f"line {line}: {first.why}" + (f" (and {more} more lines)" if more else ""))
+        said = f"line {line}: {first.why}{_leaves(made, question)}"
+        raise LimitsError(said + (f" (and {more} more lines)" if more else ""))
     if unshared:
         raise LimitsError(unshared)
     return made
+
+
+def _leaves(made: Problem, question: Question) -> str:
+    """What keeping the force limit with a probability leaves of it: the figure that a refusal compares with."""
+    asked = limits_of(made.program.machine, question.force_limit_n).force_n
+    if question.margin == 1.0 or asked is None:
+        return ""
+    return f"; {asked:g} N kept with a probability of {question.probability:g} leave {asked / question.margin:.3g} N"
 
 
 @lru_cache(maxsize=4)
@@ -120,12 +129,21 @@ def _made(text: str) -> tuple[Problem, tuple[Impossible, ...], str]:
         raise OptimisationError(
             f"no [cost]: --objective {question.objective} needs what a second and a tool cost (docs/optimise.md)"
         )
-    read = programmed(machine, question.program_text, engagement=question.planned, left_alone=question.left_alone)
+    read = _read(json.dumps([question.program_text, question.machine_toml, question.planned, question.left_alone]))
     economy = Economy.of(machine.cost) if machine.cost is not None else None
     control = control_of(machine)
     left, impossible = allowed(read, CutForces.of(read), limits, control.feed_ratio)
     left, groups, unshared = speed_groups(read, left, question.speed_changes)
     return Problem(read, left, groups, economy, control), impossible, unshared
+
+
+@lru_cache(maxsize=2)
+def _read(text: str) -> Programmed:
+    """The program and its cuts, which take the longest to work out: once for all margins."""
+    program_text, machine_toml, planned, left_alone = json.loads(text)
+    cuts = None if planned is None else {int(line): rows for line, rows in planned.items()}
+    alone = {int(line): why for line, why in left_alone.items()}
+    return programmed(machine_from_toml(machine_toml), program_text, engagement=cuts, left_alone=alone)
 
 
 def single(objective: Objective) -> Objective:

@@ -35,6 +35,7 @@ Ints = NDArray[np.int64]
 ROUNDS_MAX = 4
 SAME = 1e-9
 S_IS_NO_SPEED_G = frozenset({100, 500, 650, 660, 670, 920, 960})
+STARTS = frozenset({3, 4})
 S_IS_NO_SPEED_M = frozenset({19, 29, 98, 198})
 """Codes in whose block S is something else: an argument, a clamp, a surface speed, an angle, the speed of a tap."""
 
@@ -165,7 +166,7 @@ def _of_one_speed(problem: Problem) -> set[int]:
 
 
 def _speed_lines(problem: Problem, rpm: Floats, source: list[str]) -> dict[int, str]:
-    """Lines whose S word sets the speed of a later line: line → figure."""
+    """Lines whose S word sets the speed of a later line: line → figure. Of two starts by one S word the second gets its own."""
     found: dict[int, str] = {}
     speeds = problem.speeds
     for e, event in enumerate(speeds.candidates.events):
@@ -176,7 +177,10 @@ def _speed_lines(problem: Problem, rpm: Floats, source: list[str]) -> dict[int, 
             if place is not None:
                 of_block = codes(source[number])
                 if place.plain and not of_block.g & S_IS_NO_SPEED_G and not of_block.m & S_IS_NO_SPEED_M:
-                    found[number] = f"{rpm[speeds.owner[e]]:.9g}"
+                    figure = f"{rpm[speeds.owner[e]]:.9g}"
+                    found[
+                        event.line if found.get(number, figure) != figure and STARTS & codes(source[event.line]).m else number
+                    ] = figure
                 break
     return found
 
