@@ -7,6 +7,7 @@ control told its lines; a run that was broken off, or is of another program than
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -59,6 +60,13 @@ class Timed:
     taken_s: float
 
 
+class Told(NamedTuple):
+    """What is told of the control: how it moves, and what it makes of a program beside its text."""
+
+    model: Model
+    settings: Settings
+
+
 def judged_cycle_time(twin: Twin, given: Cycles, budgets: Budgets) -> list[Figure]:
     """A figure for each program."""
     measure = [(MEASURE, UNIT, budgets.cycle_time_pct)]
@@ -68,6 +76,7 @@ def judged_cycle_time(twin: Twin, given: Cycles, budgets: Budgets) -> list[Figur
     if twin.file is None or twin.file.program is None:
         return unseen(QUANTITY, measure, "[program] of machine.toml does not state how the control moves")
     model = Model(Limits.of(twin.file.program), program_effects(twin.file))
+    control = Told(model, replace(twin.file.settings, optional_stop=True))
     figures: list[Figure] = []
     for program in sorted({cycle.program for cycle in cycles}):
         own = [cycle for cycle in cycles if cycle.program == program]
@@ -76,21 +85,21 @@ def judged_cycle_time(twin: Twin, given: Cycles, budgets: Budgets) -> list[Figur
             why = f"ran {len(own)} times; its text is not among the programs given"
             figures += unseen(QUANTITY, measure, why, program[:TITLE_MAX])
             continue
-        figures.append(_of_program(model, replace(twin.file.settings, optional_stop=True), program, own, path, budgets))
+        figures.append(_of_program(control, program, own, path, budgets))
     return figures
 
 
-def _of_program(model: Model, settings: Settings, program: str, cycles: Sequence[Cycle], path: Path, budgets: Budgets) -> Figure:
+def _of_program(control: Told, program: str, cycles: Sequence[Cycle], path: Path, budgets: Budgets) -> Figure:
     timed: list[Timed] = []
     refused: list[str] = []
     references = False
     for cycle in cycles:
         entry = RunEntry(file=program, kind=RunKind.PROGRAM, role="check", program=path.name)
-        trial = trial_of(RunAtHand(entry, path.parent, cycle.log), settings)
+        trial = trial_of(RunAtHand(entry, path.parent, cycle.log), control.settings)
         if isinstance(trial, Trial):
             references |= trial.references
-            timed.append(_timed(model, trial))
-        elif isinstance(whole := whole_of(cycle.log, path, model, settings), Timed):
+            timed.append(_timed(control.model, trial))
+        elif isinstance(whole := whole_of(cycle.log, path, control), Timed):
             timed.append(whole)
         else:
             refused.append(f"{trial.why}; {whole}")
@@ -116,7 +125,7 @@ def _timed(model: Model, trial: Trial) -> Timed:
     return Timed(float(plan.total_s), float(trial.recorded.run.active_s))
 
 
-def whole_of(log: RunLog, path: Path, model: Model, settings: Settings) -> Timed | str:
+def whole_of(log: RunLog, path: Path, control: Told) -> Timed | str:
     """A run as a whole, where its lines do not ascend to the end of the text, as with subprograms below M30; else why not.
 
     It has to have told the lines on which the twin says that most time is spent, and overrides of 100 %.
@@ -126,8 +135,8 @@ def whole_of(log: RunLog, path: Path, model: Model, settings: Settings) -> Timed
     if any(log.has(name) and float(np.nanmax(np.abs(log[name] - 100.0))) > 0.5 for name in OVERRIDES.values()):
         return "an override was turned"
     try:
-        moves = interpret(path.read_text(encoding="utf-8"), settings)
-        planned = model.control.plan(path_from_moves(moves, settings.start_mm or None))
+        moves = interpret(path.read_text(encoding="utf-8"), control.settings)
+        planned = control.model.control.plan(path_from_moves(moves, control.settings.start_mm or None))
     except (TwinError, OSError, UnicodeDecodeError) as error:
         return str(error)
     seconds = planned.seconds_by_line()
