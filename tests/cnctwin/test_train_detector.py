@@ -12,7 +12,7 @@ from rich.console import Console
 from cnctwin.detector_training.command import train_detector
 from cnctwin.detector_training.recorded_streams import known_changes, streams_of
 from cnctwin.errors import UsageError
-from tests.twin.transient.synthetic import benchmark
+from tests.twin.transient.synthetic import drive
 from twin.runlog import run_log, write_run
 from twin.transient.artefact import load_detector
 from twin.transient.replay import replayed
@@ -25,7 +25,7 @@ ASKED = Asked("spindle_load_pct", before_s=9.0, after_s=9.0)
 def recorded(path: Path, seed: int, *, labelled: bool) -> Stream:
     """Five changes among other things at 20 dB, written as a run log."""
     rng = np.random.default_rng(seed)
-    stream: Stream = benchmark().stream_of_changes(5, 20.0, rng, stretched=False, stalled=False)
+    stream: Stream = drive().stream_of_changes(5, 20.0, rng, stretched=False, stalled=False)
     t_s = np.arange(len(stream.values)) * 0.1
     columns = {"t_s": t_s, "spindle_load_pct": stream.values}
     if labelled:

@@ -85,7 +85,8 @@ def test_a_plain_request_is_accepted_done_and_answered(start: Start, address: Br
     assert written(jobs / "night-7") == chain_to(30)
     for device in ("vmc", "jobs"):
         states = [state for state in plant.said(device, "twin/job_state") if state]
-        assert list(dict.fromkeys(states)) == ["queued", "running", "done"]
+        # a device that is born late begins with what is true by then
+        assert list(dict.fromkeys(states)) in (["queued", "running", "done"], ["running", "done"])
         assert plant.said(device, "twin/job_id")[-1] == "night-7"
         assert json.loads(str(plant.said(device, "twin/job_result")[-1]))["chain"] == chain_to(30)
         progress = [value for value in plant.said(device, "twin/job_progress_pct") if isinstance(value, float)]
