@@ -237,7 +237,7 @@ def _program(file: Path | None) -> dict[str, str]:
     if file is None:
         return {}
     text, encoding = decoded(_bytes(file))
-    return {"program_text": text} | ({} if encoding == "utf-8" else {"encoding": encoding})
+    return {"program_text": text, "name": file.name[-120:]} | ({} if encoding == "utf-8" else {"encoding": encoding})
 
 
 def _text(file: Path | None) -> str | None:

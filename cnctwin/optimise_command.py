@@ -208,7 +208,9 @@ def _planned(run: Path | None, text: str, settings: "Settings") -> dict[int, lis
 
     found = planned_cuts(read_run(run), text, settings)
     if not found:
-        raise UsageError(f"{run}: no line of it cuts; axial_depth_mm is 0 or missing all along")
+        raise UsageError(
+            f"{run}: no line of it cuts; axial_depth_mm is 0 or missing all along (simulate needs [tool] and [stock])"
+        )
     return found
 
 

@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from twin.errors import TwinError
 from twin.gcode import DwellUnit, IntegerWords, LeadIn, OffsetLookup, OutsideCorner, Settings, ToolOffset
+from twin.gcode.codes import M_CODES
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -57,6 +58,9 @@ class ControlSection(BaseModel):
 
     @model_validator(mode="after")
     def _can_be_set(self) -> "ControlSection":
+        for code in self.builder_m_codes:
+            if code in M_CODES:
+                raise ValueError(f"builder_m_codes has {code}: every control has M{code}, and it is not passed over")
         try:
             self.settings()
         except TwinError as error:

@@ -43,12 +43,13 @@ class IdentifyParameters(CaseParameters):
 class OptimiseParameters(Parameters):
     """As `cnctwin optimise`: a program and a machine, each as a file or as its text.
 
-    encoding: of the file that program_text came from, in which the answer is written
+    encoding, name: of the file that program_text came from; the answer is written in the one and told under the other
     """
 
     program: Text | None = None
     program_text: Text | None = None
     encoding: Literal["utf-8", "utf-8-sig", "latin-1"] | None = None
+    name: Annotated[str, Field(min_length=1, max_length=120)] | None = None
     machine: Text | None = None
     machine_toml: Text | None = None
     objective: Literal["time", "cost", "pareto"] = "time"
@@ -64,9 +65,9 @@ class OptimiseParameters(Parameters):
         for file, text in (("program", "program_text"), ("machine", "machine_toml")):
             if (getattr(self, file) is None) == (getattr(self, text) is None):
                 raise ValueError(f"give either {file} (a file) or {text}")
-        if self.encoding is not None:
-            if self.program_text is None:
-                raise ValueError("encoding is that of program_text; a file has its own")
+        if self.program_text is None and (self.encoding is not None or self.name is not None):
+            raise ValueError("encoding and name are those of program_text; a file has its own")
+        if self.encoding is not None and self.program_text is not None:
             try:
                 self.program_text.encode(self.encoding)
             except UnicodeEncodeError as error:

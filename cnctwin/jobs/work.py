@@ -63,11 +63,11 @@ def optimise(parameters: "OptimiseParameters", bench: Bench) -> dict[str, Any]:
     from cnctwin.jobs.spread import spread_over  # noqa: PLC0415
     from cnctwin.optimisation_run import OptimiseRequest, optimise_request  # noqa: PLC0415  with all of the twin
 
-    asked = parameters.model_dump(exclude={"program", "program_text", "encoding", "machine", "machine_toml"})
+    asked = parameters.model_dump(exclude={"program", "program_text", "encoding", "name", "machine", "machine_toml"})
     program = bench.as_taken("program.nc", lambda: parameters.program_of(bench.files))
     encoding = bench.as_taken("program.encoding", lambda: parameters.encoding_of(bench.files))
     machine = bench.as_taken("machine.toml", lambda: parameters.toml_of(bench.files))
-    name = "program.nc" if parameters.program is None else Path(parameters.program).name
+    name = parameters.name or ("program.nc" if parameters.program is None else Path(parameters.program).name)
     request = OptimiseRequest(name=name, program_text=program, machine_toml=machine, encoding=encoding, **asked)
     cluster = None if bench.dask is None else DaskCluster.from_text(bench.dask)
     with spread_over(bench.workers, cluster) as spread:

@@ -26,7 +26,7 @@ MEANING: dict[str, str] = {
     Binds.SHARED_SPEED: "another speed would be better for the line, but not for all that have to have the same",
     Binds.DYNAMICS: "the line is too short for the axes to reach its feed",
     NOTHING: "at none of them; the speed of its neighbours or the search decides",
-    LEFT_ALONE: "feed and speed as programmed; the reasons are below",
+    LEFT_ALONE: "feed as programmed, and the speed where the line needs it; the reasons are below",
 }
 
 

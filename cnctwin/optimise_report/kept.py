@@ -24,7 +24,8 @@ def left_alone(answer: Optimised) -> Markup | None:
         return None
     count = sum(map(len, by_reason.values()))
     keeps = "keeps" if count == 1 else "keep"
-    lead = f"{counted(count, 'line')} of {len(answer.lines):,} that cut or feed {keeps} feed and speed as programmed."
+    lead = f"{counted(count, 'line')} of {len(answer.lines):,} that cut or feed {keeps} the feed as programmed"
+    lead += ", and the speed where it matters."
     rows = [
         tag(
             "tr",

@@ -57,6 +57,9 @@ def test_the_force_of_an_ampere_comes_from_the_screw_or_is_stated() -> None:
         (WHOLE.replace("mass_kg = 320.0", "weight_kg = 320.0"), "axes.x.weight_kg is not known"),
         (WHOLE.replace("static_n = 520.0", "static_n = 100.0"), "static_n 100.0 is below coulomb_n 380.0"),
         (WHOLE.replace("screw_lead_mm = 12.0\n", ""), "state either force_per_command_n, or screw_lead_mm"),
+        (HEAD + "[control]\nwork_offsets_mm = { G53 = [0.0, 0.0, 0.0] }", "work offset 'G53' is not known"),
+        (HEAD + "[control]\nbuilder_m_codes = [13, 3]", "control: builder_m_codes has 3: every control has M3"),
+        (HEAD + "[control]\nbuilder_m_code = [13]", "control.builder_m_code is not known"),
         (HEAD + "[stock]\nmin_mm = [0, 0, 5]\nmax_mm = [1, 1, 5]", "is not below max_mm 5.0 in z"),
     ],
 )

@@ -20,6 +20,7 @@ from twin.errors import MachineError, OptimisationError
 from twin.gcode import Arc, Linear, interpret
 from twin.machine import MachineFile, Tool
 from twin.motion.path import EventKind, Kind, Path, path_from_moves
+from twin.optimisation.spring_passes import touching
 from twin.optimisation.words import branches, codes, figure_mm_min, find_word, inch_lines, source_lines
 
 Floats = NDArray[np.float64]
@@ -36,6 +37,8 @@ NO_FEED = frozenset({0, 100, 280, 300, 520, 530, 650, 920, 921})
 """Codes whose axis words are no feed, in tenths."""
 PROBING = frozenset({310, 311, 312, 313, 314, 370, 380, 382, 383, 384, 385})
 """G31 and its kin, G37, G38.2 to G38.5, in tenths."""
+NEAR = "it feeds close to the work without cutting: an approach"
+SPRING = "it runs along the work and cuts nothing by its plan: a spring pass"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -124,9 +127,10 @@ def programmed(
     numbers, tools = _tools(machine, path)
     notes = _tool_notes(machine, path)
     rows: PathRows | None = None
+    sections = _sections(numbers, tools, _unknown_start(path))
     collisions: tuple[int, ...] = ()
     if engagement is None and machine.stock is not None:
-        rows = engaged_along(path, machine.stock, _sections(numbers, tools, _unknown_start(path)))
+        rows = engaged_along(path, machine.stock, sections)
         notes += _collision_notes(path, rows)
         collisions = tuple(sorted({int(path.line[hit.segment]) + 1 for hit in rows.collisions}))
     speeds = path.commanded_rpm()
@@ -135,7 +139,9 @@ def programmed(
     _check_branches(source, {move.line for move in moves})
     inch = inch_lines(source, machine.settings.inch)
     headed = any(tool.modes for _, tool in tools)
-    lines, groups = [], []
+    lines: list[FeedLine] = []
+    groups: list[Floats] = []
+    near: dict[int, Ints] = {}
     for line, executions in _executions(path).items():
         segments = np.concatenate([np.arange(*span) for span in executions])
         segments = segments[path.kind[segments] != Kind.RAPID]
@@ -151,7 +157,8 @@ def programmed(
         why = left_alone.get(line) or _why_not(one, path, tied, numbers[segments], found, speeds[segments])
         why = why or _no_plain_words(source[line]) or _still(source[line], speeds[segments], len(found.rows) > 0)
         if not len(found.rows) and not _is_clear(machine, path, segments, tools, int(numbers[segments[0]])):
-            why = why or "it feeds close to the work without cutting: an approach, a spring pass"
+            why = why or NEAR
+            near[len(lines)] = segments
         in_air = not len(found.rows) and not found.plunges and not path_is_cycle(path, executions) and line not in tied
         lines.append(
             replace(
@@ -163,7 +170,18 @@ def programmed(
             )
         )
         groups.append(found.rows)
+    if rows is not None and machine.stock is not None:
+        lines = _with_spring_passes(lines, near, touching(path, machine.stock, sections, list(near.values())))
     return _numbered(Programmed(machine, text, path, tuple(lines), _no_cuts(), tuple(tools), tuple(notes), collisions), groups)
+
+
+def _with_spring_passes(lines: list[FeedLine], near: Mapping[int, Ints], touches: Sequence[bool]) -> list[FeedLine]:
+    """The lines; of those near the work, the ones that touch it need the speed that they were written for."""
+    made = list(lines)
+    for k in (k for k, one in zip(near, touches, strict=True) if one):
+        why = SPRING if made[k].left_alone == NEAR else made[k].left_alone
+        made[k] = replace(made[k], needs_speed=True, left_alone=why)
+    return made
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -262,8 +280,10 @@ def _cuts_of_segments(path: Path, rows: PathRows, segments: Ints, headed: bool) 
 def _cuts_planned(planned: Sequence[Sequence[float]], path: Path, segments: Ints, headed: bool) -> _Found:
     rows = np.array(planned, dtype=np.float64).reshape(-1, 3)
     heading = _headings_of(path, segments) if headed else np.zeros(1)
+    start, end = path.tip_ends_mm(segments)
+    steep = np.maximum(start[:, 2] - end[:, 2], 0.0) > SHALLOW * path.length_mm[segments]
     each = np.hstack([np.repeat(rows, len(heading), axis=0), np.tile(heading, len(rows))[:, None]])
-    return _Found(each, float(path.length_mm[segments].sum()) if len(rows) else 0.0, False)
+    return _Found(each, float(path.length_mm[segments].sum()) if len(rows) else 0.0, len(rows) > 0 and bool(steep.any()))
 
 
 def _headings_of(path: Path, segments: Ints) -> Floats:

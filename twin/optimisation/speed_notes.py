@@ -59,6 +59,8 @@ def _shared(made: Problem, path: Path) -> str:
         if k in rows:
             found.setdefault(int(numbers[begin]), float(rpm[begin]))
     said = [f"{f'T{number} ' if number else ''}{speed:g} rev/min" for number, speed in list(found.items())[:TOOLS_MAX]]
+    if not found:
+        return "one speed for each tool: there is no line whose speed may be changed"
     more = len(found) - TOOLS_MAX
     return f"one speed for each tool: {', '.join(said)}" + (f" and {more} more" if more > 0 else "")
 

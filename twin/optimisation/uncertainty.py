@@ -114,5 +114,5 @@ def _source(constants: tuple[Uncertain, ...]) -> str:
     known = [one.path for one in constants if one.identified]
     if len(known) == len(constants):
         return "intervals that identification or diagnosis gave"
-    rest = f"{100 * next(one.relative for one in constants if not one.identified):g} % for each constant, as [uncertainty] has it"
+    rest = f"{100 * next(one.relative for one in constants if not one.identified):g} % for each constant"
     return f"{rest}; of {', '.join(known)} the identified interval" if known else f"{rest}: nothing was identified"

@@ -43,7 +43,7 @@ KEYS = st.sampled_from(["job", "id", "reply_to", "case", "program", "program_tex
         ({"encoding": "latin-1", "program_text": "(⌀ 6)"}, "program_text has the sign '⌀', which latin-1 has not got"),
         (
             {"encoding": "latin-1", "program": "a.nc", "program_text": None},
-            "encoding is that of program_text; a file has its own",
+            "encoding and name are those of program_text; a file has its own",
         ),
         ({"objective": "fun"}, "objective = 'fun': Input should be 'time', 'cost' or 'pareto'"),
         ({"speed_changes": "never"}, "speed_changes = 'never': Input should be 'anywhere', 'in_air' or 'per_tool'"),

@@ -235,7 +235,7 @@ def test_lines_left_alone_are_told_with_their_reasons() -> None:
     count = sum(bool(line.left_alone) for line in answer.lines)
     threads = [line.line + 1 for line in answer.lines if line.left_alone.startswith("threading")]
     text = read(answer).text
-    assert f"{count} lines of 37 that cut or feed keep feed and speed as programmed." in text
+    assert f"{count} lines of 37 that cut or feed keep the feed as programmed, and the speed where it matters." in text
     assert f"threading: its feed is its pitch {ranges(threads)} {len(threads)}" in text
 
 

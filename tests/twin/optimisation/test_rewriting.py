@@ -9,6 +9,7 @@ from twin.gcode import Settings, interpret
 from twin.motion.path import path_from_moves
 from twin.optimisation.answer import Objective
 from twin.optimisation.optimise import optimise
+from twin.optimisation.program import NEAR, SPRING
 from twin.optimisation.question import Question, problem
 from twin.optimisation.rewriting import rewritten
 from twin.optimisation.words import find_word, source_lines
@@ -235,3 +236,30 @@ def test_the_second_of_two_starts_gets_an_s_word_of_its_own() -> None:
     assert lines[2] == "M3"
     assert lines[8].startswith("M3 S")
     assert lines[8][3:] != lines[1]
+
+
+WALL = (
+    "G21 G90\nS8000 M3\nG0 Z10.\nX-3.5 Y-1.\nG1 Z-0.4 F2000\nX70. F400\nY-9.\nX-3.5\n"  # 2 mm of a wall, and out
+    "Y-1.\nX70. F900\nG0 Z10.\nM30\n"  # back to it, and along it once more
+)
+
+
+@pytest.mark.parametrize("objective", [Objective.TIME, Objective.COST])
+def test_a_spring_pass_keeps_feed_and_speed_and_an_approach_the_feed(objective: Objective) -> None:
+    answer = optimise(second(program_text=WALL, objective=objective, evolutions=10, islands=1))
+    lines = {line.line: line for line in answer.lines}
+    assert lines[5].after.spindle_rpm != 8000.0 or objective is Objective.TIME
+    assert lines[9].left_alone == SPRING
+    assert (lines[9].after.feed_mm_min, lines[9].after.spindle_rpm) == (900.0, 8000.0)
+    assert lines[8].left_alone == NEAR
+    assert lines[8].after.feed_mm_min == 400.0
+
+
+def test_a_ramp_of_a_run_log_is_left_alone_as_one_of_the_stock_is() -> None:
+    ramp = "G21 G90\nS8000 M3\nG0 Z0.\nG1 X10. Z-1. F200\nX40.\nM30\n"
+    cuts = {3: [[0.5, 0.0, np.pi]], 4: [[1.0, 0.0, np.pi]]}
+    answer = optimise(second(program_text=ramp, planned=cuts, evolutions=2, islands=1, population=8))
+    lines = {line.line: line for line in answer.lines}
+    assert "goes down into material" in lines[3].left_alone
+    assert lines[3].after.feed_mm_min == 200.0
+    assert not lines[4].left_alone

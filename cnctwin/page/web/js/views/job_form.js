@@ -70,7 +70,7 @@ export function openNewJob(accepted) {
       job,
       objective: objective.value,
       speed_changes: changes.value,
-      ...(await program.given("program_text", "encoding")),
+      ...(await program.given("program_text", true)),
       ...(await machine.given("machine_toml")),
       ...Object.fromEntries(figures.map((one) => [one.name, Number(one.value)])),
     };
@@ -92,10 +92,11 @@ function fileOrName(name, accept) {
     named(`${title}: below the consumer's folder`, own),
     named(`${title}: or a file of this device`, file),
   );
-  const given = async (textKey, encodingKey) => {
+  const given = async (textKey, isProgram) => {
     if (!file.files.length) return { [name]: own.value.trim() };
     const { text, encoding } = decoded(new Uint8Array(await file.files[0].arrayBuffer()));
-    return { [textKey]: text, ...(encodingKey && encoding !== "utf-8" ? { [encodingKey]: encoding } : {}) };
+    if (!isProgram) return { [textKey]: text };
+    return { [textKey]: text, name: file.files[0].name.slice(-120), ...(encoding === "utf-8" ? {} : { encoding }) };
   };
   return { element, given };
 }
