@@ -33,7 +33,7 @@ def test_raw_blocks_reach_the_processor_which_finds_what_the_edge_found(mosquitt
         node.start()
         host.start()
         node.declare_device("vmc", [*device_metrics(sensor.offers(), {}), *sensor.metrics()])
-        deadline_s = time.monotonic() + 60.0
+        deadline_s = time.monotonic() + 30.0
         begun = False
         while len([value for value in found if value is not None]) < 2 and time.monotonic() < deadline_s:
             for event in host.poll(0.02):
@@ -52,4 +52,5 @@ def test_raw_blocks_reach_the_processor_which_finds_what_the_edge_found(mosquitt
         node.stop()
         host.stop()
     values = [value for value in found if value is not None]
+    assert values, "nothing came"
     assert values == pytest.approx(by_edge, rel=1e-4), f"{BLOCK} came as FLOAT_ARRAY"
