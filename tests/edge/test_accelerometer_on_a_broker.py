@@ -33,12 +33,16 @@ def test_raw_blocks_reach_the_processor_which_finds_what_the_edge_found(mosquitt
         node.start()
         host.start()
         node.declare_device("vmc", [*device_metrics(sensor.offers(), {}), *sensor.metrics()])
-        deadline_s = time.monotonic() + 30.0
+        deadline_s = time.monotonic() + 60.0
         begun = False
         while len([value for value in found if value is not None]) < 2 and time.monotonic() < deadline_s:
             for event in host.poll(0.02):
                 begun |= event.device == "vmc"
                 found += [value for _, name, value, _ in published(engine.feed(event, 0.0)) if name == TWIN_RMS]
+            if not begun and not sensor.received and node.online:
+                node.publish(
+                    "vmc", [Change(RMS, None, round(time.time() * 1000))]
+                )  # who comes late asks for the birth at a message
             if begun and not sensor.received:
                 sensor.start()
                 begun = False
@@ -52,5 +56,5 @@ def test_raw_blocks_reach_the_processor_which_finds_what_the_edge_found(mosquitt
         node.stop()
         host.stop()
     values = [value for value in found if value is not None]
-    assert values, "nothing came"
+    assert len(values) >= 2
     assert values == pytest.approx(by_edge, rel=1e-4), f"{BLOCK} came as FLOAT_ARRAY"
