@@ -178,9 +178,8 @@ def _speed_lines(problem: Problem, rpm: Floats, source: list[str]) -> dict[int, 
                 of_block = codes(source[number])
                 if place.plain and not of_block.g & S_IS_NO_SPEED_G and not of_block.m & S_IS_NO_SPEED_M:
                     figure = f"{rpm[speeds.owner[e]]:.9g}"
-                    found[
-                        event.line if found.get(number, figure) != figure and STARTS & codes(source[event.line]).m else number
-                    ] = figure
+                    is_taken = found.get(number, figure) != figure
+                    found[event.line if is_taken and STARTS & codes(source[event.line]).m else number] = figure
                 break
     return found
 
