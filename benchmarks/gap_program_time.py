@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from twin.case import Case, read_case
 from twin.gap.diagnosis import Diagnosed
-from twin.gap.program_time import diagnose_programs
+from twin.gap.programs.diagnose import diagnose_programs
 from twin.gcode import interpret
 from twin.motion.control import LENGTH_OVER_FEED, changed
 from twin.motion.path import path_from_moves

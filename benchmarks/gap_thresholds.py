@@ -18,8 +18,8 @@ from cnctwin.blind_check.question import Question, Sort, draw, names
 from twin.case import Case, read_case
 from twin.gap.diagnose import diagnose
 from twin.gap.null import NULL
-from twin.gap.plan import explained_stages, ground_of
 from twin.gap.search import Explained
+from twin.gap.stages.plan import explained_stages, ground_of
 
 
 def main() -> None:

@@ -14,8 +14,8 @@ import numpy as np
 
 from twin.case import read_case
 from twin.identification.identify import identify
-from twin.recorded import told_of
-from twin.response import respond
+from twin.simulator.recorded import told_of
+from twin.simulator.response import respond
 
 HEALTHY = ("case_16", "case_17", "case_18")
 NEWTON_PER_VOLT = 35.1507

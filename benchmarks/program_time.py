@@ -28,16 +28,9 @@ import sys
 from pathlib import Path
 from time import perf_counter
 
-from twin.identification.program_recording import RecordedProgram, recorded_programs
 from twin.identification.program_spindle import SpindleRamp, run_ups, spindle_ramp
-from twin.identification.program_time import (
-    PARAMETERS,
-    Comparison,
-    ProgramTimes,
-    compare,
-    ideal_limits,
-    identify_program_times,
-)
+from twin.identification.programs.recording import RecordedProgram, recorded_programs
+from twin.identification.programs.time import PARAMETERS, Comparison, ProgramTimes, compare, ideal_limits, identify_program_times
 from twin.recording.observations import read_observations
 from twin.recording.program_run import program_runs
 

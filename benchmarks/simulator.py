@@ -43,10 +43,10 @@ from twin.machine import AddedEffect, MachineFile, machine_from_toml
 from twin.motion.plan import plan
 from twin.process.kernel import process_quantities
 from twin.process.milling import milling_force, tool_constants
-from twin.response import RunInput, milling_of, respond
 from twin.servo.constants import axis_constants, effect_constants
 from twin.servo.kernel import axis_quantities
 from twin.servo.run import AxisInput, AxisRun, run_axes
+from twin.simulator.response import RunInput, milling_of, respond
 from twin.spindle.load import spindle_constants, spindle_load_pct, spindle_quantities
 
 Floats = NDArray[np.float64]

@@ -18,17 +18,17 @@ from cnctwin.errors import UsageError
 from cnctwin.program_text import decoded
 from twin.case import read_case
 from twin.errors import EffectError, ProgramError
-from twin.gap_table import GapRow
+from twin.gap.table import GapRow
 from twin.identification import identify as identification
 from twin.identification import paper
 from twin.identification.identify import Identification
 from twin.machine import machine_to_toml, read_machine
 from twin.recording.observations import read_observations
 from twin.recording.program_run import program_runs
-from twin.response import check_effects
 from twin.runlog import run_log, write_run
-from twin.simulation import Simulation
-from twin.simulation import simulate as simulated
+from twin.simulator.response import check_effects
+from twin.simulator.simulation import Simulation
+from twin.simulator.simulation import simulate as simulated
 
 
 def read_text(path: Path) -> str:

@@ -2,8 +2,8 @@
 
 The physics is written as plain functions in which `quantity = at(Site.FRICTION, value)` marks a place where something else may
 come in. Called as it stands, `at` hands the value through, so each function is its own nominal model. When a kernel is made, the
-marks are woven (`twin.weave`): an effect changes the value, a recording replaces it, a trace keeps it; a mark that nothing uses
-leaves no trace in the kernel, so what is not there costs nothing.
+marks are woven (`twin.kernels.weave`): an effect changes the value, a recording replaces it, a trace keeps it; a mark that
+nothing uses leaves no trace in the kernel, so what is not there costs nothing.
 """
 
 from enum import StrEnum

@@ -1,7 +1,8 @@
 """How much of the gap a diagnosed twin closes on runs of its machine that the diagnosis never had.
 
-Before is what the effects change in a run; what is left is twin minus recording where the twin is compared (`twin.gap.shown`);
-both over what repeated runs of the same machine differ by, which is all that the twin with the true form can reach.
+Before is what the effects change in a run; what is left is twin minus recording where the twin is compared
+(`twin.gap.stages.shown`); both over what repeated runs of the same machine differ by, which is all that the twin with the
+true form can reach.
 """
 
 from pathlib import Path
@@ -15,7 +16,7 @@ from cnctwin.reference_machine.recording import Columns
 from twin.case import Run, RunAtHand, RunEntry
 from twin.gap.diagnosis import closure_of
 from twin.gap.floors import repeatability
-from twin.gap.shown import shown
+from twin.gap.stages.shown import shown
 from twin.machine import MachineFile
 from twin.runlog import run_log
 

@@ -19,7 +19,7 @@ from twin.heat.run import Warming, spindle_temperature_c, thermal_constants
 from twin.machine import Thermal
 from twin.residual.features import AMBIENT, FEED, LOAD, MEASURED, PHYSICS, POSITIONS, SPEED
 from twin.residual.table import Recorded
-from twin.simulation import simulate
+from twin.simulator.simulation import simulate
 
 Floats = NDArray[np.float64]
 DAY_S = 86_400.0

@@ -14,7 +14,7 @@ from cnctwin.simulated_machine.description import program_text
 from cnctwin.simulated_machine.moment import Moment
 from cnctwin.simulated_machine.part import Part
 from twin.runlog import RunLog
-from twin.simulation import simulate
+from twin.simulator.simulation import simulate
 
 SHOWN_S = 0.1
 TEMPERATURE_SHOWN_S = 1.0

@@ -18,8 +18,8 @@ from cnctwin.validation.figure import Figure, Verdict, judged, unseen
 from cnctwin.validation.model import Twin
 from twin.case import RunAtHand, RunEntry, RunKind
 from twin.errors import TwinError
-from twin.gap.program_fit import REFERENCE_START_MM, Model, Watched
-from twin.gap.program_trial import Trial, trial_of
+from twin.gap.programs.fit import REFERENCE_START_MM, Model, Watched
+from twin.gap.programs.trial import Trial, trial_of
 from twin.gcode import Settings, interpret
 from twin.motion.control import program_effects
 from twin.motion.limits import Limits

@@ -12,8 +12,8 @@ from cnctwin.validation.evidence import Evidence
 from cnctwin.validation.figure import Figure, Verdict, judged, unseen
 from cnctwin.validation.model import Twin
 from twin.errors import TwinError
-from twin.recorded import told_of
-from twin.response import respond
+from twin.simulator.recorded import told_of
+from twin.simulator.response import respond
 
 QUANTITY, MEASURE, UNIT = "following_error", "rms_pct", "%"
 COURSES = 4

@@ -19,9 +19,9 @@ from twin.cutting import SpindleDrive, cutting_force
 from twin.effects.catalogue import effect_named
 from twin.effects.effect import On
 from twin.machine import MachineFile
-from twin.recorded import told_of
-from twin.response import RunInput, respond
 from twin.runlog import RunLog
+from twin.simulator.recorded import told_of
+from twin.simulator.response import RunInput, respond
 
 
 @dataclass(frozen=True, slots=True, eq=False)

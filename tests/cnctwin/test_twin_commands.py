@@ -14,7 +14,7 @@ from cnctwin.cli import main
 from tests.twin.test_simulation import MACHINE, SLOT
 from twin.machine import machine_to_toml, read_machine
 from twin.runlog import read_run, write_run
-from twin.simulation import simulate
+from twin.simulator.simulation import simulate
 
 
 class Done(NamedTuple):

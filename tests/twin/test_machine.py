@@ -9,7 +9,7 @@ from twin.case import read_case
 from twin.errors import CaseError, MachineError
 from twin.gcode import IntegerWords, Settings, ToolOffset
 from twin.machine import machine_from_toml, machine_to_toml, read_machine
-from twin.response import check_effects
+from twin.simulator.response import check_effects
 
 HEAD = "[machine]\nname = 'a'\n"
 WHOLE = (

@@ -5,9 +5,9 @@ import pytest
 
 from twin.errors import EffectError, MachineError, ProgramError
 from twin.machine import AddedEffect, MachineFile, Stock, Tool, machine_from_toml
-from twin.recorded import told_of
-from twin.response import respond
-from twin.simulation import simulate
+from twin.simulator.recorded import told_of
+from twin.simulator.response import respond
+from twin.simulator.simulation import simulate
 
 AXIS = """
 [axes.{letter}]

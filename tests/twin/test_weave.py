@@ -4,9 +4,9 @@ import pytest
 
 from twin.effects.effect import Effect, On, Parameter
 from twin.errors import EffectError
-from twin.generated import in_python
+from twin.kernels.generated import in_python
+from twin.kernels.weave import quantities, weave
 from twin.sites import Site, at
-from twin.weave import quantities, weave
 
 
 def spring(position_mm: float, stiffness_n_per_mm: float) -> float:

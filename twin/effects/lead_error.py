@@ -4,7 +4,7 @@ table = motor + amplitude · sin(2π · motor / lead + phase)
 """
 
 from twin.effects.effect import Effect, On, Parameter
-from twin.elementary import sine_of_turns
+from twin.kernels.elementary import sine_of_turns
 from twin.sites import Site
 
 

@@ -6,7 +6,7 @@ Exact for a value that is held between samples. The first reading is settled.
 """
 
 from twin.effects.effect import Effect, On, Parameter
-from twin.elementary import exp_of_minus
+from twin.kernels.elementary import exp_of_minus
 from twin.sites import Site
 
 

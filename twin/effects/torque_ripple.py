@@ -4,7 +4,7 @@ F_drive = k · (torque + amplitude · sin(order · 2π · x / lead + phase))
 """
 
 from twin.effects.effect import Effect, On, Parameter
-from twin.elementary import sine_of_turns
+from twin.kernels.elementary import sine_of_turns
 from twin.sites import Site
 
 

@@ -6,7 +6,7 @@ Time runs from the start of the recording, at which the axis is taken to be cold
 """
 
 from twin.effects.effect import Effect, On, Parameter
-from twin.elementary import exp_of_minus
+from twin.kernels.elementary import exp_of_minus
 from twin.sites import Site
 
 

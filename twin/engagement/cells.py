@@ -15,7 +15,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.compiling import kernel
 from twin.engagement.sweep import (
     LENGTH,
     RADIUS,
@@ -30,6 +29,7 @@ from twin.engagement.sweep import (
     lowest_between,
     lowest_in_square,
 )
+from twin.kernels.compiling import kernel
 
 Indices = NDArray[np.int32]
 NONE = -1

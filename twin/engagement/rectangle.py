@@ -23,7 +23,7 @@ outermost angles with the depth of the same power:
 
 import math
 
-from twin.compiling import kernel
+from twin.kernels.compiling import kernel
 
 BISECTIONS = 40
 

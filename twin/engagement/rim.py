@@ -10,10 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from twin.compiling import kernel
 from twin.engagement.cells import Cells, height_at
 from twin.engagement.rectangle import rectangle
 from twin.engagement.sweep import Floats
+from twin.kernels.compiling import kernel
 
 STEPS = 180
 PHI = np.linspace(0.0, math.pi, STEPS + 1)

@@ -12,7 +12,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.compiling import kernel
+from twin.kernels.compiling import kernel
 
 Floats = NDArray[np.float64]
 

@@ -5,10 +5,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.compiling import kernel
 from twin.engagement.cells import ENTRIES, NONE, SWEEPS, Cells, height_at, remove, span
 from twin.engagement.rim import contact
 from twin.engagement.sweep import LENGTH, RADIUS, SLOPE, UX, UY, Floats, X, Y, Z
+from twin.kernels.compiling import kernel
 
 ENTRIES_MAX = 30_000_000
 """Limit of the pool of list entries (8 bytes each). Layers of one contour don't add up unless their chords lie otherwise."""

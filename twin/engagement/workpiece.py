@@ -6,10 +6,10 @@ from typing import Self
 
 import numpy as np
 
-from twin.compiling import kernel
 from twin.engagement.cells import NONE, Cells, height_at
 from twin.engagement.sweep import COLUMNS, Floats
 from twin.errors import EngagementError
+from twin.kernels.compiling import kernel
 from twin.machine import Stock
 
 CELLS_MAX = 8_000_000

@@ -16,7 +16,7 @@ index and a comparison is not. Values are added in the order of the trees, as sc
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.compiling import kernel
+from twin.kernels.compiling import kernel
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int32]

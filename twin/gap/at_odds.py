@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from twin.case import Run, RunKind
 from twin.machine import MachineFile
-from twin.recorded import told_of
-from twin.response import milling_of
 from twin.runlog import AXIS_COLUMN, RunLog
+from twin.simulator.recorded import told_of
+from twin.simulator.response import milling_of
 
 Floats = NDArray[np.float64]
 OFF = 1.5

@@ -14,19 +14,19 @@ from twin.case import Case, Run, RunKind
 from twin.errors import CaseError
 from twin.gap.answer import candidates_of, causes_of, found_effects, not_identifiable_of, not_observable_of, sentence_of
 from twin.gap.diagnosis import Diagnosed, Diagnosis, Effected, GapNumbers, SignalGap, closure_of
+from twin.gap.experiment.what_next import what_next
 from twin.gap.inspection import inspected, slow_effects
 from twin.gap.intervals import closure_interval
 from twin.gap.joined import joined
 from twin.gap.null import NULL, Null
 from twin.gap.patterns import patterns
-from twin.gap.plan import Ground, SideBySide, explained_stages, ground_of
-from twin.gap.program_time import diagnose_programs
+from twin.gap.programs.diagnose import diagnose_programs
 from twin.gap.refitted import constant_deviations, with_constants, with_effects, with_uncertainty
 from twin.gap.score import Squares, gap_of, squares_of, traces_of, unit_of
 from twin.gap.shares import shapley
-from twin.gap.shown import shown_by_run
+from twin.gap.stages.plan import Ground, SideBySide, explained_stages, ground_of
+from twin.gap.stages.shown import shown_by_run
 from twin.gap.verdict import Judged, judged, overall
-from twin.gap.what_next import what_next
 from twin.gap.where import where
 from twin.machine import MachineFile
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from twin.gap.descent import Bounds, descend
 from twin.gap.diagnosis import Effected
-from twin.gap.stage import Model, Observed, Stage
+from twin.gap.stages.stage import Model, Observed, Stage
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.case import Run
-from twin.gap_table import measured_signals, regimes_of
+from twin.gap.table import measured_signals, regimes_of
 from twin.machine import MachineFile
-from twin.recorded import noise_of
 from twin.runlog import AXIS_COLUMN, RunLog
+from twin.simulator.recorded import noise_of
 
 Floats = NDArray[np.float64]
 LAP_SAMPLES_MIN = 200

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from twin.case import Case, Run, RunAtHand, RunKind
 from twin.errors import CaseError, RunLogError
 from twin.gap.at_odds import with_known_cut, without_axes_at_odds
-from twin.gap.cut_stage import cut_runs
-from twin.gap.heat_stage import heat_runs
 from twin.gap.servo_ticks import SlowRun, on_servo_ticks
-from twin.gap_table import measured_signals
+from twin.gap.stages.cut import cut_runs
+from twin.gap.stages.heat import heat_runs
+from twin.gap.table import measured_signals
 from twin.machine import MachineFile
 from twin.runlog import AXIS_COLUMN, RunLog
 

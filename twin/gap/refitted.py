@@ -7,11 +7,11 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from twin.gap.axis_stage import AxisStage, axis_constant_path
 from twin.gap.diagnosis import Cause, Effected
 from twin.gap.fitting import Fitted
 from twin.gap.intervals import Z90
-from twin.gap.stage import Stage
+from twin.gap.stages.axis import AxisStage, axis_constant_path
+from twin.gap.stages.stage import Stage
 from twin.identification.axis_parameters import AxisParameter, identified_axis
 from twin.machine import AddedEffect, MachineFile
 

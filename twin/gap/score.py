@@ -16,7 +16,7 @@ from twin.case import Run
 from twin.gap.diagnosis import Trace
 from twin.gap.floors import Floors
 from twin.gap.labels import regime_labels
-from twin.gap_table import measured_signals
+from twin.gap.table import measured_signals
 
 Floats = NDArray[np.float64]
 BLOCK_S = 0.5

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from twin.effects.catalogue import effect_named
 from twin.gap.diagnosis import Effected
 from twin.gap.fitting import Fitted
-from twin.gap.free import Form, Free, effect_parameters
-from twin.gap.stage import Model, Stage
+from twin.gap.stages.free import Form, Free, effect_parameters
+from twin.gap.stages.stage import Model, Stage
 
 Floats = NDArray[np.float64]
 STEP_PROBE = 1e-3

@@ -20,7 +20,7 @@ from twin.gap.evidence import Advantage, advantage
 from twin.gap.fitting import Fitted, fitted, settled
 from twin.gap.null import NULL, Null
 from twin.gap.screening import Guess, guesses, sensitivities
-from twin.gap.stage import Model, Stage
+from twin.gap.stages.stage import Model, Stage
 
 Floats = NDArray[np.float64]
 SCREENED_MAX = 9

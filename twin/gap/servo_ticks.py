@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from twin.case import Run, RunAtHand
 from twin.errors import RunLogError
-from twin.response import period_of
 from twin.runlog import AXIS_COLUMN, RunLog
+from twin.simulator.response import period_of
 
 Floats = NDArray[np.float64]
 FAST, SLOW = 0.9, 1.5

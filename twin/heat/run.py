@@ -14,10 +14,10 @@ from numpy.typing import ArrayLike, NDArray
 from twin.effects.catalogue import effect_named
 from twin.effects.effect import Effect
 from twin.errors import EffectError, TwinError
-from twin.generated import compiled, in_python
 from twin.heat import network
+from twin.kernels.generated import compiled, in_python
+from twin.kernels.weave import quantities, weave
 from twin.machine import Thermal
-from twin.weave import quantities, weave
 
 Array = NDArray[np.float64]
 PHYSICS = (network.heat, network.step)

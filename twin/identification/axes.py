@@ -19,8 +19,8 @@ from twin.identification.cutting_fit import force_of
 from twin.identification.disturbance_fit import fit_disturbance
 from twin.identification.estimate import INTERVAL_Z, Estimate
 from twin.machine import AddedEffect, MachineFile
-from twin.recorded import noise_of
 from twin.regimes import axis_regimes
+from twin.simulator.recorded import noise_of
 
 Floats = NDArray[np.float64]
 DELAY_GAIN_MIN = 0.05

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from twin.identification.axis_parameters import AxisParameter, constants_at, effects_of
 from twin.identification.batch_fit import Fit, fit, time_blocks
 from twin.machine import Axis
-from twin.recorded import start_state
 from twin.regimes import axis_regimes, motion_stretches
 from twin.servo.constants import axis_constants
 from twin.servo.run import AxisInput, AxisRun, run_axes
+from twin.simulator.recorded import start_state
 
 Floats = NDArray[np.float64]
 BLOCK_S = 1.0

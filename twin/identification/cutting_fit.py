@@ -16,9 +16,9 @@ from twin.identification.batch_fit import Fit, time_blocks
 from twin.identification.estimate import clustered_covariance
 from twin.machine import MachineFile, SpindleDrive, Tool
 from twin.process.milling import Milling, MillingForce, milling_force, tool_constants
-from twin.recorded import told_of
-from twin.response import milling_of
 from twin.runlog import RunLog
+from twin.simulator.recorded import told_of
+from twin.simulator.response import milling_of
 from twin.spindle.load import spindle_constants, spindle_load_pct
 
 Floats = NDArray[np.float64]

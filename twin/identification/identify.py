@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from twin.case import Case, Run, RunKind
 from twin.errors import CaseError
-from twin.gap_table import GapRow, gap_table
+from twin.gap.table import GapRow, gap_table
 from twin.heat.run import Warming
 from twin.identification.axes import identified_axes
 from twin.identification.batch_fit import Fit
@@ -20,8 +20,8 @@ from twin.identification.cutting_fit import fit_cutting, fit_spindle, force_of, 
 from twin.identification.estimate import INTERVAL_Z, Estimate
 from twin.identification.thermal_fit import NAMES, WarmingRun, fit_thermal, with_thermal
 from twin.machine import MachineFile
-from twin.recorded import noise_of, told_of
-from twin.response import milling_of
+from twin.simulator.recorded import noise_of, told_of
+from twin.simulator.response import milling_of
 
 Floats = NDArray[np.float64]
 Progress = Callable[[str], None]

@@ -26,8 +26,8 @@ from twin.identification.axis_parameters import GAINS, AxisParameter
 from twin.identification.friction_points import FrictionCurve, FrictionPoint, fit_friction_curve, friction_points
 from twin.machine import Axis, Friction, Tool
 from twin.process.milling import Milling, milling_force, tool_constants
-from twin.recorded import told_of
-from twin.response import milling_of
+from twin.simulator.recorded import told_of
+from twin.simulator.response import milling_of
 
 Floats = NDArray[np.float64]
 Clock = Callable[[], float]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from twin.heat.run import Warming, spindle_temperature_c, thermal_constants
 from twin.identification.batch_fit import Fit, fit, time_blocks
 from twin.machine import Thermal
-from twin.recorded import start_temperature_c
+from twin.simulator.recorded import start_temperature_c
 
 Floats = NDArray[np.float64]
 BLOCK_S = 120.0

@@ -11,7 +11,7 @@ the fastest is nearly reached.
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.compiling import kernel
+from twin.kernels.compiling import kernel
 from twin.motion.s_curve import along_profile, peak_speed, profile_time, reachable_speed, time_at_distance
 
 Floats = NDArray[np.float64]

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.compiling import kernel
+from twin.kernels.compiling import kernel
 from twin.motion.path import EventKind
 from twin.motion.s_curve import along_profile
 from twin.motion.timeline import effort

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.compiling import kernel
 from twin.errors import ProgramError
+from twin.kernels.compiling import kernel
 from twin.machine import Program
 from twin.motion.limits import Bounds, Limits, bounds
 from twin.motion.look_ahead import stretches_with_times

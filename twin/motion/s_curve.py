@@ -11,7 +11,7 @@ the trapezoid: the same formulas with a / j = 0. Speeds mm/s, distances mm, time
 
 import math
 
-from twin.compiling import kernel
+from twin.kernels.compiling import kernel
 
 ITERATIONS_MAX = 100
 """Of the safeguarded Newton steps; four to eight are used, and each that fails to help halves the bracket."""

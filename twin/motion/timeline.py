@@ -11,7 +11,7 @@ A dwell and a tool change take their time, and so does every halt: the control w
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.compiling import kernel
+from twin.kernels.compiling import kernel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

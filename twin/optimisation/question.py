@@ -16,7 +16,7 @@ from twin.optimisation.forces import CutForces
 from twin.optimisation.problem import Problem, control_of
 from twin.optimisation.program import Programmed, programmed
 from twin.optimisation.speed_groups import speed_groups
-from twin.response import check_effects
+from twin.simulator.response import check_effects
 
 POPULATION_MAX, EVOLUTIONS_MAX, ISLANDS_MAX = 10_000, 100_000, 64
 

@@ -5,7 +5,7 @@ import numpy as np
 from twin.errors import TwinError
 from twin.machine import MachineFile
 from twin.optimisation.answer import Resimulated
-from twin.simulation import Simulation, simulate
+from twin.simulator.simulation import Simulation, simulate
 
 
 def resimulated(machine: MachineFile, before: str, after: str, is_planned: bool) -> Resimulated | None:

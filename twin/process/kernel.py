@@ -15,10 +15,10 @@ from dataclasses import dataclass
 from functools import cache
 
 from twin.effects.effect import Effect
+from twin.kernels.weave import Woven, function_text, quantities, weave
 from twin.process import angle, tooth
 from twin.process.peak import AT, EVENTS, PEAK
 from twin.process.quadrature import NODES, NOTHING_KEPT, PASSED, STRETCHES, WEIGHTS, WINDOWS, indented
-from twin.weave import Woven, function_text, quantities, weave
 
 AT_TICK = ("spindle_rpm", "speed_mm_s", "axial_depth_mm")
 """Quantities of the tick that an effect may ask for beside those of the tooth."""

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from twin.effects.catalogue import effect_named
 from twin.effects.effect import Effect
 from twin.errors import EffectError, TwinError
-from twin.generated import compiled, in_python
+from twin.kernels.generated import compiled, in_python
 from twin.machine import Tool
 from twin.process.kernel import milling_kernel, process_quantities
 

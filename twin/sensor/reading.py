@@ -10,13 +10,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from twin import elementary
 from twin.effects.catalogue import effect_named
 from twin.effects.effect import Effect
 from twin.errors import EffectError
-from twin.generated import compiled, in_python
+from twin.kernels import elementary
+from twin.kernels.generated import compiled, in_python
+from twin.kernels.weave import Woven, function_text, quantities, weave
 from twin.sites import Site, at
-from twin.weave import Woven, function_text, quantities, weave
 
 Floats = NDArray[np.float64]
 

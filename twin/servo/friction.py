@@ -8,7 +8,7 @@ Each constant has a figure for either direction of motion.
 from math import copysign
 from typing import NamedTuple
 
-from twin.elementary import exp_of_minus
+from twin.kernels.elementary import exp_of_minus
 from twin.sites import Site, at
 
 

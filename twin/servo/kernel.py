@@ -11,12 +11,12 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 
-from twin import elementary
 from twin.effects.effect import Effect
 from twin.errors import EffectError
+from twin.kernels import elementary
+from twin.kernels.weave import Physics, Woven, function_text, quantities, weave
 from twin.servo import controller, friction, mechanics, metrics, table
 from twin.servo.lanes import CLOCKS, INPUTS, LaneLoops, Stage, names_of, read_by
-from twin.weave import Physics, Woven, function_text, quantities, weave
 
 STATES = frozenset(
     {

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from twin.effects.catalogue import effect_named
 from twin.effects.effect import Effect
 from twin.errors import EffectError
-from twin.generated import compiled, in_python
+from twin.kernels.generated import compiled, in_python
 from twin.servo.kernel import AxisKernel, axis_kernel, axis_quantities
 from twin.servo.metrics import AxisMetrics
 

@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from twin.compiling import kernel
+from twin.kernels.compiling import kernel
 from twin.transient.level import QUANTA_MAX
 
 Floats = NDArray[np.float64]

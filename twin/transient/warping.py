@@ -7,7 +7,7 @@ path (steps 1-1, 1-0, 0-1) within a band around the diagonal (Sakoe and Chiba 19
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.compiling import kernel
+from twin.kernels.compiling import kernel
 
 Floats = NDArray[np.float64]
 POINTS = 96

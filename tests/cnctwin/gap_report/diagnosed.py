@@ -25,7 +25,7 @@ from twin.gap.diagnosis import (
 )
 from twin.machine import AddedEffect, MachineFile
 from twin.regimes import Regime, axis_regimes
-from twin.response import RunInput, respond
+from twin.simulator.response import RunInput, respond
 
 NOISE = {"position_mm": 0.0003, "table_mm": 0.0003, "torque_a": 0.01}
 SIGMA = {"pos_mm": 0.0003, "table_mm": 0.0003, "torque_a": 0.01}

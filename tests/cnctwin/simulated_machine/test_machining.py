@@ -16,7 +16,7 @@ from cnctwin.simulated_machine.working_day import (
     cooled_c,
     network_as_built,
 )
-from twin.simulation import Simulation, simulate
+from twin.simulator.simulation import Simulation, simulate
 
 
 @pytest.fixture(scope="module")

@@ -10,8 +10,8 @@ from cnctwin.simulated_machine.as_built import machine_as_built
 from cnctwin.simulated_machine.description import PROCESSORS, TOLD
 from cnctwin.validation.model import Twin
 from twin.machine import MachineFile, read_machine
-from twin.response import RunInput, respond
 from twin.runlog import RunLog, run_log
+from twin.simulator.response import RunInput, respond
 
 Floats = NDArray[np.float64]
 START_S = 1_795_219_200.0

@@ -17,7 +17,7 @@ from tests.recordings import recording
 from tests.twin.gap.programs import made, plate_runs, shop_program
 from twin.machine import MachineFile, machine_from_toml
 from twin.runlog import RunLog, run_log
-from twin.simulation import simulate
+from twin.simulator.simulation import simulate
 
 BUDGETS = Budgets()
 MILL = """

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.gap.diagnosis import Effected
-from twin.gap.free import Free, constant
-from twin.gap.stage import Model, Observed, observed_of
+from twin.gap.stages.free import Free, constant
+from twin.gap.stages.stage import Model, Observed, observed_of
 
 Floats = NDArray[np.float64]
 BIAS, SCALE = Effected("sensor_bias", "z_pos_mm"), Effected("sensor_scale", "z_pos_mm")

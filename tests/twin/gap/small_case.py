@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from twin.case import Case, Run, RunAtHand, RunEntry, RunKind
 from twin.machine import AddedEffect, MachineFile, Thermal, machine_from_toml
-from twin.response import RunInput, respond
 from twin.runlog import RunLog, run_log
-from twin.simulation import simulate
+from twin.simulator.response import RunInput, respond
+from twin.simulator.simulation import simulate
 
 Floats = NDArray[np.float64]
 

@@ -17,7 +17,7 @@ from twin.effects.catalogue import catalogue
 from twin.errors import TwinError
 from twin.gap.diagnose import diagnose
 from twin.gap.diagnosis import Diagnosed, Verdict, closure_of
-from twin.gap.experiment_run import with_constant
+from twin.gap.experiment.run import with_constant
 from twin.gap.score_of import score_of
 from twin.machine import AddedEffect, machine_from_toml, machine_to_toml
 from twin.runlog import RunLog

@@ -7,17 +7,17 @@ import pytest
 
 from tests.twin.gap.traces import MACHINE, strokes
 from twin.gap.diagnosis import Cell, Effected
-from twin.gap.envelope import CutSeen, Envelope, envelope_of
-from twin.gap.experiment import Hypothesis, next_experiment
-from twin.gap.experiment_menu import Snippet, axis_menu, machine_menu
-from twin.gap.experiment_run import with_constant
-from twin.gap.remainder_experiment import remainder_experiment
+from twin.gap.experiment.choice import Hypothesis, next_experiment
+from twin.gap.experiment.envelope import CutSeen, Envelope, envelope_of
+from twin.gap.experiment.menu import Snippet, axis_menu, machine_menu
+from twin.gap.experiment.remainder import remainder_experiment
+from twin.gap.experiment.run import with_constant
 from twin.gcode import interpret
 from twin.machine import AddedEffect, MachineFile, SpindleDrive, Thermal
 from twin.motion.path import path_from_moves
 from twin.motion.plan import plan
 from twin.runlog import run_log
-from twin.simulation import IDEAL_TIMES
+from twin.simulator.simulation import IDEAL_TIMES
 
 FLOORS = {"x_pos_mm": 0.0005, "x_table_mm": 0.0005, "x_torque_a": 0.012, "spindle_temp_c": 0.1}
 SERVO = frozenset({"x_pos_mm", "x_torque_a"})

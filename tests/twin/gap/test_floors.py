@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from tests.twin.gap.small_case import MACHINE, air_case, axis_columns, case_of, columns_of, plant
-from twin.gap.disturbance import disturbance_of_repeats
 from twin.gap.floors import Floors, lap_of, repeatability
-from twin.gap.plan import ground_of
+from twin.gap.stages.disturbance import disturbance_of_repeats
+from twin.gap.stages.plan import ground_of
 from twin.runlog import run_log
-from twin.simulation import simulate
+from twin.simulator.simulation import simulate
 
 
 def test_the_floor_is_what_repeated_runs_differ_by_over_the_root_of_two() -> None:

@@ -7,8 +7,8 @@ import pytest
 
 from twin.effects.catalogue import catalogue, effect_named
 from twin.gap.diagnosis import Effected
-from twin.gap.free import Form, constant, effect_parameters
-from twin.gap.stage import Model
+from twin.gap.stages.free import Form, constant, effect_parameters
+from twin.gap.stages.stage import Model
 
 
 @pytest.mark.parametrize("name", list(catalogue()))

@@ -7,7 +7,7 @@ from tests.twin.gap.one_line import BIAS, OneLine
 from twin.gap.fitting import fitted
 from twin.gap.intervals import closure_interval, parameter_intervals
 from twin.gap.score import Squares
-from twin.gap.stage import Model
+from twin.gap.stages.stage import Model
 
 
 def test_the_interval_of_a_parameter_holds_the_true_one_and_is_as_wide_as_the_noise() -> None:

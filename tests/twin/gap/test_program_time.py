@@ -8,12 +8,12 @@ import pytest
 from tests.twin.gap.programs import case_of, made_case, plate_program, plate_runs, plate_slice, whole_program
 from twin.errors import CaseError
 from twin.gap.diagnosis import Diagnosed, Verdict
-from twin.gap.program_time import diagnose_programs
+from twin.gap.programs.diagnose import diagnose_programs
 from twin.gcode import Settings, interpret
 from twin.motion.control import control_of
 from twin.motion.path import path_from_moves
 from twin.runlog import run_log
-from twin.simulation import IDEAL_TIMES
+from twin.simulator.simulation import IDEAL_TIMES
 
 FEEDS = {"fit": (1200.0, 3000.0), "check": (2000.0,)}
 RAPID = "[program]\nrapid_mm_min = 30000.0\nacceleration_mm_s2 = 1e9\n"

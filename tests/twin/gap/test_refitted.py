@@ -8,13 +8,13 @@ import pytest
 
 from tests.twin.gap.one_line import BIAS, OneLine
 from tests.twin.gap.small_case import HOT, MACHINE
-from twin.gap.axis_stage import axis_constant_path, axis_constants_free
 from twin.gap.diagnosis import Cause, Diagnosed, Diagnosis, GapNumbers, Interval, Verdict
-from twin.gap.experiment_run import with_constant
+from twin.gap.experiment.run import with_constant
 from twin.gap.fitting import fitted
 from twin.gap.joined import joined
 from twin.gap.refitted import cause_deviations, constant_deviations, with_uncertainty
-from twin.gap.stage import Model
+from twin.gap.stages.axis import axis_constant_path, axis_constants_free
+from twin.gap.stages.stage import Model
 from twin.identification.axis_parameters import axis_parameters
 from twin.identification.identify import stated_uncertainty
 from twin.machine import AddedEffect, machine_from_toml, machine_to_toml

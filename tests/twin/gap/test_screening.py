@@ -6,7 +6,7 @@ import pytest
 from tests.twin.gap.one_line import BIAS, SAMPLES, SCALE, OneLine
 from twin.gap.fitting import fitted
 from twin.gap.screening import guesses, sensitivities
-from twin.gap.stage import Model
+from twin.gap.stages.stage import Model
 
 
 def screened(stage: OneLine) -> dict[object, tuple[float, float]]:

@@ -6,8 +6,8 @@ import pytest
 from tests.twin.gap.small_case import MACHINE, air_case, case_of, columns_of, plant, warm_case
 from twin.errors import EffectError
 from twin.gap.inspection import inspected
-from twin.gap.plan import ground_of
-from twin.gap.shown import shown
+from twin.gap.stages.plan import ground_of
+from twin.gap.stages.shown import shown
 from twin.machine import AddedEffect
 
 BIAS = AddedEffect(effect="sensor_bias", on="z_torque_a", parameters={"bias": 1.5})

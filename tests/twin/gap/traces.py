@@ -12,11 +12,11 @@ from twin.case import Case, read_case
 from twin.gap.diagnosis import Trace
 from twin.gap.floors import repeatability
 from twin.gap.labels import regime_labels
-from twin.gap_table import measured_signals
+from twin.gap.table import measured_signals
 from twin.machine import MachineFile, machine_from_toml
-from twin.recorded import noise_of, told_of
-from twin.response import respond
 from twin.runlog import RunLog, run_log
+from twin.simulator.recorded import noise_of, told_of
+from twin.simulator.response import respond
 
 Floats = NDArray[np.float64]
 MACHINE = machine_from_toml(

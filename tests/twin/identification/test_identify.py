@@ -15,10 +15,10 @@ from twin.identification.axis_parameters import VELOCITY_DELAY, axis_parameters
 from twin.identification.estimate import INTERVAL_Z
 from twin.identification.identify import Identification, identify
 from twin.machine import MachineFile, machine_from_toml, machine_to_toml
-from twin.recorded import told_of
-from twin.response import respond
 from twin.runlog import RunLog
-from twin.simulation import simulate
+from twin.simulator.recorded import told_of
+from twin.simulator.response import respond
+from twin.simulator.simulation import simulate
 
 PROGRAM = """
 N1 G21 G90 S6000 M3

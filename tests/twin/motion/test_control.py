@@ -9,7 +9,7 @@ from twin.machine import AddedEffect, MachineFile, machine_from_toml
 from twin.motion.control import LENGTH_OVER_FEED, Control, changed, control_of
 from twin.motion.limits import Limits
 from twin.motion.path import path_from_moves
-from twin.simulation import IDEAL_TIMES, simulate
+from twin.simulator.simulation import IDEAL_TIMES, simulate
 
 BARE = machine_from_toml("[machine]\nname = 'bare'\n")
 STATED = machine_from_toml("[machine]\nname = 'stated'\n[program]\nrapid_mm_min = 20000.0\nacceleration_mm_s2 = 2000.0\n")

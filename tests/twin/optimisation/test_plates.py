@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from tests.recordings import PROJECT, recording
-from twin.identification.program_recording import RecordedProgram, recorded_programs
-from twin.identification.program_time import ProgramTimes, identify_program_times
+from twin.identification.programs.recording import RecordedProgram, recorded_programs
+from twin.identification.programs.time import ProgramTimes, identify_program_times
 from twin.motion.limits import Limits
 from twin.motion.plan import plan
 

@@ -10,18 +10,18 @@ from numpy.typing import ArrayLike, NDArray
 from twin.case import Run
 from twin.effects.catalogue import catalogue
 from twin.effects.effect import Effect, On
-from twin.gap.cut_stage import acting
 from twin.gap.diagnosis import Effected
 from twin.gap.floors import Floors
-from twin.gap.free import Free, constant
 from twin.gap.labels import regime_labels
-from twin.gap.observed_through import Sensing, lags_to_try
-from twin.gap.stage import Model, Observed, observed_of
+from twin.gap.stages.cut import acting
+from twin.gap.stages.free import Free, constant
+from twin.gap.stages.observed_through import Sensing, lags_to_try
+from twin.gap.stages.stage import Model, Observed, observed_of
 from twin.heat.run import Warming, spindle_temperature_c, thermal_constants, thermal_quantities
 from twin.identification.batch_fit import time_blocks
 from twin.machine import MachineFile
-from twin.recorded import start_temperature_c
 from twin.runlog import RunLog
+from twin.simulator.recorded import start_temperature_c
 
 Floats = NDArray[np.float64]
 BLOCK_S = 120.0

@@ -14,7 +14,7 @@ from typing import Any, TypeVar, cast
 import numba
 from numba import njit
 
-from twin.kernel_folder import VERSIONS_MAX, keep_newest, kernel_folder
+from twin.kernels.kernel_folder import VERSIONS_MAX, keep_newest, kernel_folder
 
 Function = TypeVar("Function", bound=Callable[..., object])
 
@@ -22,8 +22,8 @@ Function = TypeVar("Function", bound=Callable[..., object])
 @cache
 def _kept_in() -> str:
     digest = hashlib.sha256(numba.__version__.encode())
-    sources = {source: source.read_bytes() for source in sorted(Path(__file__).parent.rglob("*.py"))}
-    packages = {source.parent for source, text in sources.items() if b"from twin.compiling import" in text}
+    sources = {source: source.read_bytes() for source in sorted(Path(__file__).parents[1].rglob("*.py"))}
+    packages = {source.parent for source, text in sources.items() if b"from twin.kernels.compiling import" in text}
     for source, text in sources.items():
         if source.parent in packages:
             digest.update(text)

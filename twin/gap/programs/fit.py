@@ -21,10 +21,10 @@ from scipy.optimize import least_squares
 from twin.effects.catalogue import effect_named
 from twin.effects.effect import Effect, Parameter
 from twin.gap.diagnosis import Interval
-from twin.gap.program_trial import Trial
+from twin.gap.programs.trial import Trial
 from twin.identification.estimate import clustered_covariance
-from twin.identification.program_recording import NOMINAL, line_starts
-from twin.identification.program_time import HICCUP_S, windows
+from twin.identification.programs.recording import NOMINAL, line_starts
+from twin.identification.programs.time import HICCUP_S, windows
 from twin.motion.control import Control, changed
 from twin.motion.limits import Limits
 from twin.motion.plan import Plan

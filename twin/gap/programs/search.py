@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from twin.effects.catalogue import effect_named
-from twin.gap.program_fit import LONG_WINDOW_S, Fitted, Model, Values, Watched, fit, is_one_sided, small_values
-from twin.gap.program_trial import Trial
+from twin.gap.programs.fit import LONG_WINDOW_S, Fitted, Model, Values, Watched, fit, is_one_sided, small_values
+from twin.gap.programs.trial import Trial
 from twin.motion.limits import Limits
 
 Floats = NDArray[np.float64]

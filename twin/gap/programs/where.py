@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.gap.diagnosis import Cell
-from twin.gap.program_fit import Model, Watched
-from twin.gap.program_search import SHORT_WINDOW_S
-from twin.gap.program_trial import Trial
+from twin.gap.programs.fit import Model, Watched
+from twin.gap.programs.search import SHORT_WINDOW_S
+from twin.gap.programs.trial import Trial
 from twin.gap.significance import discoveries, means_of
 from twin.gap.wording import digits, percent
-from twin.identification.program_recording import line_starts
+from twin.identification.programs.recording import line_starts
 from twin.motion.path import EventKind, Kind, Path
 from twin.motion.plan import Plan
 

@@ -22,6 +22,7 @@ from twin.effects.catalogue import effect_named
 from twin.effects.effect import On
 from twin.errors import EffectError
 from twin.heat.run import Warming, spindle_temperature_c, thermal_constants, thermal_quantities
+from twin.kernels.weave import quantities
 from twin.machine import AddedEffect, MachineFile
 from twin.process.kernel import process_quantities
 from twin.process.milling import Milling, milling_force, peak_force, tool_constants
@@ -32,7 +33,6 @@ from twin.servo.disturbance import Disturbance
 from twin.servo.kernel import axis_quantities
 from twin.servo.run import AxisInput, AxisRun, run_axes
 from twin.spindle.load import spindle_constants, spindle_load_pct, spindle_quantities
-from twin.weave import quantities
 
 Floats = NDArray[np.float64]
 SIGNAL = re.compile(r"^([a-z][a-z0-9]?_(pos_mm|table_mm|torque_a)|force_[xy]_n|spindle_load_pct|spindle_temp_c)$")

@@ -3,15 +3,15 @@
 from collections.abc import Sequence
 
 from twin.errors import TwinError
-from twin.gap.axis_stage import AxisStage
 from twin.gap.diagnosis import Cell, Effected, NextExperiment, Verdict
-from twin.gap.envelope import envelope_of
-from twin.gap.experiment import next_experiment
-from twin.gap.plan import Ground
+from twin.gap.experiment.choice import next_experiment
+from twin.gap.experiment.envelope import envelope_of
+from twin.gap.experiment.remainder import remainder_experiment
 from twin.gap.refitted import with_effects
-from twin.gap.remainder_experiment import remainder_experiment
+from twin.gap.stages.axis import AxisStage
+from twin.gap.stages.plan import Ground
+from twin.gap.table import measured_signals
 from twin.gap.verdict import Judged
-from twin.gap_table import measured_signals
 from twin.machine import MachineFile
 
 RIVALS_MAX = 3

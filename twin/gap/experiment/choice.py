@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 from twin.effects.catalogue import effect_named
 from twin.effects.effect import On
 from twin.gap.diagnosis import Effected, NextExperiment
-from twin.gap.envelope import Envelope
-from twin.gap.experiment_menu import Shows, Snippet, axis_menu, machine_menu
-from twin.gap.experiment_run import Columns, Trial, sensitivities, shown, trial_of
+from twin.gap.experiment.envelope import Envelope
+from twin.gap.experiment.menu import Shows, Snippet, axis_menu, machine_menu
+from twin.gap.experiment.run import Columns, Trial, sensitivities, shown, trial_of
 from twin.gap.wording import digits
 from twin.machine import MachineFile
 from twin.runlog import AXIS_COLUMN

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from twin.case import Run
 from twin.errors import ProgramError, TwinError
 from twin.gcode import Settings, interpret
-from twin.identification.program_recording import NOMINAL, RecordedProgram
+from twin.identification.programs.recording import NOMINAL, RecordedProgram
 from twin.motion.limits import stops
 from twin.motion.path import EventKind, Kind, Path, path_from_moves
 from twin.recording.program_run import OVERRIDES, Ending, Pause, ProgramRun

@@ -12,18 +12,18 @@ from twin.effects.catalogue import catalogue
 from twin.effects.effect import Effect, On
 from twin.gap.diagnosis import Effected
 from twin.gap.floors import Floors
-from twin.gap.free import Free, constant
 from twin.gap.labels import regime_labels
-from twin.gap.observed_through import Sensing, lags_to_try
-from twin.gap.stage import Model, Observed, observed_of
+from twin.gap.stages.free import Free, constant
+from twin.gap.stages.observed_through import Sensing, lags_to_try
+from twin.gap.stages.stage import Model, Observed, observed_of
 from twin.identification.batch_fit import time_blocks
 from twin.machine import MachineFile
 from twin.process.jump import at_a_jump
 from twin.process.kernel import process_quantities
 from twin.process.milling import Milling, MillingForce, milling_force, tool_constants
-from twin.recorded import told_of
-from twin.response import milling_of
 from twin.runlog import RunLog
+from twin.simulator.recorded import told_of
+from twin.simulator.response import milling_of
 from twin.spindle.load import spindle_constants, spindle_load_pct, spindle_quantities
 
 Floats = NDArray[np.float64]

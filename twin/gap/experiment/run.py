@@ -15,17 +15,17 @@ from twin.effects.catalogue import effect_named
 from twin.effects.effect import On
 from twin.errors import TwinError
 from twin.gap.diagnosis import Effected
-from twin.gap.envelope import Envelope
-from twin.gap.experiment_menu import Shows, Snippet
-from twin.gap.free import effect_parameters
+from twin.gap.experiment.envelope import Envelope
+from twin.gap.experiment.menu import Shows, Snippet
+from twin.gap.stages.free import effect_parameters
 from twin.gcode import interpret
 from twin.machine import AddedEffect, MachineFile
 from twin.motion.motion import Motion
 from twin.motion.path import EventKind, path_from_moves
 from twin.motion.plan import Plan, plan
-from twin.response import RunInput, respond
 from twin.runlog import AXIS_COLUMN
-from twin.simulation import IDEAL_TIMES
+from twin.simulator.response import RunInput, respond
+from twin.simulator.simulation import IDEAL_TIMES
 
 Floats = NDArray[np.float64]
 Columns = dict[str, Floats]

@@ -3,7 +3,7 @@ which.
 
 Each effect is put on the machine at the size that makes as much of it as is left, by one run of a program of the menu and, since
 most effects are in proportion to their parameter, one step from there; the programs are then judged as between any hypotheses
-(`twin.gap.experiment`).
+(`twin.gap.experiment.choice`).
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,11 +13,11 @@ import numpy as np
 from twin.effects.catalogue import effect_named
 from twin.errors import TwinError
 from twin.gap.diagnosis import Cell, Effected, NextExperiment
-from twin.gap.envelope import Envelope
-from twin.gap.experiment import Hypothesis, next_experiment, sensor_floor
-from twin.gap.experiment_menu import Snippet, axis_menu
-from twin.gap.experiment_run import Columns, Trial, shown, trial_of
-from twin.gap.free import Form, effect_parameters
+from twin.gap.experiment.choice import Hypothesis, next_experiment, sensor_floor
+from twin.gap.experiment.envelope import Envelope
+from twin.gap.experiment.menu import Snippet, axis_menu
+from twin.gap.experiment.run import Columns, Trial, shown, trial_of
+from twin.gap.stages.free import Form, effect_parameters
 from twin.gap.wording import regime_words
 from twin.machine import AddedEffect, MachineFile
 from twin.regimes import Regime

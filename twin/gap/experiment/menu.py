@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
-from twin.gap.envelope import Envelope
+from twin.gap.experiment.envelope import Envelope
 
 
 class Shows(StrEnum):

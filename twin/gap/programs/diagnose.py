@@ -14,10 +14,10 @@ from twin.case import Case, RunKind
 from twin.effects.catalogue import catalogue
 from twin.errors import CaseError, RunLogError
 from twin.gap.diagnosis import Diagnosed, NotObservable
-from twin.gap.program_answer import Answer, Asked
-from twin.gap.program_search import search
-from twin.gap.program_trial import Refused, Trial, trial_of
-from twin.identification.program_recording import rapid_rate_mm_min
+from twin.gap.programs.answer import Answer, Asked
+from twin.gap.programs.search import search
+from twin.gap.programs.trial import Refused, Trial, trial_of
+from twin.identification.programs.recording import rapid_rate_mm_min
 from twin.machine import MachineFile, Program
 from twin.motion.control import RAPID_MM_MIN, program_effects
 from twin.motion.limits import Limits

@@ -10,16 +10,16 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.gap.axis_run import AxisRunData
-from twin.gap.axis_stage import LANES, axis_effects
 from twin.gap.floors import Floors
-from twin.gap_table import regimes_of
+from twin.gap.stages.axis import LANES, axis_effects
+from twin.gap.stages.axis_run import AxisRunData
+from twin.gap.table import regimes_of
 from twin.machine import MachineFile
-from twin.recorded import noise_of, start_of
 from twin.runlog import RunLog
 from twin.servo.constants import axis_constants
 from twin.servo.disturbance import Disturbance
 from twin.servo.run import AxisInput, run_axes
+from twin.simulator.recorded import noise_of, start_of
 
 Floats = NDArray[np.float64]
 Spread = Mapping[tuple[str, str], float]

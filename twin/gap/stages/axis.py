@@ -13,19 +13,19 @@ from numpy.typing import NDArray
 
 from twin.effects.catalogue import catalogue, effect_named
 from twin.effects.effect import Effect, On
-from twin.gap.axis_run import OUTPUTS, AxisRunData
 from twin.gap.diagnosis import Effected
-from twin.gap.free import Free, constant
-from twin.gap.observed_through import Sensing, lags_to_try, seen_earlier
-from twin.gap.stage import Model, Observed, observed_of
+from twin.gap.stages.axis_run import OUTPUTS, AxisRunData
+from twin.gap.stages.free import Free, constant
+from twin.gap.stages.observed_through import Sensing, lags_to_try, seen_earlier
+from twin.gap.stages.stage import Model, Observed, observed_of
 from twin.identification.axis_parameters import AxisParameter, constants_at
 from twin.identification.batch_fit import time_blocks
 from twin.machine import Axis, MachineFile
-from twin.recorded import start_state
 from twin.servo.constants import axis_constants, effect_constants
 from twin.servo.disturbance import Disturbance
 from twin.servo.kernel import axis_quantities
 from twin.servo.run import AxisInput, AxisRun, run_axes
+from twin.simulator.recorded import start_state
 
 Floats = NDArray[np.float64]
 BLOCK_S = 0.5

@@ -26,10 +26,10 @@ from twin.gap.diagnosis import (
     Verdict,
     closure_of,
 )
-from twin.gap.program_fit import LONG_WINDOW_S, Model, Values, Watched
-from twin.gap.program_search import Names, Search
-from twin.gap.program_trial import Trial
-from twin.gap.program_where import BLOCK, SECTION, RunGap, Sections, where
+from twin.gap.programs.fit import LONG_WINDOW_S, Model, Values, Watched
+from twin.gap.programs.search import Names, Search
+from twin.gap.programs.trial import Trial
+from twin.gap.programs.where import BLOCK, SECTION, RunGap, Sections, where
 from twin.gap.refitted import with_uncertainty
 from twin.gap.wording import digits, percent
 from twin.machine import AddedEffect, MachineFile, Program

@@ -12,7 +12,7 @@ from typing import Any
 
 import numba
 
-from twin.kernel_folder import KERNELS_MAX, keep_newest, kernel_folder
+from twin.kernels.kernel_folder import KERNELS_MAX, keep_newest, kernel_folder
 
 
 class _FromText(importlib.abc.InspectLoader):

@@ -15,7 +15,7 @@ from scipy.optimize import least_squares
 
 from twin.errors import RunLogError
 from twin.identification.estimate import Estimate
-from twin.identification.program_recording import NOMINAL, RecordedProgram, SetUp, line_starts, rapid_rate_mm_min
+from twin.identification.programs.recording import NOMINAL, RecordedProgram, SetUp, line_starts, rapid_rate_mm_min
 from twin.motion.limits import Limits
 from twin.motion.plan import Plan, plan
 

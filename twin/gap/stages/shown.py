@@ -11,16 +11,16 @@ from numpy.typing import NDArray
 
 from twin.case import Run
 from twin.effects.catalogue import effect_named
-from twin.gap.axis_run import axis_run_data
-from twin.gap.axis_stage import AxisStage, standing_of
-from twin.gap.cut_stage import CutStage, cut_runs
 from twin.gap.diagnosis import Effected
 from twin.gap.floors import Floors
-from twin.gap.free import effect_parameters
-from twin.gap.heat_stage import HeatStage, heat_runs
-from twin.gap.stage import Model
+from twin.gap.stages.axis import AxisStage, standing_of
+from twin.gap.stages.axis_run import axis_run_data
+from twin.gap.stages.cut import CutStage, cut_runs
+from twin.gap.stages.free import effect_parameters
+from twin.gap.stages.heat import HeatStage, heat_runs
+from twin.gap.stages.stage import Model
 from twin.machine import MachineFile
-from twin.response import check_effects, disturbance_of
+from twin.simulator.response import check_effects, disturbance_of
 
 Floats = NDArray[np.float64]
 PAIRS = 16

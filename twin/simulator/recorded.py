@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from twin.errors import RunLogError
 from twin.machine import Axis, MachineFile
-from twin.response import RunInput, period_of
 from twin.runlog import RunLog
+from twin.simulator.response import RunInput, period_of
 
 Floats = NDArray[np.float64]
 

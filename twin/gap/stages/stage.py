@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from twin.effects.catalogue import effect_named
 from twin.gap.diagnosis import Effected
-from twin.gap.free import Free, effect_parameters
+from twin.gap.stages.free import Free, effect_parameters
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

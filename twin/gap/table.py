@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from twin.case import Run
 from twin.gap.labels import regime_labels
 from twin.machine import MachineFile
-from twin.recorded import noise_of, told_of
-from twin.response import respond
 from twin.runlog import AXIS_COLUMN, RunLog
+from twin.simulator.recorded import noise_of, told_of
+from twin.simulator.response import respond
 
 Floats = NDArray[np.float64]
 

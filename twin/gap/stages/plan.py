@@ -7,16 +7,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.case import Case, Run, RunKind
-from twin.gap.axis_run import AxisRunData, axis_run_data, repeated_groups
-from twin.gap.axis_stage import AxisStage, axis_constants_free, standing_of
-from twin.gap.cut_stage import CutStage, cut_runs
 from twin.gap.diagnosis import Effected, Verdict
-from twin.gap.disturbance import disturbance_of_repeats
 from twin.gap.floors import Floors, repeatability
-from twin.gap.heat_stage import HeatStage, heat_runs
 from twin.gap.null import NULL, Null
 from twin.gap.search import Explained, explain
-from twin.gap.stage import Stage
+from twin.gap.stages.axis import AxisStage, axis_constants_free, standing_of
+from twin.gap.stages.axis_run import AxisRunData, axis_run_data, repeated_groups
+from twin.gap.stages.cut import CutStage, cut_runs
+from twin.gap.stages.disturbance import disturbance_of_repeats
+from twin.gap.stages.heat import HeatStage, heat_runs
+from twin.gap.stages.stage import Stage
 from twin.gap.verdict import judged
 from twin.machine import MachineFile
 from twin.runlog import RunLog

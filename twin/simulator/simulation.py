@@ -18,8 +18,8 @@ from twin.motion.control import RAPID_MM_MIN, control_of, effects_tell
 from twin.motion.motion import ExecState, Motion
 from twin.motion.path import EventKind, Kind, Path, path_from_moves
 from twin.motion.plan import Plan
-from twin.response import Response, RunInput, respond
 from twin.runlog import RunLog, run_log
+from twin.simulator.response import Response, RunInput, respond
 
 Floats = NDArray[np.float64]
 

@@ -1,0 +1,1 @@
+"""Identification from recordings of part programs: where a machine spends its time."""
