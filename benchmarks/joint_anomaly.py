@@ -25,9 +25,9 @@ from sklearn.ensemble import IsolationForest
 from processors.config import Configuration
 from processors.contract import Output
 from processors.effects import Effect, Publish
-from processors.engine import Engine
-from processors.joint_anomaly import PROCESSOR, RAW, State
-from processors.joint_config import Config
+from processors.joint_anomaly.config import Config
+from processors.joint_anomaly.processor import PROCESSOR, RAW, State
+from processors.running.engine import Engine
 from processors.sample import Sample
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import Change, NodeId, Reading

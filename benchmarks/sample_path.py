@@ -36,9 +36,9 @@ from cnctwin.private_broker import PrivateBroker, _any_port
 from processors.config import Configuration, ProcessorConfig
 from processors.contract import NoState, Output, OutputSpec, Processor, Provenance, Sample, SampleKind
 from processors.effects import Publish as PublishEffect
-from processors.engine import Engine
-from processors.health import node_metrics
-from processors.worker import Worker
+from processors.running.engine import Engine
+from processors.running.health import node_metrics
+from processors.running.worker import Worker
 from sparkplug.actions import Publish
 from sparkplug.broker import BrokerAddress
 from sparkplug.datatype import DataType

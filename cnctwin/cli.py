@@ -142,7 +142,7 @@ def process(
 ) -> None:
     """Run processors until SIGTERM or Ctrl-C; beside alerts the courier that sends, beside historian the store that it keeps."""
     from cnctwin.process_command import process as run_processors
-    from processors.runtime import configured
+    from processors.running.runtime import configured
 
     pairs = configured(names, config)
     with stopped_by_signals() as stop, broker_or_own(address(broker)) as where:

@@ -20,7 +20,7 @@ from edge.spans import Spans
 from processors.contract import TWIN_NODE_PREFIX
 from processors.effects import Pin
 from processors.historian import HistorianConfig
-from processors.ports import Receipt
+from processors.running.ports import Receipt
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.topics import NodeId
 
@@ -97,7 +97,8 @@ def _size(item: Message | Pinned | Snapshot) -> int:
 
 
 class StoreRecorder:
-    """A `processors.ports.Recorder` on a store. The store is written by its thread only; `stop` writes what waits, and closes it.
+    """A `processors.running.ports.Recorder` on a store. The store is written by its thread only; `stop` writes what waits, and
+    closes it.
 
     A failure of the thread that is no StoreError is our own bug: the next `keep` raises it, and ends the processor.
     """
@@ -138,7 +139,7 @@ class StoreRecorder:
         self._put(Pinned(pin.machine, pin.from_ms, pin.to_ms, pin.reason))
 
     def health(self) -> Mapping[str, int | float | str]:
-        """How it is, by the names that `processors.health` declares."""
+        """How it is, by the names that `processors.running.health` declares."""
         health: dict[str, int | float | str] = {
             "store_samples": self._stored,
             "store_repeated": self._repeated,

@@ -19,8 +19,8 @@ from cnctwin.parts.record_log import parts
 from cnctwin.stopping import stopped_by_signals
 from cnctwin.store.opening import default_place, open_store
 from edge.state_dir import state_dir as folder_for_state
-from processors.alerts_receivers import names_secret, url_fault
-from processors.courier.secret import read_secret
+from processors.alerts.courier.secret import read_secret
+from processors.alerts.receivers import names_secret, url_fault
 
 if TYPE_CHECKING:
     from cnctwin.parts.delivery import Receiver

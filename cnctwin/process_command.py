@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
-from processors.ports import Recorder
-from processors.runtime import Configured, run_configured
+from processors.running.ports import Recorder
+from processors.running.runtime import Configured, run_configured
 from sparkplug.broker import BrokerAddress
 
 
@@ -42,13 +42,13 @@ def _recorder(pairs: Sequence[Configured], group: str) -> Iterator[Recorder | No
 @contextmanager
 def _courier(pairs: Sequence[Configured], broker: BrokerAddress, group: str) -> Iterator[None]:
     """The courier, where alerts run and somebody is to be told; else nothing, and httpx is not loaded."""
-    from processors.alerts_config import AlertsConfig  # noqa: PLC0415  with the processor that needs it
+    from processors.alerts.config import AlertsConfig  # noqa: PLC0415  with the processor that needs it
 
     config = next((one.default for _, one in pairs if isinstance(one.default, AlertsConfig)), None)
     if config is None or not config.receivers:
         yield
         return
-    from processors.courier.thread import Courier  # noqa: PLC0415
+    from processors.alerts.courier.thread import Courier  # noqa: PLC0415
 
     courier = Courier(broker, config, group)
     courier.start()

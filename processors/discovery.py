@@ -1,7 +1,11 @@
-"""Finding processors: each module of this package that holds a `PROCESSOR`. Nothing is registered by being imported."""
+"""Finding processors, without importing what is not asked for.
+
+A processor is a file `<name>.py` with its sample configuration `<name>.toml` beside it, or a folder `<name>/` with both, the
+declaration in `processor.py`. Nothing is registered by being imported.
+"""
 
 import importlib
-import pkgutil
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -11,35 +15,34 @@ from processors.errors import DeclarationError, UnknownProcessorError
 
 AnyProcessor = Processor[Any, Any] | CellProcessor[Any, Any]
 
+FOLDER = Path(processors.__path__[0])
+
+
+@cache
+def modules() -> dict[str, str]:
+    """The module that declares each processor, by the processor's name in alphabetical order; imports none of them."""
+    found = {sample.stem: f"processors.{sample.stem}" for sample in FOLDER.glob("*.toml")}
+    found |= {one.parent.name: f"processors.{one.parent.name}.processor" for one in FOLDER.glob("*/processor.py")}
+    return dict(sorted(found.items()))
+
 
 def discover() -> dict[str, AnyProcessor]:
     """All processors by name, in alphabetical order. Raises DeclarationError where file and name differ."""
-    found: dict[str, AnyProcessor] = {}
-    for module in sorted(pkgutil.iter_modules(processors.__path__), key=lambda module: module.name):
-        processor = _declared_in(module.name)
-        if processor is not None:
-            found[module.name] = processor
-    return found
+    return {name: find(name) for name in modules()}
 
 
 def find(name: str) -> AnyProcessor:
-    """The processor `name`; loads no other. Raises UnknownProcessorError."""
-    known = {module.name for module in pkgutil.iter_modules(processors.__path__)}
-    processor = _declared_in(name) if name in known else None
-    if processor is None:
-        raise UnknownProcessorError(f"no processor {name!r}; there are: {', '.join(discover())}")
-    return processor
+    """The processor `name`; imports no other. Raises UnknownProcessorError, DeclarationError."""
+    if name not in modules():
+        raise UnknownProcessorError(f"no processor {name!r}; there are: {', '.join(modules())}")
+    module = importlib.import_module(modules()[name])
+    declared = getattr(module, "PROCESSOR", None)
+    if not isinstance(declared, Processor | CellProcessor) or declared.name != name:
+        raise DeclarationError(f"{module.__name__}: PROCESSOR has to be one, named {name!r}")
+    return declared
 
 
 def sample_configuration(processor: AnyProcessor) -> Path:
-    """The sample configuration beside the processor's file; its values are the defaults."""
-    return Path(processors.__path__[0]) / f"{processor.name}.toml"
-
-
-def _declared_in(module_name: str) -> AnyProcessor | None:
-    declared = getattr(importlib.import_module(f"processors.{module_name}"), "PROCESSOR", None)
-    if declared is None:
-        return None
-    if not isinstance(declared, Processor | CellProcessor) or declared.name != module_name:
-        raise DeclarationError(f"processors/{module_name}.py: PROCESSOR has to be one, named {module_name!r}")
-    return declared
+    """The sample configuration beside the processor's declaration; its values are the defaults."""
+    beside = FOLDER / processor.name / f"{processor.name}.toml"
+    return beside if beside.exists() else FOLDER / f"{processor.name}.toml"

@@ -30,7 +30,7 @@ for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
 # Files that take half a minute and more. They begin first, so that none of them is left for one worker when the others are done.
 LONG = (
     "cnctwin/test_kill_and_restart.py",
-    "processors/courier/test_courier_on_a_broker.py",
+    "processors/alerts/courier/test_courier_on_a_broker.py",
     "cnctwin/test_demo.py",
     "twin/identification/test_identify.py",
     "twin/gap/test_program_time.py",
@@ -42,8 +42,8 @@ LONG = (
     "twin/anomaly/test_detector.py",
     "cnctwin/test_demo_by_peer.py",
     "cnctwin/test_train_anomaly.py",
-    "processors/courier/test_processor_and_courier_killed.py",
-    "processors/courier/test_simulated_crashes.py",
+    "processors/alerts/courier/test_processor_and_courier_killed.py",
+    "processors/alerts/courier/test_simulated_crashes.py",
     "cnctwin/test_historian_killed.py",
     "cnctwin/store_influx/test_outage.py",
     "cnctwin/page/test_views.py",

@@ -17,7 +17,7 @@ from cnctwin.anomaly_training.regimes import Ticks, fitted_preparation, held_run
 from cnctwin.anomaly_training.replayed_cell import Track, replayed
 from cnctwin.anomaly_training.time_split import split
 from cnctwin.errors import UsageError
-from processors.joint_config import Config
+from processors.joint_anomaly.config import Config
 from twin.anomaly.calibration import Calibration
 from twin.anomaly.common_mode import Method
 from twin.anomaly.detector import Detector, trained_model
@@ -196,7 +196,7 @@ def hourly_means(tracks: list[Track]) -> tuple[float, ...]:
     """Means of the raw score outside tool changes, by hour, of hours with at least a minute's ticks."""
     means = []
     for track in tracks:
-        judged = ~track.gated & np.isfinite(track.raw)  # as the processor has it (processors/score_drift.py)
+        judged = ~track.gated & np.isfinite(track.raw)  # as the processor has it (processors/joint_anomaly/score_drift.py)
         hour, raw = (track.t_s[judged] // HOUR_S).astype(np.int64), track.raw[judged]
         if len(hour):
             counts = np.bincount(hour - hour[0])

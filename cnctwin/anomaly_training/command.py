@@ -16,7 +16,7 @@ from cnctwin.anomaly_training.recorded_cell import recorded_cell, shared_feature
 from cnctwin.anomaly_training.replayed_cell import replayed
 from cnctwin.errors import UsageError
 from cnctwin.twin_commands import working
-from processors.joint_config import FITTED_WITH
+from processors.joint_anomaly.config import FITTED_WITH
 from twin.anomaly.alarm import AlarmRule, is_alarm, onsets
 from twin.anomaly.common_mode import Method
 from twin.anomaly.detector import Detector

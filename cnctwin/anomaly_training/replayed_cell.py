@@ -18,10 +18,10 @@ from cnctwin.errors import UsageError
 from processors.config import Configuration
 from processors.contract import Output, Outputs, Sample
 from processors.effects import DeadLetter
-from processors.engine import Engine
-from processors.joint_anomaly import PROCESSOR, RAW
-from processors.joint_config import Config
-from processors.joint_member import ADJUSTED, GATE
+from processors.joint_anomaly.config import Config
+from processors.joint_anomaly.member import ADJUSTED, GATE
+from processors.joint_anomaly.processor import PROCESSOR, RAW
+from processors.running.engine import Engine
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId, Reading
 from sparkplug.quality import Quality

@@ -12,7 +12,7 @@ from cnctwin.errors import UsageError
 from cnctwin.store.contract import Query, Store
 from cnctwin.validation.evidence import track_of
 from cnctwin.validation.track import Floats, Grid, held
-from processors.joint_config import NUMBERS
+from processors.joint_anomaly.config import NUMBERS
 from twin.residual.features import SIGNALS
 from twin.runlog import TEXT_COLUMNS, RunLog, read_run
 

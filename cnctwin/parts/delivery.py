@@ -14,9 +14,9 @@ from typing import NamedTuple
 from cnctwin.parts.journal import Journal
 from cnctwin.parts.record_log import Part, parts
 from cnctwin.store.contract import Store
-from processors.courier.exchange import Request, exchanged, judged
-from processors.courier.outcome import Outcome, Verdict
-from processors.courier.webhook import headers
+from processors.alerts.courier.exchange import Request, exchanged, judged
+from processors.alerts.courier.outcome import Outcome, Verdict
+from processors.alerts.courier.webhook import headers
 
 SIGNATURE_HEADER = "X-Cnctwin-Signature"
 LOOK_BACK_MS = 3_600_000

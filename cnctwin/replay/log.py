@@ -12,7 +12,9 @@ from sparkplug.host_session import EventKind, HostEvent
 HISTORIAN = f"{TWIN_NODE_PREFIX}historian"
 NODE_OFFLINE = "edge node offline"
 """The detail of a device's death that came with its edge node's: of a processor that was killed, stopped or cut off."""
-NOTHING_YET = "nothing computed yet"  # of processors/emission.py: such a value is stamped by the birth that began the twin device
+NOTHING_YET = (
+    "nothing computed yet"  # of processors/running/emission.py: such a value is stamped by the birth that began the twin device
+)
 SAME_MS_MAX = 64
 
 

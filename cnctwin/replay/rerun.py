@@ -13,8 +13,8 @@ from processors.config import Configuration, ProcessorConfig
 from processors.contract import CellProcessor
 from processors.discovery import AnyProcessor
 from processors.effects import DeadLetter, Declare, Effect, Publish, Remove
-from processors.engine import Engine
 from processors.errors import SnapshotError
+from processors.running.engine import Engine
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import Change, NodeId, Reading
 from sparkplug.quality import Quality

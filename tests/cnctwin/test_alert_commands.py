@@ -11,10 +11,10 @@ import pytest
 
 from cnctwin.alert_commands import alerts_app, duration_s
 from cnctwin.errors import UsageError
-from processors.alerts_config import AlertsConfig
+from processors.alerts.config import AlertsConfig
+from processors.alerts.courier.thread import Courier
 from processors.config import read_tables
-from processors.courier.thread import Courier
-from processors.runtime import run
+from processors.running.runtime import run
 from sparkplug.broker import BrokerAddress
 from sparkplug.datatype import DataType
 from sparkplug.edge_node import EdgeNode

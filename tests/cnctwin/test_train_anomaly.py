@@ -17,7 +17,7 @@ from cnctwin.errors import UsageError
 from cnctwin.train_commands import train_app
 from processors.config import Configuration
 from processors.errors import ConfigurationError
-from processors.joint_config import Config
+from processors.joint_anomaly.config import Config
 from tests.cnctwin.anomaly_training.cells import FEATURES, machine_log
 from twin.anomaly.common_mode import Method
 from twin.anomaly.detector import Detector

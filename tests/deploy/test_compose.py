@@ -25,7 +25,7 @@ from cnctwin.store.influx.address import parse
 from cnctwin.store.opening import default_place
 from edge.config_file import load
 from edge.run import broker_address
-from processors.runtime import configured
+from processors.running.runtime import configured
 from sparkplug.broker import BrokerAddress
 from tests.deploy.command_lines import parsed
 from tests.deploy.plant import DEPLOY, PEOPLE, PROCESSORS, Plant, need_programs

@@ -12,7 +12,7 @@ import pytest
 
 from cnctwin.alert_commands import alerts_app
 from cnctwin.process_command import process
-from processors.runtime import configured
+from processors.running.runtime import configured
 from sparkplug.datatype import DataType
 from sparkplug.edge_node import EdgeNode
 from sparkplug.host import EventKind, HostApplication

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from processors.discovery import discover
-from processors.runtime import configured
+from processors.running.runtime import configured
 from tests.deploy.command_lines import parsed
 from tests.deploy.plant import DEPLOY
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from processors.config import Configuration
 from processors.discovery import AnyProcessor
 from processors.effects import Effect, Publish, PublishPlain
-from processors.engine import Engine
+from processors.running.engine import Engine
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId, Reading
 from sparkplug.quality import Quality

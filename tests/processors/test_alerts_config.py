@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from processors.alerts_config import AlertsConfig
+from processors.alerts.config import AlertsConfig
 from processors.config import Configuration
 from processors.errors import ConfigurationError
 from tests.processors.courier.alert_shop import DESK

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from processors.alerts_messages import COMMAND, DELIVERY, OUTBOX
-from processors.alerts_report import STATE_TOPIC
+from processors.alerts.messages import COMMAND, DELIVERY, OUTBOX
+from processors.alerts.report import STATE_TOPIC
 from tests.depth import examples
 from tests.processors.courier.alert_shop import DESK, Shop
 

@@ -4,8 +4,8 @@ from typing import Any
 
 import pytest
 
-from processors.alerts import PROCESSOR
-from processors.alerts_config import ALARM_SIGNALS
+from processors.alerts.config import ALARM_SIGNALS
+from processors.alerts.processor import PROCESSOR
 from processors.discovery import discover
 from sparkplug.quality import Quality
 from tests.processors.courier.alert_shop import SCORE, T0_S, VIBRATION, Shop
@@ -266,7 +266,7 @@ def test_what_the_machine_was_doing_is_said() -> None:
 
 
 def test_history_wakes_nobody() -> None:
-    from processors.alerts import step
+    from processors.alerts.processor import step
     from processors.contract import Sample, SampleKind
 
     shop = Shop()

@@ -2,9 +2,9 @@
 
 import json
 
-from processors.alerts_messages import OUTBOX
-from processors.alerts_phases import Beat, caught_up
-from processors.alerts_state import Alert, AlertsState, Phase, Severity
+from processors.alerts.messages import OUTBOX
+from processors.alerts.phases import Beat, caught_up
+from processors.alerts.state import Alert, AlertsState, Phase, Severity
 from tests.processors.courier.alert_shop import VIBRATION, Shop
 
 BRIEF = {"signals": {VIBRATION: {"severity": "medium", "keep_firing_for_s": 5.0}}, "group_interval_s": 10.0}

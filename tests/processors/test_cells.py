@@ -9,8 +9,8 @@ import pytest
 from processors.config import CellConfig, Configuration
 from processors.contract import CellProcessor, Output, OutputSpec, Provenance, Sample, SampleKind
 from processors.effects import DeadLetter, Publish
-from processors.engine import Engine
 from processors.errors import ConfigurationError
+from processors.running.engine import Engine
 from sparkplug.datatype import DataType
 from tests.processors.streams import T0_MS, birth, data, death, engine_of, fed, published
 

@@ -12,7 +12,7 @@ from processors.config import Configuration, read_tables
 from processors.contract import TWIN_PREFIX
 from processors.discovery import AnyProcessor, discover, sample_configuration
 from processors.effects import DeadLetter, Effect, Publish, PublishPlain, Remove
-from processors.snapshot import decode_state, encode_state
+from processors.running.snapshot import decode_state, encode_state
 from sparkplug.host_session import HostEvent
 from tests.depth import examples
 from tests.processors.streams import birth, data, death, engine_of, fed, wild_streams

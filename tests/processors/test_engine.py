@@ -7,9 +7,9 @@ import pytest
 
 from processors.contract import NoState, OutputSpec, PlainSpec, Provenance
 from processors.effects import DeadLetter, Declare, Publish, Remove
-from processors.engine import Engine
 from processors.errors import DeclarationError
-from processors.ledger import DropReason
+from processors.running.engine import Engine
+from processors.running.ledger import DropReason
 from processors.sample import Sample, SampleKind
 from sparkplug.datatype import DataType
 from sparkplug.host_session import EventKind, HostEvent

@@ -9,8 +9,8 @@ import jsonschema
 import pytest
 
 from processors.effects import Publish
-from processors.events import PROCESSOR
-from processors.events_record import BYTES_MAX
+from processors.events.processor import PROCESSOR
+from processors.events.record import BYTES_MAX
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId
 from sparkplug.quality import Quality

@@ -10,14 +10,14 @@ from typing import Any
 import pytest
 from pydantic import TypeAdapter
 
-from processors import gap
 from processors.contract import Sample, SampleKind
 from processors.effects import Publish
-from processors.engine import Engine
 from processors.errors import ConfigurationError
-from processors.gap import BASIS, GAP, GROWING, GROWING_SIGNAL, LEFT_OUT, PROCESSOR, WINDOW, Config, State, step
-from processors.gap_growth import BLOCKS_MIN
-from processors.snapshot import decode_state, encode_state
+from processors.gap import processor as gap
+from processors.gap.growth import BLOCKS_MIN
+from processors.gap.processor import BASIS, GAP, GROWING, GROWING_SIGNAL, LEFT_OUT, PROCESSOR, WINDOW, Config, State, step
+from processors.running.engine import Engine
+from processors.running.snapshot import decode_state, encode_state
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import Change, NodeId, Reading
 from sparkplug.quality import Quality

@@ -6,8 +6,8 @@ from random import Random
 
 import pytest
 
-from processors import gap_growth
-from processors.gap_growth import BLOCKS_MIN, Baseline, Chart, Rule, charted, correlation, learned, rule_of, threshold
+from processors.gap import growth as gap_growth
+from processors.gap.growth import BLOCKS_MIN, Baseline, Chart, Rule, charted, correlation, learned, rule_of, threshold
 
 
 def series(random: Random, blocks: int, correlation: float) -> list[float]:

@@ -9,11 +9,11 @@ import pytest
 
 from processors.config import Configuration
 from processors.effects import DeadLetter, Effect, Publish
-from processors.engine import Engine
 from processors.errors import ConfigurationError
-from processors.joint_anomaly import PROCESSOR, RAW
-from processors.joint_config import Config
-from processors.joint_member import ADJUSTED, ALARM, COMMON, GATE, GATE_SOURCE, NO_MODEL, PEERS
+from processors.joint_anomaly.config import Config
+from processors.joint_anomaly.member import ADJUSTED, ALARM, COMMON, GATE, GATE_SOURCE, NO_MODEL, PEERS
+from processors.joint_anomaly.processor import PROCESSOR, RAW
+from processors.running.engine import Engine
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId
 from tests.processors.streams import T0_MS, birth, data, death, event, fed, reading
@@ -340,7 +340,7 @@ def test_history_that_comes_late_wakes_nobody() -> None:
 def test_a_threshold_is_refused_for_settings_that_it_was_not_fitted_with(monkeypatch: pytest.MonkeyPatch) -> None:
     fitted = Config().model_dump() | {"tick_s": 0.1}
     model = SimpleNamespace(features=("spindle_load_pct",), calibration=SimpleNamespace(**fitted), preparation=None)
-    monkeypatch.setattr("processors.joint_config._models_in", lambda _: {"a": model})
+    monkeypatch.setattr("processors.joint_anomaly.config._models_in", lambda _: {"a": model})
     with pytest.raises(ConfigurationError, match=r"tick_s = 1.0, but the threshold of a was fitted with 0.1"):
         Configuration(Config, {"models": "somewhere"}, name="joint_anomaly")
     assert Configuration(Config, {"models": "somewhere", "threshold": 0.3}, name="joint_anomaly").default.threshold == 0.3

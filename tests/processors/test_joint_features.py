@@ -6,11 +6,11 @@ import pytest
 
 from processors.config import Configuration
 from processors.effects import Effect, Publish
-from processors.engine import Engine
 from processors.errors import ConfigurationError
-from processors.joint_anomaly import PROCESSOR, RAW
-from processors.joint_config import Config
-from processors.joint_member import ADJUSTED, ALARM, COMMON, GATE, PEER
+from processors.joint_anomaly.config import Config
+from processors.joint_anomaly.member import ADJUSTED, ALARM, COMMON, GATE, PEER
+from processors.joint_anomaly.processor import PROCESSOR, RAW
+from processors.running.engine import Engine
 from sparkplug.host_session import HostEvent
 from sparkplug.metric import NodeId
 from tests.processors.streams import birth, data, fed
@@ -126,6 +126,6 @@ def test_a_restart_in_the_middle_changes_nothing() -> None:
 
 
 def test_a_model_without_baselines_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("processors.joint_config._models_in", lambda _: {"a": PlainModel()})
+    monkeypatch.setattr("processors.joint_anomaly.config._models_in", lambda _: {"a": PlainModel()})
     with pytest.raises(ConfigurationError, match="the model of a was not trained for it"):
         Configuration(Config, {"models": "somewhere", "common_mode": "features"}, name="joint_anomaly")

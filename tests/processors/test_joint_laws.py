@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from processors.effects import DeadLetter, Effect, Publish
-from processors.engine import Engine
-from processors.joint_anomaly import RAW
-from processors.joint_member import ADJUSTED, ALARM, COMMON, GATE
+from processors.joint_anomaly.member import ADJUSTED, ALARM, COMMON, GATE
+from processors.joint_anomaly.processor import RAW
+from processors.running.engine import Engine
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId
 from tests.depth import examples

@@ -3,7 +3,7 @@
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from processors.ledger import DropReason, Ledger
+from processors.running.ledger import DropReason, Ledger
 from sparkplug.host_session import EventKind, HostEvent
 from tests.processors.recorder import RECORDER
 from tests.processors.streams import engine_of, wild_streams

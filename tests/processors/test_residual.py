@@ -15,10 +15,10 @@ from pydantic import TypeAdapter
 
 from processors.config import Configuration
 from processors.effects import DeadLetter, Effect, Publish
-from processors.engine import Engine
 from processors.errors import ConfigurationError
 from processors.residual import BASIS, CORRECTED, CORRECTION, GAIN, IN_REGION, LEFT, NO_MODEL, PROCESSOR
-from processors.snapshot import decode_state, encode_state
+from processors.running.engine import Engine
+from processors.running.snapshot import decode_state, encode_state
 from processors.thermal import PROCESSOR as THERMAL
 from sparkplug.host_session import HostEvent
 from sparkplug.metric import NodeId

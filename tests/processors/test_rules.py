@@ -8,11 +8,11 @@ from hypothesis import strategies as st
 
 from processors.contract import OutputSpec
 from processors.effects import DeadLetter, Effect, Publish
-from processors.engine import Engine
 from processors.errors import ConfigurationError
-from processors.rule_alarm import IDLE, Judgement, Stand, Timing, latched
-from processors.rule_vibration import BOUNDARIES_MM_S
-from processors.rules import DETAIL, PROCESSOR, RULES, SEVERITY, ZONE
+from processors.rules.alarm import IDLE, Judgement, Stand, Timing, latched
+from processors.rules.processor import DETAIL, PROCESSOR, RULES, SEVERITY, ZONE
+from processors.rules.vibration import BOUNDARIES_MM_S
+from processors.running.engine import Engine
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import Change
 from sparkplug.quality import Quality

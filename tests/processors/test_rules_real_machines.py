@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from processors.effects import DeadLetter
-from processors.rules import PROCESSOR
+from processors.rules.processor import PROCESSOR
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import Reading
 from sparkplug.quality import Quality

@@ -14,7 +14,7 @@ import pytest
 
 from processors.config import Configuration
 from processors.errors import ConfigurationError, UnknownProcessorError
-from processors.runtime import configured, run
+from processors.running.runtime import configured, run
 from processors.thermal import PROCESSOR as THERMAL
 from sparkplug.broker import BrokerAddress
 from sparkplug.datatype import DataType
@@ -125,7 +125,8 @@ def process(broker: BrokerAddress, tmp_path: Path, *names: str) -> subprocess.Po
     config = tmp_path / "processors.toml"
     config.write_text(CONFIGURATION)
     code = (
-        "import sys; from pathlib import Path; from processors.runtime import run; from sparkplug.broker import BrokerAddress;"
+        "import sys; from pathlib import Path; from processors.running.runtime import run;"
+        "from sparkplug.broker import BrokerAddress;"
         f"run({names!r}, BrokerAddress(port={broker.port}), Path(sys.argv[1]), session_dir=Path(sys.argv[2]))"
     )
     command = [sys.executable, "-c", code, str(config), str(tmp_path / "sessions")]

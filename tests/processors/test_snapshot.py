@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import TypeAdapter
 
-from processors.engine import Engine
 from processors.errors import SnapshotError
-from processors.snapshot import decode_state, encode_state
+from processors.running.engine import Engine
+from processors.running.snapshot import decode_state, encode_state
 from processors.thermal import PROCESSOR
 from tests.processors.streams import birth, data, engine_of, fed
 

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from processors.effects import Effect, Publish
-from processors.engine import Engine
+from processors.running.engine import Engine
 from processors.thermal import BASIS, PROCESSOR, RESIDUAL, RISE, TEMPERATURE
 from sparkplug.host_session import EventKind
 from sparkplug.metric import Change

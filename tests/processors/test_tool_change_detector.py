@@ -11,8 +11,8 @@ from pydantic import TypeAdapter
 from processors.config import Configuration
 from processors.effects import DeadLetter, Effect
 from processors.errors import ConfigurationError
-from processors.snapshot import decode_state, encode_state
-from processors.tool_change_detector import ACTIVE, BASIS, CONFIDENCE, PHASE, PROCESSOR, SOURCE
+from processors.running.snapshot import decode_state, encode_state
+from processors.tool_change_detector.processor import ACTIVE, BASIS, CONFIDENCE, PHASE, PROCESSOR, SOURCE
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import Change
 from sparkplug.quality import Quality

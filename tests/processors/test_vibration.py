@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from pydantic import TypeAdapter
 
 from processors.effects import DeadLetter, Effect, Publish
-from processors.engine import Engine
-from processors.snapshot import decode_state, encode_state
+from processors.running.engine import Engine
+from processors.running.snapshot import decode_state, encode_state
 from processors.vibration import BLOCK, CREST, KURTOSIS, NAMES, PEAK, PROCESSOR, RATE, RMS, VELOCITY
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import Change
@@ -310,6 +310,6 @@ def test_nothing_that_comes_as_a_block_crashes_it(stream: list[tuple[float, Any,
 
 
 def test_it_is_found_without_numpy() -> None:
-    code = "import sys; sys.modules['numpy'] = None; import processors.vibration, processors.rules"
+    code = "import sys; sys.modules['numpy'] = None; import processors.vibration, processors.rules.processor"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

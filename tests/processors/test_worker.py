@@ -11,9 +11,9 @@ import pytest
 
 from processors.config import Configuration
 from processors.discovery import AnyProcessor
-from processors.ledger import DropReason
+from processors.running.ledger import DropReason
+from processors.running.worker import Worker
 from processors.thermal import PROCESSOR as THERMAL
-from processors.worker import Worker
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import Change, MetricSpec, NodeId
 from tests.processors.recorder import RECORDER
@@ -137,7 +137,7 @@ def test_it_subscribes_first_and_folds_only_after_the_snapshots_have_come() -> N
 def test_a_broker_that_never_gives_the_marker_back_costs_a_second(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr("processors.worker.RESTORE_S_MAX", 0.01)
+    monkeypatch.setattr("processors.running.worker.RESTORE_S_MAX", 0.01)
     worker = Worker(RECORDER, Configuration(RECORDER.config), FakeHost(birth(0.0, spindle_rpm=1.0), marker=False), FakeEdge())
     stop = Event()
     Timer(0.2, stop.set).start()

@@ -10,9 +10,9 @@ from cnctwin.anomaly_training.recorded_cell import part
 from cnctwin.anomaly_training.replayed_cell import replayed
 from processors.config import Configuration
 from processors.effects import Publish
-from processors.engine import Engine
-from processors.joint_anomaly import PROCESSOR
-from processors.joint_config import Config
+from processors.joint_anomaly.config import Config
+from processors.joint_anomaly.processor import PROCESSOR
+from processors.running.engine import Engine
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId, Reading
 from sparkplug.quality import Quality

@@ -10,7 +10,7 @@ import pytest
 from cnctwin.api import alert_routes
 from cnctwin.api.access import Access
 from cnctwin.api.server import Server
-from processors.runtime import run
+from processors.running.runtime import run
 from sparkplug.broker import BrokerAddress
 from sparkplug.datatype import DataType
 from sparkplug.edge_node import EdgeNode

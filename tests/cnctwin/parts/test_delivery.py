@@ -10,7 +10,7 @@ from cnctwin.parts.journal import Journal
 from cnctwin.parts.record_log import parts
 from cnctwin.store.contract import Message
 from cnctwin.store.opening import open_store
-from processors.courier.outcome import Outcome, Verdict
+from processors.alerts.courier.outcome import Outcome, Verdict
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId, Reading
 from sparkplug.quality import Quality

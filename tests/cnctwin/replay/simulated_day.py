@@ -1,7 +1,7 @@
 """A day in memory: edges, processors and a historian, each with a clock of its own, on a broker that keeps the order.
 
-What a processor does is what `processors.worker.Worker` does, so far as it matters to the state: events as they come, silence
-when none waits, a snapshot within two seconds; it may be killed at any moment and started again.
+What a processor does is what `processors.running.worker.Worker` does, so far as it matters to the state: events as they come,
+silence when none waits, a snapshot within two seconds; it may be killed at any moment and started again.
 """
 
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ from cnctwin.store.contract import Message, Snapshot
 from processors.config import Configuration
 from processors.discovery import AnyProcessor
 from processors.effects import Declare, Effect, Publish, Remove
-from processors.engine import Engine
+from processors.running.engine import Engine
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import Change, NodeId, Reading
 from tests.cnctwin.replay.memory_store import MemoryStore

@@ -9,7 +9,7 @@ from cnctwin.shdr_import import recorded_runs
 from cnctwin.simulated_machine.anomaly_model import FEATURES, place_model
 from cnctwin.simulated_machine.description import DEVICES, SPARE_PART
 from processors.config import Configuration, read_tables
-from processors.joint_config import Config
+from processors.joint_anomaly.config import Config
 
 
 def test_the_part_that_ships_with_the_project_is_nothing_unusual_to_it(tmp_path: Path) -> None:

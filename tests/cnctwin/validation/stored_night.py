@@ -9,7 +9,7 @@ from cnctwin.store.opening import open_store
 from processors.config import Configuration
 from processors.discovery import find
 from processors.effects import Declare, Publish
-from processors.engine import Engine
+from processors.running.engine import Engine
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import Change, NodeId, Reading
 from sparkplug.quality import Quality

@@ -6,14 +6,14 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
-from processors.alerts import step
-from processors.alerts_config import AlertsConfig
-from processors.alerts_messages import COMMAND, DELIVERY, OUTBOX
-from processors.alerts_report import STATE_TOPIC
-from processors.alerts_state import AlertsState
+from processors.alerts.config import AlertsConfig
+from processors.alerts.messages import COMMAND, DELIVERY, OUTBOX
+from processors.alerts.processor import step
+from processors.alerts.report import STATE_TOPIC
+from processors.alerts.state import AlertsState
 from processors.config import Configuration
 from processors.contract import Output, PlainOutput, Sample, SampleKind
-from processors.snapshot import decode_state, encode_state
+from processors.running.snapshot import decode_state, encode_state
 from sparkplug.metric import Reading
 from sparkplug.quality import Quality
 

@@ -12,9 +12,9 @@ from typing import Any
 
 import pytest
 
-from processors.alerts_config import AlertsConfig
-from processors.courier.thread import Courier
-from processors.runtime import run
+from processors.alerts.config import AlertsConfig
+from processors.alerts.courier.thread import Courier
+from processors.running.runtime import run
 from sparkplug.broker import BrokerAddress
 from sparkplug.datatype import DataType
 from sparkplug.edge_node import EdgeNode
@@ -177,8 +177,8 @@ def test_a_broker_that_is_killed_and_comes_back_empty_brings_no_notification_twi
 
 CODE = """
 import json, sys, threading
-from processors.alerts_config import AlertsConfig
-from processors.courier.thread import Courier
+from processors.alerts.config import AlertsConfig
+from processors.alerts.courier.thread import Courier
 from sparkplug.broker import BrokerAddress
 Courier(BrokerAddress(port=int(sys.argv[1])), AlertsConfig.model_validate(json.loads(sys.argv[2]))).start()
 threading.Event().wait()
@@ -230,7 +230,7 @@ def test_killed_at_any_moment_nothing_comes_twice_and_what_is_missing_is_said_to
 def pushover(server: ReceivingServer, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     monkeypatch.setenv("PUSHOVER_TOKEN", "t" * 30)
     monkeypatch.setenv("PUSHOVER_USER", "u" * 30)
-    monkeypatch.setattr("processors.courier.thread.POLLS_S_MIN", 0.3)
+    monkeypatch.setattr("processors.alerts.courier.thread.POLLS_S_MIN", 0.3)
     server.by_path["/1/messages.json"] = Answer(200, b'{"status":1,"request":"r","receipt":"rcpt1"}')
     server.by_path["/1/receipts/rcpt1.json"] = Answer(200, b'{"status":1,"acknowledged":0,"expired":0}')
     server.by_path["/1/receipts/rcpt1/cancel.json"] = Answer(200, b'{"status":1}')

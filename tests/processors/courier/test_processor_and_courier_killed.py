@@ -24,10 +24,10 @@ MARKER = "cnctwin/marker/alerts"
 CODE = """
 import sys
 from pathlib import Path
-from processors.alerts_config import AlertsConfig
+from processors.alerts.config import AlertsConfig
 from processors.config import read_tables
-from processors.courier.thread import Courier
-from processors.runtime import run
+from processors.alerts.courier.thread import Courier
+from processors.running.runtime import run
 from sparkplug.broker import BrokerAddress
 broker, file = BrokerAddress(port=int(sys.argv[1])), Path(sys.argv[2])
 Courier(broker, AlertsConfig.model_validate(read_tables(file)["alerts"])).start()

@@ -11,13 +11,13 @@ from typing import Any
 import pytest
 from pydantic import TypeAdapter
 
-from processors.alerts_messages import OUTBOX
-from processors.alerts_receivers import AnyReceiver
-from processors.courier.alertmanager import alerts_for
-from processors.courier.outcome import Verdict
-from processors.courier.pushover import Pushover, ReceiptState
-from processors.courier.secret import read_secret
-from processors.courier.service import Message, Service, service_of
+from processors.alerts.courier.alertmanager import alerts_for
+from processors.alerts.courier.outcome import Verdict
+from processors.alerts.courier.pushover import Pushover, ReceiptState
+from processors.alerts.courier.secret import read_secret
+from processors.alerts.courier.service import Message, Service, service_of
+from processors.alerts.messages import OUTBOX
+from processors.alerts.receivers import AnyReceiver
 from processors.errors import ConfigurationError
 from tests.processors.courier.alert_shop import Shop
 from tests.processors.courier.receiving_server import Answer, ReceivingServer

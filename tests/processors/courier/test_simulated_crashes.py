@@ -14,16 +14,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import TypeAdapter
 
-from processors.alerts import step
-from processors.alerts_config import AlertsConfig
-from processors.alerts_messages import DELIVERY, OUTBOX
-from processors.alerts_state import AlertsState
+from processors.alerts.config import AlertsConfig
+from processors.alerts.courier.desk import CLAIM, Desk, Publish, Send
+from processors.alerts.courier.outcome import Outcome, Verdict
+from processors.alerts.courier.service import Message
+from processors.alerts.messages import DELIVERY, OUTBOX
+from processors.alerts.processor import step
+from processors.alerts.state import AlertsState
 from processors.config import Configuration
 from processors.contract import PlainOutput, Sample, SampleKind
-from processors.courier.desk import CLAIM, Desk, Publish, Send
-from processors.courier.outcome import Outcome, Verdict
-from processors.courier.service import Message
-from processors.snapshot import decode_state, encode_state
+from processors.running.snapshot import decode_state, encode_state
 from sparkplug.metric import Reading
 from sparkplug.quality import Quality
 from tests.depth import examples

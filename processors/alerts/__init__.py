@@ -1,0 +1,1 @@
+"""Alerts: from alarm signals to notifications. `processor.py` declares the processor, `courier/` sends."""

@@ -1,0 +1,130 @@
+"""Configuration of alerts: which signals, how long, who is told, how often. All durations are wall clock."""
+
+import re
+from collections.abc import Mapping
+from typing import Any, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
+
+from processors.alerts.quiet import QuietHours
+from processors.alerts.receivers import AnyReceiver, Escalation, Heartbeat
+from processors.alerts.state import Severity
+from processors.config import CellConfig
+
+RULES = ("twin/rule_load_over_limit", "twin/rule_thermal_runaway", "twin/rule_load_without_feed", "twin/rule_vibration")
+SCORE = "twin/anomaly_alarm"
+GAP, DRIFT = "twin/gap_growing", "twin/score_drift"
+ALARM_SIGNALS = (*RULES, SCORE, GAP, DRIFT)
+MACHINE_OFFLINE, SOURCE_LOST = "machine_offline", "alarm_source_lost"
+RECEIVERS_MAX = 20
+ROUTES_MAX = 100
+_NAME = re.compile(r"[A-Za-z0-9_-]{1,32}")
+_LABEL = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,63}")
+_RECEIVERS: TypeAdapter[dict[str, AnyReceiver]] = TypeAdapter(dict[str, AnyReceiver])
+_OWN_LABELS = frozenset({"alertname", "machine", "signal", "severity"})
+
+
+class Rule(BaseModel):
+    """One kind of alert.
+
+    for_s: the alarm has to stand so long before the alert fires
+    keep_firing_for_s: it has to be gone so long before the alert is resolved
+    raised_by_rule: high where a rule fires on the same machine
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    severity: Severity
+    for_s: float = Field(default=0.0, ge=0.0, le=86_400.0)
+    keep_firing_for_s: float = Field(default=60.0, ge=0.0, le=86_400.0)
+    raised_by_rule: bool = False
+
+
+def _signals() -> dict[str, Rule]:
+    rules = dict.fromkeys(RULES, Rule(severity=Severity.HIGH))
+    score = Rule(severity=Severity.MEDIUM, raised_by_rule=True)
+    return {**rules, SCORE: score, GAP: Rule(severity=Severity.MEDIUM), DRIFT: Rule(severity=Severity.LOW)}
+
+
+class Route(BaseModel):
+    """Which alerts go to which receivers; what is left empty matches all. An alert goes to the receivers of every route that
+    matches it."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    receivers: tuple[str, ...]
+    machines: tuple[str, ...] = ()
+    alerts: tuple[str, ...] = ()
+    severity_min: Severity = Severity.LOW
+    escalation: tuple[Escalation, ...] = ()
+
+
+class AlertsConfig(CellConfig):
+    """See the sample file, which says what each field does."""
+
+    signals: dict[str, Rule] = Field(default_factory=_signals)
+    machine_offline: Rule | None = Rule(severity=Severity.MEDIUM, for_s=60.0)
+    alarm_source_lost: Rule | None = Rule(severity=Severity.MEDIUM, for_s=120.0)
+    labels: dict[str, str] = Field(default_factory=dict)
+    group_by: Literal["machine", "all"] = "machine"
+    group_wait_s: float = Field(default=10.0, ge=0.0, le=3600.0)
+    group_interval_s: float = Field(default=300.0, ge=0.0, le=86_400.0)
+    repeat_interval_s: float = Field(default=14_400.0, ge=60.0, le=30 * 86_400.0)
+    flap_episodes: int = Field(default=4, ge=2, le=50)
+    flap_window_s: float = Field(default=21_600.0, ge=60.0, le=7 * 86_400.0)
+    flap_keep_firing_for_s: float = Field(default=7200.0, ge=0.0, le=7 * 86_400.0)
+    forget_after_s: float = Field(default=604_800.0, ge=3600.0, le=365 * 86_400.0)
+    external_url: str = Field(default="", max_length=200)
+    receivers: dict[str, AnyReceiver] = Field(default_factory=dict, max_length=RECEIVERS_MAX)
+    routes: tuple[Route, ...] = Field(default=(), max_length=ROUTES_MAX)
+    quiet_hours: tuple[QuietHours, ...] = Field(default=(), max_length=ROUTES_MAX)
+    heartbeat: Heartbeat = Heartbeat()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _says_no_secret(cls, table: Any) -> Any:
+        """A receiver's table is checked here first: an error about it must not repeat what stands there, perhaps a secret."""
+        receivers = table.get("receivers", {}) if isinstance(table, Mapping) else {}
+        try:
+            _RECEIVERS.validate_python(receivers)
+        except ValidationError as error:
+            first = error.errors(include_input=False)[0]
+            where = ".".join(str(part) for part in first["loc"])
+            raise ValueError(f"receivers.{where}: {first['msg'].removeprefix('Value error, ')}") from None
+        return table
+
+    @model_validator(mode="after")
+    def _names_are_known(self) -> Self:
+        if self.cells:
+            raise ValueError("cells: alerts watch all machines together; leave it out")
+        for signal in self.signals:
+            if signal not in ALARM_SIGNALS:
+                raise ValueError(f"signals: {signal!r} is no alarm signal; there are: {', '.join(ALARM_SIGNALS)}")
+        for name in self.labels:
+            if not _LABEL.fullmatch(name) or name in _OWN_LABELS:
+                raise ValueError(
+                    f"labels: {name!r} has to be letters, digits and _, and none of {', '.join(sorted(_OWN_LABELS))}"
+                )
+        for name in self.receivers:
+            if not _NAME.fullmatch(name):
+                raise ValueError(f"receivers: {name!r} has to be 1 to 32 letters, digits, - and _")
+        named = [(f"routes[{n}]", name) for n, route in enumerate(self.routes) for name in _receivers_of(route)]
+        named += [(f"quiet_hours[{n}]", name) for n, quiet in enumerate(self.quiet_hours) for name in quiet.receivers]
+        named += [("heartbeat", self.heartbeat.receiver)] if self.heartbeat.receiver else []
+        for where, name in named:
+            if name not in self.receivers:
+                raise ValueError(f"{where}: there is no receiver {name!r}; there are: {', '.join(self.receivers) or 'none'}")
+        beats_to = self.receivers.get(self.heartbeat.receiver)
+        if beats_to is not None and beats_to.type == "pushover":
+            raise ValueError("heartbeat: a person is not to be told every few minutes that all is well; use a webhook")
+        return self
+
+    def rule_of(self, name: str, signal: str) -> Rule | None:
+        """The rule of an alert; None where it is not watched (any more)."""
+        if signal:
+            return self.signals.get(signal)
+        return {MACHINE_OFFLINE: self.machine_offline, SOURCE_LOST: self.alarm_source_lost}.get(name)
+
+
+def _receivers_of(route: Route) -> tuple[str, ...]:
+    return (*route.receivers, *(step.receiver for step in route.escalation))

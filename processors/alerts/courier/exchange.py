@@ -1,0 +1,138 @@
+"""One HTTP request, within limits of time and size, and what its end says about whether it was taken.
+
+A connection is made for each: one that lay idle may be closed by the server just when a notification goes into it, and then
+nobody knows whether it arrived. Redirects are not followed: a secret goes nowhere but to the address that was configured.
+"""
+
+import asyncio
+import logging
+import ssl
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+from urllib.parse import urlsplit
+
+import httpx
+
+from processors.alerts.courier.outcome import Outcome, Verdict
+from processors.alerts.courier.secret import redacted
+from processors.alerts.receivers import LOOPBACK
+
+ANSWER_BYTES_MAX = 64 * 1024
+CONNECT_S_MAX = 5.0
+AFTER_S_MAX = 300.0
+for _chatty in ("httpx", "httpcore"):  # they log whole addresses, and a token may be in one
+    logging.getLogger(_chatty).setLevel(logging.WARNING)
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """What is to be sent; `secrets` are kept out of every reason."""
+
+    method: str
+    url: str
+    headers: Mapping[str, str]
+    json: Any = None
+    content: bytes | None = None
+    form: Mapping[str, str] | None = None
+    query: Mapping[str, str] | None = None
+    secrets: Sequence[str] = ()
+
+    @property
+    def host(self) -> str:
+        """Where it goes, for people to read."""
+        return urlsplit(self.url).hostname or "?"
+
+
+class Answer:
+    """An answer; `body` is cut at ANSWER_BYTES_MAX, or where the connection ended."""
+
+    __slots__ = ("body", "headers", "status")
+
+    def __init__(self, status: int, headers: Mapping[str, str], body: bytes) -> None:
+        self.status, self.headers, self.body = status, headers, body
+
+
+def exchanged(request: Request, timeout_s: float) -> Answer | Outcome:
+    """The answer, or the outcome where there is none."""
+    return asyncio.run(_limited(request, timeout_s))
+
+
+def judged(answer: Answer, request: Request) -> Outcome:
+    """What a status says: 2xx taken; 429 and 5xx surely not taken, but for 504, where a gateway has passed it on."""
+    status = answer.status
+    if 200 <= status < 300:
+        return Outcome(Verdict.DELIVERED)
+    reason = f"{request.host} answered {status}"
+    if status == 504:
+        return Outcome(Verdict.UNSURE, f"{reason}: a gateway had no answer; it may have arrived")
+    if status == 429 or status >= 500:
+        return Outcome(Verdict.NOT_TAKEN, reason, _after_s(answer.headers.get("retry-after", "")))
+    return Outcome(Verdict.REFUSED, reason)
+
+
+def _after_s(text: str) -> float | None:
+    """The Retry-After header in seconds; a date is not worth reading.
+
+    >>> _after_s("30"), _after_s("Wed, 21 Oct 2026 07:28:00 GMT"), _after_s("1e9")
+    (30.0, None, None)
+    """
+    return min(float(text), AFTER_S_MAX) if text.isascii() and text.isdigit() else None
+
+
+@lru_cache(maxsize=1)
+def _authorities() -> ssl.SSLContext:
+    """Whom to trust; read once, since that takes longer than a request."""
+    return httpx.create_ssl_context()
+
+
+async def _limited(request: Request, timeout_s: float) -> Answer | Outcome:
+    begun: list[str] = []
+    try:
+        async with asyncio.timeout(timeout_s + CONNECT_S_MAX):
+            return await _exchange(request, timeout_s, begun)
+    except TimeoutError:
+        return _without_answer(request, f"no answer within {timeout_s:g} s", begun)
+    except httpx.TimeoutException as error:
+        return _without_answer(request, f"{type(error).__name__} after {timeout_s:g} s", begun)
+    except (httpx.HTTPError, httpx.InvalidURL, OSError) as error:
+        return _without_answer(request, f"{type(error).__name__}: {error}", begun)
+
+
+def _without_answer(request: Request, error: str, begun: list[str]) -> Outcome:
+    reason = redacted(f"{request.host}: {error}", [request.url, *request.secrets])
+    if begun:
+        return Outcome(Verdict.UNSURE, f"{reason}; it may have arrived")
+    return Outcome(Verdict.NOT_TAKEN, reason)
+
+
+async def _exchange(request: Request, timeout_s: float, begun: list[str]) -> Answer:
+    async def watch(event: str, _: Any) -> None:
+        if event.endswith("send_request_headers.started"):
+            begun.append(event)
+
+    limits = httpx.Timeout(timeout_s, connect=min(timeout_s, CONNECT_S_MAX))
+    # The proxies of the environment are for what is outside; nothing of this computer goes through them.
+    is_outside = request.host not in LOOPBACK
+    async with (
+        httpx.AsyncClient(timeout=limits, follow_redirects=False, trust_env=is_outside, verify=_authorities()) as client,
+        client.stream(
+            request.method,
+            request.url,
+            headers=dict(request.headers),
+            json=request.json,
+            content=request.content,
+            data=None if request.form is None else dict(request.form),
+            params=None if request.query is None else dict(request.query),
+            extensions={"trace": watch},
+        ) as response,
+    ):
+        body = b""
+        with suppress(httpx.HTTPError, TimeoutError, asyncio.CancelledError):  # the status has come, and says it
+            async for piece in response.aiter_bytes():
+                body += piece
+                if len(body) >= ANSWER_BYTES_MAX:
+                    break
+        return Answer(response.status_code, response.headers, body[:ANSWER_BYTES_MAX])

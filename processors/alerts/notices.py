@@ -1,0 +1,216 @@
+"""When a receiver is told: grouping, the interval of a group, repeats, the rate limit, quiet hours.
+
+News waits group_wait_s, so that what happens together is told together. A group that was told is told again after
+group_interval_s; a high alert that begins does not wait for that. In quiet hours only high alerts go out; what is still so at
+their end goes out as one digest. What the rate limit holds back is told when there is room, as it is then, and the number of
+notifications that were held back is said.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import NamedTuple
+
+from processors.alerts.body import Notice, item
+from processors.alerts.config import AlertsConfig
+from processors.alerts.receivers import AnyReceiver
+from processors.alerts.routing import FIRING, OVER, PASSED, RAISED, REPEAT, RESOLVED, Change, changes_for, has_passed
+from processors.alerts.silence import silenced_by
+from processors.alerts.state import OUTBOX_MAX, Alert, AlertsState, Group, ReceiverState, Severity, Told
+from processors.config import Configuration
+
+HOUR_S = 3600.0
+EXPIRES_S = 6 * HOUR_S
+DIGEST = "digest"
+
+
+class _Bundle(NamedTuple):
+    """News that goes out together."""
+
+    kind: str
+    key: str
+    labels: Mapping[str, str]
+    news: list[Change]
+
+
+class _Desk(NamedTuple):
+    """What deciding for one receiver needs."""
+
+    name: str
+    receiver: AnyReceiver
+    config: AlertsConfig
+    state: AlertsState
+    silenced: Mapping[str, str]
+
+
+def notified(configuration: Configuration[AlertsConfig], state: AlertsState) -> AlertsState:
+    """The state with every notification that is due in the outbox."""
+    config = configuration.default
+    configs = {alert.machine: configuration.of(alert.machine) for alert in state.alerts.values()}
+    silences = tuple(silence for silence in state.silences if silence.ends_s > state.wall_s)
+    state = replace(state, silences=silences)
+    silenced = silenced_alerts(state, configs)
+    receivers, outbox = {}, dict(state.outbox)
+    for name, receiver in config.receivers.items():
+        known = _passed_in_silence(_tidied(state.receivers.get(name, ReceiverState()), state), state, silenced)
+        changes = changes_for(name, known, state, configs, silenced)
+        if not receiver.send_resolved:
+            known, changes = _without_resolved(known, changes, state.clock_s)
+        desk = _Desk(name, receiver, config, state, silenced)
+        known, notices = _due(desk, known, changes)
+        for notice in notices:
+            if len(outbox) < OUTBOX_MAX:
+                made = item(notice, config, state.wall_s, state.clock_s)
+                if made.id not in state.settled and made.id not in outbox:
+                    outbox[made.id] = made
+        receivers[name] = known
+    return replace(state, receivers=receivers, outbox=outbox)
+
+
+def silenced_alerts(state: AlertsState, configs: Mapping[str, AlertsConfig]) -> dict[str, str]:
+    """The alerts that a silence holds for, and which."""
+    if not state.silences:
+        return {}
+    found = {key: silenced_by(state.silences, a, configs[a.machine], state.wall_s) for key, a in state.alerts.items()}
+    return {key: silence for key, silence in found.items() if silence}
+
+
+def _tidied(known: ReceiverState, state: AlertsState) -> ReceiverState:
+    """Without what is over: alerts that are forgotten, notifications of more than an hour ago."""
+    after_s = state.clock_s - HOUR_S
+    return replace(
+        known,
+        told={key: told for key, told in known.told.items() if key in state.alerts},
+        recent_s=tuple(at_s for at_s in known.recent_s if at_s > after_s),
+        recent_high_s=tuple(at_s for at_s in known.recent_high_s if at_s > after_s),
+    )
+
+
+def _passed_in_silence(known: ReceiverState, state: AlertsState, silenced: Mapping[str, str]) -> ReceiverState:
+    """What came and went while it was silenced is not told afterwards."""
+    alerts = [state.alerts[key] for key in silenced]
+    over = [alert for alert in alerts if has_passed(alert, known.told.get(alert.fingerprint), state.clock_s)]
+    firing = [alert for alert in over if (told := known.told.get(alert.fingerprint)) is not None and told.is_firing]
+    return _told(known, [Change(alert, PASSED, 0) for alert in over if alert not in firing], state.clock_s)
+
+
+def _without_resolved(known: ReceiverState, changes: list[Change], clock_s: float) -> tuple[ReceiverState, list[Change]]:
+    """For a receiver that wants no ends: they are noted as told, so that the next firing is news."""
+    ended = [change for change in changes if change.what == RESOLVED]
+    return _told(known, ended, clock_s), [change for change in changes if change.what != RESOLVED]
+
+
+def _due(desk: _Desk, known: ReceiverState, changes: list[Change]) -> tuple[ReceiverState, list[Notice]]:
+    """The notices that are due for one receiver, and what it knows then."""
+    config, clock_s = desk.config, desk.state.clock_s
+    quiet = any(hours.holds(desk.name, desk.state.wall_s) for hours in config.quiet_hours)
+    notices: list[Notice] = []
+    if quiet:
+        loud = [change for change in changes if change.alert.severity is Severity.HIGH]
+        muted = [change for change in changes if change not in loud]
+        over = [change for change in muted if change.what == PASSED]  # not so any more when the quiet ends
+        known = replace(_told(known, over, clock_s), is_muted=known.is_muted or len(over) < len(muted))
+        changes = loud
+    elif known.is_muted:
+        if changes:
+            is_held = known.groups.get(DIGEST, Group()).is_held
+            known, sent = _send(desk, known, _Bundle(DIGEST, DIGEST, {}, changes), is_held=is_held)
+            if sent is None:
+                return replace(known, groups=known.groups | {DIGEST: Group(is_held=True)}), []
+            notices.append(sent)
+        known, changes = replace(known, is_muted=False), []
+    groups: dict[str, list[Change]] = {}
+    for change in changes:
+        groups.setdefault(_group_key(config, change.alert), []).append(change)
+    states = {key: group for key, group in known.groups.items() if key in groups or _is_fresh(group, config, clock_s)}
+    for key in states.keys() - groups.keys():
+        states[key] = replace(states[key], waiting_s=None, is_held=False)
+    for key, news in groups.items():
+        group = states.get(key, Group())
+        if group.waiting_s is None:
+            group = replace(group, waiting_s=clock_s)
+        states[key] = group
+        if not _is_ready(group, news, config, clock_s):
+            continue
+        bundle = _Bundle("notify", key, _group_labels(config, news[0].alert), news)
+        known, sent = _send(desk, known, bundle, is_held=group.is_held)
+        if sent is None:
+            states[key] = replace(group, is_held=True)
+            continue
+        notices.append(sent)
+        states[key] = Group(sent_s=clock_s)
+    return replace(known, groups=states), notices
+
+
+def _is_ready(group: Group, news: list[Change], config: AlertsConfig, clock_s: float) -> bool:
+    waited_s = clock_s - (clock_s if group.waiting_s is None else group.waiting_s)
+    if waited_s < config.group_wait_s and not all(change.what == REPEAT for change in news):
+        return False
+    if group.sent_s is None or clock_s - group.sent_s >= config.group_interval_s:
+        return True
+    return any(change.alert.severity is Severity.HIGH and change.what in (FIRING, RAISED) for change in news)
+
+
+def _is_fresh(group: Group, config: AlertsConfig, clock_s: float) -> bool:
+    return group.sent_s is not None and clock_s - group.sent_s < config.group_interval_s
+
+
+def _send(desk: _Desk, known: ReceiverState, bundle: _Bundle, *, is_held: bool) -> tuple[ReceiverState, Notice | None]:
+    """The notice, unless the rate limit holds it back; counted when it begins to."""
+    kind, key, labels, news = bundle
+    clock_s, receiver = desk.state.clock_s, desk.receiver
+    is_high = any(change.alert.severity is Severity.HIGH and change.what not in OVER for change in news)
+    used = len(known.recent_high_s if is_high else known.recent_s)
+    if used >= (receiver.rate_high_per_hour if is_high else receiver.rate_per_hour) or len(desk.state.outbox) >= OUTBOX_MAX:
+        if is_held:
+            return known, None
+        held, unsaid = known.held_back + 1, known.held_back_unsaid + 1
+        return replace(known, held_back=held, held_back_unsaid=unsaid), None
+    notes = (f"{known.held_back_unsaid} notifications were held back before this one",) if known.held_back_unsaid else ()
+    alerts = _alerts_in(desk, known, key, news, kind)
+    says = tuple(change.says for change in news)
+    notice = Notice(desk.name, kind, f"{{}}/{{receiver={desk.name!r}}}:{{{key}}}", labels, alerts, says, notes, EXPIRES_S)
+    if is_high:
+        known = replace(known, recent_high_s=(*known.recent_high_s, clock_s))
+    else:
+        known = replace(known, recent_s=(*known.recent_s, clock_s))
+    known = _told(replace(known, held_back_unsaid=0), news, clock_s)
+    also = {alert.fingerprint: replace(known.told[alert.fingerprint], at_s=clock_s) for alert in alerts if alert.is_on}
+    return replace(known, told=known.told | also), notice
+
+
+def _alerts_in(desk: _Desk, known: ReceiverState, key: str, news: list[Change], kind: str) -> tuple[Alert, ...]:
+    """What is new, then what else of the group this receiver believes to be firing, so that it sees the whole."""
+    new = tuple(change.alert for change in news)
+    if kind == DIGEST:
+        return new
+    named = {alert.fingerprint for alert in new}
+    rest = (
+        alert
+        for fingerprint, alert in desk.state.alerts.items()
+        if fingerprint not in named
+        and alert.is_on
+        and fingerprint not in desk.silenced
+        and _group_key(desk.config, alert) == key
+        and (told := known.told.get(fingerprint)) is not None
+        and told.episode == alert.episode
+        and told.is_firing
+    )
+    return (*new, *rest)
+
+
+def _told(known: ReceiverState, news: list[Change], clock_s: float) -> ReceiverState:
+    told = {
+        change.alert.fingerprint: Told(
+            change.alert.episode, change.alert.severity, change.what not in OVER, clock_s, change.told_before + 1
+        )
+        for change in news
+    }
+    return replace(known, told=known.told | told)
+
+
+def _group_key(config: AlertsConfig, alert: Alert) -> str:
+    return f"machine={alert.machine!r}" if config.group_by == "machine" else ""
+
+
+def _group_labels(config: AlertsConfig, alert: Alert) -> dict[str, str]:
+    return {"machine": alert.machine} if config.group_by == "machine" else {}

@@ -1,0 +1,112 @@
+"""Which receivers an alert goes to, and what is news to each of them."""
+
+from collections.abc import Iterable, Mapping
+from typing import NamedTuple
+
+from processors.alerts.config import AlertsConfig, Route
+from processors.alerts.state import Alert, AlertsState, Phase, ReceiverState, Severity, Told
+
+FIRING, RAISED, REPEAT, RESOLVED = "firing", "raised", "repeat", "resolved"
+PASSED = "passed"  # it fired and was over before anybody was told
+OVER = (RESOLVED, PASSED)
+PASSED_S_MAX = 3600.0
+
+
+class Change(NamedTuple):
+    """An alert that a receiver has to be told of, what is new, and how often it was told of this episode before."""
+
+    alert: Alert
+    what: str
+    told_before: int
+
+    @property
+    def says(self) -> str:
+        """What the notification says, to be recognized after a crash."""
+        alert = self.alert
+        return f"{alert.fingerprint}.{alert.episode}.{self.what}.{self.told_before}.{alert.severity.value}"
+
+
+class Said(NamedTuple):
+    """What a notification said of one alert."""
+
+    fingerprint: str
+    episode: int
+    what: str
+    told_before: int
+    severity: Severity
+
+    @classmethod
+    def of(cls, text: str) -> "Said | None":
+        """The parts of `Change.says`; None for what says something else. Raises ValueError where a number is none."""
+        parts = text.split(".")
+        if len(parts) != 5 or parts[4] not in {severity.value for severity in Severity}:
+            return None
+        return cls(parts[0], int(parts[1]), parts[2], int(parts[3]), Severity(parts[4]))
+
+
+def receivers_of(alert: Alert, config: AlertsConfig, clock_s: float, told_by: Iterable[str]) -> set[str]:
+    """Who is to know of this alert now. Without any route every receiver is, but one that is there for the heartbeat.
+
+    An escalation goes out when nobody has acknowledged in time, or a notification has failed; who was told in this episode, by a
+    route or an escalation, is told of its end too.
+    """
+    if not config.routes:
+        return set(config.receivers) - {config.heartbeat.receiver} or set(config.receivers)
+    names: set[str] = set(told_by)
+    for route in config.routes:
+        if not _matches(route, alert):
+            continue
+        names.update(route.receivers)
+        if alert.phase is Phase.FIRING:
+            waited_s = clock_s - alert.fired_s
+            names.update(step.receiver for step in route.escalation if alert.undelivered or waited_s >= step.after_s)
+    return names
+
+
+def _matches(route: Route, alert: Alert) -> bool:
+    named = (not route.machines or alert.machine in route.machines) and (not route.alerts or alert.name in route.alerts)
+    return named and alert.severity.rank >= route.severity_min.rank
+
+
+def change_of(alert: Alert, told: Told | None, config: AlertsConfig, clock_s: float) -> Change | None:
+    """What is news to a receiver that was last told `told`."""
+    if not alert.is_on:
+        # One that pends again is waited for: it fires, or is over after all.
+        if told is not None and told.is_firing:
+            return Change(alert, RESOLVED, told.count) if alert.phase is Phase.RESOLVED else None
+        return Change(alert, PASSED, 0) if has_passed(alert, told, clock_s) else None
+    same = told is not None and told.episode == alert.episode
+    if told is None or not same or not told.is_firing:
+        if alert.phase is Phase.ACKNOWLEDGED:
+            return None  # somebody is on it already
+        return Change(alert, FIRING, told.count if told is not None and same else 0)
+    if alert.severity.rank > told.severity.rank:
+        return Change(alert, RAISED, told.count)
+    if alert.phase is Phase.FIRING and clock_s - told.at_s >= config.repeat_interval_s:
+        return Change(alert, REPEAT, told.count)
+    return None
+
+
+def has_passed(alert: Alert, told: Told | None, clock_s: float) -> bool:
+    """Whether an episode is over of which a receiver knows nothing, and not long ago."""
+    if alert.phase is not Phase.RESOLVED or not alert.rises_s or (told is not None and told.episode >= alert.episode):
+        return False
+    return clock_s - alert.resolved_s <= PASSED_S_MAX
+
+
+def changes_for(
+    receiver: str, known: ReceiverState, state: AlertsState, configs: Mapping[str, AlertsConfig], silenced: Mapping[str, str]
+) -> list[Change]:
+    """All news for one receiver, the worst first."""
+    changes = []
+    for key, alert in state.alerts.items():
+        if key in silenced:
+            continue
+        config, told = configs[alert.machine], known.told.get(key)
+        told_by = (receiver,) if told is not None and told.is_firing else ()
+        if receiver not in receivers_of(alert, config, state.clock_s, told_by):
+            continue
+        change = change_of(alert, told, config, state.clock_s)
+        if change is not None:
+            changes.append(change)
+    return sorted(changes, key=lambda change: (-change.alert.severity.rank, change.alert.machine, change.alert.name))

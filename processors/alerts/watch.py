@@ -1,0 +1,183 @@
+"""From the rows of all machines to their alerts, once a beat."""
+
+from collections.abc import Iterator, Mapping, Set
+from dataclasses import replace
+from typing import NamedTuple
+
+from processors.alerts.config import ALARM_SIGNALS, MACHINE_OFFLINE, RULES, SOURCE_LOST, AlertsConfig, Rule
+from processors.alerts.phases import Beat, Condition, advanced, begun, condition_of, raised
+from processors.alerts.state import ALERTS_MAX, Alert, AlertsState, Phase, Severity, fingerprint, labels_of
+from processors.config import Configuration
+from processors.contract import TWIN_PREFIX
+from sparkplug.metric import Reading
+from sparkplug.quality import Quality
+
+SEVERITY = f"{TWIN_PREFIX}severity"
+PROGRAM, TOOL = "program", "tool_number"
+INPUTS = frozenset({*ALARM_SIGNALS, SEVERITY, PROGRAM, TOOL})
+SEEN_S_MAX = 5.0  # of one beat: what lies between two that are further apart was not watched
+RESOLVED_SHOWN_S = 3600.0
+MACHINES_MAX = 2000
+CONTEXT_MAX = 100
+OFFLINE = "the machine is offline"
+
+Row = Mapping[str, Reading]
+
+
+class Watched(NamedTuple):
+    """One thing that may be an alert, as it stands now."""
+
+    machine: str
+    name: str
+    signal: str
+    rule: Rule
+    condition: Condition
+
+
+def next_beat(state: AlertsState, wall_s: float) -> Beat:
+    """The beat at `wall_s`: a clock that was set back stands still, and one that leaps is followed."""
+    passed_s = max(0.0, wall_s - state.wall_s) if state.wall_s else 0.0
+    return Beat(wall_s, state.clock_s + passed_s, min(passed_s, SEEN_S_MAX))
+
+
+def watched(configuration: Configuration[AlertsConfig], state: AlertsState, cell: Mapping[str, Row], beat: Beat) -> AlertsState:
+    """All alerts one beat later."""
+    machines = _machines(state, cell, beat, configuration.default.forget_after_s)
+    known = {(alert.machine, alert.name): alert for alert in state.alerts.values()}
+    alerts: dict[str, Alert] = {}
+    overflowed = state.overflowed
+    for one in _all(configuration, machines, state, cell, known.keys()):
+        config = configuration.of(one.machine)
+        before = alert = known.pop((one.machine, one.name), None)
+        if before is not None:
+            alert = advanced(before, one.rule, one.condition, beat, config)
+        elif len(alerts) < ALERTS_MAX:
+            alert = begun(_fresh(one, config), one.rule, one.condition, beat)
+        else:
+            overflowed += 1
+        if alert is not None and (before is None or before.episode != alert.episode):
+            alert = replace(alert, context=_context(cell.get(one.machine, {})))
+        if alert is not None and _is_remembered(alert, state, beat, config):
+            alerts[alert.fingerprint] = alert
+    for left in known.values():  # neither its machine nor its rule is known any more
+        ended = advanced(left, Rule(severity=left.severity), Condition(False, "", 0), beat, configuration.default)
+        if ended is not None and _is_remembered(ended, state, beat, configuration.default):
+            alerts[ended.fingerprint] = ended
+    return replace(
+        state,
+        wall_s=beat.wall_s,
+        clock_s=beat.clock_s,
+        machines=machines,
+        deaths={machine: at_ms for machine, at_ms in state.deaths.items() if machine in machines and machine not in cell},
+        pulses={},
+        alerts=_raised(configuration, alerts, cell, beat),
+        overflowed=overflowed,
+    )
+
+
+def _fresh(one: Watched, config: AlertsConfig) -> Alert:
+    key = fingerprint(labels_of(one.machine, one.name, one.signal, config.labels))
+    return Alert(one.machine, one.name, one.signal, key, one.rule.severity, 0)
+
+
+def _machines(state: AlertsState, cell: Mapping[str, Row], beat: Beat, forget_after_s: float) -> dict[str, float]:
+    """The machines that are known, and when each was last online."""
+    known = {name: at_s for name, at_s in state.machines.items() if beat.wall_s - at_s <= forget_after_s}
+    new = [name for name in cell if name not in known]
+    known.update(dict.fromkeys([name for name in cell if name in known], beat.wall_s))
+    known.update(dict.fromkeys(new[: max(MACHINES_MAX - len(known), 0)], beat.wall_s))
+    return known
+
+
+def _all(
+    configuration: Configuration[AlertsConfig],
+    machines: Mapping[str, float],
+    state: AlertsState,
+    cell: Mapping[str, Row],
+    known: Set[tuple[str, str]],
+) -> Iterator[Watched]:
+    """What stands, and what is an alert already: of a shop in order that is next to nothing."""
+    for machine, last_s in machines.items():
+        config, row = configuration.of(machine), cell.get(machine)
+        for signal, rule in config.signals.items():
+            reading = None if row is None else row.get(signal)
+            name = signal.removeprefix(TWIN_PREFIX)
+            is_up = (reading is not None and reading.value is True) or f"{machine}\0{signal}" in state.pulses
+            if is_up or (machine, name) in known:
+                condition = condition_of(reading) if row is not None else Condition(None, OFFLINE, 0)
+                pulse_ms = state.pulses.get(f"{machine}\0{signal}")
+                if pulse_ms is not None and not condition.stands and rule.for_s == 0.0:
+                    condition = Condition(True, "", pulse_ms)
+                if condition.stands or (machine, name) in known:
+                    yield Watched(machine, name, signal, rule, condition)
+        if config.machine_offline is not None and (row is None or (machine, MACHINE_OFFLINE) in known):
+            died_ms = state.deaths.get(machine, round(last_s * 1000))
+            yield Watched(machine, MACHINE_OFFLINE, "", config.machine_offline, Condition(row is None, "", died_ms))
+        if config.alarm_source_lost is not None:
+            lost = _source(config, row)
+            if lost.stands or (machine, SOURCE_LOST) in known:
+                yield Watched(machine, SOURCE_LOST, "", config.alarm_source_lost, lost)
+
+
+def _source(config: AlertsConfig, row: Row | None) -> Condition:
+    """Whether a processor that gave alarm signals has gone while the machine is there: then nobody watches, and no alarm is no
+    good news."""
+    if row is None:
+        return Condition(None, OFFLINE, 0)
+    lost = [row[signal].timestamp_ms for signal in config.signals if signal in row and row[signal].quality is Quality.STALE]
+    return Condition(bool(lost), "", max(lost, default=0))
+
+
+def _raised(
+    configuration: Configuration[AlertsConfig], alerts: dict[str, Alert], cell: Mapping[str, Row], beat: Beat
+) -> dict[str, Alert]:
+    """Where a rule fires on the same machine, what the score says is confirmed."""
+    by_rule = {alert.machine for alert in alerts.values() if alert.is_on and alert.signal in RULES}
+    said_high = {machine for machine, row in cell.items() if _says_high(row.get(SEVERITY))}
+    worse = by_rule | said_high
+    if not worse:
+        return alerts
+    rises = {
+        key: raised(alert, Severity.HIGH, beat)
+        for key, alert in alerts.items()
+        if alert.machine in worse and alert.is_on and _may_rise(configuration.of(alert.machine), alert)
+    }
+    return alerts | rises
+
+
+def _may_rise(config: AlertsConfig, alert: Alert) -> bool:
+    rule = config.rule_of(alert.name, alert.signal)
+    return rule is not None and rule.raised_by_rule
+
+
+def _says_high(reading: Reading | None) -> bool:
+    return reading is not None and reading.quality is Quality.GOOD and reading.value == Severity.HIGH.value
+
+
+def _context(row: Row) -> str:
+    """What the machine was doing, for the person who is woken up."""
+    parts = []
+    for signal, word in ((PROGRAM, "program"), (TOOL, "tool")):
+        reading = row.get(signal)
+        if (
+            reading is not None
+            and reading.quality is Quality.GOOD
+            and isinstance(reading.value, (str, int))
+            and reading.value != ""
+        ):
+            parts.append(f"{word} {reading.value}"[:CONTEXT_MAX])
+    return ", ".join(parts)
+
+
+def _is_remembered(alert: Alert, state: AlertsState, beat: Beat, config: AlertsConfig) -> bool:
+    """A resolved alert is kept while somebody believes that it fires, while it may flap, and for an hour to look at."""
+    if alert.phase is not Phase.RESOLVED:
+        return True
+    if (
+        beat.clock_s - alert.resolved_s <= RESOLVED_SHOWN_S
+        or beat.clock_s - max(alert.rises_s, default=0.0) <= config.flap_window_s
+    ):
+        return True
+    return any(
+        receiver.told[alert.fingerprint].is_firing for receiver in state.receivers.values() if alert.fingerprint in receiver.told
+    )

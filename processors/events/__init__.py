@@ -1,0 +1,1 @@
+"""Execution events, stops and as-built records. `processor.py` declares the processor."""

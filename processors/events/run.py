@@ -1,0 +1,226 @@
+"""One run of a program while it lasts: what was done with which tool, and the figures of it, in bounded space.
+
+Seconds are added up by what the machine was doing, so that a clock that is set does not change them. Numbers are looked at once a
+tick (a second), values held; peaks of force and vibration at each message.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+from processors.events.execution import ACTIVE, OVERRIDES, is_changing_tool, stop_reason, tool
+from processors.sample import Sample, SampleKind
+from sparkplug.metric import Reading
+from sparkplug.quality import Quality
+
+TEMPERATURE, FORCE, SCORE = "spindle_temp_c", "twin/cutting_force_n", "twin/adjusted_score"
+VIBRATION = ("vibration_velocity_mm_s", "twin/vibration_velocity_mm_s")
+GAPS = (
+    "twin/gap_spindle_temp_c",
+    "twin/gap_spindle_load_pct",
+    "twin/gap_spindle_rpm",
+    *(f"twin/gap_axis_{axis}_load_pct" for axis in "xyzabc"),
+)
+FLAGS = (
+    "twin/anomaly_alarm",
+    "twin/gap_growing",
+    "twin/rule_load_over_limit",
+    "twin/rule_thermal_runaway",
+    "twin/rule_load_without_feed",
+    "twin/rule_vibration",
+)
+BASES = ("twin/spindle_temp_basis", "twin/cutting_force_basis", "twin/gap_basis", "twin/anomaly_basis", "twin/residual_basis")
+FIGURES = (TEMPERATURE, SCORE, *VIBRATION, *OVERRIDES, *GAPS)
+TOOLS_MAX, REASONS_MAX, FLAGS_MAX, PROFILE_MAX = 24, 12, 40, 240
+OTHER_TOOLS = -1
+MINUTE_S = 60.0
+FIGURE_MAX = 1e9
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """A number over the run: weighted by time, with its extremes and its last value."""
+
+    low: float
+    high: float
+    last: float
+    seconds: float = 0.0
+    sum: float = 0.0
+
+    @property
+    def mean(self) -> float:
+        """By time; of no time, the last value."""
+        return self.sum / self.seconds if self.seconds > 0.0 else self.last
+
+
+@dataclass(frozen=True, slots=True)
+class ToolUse:
+    """A tool (None: none or not known; OTHER_TOOLS: beyond the bound): how often it was put in, seconds ACTIVE, its force."""
+
+    number: int | None
+    changes: int = 0
+    active_s: float = 0.0
+    force: Figure | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Raised:
+    """A flag that rose during the run."""
+
+    flag: str
+    at_ms: int
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """See the module. profile: the mean temperature of each `profile_s`, None where it was not known."""
+
+    program: str | None
+    mode: str | None
+    began_ms: int
+    is_begin_seen: bool
+    active_s: float = 0.0
+    interrupted_s: float = 0.0
+    unknown_s: float = 0.0
+    holes: int = 0
+    interruptions: int = 0
+    reasons: Mapping[str, float] = field(default_factory=dict)
+    tools: tuple[ToolUse, ...] = ()
+    tool: int | None = None
+    tool_changes: int = 0
+    figures: Mapping[str, Figure] = field(default_factory=dict)
+    raised: tuple[Raised, ...] = ()
+    raised_more: int = 0
+    profile: tuple[float | None, ...] = ()
+    profile_s: float = MINUTE_S
+    minute_s: float = 0.0
+    minute_sum: float = 0.0
+    minute_seen_s: float = 0.0
+
+    @property
+    def seconds(self) -> float:
+        """From its beginning until now."""
+        return self.active_s + self.interrupted_s + self.unknown_s
+
+
+def begun(sample: Sample, program: str | None, mode: str | None, *, is_begin_seen: bool) -> Run:
+    """A run that begins now."""
+    number = tool(sample.row)
+    return Run(program, mode, round(sample.at_s * 1000), is_begin_seen, tool=number, tools=(ToolUse(number),))
+
+
+def lasted(run: Run, sample: Sample, state: str | None, reason: str, dt_s: float) -> Run:
+    """After `dt_s` in a state (None: unknown), for a reason where it is not ACTIVE."""
+    if state is None:
+        return replace(run, unknown_s=run.unknown_s + dt_s)
+    if state == ACTIVE and not reason:
+        run = replace(run, active_s=run.active_s + dt_s, tools=_with_tool_time(run, sample, dt_s))
+    else:
+        told = reason if reason in run.reasons or len(run.reasons) < REASONS_MAX else "other"
+        reasons = {**run.reasons, told: run.reasons.get(told, 0.0) + dt_s}
+        run = replace(run, interrupted_s=run.interrupted_s + dt_s, reasons=reasons)
+    figures = dict(run.figures)
+    for name in FIGURES:
+        if name in sample.row:
+            value = figure_of(sample, name)
+            if value is not None:
+                figures[name] = with_value(figures.get(name), value, dt_s)
+    return _with_profile(replace(run, figures=figures), sample, dt_s)
+
+
+def followed(run: Run, sample: Sample) -> Run:
+    """What a message tells at once: another tool, a peak, a flag that rises."""
+    changed = sample.changed
+    if "tool_number" in changed:
+        number = tool(sample.row)
+        if number is not None and number != run.tool:
+            run = replace(run, tool=number, tool_changes=run.tool_changes + 1, tools=_with_change(run.tools, number))
+    if FORCE in changed and (force := figure_of(sample, FORCE)) is not None:
+        run = replace(run, tools=_with_force(run, force, 0.0))
+    for name in VIBRATION:
+        if name in changed and (value := figure_of(sample, name)) is not None:
+            run = replace(run, figures={**run.figures, name: with_value(run.figures.get(name), value, 0.0)})
+    for name in changed if sample.kind is SampleKind.DATA else ():  # a birth only says again what stands
+        if name in FLAGS and _is_up(sample.row[name]):
+            if len(run.raised) < FLAGS_MAX:
+                run = replace(run, raised=(*run.raised, Raised(name, sample.row[name].timestamp_ms)))
+            else:
+                run = replace(run, raised_more=run.raised_more + 1)
+    return run
+
+
+def why_standing(state: str, sample: Sample, *, is_held: bool) -> str:
+    """Why a run does not go on; '' while it does."""
+    if state == ACTIVE and not is_held:
+        return ""
+    return "tool change" if state != ACTIVE and is_changing_tool(sample.row) else stop_reason(state, sample)
+
+
+def figure_of(sample: Sample, name: str) -> float | None:
+    """A number that sums can be made of."""
+    value, _ = sample.number(name)
+    return value if value is not None and abs(value) <= FIGURE_MAX else None
+
+
+def with_value(known: Figure | None, value: float, dt_s: float) -> Figure:
+    """A figure with one more value, held for `dt_s`.
+
+    >>> with_value(with_value(None, 20.0, 1.0), 26.0, 1.0).mean
+    23.0
+    """
+    if known is None:
+        return Figure(value, value, value, dt_s, value * dt_s)
+    low, high = min(known.low, value), max(known.high, value)
+    return Figure(low, high, value, known.seconds + dt_s, known.sum + value * dt_s)
+
+
+def _is_up(reading: Reading) -> bool:
+    return reading.quality is Quality.GOOD and reading.value is True
+
+
+def _with_change(tools: tuple[ToolUse, ...], number: int) -> tuple[ToolUse, ...]:
+    if any(use.number == number for use in tools):
+        return tuple(replace(use, changes=use.changes + 1) if use.number == number else use for use in tools)
+    if len(tools) < TOOLS_MAX:
+        return (*tools, ToolUse(number, 1))
+    return _with_change(tools, OTHER_TOOLS) if number != OTHER_TOOLS else (*tools, ToolUse(OTHER_TOOLS, 1))
+
+
+def _with_tool_time(run: Run, sample: Sample, dt_s: float) -> tuple[ToolUse, ...]:
+    force = figure_of(sample, FORCE)
+    tools = run.tools if force is None else _with_force(run, force, dt_s)
+    number = _kept_as(run)
+    return tuple(replace(use, active_s=use.active_s + dt_s) if use.number == number else use for use in tools)
+
+
+def _with_force(run: Run, force: float, dt_s: float) -> tuple[ToolUse, ...]:
+    number = _kept_as(run)
+    return tuple(replace(use, force=with_value(use.force, force, dt_s)) if use.number == number else use for use in run.tools)
+
+
+def _kept_as(run: Run) -> int | None:
+    return run.tool if any(use.number == run.tool for use in run.tools) else OTHER_TOOLS
+
+
+def _with_profile(run: Run, sample: Sample, dt_s: float) -> Run:
+    """The mean temperature of each minute; where there are too many, of twice as long."""
+    value = figure_of(sample, TEMPERATURE)
+    seen_s = run.minute_seen_s + (0.0 if value is None else dt_s)
+    run = replace(
+        run,
+        minute_s=run.minute_s + dt_s,
+        minute_seen_s=seen_s,
+        minute_sum=run.minute_sum + (0.0 if value is None else value * dt_s),
+    )
+    if run.minute_s < run.profile_s:
+        return run
+    mean = round(run.minute_sum / seen_s, 2) if seen_s > 0.0 else None
+    profile, profile_s = (*run.profile, mean), run.profile_s
+    if len(profile) > PROFILE_MAX:
+        pairs = zip(profile[::2], profile[1::2], strict=False)
+        profile, profile_s = tuple(_mean(first, second) for first, second in pairs), 2.0 * profile_s
+    return replace(run, profile=profile, profile_s=profile_s, minute_s=0.0, minute_sum=0.0, minute_seen_s=0.0)
+
+
+def _mean(first: float | None, second: float | None) -> float | None:
+    known = [value for value in (first, second) if value is not None]
+    return round(sum(known) / len(known), 2) if known else None

@@ -1,0 +1,1 @@
+"""The standing gap between twin and machine. `processor.py` declares the processor."""

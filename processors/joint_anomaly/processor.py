@@ -1,0 +1,282 @@
+"""How unusual each machine of a cell is, beside its peers, and not while it changes its tool.
+
+At each tick the features of a machine, as last reported, are scored by its model (`twin/anomaly/model.py`): the raw score, 0 = as
+unusual as the model's contamination share of the training data, larger = worse. It is always published. Once all machines that
+are in step have come to that tick (`processors/joint_anomaly/frames.py`), the frame is judged:
+
+    adjusted = 0 where the score is common mode (`twin/anomaly/common_mode.py`) or gated (`processors/joint_anomaly/gate.py`),
+               else raw
+
+An adjusted score at or above the threshold in `dwell_ticks` ticks in a row is an alarm (`twin/anomaly/alarm.py`). The threshold
+is fitted in alerts per machine-week on scores as they come out of this fold (`cnctwin train anomaly`); it holds for the settings
+that it was fitted with only, so others are refused. Suppressing an alarm hides no data: raw score, adjusted score and the gate
+are published side by side.
+"""
+
+import math
+from collections.abc import Container, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from processors.config import Configuration
+from processors.contract import CellProcessor, Output, OutputSpec, Provenance, Sample, SampleKind
+from processors.joint_anomaly.config import NUMBERS, Config
+from processors.joint_anomaly.features import beside_by_features
+from processors.joint_anomaly.frames import Frame, InStep, Scored, frames, in_step
+from processors.joint_anomaly.gate import followed
+from processors.joint_anomaly.member import (
+    ADJUSTED,
+    ALARM,
+    COMMON,
+    GATE,
+    GATE_SOURCE,
+    GATED_SHARE,
+    NO_MODEL,
+    NO_PEER,
+    NO_THRESHOLD,
+    PEER,
+    PEERS,
+    Beside,
+    Member,
+    Seat,
+    after,
+)
+from processors.joint_anomaly.score_drift import DRIFT, NO_GOLDEN_WEEK
+from processors.tool_change_detector.context import INPUTS as CONTEXT_INPUTS
+from processors.tool_change_detector.context import tool_change_context
+from sparkplug.datatype import DataType
+from sparkplug.metric import Reading
+from sparkplug.quality import Quality
+from twin.anomaly.alarm import AlarmRule
+from twin.anomaly.common_mode import Method, adjust_frame, standardised
+from twin.anomaly.preparation import CONTEXT, Preparation, standardised_row
+
+RAW, THRESHOLD, BASIS = "twin/raw_score", "twin/anomaly_threshold", "twin/anomaly_basis"
+CLOCK_OFFSET, STAMP_CLOCK = "clock_offset_s", "stamp_clock"
+BY_EDGE = "edge"  # the control gives no stamps: its samples carry the edge's time, whatever its own clock shows
+_VALUE, _QUALITY = Reading._fields.index("value"), Reading._fields.index("quality")
+SEATS_MAX = 10_000
+MEMBERS_MAX = 2000  # of a cell; those that are offline are forgotten when there are more
+OFFSET_TICKS_MAX = 0.75  # that a clock's offset may change before it is a step of the clock
+NOT_FINITE = "the model has no finite answer"
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """The machines of the cell, and who of them is in step."""
+
+    members: Mapping[str, Member] = field(default_factory=dict)
+    in_step: InStep = field(default_factory=InStep)
+
+
+def step(config: Configuration[Config], state: State, sample: Sample) -> tuple[State, Sequence[Output]]:
+    """Score at ticks; follow what is said of tool changes, and who is there; judge the frames that are complete."""
+    if sample.is_history:
+        return state, ()
+    if sample.kind is SampleKind.TICK:
+        return _ticked(config, state, sample)
+    rule, machine, at_s = config.default.gate_rule, sample.machine, sample.at_s
+    member = state.members.get(machine) or Member()
+    member = member._replace(gate=followed(member.gate, rule, tool_change_context(sample.row), at_s))
+    outputs: list[Output] = []
+    if sample.kind is SampleKind.BIRTH:
+        member = _placed(config.default, member, sample)
+        member = member._replace(tick=_tick(config.default, member, at_s))
+        outputs = _introduced(config, machine)
+    elif sample.kind is SampleKind.DEATH and machine not in sample.cell:
+        member = member.offline(rule)
+    elif sample.kind is SampleKind.HOLE and member.tick is not None and _tick(config.default, member, at_s) < member.tick:
+        member = member.set_back(at_s, member.offset_ticks)
+    members = {**state.members, machine: member}
+    if machine not in state.members:
+        members = _by_name(members, sample.cell)
+    elif member.tick == state.members[machine].tick:
+        return State(members, state.in_step), outputs
+    return _together(config, members, outputs)
+
+
+def _ticked(config: Configuration[Config], state: State, sample: Sample) -> tuple[State, Sequence[Output]]:
+    """Score a machine; judge what its coming to this tick makes complete."""
+    shared, machine = config.default, sample.machine
+    seat, step_before = _seat(config, machine), state.in_step
+    member = _placed(shared, state.members.get(machine) or Member(), sample)
+    before, tick = member.tick, _tick(shared, member, sample.at_s)
+    scored = _scored(seat, sample, tick)
+    members = {**state.members, machine: member.waiting_with(scored, shared.gate_rule, shared.look_back_ticks)}
+    outputs = [Output.null(RAW, scored.reason or "") if scored.raw is None else Output(RAW, scored.raw)]
+    step_now = step_before.moved(before, tick)
+    if step_now is None:
+        return _together(config, members, outputs)
+    if not step_now.has(tick):
+        _judge(config, members, (machine,), step_now, outputs)
+    return State(members, step_now), outputs
+
+
+def _by_name(members: dict[str, Member], online: Container[str]) -> dict[str, Member]:
+    """In an order that is not that of arrival; too many for one cell, those that are offline are forgotten."""
+    kept = sorted(members if len(members) <= MEMBERS_MAX else [name for name in members if name in online])
+    return {name: members[name] for name in kept}
+
+
+def _together(config: Configuration[Config], members: dict[str, Member], outputs: list[Output]) -> tuple[State, list[Output]]:
+    """Find out who is in step, and judge the frames that are complete by that."""
+    ticks = [one.tick for one in members.values() if one.tick is not None]
+    found = in_step(ticks, config.default.wait_ticks)
+    _judge(config, members, members, found, outputs)
+    return State(members, found), outputs
+
+
+def _placed(shared: Config, member: Member, sample: Sample) -> Member:
+    """The machine, whose clock may have been found to be ahead of that of its peers by another number of ticks than before."""
+    if CLOCK_OFFSET not in sample.row:
+        return member
+    stamped_by = sample.row.get(STAMP_CLOCK)
+    is_by_edge = stamped_by is not None and stamped_by.value == BY_EDGE
+    offset_s = 0.0 if is_by_edge else sample.number(CLOCK_OFFSET)[0]
+    if offset_s is None or abs(offset_s / shared.tick_s - member.offset_ticks) <= OFFSET_TICKS_MAX:
+        return member
+    return member.set_back(sample.at_s, round(offset_s / shared.tick_s))
+
+
+def _tick(shared: Config, member: Member, at_s: float) -> int:
+    """The last tick of a machine at its time, by the clock that the peers have too."""
+    return round(at_s * 1000.0) // shared.tick_ms - member.offset_ticks
+
+
+def _scored(seat: Seat, sample: Sample, tick: int) -> Scored:
+    """The raw score of a machine as of a tick. A model that fails concerns its own machine only."""
+    model = seat.model
+    if model is None:
+        return Scored(tick, sample.at_s, None, NO_MODEL)
+    row, values = sample.row, []
+    for name in model.features:
+        reading = row.get(name)
+        value = None if reading is None or reading[_QUALITY] is not Quality.GOOD else reading[_VALUE]
+        if type(value) is not float or not -math.inf < value < math.inf:  # a float is what nearly every reading is
+            value, why = sample.number(name)
+            if value is None:
+                return Scored(tick, sample.at_s, None, why)
+        values.append(value)
+    try:
+        now = None if model.preparation is None else standardised_row(model.preparation, values, _context(model.preparation, row))
+        raw = model.score_one(values if now is None else now.values)
+    except Exception as error:  # whatever a library does with these values
+        return Scored(tick, sample.at_s, None, f"the model fails: {type(error).__name__}")
+    return Scored(tick, sample.at_s, raw, None, now) if math.isfinite(raw) else Scored(tick, sample.at_s, None, NOT_FINITE)
+
+
+def _context(preparation: Preparation, row: Mapping[str, Reading]) -> list[object]:
+    """What names the regime; None where it is not known."""
+    readings = [row.get(name) for name in preparation.context]
+    return [None if one is None or one.quality is not Quality.GOOD else one.value for one in readings]
+
+
+def _judge(
+    config: Configuration[Config], members: dict[str, Member], names: Iterable[str], step_now: InStep, outputs: list[Output]
+) -> None:
+    """Judge what is complete of these machines; the members are replaced, what came of it is added to the outputs."""
+    shared = config.default
+    ready = {name: members[name].ready for name in names if members[name].ready}
+    for frame in frames(ready, step_now, shared.look_back_ticks):
+        seats = {name: _seat(config, name) for name in frame}
+        if shared.common_mode is Method.FEATURES:
+            found = beside_by_features(seats, frame, members)
+        else:
+            found = _beside_by_scores(shared, seats, frame)
+        for name, seat in seats.items():
+            members[name] = after(seat, members[name], found[name], outputs)
+
+
+def _beside_by_scores(shared: Config, seats: Mapping[str, Seat], frame: Frame) -> dict[str, Beside]:
+    """By the published rule, or the residual of the scores."""
+    names = list(seats)
+    scores = [_on_the_scale(shared, seat, frame[name][0].raw) for name, seat in seats.items()]
+    judged = adjust_frame(shared.common_mode_rule, scores, [frame[name][1].is_on is True for name in names])
+    return {
+        name: Beside(one.score, one.is_common, names[one.peer] if one.is_common and one.peer is not None else NO_PEER, one.peers)
+        for name, one in zip(names, judged, strict=True)
+    }
+
+
+def _on_the_scale(shared: Config, seat: Seat, raw: float | None) -> float | None:
+    """The raw score for the published rule; for the residual, how many spreads it lies above its centre."""
+    if raw is None or shared.common_mode is Method.SOURCE:
+        return raw
+    calibration = seat.calibration
+    return None if calibration is None else standardised(raw, calibration.raw_center, calibration.raw_spread)
+
+
+def _seat(config: Configuration[Config], machine: str) -> Seat:
+    """What the configuration says of one machine, put together once."""
+    shared = config.default
+    seat = shared.seats.get(machine)
+    if seat is None:
+        model = shared.loaded.get(machine)
+        threshold = config.of(machine).threshold
+        if threshold is None and model is not None and model.calibration is not None:
+            threshold = model.calibration.threshold
+        rule = None if threshold is None or model is None else AlarmRule(threshold, shared.dwell_ticks, shared.clear_fraction)
+        if len(shared.seats) >= SEATS_MAX:
+            shared.seats.clear()
+        seat = shared.seats[machine] = Seat(machine, model, rule, shared.tick_s)
+    return seat
+
+
+def _introduced(config: Configuration[Config], machine: str) -> list[Output]:
+    """What a reader of a machine has to know of its scores, once."""
+    shared, seat = config.default, _seat(config, machine)
+    model, rule = seat.model, seat.rule
+    if model is None:
+        return [Output.null(THRESHOLD, NO_MODEL), Output(BASIS, NO_MODEL)]
+    fitted = "configured" if config.of(machine).threshold is not None else "not fitted"
+    if fitted == "not fitted" and model.calibration is not None:
+        fitted = model.calibration.in_words
+    common = f"common mode by {shared.common_mode.value}, factor {shared.common_mode_factor:g}"
+    basis = f"{model.in_words}; threshold {fitted}; {common}; gate tail {shared.tail_s:g} s, look-back {shared.look_back_s:g} s"
+    threshold = Output.null(THRESHOLD, NO_THRESHOLD) if rule is None else Output(THRESHOLD, rule.threshold)
+    drift = [Output.null(DRIFT, NO_GOLDEN_WEEK)] if model.calibration is None else []
+    return [threshold, Output(BASIS, basis), *drift]
+
+
+def _specs() -> tuple[OutputSpec, ...]:
+    inferred, text, number = Provenance.INFERRED, DataType.STRING, DataType.DOUBLE
+    return (
+        OutputSpec(
+            RAW, number, None, "how unusual the machine is: 0 = at the contamination share of training, larger = worse", inferred
+        ),
+        OutputSpec(
+            ADJUSTED, number, None, "raw score; 0 while it is common mode or gated (residual: spreads over the peers)", inferred
+        ),
+        OutputSpec(COMMON, DataType.BOOLEAN, None, "peers are as unusual: no fault of this machine", inferred),
+        OutputSpec(
+            PEER,
+            text,
+            None,
+            "the peer that makes the score common mode, the largest of them",
+            inferred,
+        ),
+        OutputSpec(PEERS, DataType.INT64, None, "how many peers had a score as of the same tick", inferred),
+        OutputSpec(GATE, DataType.BOOLEAN, None, "a tool change, its look-back or its tail: scores are not judged", inferred),
+        OutputSpec(GATE_SOURCE, text, None, "who says so: controller, detector, none or stale", inferred),
+        OutputSpec(GATED_SHARE, number, "%", "share of the last week that was gated", inferred, 0.5),
+        OutputSpec(
+            ALARM, DataType.BOOLEAN, None, "the adjusted score has been at the threshold for the dwell", inferred, is_alarm=True
+        ),
+        OutputSpec(THRESHOLD, number, None, "of the adjusted score", inferred),
+        OutputSpec(BASIS, text, None, "what the score and its threshold rest on", inferred),
+        OutputSpec(
+            DRIFT, DataType.BOOLEAN, None, "raw scores have left what they were in the golden week", inferred, is_alarm=True
+        ),
+    )
+
+
+PROCESSOR = CellProcessor(
+    name="joint_anomaly",
+    version=1,
+    inputs=NUMBERS | CONTEXT_INPUTS | {CLOCK_OFFSET, STAMP_CLOCK, *CONTEXT},
+    outputs=_specs(),
+    config=Config,
+    state=State,
+    initial=lambda _: State(),
+    step=step,
+    wakes=CONTEXT_INPUTS,
+)

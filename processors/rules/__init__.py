@@ -1,0 +1,1 @@
+"""Rules that anybody can check by hand. `processor.py` declares the processor."""

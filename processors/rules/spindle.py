@@ -1,0 +1,151 @@
+"""Rules on the spindle's drive: load over limit, and load without feed. Both are excused while the spindle changes its speed.
+
+A spindle that runs up or brakes takes up to twice its rated power for a second or two, and that is what it is built for. From one
+reported speed to the next, over at most a second,
+
+    |Δn| / min(max(Δt, 0.1 s), 1 s) > ramp_rpm_per_s
+
+is a ramp: a speed that is reported by exception has last been seen long ago, and changed just now. The slow drift of a lathe
+at constant surface speed is none. A ramp that does not end within `ramp_s_max` excuses nothing. The commanded speed is no
+help: at constant surface speed the control's actual speed is far from it, and a spindle that stalls is too.
+"""
+
+from typing import NamedTuple, Self
+
+from pydantic import NonNegativeFloat, PositiveFloat, model_validator
+
+from processors.config import ProcessorConfig
+from processors.rules.alarm import Judgement, Stand, over_under
+from processors.sample import Sample, why_unknown
+
+LOAD, SPEED, FEED, EXECUTION = "spindle_load_pct", "spindle_rpm", "feed_mm_min", "exec_state"
+LOAD_PCT_MAX = 1000.0
+RPM_MAX = 200_000.0
+REPORT_S_MIN, REPORT_S_MAX = 0.1, 1.0
+EXCUSED = Judgement(Stand.EXCUSED)
+
+
+class SpindleLimits(ProcessorConfig):
+    """Limits of the load, and what a ramp is."""
+
+    load_limit_pct: PositiveFloat = 110.0
+    load_clear_pct: PositiveFloat = 100.0
+    load_dwell_s: NonNegativeFloat = 5.0
+    load_clear_s: NonNegativeFloat = 5.0
+    no_feed_load_pct: PositiveFloat = 60.0
+    no_feed_clear_pct: PositiveFloat = 50.0
+    no_feed_mm_min: PositiveFloat = 1.0
+    no_feed_dwell_s: NonNegativeFloat = 5.0
+    no_feed_clear_s: NonNegativeFloat = 2.0
+    exec_states: tuple[str, ...] = ("ACTIVE",)
+    spindle_rpm_min: PositiveFloat = 100.0
+    ramp_rpm_per_s: PositiveFloat = 200.0
+    ramp_settle_s: NonNegativeFloat = 2.0
+    ramp_s_max: PositiveFloat = 20.0
+
+    @model_validator(mode="after")
+    def _alarms_end_below_where_they_begin(self) -> Self:
+        if self.load_clear_pct > self.load_limit_pct:
+            raise ValueError(f"load_clear_pct {self.load_clear_pct:g} is above load_limit_pct {self.load_limit_pct:g}")
+        if self.no_feed_clear_pct > self.no_feed_load_pct:
+            raise ValueError(f"no_feed_clear_pct {self.no_feed_clear_pct:g} is above no_feed_load_pct {self.no_feed_load_pct:g}")
+        return self
+
+
+class Spindle(NamedTuple):
+    """The spindle's speed as it was last reported, and its ramp.
+
+    rpm: None while it is unknown, with the reason; seen_s: when it was reported
+    ramp_s, ramped_s: when the present ramp began and when it was last seen; None = no ramp yet
+    """
+
+    rpm: float | None = None
+    why_not: str = f"no {SPEED} yet"
+    seen_s: float = 0.0
+    ramp_s: float | None = None
+    ramped_s: float | None = None
+
+
+class Motion(NamedTuple):
+    """What the spindle does now. `rpm` None: unknown, with the reason."""
+
+    rpm: float | None
+    why_not: str
+    is_turning: bool
+    is_ramping: bool
+
+
+def followed(spindle: Spindle, limits: SpindleLimits, sample: Sample) -> Spindle:
+    """The spindle as of this sample."""
+    rpm, reason = sample.number(SPEED)
+    if rpm is None or abs(rpm) > RPM_MAX:
+        why_not = reason or f"{SPEED} is beyond any spindle"
+        return spindle if spindle.rpm is None and spindle.why_not == why_not else Spindle(None, why_not, sample.at_s)
+    if spindle.rpm is None:
+        return Spindle(rpm, "", sample.at_s)
+    if rpm == spindle.rpm:
+        return spindle._replace(seen_s=sample.at_s) if SPEED in sample.changed else spindle
+    report_s = min(max(sample.at_s - spindle.seen_s, REPORT_S_MIN), REPORT_S_MAX)
+    if abs(rpm - spindle.rpm) <= limits.ramp_rpm_per_s * report_s:
+        return spindle._replace(rpm=rpm, seen_s=sample.at_s)
+    goes_on = spindle.ramped_s is not None and sample.at_s - spindle.ramped_s <= limits.ramp_settle_s
+    return Spindle(rpm, "", sample.at_s, spindle.ramp_s if goes_on else sample.at_s, sample.at_s)
+
+
+def motion(spindle: Spindle, limits: SpindleLimits, at_s: float) -> Motion:
+    """What the spindle does at `at_s`."""
+    if spindle.rpm is None:
+        return Motion(None, spindle.why_not, False, False)
+    ramping = False
+    if spindle.ramp_s is not None and spindle.ramped_s is not None:
+        ramping = at_s - spindle.ramped_s <= limits.ramp_settle_s and at_s - spindle.ramp_s <= limits.ramp_s_max
+    return Motion(spindle.rpm, "", abs(spindle.rpm) >= limits.spindle_rpm_min, ramping)
+
+
+def load_over_limit(limits: SpindleLimits, moves: Motion, sample: Sample) -> Judgement:
+    """Load over its limit, whatever the direction of the torque."""
+    load_pct, why_not = _load(sample)
+    if load_pct is None or moves.rpm is None:
+        return Judgement(Stand.UNKNOWN, why_not or moves.why_not)
+    if moves.is_ramping:
+        return EXCUSED
+    stand = over_under(load_pct, limits.load_limit_pct, limits.load_clear_pct)
+    if stand is not Stand.OVER:
+        return Judgement(stand)
+    return Judgement(stand, finding=f"{LOAD} {load_pct:.0f} % over {limits.load_limit_pct:g} %")
+
+
+def load_without_feed(limits: SpindleLimits, moves: Motion, sample: Sample) -> Judgement:
+    """Load on a spindle that turns at its speed while the program runs and nothing is fed: it rubs, or something is wound up."""
+    load_pct, why_not = _load(sample)
+    feed, no_feed = sample.number(FEED)
+    running, not_known = _is_running(limits, sample)
+    if load_pct is None or feed is None or running is None or moves.rpm is None:
+        return Judgement(Stand.UNKNOWN, why_not or no_feed or not_known or moves.why_not)
+    if moves.is_ramping:
+        return EXCUSED
+    if not running or not moves.is_turning or abs(feed) >= limits.no_feed_mm_min:
+        return Judgement(Stand.UNDER)
+    stand = over_under(load_pct, limits.no_feed_load_pct, limits.no_feed_clear_pct)
+    if stand is not Stand.OVER:
+        return Judgement(stand)
+    over = f"{load_pct:.0f} % over {limits.no_feed_load_pct:g} %"
+    return Judgement(stand, finding=f"{LOAD} {over} with {FEED} below {limits.no_feed_mm_min:g} mm/min")
+
+
+def _load(sample: Sample) -> tuple[float | None, str]:
+    load_pct, reason = sample.number(LOAD)
+    if load_pct is None:
+        return None, reason or ""
+    return (None, f"{LOAD} is beyond any spindle") if abs(load_pct) > LOAD_PCT_MAX else (abs(load_pct), "")
+
+
+def _is_running(limits: SpindleLimits, sample: Sample) -> tuple[bool | None, str]:
+    """Whether the program runs; None with the reason. Without any state to ask for, it is taken to run."""
+    if not limits.exec_states:
+        return True, ""
+    reading = sample.row.get(EXECUTION)
+    reason = f"{EXECUTION} is not offered" if reading is None else why_unknown(reading)
+    if reading is None or reason is not None:
+        return None, reason or ""
+    return reading.value in limits.exec_states, ""

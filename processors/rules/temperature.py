@@ -1,0 +1,111 @@
+"""Rule on the spindle's temperature: thermal runaway, dT/dt over a limit in K/min.
+
+The slope is Theil's and Sen's: the median of the slopes of all pairs of the window's points, which neither a step of a sensor
+that reports whole degrees nor single wrong points move (up to 29 % of them). A window of T seconds and a sensor of resolution q
+leave about q/T of doubt: 1 K over 180 s is 0.33 K/min. The price is time: a slope that begins now is seen when it fills half
+of the window, and before three quarters of a window is known nothing is said.
+
+A value that jumps by more than `temperature_step_k_max` is no temperature of the same spindle (sensors that drop to 0 for a
+second): it is left out, and believed as a new level once it has stayed for STRAY_S.
+
+Theil, H.: A rank-invariant method of linear and polynomial regression analysis (1950); Sen, P. K., JASA 63 (1968) 1379-1389.
+"""
+
+from collections.abc import Sequence
+from itertools import combinations
+from statistics import median
+from typing import NamedTuple, Self
+
+from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
+
+from processors.config import ProcessorConfig
+from processors.rules.alarm import Judgement, Stand, over_under
+from processors.sample import Sample
+
+TEMPERATURE = "spindle_temp_c"
+POINTS = 24
+"""Points a window: 276 pairs."""
+KNOWN_PART = 0.75
+"""Of a window, which has to be known."""
+STRAY_S = 10.0
+TEMPERATURES_C = (-60.0, 400.0)
+"""Beyond them nothing is a spindle's temperature."""
+
+
+class TemperatureLimits(ProcessorConfig):
+    """What runaway is."""
+
+    runaway_k_per_min: PositiveFloat = 5.0
+    runaway_clear_k_per_min: PositiveFloat = 3.0
+    runaway_window_s: float = Field(default=180.0, ge=30.0, le=3600.0)
+    runaway_dwell_s: NonNegativeFloat = 10.0
+    runaway_clear_s: NonNegativeFloat = 30.0
+    temperature_step_k_max: PositiveFloat = 10.0
+
+    @model_validator(mode="after")
+    def _a_slope_can_be_seen(self) -> Self:
+        if self.runaway_clear_k_per_min > self.runaway_k_per_min:
+            raise ValueError(f"runaway_clear_k_per_min {self.runaway_clear_k_per_min:g} is above runaway_k_per_min")
+        if self.tick_s > self.runaway_window_s / POINTS:
+            raise ValueError(f"tick_s {self.tick_s:g} is more than runaway_window_s / {POINTS}")
+        return self
+
+
+class Trend(NamedTuple):
+    """The temperature over the window.
+
+    points: (s, °C), oldest first, one each window / POINTS; slope in K/min, None while too little of the window is known
+    level_c: the last value that was believed; stray_s: since when values are too far from it
+    """
+
+    points: tuple[tuple[float, float], ...] = ()
+    slope_k_per_min: float | None = None
+    level_c: float | None = None
+    stray_s: float | None = None
+
+
+def slope_per_s(points: Sequence[tuple[float, float]]) -> float:
+    """The median of the slopes of all pairs; points at different times.
+
+    >>> slope_per_s([(0.0, 20.0), (10.0, 21.0), (20.0, 0.0), (30.0, 23.0), (40.0, 24.0)])
+    0.1
+    """
+    return median((b_c - a_c) / (b_s - a_s) for (a_s, a_c), (b_s, b_c) in combinations(points, 2))
+
+
+def followed(trend: Trend, limits: TemperatureLimits, sample: Sample) -> Trend:
+    """The temperature's trend as of this sample."""
+    temperature_c, _ = sample.number(TEMPERATURE)
+    if temperature_c is None or not TEMPERATURES_C[0] <= temperature_c <= TEMPERATURES_C[1]:
+        return trend
+    at_s = sample.at_s
+    if trend.level_c is not None and abs(temperature_c - trend.level_c) > limits.temperature_step_k_max:
+        if trend.stray_s is None:
+            return trend._replace(stray_s=at_s)
+        if at_s - trend.stray_s < STRAY_S:
+            return trend
+        trend = Trend()  # another level: what came before it says nothing of a slope
+    grid_s = limits.runaway_window_s / POINTS
+    if trend.points and at_s - trend.points[-1][0] < grid_s:
+        if temperature_c == trend.level_c and trend.stray_s is None:
+            return trend
+        return trend._replace(level_c=temperature_c, stray_s=None)
+    points = (*(point for point in trend.points if at_s - point[0] <= limits.runaway_window_s), (at_s, temperature_c))
+    known = len(points) >= POINTS // 4 and points[-1][0] - points[0][0] >= KNOWN_PART * limits.runaway_window_s
+    return Trend(points, 60.0 * slope_per_s(points) if known else None, temperature_c)
+
+
+def thermal_runaway(limits: TemperatureLimits, trend: Trend, sample: Sample) -> Judgement:
+    """Temperature rises faster than it may."""
+    temperature_c, reason = sample.number(TEMPERATURE)
+    if temperature_c is None:
+        return Judgement(Stand.UNKNOWN, reason or "")
+    if not TEMPERATURES_C[0] <= temperature_c <= TEMPERATURES_C[1]:
+        return Judgement(Stand.UNKNOWN, f"{TEMPERATURE} is beyond any spindle")
+    slope = trend.slope_k_per_min
+    if slope is None:
+        return Judgement(Stand.UNKNOWN, f"{TEMPERATURE} is known for less than {KNOWN_PART * limits.runaway_window_s:g} s")
+    stand = over_under(slope, limits.runaway_k_per_min, limits.runaway_clear_k_per_min)
+    if stand is not Stand.OVER:
+        return Judgement(stand)
+    return Judgement(stand, finding=f"{TEMPERATURE} rises by {slope:.1f} K/min, over {limits.runaway_k_per_min:g} K/min")

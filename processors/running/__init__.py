@@ -1,0 +1,1 @@
+"""The machinery that runs processors: broker, clock, lanes, ledger, snapshots, dead letters."""

@@ -1,0 +1,37 @@
+"""What a processor says of itself: the node metrics of its edge node."""
+
+from processors.running.ledger import Ledger
+from sparkplug.datatype import DataType
+from sparkplug.metric import MetricSpec
+
+HEALTH = (
+    MetricSpec("health/machines", DataType.INT64, properties={"meaning": "machines online"}),
+    MetricSpec("health/lag_s", DataType.DOUBLE, unit="s", properties={"meaning": "age of the last message when it was folded"}),
+    MetricSpec("health/queue_depth", DataType.INT64, properties={"meaning": "messages behind the network thread"}),
+    MetricSpec("health/holes", DataType.INT64, properties={"meaning": "times that messages are missing, or event time jumped"}),
+    MetricSpec("health/late", DataType.INT64, properties={"meaning": "messages behind the machine's clock, folded all the same"}),
+    MetricSpec("health/ticks", DataType.INT64, properties={"meaning": "ticks of event time"}),
+    MetricSpec("health/dead_letters", DataType.INT64, properties={"meaning": "samples that the fold could not take"}),
+    MetricSpec("health/ignored", DataType.INT64, properties={"meaning": "messages of nodes that this processor does not read"}),
+    MetricSpec("health/snapshot_age_s", DataType.DOUBLE, unit="s", properties={"meaning": "age of the oldest unsaved state"}),
+    MetricSpec("health/snapshots_rejected", DataType.INT64, properties={"meaning": "snapshots that could not be restored"}),
+    MetricSpec("health/reconnects", DataType.INT64, properties={"meaning": "connections made again"}),
+)
+
+STORE = (
+    MetricSpec("health/store_samples", DataType.INT64, properties={"meaning": "samples that were stored since the start"}),
+    MetricSpec("health/store_repeated", DataType.INT64, properties={"meaning": "samples that the store had already"}),
+    MetricSpec("health/store_refused", DataType.INT64, properties={"meaning": "samples that the store cannot keep"}),
+    MetricSpec("health/store_dropped", DataType.INT64, properties={"meaning": "messages for which there was no room to wait"}),
+    MetricSpec("health/store_waiting", DataType.INT64, properties={"meaning": "samples that wait to be written"}),
+    MetricSpec("health/store_bytes", DataType.INT64, unit="bytes", properties={"meaning": "on the disk"}),
+    MetricSpec("health/store_days_left", DataType.DOUBLE, unit="d", properties={"meaning": "that the disk lasts at this rate"}),
+    MetricSpec("health/store_pins", DataType.INT64, properties={"meaning": "stretches that no sweep may take"}),
+    MetricSpec("health/store_trouble", DataType.STRING, properties={"meaning": "what is wrong with the store; empty: nothing"}),
+)
+
+
+def node_metrics(*, records: bool = False) -> tuple[MetricSpec, ...]:
+    """All metrics of the node: its ledger, in messages of devices, its health, and that of the store where it keeps one."""
+    ledger = (MetricSpec(name, DataType.INT64, unit="messages") for name in Ledger().metrics())
+    return (*ledger, *HEALTH, *(STORE if records else ()))

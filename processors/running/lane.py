@@ -1,0 +1,315 @@
+"""One machine's stream through a fold: its clock and its row. A machine's live data and its history have a lane each.
+
+Event time is that of the readings. It only goes forward, in steps that hold on any day:
+
+* before a message is folded, a tick is given at each multiple of tick_s up to its time;
+* silence longer than gap_s_max gets the ticks of its first gap_s_max, then one HOLE. Wall-clock ticks are the same ticks given
+  earlier, so the day and its replay see the same samples;
+* a message up to late_s_max behind is folded at the present time; a reading older than what is known of its signal is not news;
+* a message further behind is held back. Where the next ones agree with it, the clock was set back: one HOLE, then they are
+  folded; where they don't, it was a straggler, and is dropped as late;
+* a death is stamped by the clock of the host that hears it, another one in each process: it moves time only within gap_s_max, and
+  only to the last tick before it, so that all hosts come to the same state.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from operator import itemgetter
+from types import MappingProxyType
+from typing import Any
+
+from processors.config import ProcessorConfig
+from processors.effects import Effect
+from processors.running.counts import Counts
+from processors.running.fold import Fold
+from processors.running.ledger import DropReason, Ledger
+from processors.sample import Sample, SampleKind
+from sparkplug.metric import Reading
+from sparkplug.quality import Quality
+
+REWIND_MESSAGES = 3  # so many messages in a row, far behind, mean that the clock was set back
+_name: Callable[[Reading], str] = itemgetter(Reading._fields.index("name"))
+_timestamp_ms: Callable[[Reading], int] = itemgetter(Reading._fields.index("timestamp_ms"))
+
+
+class Lane:
+    """See the module.
+
+    ticking: the machine was online from clock_ms on, so that silence means that nothing changed
+    births: of each edge node of the machine, the first birth that was heard since the processor was started, by its stamp: what a
+        replay has to know of a life. Restored ones are of the life before, and go with the first of this one.
+    """
+
+    __slots__ = (
+        "_anchor_ms", "_anchor_wall_s", "_counts", "_fold_in", "_gap_ms", "_held", "_inputs", "_late_ms", "_ledger", "_machine",
+        "_tick_ms", "_view",
+        "births", "births_are_old", "clock_ms", "emission", "fold", "is_restored", "is_silent", "last_ms", "row", "ticking",
+    )  # fmt: skip
+
+    def __init__(  # noqa: PLR0917
+        self, fold: Fold, inputs: frozenset[str] | None, config: ProcessorConfig, machine: str, ledger: Ledger, counts: Counts
+    ) -> None:
+        self.row: dict[str, Reading] = {}
+        self.fold = fold
+        self.emission = fold.join(machine)
+        self.clock_ms: int | None = None  # event time that the fold has seen
+        self.last_ms = 0  # event time of the newest message; meaningless while clock_ms is None
+        self.ticking = fold.is_history
+        self.is_silent = False  # the hole of the present silence has been given
+        self.is_restored = False
+        self.births: dict[str, int] = {}
+        self.births_are_old = False
+        self._view: Mapping[str, Reading] = MappingProxyType(self.row)
+        self._fold_in, self._inputs, self._machine = fold.take, inputs, machine
+        self._ledger, self._counts = ledger, counts
+        self._tick_ms = max(1, round(config.tick_s * 1000))
+        self._gap_ms = round(config.gap_s_max * 1000)
+        self._late_ms = round(config.late_s_max * 1000)
+        self._held: list[Sequence[Reading]] = []
+        self._anchor_ms, self._anchor_wall_s = 0, 0.0
+
+    @property
+    def state(self) -> Any:
+        """The state that the fold has come to."""
+        return self.fold.state
+
+    # Messages.
+
+    def data(self, readings: Sequence[Reading], wall_s: float, effects: list[Effect], *, is_of_twin: bool = False) -> None:
+        """A message with changes has come; the ledger says what became of it. What another processor says never sets the clock
+        back: its figures may be of a while ago, or as old as their last change."""
+        if not readings:
+            self._ledger.emitted += 1
+            return
+        if self._inputs is None:
+            self._show(SampleKind.DATA, readings, effects)
+            return
+        at_ms = self._time_of(readings)
+        if is_of_twin:
+            self._accept(readings, self._if_news(at_ms), wall_s, effects)
+            return
+        if at_ms is not None and self.clock_ms is not None and at_ms < self.last_ms - self._late_ms:
+            self._held.append(readings)
+            self._ledger.buffered += 1
+            if len(self._held) == REWIND_MESSAGES:
+                self._follow_the_clock_back(wall_s, effects)
+            return
+        if self._held:
+            self.drop_held()
+        self._accept(readings, at_ms, wall_s, effects)
+
+    def birth(
+        self,
+        readings: Sequence[Reading],
+        taken: Sequence[Reading],
+        wall_s: float,
+        effects: list[Effect],
+        *,
+        is_of_twin: bool = False,
+    ) -> None:
+        """A birth has come: the values `taken` of it hold, whatever was known before."""
+        self.fold.show(self._machine, self._view)
+        if self._inputs is None:
+            self.is_restored = False
+            self._show(SampleKind.BIRTH, taken, effects)
+            return
+        self.drop_held()
+        at_ms = self._time_of(readings)
+        if is_of_twin:
+            at_ms = self._if_news(at_ms)
+        before_ms = self.last_ms if self.clock_ms is not None else None
+        if at_ms is not None:
+            if before_ms is not None and max(map(_timestamp_ms, readings)) < before_ms - self._late_ms:
+                self._jump_back(at_ms, effects)
+            if self.is_restored and before_ms is not None and at_ms > before_ms:
+                # Nobody heard what held meanwhile: no ticks, and so no figures, of that time.
+                self.ticking = False
+                self._reach(at_ms, wall_s, effects)
+                self._hole((at_ms - before_ms) / 1000, "restarted: what came in between was not seen", effects)
+            else:
+                self._reach(at_ms, wall_s, effects)
+        self.is_restored = False
+        self.row.update((reading.name, reading) for reading in taken)
+        self.ticking = True
+        names = tuple(reading.name for reading in taken)
+        self._settle(self._fold(SampleKind.BIRTH, self._now_ms(readings), names, effects))
+
+    def born(self, node: str, stamp_ms: int) -> None:
+        """A birth of this node is heard."""
+        if self.births_are_old:
+            self.births, self.births_are_old = {}, False
+        self.births.setdefault(node, stamp_ms)
+
+    def note(self, readings: Sequence[Reading]) -> None:
+        """Keep what another processor says of a machine whose edge is offline: nothing is made of it until the edge is back."""
+        self.row.update((reading.name, reading) for reading in readings)
+        self._ledger.emitted += 1
+
+    def _show(self, kind: SampleKind, readings: Sequence[Reading], effects: list[Effect]) -> None:
+        """For a processor that reads everything, from several sources, each with a clock of its own: there is no common time.
+
+        What comes last of a source is what it said last: the session has put its messages in order.
+        """
+        self.row.update((reading.name, reading) for reading in readings)
+        self._settle(self._fold(kind, self._now_ms(readings), tuple(reading.name for reading in readings), effects))
+
+    def death(self, names: Sequence[str], at_ms: int, reason: str, effects: list[Effect], *, is_last: bool) -> bool:
+        """An edge of the machine went offline, and `names` with it. Whether the fold took it."""
+        self.drop_held()
+        if self.clock_ms is not None and self.clock_ms < at_ms <= self.last_ms + self._gap_ms:
+            self._pass_silence(at_ms, effects)  # and no further than its last tick: each host stamps a death by its own clock
+        self.ticking = self.ticking and not is_last
+        for name in names:
+            self.row[name] = self.row[name]._replace(quality=Quality.STALE, reason=reason)
+        if is_last:
+            self.fold.hide(self._machine)
+        now_ms = at_ms if self.clock_ms is None else self.clock_ms
+        return self._fold(SampleKind.DEATH, now_ms, tuple(names), effects, detail=reason)
+
+    def lost(self, detail: str, effects: list[Effect]) -> None:
+        """Messages were lost on the way."""
+        self._hole(0.0, detail, effects)
+
+    def withdraw(self, names: Sequence[str]) -> None:
+        """Signals that a new birth does not offer any more."""
+        for name in names:
+            self.row[name] = self.row[name]._replace(quality=Quality.STALE, reason="not offered any more")
+
+    def go_on(self) -> None:
+        """A restored lane, at the very message at which it was saved: nothing was missed, and who was online still is."""
+        self.is_restored = self.births_are_old = False
+        if self.ticking:
+            self.fold.show(self._machine, self._view)
+
+    def drop_held(self) -> None:
+        """What was held back was a straggler."""
+        self._ledger.buffered -= len(self._held)
+        self._ledger.dropped[DropReason.LATE] += len(self._held)
+        self._held.clear()
+
+    # Time.
+
+    def silence(self, wall_s: float, margin_s: float, effects: list[Effect]) -> None:
+        """No message waits: give the ticks up to the present, held back by a margin for what is still on its way."""
+        if self.ticking and self._anchor_ms and self.clock_ms is not None and not self.is_silent:
+            now_ms = self._anchor_ms + int((wall_s - self._anchor_wall_s - margin_s) * 1000)
+            if now_ms - self.clock_ms >= self._tick_ms or now_ms > self.last_ms + self._gap_ms:
+                self._pass_silence(now_ms, effects)
+
+    def _time_of(self, readings: Sequence[Reading]) -> int | None:
+        """Event time of a message: its newest reading; None where it has none to believe. When time leaps, only a good value is
+        believed: an UNAVAILABLE may be stamped by another clock."""
+        newest_ms = max(map(_timestamp_ms, readings), default=None)
+        if newest_ms is None or (self.clock_ms is not None and newest_ms <= self.last_ms + self._gap_ms):
+            return newest_ms
+        good = (reading.timestamp_ms for reading in readings if reading.quality is Quality.GOOD and reading.value is not None)
+        return max(good, default=None)
+
+    def _if_news(self, at_ms: int | None) -> int | None:
+        """The time of what another processor says, if it is beyond the present."""
+        return at_ms if at_ms is None or self.clock_ms is None or at_ms > self.clock_ms else None
+
+    def _now_ms(self, readings: Sequence[Reading]) -> int:
+        """The time of the fold, also before any time was believed."""
+        return max(map(_timestamp_ms, readings), default=0) if self.clock_ms is None else self.clock_ms
+
+    def _accept(self, readings: Sequence[Reading], at_ms: int | None, wall_s: float, effects: list[Effect]) -> None:
+        before_ms = self.last_ms
+        if at_ms is not None:
+            if self.clock_ms is not None and at_ms < before_ms:
+                self._counts.late += 1
+            self._reach(at_ms, wall_s, effects)
+        inputs = self._inputs
+        if inputs is not None and not inputs.issuperset(map(_name, readings)):
+            readings = [reading for reading in readings if reading[0] in inputs]
+        if not readings:
+            self._ledger.emitted += 1  # nothing in it for this processor, but the time
+        elif not (changed := self._update(readings, before_ms)):
+            self._ledger.drop(DropReason.SUPERSEDED)
+        elif self.fold.wakes is not None and self.fold.wakes.isdisjoint(changed):
+            self._ledger.emitted += 1  # the next tick sees it
+        else:
+            self._settle(self._fold(SampleKind.DATA, self._now_ms(readings), changed, effects))
+
+    def _reach(self, at_ms: int, wall_s: float, effects: list[Effect]) -> None:
+        if self.clock_ms is None:
+            self.clock_ms = self.last_ms = at_ms
+        elif at_ms > self.clock_ms:
+            self._pass_silence(at_ms, effects)
+            self.clock_ms = self.last_ms = at_ms
+        else:
+            self.last_ms = max(self.last_ms, at_ms)
+        self.is_silent = False
+        self._anchor_ms, self._anchor_wall_s = self.clock_ms, wall_s
+
+    def _pass_silence(self, to_ms: int, effects: list[Effect]) -> None:
+        """Give what silence up to `to_ms` brings: ticks, then a hole if it is long. Bounded by gap_s_max / tick_s."""
+        clock_ms = self.clock_ms
+        if clock_ms is None or self.is_silent:
+            return
+        end_ms = self.last_ms + self._gap_ms
+        if self.ticking:
+            tick_ms = self._tick_ms
+            for at_ms in range((clock_ms // tick_ms + 1) * tick_ms, min(to_ms, end_ms) + 1, tick_ms):
+                self.clock_ms = at_ms
+                self._counts.ticks += 1
+                self._fold(SampleKind.TICK, at_ms, (), effects)
+        if to_ms > end_ms:
+            self.clock_ms, self.is_silent = end_ms, True
+            self._hole(self._gap_ms / 1000, f"no message for {self._gap_ms / 1000:g} s", effects)
+
+    def _follow_the_clock_back(self, wall_s: float, effects: list[Effect]) -> None:
+        held = list(self._held)
+        self._held.clear()
+        self._ledger.buffered -= len(held)
+        self._jump_back(min(max(map(_timestamp_ms, readings)) for readings in held), effects)
+        for readings in held:
+            self._accept(readings, self._time_of(readings), wall_s, effects)
+
+    def _jump_back(self, at_ms: int, effects: list[Effect]) -> None:
+        gap_s = (self.last_ms - at_ms) / 1000
+        self.clock_ms = self.last_ms = at_ms
+        self.is_silent = False
+        self._hole(gap_s, "the machine's clock was set back", effects)
+
+    def _hole(self, gap_s: float, detail: str, effects: list[Effect]) -> None:
+        self._counts.holes += 1
+        if self.clock_ms is not None:
+            self._fold(SampleKind.HOLE, self.clock_ms, (), effects, gap_s=gap_s, detail=detail)
+
+    # The fold.
+
+    def _update(self, readings: Sequence[Reading], before_ms: int) -> tuple[str, ...]:
+        """Put a message into the row; the names that it set. A reading stamped beyond the machine's clock can't be trusted to be
+        newer than what follows, so it is always replaced."""
+        row, last_ms = self.row, self.last_ms
+        names = tuple(map(_name, readings))
+        if before_ms <= min(map(_timestamp_ms, readings)):  # nearly always: newer than all that came before
+            row.update(zip(names, readings, strict=True))
+            return names
+        changed = []
+        for name, reading in zip(names, readings, strict=True):
+            known = row.get(name)
+            if known is None or reading.timestamp_ms >= known.timestamp_ms or known.timestamp_ms > last_ms:
+                row[name] = reading
+                changed.append(name)
+        return tuple(changed)
+
+    def _settle(self, folded: bool) -> None:
+        if folded:
+            self._ledger.emitted += 1
+        else:
+            self._ledger.drop(DropReason.DEAD_LETTER)
+
+    def _fold(
+        self,
+        kind: SampleKind,
+        at_ms: int,
+        changed: tuple[str, ...],
+        effects: list[Effect],
+        *,
+        gap_s: float = 0.0,
+        detail: str = "",
+    ) -> bool:
+        fold = self.fold
+        sample = Sample(self._machine, kind, at_ms / 1000, self._view, changed, gap_s, detail, fold.is_history, fold.cell)
+        return self._fold_in(sample, at_ms, effects)

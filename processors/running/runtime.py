@@ -1,0 +1,140 @@
+"""Running processors against a broker: one thread each, until SIGTERM, Ctrl-C or `stop`."""
+
+import signal
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+from processors.config import Configuration, ProcessorConfig, read_tables
+from processors.discovery import AnyProcessor, find
+from processors.errors import ConfigurationError
+from processors.running.health import node_metrics
+from processors.running.ports import Recorder
+from processors.running.worker import Worker
+from sparkplug.broker import BrokerAddress
+from sparkplug.edge_node import EdgeNode
+from sparkplug.host import HostApplication
+from sparkplug.metric import NodeId
+
+JOIN_S_MAX = 15.0
+OTHERS = ("validation",)  # tables of the same file that are for no processor
+
+
+def run(
+    names: Sequence[str],
+    broker: BrokerAddress,
+    config_path: Path | None = None,
+    stop: threading.Event | None = None,
+    *,
+    group: str = "cnc",
+    session_dir: Path | None = None,
+) -> None:
+    """Run the processors `names` until `stop` is set, or SIGTERM or SIGINT comes where it is not given.
+
+    Everything is checked before anything connects. Raises UnknownProcessorError, ConfigurationError. `session_dir` keeps the
+    birth/death sequence numbers over restarts; all other state is kept on the broker.
+    """
+    run_configured(configured(names, config_path), broker, stop, group=group, session_dir=session_dir)
+
+
+Configured = tuple[AnyProcessor, Configuration[ProcessorConfig]]
+
+
+def run_configured(
+    pairs: Sequence[Configured],
+    broker: BrokerAddress,
+    stop: threading.Event | None = None,
+    *,
+    group: str = "cnc",
+    session_dir: Path | None = None,
+    recorder: Recorder | None = None,
+) -> None:
+    """The same of processors whose configuration has been checked. `recorder` is for the one that `records`."""
+    workers = [
+        _worker(processor, configuration, broker, group, session_dir, recorder=recorder) for processor, configuration in pairs
+    ]
+    failures: list[BaseException] = []
+    with _stopped_by_signals(stop) as stopped:
+        threads = [
+            threading.Thread(target=_guarded, args=(worker, stopped, failures), name=pair[0].name, daemon=True)
+            for worker, pair in zip(workers, pairs, strict=True)
+        ]
+        for thread in threads:
+            thread.start()
+        while not stopped.wait(0.5):
+            pass
+        for thread in threads:
+            thread.join(JOIN_S_MAX)
+    if failures:
+        raise failures[0]
+
+
+def configured(names: Sequence[str], config_path: Path | None = None) -> "list[Configured]":
+    """The processors with their configuration, checked. Raises UnknownProcessorError, ConfigurationError."""
+    tables = {} if config_path is None else read_tables(config_path)
+    for table in tables:
+        if table not in OTHERS:
+            _table_owner(table, config_path)
+    processors = [find(name) for name in dict.fromkeys(names)]
+    try:
+        return [
+            (processor, Configuration(processor.config, tables.get(processor.name), name=processor.name))
+            for processor in processors
+        ]
+    except ConfigurationError as error:
+        raise ConfigurationError(f"{config_path}: {error}") from error
+
+
+def _table_owner(table: str, config_path: Path | None) -> AnyProcessor:
+    """The processor that a table of a configuration file is for, running or not. Raises ConfigurationError."""
+    try:
+        return find(table)
+    except Exception as error:
+        raise ConfigurationError(f"{config_path}: [{table}]: {error}") from error
+
+
+def _worker(
+    processor: AnyProcessor,
+    configuration: Configuration[ProcessorConfig],
+    broker: BrokerAddress,
+    group: str,
+    session_dir: Path | None,
+    *,
+    recorder: Recorder | None,
+) -> Worker:
+    host = HostApplication(broker, processor.node, (f"spBv1.0/{group}/#",), wanted=lambda node: processor.listens_to(node.node))
+    session_file = None if session_dir is None else session_dir / f"{processor.node}.json"
+    edge = EdgeNode(broker, NodeId(group, processor.node), node_metrics(records=processor.records), session_file=session_file)
+    return Worker(processor, configuration, host, edge, recorder if processor.records else None)
+
+
+def _guarded(worker: Worker, stop: threading.Event, failures: list[BaseException]) -> None:
+    """A thread that fails ends all: half a set of processors is worse than none, and a supervisor can start anew."""
+    try:
+        worker.run(stop)
+    except BaseException as error:
+        failures.append(error)
+        stop.set()
+        raise
+
+
+@contextmanager
+def _stopped_by_signals(stop: threading.Event | None) -> Iterator[threading.Event]:
+    """The given event, or one that SIGTERM and SIGINT set."""
+    if stop is not None:
+        yield stop
+        return
+    stopped = threading.Event()
+
+    def stop_now(_number: int, _frame: FrameType | None) -> None:
+        stopped.set()
+
+    before: dict[int, Any] = {number: signal.signal(number, stop_now) for number in (signal.SIGTERM, signal.SIGINT)}
+    try:
+        yield stopped
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

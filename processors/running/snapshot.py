@@ -1,0 +1,139 @@
+"""The state of a machine, or of a cell, and its lanes, as JSON, so that a processor can be killed anywhere and go on anywhere.
+
+Floats are written with as many digits as make them come back the same, NaN and the infinities as Python's JSON writes them.
+Nothing is unpickled: what comes back is validated against the state's type.
+"""
+
+import json
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from pydantic import TypeAdapter, ValidationError
+
+from processors.discovery import AnyProcessor
+from processors.errors import SnapshotError
+from processors.running.fold import Fold
+from processors.running.lane import Lane
+from sparkplug.metric import Change, Reading
+from sparkplug.quality import Quality
+
+FORMAT = 2
+PLAIN_TYPES = (bool, int, float, str)
+
+
+def encode_state(adapter: TypeAdapter[Any], state: Any) -> Any:
+    """The state as JSON values."""
+    return adapter.dump_python(state, mode="json")
+
+
+def decode_state(adapter: TypeAdapter[Any], dumped: Any) -> Any:
+    """The state again. Raises SnapshotError where it is not the same thing: a field too many, too few, or of another type."""
+    try:
+        state = adapter.validate_python(dumped)
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise SnapshotError(f"state: {'.'.join(map(str, first['loc']))}: {first['msg']}") from error
+    if json.dumps(encode_state(adapter, state), sort_keys=True) != json.dumps(dumped, sort_keys=True):
+        raise SnapshotError("state has another form than this version writes")
+    return state
+
+
+class SnapshotCodec:
+    """Snapshots of one processor; `unit` is the machine, or the cell, that has a state."""
+
+    def __init__(self, processor: AnyProcessor) -> None:
+        self._name, self._version = processor.name, processor.version
+        self._adapter: TypeAdapter[Any] = TypeAdapter(processor.state)
+
+    def encode(self, unit: str, live: Fold, lanes: Mapping[str, Lane], history: Fold | None, late: Mapping[str, Lane]) -> bytes:
+        """The snapshot of a unit: its state and the lanes that lead to it, live and of its history."""
+        document = {
+            "format": FORMAT,
+            "processor": self._name,
+            "version": self._version,
+            "unit": unit,
+            "live": self._part(live, lanes),
+            "history": None if history is None else self._part(history, late),
+        }
+        return json.dumps(document, separators=(",", ":"), ensure_ascii=False).encode()
+
+    def unit(self, payload: bytes) -> tuple[str, dict[str, Any]]:
+        """The unit's name and the document. Raises SnapshotError where it is none of ours."""
+        try:
+            document = json.loads(payload)
+        except (ValueError, RecursionError) as error:
+            raise SnapshotError(f"not JSON: {error}") from error
+        if not isinstance(document, dict) or not isinstance(document.get("unit"), str):
+            raise SnapshotError("no JSON object with a unit")
+        found = (document.get("format"), document.get("processor"), document.get("version"))
+        if found != (FORMAT, self._name, self._version):
+            raise SnapshotError(f"format, processor, version are {found}; this is {(FORMAT, self._name, self._version)}")
+        return document["unit"], document
+
+    def restore(self, document: Any, fold: Fold, lane_of: Callable[[str], Lane]) -> None:
+        """Put one part of a document into a fresh fold and fresh lanes. Raises SnapshotError before the state is changed."""
+        try:
+            lanes = [(lane_of(name), _lane_values(entry, fold.is_history)) for name, entry in document["machines"].items()]
+            state = decode_state(self._adapter, document["state"])
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            raise SnapshotError(f"{type(error).__name__}: {error}") from error
+        for lane, (clock_ms, last_ms, ticking, is_silent, row, latest, births) in lanes:
+            lane.clock_ms, lane.last_ms, lane.ticking, lane.is_silent = clock_ms, last_ms, ticking, is_silent
+            lane.row.update(row)
+            lane.emission.latest.update(latest)
+            lane.is_restored = lane.births_are_old = True
+            lane.births = births
+        fold.state = state
+
+    def _part(self, fold: Fold, lanes: Mapping[str, Lane]) -> dict[str, Any]:
+        return {
+            "state": encode_state(self._adapter, fold.state),
+            "machines": {name: _lane_document(lane) for name, lane in lanes.items()},
+        }
+
+
+def _lane_document(lane: Lane) -> dict[str, Any]:
+    return {
+        "clock_ms": lane.clock_ms,
+        "last_ms": lane.last_ms,
+        "ticking": lane.ticking,
+        "is_silent": lane.is_silent,
+        "births": lane.births,
+        # The broker gives tables, bytes and templates again with the next birth.
+        "row": {
+            name: [reading.value, reading.timestamp_ms, int(reading.quality), reading.unit, reading.reason]
+            for name, reading in lane.row.items()
+            if reading.value is None or isinstance(reading.value, PLAIN_TYPES)
+        },
+        "latest": {
+            name: [change.value, change.timestamp_ms, int(change.quality), change.reason]
+            for name, change in lane.emission.latest.items()
+        },
+    }
+
+
+_Values = tuple[int | None, int, bool, bool, dict[str, Reading], dict[str, Change], dict[str, int]]
+
+
+def _lane_values(entry: Any, is_history: bool) -> _Values:
+    row = {name: _reading(name, reading) for name, reading in entry["row"].items()}
+    latest = {name: _change(name, change, is_history) for name, change in entry["latest"].items()}
+    clock_ms, last_ms = _whole(entry["clock_ms"]), _whole(entry["last_ms"]) or 0
+    births = {str(node): int(stamp_ms) for node, stamp_ms in entry.get("births", {}).items()}
+    return clock_ms, last_ms, entry["ticking"] is True, entry["is_silent"] is True, row, latest, births
+
+
+def _whole(value: Any) -> int | None:
+    if value is not None and type(value) is not int:
+        raise TypeError(f"{value!r} is no whole number")
+    return value
+
+
+def _reading(name: str, entry: Any) -> Reading:
+    value, timestamp_ms, quality, unit, reason = entry
+    return Reading(name, value, int(timestamp_ms), Quality(quality), unit, reason, is_historical=False)
+
+
+def _change(name: str, entry: Any, is_history: bool) -> Change:
+    value, timestamp_ms, quality, reason = entry
+    return Change(name, value, int(timestamp_ms), Quality(quality), reason, is_history)

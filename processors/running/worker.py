@@ -1,0 +1,311 @@
+"""One processor at work: reads from a host application, folds, writes to an edge node. All of it in the thread that calls `run`.
+
+Start: subscribe to the snapshots, then publish a marker behind them: when it comes back, all retained snapshots have come. Only
+then is anything folded; what comes before waits. A machine whose edges are all offline has its twin device die (DDEATH), so that
+every reader marks its values stale by Sparkplug's own rule, and is born again with it.
+"""
+
+import logging
+import time
+from collections import deque
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import replace
+from threading import Event
+
+from paho.mqtt.client import topic_matches_sub
+
+from processors.config import Configuration, ProcessorConfig
+from processors.contract import CellProcessor
+from processors.discovery import AnyProcessor
+from processors.effects import Declare, Effect, Pin, Publish, PublishPlain, Remove
+from processors.errors import SnapshotError
+from processors.plain_topic import topic_level
+from processors.running.engine import Engine
+from processors.running.ledger import DropReason
+from processors.running.ports import EdgePort, HostPort, Recorder
+from sparkplug.errors import SparkplugError
+from sparkplug.host_session import EventKind, HostEvent
+from sparkplug.metric import Change, MetricSpec
+
+POLL_S = 0.05
+RESTORE_S_MAX = 1.0  # to wait for the snapshots, once the broker answers
+UNBORN_S_MAX = 15.0  # for a restored machine to be born again, before it is taken for offline
+SNAPSHOT_S = 2.0
+REPORT_S = 1.0
+STALL_S = 1.0  # a longer pause of this process is no silence of the machine
+WAITING_MAX = 100_000  # events, while the snapshots are awaited
+DEAD_LETTERS_A_REPORT_MAX = 10  # that are published; all are counted
+_log = logging.getLogger(__name__)
+
+
+class Worker:
+    """See the module."""
+
+    def __init__(
+        self,
+        processor: AnyProcessor,
+        configuration: Configuration[ProcessorConfig],
+        host: HostPort,
+        edge: EdgePort,
+        recorder: Recorder | None = None,
+    ) -> None:
+        self.engine = Engine(processor, configuration)
+        self._processor, self._host, self._edge, self._recorder = processor, host, edge, recorder
+        self._specs: tuple[MetricSpec, ...] = tuple(spec.metric() for spec in processor.outputs)
+        self._snapshot_prefix = f"cnctwin/snapshot/{processor.name}/"
+        self._letter_prefix = f"cnctwin/deadletter/{processor.name}/"
+        self._marker_topic = f"cnctwin/marker/{processor.name}"
+        self._listens = processor.listens if isinstance(processor, CellProcessor) else ()
+        self._declared: set[str] = set()
+        self._waiting: deque[HostEvent] = deque()
+        self._unsaved: dict[str, float] = {}  # unit: since when
+        self._saved: set[str] = set()
+        self._letters_left = DEAD_LETTERS_A_REPORT_MAX
+        self._reported_s = self._saved_s = 0.0
+        self._is_restored = False
+        self._turned_s = time.monotonic()
+        self._patient_until_s = 0.0
+        self._unborn_until_s: float | None = None
+        self._queue_dropped = self._reconnects = 0
+        self._lag_s = 0.0
+
+    def run(self, stop: Event) -> None:
+        """Work until `stop` is set, then save, say goodbye and disconnect."""
+        self._host.subscribe_plain(self._snapshot_prefix + "+")
+        self._host.subscribe_plain(self._marker_topic)
+        for wanted in self._listens:
+            self._host.subscribe_plain(wanted)
+        if self._recorder is not None:
+            self._host.subscribe_plain(self._recorder.keeps_plain)
+        self._host.start()
+        self._edge.start()
+        try:
+            if self._restore(stop):
+                self._begin(stop)
+                while not stop.is_set():
+                    self.turn()
+        finally:
+            self._close()
+
+    def turn(self) -> None:
+        """One round: what has come, else silence; then what is due."""
+        called_s = time.monotonic()
+        events = self._host.poll(POLL_S)
+        now_s = time.monotonic()
+        for event in events:
+            self._take(event, now_s)
+        if max(now_s - called_s, called_s - self._turned_s) > STALL_S:
+            self._patient_until_s = now_s + STALL_S  # we slept: what came meanwhile is still on its way to the queue
+        self._turned_s = now_s
+        if self._host.online and not self._host.queue_depth and now_s >= self._patient_until_s:
+            self._apply(self.engine.silence(now_s))
+        if self._unborn_until_s is not None and now_s >= self._unborn_until_s:
+            self._unborn_until_s = None
+            self._apply(self.engine.bury_unborn(time.time_ns() // 1_000_000))
+        if now_s - self._reported_s >= REPORT_S:
+            self._reported_s = now_s
+            self._letters_left = DEAD_LETTERS_A_REPORT_MAX
+            self._apply(self.engine.beat(time.time_ns() // 1_000_000))
+            self._note_changed(now_s)
+            self._report(now_s)
+        if now_s - self._saved_s >= SNAPSHOT_S or not self._saved.issuperset(self.engine.units):
+            # What was never saved is saved at once: what its estimate was started from would be lost for good.
+            self._saved_s = now_s
+            self._save(now_s)
+
+    # Start and end.
+
+    def _restore(self, stop: Event) -> bool:
+        """Take the retained snapshots; False where `stop` came first, and nothing is known that may be saved."""
+        marked_s: float | None = None
+        while not stop.is_set():
+            if marked_s is None and self._host.publish_plain(self._marker_topic, b"all retained snapshots have come", qos=1):
+                marked_s = time.monotonic()
+            complete = False
+            for event in self._host.poll(POLL_S):
+                if event.topic == self._marker_topic:
+                    complete = marked_s is not None
+                elif event.topic.startswith(self._snapshot_prefix):
+                    self._take_snapshot(event)
+                else:
+                    self._wait_with(event)
+            if complete:
+                return True
+            if marked_s is not None and time.monotonic() - marked_s > RESTORE_S_MAX:
+                _log.warning(
+                    "%s: the broker took more than %g s; what has come by now is all", self._processor.name, RESTORE_S_MAX
+                )
+                return True
+        return False
+
+    def _begin(self, stop: Event) -> None:
+        """Fold what has come while the snapshots were awaited."""
+        self._is_restored = True
+        self._unborn_until_s = time.monotonic() + UNBORN_S_MAX
+        self._await_edge(stop)
+        self._reconnects = self._host.reconnects
+        now_s = time.monotonic()
+        while self._waiting:
+            event = self._waiting.popleft()
+            if self._is_message(event):
+                self.engine.ledger.received -= 1
+                self.engine.ledger.buffered -= 1
+            self._take(event, now_s)
+
+    def _await_edge(self, stop: Event) -> None:
+        """Results can go out once our own node is born; a moment's patience saves the first ones."""
+        until_s = time.monotonic() + RESTORE_S_MAX
+        while not (self._edge.online or stop.is_set() or time.monotonic() > until_s):
+            for event in self._host.poll(POLL_S):
+                self._wait_with(event)
+
+    def _is_message(self, event: HostEvent) -> bool:
+        return event.device is not None and event.kind is not EventKind.HOLE and self._processor.listens_to(event.node.node)
+
+    def _wait_with(self, event: HostEvent) -> None:
+        ledger = self.engine.ledger
+        counted = self._is_message(event)
+        ledger.received += counted
+        if len(self._waiting) >= WAITING_MAX:
+            ledger.dropped[DropReason.QUEUE_FULL] += counted
+            return
+        ledger.buffered += counted
+        self._waiting.append(event)
+
+    def _take_snapshot(self, event: HostEvent) -> None:
+        if not event.payload:
+            return
+        try:
+            machine = self.engine.restore(event.payload)
+        except SnapshotError as error:
+            _log.warning(
+                "%s: snapshot on %s is not restored, the state starts fresh: %s", self._processor.name, event.topic, error
+            )
+        else:
+            _log.info("%s: restored %s", self._processor.name, machine)
+
+    def _close(self) -> None:
+        now_s = time.monotonic()
+        if self._is_restored:
+            self._save(now_s)
+            for plain in self.engine.farewell(time.time_ns() // 1_000_000):
+                self._host.publish_plain(plain.topic, plain.payload, qos=1, retain=plain.retain)
+            self._report(now_s)
+        self._edge.stop()
+        self._host.stop()
+
+    # Events and effects.
+
+    def _take(self, event: HostEvent, now_s: float) -> None:
+        if event.kind is not EventKind.PLAIN:
+            if self._recorder is not None and self._processor.listens_to(event.node.node):
+                self._recorder.keep(event, time.time_ns() // 1_000_000)
+            self._feed(event, now_s)
+        elif self._recorder is not None and topic_matches_sub(self._recorder.keeps_plain, event.topic):
+            self._recorder.keep(event, event.timestamp_ms)
+        elif event.payload and any(topic_matches_sub(wanted, event.topic) for wanted in self._listens):
+            self._apply(self.engine.plain(event.topic, event.payload, event.timestamp_ms))
+
+    def _feed(self, event: HostEvent, now_s: float) -> None:
+        emitted = self.engine.ledger.emitted
+        sent = self._apply(self.engine.feed(event, now_s))
+        if not sent and self.engine.ledger.emitted > emitted:
+            self.engine.ledger.unsent()
+        if event.device is not None:
+            self._lag_s = time.time() - event.timestamp_ms / 1000
+
+    def _apply(self, effects: Sequence[Effect]) -> bool:
+        """Carry out what the engine asks; whether everything could be sent."""
+        sent = True
+        for effect in effects:
+            if isinstance(effect, Publish):
+                sent = self._publish(effect) and sent
+            elif isinstance(effect, PublishPlain):
+                sent = self._host.publish_plain(effect.topic, effect.payload, qos=effect.qos, retain=effect.retain) and sent
+            elif isinstance(effect, Declare):
+                self._edge.declare_device(effect.machine, [_with_latest(spec, effect.latest) for spec in self._specs])
+                self._declared.add(effect.machine)
+            elif isinstance(effect, Remove):
+                if effect.machine in self._declared:
+                    self._declared.discard(effect.machine)
+                    self._edge.remove_device(effect.machine)
+            elif isinstance(effect, Pin):
+                if self._recorder is not None:
+                    self._recorder.pin(effect)
+            elif self._letters_left > 0:
+                self._letters_left -= 1
+                _log.warning("%s: dead letter of %s: %s", self._processor.name, effect.machine, effect.payload.decode())
+                self._host.publish_plain(self._letter_prefix + topic_level(effect.machine), effect.payload)
+        return sent
+
+    def _publish(self, effect: Publish) -> bool:
+        if effect.machine not in self._declared:
+            return True  # of a machine that is offline; its next birth carries what is known then
+        try:
+            return self._edge.publish(effect.machine, effect.changes)
+        except SparkplugError as error:
+            self.engine.counts.dead_letters += 1
+            _log.warning("%s: %s: %s", self._processor.name, effect.machine, error)
+            return True
+
+    # What is due.
+
+    def _note_changed(self, now_s: float) -> None:
+        if self._host.reconnects != self._reconnects:
+            self._reconnects = self._host.reconnects
+            self.engine.mark_all_changed()  # a broker that was killed may have forgotten what it retained
+        for machine in self.engine.take_changed():
+            self._unsaved.setdefault(machine, now_s)
+
+    def _save(self, now_s: float) -> None:
+        self._note_changed(now_s)
+        for machine in list(self._unsaved):
+            try:
+                payload = self.engine.snapshot(machine)
+            except KeyError:  # forgotten since
+                del self._unsaved[machine]
+                continue
+            if self._host.publish_plain(self._snapshot_prefix + topic_level(machine), payload, qos=1, retain=True):
+                del self._unsaved[machine]
+                self._saved.add(machine)
+
+    def _report(self, now_s: float) -> None:
+        ledger, counts, host = self.engine.ledger, self.engine.counts, self._host
+        overflowed = host.dropped - self._queue_dropped
+        self._queue_dropped += overflowed
+        ledger.received += overflowed
+        ledger.dropped[DropReason.QUEUE_FULL] += overflowed
+        at_ms = time.time_ns() // 1_000_000
+        self._edge.publish(None, [Change(name, count, at_ms) for name, count in ledger.metrics().items()])
+        health: dict[str, int | float | str] = {
+            "machines": len(self.engine.machines),
+            "lag_s": round(self._lag_s, 3),
+            "queue_depth": host.queue_depth,
+            "holes": counts.holes,
+            "late": counts.late,
+            "ticks": counts.ticks,
+            "dead_letters": counts.dead_letters,
+            "ignored": counts.ignored,
+            "snapshot_age_s": round(max((now_s - since_s for since_s in self._unsaved.values()), default=0.0), 3),
+            "snapshots_rejected": counts.snapshots_rejected,
+            "reconnects": host.reconnects,
+        }
+        if self._recorder is not None:
+            self._give_receipts(self._recorder, at_ms)
+            health |= self._recorder.health()
+        self._edge.publish(None, [Change(f"health/{name}", value, at_ms) for name, value in health.items()])
+
+    def _give_receipts(self, recorder: Recorder, at_ms: int) -> None:
+        """Tell the edges that wait for it what is kept."""
+        for node, device, name, value in recorder.receipts():
+            with suppress(SparkplugError):  # an edge that is gone, or does not ask for receipts
+                self._host.send_command(node, device, [Change(name, value, at_ms)])
+
+
+def _with_latest(spec: MetricSpec, latest: Sequence[Change]) -> MetricSpec:
+    """The declaration with the value that was published last, so that the birth carries it, as of its own time."""
+    for name, value, timestamp_ms, quality, reason, _ in latest:
+        if name == spec.name:
+            return replace(spec, value=value, timestamp_ms=timestamp_ms, quality=quality, reason=reason)
+    return spec
