@@ -13,9 +13,9 @@ import time
 
 import numpy as np
 
-from edge.accelerometer_fold import State, step
-from edge.accelerometer_frame import Block, Frames, encode
-from edge.accelerometer_section import AccelerometerSection, Publish
+from edge.accelerometer.fold import State, step
+from edge.accelerometer.frame import Block, Frames, encode
+from edge.accelerometer.section import AccelerometerSection, Publish
 from twin import vibration
 
 

@@ -18,7 +18,8 @@ from pathlib import Path
 from statistics import median
 from typing import NamedTuple
 
-from edge import clock, clock_signals
+from edge.clock import offset as clock
+from edge.clock import signals as clock_signals
 from edge.sample import ClockReading
 
 T0_S = 1_700_000_000.0

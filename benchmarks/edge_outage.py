@@ -16,10 +16,10 @@ from pathlib import Path
 from typing import Any
 
 from edge.config import BrokerSection, EdgeConfig, MachineSection, StoreSection
+from edge.controls.mtconnect.adapter import ADAPTER
 from edge.controls.mtconnect.config import MtconnectConfig
-from edge.mtconnect import ADAPTER
 from edge.place import Place
-from edge.run import edge_runtime
+from edge.running.run import edge_runtime
 from edge.sample import EdgeSample, Offer, SampleSet
 from edge.sweep import Fact, Sweep
 

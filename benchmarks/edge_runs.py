@@ -23,7 +23,7 @@ from xml.etree import ElementTree as ET
 from benchmarks.edge_load import observations
 from edge.config import StoreSection
 from edge.place import Place
-from edge.ring import Ring
+from edge.running.ring import Ring
 from sparkplug.broker import BrokerAddress
 from sparkplug.host import EventKind
 from sparkplug.host_session import HostEvent

@@ -17,9 +17,9 @@ from edge.adapter import Row
 from edge.config import EdgeConfig
 from edge.config_file import load
 from edge.errors import ConfigError
-from edge.gateway import Gateway
-from edge.run import broker_address, edge_runtime
-from edge.runtime import EdgeRuntime
+from edge.running.gateway import Gateway
+from edge.running.run import broker_address, edge_runtime
+from edge.running.runtime import EdgeRuntime
 from edge.state_dir import state_dir
 from sparkplug.broker import BrokerAddress
 from sparkplug.errors import SparkplugError

@@ -14,9 +14,9 @@ from typing import NamedTuple
 from cnctwin.store.contract import Message, Pinned, Snapshot, Store, StoreError
 from cnctwin.store.opening import default_place, open_store
 from cnctwin.store.retention import Retention
-from edge.forwarder import SEQUENCE
-from edge.receipts import RECEIPT, REPEAT_S
-from edge.spans import Spans
+from edge.running.forwarder import SEQUENCE
+from edge.running.receipts import RECEIPT, REPEAT_S
+from edge.running.spans import Spans
 from processors.contract import TWIN_NODE_PREFIX
 from processors.effects import Pin
 from processors.historian import HistorianConfig

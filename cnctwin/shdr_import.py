@@ -28,7 +28,7 @@ from cnctwin.twin_commands import check_suffix, write
 from edge.config import EdgeConfig
 from edge.controls.mtconnect.config import MtconnectConfig
 from edge.controls.mtconnect.cursor import next_request, parse, start
-from edge.pipeline import Pipeline
+from edge.running.pipeline import Pipeline
 from edge.sample import EdgeSample, SampleSet
 from sparkplug.quality import Quality
 from twin.runlog import COLUMNS, TEXT_COLUMNS, RunLog, run_log, write_run

@@ -14,7 +14,7 @@ from cnctwin.errors import UsageError
 from cnctwin.mtconnect_agent.errors import ReplayError
 from cnctwin.shdr_import import recorded_rows
 from cnctwin.store.contract import Message, Pinned, Store
-from edge.birth import DATATYPES
+from edge.running.birth import DATATYPES
 from edge.sample import EdgeSample
 from edge.signals import DERIVED, signal
 from sparkplug.datatype import DataType

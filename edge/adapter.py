@@ -1,12 +1,12 @@
 """What an edge adapter is, and how adapters are found.
 
-An adapter is one file of this package that ends in `ADAPTER = Adapter(...)`. `parse` is a pure function from a cursor and the
-bytes of one frame to the next cursor and what the frame gave; all I/O is in the connection that `connect` opens. A cursor is a
-frozen value of plain fields, so it can be compared, kept as JSON and played back.
+An adapter is a file `edge/controls/<name>.py` that ends in `ADAPTER = Adapter(...)`, with its sample configuration `<name>.toml`
+beside it, or a folder `edge/controls/<name>/` with both, the declaration in `adapter.py`. `parse` is a pure function from a
+cursor and the bytes of one frame to the next cursor and what the frame gave; all I/O is in the connection that `connect` opens. A
+cursor is a frozen value of plain fields, so it can be compared, kept as JSON and played back.
 """
 
 import importlib
-import pkgutil
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache
@@ -15,8 +15,9 @@ from typing import Any, Protocol
 
 from pydantic import BaseModel
 
-import edge
+import edge.controls
 from edge.config import EdgeConfig
+from edge.errors import ConfigError
 from edge.place import Place
 from edge.sample import SampleSet
 
@@ -75,11 +76,23 @@ class Adapter:
 
 
 @cache
+def modules() -> dict[str, str]:
+    """The module that declares each adapter, by the adapter's name in alphabetical order; imports none of them."""
+    folder = Path(edge.controls.__path__[0])
+    found = {sample.stem: f"edge.controls.{sample.stem}" for sample in folder.glob("*.toml")}
+    found |= {one.parent.name: f"edge.controls.{one.parent.name}.adapter" for one in folder.glob("*/adapter.py")}
+    return dict(sorted(found.items()))
+
+
 def adapters() -> dict[str, Adapter]:
-    """All adapters of this package by name."""
-    found: dict[str, Adapter] = {}
-    for module in pkgutil.iter_modules(edge.__path__):
-        adapter = getattr(importlib.import_module(f"edge.{module.name}"), "ADAPTER", None)
-        if isinstance(adapter, Adapter):
-            found[adapter.name] = adapter
-    return found
+    """All adapters by name."""
+    return {name: find(name) for name in modules()}
+
+
+def find(name: str) -> Adapter:
+    """The adapter `name`; imports no other. Raises ConfigError."""
+    if name not in modules():
+        raise ConfigError(f"no adapter {name!r}; there are {', '.join(modules())}")
+    adapter = getattr(importlib.import_module(modules()[name]), "ADAPTER", None)
+    assert isinstance(adapter, Adapter) and adapter.name == name, f"{modules()[name]} declares no adapter {name!r}"
+    return adapter

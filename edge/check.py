@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from edge.adapter import Row, adapters
+from edge.adapter import Row, adapters, find
 from edge.config import without_secret
 from edge.config_file import load
 from edge.errors import ConfigError
@@ -11,7 +11,7 @@ from edge.errors import ConfigError
 def check(config_path: Path) -> list[Row]:
     """What the edge of this file would publish; ConfigError or ConnectionLostError where it cannot work."""
     config = load(config_path)
-    return adapters()[config.machine.adapter].describe(config)
+    return find(config.machine.adapter).describe(config)
 
 
 def discover(url: str, *, device: str = "") -> str:

@@ -10,7 +10,7 @@ from typing import Annotated, Generic, Literal, TypeVar
 
 from pydantic import AfterValidator, BaseModel, Field, ValidationError
 
-from edge.accelerometer_section import AccelerometerSection
+from edge.accelerometer.section import AccelerometerSection
 from edge.errors import ConfigError
 from edge.section import Section
 from edge.signals import DERIVED, Kind, signal

@@ -6,8 +6,8 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from edge.accelerometer_section import AccelerometerSection
-from edge.adapter import adapters
+from edge.accelerometer.section import AccelerometerSection
+from edge.adapter import find, modules
 from edge.config import (
     BrokerSection,
     EdgeConfig,
@@ -49,10 +49,9 @@ def parse(text: str, path: Path) -> EdgeConfig[Any]:
         raise ConfigError(f"{path}: is no TOML: {error}") from error
     sections = {name: _section(path, name, kind, tables.pop(name, {})) for name, kind in _SECTIONS.items()}
     chosen: str = sections["machine"].adapter
-    adapter = adapters().get(chosen)
-    if adapter is None:
-        raise ConfigError(f"{path}: machine.adapter = {chosen!r}: no such adapter; there are {', '.join(sorted(adapters()))}")
-    source = _section(path, chosen, TypeAdapter(adapter.config_model), tables.pop(chosen, {}))
+    if chosen not in modules():
+        raise ConfigError(f"{path}: machine.adapter = {chosen!r}: no such adapter; there are {', '.join(modules())}")
+    source = _section(path, chosen, TypeAdapter(find(chosen).config_model), tables.pop(chosen, {}))
     if tables:
         raise ConfigError(f"{path}: [{next(iter(tables))}]: no such table; there are {', '.join(_SECTIONS)} and {chosen}")
     return EdgeConfig(source=source, path=path, **sections)

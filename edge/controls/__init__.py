@@ -1,1 +1,1 @@
-"""What the adapters are made of: a folder for each control, named like its adapter."""
+"""The controls that an edge can read: a file or a folder for each, named like its adapter."""

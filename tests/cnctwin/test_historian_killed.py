@@ -12,9 +12,9 @@ import pytest
 from cnctwin.store.contract import Query, StoreError
 from cnctwin.store.opening import open_store
 from edge.config import StoreSection
-from edge.forwarder import SEQUENCE, Forwarder
-from edge.receipts import RECEIPT
-from edge.ring import Ring
+from edge.running.forwarder import SEQUENCE, Forwarder
+from edge.running.receipts import RECEIPT
+from edge.running.ring import Ring
 from edge.sample import EdgeSample
 from sparkplug.broker import BrokerAddress
 from sparkplug.datatype import DataType

@@ -24,7 +24,7 @@ from cnctwin.jobs.client import JobsClient
 from cnctwin.store.influx.address import parse
 from cnctwin.store.opening import default_place
 from edge.config_file import load
-from edge.run import broker_address
+from edge.running.run import broker_address
 from processors.running.runtime import configured
 from sparkplug.broker import BrokerAddress
 from tests.deploy.command_lines import parsed

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from edge.config_file import load
-from edge.run import broker_address
+from edge.running.run import broker_address
 from tests.deploy.plant import DEPLOY
 
 UNITS = sorted((DEPLOY / "systemd").glob("*.service"))

@@ -14,11 +14,11 @@ from pathlib import Path
 import pytest
 from pydantic import ValidationError
 
-from edge.accelerometer import HEALTH, WAITING_MAX, Accelerometer
-from edge.accelerometer_fold import BLOCK, BLOCK_METRICS, RATE, RMS, VELOCITY, Delivery
-from edge.accelerometer_frame import encode
-from edge.accelerometer_section import AccelerometerSection, Publish
-from edge.accelerometer_source import Source, file_blocks
+from edge.accelerometer.fold import BLOCK, BLOCK_METRICS, RATE, RMS, VELOCITY, Delivery
+from edge.accelerometer.frame import encode
+from edge.accelerometer.section import AccelerometerSection, Publish
+from edge.accelerometer.sensor import HEALTH, WAITING_MAX, Accelerometer
+from edge.accelerometer.source import Source, file_blocks
 from edge.signals import signal
 from tests.edge.test_accelerometer_fold import RATE_HZ, blocks, shaken
 from tests.recordings import PROJECT

@@ -7,7 +7,7 @@ import time
 import numpy as np
 import pytest
 
-from edge.accelerometer_filter import Carried, Sums, band, filtered, started
+from edge.accelerometer.filter import Carried, Sums, band, filtered, started
 from twin import vibration
 
 

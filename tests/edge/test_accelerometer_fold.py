@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import TypeAdapter
 
-from edge.accelerometer_fold import BLOCK, NO_BLOCK, RATE, RMS, VELOCITY, Delivery, State, silent, step
-from edge.accelerometer_frame import Block
-from edge.accelerometer_section import AccelerometerSection, Publish
+from edge.accelerometer.fold import BLOCK, NO_BLOCK, RATE, RMS, VELOCITY, Delivery, State, silent, step
+from edge.accelerometer.frame import Block
+from edge.accelerometer.section import AccelerometerSection, Publish
 from processors.vibration import PROCESSOR
 from processors.vibration import RMS as TWIN_RMS
 from processors.vibration import VELOCITY as TWIN_VELOCITY

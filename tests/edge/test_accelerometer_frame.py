@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from edge.accelerometer_frame import HEADER, SAMPLES_MAX, Block, Frames, encode
+from edge.accelerometer.frame import HEADER, SAMPLES_MAX, Block, Frames, encode
 from edge.errors import DocumentError
 
 BLOCK = Block(7, 10_000.0, 1_700_000_000_000_000, (0.5, -0.25, 1.0))

@@ -4,11 +4,11 @@ import time
 
 import pytest
 
-from edge.accelerometer import Accelerometer
-from edge.accelerometer_fold import BLOCK, RMS
-from edge.accelerometer_frame import encode
-from edge.accelerometer_section import AccelerometerSection, Publish
-from edge.birth import device_metrics
+from edge.accelerometer.fold import BLOCK, RMS
+from edge.accelerometer.frame import encode
+from edge.accelerometer.section import AccelerometerSection, Publish
+from edge.accelerometer.sensor import Accelerometer
+from edge.running.birth import device_metrics
 from processors.vibration import PROCESSOR
 from processors.vibration import RMS as TWIN_RMS
 from sparkplug.broker import BrokerAddress

@@ -16,10 +16,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import TypeAdapter
 
-from edge.adapter import Adapter, adapters
+from edge.adapter import Adapter, adapters, modules
 from edge.config import EdgeConfig
 from edge.config_file import load
-from edge.pipeline import Pipeline
+from edge.running.pipeline import Pipeline
 from edge.sample import EdgeSample, SampleSet
 from edge.signals import signal
 from edge.tool_change import not_observable
@@ -56,9 +56,8 @@ def plain(given_: SampleSet) -> dict[str, object]:
 
 @every_adapter
 def test_it_is_found_by_the_name_of_its_file(adapter: Adapter) -> None:
-    assert (Path(__file__).parents[2] / "edge" / f"{adapter.name}.py").read_text(encoding="utf-8").count(
-        "\nADAPTER = Adapter("
-    ) == 1
+    declaration = Path(__file__).parents[2] / f"{modules()[adapter.name].replace('.', '/')}.py"
+    assert declaration.read_text(encoding="utf-8").count("\nADAPTER = Adapter(") == 1
     assert frames_of(adapter), "an adapter needs recorded frames"
 
 

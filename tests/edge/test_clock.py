@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import TypeAdapter
 
-from edge import clock
-from edge.clock import OFFSET, SPREAD, STAMPED_BY, Heard, State, heard
+from edge.clock import offset as clock
+from edge.clock.offset import OFFSET, SPREAD, STAMPED_BY, Heard, State, heard
 from edge.sample import ClockReading, EdgeSample, SampleSet
 from edge.signals import signal
 from sparkplug.metric import MetricSpec

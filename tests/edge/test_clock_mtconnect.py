@@ -2,7 +2,7 @@
 
 import pytest
 
-from edge import clock
+from edge.clock import offset as clock
 from edge.sample import ClockReading
 from tests.edge.controls.mtconnect.agent_documents import error, fed, probe, streams, value
 

@@ -6,9 +6,10 @@ from statistics import median
 
 import pytest
 
-from edge import clock, clock_signals
-from edge.clock_bounds import Bound
-from edge.clock_signals import News, Points, State, compare, step
+from edge.clock import offset as clock
+from edge.clock import signals as clock_signals
+from edge.clock.bounds import Bound
+from edge.clock.signals import News, Points, State, compare, step
 from edge.controls.mtconnect.documents import timestamp_ms
 from edge.sample import ClockReading
 from tests.recordings import recording

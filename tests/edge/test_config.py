@@ -7,10 +7,10 @@ import pytest
 from edge.check import discover
 from edge.config import BLOCK_PATTERN, BrokerSection, EdgeConfig
 from edge.config_file import load, parse
+from edge.controls.mtconnect.adapter import ADAPTER
 from edge.controls.mtconnect.config import MtconnectConfig
 from edge.errors import ConfigError
-from edge.mtconnect import ADAPTER
-from edge.run import broker_address
+from edge.running.run import broker_address
 
 FILE = Path("vmc.toml")
 

@@ -15,9 +15,9 @@ from cnctwin.mtconnect_agent.replay_agent import ReplayAgent
 from edge.config import BrokerSection, EdgeConfig, MachineSection
 from edge.controls.mtconnect.check import describe
 from edge.controls.mtconnect.config import MtconnectConfig
-from edge.ledger import Ledger
-from edge.run import edge_runtime
-from edge.runtime import EdgeRuntime
+from edge.running.ledger import Ledger
+from edge.running.run import edge_runtime
+from edge.running.runtime import EdgeRuntime
 from sparkplug.broker import BrokerAddress
 from sparkplug.host import EventKind
 from sparkplug.host_session import HostEvent

@@ -9,9 +9,9 @@ import pytest
 
 from edge.config import StoreSection
 from edge.errors import StoreError
-from edge.forwarder import FLIGHTS_MAX, SEQUENCE, Forwarder
 from edge.place import Place
-from edge.ring import Ring, StoredRow
+from edge.running.forwarder import FLIGHTS_MAX, SEQUENCE, Forwarder
+from edge.running.ring import Ring, StoredRow
 from edge.sample import Drop, EdgeSample
 from sparkplug.metric import Change
 

@@ -13,9 +13,9 @@ import pytest
 
 from edge.config import EdgeConfig
 from edge.errors import ConfigError
-from edge.gateway import Gateway
-from edge.ledger import Ledger
-from edge.runtime import EdgeRuntime
+from edge.running.gateway import Gateway
+from edge.running.ledger import Ledger
+from edge.running.runtime import EdgeRuntime
 
 
 class Edge:

@@ -2,7 +2,7 @@
 
 from edge.config import EdgeConfig, ReportSection, SignalSection
 from edge.controls.mtconnect.config import MtconnectConfig
-from edge.pipeline import Pipeline, rows_of
+from edge.running.pipeline import Pipeline, rows_of
 from edge.sample import Drop, EdgeSample, SampleSet
 
 

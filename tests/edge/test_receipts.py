@@ -7,9 +7,9 @@ import pytest
 
 from edge.config import StoreSection
 from edge.errors import StoreError
-from edge.forwarder import Forwarder
-from edge.receipts import REPEAT_S, Receipts, spans_of
-from edge.ring import Ring
+from edge.running.forwarder import Forwarder
+from edge.running.receipts import REPEAT_S, Receipts, spans_of
+from edge.running.ring import Ring
 from tests.edge.test_forwarder import NAMES, Wire, World
 
 LIMITS = StoreSection(free_bytes_min=0, history_rows_per_s=2_000, await_receipt=True)

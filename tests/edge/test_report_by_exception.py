@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from edge.report_by_exception import State
+from edge.running.report_by_exception import State
 from edge.sample import Drop, EdgeSample
 from sparkplug.quality import Quality
 

@@ -14,7 +14,7 @@ import pytest
 from edge.config import StoreSection
 from edge.errors import StoreError
 from edge.place import Place
-from edge.ring import Eviction, Ring
+from edge.running.ring import Eviction, Ring
 
 PLENTY = 10**12
 
@@ -206,7 +206,7 @@ import sys, time
 from pathlib import Path
 from edge.config import StoreSection
 from edge.place import Place
-from edge.ring import Ring
+from edge.running.ring import Ring
 ring = Ring(Path(sys.argv[1]), StoreSection(free_bytes_min=0), wall_ms=lambda: time.time_ns() // 10**6, clock=time.monotonic)
 while True:
     first = ring.append([(1, "row")] * 7, Place("control", ring.last + 8))

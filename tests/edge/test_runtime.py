@@ -10,10 +10,10 @@ from typing import Any
 import pytest
 
 from edge.config import EdgeConfig, MachineSection
+from edge.controls.mtconnect.adapter import ADAPTER
 from edge.controls.mtconnect.config import MtconnectConfig
-from edge.ledger import Ledger
-from edge.mtconnect import ADAPTER
-from edge.runtime import EdgeRuntime
+from edge.running.ledger import Ledger
+from edge.running.runtime import EdgeRuntime
 from sparkplug.metric import Change, MetricSpec
 from tests.edge.controls.mtconnect.agent_documents import error, probe, streams, value
 

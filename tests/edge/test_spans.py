@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from edge.spans import Spans
+from edge.running.spans import Spans
 
 
 def numbers(spans: Spans) -> list[int]:

@@ -18,7 +18,7 @@ from cnctwin.simulated_machine.description import DEVICES
 from cnctwin.simulated_machine.moment import Adapter
 from edge.adapter import adapters
 from edge.config_file import load
-from edge.runtime import EdgeRuntime
+from edge.running.runtime import EdgeRuntime
 from sparkplug.broker import BrokerAddress
 from sparkplug.host import EventKind
 from sparkplug.host_session import HostEvent

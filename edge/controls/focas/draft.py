@@ -40,7 +40,8 @@ def text_of(source: FocasConfig, device: str, sweep: Sweep, frame: SampleSet) ->
     nulls = {sample.signal for sample in frame.samples if sample.value is None}
     signals = [offer.signal for offer in frame.offers or () if offer.signal not in nulls]
     lines = [
-        f"# Drafted from focas://{source.host}:{source.port}. Values that are not here have their defaults; see edge/focas.toml.",
+        f"# Drafted from focas://{source.host}:{source.port}. Values that are not here have their defaults; "
+        "see edge/controls/focas/focas.toml.",
         _comment(f"{told['cnc_type']}i-{told['mt_type']} series {told['series']} version {told['version']}, axes {told['axes']}"),
         "",
         "[machine]",

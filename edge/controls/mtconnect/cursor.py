@@ -135,7 +135,7 @@ def parse(config: Config, cursor: Cursor, raw: bytes) -> tuple[Cursor, SampleSet
 
 
 def _clock(header: Header) -> ClockReading | None:
-    """What the agent's clock showed; when that was by the edge's, `edge.clock` finds from when the document arrived."""
+    """What the agent's clock showed; when that was by the edge's, `edge.clock.offset` finds from when the document arrived."""
     if header.created_ms is None:
         return None
     return ClockReading(header.created_ms, 0, DOCUMENT_MS_MAX, header.resolution_ms)

@@ -16,7 +16,14 @@ from cnctwin.simulated_machine.as_built import machine_as_built
 from twin.machine import read_machine
 
 HEAVY = ("numpy", "scipy", "numba", "pyarrow")
-LIGHT = ("cnctwin.cli", "cnctwin.demo", "cnctwin.machine_command", "edge.runtime", "edge.check", "processors.running.runtime")
+LIGHT = (
+    "cnctwin.cli",
+    "cnctwin.demo",
+    "cnctwin.machine_command",
+    "edge.running.runtime",
+    "edge.check",
+    "processors.running.runtime",
+)
 MODULES = ("as_built", "moment", "part", "working_day", "machining")
 
 

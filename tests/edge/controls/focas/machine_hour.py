@@ -25,8 +25,8 @@ from edge.controls.focas.connection import FocasConnection
 from edge.controls.focas.cursor import parse, start
 from edge.controls.focas.ethernet import EthernetBackend
 from edge.controls.focas.policy import Policy, policy_of
-from edge.ledger import Ledger
-from edge.pipeline import Pipeline
+from edge.running.ledger import Ledger
+from edge.running.pipeline import Pipeline
 from edge.sample import EdgeSample, Gap
 
 SWITCHED_ON_S = 1_767_225_600.0

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from edge.config import EdgeConfig, SignalSection
 from edge.controls.focas.config import FocasConfig
 from edge.controls.focas.cursor import Cursor, parse, start
-from edge.pipeline import Pipeline
+from edge.running.pipeline import Pipeline
 from edge.sample import Drop, EdgeSample, SampleSet
 from edge.sweep import Fact, Hole, Plain, Sweep
 from sparkplug.quality import Quality

@@ -16,8 +16,8 @@ from edge.controls.heidenhain.config import HeidenhainConfig
 from edge.controls.heidenhain.connection import HeidenhainConnection
 from edge.controls.heidenhain.cursor import parse, start
 from edge.controls.heidenhain.klartext import read_program
-from edge.ledger import Ledger
-from edge.pipeline import Pipeline
+from edge.running.ledger import Ledger
+from edge.running.pipeline import Pipeline
 from edge.sample import EdgeSample, SampleSet
 from tests.edge.controls.heidenhain.machine_time import SWITCHED_ON_S, MachineTime
 

@@ -5,7 +5,7 @@ from typing import Any
 from edge.config import EdgeConfig, SignalSection
 from edge.controls.heidenhain.config import Config, HeidenhainConfig
 from edge.controls.heidenhain.cursor import Cursor, parse, start
-from edge.pipeline import Pipeline
+from edge.running.pipeline import Pipeline
 from edge.sample import UNAVAILABLE, EdgeSample, SampleSet
 from edge.sweep import Fact, Hole, Plain, Sweep
 from tests.edge.controls.heidenhain.test_klartext import program_of

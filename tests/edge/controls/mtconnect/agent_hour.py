@@ -25,8 +25,8 @@ from edge.config import EdgeConfig
 from edge.controls.mtconnect.config import MtconnectConfig
 from edge.controls.mtconnect.connection import MtconnectConnection
 from edge.controls.mtconnect.cursor import Config, Phase, parse, start
-from edge.ledger import Ledger
-from edge.pipeline import Pipeline
+from edge.running.ledger import Ledger
+from edge.running.pipeline import Pipeline
 from edge.sample import Drop, EdgeSample, Gap
 from tests.edge.controls.mtconnect.faulty_link import FaultyLink
 from tests.edge.controls.mtconnect.mischief import Episode, episodes

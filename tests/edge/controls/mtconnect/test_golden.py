@@ -13,7 +13,7 @@ from edge.config import EdgeConfig, ToolChangeSection
 from edge.controls.mtconnect.config import MtconnectConfig
 from edge.controls.mtconnect.cursor import Cursor, Phase
 from edge.controls.mtconnect.multipart import MultipartParser
-from edge.pipeline import Pipeline
+from edge.running.pipeline import Pipeline
 from edge.sample import Drop
 from tests.edge.controls.mtconnect.agent_documents import CONFIG, fed, values
 from tests.recordings import recording

@@ -11,7 +11,7 @@ from edge.config import EdgeConfig, SignalSection
 from edge.controls.mtconnect.config import MtconnectConfig
 from edge.controls.mtconnect.connection import fetch
 from edge.controls.mtconnect.cursor import Phase, next_request, parse, start
-from edge.pipeline import Pipeline
+from edge.running.pipeline import Pipeline
 from edge.sample import Drop, EdgeSample
 from tests.depth import IS_FULL
 from tests.recordings import PROJECT, recording, recordings_folder

@@ -16,7 +16,7 @@ from edge.config import EdgeConfig
 from edge.controls.opcua.config import Config, OpcUaConfig
 from edge.controls.opcua.connection import OpcUaConnection
 from edge.controls.opcua.cursor import parse, start
-from edge.pipeline import Pipeline
+from edge.running.pipeline import Pipeline
 from edge.sample import EdgeSample, Gap
 from tests.edge.controls.opcua.control_process import SWITCHED_ON_S, ControlProcess
 

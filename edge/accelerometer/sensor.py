@@ -18,11 +18,11 @@ import threading
 import time
 from collections.abc import Callable
 
-from edge import accelerometer_fold as fold
-from edge.accelerometer_fold import BLOCK_METRICS, Delivery
-from edge.accelerometer_frame import Block
-from edge.accelerometer_section import AccelerometerSection, Publish
-from edge.accelerometer_source import SILENCE_S_MAX, Source
+from edge.accelerometer import fold
+from edge.accelerometer.fold import BLOCK_METRICS, Delivery
+from edge.accelerometer.frame import Block
+from edge.accelerometer.section import AccelerometerSection, Publish
+from edge.accelerometer.source import SILENCE_S_MAX, Source
 from edge.sample import Offer
 from sparkplug.datatype import DataType
 from sparkplug.metric import MetricSpec

@@ -17,8 +17,9 @@ from typing import Any, NamedTuple
 
 from pydantic import TypeAdapter, ValidationError
 
-from edge import report_by_exception, tool_change
+from edge import tool_change
 from edge.config import EdgeConfig, SignalSection
+from edge.running import report_by_exception
 from edge.sample import Drop, EdgeSample, SampleSet
 from edge.signals import DERIVED
 

@@ -7,15 +7,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from edge import accelerometer, clock
-from edge.adapter import Adapter, adapters
+from edge.accelerometer import sensor as accelerometer
+from edge.adapter import Adapter, find
+from edge.clock import offset as clock
 from edge.config import BrokerSection, EdgeConfig
 from edge.errors import ConfigError
-from edge.forwarder import Forwarder
-from edge.health import HEALTH
-from edge.ledger import Ledger
-from edge.ring import Ring
-from edge.runtime import EdgeRuntime, Publisher
+from edge.running.forwarder import Forwarder
+from edge.running.health import HEALTH
+from edge.running.ledger import Ledger
+from edge.running.ring import Ring
+from edge.running.runtime import EdgeRuntime, Publisher
 from sparkplug.broker import BrokerAddress
 from sparkplug.edge_node import EdgeNode
 from sparkplug.edge_session import Command
@@ -87,7 +88,7 @@ def edge_runtime(
     )
     runtime = EdgeRuntime(
         config,
-        adapter or adapters()[config.machine.adapter],
+        adapter or find(config.machine.adapter),
         node,
         ledger=ledger,
         place_file=Path(broker.session_file + ".place") if broker.session_file else None,

@@ -20,7 +20,7 @@ from operator import mul, sub
 from statistics import median
 from typing import NamedTuple
 
-from edge.clock_bounds import Bound
+from edge.clock.bounds import Bound
 from edge.sample import EdgeSample
 
 WINDOW_S = 120.0

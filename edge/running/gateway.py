@@ -18,7 +18,7 @@ from typing import Any
 from edge.config import EdgeConfig
 from edge.config_file import load
 from edge.errors import ConfigError, EdgeError
-from edge.runtime import EdgeRuntime
+from edge.running.runtime import EdgeRuntime
 
 EDGES_MAX = 500
 LOOK_S = 1.0

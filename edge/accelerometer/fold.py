@@ -11,9 +11,9 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
-from edge.accelerometer_filter import Carried, Sums, band, filtered, started
-from edge.accelerometer_frame import Block
-from edge.accelerometer_section import RATE_HZ_MIN, AccelerometerSection, Publish
+from edge.accelerometer.filter import Carried, Sums, band, filtered, started
+from edge.accelerometer.frame import Block
+from edge.accelerometer.section import RATE_HZ_MIN, AccelerometerSection, Publish
 from edge.sample import EdgeSample, Gap, SampleSet
 from sparkplug.datatype import DataType
 from sparkplug.metric import Change, MetricSpec
@@ -36,7 +36,7 @@ NO_BLOCK = "no block from the accelerometer yet"
 
 
 class Delivery(NamedTuple):
-    """What came of a block: values and holes, blocks to publish as they are, and the envelope for `edge.clock_signals`.
+    """What came of a block: values and holes, blocks to publish as they are, and the envelope for `edge.clock.signals`.
 
     envelope: middle of each tenth of a second, in seconds since 1970 by the EDGE's clock, and its rms in g
     """

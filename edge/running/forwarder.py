@@ -12,7 +12,7 @@ sent on a connection that ended before its barrier came back may have arrived or
 Live rows go out at once, whatever waits. History follows in the order of its numbers, no faster than the configured rate, with
 its own time stamps and `is_historical`, and only as far ahead of its confirmation as one second of that rate.
 
-With `await_receipt` what the broker has confirmed stays until a memory confirms it too (`edge.receipts`).
+With `await_receipt` what the broker has confirmed stays until a memory confirms it too (`edge.running.receipts`).
 """
 
 import json
@@ -25,10 +25,10 @@ from typing import NamedTuple, Protocol
 from edge.config import StoreSection
 from edge.errors import StoreError
 from edge.place import Place
-from edge.receipts import Receipts
-from edge.ring import Eviction, Ring, StoredRow
+from edge.running.receipts import Receipts
+from edge.running.ring import Eviction, Ring, StoredRow
+from edge.running.spans import Spans
 from edge.sample import Drop, EdgeSample
-from edge.spans import Spans
 from sparkplug.errors import SparkplugError
 from sparkplug.metric import Change
 from sparkplug.quality import Quality

@@ -11,7 +11,7 @@ from itertools import combinations
 from statistics import median
 from typing import NamedTuple
 
-from edge.clock_bounds import Bound
+from edge.clock.bounds import Bound
 
 FIRST_S = 60.0
 POINTS_MAX = 64

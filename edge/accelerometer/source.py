@@ -14,8 +14,8 @@ from itertools import count
 from pathlib import Path
 from typing import IO
 
-from edge.accelerometer_frame import Block, Frames
-from edge.accelerometer_section import AccelerometerSection
+from edge.accelerometer.frame import Block, Frames
+from edge.accelerometer.section import AccelerometerSection
 from edge.errors import ConfigError, ConnectionLostError, DocumentError
 
 LOOK_S = 0.5

@@ -17,17 +17,19 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
-from edge import clock, clock_signals, tool_change
-from edge.accelerometer import Accelerometer
+from edge import tool_change
+from edge.accelerometer.sensor import Accelerometer
 from edge.adapter import Adapter, Connection
-from edge.birth import device_metrics
+from edge.clock import offset as clock
+from edge.clock import signals as clock_signals
 from edge.config import EdgeConfig
-from edge.forwarder import SEQUENCE, Forwarder, Sender
-from edge.health import Health
-from edge.ledger import Ledger
-from edge.pipeline import Outcome, Pipeline
 from edge.place import Place, PlaceFile
-from edge.receipts import RECEIPT
+from edge.running.birth import device_metrics
+from edge.running.forwarder import SEQUENCE, Forwarder, Sender
+from edge.running.health import Health
+from edge.running.ledger import Ledger
+from edge.running.pipeline import Outcome, Pipeline
+from edge.running.receipts import RECEIPT
 from edge.sample import UNAVAILABLE, Drop, EdgeSample, Offer, SampleSet
 from sparkplug.datatype import DataType
 from sparkplug.edge_session import Command

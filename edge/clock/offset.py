@@ -3,14 +3,14 @@
     done = clock.step(state, clock.heard(frame, at_s, arrival_ms))     # after each frame
     state, samples, health = done
 
-Evidence, best first (`edge/clock_bounds.py`): readings of the clock over a round trip, each of which proves an interval; the time
+Evidence, best first (`edge/clock/bounds.py`): readings of the clock over a round trip, each of which proves an interval; the time
 of documents that come one way (a ClockReading with `edge_ms` 0; most within `round_trip_ms`); the stamps of samples, which come
-one way too; and the signals themselves (`edge/clock_signals.py`), where a sensor of the edge sees the spindle. It is gathered for
+one way too; and the signals themselves (`edge/clock/signals.py`), where a sensor of the edge sees the spindle. It is gathered for
 `BUCKET_S`, and windows of such buckets are put together.
 
 A clock was set (a step) when the last buckets agree with each other and not with those before; the windows start anew with them.
 What the edge's own clock was set by is seen against its monotonic clock, and taken off all bounds. Drift is a robust line
-(`edge/clock_drift.py`). A step, or a drift that has taken the offset past a second from where it began, is an alarm.
+(`edge/clock/drift.py`). A step, or a drift that has taken the offset past a second from where it began, is an alarm.
 
 Stamps are never changed: consumers that put machines side by side subtract the offset, and only where `stamp_clock` is "control".
 A control that gives no stamps has its samples stamped by the edge; there the offset is a figure about the control, and no more.
@@ -20,8 +20,8 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import Any, NamedTuple, TypeVar
 
-from edge.clock_bounds import Bound, OneWay, above, agreed, largest_gap, of_reading
-from edge.clock_drift import Drift, Series, drift
+from edge.clock.bounds import Bound, OneWay, above, agreed, largest_gap, of_reading
+from edge.clock.drift import Drift, Series, drift
 from edge.sample import ClockReading, EdgeSample, SampleSet
 from sparkplug.datatype import DataType
 from sparkplug.metric import MetricSpec

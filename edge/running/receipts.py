@@ -15,7 +15,7 @@ from collections import deque
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from edge.spans import Spans
+from edge.running.spans import Spans
 
 RECEIPT = "Device Control/Receipt"
 REPEAT_S = 5.0

@@ -7,8 +7,8 @@ from urllib.parse import unquote, urlsplit
 
 from pydantic import Field, model_validator
 
-from edge.accelerometer_filter import HIGH_HZ, RATE_BANDS_MIN
-from edge.accelerometer_frame import RATE_HZ_MAX
+from edge.accelerometer.filter import HIGH_HZ, RATE_BANDS_MIN
+from edge.accelerometer.frame import RATE_HZ_MAX
 from edge.section import Section
 
 SUFFIXES = (".wav", ".csv", ".acb")
@@ -26,7 +26,7 @@ class Publish(StrEnum):
 class AccelerometerSection(Section):
     """The sensor; without a url there is none.
 
-    url: tcp://host:port (frames, `edge/accelerometer_frame.py`), or file:///folder/name.wav, .csv or .acb, played at its pace
+    url: tcp://host:port (frames, `edge/accelerometer/frame.py`), or file:///folder/name.wav, .csv or .acb, played at its pace
     sample_rate_hz: of a CSV, which does not say it; 0 = as frames and WAV say
     scale_g: full scale of the sensor: of a WAV's samples, and where a block counts as clipped
     block_s: length of the blocks that are published, and of those that a file is played in

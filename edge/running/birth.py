@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
-from edge import clock
+from edge.clock import offset as clock
 from edge.sample import EdgeSample, Offer
 from edge.signals import DERIVED, Kind, signal
 from edge.tool_change import CUE

@@ -1,0 +1,1 @@
+"""A sensor beside the control: blocks of raw acceleration in, vibration out."""

@@ -1,0 +1,1 @@
+"""The machinery that runs an edge: connection, pipeline, store and forward, receipts, health."""
