@@ -12,7 +12,7 @@ import sys
 from collections import Counter
 from collections.abc import Callable, Iterable
 
-from cnctwin.simulated_control.state import tool_changes
+from cnctwin.standins.simulated_control.state import tool_changes
 from tests.edge.controls.changes_told import changes_told
 from tests.edge.controls.focas import hour_judged as judged
 from tests.edge.controls.focas.machine_hour import SWITCHED_ON_S, Hour, run

@@ -22,7 +22,7 @@ from playwright.sync_api import Page, sync_playwright
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))  # the made-up shop is the tests'
 
-from cnctwin.private_broker import PrivateBroker  # noqa: E402
+from cnctwin.processes.private_broker import PrivateBroker  # noqa: E402
 from sparkplug.broker import BrokerAddress  # noqa: E402
 from sparkplug.datatype import DataType  # noqa: E402
 from sparkplug.edge_node import EdgeNode  # noqa: E402

@@ -22,7 +22,7 @@ import httpx
 
 from cnctwin.api.live_plant import LivePlant
 from cnctwin.api.trace import SAMPLES_MAX
-from cnctwin.private_broker import PrivateBroker
+from cnctwin.processes.private_broker import PrivateBroker
 from sparkplug.broker import BrokerAddress
 from sparkplug.datatype import DataType
 from sparkplug.edge_node import EdgeNode

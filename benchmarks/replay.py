@@ -2,7 +2,8 @@
 
     .venv/bin/python benchmarks/replay.py RECORDING --devices Devices.xml
 
-The recording goes into a store of its own first (cnctwin/store_import.py). Then each processor alone: what costs how much.
+The recording goes into a store of its own first (cnctwin/memory/importing/into_store.py). Then each processor alone: what costs
+how much.
 """
 
 import argparse
@@ -11,9 +12,9 @@ import tempfile
 import time
 from pathlib import Path
 
-from cnctwin.replay import replay
-from cnctwin.store.opening import open_store
-from cnctwin.store_import import import_recording
+from cnctwin.memory.importing.into_store import import_recording
+from cnctwin.memory.replay import replay
+from cnctwin.memory.store.opening import open_store
 from processors.discovery import discover
 
 LEFT_OUT = {"historian", "mirror"}

@@ -32,7 +32,7 @@ from typing import Any
 import paho.mqtt.client as paho
 from paho.mqtt.enums import CallbackAPIVersion
 
-from cnctwin.private_broker import PrivateBroker, _any_port
+from cnctwin.processes.private_broker import PrivateBroker, _any_port
 from processors.config import Configuration, ProcessorConfig
 from processors.contract import NoState, Output, OutputSpec, Processor, Provenance, Sample, SampleKind
 from processors.effects import Publish as PublishEffect

@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from cnctwin.anomaly_training.held_rows import held_rows
-from cnctwin.shdr_import import recorded_runs
+from cnctwin.memory.importing.shdr import recorded_runs
+from cnctwin.training.anomaly.held_rows import held_rows
 from twin.anomaly.alarm import AlarmRule, dwell_score, is_alarm, onsets
 from twin.anomaly.detector import Detector, trained_model
 from twin.anomaly.gate import gate, held

@@ -21,12 +21,12 @@ from pathlib import Path
 import httpx
 
 from benchmarks.edge_runs import cpu_s
-from cnctwin.child import Child
-from cnctwin.plant import ledgers
-from cnctwin.private_broker import PrivateBroker
-from cnctwin.simulated_machine import description
-from cnctwin.simulated_machine.anomaly_model import place_model
-from cnctwin.watch import viewer
+from cnctwin.plant.view import ledgers
+from cnctwin.plant.watch import viewer
+from cnctwin.processes.child import Child
+from cnctwin.processes.private_broker import PrivateBroker
+from cnctwin.standins.simulated_machine import description
+from cnctwin.standins.simulated_machine.anomaly_model import place_model
 from processors.discovery import discover
 from sparkplug.host import EventKind, HostApplication
 

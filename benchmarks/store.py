@@ -26,9 +26,9 @@ from typing import Any
 import duckdb
 import numpy as np
 
-from cnctwin.store.contract import Message, Query
-from cnctwin.store.embedded import EmbeddedStore
-from cnctwin.store.manifest import DAY_MS, HOUR_MS
+from cnctwin.memory.store.contract import Message, Query
+from cnctwin.memory.store.embedded import EmbeddedStore
+from cnctwin.memory.store.manifest import DAY_MS, HOUR_MS
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId, Reading
 from sparkplug.quality import Quality

@@ -21,9 +21,9 @@ import httpx
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
-from cnctwin.store.contract import Message, Query  # noqa: E402
-from cnctwin.store.influx.opening import open_influx  # noqa: E402
-from cnctwin.store.influx.store import ServerStore  # noqa: E402
+from cnctwin.memory.store.contract import Message, Query  # noqa: E402
+from cnctwin.memory.store.influx.opening import open_influx  # noqa: E402
+from cnctwin.memory.store.influx.store import ServerStore  # noqa: E402
 from sparkplug.host_session import EventKind, HostEvent  # noqa: E402
 from sparkplug.metric import NodeId, Reading  # noqa: E402
 from sparkplug.quality import Quality  # noqa: E402

@@ -17,25 +17,25 @@ import typer
 from rich.console import Console
 from typer.exceptions import TyperException
 
-from cnctwin import demo as demo_command
-from cnctwin.alert_commands import alerts_app
-from cnctwin.control_commands import control_app
-from cnctwin.demo_parts import DemoOptions
+from cnctwin.commands.alerts import alerts_app
+from cnctwin.commands.jobs import jobs_app
+from cnctwin.commands.model import model_app
+from cnctwin.commands.moment import moment_ms
+from cnctwin.commands.optimise import optimise
+from cnctwin.commands.parts import parts_app
+from cnctwin.commands.replay import replay_history
+from cnctwin.commands.serve import serve
+from cnctwin.commands.simulate_control import control_app
+from cnctwin.commands.store import export, store_app
+from cnctwin.commands.train.app import train_app
+from cnctwin.commands.train.detector import train_detector
+from cnctwin.commands.train.residual import train_residual
+from cnctwin.commands.validate import validate
+from cnctwin.demo import demo as demo_command
+from cnctwin.demo.parts import DemoOptions
 from cnctwin.errors import BrokerStartError, ProgramError, UsageError
-from cnctwin.given_broker import address, broker_or_own
-from cnctwin.history_commands import replay_history
-from cnctwin.jobs_commands import jobs_app
-from cnctwin.model_commands import model_app
-from cnctwin.moment import moment_ms
-from cnctwin.optimise_command import optimise
-from cnctwin.page_commands import serve
-from cnctwin.parts_commands import parts_app
-from cnctwin.stopping import stopped_by_signals
-from cnctwin.store_commands import export, store_app
-from cnctwin.train_commands import train_app
-from cnctwin.train_detector_command import train_detector
-from cnctwin.train_residual_command import train_residual
-from cnctwin.validate_command import validate
+from cnctwin.processes.given_broker import address, broker_or_own
+from cnctwin.processes.stopping import stopped_by_signals
 from edge.errors import EdgeError
 from edge.state_dir import state_dir as folder_for_state
 from processors.errors import ProcessorError
@@ -97,7 +97,7 @@ def watch(
     group: Group = "cnc",
 ) -> None:
     """Live view in the terminal: each machine with the twin beside it, and the ledger of each stage."""
-    from cnctwin.watch import watch as look
+    from cnctwin.plant.watch import watch as look
 
     with stopped_by_signals() as stop, broker_or_own(address(broker)) as where:
         look(where, group, machine, stop)
@@ -111,8 +111,8 @@ def doctor(
     as_json: AsJson = False,
 ) -> None:
     """Is everything connected, in order and accounted for: received = emitted + dropped + buffered?"""
-    from cnctwin.doctor import examine
-    from cnctwin.terminal import ledger_table
+    from cnctwin.plant.doctor import examine
+    from cnctwin.plant.screen import ledger_table
     from sparkplug.broker import BrokerAddress
 
     logging.getLogger("sparkplug").setLevel(logging.ERROR)  # what is wrong with the connection stands in the report
@@ -141,7 +141,7 @@ def process(
     ] = None,
 ) -> None:
     """Run processors until SIGTERM or Ctrl-C; beside alerts the courier that sends, beside historian the store that it keeps."""
-    from cnctwin.process_command import process as run_processors
+    from cnctwin.commands.process import process as run_processors
     from processors.running.runtime import configured
 
     pairs = configured(names, config)
@@ -200,7 +200,7 @@ def import_(
     elif devices is None:
         _twin().import_recording(Path(recording), out, _console())
     else:
-        from cnctwin.shdr_import import import_shdr
+        from cnctwin.memory.importing.shdr import import_shdr
 
         import_shdr(Path(recording), devices, device, out, _console())
 
@@ -242,7 +242,7 @@ def edge_run(
     broker: Broker = None,
 ) -> None:
     """Run an edge, or one for each file of a folder, until SIGTERM or Ctrl-C; changes of the files are taken up."""
-    from cnctwin.edge_commands import run
+    from cnctwin.commands.edge import run
 
     with stopped_by_signals() as stop:
         run(config, address(broker), stop)
@@ -251,7 +251,7 @@ def edge_run(
 @edge_app.command("check")
 def edge_check(config: Annotated[Path, typer.Argument(help="The TOML file of one machine")], as_json: AsJson = False) -> None:
     """Check a configuration against its control and show what would be published, without a broker."""
-    from cnctwin.edge_commands import table
+    from cnctwin.commands.edge import table
     from edge.check import check
 
     if config.is_dir():
@@ -285,7 +285,7 @@ app.command()(validate)
 def _twin() -> ModuleType:
     """The commands of the twin, which need what the extra brings: arrays, kernels, Parquet."""
     try:
-        from cnctwin import twin_commands
+        from cnctwin.commands import twin as twin_commands
     except ModuleNotFoundError as missing:
         raise UsageError(f"the twin needs the package {missing.name}; pip install 'cnctwin[twin]' brings it") from None
     return twin_commands
@@ -294,7 +294,7 @@ def _twin() -> ModuleType:
 def _gap() -> ModuleType:
     """The commands of the gap, which need what the twin needs."""
     _twin()
-    from cnctwin import gap_commands
+    from cnctwin.commands import gap as gap_commands
 
     return gap_commands
 

@@ -38,7 +38,7 @@ LONG = (
     "processors/test_contract.py",
     "twin/gap/test_diagnose.py",
     "cnctwin/validation/test_axes_and_programs.py",
-    "cnctwin/simulated_machine/test_machining.py",
+    "cnctwin/standins/simulated_machine/test_machining.py",
     "twin/anomaly/test_detector.py",
     "cnctwin/test_demo_by_peer.py",
     "cnctwin/test_train_anomaly.py",
@@ -50,7 +50,7 @@ LONG = (
     "cnctwin/page/test_connection.py",
     "cnctwin/models/test_compare.py",
     "processors/test_alerts_laws.py",
-    "cnctwin/replay/test_replay_of_a_live_plant.py",
+    "cnctwin/memory/replay/test_replay_of_a_live_plant.py",
 )
 
 # Files that share what takes long to start: one worker does it once for all of them.

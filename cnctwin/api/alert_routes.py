@@ -11,12 +11,12 @@ from uuid import uuid4
 from fastapi import APIRouter, Path, Request
 from pydantic import BaseModel, ConfigDict, Field
 
-from cnctwin.alert_commands import COMMAND, FRESH_S_MAX
 from cnctwin.api.answers import Answer, Problem
 from cnctwin.api.errors import ApiError
 from cnctwin.api.health_routes import state_age_s
 from cnctwin.api.live_plant import LivePlant
 from cnctwin.api.viewer import Viewer
+from cnctwin.commands.alerts import COMMAND, FRESH_S_MAX
 from sparkplug.connection import now_ms
 
 ANSWER_S_MAX = 5.0

@@ -10,7 +10,7 @@ from itertools import pairwise
 from typing import Any
 
 from cnctwin.api.trace import Sample
-from cnctwin.plant import TWIN_PREFIX
+from cnctwin.plant.view import TWIN_PREFIX
 from sparkplug.quality import Quality
 
 PART_RECORD = f"{TWIN_PREFIX}part_record"

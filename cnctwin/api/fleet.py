@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any, Protocol
 
 from cnctwin.api.value_object import Plain, plain
-from cnctwin.plant import TWIN_PREFIX
+from cnctwin.plant.view import TWIN_PREFIX
 from sparkplug.metric import Reading
 from sparkplug.quality import Quality
 

@@ -7,17 +7,17 @@ from typing import Any
 from fastapi import APIRouter
 from fastapi.responses import JSONResponse, Response
 
-from cnctwin.alert_commands import FRESH_S_MAX
 from cnctwin.api.answers import Health, Part, Ready
 from cnctwin.api.errors import ApiError
 from cnctwin.api.live_plant import LivePlant
 from cnctwin.api.residual import models_part
 from cnctwin.api.sources import Sources
-from cnctwin.doctor import COME_AND_GO
+from cnctwin.commands.alerts import FRESH_S_MAX
 from cnctwin.errors import ProgramError
 from cnctwin.jobs.announcer import NODE as JOBS_NODE
 from cnctwin.jobs.client import FRESH_S_MAX as JOBS_FRESH_S_MAX
 from cnctwin.page import WEB
+from cnctwin.plant.doctor import COME_AND_GO
 from processors.contract import TWIN_NODE_PREFIX
 from sparkplug.connection import now_ms
 

@@ -14,8 +14,8 @@ from cnctwin.api.memory_column import column
 from cnctwin.api.plant_routes import BUSY, UNKNOWN, Machine, unknown_machine
 from cnctwin.api.store_reader import StoreReader
 from cnctwin.api.value_object import QUALITY_NAMES, plain
-from cnctwin.store.contract import Column, Store, StoreError
-from cnctwin.store.contract import Query as StoreQuery
+from cnctwin.memory.store.contract import Column, Store, StoreError
+from cnctwin.memory.store.contract import Query as StoreQuery
 from sparkplug.connection import now_ms
 
 SIGNALS_MAX = 60

@@ -16,7 +16,7 @@ from cnctwin.api.fleet import fleet_item, is_key_signal
 from cnctwin.api.trace import Sample, Trace
 from cnctwin.api.value_object import plain, value_object
 from cnctwin.jobs.announcer import NODE as JOBS_NODE
-from cnctwin.plant import TWIN_PREFIX
+from cnctwin.plant.view import TWIN_PREFIX
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId, Reading
 from sparkplug.quality import Quality

@@ -8,7 +8,7 @@ from cnctwin.api.fan_out import FanOut
 from cnctwin.api.metrics_text import PlantCollector, text
 from cnctwin.api.sources import Sources
 from cnctwin.errors import ProgramError
-from cnctwin.store.contract import Status
+from cnctwin.memory.store.contract import Status
 from sparkplug.connection import now_ms
 
 MEDIA_TYPE = "text/plain; version=0.0.4; charset=utf-8"

@@ -11,8 +11,8 @@ from cnctwin.api.fleet import GATE, GROWING, is_gap_figure
 from cnctwin.api.live_plant import NodeView
 from cnctwin.api.metrics_validation import validation_metrics
 from cnctwin.api.sources import Sources
-from cnctwin.plant import TWIN_PREFIX
-from cnctwin.store.contract import Status
+from cnctwin.memory.store.contract import Status
+from cnctwin.plant.view import TWIN_PREFIX
 from sparkplug.metric import Reading
 from sparkplug.quality import Quality
 

@@ -16,8 +16,8 @@ from cnctwin.api.replay_child import replayed
 from cnctwin.api.sources import Sources
 from cnctwin.api.trace import Sample
 from cnctwin.api.value_object import plain
-from cnctwin.store.contract import Query as StoreQuery
-from cnctwin.store.contract import Store, StoreError
+from cnctwin.memory.store.contract import Query as StoreQuery
+from cnctwin.memory.store.contract import Store, StoreError
 from sparkplug.connection import now_ms
 
 DAY_MS = 86_400_000

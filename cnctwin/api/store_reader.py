@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
 from cnctwin.api.errors import ApiError
-from cnctwin.store.contract import Status, Store, StoreError
+from cnctwin.memory.store.contract import Status, Store, StoreError
 
 THREADS = 3
 THREADS_BESIDE = 2
@@ -101,7 +101,7 @@ class StoreReader:
                 raise ApiError(503, self._trouble)
             self._tried_s = time.monotonic()
             try:
-                from cnctwin.store.opening import open_store  # noqa: PLC0415  with the extra that it needs
+                from cnctwin.memory.store.opening import open_store  # noqa: PLC0415  with the extra that it needs
 
                 self._store = open_store(self.where, writable=False)
             except ModuleNotFoundError as missing:

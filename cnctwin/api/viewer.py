@@ -8,11 +8,11 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from cnctwin.alert_commands import STATE as ALERTS_TOPIC
 from cnctwin.api.batches import Batch
 from cnctwin.api.live_jobs import LiveJobs
 from cnctwin.api.live_plant import LivePlant
-from cnctwin.watch import viewer
+from cnctwin.commands.alerts import STATE as ALERTS_TOPIC
+from cnctwin.plant.watch import viewer
 from sparkplug.broker import BrokerAddress
 from sparkplug.connection import now_ms
 from sparkplug.host_session import EventKind, HostEvent

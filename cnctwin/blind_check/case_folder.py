@@ -12,13 +12,22 @@ import tomli_w
 
 from cnctwin.blind_check.answer import Answer, Answered
 from cnctwin.blind_check.question import Asked, Question, effect_on
-from cnctwin.reference_machine.effect import Parameters
-from cnctwin.reference_machine.physics import Physics, physics_of
-from cnctwin.reference_machine.program import air_program, cut_program, nc_text
-from cnctwin.reference_machine.recording import Columns, Motion, WarmUp, motion_of, motion_run, warmup_of, warmup_run, write
-from cnctwin.reference_machine.size import amplitude_for, rms_by_signal, sizes
-from cnctwin.reference_machine.stated import MachineFigures, drawn_machine, machine_toml, scattered
-from cnctwin.reference_machine.trajectory import Dynamics
+from cnctwin.standins.reference_machine.effect import Parameters
+from cnctwin.standins.reference_machine.physics import Physics, physics_of
+from cnctwin.standins.reference_machine.program import air_program, cut_program, nc_text
+from cnctwin.standins.reference_machine.recording import (
+    Columns,
+    Motion,
+    WarmUp,
+    motion_of,
+    motion_run,
+    warmup_of,
+    warmup_run,
+    write,
+)
+from cnctwin.standins.reference_machine.size import amplitude_for, rms_by_signal, sizes
+from cnctwin.standins.reference_machine.stated import MachineFigures, drawn_machine, machine_toml, scattered
+from cnctwin.standins.reference_machine.trajectory import Dynamics
 
 FIT, REPEAT, CHECK, UNSEEN = 1, 2, 3, 4
 """Seeds of the chances of each run; a fit and its repeat are runs of one program."""

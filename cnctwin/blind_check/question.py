@@ -6,9 +6,9 @@ from enum import StrEnum
 
 import numpy as np
 
-from cnctwin.reference_machine.effect import Effect
-from cnctwin.reference_machine.named_effects import NAMED
-from cnctwin.reference_machine.unnamed_effects import UNNAMED
+from cnctwin.standins.reference_machine.effect import Effect
+from cnctwin.standins.reference_machine.named_effects import NAMED
+from cnctwin.standins.reference_machine.unnamed_effects import UNNAMED
 
 Chance = np.random.Generator
 SIZES = (0.7, 30.0)

@@ -12,7 +12,7 @@ import numpy as np
 from cnctwin.blind_check.answer import Answer
 from cnctwin.blind_check.case_folder import UNSEEN, machine_of, physics_with, recorded
 from cnctwin.blind_check.question import Question
-from cnctwin.reference_machine.recording import Columns
+from cnctwin.standins.reference_machine.recording import Columns
 from twin.case import Run, RunAtHand, RunEntry
 from twin.gap.diagnosis import closure_of
 from twin.gap.floors import repeatability

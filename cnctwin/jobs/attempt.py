@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from cnctwin.given_broker import PASSWORD_VARIABLE
 from cnctwin.jobs.left_over import JOB_VARIABLE, end_left_over
+from cnctwin.processes.given_broker import PASSWORD_VARIABLE
 
 ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 """Small matrices: threads of linear algebra would only fight for the cores, with those that are live too."""

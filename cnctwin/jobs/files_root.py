@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from cnctwin.errors import UsageError
-from cnctwin.program_text import decoded
+from cnctwin.files.program_text import decoded
 
 TEXT_BYTES_MAX = 20_000_000
 TOML_BYTES_MAX = 1_000_000

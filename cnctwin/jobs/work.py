@@ -59,9 +59,9 @@ class Bench:
 
 def optimise(parameters: "OptimiseParameters", bench: Bench) -> dict[str, Any]:
     """As `cnctwin optimise`: optimised.nc, optimisation.json, report.html."""
+    from cnctwin.batch.optimisation import OptimiseRequest, optimise_request  # noqa: PLC0415  with all of the twin
     from cnctwin.jobs.dask_cluster import DaskCluster  # noqa: PLC0415
     from cnctwin.jobs.spread import spread_over  # noqa: PLC0415
-    from cnctwin.optimisation_run import OptimiseRequest, optimise_request  # noqa: PLC0415  with all of the twin
 
     asked = parameters.model_dump(exclude={"program", "program_text", "encoding", "name", "machine", "machine_toml"})
     program = bench.as_taken("program.nc", lambda: parameters.program_of(bench.files))
@@ -81,7 +81,7 @@ def identify(parameters: "IdentifyParameters", bench: Bench) -> dict[str, Any]:
     """As `cnctwin identify`: machine.toml, identification.json."""
     import json  # noqa: PLC0415
 
-    from cnctwin.twin_commands import identification_json  # noqa: PLC0415  with all of the twin
+    from cnctwin.commands.twin import identification_json  # noqa: PLC0415  with all of the twin
     from twin.case import read_case  # noqa: PLC0415
     from twin.identification.identify import identify as identified  # noqa: PLC0415
     from twin.machine import machine_to_toml  # noqa: PLC0415
@@ -100,8 +100,8 @@ def identify(parameters: "IdentifyParameters", bench: Bench) -> dict[str, Any]:
 
 def diagnose(parameters: "CaseParameters", bench: Bench) -> dict[str, Any]:
     """As `cnctwin gap diagnose`: diagnosis.json, report.html, twin.toml."""
-    from cnctwin.gap_commands import FILES, in_threads  # noqa: PLC0415  with all of the twin
-    from cnctwin.gap_report.page import report_html  # noqa: PLC0415
+    from cnctwin.commands.gap import FILES, in_threads  # noqa: PLC0415  with all of the twin
+    from cnctwin.reports.gap.page import report_html  # noqa: PLC0415
     from twin.case import read_case  # noqa: PLC0415
     from twin.machine import machine_to_toml  # noqa: PLC0415
 

@@ -57,8 +57,8 @@ def residual(folder: Path, log: RunLog, _machine: str) -> tuple[Floats, Floats, 
 
 def anomaly(folder: Path, log: RunLog, machine: str) -> tuple[Floats, Floats, float]:
     """Alarms that come on, of the machine alone: its peers are not in a stretch of one machine."""
-    from cnctwin.anomaly_training.frozen_week import segments  # noqa: PLC0415
-    from cnctwin.anomaly_training.replayed_cell import replayed  # noqa: PLC0415
+    from cnctwin.training.anomaly.frozen_week import segments  # noqa: PLC0415
+    from cnctwin.training.anomaly.replayed_cell import replayed  # noqa: PLC0415
     from processors.joint_anomaly.config import FITTED_WITH  # noqa: PLC0415
     from twin.anomaly.alarm import AlarmRule, is_alarm, onsets  # noqa: PLC0415
     from twin.anomaly.model import load_model  # noqa: PLC0415

@@ -9,7 +9,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from cnctwin.errors import UsageError
-from cnctwin.store.contract import Query, Store
+from cnctwin.memory.store.contract import Query, Store
 from cnctwin.validation.evidence import track_of
 from cnctwin.validation.track import Floats, Grid, held
 from processors.joint_anomaly.config import NUMBERS

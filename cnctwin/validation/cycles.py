@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from cnctwin.store.contract import Column, Query, Store
+from cnctwin.memory.store.contract import Column, Query, Store
 from cnctwin.validation.cycle_time import Cycle
 from sparkplug.quality import Quality
 from sparkplug.values import Value

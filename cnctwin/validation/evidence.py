@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cnctwin.errors import UsageError
-from cnctwin.store.contract import Column, Query, Store
+from cnctwin.memory.store.contract import Column, Query, Store
 from cnctwin.validation.clock import Clock, Pair, placed
 from cnctwin.validation.track import Floats, Track
 from sparkplug.quality import Quality

@@ -12,9 +12,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from cnctwin.mtconnect_agent.replay_agent import ReplayAgent
-from cnctwin.plant import StageLedger, ledgers
-from cnctwin.simulated_machine.description import DEVICES, SPARE_PART
+from cnctwin.plant.view import StageLedger, ledgers
+from cnctwin.standins.mtconnect_agent.replay_agent import ReplayAgent
+from cnctwin.standins.simulated_machine.description import DEVICES, SPARE_PART
 from edge.config_file import load
 from edge.controls.mtconnect.check import describe
 from sparkplug.broker import BrokerAddress

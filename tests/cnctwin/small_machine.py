@@ -6,8 +6,8 @@ from pathlib import Path
 from urllib.parse import urlsplit
 from xml.etree import ElementTree
 
-from cnctwin.mtconnect_agent import ReplayAgent
-from cnctwin.mtconnect_agent.xml_text import local_name
+from cnctwin.standins.mtconnect_agent import ReplayAgent
+from cnctwin.standins.mtconnect_agent.xml_text import local_name
 
 DEVICES = """<MTConnectDevices xmlns="urn:mtconnect.org:MTConnectDevices:1.7"><Devices>
   <Device id="d1" name="VMC-3" uuid="000">

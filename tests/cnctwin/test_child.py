@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from cnctwin import child as child_module
-from cnctwin.child import Child
+from cnctwin.processes import child as child_module
+from cnctwin.processes.child import Child
 from tests.cnctwin.program import is_alive, until
 
 

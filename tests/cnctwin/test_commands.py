@@ -12,11 +12,11 @@ from typing import Any
 import pytest
 
 from cnctwin.cli import main
-from cnctwin.edge_commands import run
-from cnctwin.mtconnect_agent.replay_agent import ReplayAgent
-from cnctwin.replay_command import replay
-from cnctwin.simulated_machine.description import DEVICES
-from cnctwin.simulated_machine.description import SPARE_PART as RECORDING
+from cnctwin.commands.edge import run
+from cnctwin.standins.mtconnect_agent.replay_agent import ReplayAgent
+from cnctwin.standins.mtconnect_agent.serve import replay
+from cnctwin.standins.simulated_machine.description import DEVICES
+from cnctwin.standins.simulated_machine.description import SPARE_PART as RECORDING
 from sparkplug.broker import BrokerAddress
 from sparkplug.host import HostApplication
 from tests.cnctwin.program import until

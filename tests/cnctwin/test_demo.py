@@ -12,13 +12,13 @@ from typing import Any
 
 import pytest
 
-from cnctwin import demo as demo_module
-from cnctwin.demo import Summary, ToolChanges, greeting, run
-from cnctwin.demo_parts import PROCESSORS, Demo, DemoOptions, machine_name
+from cnctwin.demo import demo as demo_module
+from cnctwin.demo.demo import Summary, ToolChanges, greeting, run
+from cnctwin.demo.parts import PROCESSORS, Demo, DemoOptions, machine_name
 from cnctwin.errors import UsageError
-from cnctwin.plant import StageLedger, ledgers
-from cnctwin.private_broker import answers
-from cnctwin.simulated_machine.description import DEVICES, SPARE_PART
+from cnctwin.plant.view import StageLedger, ledgers
+from cnctwin.processes.private_broker import answers
+from cnctwin.standins.simulated_machine.description import DEVICES, SPARE_PART
 from sparkplug.broker import BrokerAddress
 from sparkplug.host import EventKind, HostApplication, HostEvent
 from sparkplug.metric import NodeId, Reading
@@ -152,7 +152,7 @@ def test_the_exit_code_is_1_when_a_stage_is_missing(monkeypatch: pytest.MonkeyPa
 
 @pytest.mark.parametrize(("port", "option"), [(1883, ""), (18830, " -p 18830")])
 def test_the_usual_port_need_not_be_named(tmp_path: Path, port: int, option: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cnctwin.private_broker.is_free", lambda _port: True)
+    monkeypatch.setattr("cnctwin.processes.private_broker.is_free", lambda _port: True)
     said = greeting(Demo(DemoOptions(port=port), tmp_path))
     assert f"mosquitto_sub{option} -t 'cnc/#' -v" in said
     assert f"mqtt://127.0.0.1:{port}" in said

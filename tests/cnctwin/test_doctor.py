@@ -10,7 +10,7 @@ from contextlib import contextmanager
 import pytest
 
 from cnctwin.cli import main
-from cnctwin.doctor import Report, examine, of_store
+from cnctwin.plant.doctor import Report, examine, of_store
 from sparkplug.broker import BrokerAddress
 from sparkplug.datatype import DataType
 from sparkplug.edge_node import EdgeNode

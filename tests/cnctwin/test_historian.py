@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from cnctwin import historian
-from cnctwin.historian import StoreRecorder
-from cnctwin.store.contract import Appended, Message, Pinned, Snapshot, Status, StoreError, Tidied
+from cnctwin.memory import historian
+from cnctwin.memory.historian import StoreRecorder
+from cnctwin.memory.store.contract import Appended, Message, Pinned, Snapshot, Status, StoreError, Tidied
 from processors.effects import Pin
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import Reading

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from cnctwin.store.contract import Query, StoreError
-from cnctwin.store.opening import open_store
+from cnctwin.memory.store.contract import Query, StoreError
+from cnctwin.memory.store.opening import open_store
 from edge.config import StoreSection
 from edge.running.forwarder import SEQUENCE, Forwarder
 from edge.running.receipts import RECEIPT

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from cnctwin.simulated_machine.description import SPARE_PART
+from cnctwin.standins.simulated_machine.description import SPARE_PART
 from sparkplug import actions
 from tests.cnctwin.plant_on_trial import Plant
 from tests.sparkplug.edge_watch import EdgeWatch

@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from cnctwin.mtconnect_agent import ShdrAdapter
+from cnctwin.standins.mtconnect_agent import ShdrAdapter
 from tests.cnctwin.small_machine import at, write_machine
 from tests.recordings import recording
 

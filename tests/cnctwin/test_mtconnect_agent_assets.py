@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from cnctwin.mtconnect_agent.assets import AssetStore, read_asset
+from cnctwin.standins.mtconnect_agent.assets import AssetStore, read_asset
 from tests.cnctwin.small_machine import at, elements, fetch, header, observations, played, values
 
 

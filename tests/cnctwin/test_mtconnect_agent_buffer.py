@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cnctwin.mtconnect_agent.buffer import ObservationBuffer
-from cnctwin.mtconnect_agent.device_model import Component, DataItem
-from cnctwin.mtconnect_agent.observation import Observation, observe
+from cnctwin.standins.mtconnect_agent.buffer import ObservationBuffer
+from cnctwin.standins.mtconnect_agent.device_model import Component, DataItem
+from cnctwin.standins.mtconnect_agent.observation import Observation, observe
 from tests.cnctwin.small_machine import at, played
 
 _DEVICE = Component("Device", "d", "d")

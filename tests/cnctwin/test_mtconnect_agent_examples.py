@@ -6,9 +6,9 @@ import pkgutil
 
 import pytest
 
-import cnctwin.mtconnect_agent
+import cnctwin.standins.mtconnect_agent
 
-MODULES = [m.name for m in pkgutil.iter_modules(cnctwin.mtconnect_agent.__path__, "cnctwin.mtconnect_agent.")]
+MODULES = [m.name for m in pkgutil.iter_modules(cnctwin.standins.mtconnect_agent.__path__, "cnctwin.standins.mtconnect_agent.")]
 
 
 @pytest.mark.parametrize("name", MODULES)

@@ -20,8 +20,8 @@ from xml.etree import ElementTree
 import httpx
 import pytest
 
-from cnctwin.mtconnect_agent import ReplayAgent
-from cnctwin.mtconnect_agent.xml_text import local_name
+from cnctwin.standins.mtconnect_agent import ReplayAgent
+from cnctwin.standins.mtconnect_agent.xml_text import local_name
 from tests.recordings import recording
 
 GOLDEN_OBSERVATIONS = 25_727

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from cnctwin.mtconnect_agent import ReplayAgent
-from cnctwin.mtconnect_agent.request import Answer, answer
+from cnctwin.standins.mtconnect_agent import ReplayAgent
+from cnctwin.standins.mtconnect_agent.request import Answer, answer
 from tests.cnctwin.small_machine import ask, at, elements, error, fetch, header, observations, played, values
 
 STYLES = ("2.3", "1.4")

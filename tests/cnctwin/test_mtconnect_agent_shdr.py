@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cnctwin.mtconnect_agent.data_set import changes, merged, parse_data_set
-from cnctwin.mtconnect_agent.shdr import LINE_CHARS_MAX, Command, Entry, Line, Unusable, entries, parse_line, parse_lines
-from cnctwin.mtconnect_agent.stamp import microsecond_text, read_stamp, stamp_text
-from cnctwin.mtconnect_agent.units import conversion
+from cnctwin.standins.mtconnect_agent.data_set import changes, merged, parse_data_set
+from cnctwin.standins.mtconnect_agent.shdr import LINE_CHARS_MAX, Command, Entry, Line, Unusable, entries, parse_line, parse_lines
+from cnctwin.standins.mtconnect_agent.stamp import microsecond_text, read_stamp, stamp_text
+from cnctwin.standins.mtconnect_agent.units import conversion
 from tests.cnctwin.small_machine import at, fetch, observations, played, values
 
 

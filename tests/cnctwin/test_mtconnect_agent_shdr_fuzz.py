@@ -6,7 +6,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cnctwin.mtconnect_agent.shdr import LINE_CHARS_MAX, MULTILINE_MARK, Command, Line, Unusable, entries, parse_line, parse_lines
+from cnctwin.standins.mtconnect_agent.shdr import (
+    LINE_CHARS_MAX,
+    MULTILINE_MARK,
+    Command,
+    Line,
+    Unusable,
+    entries,
+    parse_line,
+    parse_lines,
+)
 from tests.fuzz_depth import FUZZ, within
 
 STAMP = "2022-08-08T13:51:34.7167146Z"

@@ -10,7 +10,7 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from cnctwin.mtconnect_agent import ReplayAgent
+from cnctwin.standins.mtconnect_agent import ReplayAgent
 from tests.cnctwin.small_machine import at, error, fetch, header, observations, played, values, write_machine
 
 STYLES = ("2.3", "1.4")

@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 from rich.console import Console
 
-from cnctwin.plant import StageLedger, health, ledgers, machines, text
-from cnctwin.terminal import ledger_table, line, screen
+from cnctwin.plant.screen import ledger_table, line, screen
+from cnctwin.plant.view import StageLedger, health, ledgers, machines, text
 from sparkplug.metric import Reading
 from sparkplug.quality import Quality
 from tests.cnctwin.pictures import Pictures, balance, owner

@@ -10,11 +10,11 @@ from pathlib import Path
 import paho.mqtt.client as mqtt
 import pytest
 
-from cnctwin import child as child_module
-from cnctwin import given_broker, private_broker
 from cnctwin.errors import BrokerStartError, UsageError
-from cnctwin.given_broker import address, broker_or_own
-from cnctwin.private_broker import PrivateBroker, answers, find_mosquitto
+from cnctwin.processes import child as child_module
+from cnctwin.processes import given_broker, private_broker
+from cnctwin.processes.given_broker import address, broker_or_own
+from cnctwin.processes.private_broker import PrivateBroker, answers, find_mosquitto
 from sparkplug.broker import BrokerAddress
 from tests.cnctwin.program import is_alive, until
 from tests.wire.mosquitto import Mosquitto, free_port

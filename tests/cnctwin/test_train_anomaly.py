@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from cnctwin.anomaly_training.calibrated_cell import Asked, Calibrated, calibrated_cell
-from cnctwin.anomaly_training.recorded_cell import part, recorded_cell
-from cnctwin.anomaly_training.replayed_cell import replayed
-from cnctwin.anomaly_training.time_split import split
+from cnctwin.commands.train.app import train_app
 from cnctwin.errors import UsageError
-from cnctwin.train_commands import train_app
+from cnctwin.training.anomaly.calibrated_cell import Asked, Calibrated, calibrated_cell
+from cnctwin.training.anomaly.recorded_cell import part, recorded_cell
+from cnctwin.training.anomaly.replayed_cell import replayed
+from cnctwin.training.anomaly.time_split import split
 from processors.config import Configuration
 from processors.errors import ConfigurationError
 from processors.joint_anomaly.config import Config

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from cnctwin.detector_training.command import train_detector
-from cnctwin.detector_training.recorded_streams import known_changes, streams_of
 from cnctwin.errors import UsageError
+from cnctwin.training.detector.recorded_streams import known_changes, streams_of
+from cnctwin.training.detector.train import train_detector
 from tests.twin.transient.synthetic import drive
 from twin.runlog import run_log, write_run
 from twin.transient.artefact import load_detector

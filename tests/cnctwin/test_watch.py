@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from cnctwin import watch as watch_module
-from cnctwin.watch import show
+from cnctwin.plant import watch as watch_module
+from cnctwin.plant.watch import show
 from sparkplug.host import HostEvent
 from tests.cnctwin.pictures import Pictures, balance, owner
 from tests.cnctwin.program import Program, until

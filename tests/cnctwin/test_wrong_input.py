@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from cnctwin.cli import main
-from cnctwin.simulated_machine.description import SPARE_PART
+from cnctwin.standins.simulated_machine.description import SPARE_PART
 from processors.discovery import discover
 
 NO_TOML = "[machine\n"

@@ -6,7 +6,7 @@ Signals are told when they change: the fast ones each two seconds, a tool number
 import math
 from collections.abc import Iterator
 
-from cnctwin.store.contract import TWIN_PREFIX, Message
+from cnctwin.memory.store.contract import TWIN_PREFIX, Message
 from processors.discovery import discover
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId, Reading

@@ -21,8 +21,8 @@ from cnctwin.api.application import create_app
 from cnctwin.api.live_plant import LivePlant
 from cnctwin.api.sources import Sources
 from cnctwin.jobs.client import JobsClient
-from cnctwin.store.influx.address import parse
-from cnctwin.store.opening import default_place
+from cnctwin.memory.store.influx.address import parse
+from cnctwin.memory.store.opening import default_place
 from edge.config_file import load
 from edge.running.run import broker_address
 from processors.running.runtime import configured

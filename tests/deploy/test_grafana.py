@@ -14,8 +14,8 @@ import httpx
 import pytest
 import yaml
 
-from cnctwin.store.influx.opening import open_influx
-from cnctwin.store.influx.store import ServerStore
+from cnctwin.memory.store.influx.opening import open_influx
+from cnctwin.memory.store.influx.store import ServerStore
 from tests.cnctwin.store_influx.servers import Influxd, ServerProcess, VictoriaMetrics
 from tests.deploy.grafana_schema import complaints
 from tests.deploy.plant import DEPLOY

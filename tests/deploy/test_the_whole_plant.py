@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
-from cnctwin.alert_commands import alerts_app
-from cnctwin.process_command import process
+from cnctwin.commands.alerts import alerts_app
+from cnctwin.commands.process import process
 from processors.running.runtime import configured
 from sparkplug.datatype import DataType
 from sparkplug.edge_node import EdgeNode

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from cnctwin.mtconnect_agent.replay_agent import ReplayAgent
+from cnctwin.standins.mtconnect_agent.replay_agent import ReplayAgent
 from edge.check import check, discover
 from edge.config_file import parse
 from edge.controls.mtconnect.documents import DevicesDocument, parse_document

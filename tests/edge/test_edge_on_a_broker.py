@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from cnctwin.mtconnect_agent.replay_agent import ReplayAgent
+from cnctwin.standins.mtconnect_agent.replay_agent import ReplayAgent
 from edge.config import BrokerSection, EdgeConfig, MachineSection
 from edge.controls.mtconnect.check import describe
 from edge.controls.mtconnect.config import MtconnectConfig

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import pytest
 
-from cnctwin.mtconnect_agent.replay_agent import ReplayAgent
-from cnctwin.simulated_control.state import production_moments
-from cnctwin.simulated_machine.description import DEVICES
-from cnctwin.simulated_machine.moment import Adapter
+from cnctwin.standins.mtconnect_agent.replay_agent import ReplayAgent
+from cnctwin.standins.simulated_control.state import production_moments
+from cnctwin.standins.simulated_machine.description import DEVICES
+from cnctwin.standins.simulated_machine.moment import Adapter
 from edge.adapter import adapters
 from edge.config_file import load
 from edge.running.runtime import EdgeRuntime

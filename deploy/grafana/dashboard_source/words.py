@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from cnctwin.store.influx.codes import CODES
+from cnctwin.memory.store.influx.codes import CODES
 
 Words = tuple[tuple[float, str, str], ...]
 GREEN, YELLOW, ORANGE, RED, BLUE, PURPLE, GREY = "green", "yellow", "orange", "red", "blue", "purple", "#8e8e8e"

@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cnctwin.anomaly_training.held_rows import held_rows, milliseconds
-from cnctwin.anomaly_training.recorded_cell import part
-from cnctwin.anomaly_training.replayed_cell import replayed
+from cnctwin.training.anomaly.held_rows import held_rows, milliseconds
+from cnctwin.training.anomaly.recorded_cell import part
+from cnctwin.training.anomaly.replayed_cell import replayed
 from processors.config import Configuration
 from processors.effects import Publish
 from processors.joint_anomaly.config import Config

@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from cnctwin.anomaly_training.regimes import Held, Ticks, fitted_preparation, held_run, left_in, standardised, tailed_preparations
+from cnctwin.training.anomaly.regimes import Held, Ticks, fitted_preparation, held_run, left_in, standardised, tailed_preparations
 from tests.cnctwin.anomaly_training.cells import FEATURES, machine_log
 from twin.anomaly.common_features import left_over
 from twin.anomaly.preparation import STANDING, regime_name, smoothed_after, standardised_row, unsmoothed

@@ -8,8 +8,8 @@ import pytest
 
 from cnctwin.api.access import COOKIE, SESSION_S, Access, Asking
 from cnctwin.api.failures import OF_ALL_MAX, OF_ONE_MAX, WINDOW_S, Failures
+from cnctwin.api.serve import ServeOptions, access_of
 from cnctwin.errors import UsageError
-from cnctwin.serve_command import ServeOptions, access_of
 from tests.cnctwin.api.small_plant import Client, client_of, small_plant
 
 TOKEN = "a-token-of-more-than-sixteen"

@@ -10,8 +10,8 @@ import pytest
 from cnctwin.api.event_list import events_of, part_records
 from cnctwin.api.store_reader import StoreReader
 from cnctwin.api.trace import AGE_MS_MAX, SAMPLES_MAX, Sample, Trace
-from cnctwin.store.contract import Message, Pinned
-from cnctwin.store.opening import open_store
+from cnctwin.memory.store.contract import Message, Pinned
+from cnctwin.memory.store.opening import open_store
 from sparkplug.quality import Quality
 from tests.cnctwin.api.small_plant import Client, birth, client_of, data, death, now, small_plant
 

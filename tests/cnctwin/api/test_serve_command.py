@@ -9,12 +9,12 @@ import httpx
 import pytest
 
 from cnctwin.api.application import create_app
+from cnctwin.api.serve import ServeOptions, serve
 from cnctwin.api.server import Server
 from cnctwin.api.sources import Sources
 from cnctwin.errors import UsageError
-from cnctwin.serve_command import ServeOptions, serve
-from cnctwin.store.contract import Message
-from cnctwin.store.opening import open_store
+from cnctwin.memory.store.contract import Message
+from cnctwin.memory.store.opening import open_store
 from processors.errors import ConfigurationError
 from sparkplug.broker import BrokerAddress
 from tests.cnctwin.api.served_plant import LOAD, PATIENCE_S, get, machine, tell

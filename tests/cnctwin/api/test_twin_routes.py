@@ -11,7 +11,7 @@ from cnctwin.api import replay_child
 from cnctwin.api.constants import Constants
 from cnctwin.api.residual import Models
 from cnctwin.api.store_reader import StoreReader
-from cnctwin.store.opening import open_store
+from cnctwin.memory.store.opening import open_store
 from processors.discovery import find
 from tests.cnctwin.api.small_plant import birth, client_of, data, small_plant
 from tests.cnctwin.replay.simulated_day import T0_MS, Day

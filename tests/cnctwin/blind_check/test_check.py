@@ -14,8 +14,8 @@ from cnctwin.blind_check.question import SHARES, SIZES, Asked, Question, Sort, d
 from cnctwin.blind_check.sealed import SealError, opened, seal
 from cnctwin.blind_check.table import table
 from cnctwin.blind_check.write import main
-from cnctwin.reference_machine.named_effects import NAMED
-from cnctwin.reference_machine.unnamed_effects import UNNAMED
+from cnctwin.standins.reference_machine.named_effects import NAMED
+from cnctwin.standins.reference_machine.unnamed_effects import UNNAMED
 from twin.case import Case, read_case
 from twin.effects.catalogue import effect_named
 from twin.errors import TwinError

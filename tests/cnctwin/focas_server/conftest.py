@@ -4,9 +4,9 @@ from collections.abc import Iterator
 
 import pytest
 
-from cnctwin.focas_server.server import FocasServer
-from cnctwin.focas_server.shown import ControlDescription
-from cnctwin.simulated_control.state import ControlState
+from cnctwin.standins.focas_server.server import FocasServer
+from cnctwin.standins.focas_server.shown import ControlDescription
+from cnctwin.standins.simulated_control.state import ControlState
 from tests.cnctwin.focas_server.moments import CHANGING, DESCRIPTION, Serve, control_at
 
 

@@ -3,10 +3,10 @@
 from collections.abc import Callable
 from dataclasses import replace
 
-from cnctwin.focas_server.server import FocasServer
-from cnctwin.focas_server.shown import ControlDescription, coded
-from cnctwin.simulated_control.control import SimulatedControl
-from cnctwin.simulated_control.state import ControlState
+from cnctwin.standins.focas_server.server import FocasServer
+from cnctwin.standins.focas_server.shown import ControlDescription, coded
+from cnctwin.standins.simulated_control.control import SimulatedControl
+from cnctwin.standins.simulated_control.state import ControlState
 
 CHANGING = ControlState(
     exec_state="ACTIVE",

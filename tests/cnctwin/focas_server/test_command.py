@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from cnctwin.errors import ProgramError, UsageError
-from cnctwin.focas_server.command import simulate_focas
+from cnctwin.standins.focas_server.serve import simulate_focas
 from tests.cnctwin.focas_server.client import RawClient, ask
 from tests.cnctwin.focas_server.moments import Serve
 

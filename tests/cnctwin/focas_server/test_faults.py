@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from cnctwin.focas_server.faults import Refusal, Wrong
+from cnctwin.standins.focas_server.faults import Refusal, Wrong
 from tests.cnctwin.focas_server.client import RawClient, ask, command
 from tests.cnctwin.focas_server.moments import Serve
 

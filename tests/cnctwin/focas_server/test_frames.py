@@ -8,9 +8,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cnctwin.focas_server import faults, frames, shown
-from cnctwin.focas_server.faults import Wrong, spoiled
-from cnctwin.focas_server.frames import BODY_BYTES_MAX, HEADER_BYTES, FrameError, FrameType, Request, answer, answer_block
+from cnctwin.standins.focas_server import faults, frames, shown
+from cnctwin.standins.focas_server.faults import Wrong, spoiled
+from cnctwin.standins.focas_server.frames import (
+    BODY_BYTES_MAX,
+    HEADER_BYTES,
+    FrameError,
+    FrameType,
+    Request,
+    answer,
+    answer_block,
+)
 from tests.cnctwin.focas_server import captured
 from tests.cnctwin.focas_server.client import blocks, command
 

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cnctwin.focas_server import functions
-from cnctwin.focas_server.frames import Code, Request
-from cnctwin.focas_server.shown import ControlDescription, Moment
-from cnctwin.simulated_control.state import ControlState
+from cnctwin.standins.focas_server import functions
+from cnctwin.standins.focas_server.frames import Code, Request
+from cnctwin.standins.focas_server.shown import ControlDescription, Moment
+from cnctwin.standins.simulated_control.state import ControlState
 from tests.cnctwin.focas_server import captured
 from tests.cnctwin.focas_server.client import Block, RawClient, ask, blocks
 from tests.cnctwin.focas_server.moments import CHANGING, CUTTING, DESCRIPTION, SWITCHED_ON_S, Serve

@@ -7,7 +7,7 @@ import pytest
 from pyfocas.protocol.packet import DecodingError, FOCASError
 from pyfocas.protocol.protocol import FOCAS
 
-from cnctwin.focas_server.server import FocasServer
+from cnctwin.standins.focas_server.server import FocasServer
 from tests.cnctwin.focas_server.moments import CUTTING, Serve
 
 

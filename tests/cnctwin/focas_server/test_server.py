@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cnctwin.errors import ProgramError
-from cnctwin.focas_server.functions import FUNCTIONS, WRITES
-from cnctwin.focas_server.server import FocasServer
+from cnctwin.standins.focas_server.functions import FUNCTIONS, WRITES
+from cnctwin.standins.focas_server.server import FocasServer
 from tests.cnctwin.focas_server import captured
 from tests.cnctwin.focas_server.client import RawClient, ask, blocks, command
 from tests.cnctwin.focas_server.moments import CHANGING, DESCRIPTION, Serve, control_at

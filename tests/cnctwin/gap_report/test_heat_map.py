@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from cnctwin.gap_report.heat_map import STEPS, groups, step_of, where
-from cnctwin.gap_report.page import report_html
+from cnctwin.reports.gap.heat_map import STEPS, groups, step_of, where
+from cnctwin.reports.gap.page import report_html
 from tests.cnctwin.gap_report.diagnosed import explained, partly, unknown, warming
 from tests.cnctwin.gap_report.page_reader import PageReader
 from twin.gap.diagnosis import Cell

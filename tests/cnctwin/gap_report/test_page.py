@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 from hatchling.builders.wheel import WheelBuilder
 
-from cnctwin.gap_report.page import report_html
+from cnctwin.reports.gap.page import report_html
 from tests.cnctwin.gap_report.diagnosed import DIAGNOSED, explained, healthy, partly, unknown
 from tests.cnctwin.gap_report.page_reader import PageReader
 from twin.gap.diagnosis import Candidate, Diagnosed, Interval, Pattern, Trace
@@ -176,7 +176,7 @@ def test_runs_that_were_not_fitted_are_named() -> None:
 def test_style_and_script_are_in_the_package_that_is_installed(tmp_path: Path) -> None:
     wheel = next(iter(WheelBuilder(str(ROOT)).build(directory=str(tmp_path), versions=["standard"])))
     with zipfile.ZipFile(wheel) as built:
-        assert {"cnctwin/gap_report/report.css", "cnctwin/gap_report/report.js"} <= set(built.namelist())
+        assert {"cnctwin/reports/gap/report.css", "cnctwin/reports/gap/report.js"} <= set(built.namelist())
 
 
 def test_the_same_diagnosis_is_the_same_page() -> None:

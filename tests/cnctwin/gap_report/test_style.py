@@ -5,7 +5,7 @@ from importlib.resources import files
 
 import pytest
 
-CSS = files("cnctwin.gap_report").joinpath("report.css").read_text(encoding="utf-8")
+CSS = files("cnctwin.reports.gap").joinpath("report.css").read_text(encoding="utf-8")
 TEXT = [
     *(
         (ink, ground)

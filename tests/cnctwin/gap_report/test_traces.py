@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cnctwin.gap_report.chart import envelope, frame_of, path, ticks
-from cnctwin.gap_report.page import report_html
-from cnctwin.gap_report.trace_choice import TRACES_MAX, chosen, window_s
-from cnctwin.gap_report.trace_data import BYTES_MAX, MISSING, as_script, packed, rows_max, thinned
+from cnctwin.reports.gap.chart import envelope, frame_of, path, ticks
+from cnctwin.reports.gap.page import report_html
+from cnctwin.reports.gap.trace_choice import TRACES_MAX, chosen, window_s
+from cnctwin.reports.gap.trace_data import BYTES_MAX, MISSING, as_script, packed, rows_max, thinned
 from tests.cnctwin.gap_report.diagnosed import explained, traces, unknown, warming
 from tests.cnctwin.gap_report.page_reader import PageReader
 from twin.gap.diagnosis import Trace

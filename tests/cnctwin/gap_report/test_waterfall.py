@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from cnctwin.gap_report.page import report_html
-from cnctwin.gap_report.waterfall import steps
+from cnctwin.reports.gap.page import report_html
+from cnctwin.reports.gap.waterfall import steps
 from tests.cnctwin.gap_report.diagnosed import explained, healthy, partly, unknown
 from tests.cnctwin.gap_report.page_reader import PageReader
 

@@ -7,14 +7,14 @@ import pkgutil
 
 import pytest
 
-import cnctwin.gap_report
-from cnctwin.gap_report.markup import escaped, tag
-from cnctwin.gap_report.signal_name import effect_words
-from cnctwin.gap_report.written import figure, interval, known, p_value, share, stated, times
+import cnctwin.reports.gap
+from cnctwin.reports.gap.markup import escaped, tag
+from cnctwin.reports.gap.signal_name import effect_words
+from cnctwin.reports.gap.written import figure, interval, known, p_value, share, stated, times
 from twin.effects.catalogue import catalogue
 from twin.gap.diagnosis import Interval
 
-MODULES = sorted(module.name for module in pkgutil.walk_packages(cnctwin.gap_report.__path__, "cnctwin.gap_report."))
+MODULES = sorted(module.name for module in pkgutil.walk_packages(cnctwin.reports.gap.__path__, "cnctwin.reports.gap."))
 
 
 @pytest.mark.parametrize("name", MODULES)

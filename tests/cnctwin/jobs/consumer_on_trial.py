@@ -7,7 +7,7 @@ from pathlib import Path
 from cnctwin.errors import UsageError
 from cnctwin.jobs.consumer import Consumer, Setting
 from cnctwin.jobs.job_queue import Limits
-from cnctwin.stopping import stopped_by_signals
+from cnctwin.processes.stopping import stopped_by_signals
 from sparkplug.broker import BrokerAddress
 from tests.cnctwin.jobs.counting import register
 

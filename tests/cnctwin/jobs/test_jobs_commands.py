@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
+from cnctwin.commands.jobs import jobs_app
 from cnctwin.errors import UsageError
 from cnctwin.jobs.client import JobsClient
 from cnctwin.jobs.consumer import Setting
-from cnctwin.jobs_commands import jobs_app
 from sparkplug.broker import BrokerAddress
 from tests.cnctwin.jobs.conftest import PatientClient, Start, over
 from tests.cnctwin.jobs.consumer_on_trial import setting

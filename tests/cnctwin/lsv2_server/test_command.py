@@ -9,7 +9,7 @@ import pyLSV2
 import pytest
 
 from cnctwin.errors import ProgramError, UsageError
-from cnctwin.lsv2_server.command import simulate_lsv2
+from cnctwin.standins.lsv2_server.serve import simulate_lsv2
 
 
 def test_it_serves_until_it_is_stopped_and_says_where(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -14,11 +14,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cnctwin.lsv2_server.answers import Answers, Model, Session
-from cnctwin.lsv2_server.server import CLIENTS_MAX, Fault, Lsv2Server
-from cnctwin.lsv2_server.telegram import PAYLOAD_BYTES_MAX, Telegram, TelegramError, TelegramReader, encode
-from cnctwin.simulated_control.control import SimulatedControl
-from cnctwin.simulated_control.state import ControlState
+from cnctwin.standins.lsv2_server.answers import Answers, Model, Session
+from cnctwin.standins.lsv2_server.server import CLIENTS_MAX, Fault, Lsv2Server
+from cnctwin.standins.lsv2_server.telegram import PAYLOAD_BYTES_MAX, Telegram, TelegramError, TelegramReader, encode
+from cnctwin.standins.simulated_control.control import SimulatedControl
+from cnctwin.standins.simulated_control.state import ControlState
 
 SWITCHED_ON_S = 1_772_438_400.0
 STATE = ControlState(

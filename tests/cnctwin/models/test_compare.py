@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from cnctwin.commands.model import model_app
 from cnctwin.errors import ProgramError, UsageError
-from cnctwin.model_commands import model_app
+from cnctwin.memory.store.opening import open_store
 from cnctwin.models import contest, golden, losses, registry
 from cnctwin.models.contest import Losses, outcome
 from cnctwin.models.golden import freeze, golden_of
 from cnctwin.models.registry import Shelf
 from cnctwin.models.stretch import read_stretch, stretch_of_store
-from cnctwin.simulated_machine.description import ANOMALY_MODEL
-from cnctwin.store.opening import open_store
+from cnctwin.standins.simulated_machine.description import ANOMALY_MODEL
 from tests.cnctwin.models.made_model import made_model
 from tests.cnctwin.validation.made_night import START_S, warm_night
 from tests.cnctwin.validation.stored_night import stored, told

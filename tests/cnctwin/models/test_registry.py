@@ -9,7 +9,7 @@ from cnctwin.errors import UsageError
 from cnctwin.models import registry
 from cnctwin.models.card import card_of, faults_of
 from cnctwin.models.registry import Shelf
-from cnctwin.simulated_machine.description import ANOMALY_MODEL
+from cnctwin.standins.simulated_machine.description import ANOMALY_MODEL
 from tests.cnctwin.models.made_model import made_model
 from twin.anomaly import store as link_store
 from twin.anomaly.model import load_models

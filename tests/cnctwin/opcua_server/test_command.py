@@ -17,9 +17,9 @@ from asyncua import ua
 from asyncua.client.client import Client
 
 from cnctwin.errors import ProgramError
-from cnctwin.opcua_server.command import simulate_opcua
-from cnctwin.opcua_server.shown import MODELS, shown
-from cnctwin.simulated_control.state import ControlState
+from cnctwin.standins.opcua_server.serve import simulate_opcua
+from cnctwin.standins.opcua_server.shown import MODELS, shown
+from cnctwin.standins.simulated_control.state import ControlState
 from edge.controls.opcua.point import maps
 
 TOOL = "/Channel/State/actTNumber[u1,1]"

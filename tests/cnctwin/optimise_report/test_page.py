@@ -13,7 +13,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from cnctwin.optimise_report.page import report_html
+from cnctwin.reports.optimisation.page import report_html
 from tests.cnctwin.gap_report.page_reader import PageReader
 from tests.cnctwin.optimise_report.answers import ANSWERS, bare, long, mixed, nothing, paper, pareto
 from twin.optimisation.answer import Objective, Optimised
@@ -170,6 +170,6 @@ def test_the_course_of_the_search_says_what_it_is_of(objective: Objective, words
 
 
 def test_the_style_is_in_the_package() -> None:
-    import cnctwin.optimise_report
+    import cnctwin.reports.optimisation
 
-    assert (Path(cnctwin.optimise_report.__file__).parent / "optimise.css").is_file()
+    assert (Path(cnctwin.reports.optimisation.__file__).parent / "optimise.css").is_file()

@@ -9,19 +9,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import cnctwin.optimise_report
-from cnctwin.optimise_report.binding import bound_by
-from cnctwin.optimise_report.course import blocks, edges_of, steps
-from cnctwin.optimise_report.kept import ranges
-from cnctwin.optimise_report.lines import ROWS_MAX, chosen, limits_of
-from cnctwin.optimise_report.page import report_html
-from cnctwin.optimise_report.quantity import limit_figure
-from cnctwin.optimise_report.totals import bounds
+import cnctwin.reports.optimisation
+from cnctwin.reports.optimisation.binding import bound_by
+from cnctwin.reports.optimisation.course import blocks, edges_of, steps
+from cnctwin.reports.optimisation.kept import ranges
+from cnctwin.reports.optimisation.lines import ROWS_MAX, chosen, limits_of
+from cnctwin.reports.optimisation.page import report_html
+from cnctwin.reports.optimisation.quantity import limit_figure
+from cnctwin.reports.optimisation.totals import bounds
 from tests.cnctwin.gap_report.page_reader import PageReader
 from tests.cnctwin.optimise_report.answers import SENSITIVITY, bare, long, mixed, paper, pareto
 from twin.optimisation.answer import Binds, Objective, Optimised
 
-MODULES = sorted(m.name for m in pkgutil.walk_packages(cnctwin.optimise_report.__path__, "cnctwin.optimise_report."))
+MODULES = sorted(m.name for m in pkgutil.walk_packages(cnctwin.reports.optimisation.__path__, "cnctwin.reports.optimisation."))
 
 
 @pytest.mark.parametrize("name", MODULES)

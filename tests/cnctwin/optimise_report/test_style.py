@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import sync_playwright
 
-from cnctwin.optimise_report.page import report_html
+from cnctwin.reports.optimisation.page import report_html
 from tests.cnctwin.gap_report.test_style import contrast, variables
 from tests.cnctwin.optimise_report.answers import mixed, pareto
 
-CSS = files("cnctwin.optimise_report").joinpath("optimise.css").read_text(encoding="utf-8")
+CSS = files("cnctwin.reports.optimisation").joinpath("optimise.css").read_text(encoding="utf-8")
 CHROMIUM = Path("/usr/bin/chromium")
 
 

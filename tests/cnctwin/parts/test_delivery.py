@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from cnctwin.parts.delivery import Delivery, Receiver, signature
-from cnctwin.parts.journal import Journal
-from cnctwin.parts.record_log import parts
-from cnctwin.store.contract import Message
-from cnctwin.store.opening import open_store
+from cnctwin.memory.parts.delivery import Delivery, Receiver, signature
+from cnctwin.memory.parts.journal import Journal
+from cnctwin.memory.parts.record_log import parts
+from cnctwin.memory.store.contract import Message
+from cnctwin.memory.store.opening import open_store
 from processors.alerts.courier.outcome import Outcome, Verdict
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId, Reading

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from cnctwin.reference_machine import axis
-from cnctwin.reference_machine.axis import AxisPhysics
+from cnctwin.standins.reference_machine import axis
+from cnctwin.standins.reference_machine.axis import AxisPhysics
 
 NOMINAL = AxisPhysics(320.0, 628.3, 12.0, 40.0, 0.3, 9.0, 60.0, 380.0, 520.0, 6.0, 2.4)
 TICKS = 1500

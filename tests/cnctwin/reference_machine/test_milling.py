@@ -5,9 +5,9 @@ from math import cos, pi, sin
 import numpy as np
 import pytest
 
-from cnctwin.reference_machine import milling
-from cnctwin.reference_machine.axis import STEPS
-from cnctwin.reference_machine.milling import CutPhysics
+from cnctwin.standins.reference_machine import milling
+from cnctwin.standins.reference_machine.axis import STEPS
+from cnctwin.standins.reference_machine.milling import CutPhysics
 
 TOOL = CutPhysics(20.0, 4, 900.0, 0.4)
 TICKS = 200

@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-from cnctwin.reference_machine import heat, spindle
-from cnctwin.reference_machine.effect import Effect
-from cnctwin.reference_machine.heat import HeatPhysics
-from cnctwin.reference_machine.named_effects import AXIS_EFFECTS, NAMED
-from cnctwin.reference_machine.physics import Physics, physics_of
-from cnctwin.reference_machine.recording import Columns, Motion, motion_of, motion_run
-from cnctwin.reference_machine.spindle import MeterPhysics
-from cnctwin.reference_machine.stated import drawn_machine
-from cnctwin.reference_machine.trajectory import Dwell, Dynamics, Line
-from cnctwin.reference_machine.unnamed_effects import UNNAMED
+from cnctwin.standins.reference_machine import heat, spindle
+from cnctwin.standins.reference_machine.effect import Effect
+from cnctwin.standins.reference_machine.heat import HeatPhysics
+from cnctwin.standins.reference_machine.named_effects import AXIS_EFFECTS, NAMED
+from cnctwin.standins.reference_machine.physics import Physics, physics_of
+from cnctwin.standins.reference_machine.recording import Columns, Motion, motion_of, motion_run
+from cnctwin.standins.reference_machine.spindle import MeterPhysics
+from cnctwin.standins.reference_machine.stated import drawn_machine
+from cnctwin.standins.reference_machine.trajectory import Dwell, Dynamics, Line
+from cnctwin.standins.reference_machine.unnamed_effects import UNNAMED
 
 STRAIGHT = (Dwell(0.2, 6000.0), Line((40.0, 30.0, -20.0), 4000.0), Dwell(0.3), Line((0.0, 0.0, 0.0), 9000.0), Dwell(1.2))
 SLOT = (Dwell(0.4, 3000.0), Line((60.0, None, None), 2400.0, 2.0, (0.0, np.pi)), Dwell(0.3))

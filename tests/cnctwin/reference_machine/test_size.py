@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cnctwin.reference_machine.size import amplitude_for, rms_by_signal, sizes
+from cnctwin.standins.reference_machine.size import amplitude_for, rms_by_signal, sizes
 
 
 @pytest.mark.parametrize("power", [0.5, 1.0, 2.0])

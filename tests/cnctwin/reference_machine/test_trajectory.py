@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from cnctwin.reference_machine.program import air_program, cut_program, nc_text
-from cnctwin.reference_machine.trajectory import PER_MS, Circle, Dwell, Dynamics, Line, path_of
+from cnctwin.standins.reference_machine.program import air_program, cut_program, nc_text
+from cnctwin.standins.reference_machine.trajectory import PER_MS, Circle, Dwell, Dynamics, Line, path_of
 from twin.gcode import Linear, interpret
 
 DYNAMICS = Dynamics(2400.0, 0.04)

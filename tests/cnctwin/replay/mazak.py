@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from cnctwin.shdr_import import recorded_rows
-from cnctwin.store.contract import Message
-from cnctwin.store_import import recorded_messages
+from cnctwin.memory.importing.into_store import recorded_messages
+from cnctwin.memory.importing.shdr import recorded_rows
+from cnctwin.memory.store.contract import Message
 from tests.recordings import recording
 
 LINES = 16_000

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 
-from cnctwin.store.contract import Message, Series, Snapshot
+from cnctwin.memory.store.contract import Message, Series, Snapshot
 from sparkplug.host_session import EventKind, HostEvent
 
 

@@ -7,7 +7,7 @@ silence when none waits, a snapshot within two seconds; it may be killed at any 
 from collections.abc import Sequence
 from random import Random
 
-from cnctwin.store.contract import Message, Snapshot
+from cnctwin.memory.store.contract import Message, Snapshot
 from processors.config import Configuration
 from processors.discovery import AnyProcessor
 from processors.effects import Declare, Effect, Publish, Remove

@@ -3,9 +3,9 @@
 import json
 from dataclasses import dataclass
 
-from cnctwin.replay.lives import births_of_life
-from cnctwin.replay.log import Mark
-from cnctwin.store.contract import Snapshot
+from cnctwin.memory.replay.lives import births_of_life
+from cnctwin.memory.replay.log import Mark
+from cnctwin.memory.store.contract import Snapshot
 from processors.discovery import find
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.topics import NodeId

@@ -4,7 +4,7 @@ from random import Random
 
 import pytest
 
-from cnctwin.replay import ReplayRefusedError, replay
+from cnctwin.memory.replay import ReplayRefusedError, replay
 from processors.discovery import find
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import Reading

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import pytest
 
-from cnctwin.replay import Replayed, replay
-from cnctwin.store.opening import open_store
+from cnctwin.memory.replay import Replayed, replay
+from cnctwin.memory.store.opening import open_store
 from processors.config import read_tables
 from sparkplug.broker import BrokerAddress
 from sparkplug.datatype import DataType

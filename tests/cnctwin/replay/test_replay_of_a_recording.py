@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 
 from cnctwin.errors import UsageError
-from cnctwin.replay import replay
-from cnctwin.store.opening import open_store
-from cnctwin.store_import import import_recording
+from cnctwin.memory.importing.into_store import import_recording
+from cnctwin.memory.replay import replay
+from cnctwin.memory.store.opening import open_store
 from sparkplug.host_session import EventKind
 from tests.cnctwin.replay.mazak import mazak_file, mazak_hours
 

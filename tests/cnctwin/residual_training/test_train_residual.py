@@ -11,11 +11,11 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from cnctwin.commands.train.residual import train_residual
 from cnctwin.errors import UsageError
-from cnctwin.residual_training.recording import from_files, from_store
-from cnctwin.store.contract import Message
-from cnctwin.store.opening import open_store
-from cnctwin.train_residual_command import train_residual
+from cnctwin.memory.store.contract import Message
+from cnctwin.memory.store.opening import open_store
+from cnctwin.training.residual.recording import from_files, from_store
 from processors.config import Configuration
 from processors.residual import PROCESSOR
 from sparkplug.host_session import EventKind, HostEvent

@@ -3,9 +3,9 @@
 import doctest
 from itertools import pairwise
 
-from cnctwin.simulated_control import state
-from cnctwin.simulated_control.control import SimulatedControl
-from cnctwin.simulated_control.state import production, tool_changes
+from cnctwin.standins.simulated_control import state
+from cnctwin.standins.simulated_control.control import SimulatedControl
+from cnctwin.standins.simulated_control.state import production, tool_changes
 
 
 def test_the_examples_are_true() -> None:

@@ -9,10 +9,10 @@ from itertools import pairwise
 import pytest
 
 from cnctwin.errors import UsageError
-from cnctwin.simulated_machine import description
-from cnctwin.simulated_machine.agent import COMPILING, SimulatedMachine
-from cnctwin.simulated_machine.moment import Moment
-from cnctwin.simulated_machine.part import Part, spare_part
+from cnctwin.standins.simulated_machine import description
+from cnctwin.standins.simulated_machine.agent import COMPILING, SimulatedMachine
+from cnctwin.standins.simulated_machine.moment import Moment
+from cnctwin.standins.simulated_machine.part import Part, spare_part
 from tests.cnctwin.program import until
 from tests.cnctwin.small_machine import header, observations, values
 
@@ -112,7 +112,7 @@ def test_a_stop_in_the_middle_of_a_part_ends_every_thread() -> None:
 
 
 def test_a_stop_says_where_a_part_is_still_being_computed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cnctwin.simulated_machine.agent.COMPUTING_S_MAX", 0.1)
+    monkeypatch.setattr("cnctwin.standins.simulated_machine.agent.COMPUTING_S_MAX", 0.1)
     machine = SimulatedMachine(speed=20.0, begin=Never)
     machine.start()
     until(lambda: machine.ledger.lines > 1, "the machine to be switched on")
@@ -120,8 +120,8 @@ def test_a_stop_says_where_a_part_is_still_being_computed(monkeypatch: pytest.Mo
 
 
 def test_while_the_kernels_are_compiled_a_part_is_shown_and_said_to_be_a_spare_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cnctwin.simulated_machine.agent.PATIENCE_S", 0.1)
-    monkeypatch.setattr("cnctwin.simulated_machine.agent.WAITING_SAID_S", 0.1)
+    monkeypatch.setattr("cnctwin.standins.simulated_machine.agent.PATIENCE_S", 0.1)
+    monkeypatch.setattr("cnctwin.standins.simulated_machine.agent.WAITING_SAID_S", 0.1)
     with SimulatedMachine(speed=SPEED, begin=Never) as machine:
         until(lambda: machine.notice == COMPILING, "the notice")
         until(lambda: machine.parts == 1, "the spare part to be made")

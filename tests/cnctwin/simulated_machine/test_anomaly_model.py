@@ -4,10 +4,10 @@ from pathlib import Path
 
 import numpy as np
 
-from cnctwin.anomaly_training.replayed_cell import replayed
-from cnctwin.shdr_import import recorded_runs
-from cnctwin.simulated_machine.anomaly_model import FEATURES, place_model
-from cnctwin.simulated_machine.description import DEVICES, SPARE_PART
+from cnctwin.memory.importing.shdr import recorded_runs
+from cnctwin.standins.simulated_machine.anomaly_model import FEATURES, place_model
+from cnctwin.standins.simulated_machine.description import DEVICES, SPARE_PART
+from cnctwin.training.anomaly.replayed_cell import replayed
 from processors.config import Configuration, read_tables
 from processors.joint_anomaly.config import Config
 

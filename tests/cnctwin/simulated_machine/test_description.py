@@ -11,15 +11,15 @@ from typing import Any
 
 import pytest
 
-from cnctwin.simulated_machine import description
-from cnctwin.simulated_machine.as_built import machine_as_built
+from cnctwin.standins.simulated_machine import description
+from cnctwin.standins.simulated_machine.as_built import machine_as_built
 from twin.machine import read_machine
 
 HEAVY = ("numpy", "scipy", "numba", "pyarrow")
 LIGHT = (
     "cnctwin.cli",
-    "cnctwin.demo",
-    "cnctwin.machine_command",
+    "cnctwin.demo.demo",
+    "cnctwin.standins.simulated_machine.serve",
     "edge.running.runtime",
     "edge.check",
     "processors.running.runtime",
@@ -67,6 +67,6 @@ def test_start_up_imports_none_of_the_arrays() -> None:
 
 @pytest.mark.parametrize("name", MODULES)
 def test_the_examples_in_the_docstrings_are_right(name: str) -> None:
-    module = importlib.import_module(f"cnctwin.simulated_machine.{name}")
+    module = importlib.import_module(f"cnctwin.standins.simulated_machine.{name}")
     found = doctest.testmod(module)
     assert (found.failed, found.attempted > 0) == (0, True)

@@ -5,11 +5,11 @@ import re
 import numpy as np
 import pytest
 
-from cnctwin.simulated_machine.as_built import machine_as_built
-from cnctwin.simulated_machine.description import program_text
-from cnctwin.simulated_machine.machining import machined, moments_of_run
-from cnctwin.simulated_machine.part import Part, spare_part
-from cnctwin.simulated_machine.working_day import (
+from cnctwin.standins.simulated_machine.as_built import machine_as_built
+from cnctwin.standins.simulated_machine.description import program_text
+from cnctwin.standins.simulated_machine.machining import machined, moments_of_run
+from cnctwin.standins.simulated_machine.part import Part, spare_part
+from cnctwin.standins.simulated_machine.working_day import (
     SPARE_START_C,
     START_TEMPERATURE_C,
     ambient_temp_c,

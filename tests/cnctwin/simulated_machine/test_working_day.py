@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import pytest
 
-from cnctwin.simulated_machine.moment import Moment
-from cnctwin.simulated_machine.part import Part
-from cnctwin.simulated_machine.working_day import Pending, ambient_temp_c, switched_on, working_day
+from cnctwin.standins.simulated_machine.moment import Moment
+from cnctwin.standins.simulated_machine.part import Part
+from cnctwin.standins.simulated_machine.working_day import Pending, ambient_temp_c, switched_on, working_day
 
 SHORT = Part((Moment(0.0, {"Tool_number": "", "Srpm": "0"}), Moment(4.0, {"Tool_number": "1", "Srpm": "8500"})), 10.0, 27.5)
 SPARE = Part((Moment(0.0, {"Srpm": "1"}),), 30.0, 25.0)

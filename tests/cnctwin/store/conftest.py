@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from cnctwin.store.embedded import EmbeddedStore
+from cnctwin.memory.store.embedded import EmbeddedStore
 
 
 @pytest.fixture(autouse=True)

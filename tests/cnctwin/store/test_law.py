@@ -12,8 +12,8 @@ from typing import Any
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from cnctwin.store.contract import Message, Query
-from cnctwin.store.embedded import EmbeddedStore
+from cnctwin.memory.store.contract import Message, Query
+from cnctwin.memory.store.embedded import EmbeddedStore
 from sparkplug.host_session import EventKind
 from sparkplug.metric import Reading
 from sparkplug.quality import Quality

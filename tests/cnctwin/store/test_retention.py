@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cnctwin.store.contract import Message, Pinned, Query, Snapshot, StoreError
-from cnctwin.store.embedded import EmbeddedStore
-from cnctwin.store.opening import open_store
-from cnctwin.store.plan import load_of, plan
-from cnctwin.store.retention import DAY_MS, Retention
-from cnctwin.store.store_status import SPARE_FREE_BYTES
+from cnctwin.memory.store.contract import Message, Pinned, Query, Snapshot, StoreError
+from cnctwin.memory.store.embedded import EmbeddedStore
+from cnctwin.memory.store.opening import open_store
+from cnctwin.memory.store.plan import load_of, plan
+from cnctwin.memory.store.retention import DAY_MS, Retention
+from cnctwin.memory.store.store_status import SPARE_FREE_BYTES
 from sparkplug.host_session import EventKind
 from tests.cnctwin.store.told import BAD, HOUR_MS, T0_MS, TWIN, reading, steady, told
 
@@ -20,7 +20,7 @@ HOURS = 6
 @pytest.fixture
 def filled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> EmbeddedStore:
     """Six hours of a machine with what its twin says, and a pin in the third hour; all sealed, a file for each hour."""
-    monkeypatch.setattr("cnctwin.store.sealing.SAMPLES_MIN", 1)
+    monkeypatch.setattr("cnctwin.memory.store.sealing.SAMPLES_MIN", 1)
     store = EmbeddedStore(tmp_path, writable=True, retention=Retention(raw_days=2.0, block_days=1.0, disk_bytes=None))
     for hour in range(HOURS):
         store.append(steady(hour * HOUR_MS, 600, every_ms=6000, start=hour))

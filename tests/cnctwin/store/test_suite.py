@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from cnctwin.store.contract import Store
-from cnctwin.store.embedded import EmbeddedStore
+from cnctwin.memory.store.contract import Store
+from cnctwin.memory.store.embedded import EmbeddedStore
 from tests.cnctwin.store_influx.suite import T0_MS, Opened, StoreSuite
 
 

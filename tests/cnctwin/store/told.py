@@ -3,8 +3,8 @@
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from cnctwin.store.contract import Message
-from cnctwin.store.value_form import same
+from cnctwin.memory.store.contract import Message
+from cnctwin.memory.store.value_form import same
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId, Reading
 from sparkplug.quality import Quality

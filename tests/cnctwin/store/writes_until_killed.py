@@ -8,8 +8,8 @@ import os
 import sys
 from pathlib import Path
 
-from cnctwin.store import sealed_tier, sealing
-from cnctwin.store.embedded import EmbeddedStore
+from cnctwin.memory.store import sealed_tier, sealing
+from cnctwin.memory.store.embedded import EmbeddedStore
 from tests.cnctwin.store.told import HOUR_MS, T0_MS, steady
 
 EVERY_MS, BATCH = 10_000, 200

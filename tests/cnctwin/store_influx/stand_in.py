@@ -13,7 +13,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import NamedTuple
 from urllib.parse import parse_qs, urlsplit
 
-from cnctwin.store.influx.server import RefusedError, ServerAnswer, ServerAwayError
+from cnctwin.memory.store.influx.server import RefusedError, ServerAnswer, ServerAwayError
 
 ANSWERS_MAX = 10_000
 

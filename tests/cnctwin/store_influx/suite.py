@@ -14,7 +14,7 @@ from uuid import uuid4
 
 import pytest
 
-from cnctwin.store.contract import DERIVED, RAW, Appended, Column, Message, Pinned, Query, Sample, Store
+from cnctwin.memory.store.contract import DERIVED, RAW, Appended, Column, Message, Pinned, Query, Sample, Store
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId, Reading
 from sparkplug.quality import Quality
@@ -46,7 +46,7 @@ def points(column: Column) -> list[tuple[int, Any]]:
 
 
 class StoreSuite:
-    """The contract of `cnctwin.store.contract.Store` about samples."""
+    """The contract of `cnctwin.memory.store.contract.Store` about samples."""
 
     figures_rel = 1e-12
     """VictoriaMetrics keeps numbers as decimals: the last digits of a double may differ."""

@@ -9,14 +9,14 @@ from pathlib import Path
 
 import pytest
 
-from cnctwin.store.contract import StoreError
-from cnctwin.store.influx.address import TOKEN, TOKEN_FILE, parse
-from cnctwin.store.influx.influx1 import Influx1
-from cnctwin.store.influx.influx2 import Influx2
-from cnctwin.store.influx.influx_reader import InfluxReader
-from cnctwin.store.influx.opening import open_influx
-from cnctwin.store.influx.server import Server, ServerAwayError
-from cnctwin.store.influx.victoria import Victoria
+from cnctwin.memory.store.contract import StoreError
+from cnctwin.memory.store.influx.address import TOKEN, TOKEN_FILE, parse
+from cnctwin.memory.store.influx.influx1 import Influx1
+from cnctwin.memory.store.influx.influx2 import Influx2
+from cnctwin.memory.store.influx.influx_reader import InfluxReader
+from cnctwin.memory.store.influx.opening import open_influx
+from cnctwin.memory.store.influx.server import Server, ServerAwayError
+from cnctwin.memory.store.influx.victoria import Victoria
 from tests.cnctwin.store_influx.stand_in import Answer, HttpServer
 
 SECRET = "s3cret-token-of-the-plant"

@@ -7,10 +7,10 @@ from uuid import uuid4
 
 import pytest
 
-from cnctwin.store.contract import Column, Message, Query, Store
-from cnctwin.store.influx.opening import open_influx
-from cnctwin.store.influx.store import ServerStore
-from cnctwin.store.opening import open_store
+from cnctwin.memory.store.contract import Column, Message, Query, Store
+from cnctwin.memory.store.influx.opening import open_influx
+from cnctwin.memory.store.influx.store import ServerStore
+from cnctwin.memory.store.opening import open_store
 from sparkplug.host_session import EventKind
 from sparkplug.metric import NodeId, Reading
 from tests.cnctwin.store_influx.servers import Influxd, ServerProcess, VictoriaMetrics

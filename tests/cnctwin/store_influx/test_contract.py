@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from cnctwin.store.contract import Store
-from cnctwin.store.influx.opening import open_influx
-from cnctwin.store.influx.store import ServerStore
+from cnctwin.memory.store.contract import Store
+from cnctwin.memory.store.influx.opening import open_influx
+from cnctwin.memory.store.influx.store import ServerStore
 from tests.cnctwin.store_influx.servers import Influxd, ServerProcess, VictoriaMetrics, given_influx2
 from tests.cnctwin.store_influx.suite import Opened, StoreSuite
 

@@ -11,12 +11,12 @@ from random import Random
 
 import pytest
 
-from cnctwin.store.contract import Pinned, Query, StoreError
-from cnctwin.store.influx.address import TOKEN, parse
-from cnctwin.store.influx.influx2 import Influx2
-from cnctwin.store.influx.influx_reader import InfluxReader
-from cnctwin.store.influx.sender import Patience
-from cnctwin.store.influx.store import ServerStore
+from cnctwin.memory.store.contract import Pinned, Query, StoreError
+from cnctwin.memory.store.influx.address import TOKEN, parse
+from cnctwin.memory.store.influx.influx2 import Influx2
+from cnctwin.memory.store.influx.influx_reader import InfluxReader
+from cnctwin.memory.store.influx.sender import Patience
+from cnctwin.memory.store.influx.store import ServerStore
 from sparkplug.host_session import EventKind
 from tests.cnctwin.store_influx.stand_in import Answer, HttpServer, error
 from tests.cnctwin.store_influx.suite import BAD, STALE, T0_MS, reading, told

@@ -8,15 +8,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cnctwin.store.contract import Appended, Message
-from cnctwin.store.influx.codes import CODES
-from cnctwin.store.influx.intake import Intake
-from cnctwin.store.influx.line_protocol import UnfitTextError, fields, influx_line, tag, tags, victoria_line
-from cnctwin.store.influx.pins import Pins
-from cnctwin.store.influx.sample_row import SampleRow, SeriesKey
-from cnctwin.store.influx.spool import RingLimits, Spool
-from cnctwin.store.influx.stamps import AGE_MS, Stamps, digest
-from cnctwin.store.influx.vocabulary import TEXTS_MAX, Vocabulary
+from cnctwin.memory.store.contract import Appended, Message
+from cnctwin.memory.store.influx.codes import CODES
+from cnctwin.memory.store.influx.intake import Intake
+from cnctwin.memory.store.influx.line_protocol import UnfitTextError, fields, influx_line, tag, tags, victoria_line
+from cnctwin.memory.store.influx.pins import Pins
+from cnctwin.memory.store.influx.sample_row import SampleRow, SeriesKey
+from cnctwin.memory.store.influx.spool import RingLimits, Spool
+from cnctwin.memory.store.influx.stamps import AGE_MS, Stamps, digest
+from cnctwin.memory.store.influx.vocabulary import TEXTS_MAX, Vocabulary
 from sparkplug.host_session import EventKind
 from tests.cnctwin.store_influx.suite import BAD, GOOD, STALE, reading, told
 

@@ -11,18 +11,18 @@ from uuid import uuid4
 import httpx
 import pytest
 
-from cnctwin.store.contract import Query
-from cnctwin.store.influx.address import parse
-from cnctwin.store.influx.influx1 import Influx1
-from cnctwin.store.influx.influx2 import Influx2
-from cnctwin.store.influx.influx_reader import InfluxReader
-from cnctwin.store.influx.opening import open_influx
-from cnctwin.store.influx.sender import Patience
-from cnctwin.store.influx.server import Server
-from cnctwin.store.influx.spool import RingLimits
-from cnctwin.store.influx.store import Reader, ServerStore
-from cnctwin.store.influx.victoria import Victoria
-from cnctwin.store.influx.victoria_reader import VictoriaReader
+from cnctwin.memory.store.contract import Query
+from cnctwin.memory.store.influx.address import parse
+from cnctwin.memory.store.influx.influx1 import Influx1
+from cnctwin.memory.store.influx.influx2 import Influx2
+from cnctwin.memory.store.influx.influx_reader import InfluxReader
+from cnctwin.memory.store.influx.opening import open_influx
+from cnctwin.memory.store.influx.sender import Patience
+from cnctwin.memory.store.influx.server import Server
+from cnctwin.memory.store.influx.spool import RingLimits
+from cnctwin.memory.store.influx.store import Reader, ServerStore
+from cnctwin.memory.store.influx.victoria import Victoria
+from cnctwin.memory.store.influx.victoria_reader import VictoriaReader
 from tests.cnctwin.store_influx.gate import Gate
 from tests.cnctwin.store_influx.servers import Influxd, ServerProcess, VictoriaMetrics
 from tests.cnctwin.store_influx.suite import T0_MS, reading, told

@@ -8,11 +8,11 @@ from uuid import uuid4
 import httpx
 import pytest
 
-from cnctwin.store.contract import Pinned, Query, Snapshot, Store, StoreError
-from cnctwin.store.influx.both import Both
-from cnctwin.store.influx.opening import open_influx
-from cnctwin.store.influx.store import ServerStore, steady_wall_ms
-from cnctwin.store.opening import open_store
+from cnctwin.memory.store.contract import Pinned, Query, Snapshot, Store, StoreError
+from cnctwin.memory.store.influx.both import Both
+from cnctwin.memory.store.influx.opening import open_influx
+from cnctwin.memory.store.influx.store import ServerStore, steady_wall_ms
+from cnctwin.memory.store.opening import open_store
 from sparkplug.host_session import EventKind
 from tests.cnctwin.store_influx.servers import Influxd
 from tests.cnctwin.store_influx.suite import BAD, T0_MS, points, reading, told
@@ -193,8 +193,8 @@ def test_a_ring_that_takes_nothing_holds_up_no_pin_of_the_embedded_store(
         raise StoreError("the ring's disk is full")
 
     with monkeypatch.context() as failing:
-        failing.setattr("cnctwin.store.influx.spool.Spool.write", full)
-        failing.setattr("cnctwin.store.influx.spool.Spool.put", full)
+        failing.setattr("cnctwin.memory.store.influx.spool.Spool.write", full)
+        failing.setattr("cnctwin.memory.store.influx.spool.Spool.put", full)
         both.append(said)
         both.pin(Pinned(machine, T0_MS, T0_MS + 1000, "score 9.1"))
     assert both.pins(machine) and "1 samples did not come" in both.status().trouble
@@ -217,7 +217,7 @@ def test_what_a_server_that_is_away_had_is_asked_of_the_embedded_store(tmp_path:
 
 
 def test_a_clock_that_is_set_while_we_run_evicts_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cnctwin.store.influx.store.time.time_ns", lambda: 0)
+    monkeypatch.setattr("cnctwin.memory.store.influx.store.time.time_ns", lambda: 0)
     wall_ms = steady_wall_ms()
-    monkeypatch.setattr("cnctwin.store.influx.store.time.time_ns", lambda: 1_790_000_000_000_000_000)
+    monkeypatch.setattr("cnctwin.memory.store.influx.store.time.time_ns", lambda: 1_790_000_000_000_000_000)
     assert 0 <= wall_ms() < 60_000

@@ -11,10 +11,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cnctwin.store.contract import StoreError
-from cnctwin.store.influx.sender import Patience, Sender
-from cnctwin.store.influx.server import RefusedError, ServerAwayError, TooLargeError
-from cnctwin.store.influx.spool import Batch, RingLimits, Spool
+from cnctwin.memory.store.contract import StoreError
+from cnctwin.memory.store.influx.sender import Patience, Sender
+from cnctwin.memory.store.influx.server import RefusedError, ServerAwayError, TooLargeError
+from cnctwin.memory.store.influx.spool import Batch, RingLimits, Spool
 from tests.cnctwin.store_influx.stand_in import MemoryServer, refuses
 
 QUICK = Patience(delay_s_min=0.001, delay_s_max=0.01, samples_at_once=100)

@@ -6,8 +6,8 @@ python -m tests.cnctwin.store_influx.writer URL RING MACHINE FIRST LAST T0_MS
 import sys
 from pathlib import Path
 
-from cnctwin.store.contract import Message
-from cnctwin.store.influx.opening import open_influx
+from cnctwin.memory.store.contract import Message
+from cnctwin.memory.store.influx.opening import open_influx
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId, Reading
 from sparkplug.quality import Quality

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cnctwin.simulated_machine.as_built import machine_as_built
-from cnctwin.simulated_machine.description import PROCESSORS, TOLD
+from cnctwin.standins.simulated_machine.as_built import machine_as_built
+from cnctwin.standins.simulated_machine.description import PROCESSORS, TOLD
 from cnctwin.validation.model import Twin
 from twin.machine import MachineFile, read_machine
 from twin.runlog import RunLog, run_log

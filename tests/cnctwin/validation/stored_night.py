@@ -4,8 +4,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from cnctwin.store.contract import Message
-from cnctwin.store.opening import open_store
+from cnctwin.memory.store.contract import Message
+from cnctwin.memory.store.opening import open_store
 from processors.config import Configuration
 from processors.discovery import find
 from processors.effects import Declare, Publish

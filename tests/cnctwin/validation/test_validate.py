@@ -10,10 +10,10 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from cnctwin.commands.validate import validate
 from cnctwin.errors import ProgramError
-from cnctwin.simulated_machine.description import PROCESSORS, TOLD
-from cnctwin.store.opening import open_store
-from cnctwin.validate_command import validate
+from cnctwin.memory.store.opening import open_store
+from cnctwin.standins.simulated_machine.description import PROCESSORS, TOLD
 from cnctwin.validation.budgets import Budgets, budgets_of, tables_of
 from cnctwin.validation.cycles import cycles_of
 from cnctwin.validation.evidence import of_store

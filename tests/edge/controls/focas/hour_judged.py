@@ -6,8 +6,8 @@ The truth is the list of states that the control showed. A look shows one moment
 from bisect import bisect_left
 from collections.abc import Callable, Iterator
 
-from cnctwin.focas_server.shown import CodedState
-from cnctwin.simulated_control.state import ToolChange, tool_changes
+from cnctwin.standins.focas_server.shown import CodedState
+from cnctwin.standins.simulated_control.state import ToolChange, tool_changes
 from edge.controls.focas.connection import HOLE_INTERVALS
 from tests.edge.controls.changes_told import changes_told
 from tests.edge.controls.focas.machine_hour import SWITCHED_ON_S, Hour

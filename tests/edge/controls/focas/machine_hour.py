@@ -12,12 +12,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from time import process_time, thread_time
 
-from cnctwin.focas_server.faults import Refusal, Wrong
-from cnctwin.focas_server.server import FocasServer
-from cnctwin.focas_server.shown import CodedState, ControlDescription, coded
-from cnctwin.simulated_control.control import SimulatedControl
-from cnctwin.simulated_control.state import production
-from cnctwin.simulated_machine.description import PROGRAM
+from cnctwin.standins.focas_server.faults import Refusal, Wrong
+from cnctwin.standins.focas_server.server import FocasServer
+from cnctwin.standins.focas_server.shown import CodedState, ControlDescription, coded
+from cnctwin.standins.simulated_control.control import SimulatedControl
+from cnctwin.standins.simulated_control.state import production
+from cnctwin.standins.simulated_machine.description import PROGRAM
 from edge.config import EdgeConfig
 from edge.controls.focas.calls import Answer, FocasBackend, Opened, Request
 from edge.controls.focas.config import FocasConfig

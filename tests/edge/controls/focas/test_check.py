@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from cnctwin.focas_server.server import FocasServer
-from cnctwin.simulated_control.control import SimulatedControl
-from cnctwin.simulated_control.state import ControlState
+from cnctwin.standins.focas_server.server import FocasServer
+from cnctwin.standins.simulated_control.control import SimulatedControl
+from cnctwin.standins.simulated_control.state import ControlState
 from edge.config import EdgeConfig
 from edge.config_file import parse
 from edge.controls.focas.check import describe

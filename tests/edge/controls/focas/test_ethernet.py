@@ -8,10 +8,10 @@ from contextlib import contextmanager
 
 import pytest
 
-from cnctwin.focas_server.faults import Refusal, Wrong
-from cnctwin.focas_server.server import FocasServer
-from cnctwin.simulated_control.control import SimulatedControl
-from cnctwin.simulated_control.state import ControlState
+from cnctwin.standins.focas_server.faults import Refusal, Wrong
+from cnctwin.standins.focas_server.server import FocasServer
+from cnctwin.standins.simulated_control.control import SimulatedControl
+from cnctwin.standins.simulated_control.state import ControlState
 from edge.controls.focas import wire
 from edge.controls.focas.calls import Call, Request
 from edge.controls.focas.config import FocasConfig

@@ -4,7 +4,7 @@ slow, wrong and partial. In the suite eight minutes of it; the whole hour with C
 
 import pytest
 
-from cnctwin.simulated_control.state import tool_changes
+from cnctwin.standins.simulated_control.state import tool_changes
 from tests.depth import IS_FULL
 from tests.edge.controls.focas import hour_judged as judged
 from tests.edge.controls.focas.machine_hour import CLOCK_OFFSET_S, Hour, run

@@ -7,10 +7,10 @@ from functools import partial
 from operator import attrgetter
 from typing import Any, NamedTuple
 
-from cnctwin.lsv2_server.answers import Model
-from cnctwin.lsv2_server.server import Fault, Lsv2Server
-from cnctwin.simulated_control.control import SimulatedControl
-from cnctwin.simulated_control.state import ControlState, ToolChange, production, tool_changes
+from cnctwin.standins.lsv2_server.answers import Model
+from cnctwin.standins.lsv2_server.server import Fault, Lsv2Server
+from cnctwin.standins.simulated_control.control import SimulatedControl
+from cnctwin.standins.simulated_control.state import ControlState, ToolChange, production, tool_changes
 from edge.config import EdgeConfig
 from edge.controls.heidenhain.config import HeidenhainConfig
 from edge.controls.heidenhain.connection import HeidenhainConnection

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from cnctwin.lsv2_server.answers import Model
-from cnctwin.lsv2_server.server import Lsv2Server
-from cnctwin.simulated_control.control import SimulatedControl
-from cnctwin.simulated_control.state import ControlState
+from cnctwin.standins.lsv2_server.answers import Model
+from cnctwin.standins.lsv2_server.server import Lsv2Server
+from cnctwin.standins.simulated_control.control import SimulatedControl
+from cnctwin.standins.simulated_control.state import ControlState
 from edge.config import EdgeConfig
 from edge.config_file import parse
 from edge.controls.heidenhain.check import describe

@@ -9,10 +9,10 @@ from typing import Any
 
 import pytest
 
-from cnctwin.lsv2_server.answers import Model
-from cnctwin.lsv2_server.server import Fault, Lsv2Server
-from cnctwin.simulated_control.control import SimulatedControl
-from cnctwin.simulated_control.state import ControlState, production
+from cnctwin.standins.lsv2_server.answers import Model
+from cnctwin.standins.lsv2_server.server import Fault, Lsv2Server
+from cnctwin.standins.simulated_control.control import SimulatedControl
+from cnctwin.standins.simulated_control.state import ControlState, production
 from edge.config import EdgeConfig
 from edge.controls.heidenhain.config import HeidenhainConfig
 from edge.controls.heidenhain.connection import HeidenhainConnection

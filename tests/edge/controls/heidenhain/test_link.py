@@ -14,10 +14,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cnctwin.lsv2_server.answers import Model
-from cnctwin.lsv2_server.server import Lsv2Server
-from cnctwin.simulated_control.control import SimulatedControl
-from cnctwin.simulated_control.state import production
+from cnctwin.standins.lsv2_server.answers import Model
+from cnctwin.standins.lsv2_server.server import Lsv2Server
+from cnctwin.standins.simulated_control.control import SimulatedControl
+from cnctwin.standins.simulated_control.state import production
 from edge.config import EdgeConfig
 from edge.controls.heidenhain.config import HeidenhainConfig
 from edge.controls.heidenhain.control import Control, library

@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cnctwin.lsv2_server import plc_memory
-from cnctwin.lsv2_server.server import Lsv2Server
-from cnctwin.simulated_control.control import SimulatedControl
-from cnctwin.simulated_control.state import ControlState
+from cnctwin.standins.lsv2_server import plc_memory
+from cnctwin.standins.lsv2_server.server import Lsv2Server
+from cnctwin.standins.simulated_control.control import SimulatedControl
+from cnctwin.standins.simulated_control.state import ControlState
 from edge.controls.heidenhain.plc import PlcAddress
 from edge.errors import ConfigError
 

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import pytest
 
-from cnctwin.lsv2_server.answers import Model
+from cnctwin.standins.lsv2_server.answers import Model
 from edge.sample import EdgeSample
 from tests.depth import IS_FULL
 from tests.edge.controls.heidenhain.machine_time import SWITCHED_ON_S

@@ -12,15 +12,15 @@ import time
 from collections import Counter
 from dataclasses import dataclass, field
 
-from cnctwin.mtconnect_agent.agent import Agent
-from cnctwin.mtconnect_agent.device_model import read_device_model
-from cnctwin.mtconnect_agent.dialect import dialect
-from cnctwin.mtconnect_agent.observation import Observation
-from cnctwin.mtconnect_agent.server import AgentServer
-from cnctwin.mtconnect_agent.shdr import parse_line
-from cnctwin.simulated_control.state import production_moments
-from cnctwin.simulated_machine.description import DEVICES
-from cnctwin.simulated_machine.moment import Adapter, Moment
+from cnctwin.standins.mtconnect_agent.agent import Agent
+from cnctwin.standins.mtconnect_agent.device_model import read_device_model
+from cnctwin.standins.mtconnect_agent.dialect import dialect
+from cnctwin.standins.mtconnect_agent.observation import Observation
+from cnctwin.standins.mtconnect_agent.server import AgentServer
+from cnctwin.standins.mtconnect_agent.shdr import parse_line
+from cnctwin.standins.simulated_control.state import production_moments
+from cnctwin.standins.simulated_machine.description import DEVICES
+from cnctwin.standins.simulated_machine.moment import Adapter, Moment
 from edge.config import EdgeConfig
 from edge.controls.mtconnect.config import MtconnectConfig
 from edge.controls.mtconnect.connection import MtconnectConnection

@@ -8,8 +8,8 @@ from bisect import bisect_left, bisect_right
 from collections import defaultdict
 from collections.abc import Iterator
 
-from cnctwin.mtconnect_agent.stamp import stamp_text
-from cnctwin.simulated_control.state import ToolChange, states, tool_changes
+from cnctwin.standins.mtconnect_agent.stamp import stamp_text
+from cnctwin.standins.simulated_control.state import ToolChange, states, tool_changes
 from edge.controls.mtconnect.documents import timestamp_ms
 from edge.sample import EMPTY, UNAVAILABLE, EdgeSample
 from tests.edge.controls.changes_told import changes_told

@@ -8,7 +8,7 @@ from contextlib import contextmanager, suppress
 
 import pytest
 
-from cnctwin.mtconnect_agent.replay_agent import ReplayAgent
+from cnctwin.standins.mtconnect_agent.replay_agent import ReplayAgent
 from edge.config import EdgeConfig
 from edge.controls.mtconnect.config import MtconnectConfig
 from edge.controls.mtconnect.connection import MtconnectConnection, client_of, fetch

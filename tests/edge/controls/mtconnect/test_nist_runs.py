@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from cnctwin.mtconnect_agent.replay_agent import ReplayAgent
+from cnctwin.standins.mtconnect_agent.replay_agent import ReplayAgent
 from edge.config import EdgeConfig, SignalSection
 from edge.controls.mtconnect.config import MtconnectConfig
 from edge.controls.mtconnect.connection import fetch

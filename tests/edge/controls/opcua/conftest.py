@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from cnctwin.simulated_control.control import SimulatedControl
-from cnctwin.simulated_control.state import ControlState
+from cnctwin.standins.simulated_control.control import SimulatedControl
+from cnctwin.standins.simulated_control.state import ControlState
 from edge.config import EdgeConfig
 from edge.controls.opcua.config import Config, OpcUaConfig
 
@@ -25,7 +25,7 @@ class Bench:
     machine_s: float = 0.0
 
     def __post_init__(self) -> None:
-        from cnctwin.opcua_server.server import OpcUaServer
+        from cnctwin.standins.opcua_server.server import OpcUaServer
         from edge.controls.opcua.certificates import own_identity
 
         self.user = own_identity(self.folder / "user", name="user")

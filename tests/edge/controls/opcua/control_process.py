@@ -98,9 +98,9 @@ class ControlProcess:
 
 def serve(folder: Path, port: int, seconds: float, machine_s: float, missing: list[str]) -> None:
     """The program."""
-    from cnctwin.opcua_server.server import OpcUaServer
-    from cnctwin.simulated_control.control import SimulatedControl
-    from cnctwin.simulated_control.state import production
+    from cnctwin.standins.opcua_server.server import OpcUaServer
+    from cnctwin.standins.simulated_control.control import SimulatedControl
+    from cnctwin.standins.simulated_control.state import production
 
     now_s = machine_s
     control = SimulatedControl(production(seconds), machine_s=lambda: now_s, switched_on_s=SWITCHED_ON_S)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from cnctwin.simulated_control.state import ControlState, ToolChange, production, tool_changes
+from cnctwin.standins.simulated_control.state import ControlState, ToolChange, production, tool_changes
 from edge.config import EdgeConfig
 from edge.controls.opcua.config import Config, OpcUaConfig
 from edge.controls.opcua.connection import OpcUaConnection

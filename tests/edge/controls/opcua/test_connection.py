@@ -11,7 +11,7 @@ import pytest
 
 pytest.importorskip("asyncua")
 
-from cnctwin.simulated_control.state import ControlState
+from cnctwin.standins.simulated_control.state import ControlState
 from edge.config import EdgeConfig, SignalSection
 from edge.controls.opcua.config import Config
 from edge.controls.opcua.connection import OpcUaConnection

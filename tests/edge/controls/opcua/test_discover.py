@@ -9,7 +9,7 @@ pytest.importorskip("asyncua")
 
 from asyncua import ua
 
-from cnctwin.simulated_control.state import ControlState
+from cnctwin.standins.simulated_control.state import ControlState
 from edge.config_file import parse
 from edge.controls.opcua import resolve, session
 from edge.controls.opcua.check import describe

@@ -12,7 +12,7 @@ import pytest
 
 pytest.importorskip("asyncua")
 
-from cnctwin.simulated_control.state import ControlState
+from cnctwin.standins.simulated_control.state import ControlState
 from edge.sample import EdgeSample
 from tests.depth import IS_FULL
 from tests.edge.controls.opcua.control_process import LOOK_S, SWITCHED_ON_S

@@ -1,0 +1,55 @@
+"""`cnctwin serve` on the command line; `cnctwin/api/serve.py` does it, and is imported when it is run."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cnctwin.processes.given_broker import address, broker_or_own
+from cnctwin.processes.stopping import stopped_by_signals
+
+
+def serve(
+    broker: Annotated[
+        str | None, typer.Option(help="mqtt[s]://[user@]host[:port]; else $CNCTWIN_BROKER", show_default=False)
+    ] = None,
+    group: Annotated[str, typer.Option(help="Sparkplug group: the plant")] = "cnc",
+    store: Annotated[
+        str | None, typer.Option(help="Folder or address of the store; else $CNCTWIN_STORE or the default", show_default=False)
+    ] = None,
+    config: Annotated[Path | None, typer.Option(help="The processors' TOML: constants of the machines for /predict")] = None,
+    models: Annotated[Path | None, typer.Option(help="Folder of the models")] = None,
+    diagnoses: Annotated[Path | None, typer.Option(help="Folder with <machine>/diagnosis.json and report.html")] = None,
+    jobs: Annotated[Path | None, typer.Option(help="The batch consumer's folder, to offer the files of results")] = None,
+    host: Annotated[str, typer.Option(help="Address to listen on; another than loopback needs a token or a proxy")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(help="TCP port; 0 = a free one", min=0, max=65535)] = 8080,
+    token_file: Annotated[Path | None, typer.Option(help="File of mode 600 with the token; else $CNCTWIN_PAGE_TOKEN")] = None,
+    proxy_header: Annotated[str | None, typer.Option(help="Header in which the reverse proxy names the user")] = None,
+    proxy: Annotated[str | None, typer.Option(help="Address that the proxy connects from")] = None,
+    allow_host: Annotated[list[str] | None, typer.Option(help="One more name that this server is asked by")] = None,
+    state_file: Annotated[Path | None, typer.Option(help="Keep address and state there, for a program that starts this")] = None,
+    no_open: Annotated[bool, typer.Option("--no-open", help="Do not open a browser")] = False,
+) -> None:
+    """The page and the runtime interface: state, predictions, history, gaps and alerts over HTTP."""
+    from cnctwin.api.serve import ServeOptions
+    from cnctwin.api.serve import serve as run_server
+    from cnctwin.memory.store.opening import default_place
+
+    options = ServeOptions(
+        group=group,
+        store=store or str(default_place()),
+        config=config,
+        models=models,
+        diagnoses=diagnoses,
+        jobs=jobs,
+        host=host,
+        port=port,
+        token_file=token_file,
+        proxy_header=proxy_header,
+        proxy=proxy,
+        allow_hosts=tuple(allow_host or ()),
+        state_file=state_file,
+        no_open=no_open,
+    )
+    with stopped_by_signals() as stop, broker_or_own(address(broker)) as where:
+        run_server(options, where, stop)

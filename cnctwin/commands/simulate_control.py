@@ -1,0 +1,119 @@
+"""`cnctwin simulate-control`: stands in for a control, in each of the protocols that the edges speak."""
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cnctwin.processes.stopping import stopped_by_signals
+from cnctwin.standins.mtconnect_agent.serve import replay
+
+control_app = typer.Typer(no_args_is_help=True, help="Stand in for a control, to develop and test without a machine.")
+
+Speed = Annotated[float, typer.Option(help="How many times faster than real time")]
+StateFile = Annotated[Path | None, typer.Option(help="Keep address and ledger in this JSON file", hidden=True)]
+
+
+class HeidenhainModel(StrEnum):
+    """Which control an LSV2 server is."""
+
+    TNC640 = "TNC640"
+    ITNC530 = "iTNC530"
+
+
+@control_app.command("mtconnect")
+def simulate_mtconnect(
+    recording: Annotated[Path, typer.Argument(help="SHDR log or time|key|value text")],
+    devices: Annotated[Path | None, typer.Option(help="Its Devices.xml; else a device model is drafted from its keys")] = None,
+    device: Annotated[str | None, typer.Option(help="Which device of the model the recording belongs to")] = None,
+    speed: Annotated[float, typer.Option(help="How many times faster than recorded")] = 1.0,
+    port: Annotated[int, typer.Option(help="HTTP port on loopback; 0 = any", min=0, max=65535)] = 0,
+    style: Annotated[str, typer.Option(help="The generation of the agent: 2.3 or 1.4")] = "2.3",
+    loop: Annotated[bool, typer.Option("--loop", help="Begin again at the end")] = False,
+    wait: Annotated[bool, typer.Option("--wait", help="Begin when the first client asks for samples")] = False,
+    state_file: StateFile = None,
+) -> None:
+    """Serve a recording as a real MTConnect agent serves its machine."""
+    with stopped_by_signals() as stop:
+        replay(
+            recording,
+            devices,
+            stop,
+            device=device,
+            speed=speed,
+            port=port,
+            style=style,
+            loop=loop,
+            wait=wait,
+            state_file=state_file,
+        )
+
+
+@control_app.command("machine")
+def simulate_machine(
+    speed: Speed = 1.0,
+    port: Annotated[int, typer.Option(help="HTTP port on loopback; 0 = any", min=0, max=65535)] = 0,
+    state_file: StateFile = None,
+) -> None:
+    """Serve the simulated machine, which cuts one part after the other, as an MTConnect agent."""
+    from cnctwin.standins.simulated_machine.serve import simulate_machine as serve
+
+    with stopped_by_signals() as stop:
+        serve(stop, speed=speed, port=port, state_file=state_file)
+
+
+@control_app.command("focas")
+def simulate_focas(
+    speed: Speed = 1.0,
+    port: Annotated[int, typer.Option(help="TCP port on loopback; 0 = any", min=0, max=65535)] = 8193,
+    clock_offset_s: Annotated[float, typer.Option(help="How far the control's clock is ahead")] = 0.0,
+    tool_number: Annotated[
+        bool, typer.Option("--tool-number", help="With the option that tells the tool in the spindle")
+    ] = False,
+    state_file: StateFile = None,
+) -> None:
+    """Show the simulated machine as a FANUC control does, over FOCAS Ethernet."""
+    from cnctwin.standins.focas_server.serve import simulate_focas as serve
+
+    with stopped_by_signals() as stop:
+        serve(stop, speed=speed, port=port, clock_offset_s=clock_offset_s, tool_number=tool_number, state_file=state_file)
+
+
+@control_app.command("opcua")
+def simulate_opcua(
+    speed: Speed = 1.0,
+    port: Annotated[int, typer.Option(help="TCP port on loopback; 0 = any", min=0, max=65535)] = 4840,
+    clock_offset_s: Annotated[float, typer.Option(help="How far the control's clock is ahead")] = 0.0,
+    is_open: Annotated[bool, typer.Option("--open", help="Also an endpoint without security")] = False,
+    state_file: StateFile = None,
+) -> None:
+    """Show the simulated machine as an OPC UA server does: SINUMERIK's names, and the companion models 40501 and 40502."""
+    from cnctwin.standins.opcua_server.serve import simulate_opcua as serve
+
+    with stopped_by_signals() as stop:
+        serve(stop, speed=speed, port=port, clock_offset_s=clock_offset_s, is_open=is_open, state_file=state_file)
+
+
+@control_app.command("lsv2")
+def simulate_lsv2(
+    speed: Speed = 1.0,
+    port: Annotated[int, typer.Option(help="TCP port on loopback; 0 = any", min=0, max=65535)] = 19000,
+    clock_offset_s: Annotated[float, typer.Option(help="How far the control's clock is ahead")] = 0.0,
+    model: Annotated[HeidenhainModel, typer.Option(help="Which control")] = HeidenhainModel.TNC640,
+    program: Annotated[Path | None, typer.Option(help="Shown in place of the program that is run")] = None,
+    state_file: StateFile = None,
+) -> None:
+    """Show the simulated machine as a HEIDENHAIN control does, over LSV2."""
+    from cnctwin.standins.lsv2_server.serve import simulate_lsv2 as serve
+
+    with stopped_by_signals() as stop:
+        serve(
+            stop,
+            speed=speed,
+            port=port,
+            model=model,
+            clock_offset_s=clock_offset_s,
+            program=program,
+            state_file=state_file,
+        )

@@ -1,0 +1,1 @@
+"""`cnctwin train`: options of the command line; `cnctwin/training` does the work."""

@@ -1,0 +1,62 @@
+"""`cnctwin validate` on the command line; `cnctwin/validation` does it, and is imported when it is run."""
+
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from cnctwin.commands.moment import moment_ms
+from cnctwin.errors import UsageError
+from cnctwin.processes.given_broker import address
+from edge.state_dir import state_dir
+
+DAY_MS = 86_400_000
+TIME = "UTC, as 2026-11-21T06:00 or ms since 1970"
+
+
+def validate(
+    machine: Annotated[str, typer.Option(help="Which machine")],
+    store: Annotated[
+        str | None, typer.Option(help="Folder or URL of the store; else $CNCTWIN_STORE or the default", show_default=False)
+    ] = None,
+    runs: Annotated[list[Path] | None, typer.Option(help="Run logs in place of the store; of several the worst counts")] = None,
+    from_: Annotated[str | None, typer.Option("--from", help=f"{TIME}; else a day before --to", show_default=False)] = None,
+    to: Annotated[str | None, typer.Option(help=f"{TIME}; else now", show_default=False)] = None,
+    truth: Annotated[
+        list[Path] | None, typer.Option(help="Run log of a dynamometer, thermocouple, accelerometer; one for each of --runs")
+    ] = None,
+    programs: Annotated[Path | None, typer.Option(help="Folder with the NC files, by the names the control tells")] = None,
+    config: Annotated[Path | None, typer.Option(help="The processors' TOML; [validation] in it has the budgets")] = None,
+    twin: Annotated[Path | None, typer.Option(help="machine.toml of the twin")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder of the history; else `validation` in the state folder")] = None,
+    keep: Annotated[bool, typer.Option(help="Keep this night in the history")] = True,
+    broker: Annotated[str | None, typer.Option(help="Publish there: mqtt[s]://[user@]host[:port]", show_default=False)] = None,
+    group: Annotated[str, typer.Option(help="Sparkplug group: the plant")] = "cnc",
+    as_json: Annotated[bool, typer.Option("--json", help="For a program to read")] = False,
+) -> None:
+    """Twin against ground truth: temperature, force, vibration, following error, cycle time. Exit code 1: over a budget."""
+    now_ms = round(1000.0 * time.time())
+    to_ms = now_ms if to is None else moment_ms(to, "--to")
+    from_ms = to_ms - DAY_MS if from_ is None else moment_ms(from_, "--from")
+    if from_ms >= to_ms:
+        raise UsageError(f"--from {from_} is not before --to {to or 'now'}")
+    if runs and store is not None:
+        raise UsageError("--runs and --store: give one of them")
+    try:
+        from cnctwin.validation import validate as command
+    except ModuleNotFoundError as missing:
+        raise UsageError(
+            f"validation needs the package {missing.name}; pip install 'cnctwin[twin,historian]' brings it"
+        ) from None
+    asked = command.Asked(
+        *(machine, store, tuple(runs or ()), tuple(truth or ()), from_ms, to_ms, programs, config, twin),
+        *(out or state_dir() / "validation", keep, group),
+    )
+    console = Console()
+    if not console.is_terminal:
+        console.width = 120
+    where = None if broker is None else address(broker)
+    session_file = None if where is None else state_dir() / "twin-validation.json"
+    raise typer.Exit(command.validate(asked, where, session_file, as_json=as_json, console=console))

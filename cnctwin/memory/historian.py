@@ -1,0 +1,313 @@
+"""What the processor `historian` hears, on its way into a store: a bounded queue, and a thread that writes batches.
+
+What is in the queue is not safe yet; what the store has taken is. So the thread writes as soon as anything waits. Where the store
+cannot write (a full disk), the batch is kept and tried again, and what does not fit into the queue meanwhile is counted.
+"""
+
+import logging
+import threading
+import time
+from collections import deque
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+from cnctwin.memory.store.contract import Message, Pinned, Snapshot, Store, StoreError
+from cnctwin.memory.store.opening import default_place, open_store
+from cnctwin.memory.store.retention import Retention
+from edge.running.forwarder import SEQUENCE
+from edge.running.receipts import RECEIPT, REPEAT_S
+from edge.running.spans import Spans
+from processors.contract import TWIN_NODE_PREFIX
+from processors.effects import Pin
+from processors.historian import HistorianConfig
+from processors.running.ports import Receipt
+from sparkplug.host_session import EventKind, HostEvent
+from sparkplug.topics import NodeId
+
+QUEUE_MAX = 400_000  # samples
+BATCH_MAX = 20_000  # samples
+GATHER_S = 0.05
+TIDY_S, STATUS_S = 60.0, 5.0
+AGAIN_S = 5.0  # after a `tidy` that sealed something
+RETRY_S_MAX = 10.0
+BEHIND_S, BEHIND_S_MAX = 1.0, REPEAT_S - 1.0  # from when on nobody is told that we are here; nor anything else
+SNAPSHOTS = "cnctwin/snapshot/"
+HOUR_MS = 3_600_000
+MACHINES_MAX = 1_000  # that are given receipts
+UNITS_MAX = 20_000  # of processors, whose snapshots are kept
+_log = logging.getLogger(__name__)
+
+
+def store_of(config: HistorianConfig) -> Store:
+    """The store that a historian is told to write. Raises StoreError."""
+    retention = Retention(raw_days=config.raw_days, block_days=config.block_days, disk_bytes=round(config.disk_gb * 1e9) or None)
+    return open_store(config.store or default_place(), writable=True, retention=retention)
+
+
+class _Queue:
+    """Messages, pins and snapshots in the order in which they came, as many samples as fit."""
+
+    def __init__(self) -> None:
+        self._items: deque[Message | Pinned | Snapshot] = deque()
+        self.samples = 0
+        self.filled = threading.Event()
+        self._lock = threading.Lock()
+
+    def put(self, item: Message | Pinned | Snapshot) -> bool:
+        """Whether there was room."""
+        size = _size(item)
+        with self._lock:
+            if self.samples + size > QUEUE_MAX:
+                return False
+            self._items.append(item)
+            self.samples += size
+        self.filled.set()
+        return True
+
+    def take(self) -> "_Batch":
+        """What goes in one transaction: messages up to the first pin or snapshot, or that one alone."""
+        messages: list[Message] = []
+        samples = 0
+        with self._lock:
+            while self._items and samples < BATCH_MAX:
+                item = self._items[0]
+                if not isinstance(item, Message):
+                    if not messages:
+                        self._items.popleft()
+                        self.samples -= 1
+                        return _Batch((), item, 1)
+                    break
+                self._items.popleft()
+                messages.append(item)
+                samples += _size(item)
+            self.samples -= samples
+            if not self._items:
+                self.filled.clear()
+        return _Batch(tuple(messages), None, samples)
+
+
+class _Batch(NamedTuple):
+    messages: tuple[Message, ...]
+    other: Pinned | Snapshot | None
+    samples: int
+
+
+def _size(item: Message | Pinned | Snapshot) -> int:
+    return max(len(item.event.readings), 1) if isinstance(item, Message) else 1
+
+
+class StoreRecorder:
+    """A `processors.running.ports.Recorder` on a store. The store is written by its thread only; `stop` writes what waits, and
+    closes it.
+
+    A failure of the thread that is no StoreError is our own bug: the next `keep` raises it, and ends the processor.
+    """
+
+    keeps_plain = SNAPSHOTS + "#"
+
+    def __init__(self, store: Store, group: str = "cnc") -> None:
+        self._store, self._group = store, group
+        self._queue = _Queue()
+        self._thread = threading.Thread(target=self._run, name="store", daemon=True)
+        self._stopping = threading.Event()
+        self._kept_hours: dict[tuple[str, str], int] = {}
+        self._last_snapshots: dict[tuple[str, str], Snapshot] = {}
+        self._stored = self._repeated = self._refused = self._dropped = self._pins = 0
+        self._writing = 0  # samples in the hands of the thread
+        self._caught_up_s = time.monotonic()  # all that was heard before it is in the store
+        self._bytes, self._store_waiting, self._trouble = 0, 0, ""
+        self._days_left: float | None = None
+        self._failure: BaseException | None = None
+        self._receipts: dict[tuple[NodeId, str], Spans] = {}
+        self._receipts_lock = threading.Lock()
+
+    # What the worker calls.
+
+    def keep(self, event: HostEvent, received_ms: int) -> None:
+        """Queue a message, or a snapshot of a processor."""
+        if self._failure is not None:
+            raise self._failure
+        if event.kind is EventKind.PLAIN:
+            self._hear_snapshot(event, received_ms)
+            return
+        self._put(Message(received_ms, event))
+        if event.kind is EventKind.DEATH:
+            self._keep_last_snapshots(event.node.node.removeprefix(TWIN_NODE_PREFIX))
+
+    def pin(self, pin: Pin) -> None:
+        """Queue a pin behind the messages that it concerns."""
+        self._put(Pinned(pin.machine, pin.from_ms, pin.to_ms, pin.reason))
+
+    def health(self) -> Mapping[str, int | float | str]:
+        """How it is, by the names that `processors.running.health` declares."""
+        health: dict[str, int | float | str] = {
+            "store_samples": self._stored,
+            "store_repeated": self._repeated,
+            "store_refused": self._refused,
+            "store_dropped": self._dropped,
+            "store_waiting": self._queue.samples + self._writing + self._store_waiting,
+            "store_bytes": self._bytes,
+            "store_pins": self._pins,
+            "store_trouble": self._trouble,
+        }
+        if self._days_left is not None:
+            health["store_days_left"] = round(self._days_left, 1)
+        return health
+
+    def receipts(self) -> list[Receipt]:
+        """The rows of each edge that the store has taken since this was last asked; of those that are silent none, which says
+        that somebody is here. While the store holds things up nothing is said: what was heard and waits here is not missed."""
+        behind_s = self._behind_s()
+        if behind_s > BEHIND_S_MAX:
+            return []
+        with self._receipts_lock:
+            kept, self._receipts = self._receipts, {key: Spans() for key in list(self._receipts)[-MACHINES_MAX:]}
+        return [
+            Receipt(node, device, RECEIPT, " ".join(f"{a}-{b}" for a, b in spans))
+            for (node, device), spans in kept.items()
+            if spans or behind_s <= BEHIND_S
+        ]
+
+    def _behind_s(self) -> float:
+        """For how long something may have waited for the store; 0 where nothing does."""
+        return time.monotonic() - self._caught_up_s if self._queue.samples or self._writing else 0.0
+
+    # Its life.
+
+    def start(self) -> None:
+        """Say where the memory has a hole since it was last written, and begin to write."""
+        status = self._store.status()
+        now_ms = time.time_ns() // 1_000_000
+        if status.newest_ms is not None:
+            away_s = max(now_ms - status.newest_ms, 0) / 1000
+            detail = f"the historian began; the newest sample before it is {away_s:.0f} s old"
+            node = NodeId(self._group, "twin-historian")
+            for machine in self._store.machines():
+                self._queue.put(Message(now_ms, HostEvent(EventKind.HOLE, node, machine, now_ms, detail=detail)))
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Write what waits, and close the store."""
+        self._stopping.set()
+        self._queue.filled.set()
+        self._thread.join()
+        self._store.close()
+
+    def _put(self, item: Message | Pinned | Snapshot) -> None:
+        if not self._queue.put(item):
+            self._dropped += 1
+
+    def _hear_snapshot(self, event: HostEvent, received_ms: int) -> None:
+        """Keep the first of each hour of a processor's unit, and remember the last."""
+        processor, _, unit = event.topic.removeprefix(SNAPSHOTS).partition("/")
+        key, hour = (processor, unit), received_ms // HOUR_MS
+        if not event.payload or not unit or (key not in self._kept_hours and len(self._kept_hours) >= UNITS_MAX):
+            return
+        snapshot = Snapshot(processor, unit, received_ms, event.payload)
+        if self._kept_hours.get(key) != hour:
+            self._kept_hours[key] = hour
+            self._put(snapshot)
+        self._last_snapshots[key] = snapshot
+
+    def _keep_last_snapshots(self, processor: str) -> None:
+        """A processor died: what it goes on from, so that a replay can go on from there too."""
+        for key in [key for key in self._last_snapshots if key[0] == processor]:
+            self._put(self._last_snapshots.pop(key))
+
+    # The thread.
+
+    def _run(self) -> None:
+        try:
+            self._work()
+        except BaseException as failure:
+            self._failure = failure
+            raise
+
+    def _work(self) -> None:
+        tidied_s = status_s = time.monotonic()
+        while not (self._stopping.is_set() and not self._queue.samples):
+            if not self._stopping.is_set():
+                self._queue.filled.wait(1.0)
+                self._stopping.wait(GATHER_S)  # what comes within it goes into the same transaction
+            took_s = time.monotonic()
+            batch = self._queue.take()
+            is_all = not self._queue.samples
+            self._writing = batch.samples
+            if not self._write(batch):
+                _log.warning("%d samples are not written", batch.samples + self._queue.samples)
+                return
+            self._writing = 0
+            if is_all:
+                self._caught_up_s = took_s
+            now_s = time.monotonic()
+            if now_s - tidied_s >= TIDY_S:
+                tidied_s = now_s
+                if self._tidy():  # there may be more: sooner again, but not all the time
+                    done_s = time.monotonic()
+                    tidied_s = done_s - TIDY_S + max(AGAIN_S, 4 * (done_s - now_s))
+            if now_s - status_s >= STATUS_S:
+                status_s = now_s
+                self._look()
+
+    def _write(self, batch: _Batch) -> bool:
+        """Until the store has taken it; False where we are to stop and it cannot."""
+        pause_s = 0.1
+        while True:
+            try:
+                self._hand_over(batch)
+            except StoreError as error:
+                if str(error) != self._trouble:
+                    _log.warning("the store cannot write: %s; %d samples wait", error, batch.samples + self._queue.samples)
+                self._trouble = str(error)
+                if self._stopping.is_set():
+                    return False
+            else:
+                self._trouble = ""
+                return True
+            self._stopping.wait(pause_s)
+            pause_s = min(2 * pause_s, RETRY_S_MAX)
+
+    def _hand_over(self, batch: _Batch) -> None:
+        if batch.messages:
+            appended = self._store.append(batch.messages)
+            self._stored += appended.stored
+            self._repeated += appended.repeated
+            self._refused += appended.refused
+            self._note_kept(batch.messages)
+        if isinstance(batch.other, Pinned):
+            self._store.pin(batch.other)
+            self._pins += 1
+        elif batch.other is not None:
+            self._store.keep_snapshot(batch.other)
+
+    def _note_kept(self, messages: Sequence[Message]) -> None:
+        """Which devices wait for receipts, and the numbers of their rows; a birth shows the state after a row, and is not it."""
+        with self._receipts_lock:
+            for _, event in messages:
+                if event.device is None or not event.readings:
+                    continue
+                key = event.node, event.device
+                if event.kind is EventKind.BIRTH and any(reading.name == RECEIPT for reading in event.readings):
+                    self._receipts.setdefault(key, Spans())
+                elif event.kind is EventKind.DATA and key in self._receipts:
+                    number = next((one.value for one in reversed(event.readings) if one.name == SEQUENCE), None)
+                    if isinstance(number, int):
+                        self._receipts[key].discard(number, number)
+                        self._receipts[key].add(number, number)
+
+    def _tidy(self) -> bool:
+        """Whether hours were sealed."""
+        try:
+            return self._store.tidy(time.time_ns() // 1_000_000).sealed > 0
+        except StoreError as error:
+            _log.warning("the store cannot be tidied: %s", error)
+            return False
+
+    def _look(self) -> None:
+        try:
+            status = self._store.status()
+        except StoreError as error:
+            self._trouble = str(error)
+            return
+        self._bytes, self._days_left, self._store_waiting = status.bytes, status.days_left, status.waiting
+        self._trouble = status.trouble

@@ -1,0 +1,1 @@
+"""Recordings from elsewhere: into run logs, or into the store."""

@@ -1,0 +1,148 @@
+"""A replay: the log is read twice, once for who was born and died in it, once for the folds."""
+
+import hashlib
+import time
+from collections import deque
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from cnctwin.memory.replay.comparison import Comparison
+from cnctwin.memory.replay.lives import Start, begun_within, kept_start, offers, restarts
+from cnctwin.memory.replay.log import Mark, Stretch, marks
+from cnctwin.memory.replay.rerun import Rerun
+from cnctwin.memory.replay.result import Difference, ProcessorReplayed, Replayed, ReplayRefusedError
+from cnctwin.memory.store.contract import Series, Store
+from processors.config import CellConfig, Configuration, ProcessorConfig
+from processors.contract import TWIN_NODE_PREFIX
+from processors.discovery import AnyProcessor, find
+from processors.errors import UnknownProcessorError
+from sparkplug.host_session import HostEvent
+
+WARM_UP_MS = 1_800_000
+NOT_COMPARED = frozenset({"historian", "mirror"})  # what they give is no metric, or is of the store itself
+
+
+def replay(  # noqa: PLR0917
+    store: Store,
+    machine: str,
+    from_ms: int,
+    to_ms: int,
+    processors: Sequence[str] | None = None,
+    tables: Mapping[str, Mapping[str, Any]] | None = None,
+    *,
+    chain: bool = False,
+    warm_up_ms: int = WARM_UP_MS,
+) -> Replayed:
+    """Run processors again over [from_ms, to_ms) of a machine's history, and compare with what they published then.
+
+    processors None: all that published of this machine. tables: their configuration, as it was then. chain: each is fed with what
+    the others give now, not with what they gave then. Raises ReplayRefusedError, StoreError, ConfigurationError.
+    """
+    began_s = time.perf_counter()
+    if to_ms <= from_ms:
+        raise ReplayRefusedError(f"to {to_ms} is not after from {from_ms}; give a stretch of time")
+    known = store.machines()
+    if machine not in known:
+        raise ReplayRefusedError(f"the store has no machine {machine!r}; it has: {', '.join(known) or 'none'}")
+    series = {machine: store.series(machine)}
+    chosen = [_found(name) for name in (published_of(series[machine]) if processors is None else dict.fromkeys(processors))]
+    if not chosen:
+        raise ReplayRefusedError(f"no processor has ever published of {machine!r}; name those to run with --processors")
+    pairs = [(one, Configuration(one.config, (tables or {}).get(one.name), name=one.name)) for one in chosen]
+    units = [_units(configuration, machine, known) for _, configuration in pairs]
+    starts = [kept_start(store, one, tuple(unit), from_ms, warm_up_ms) for (one, _), unit in zip(pairs, units, strict=True)]
+    machines = tuple(sorted({name for unit in units for members in unit.values() for name in members}))
+    series |= {name: store.series(name) for name in machines if name != machine}
+    stretch = Stretch(store, machines, min(start.from_ms for start in starts), to_ms)
+    found, messages, samples = marks(stretch)
+    differences: list[Difference] = []
+    reruns = [
+        _rerun(store, pair, machine, unit, start, found, series, differences, [one.node for one in chosen] if chain else [])
+        for pair, unit, start in zip(pairs, units, starts, strict=True)
+    ]
+    _run(stretch, reruns, from_ms)
+    results = tuple(_result(one) for one in reruns)
+    digest = hashlib.sha256("\n".join(f"{one.name} {one.sha256}" for one in results).encode()).hexdigest()
+    seconds = time.perf_counter() - began_s
+    return Replayed(machine, from_ms, to_ms, chain, results, tuple(differences), messages, samples, seconds, digest)
+
+
+def published_of(series: Sequence[Series]) -> list[str]:
+    """The processors that have published of a machine, by name."""
+    nodes = {one.node.rpartition("/")[2] for one in series}
+    names = {node.removeprefix(TWIN_NODE_PREFIX) for node in nodes if node.startswith(TWIN_NODE_PREFIX)}
+    return sorted(names - NOT_COMPARED)
+
+
+def _found(name: str) -> AnyProcessor:
+    try:
+        processor = find(name)
+    except UnknownProcessorError as error:
+        raise ReplayRefusedError(str(error)) from None
+    if name in NOT_COMPARED:
+        raise ReplayRefusedError(f"{name} publishes nothing that could be compared; leave it out")
+    return processor
+
+
+def _units(configuration: Configuration[ProcessorConfig], machine: str, known: Sequence[str]) -> dict[str, list[str]]:
+    """What has a state, with its machines: the machine, or all cells that are needed to run its own."""
+    config = configuration.default
+    if not isinstance(config, CellConfig):
+        return {machine: [machine]}
+    cell = config.cell_of(machine)
+    return {cell: [name for name in known if config.cell_of(name) == cell]}
+
+
+def _rerun(  # noqa: PLR0917
+    store: Store,
+    pair: tuple[AnyProcessor, Configuration[ProcessorConfig]],
+    machine: str,
+    units: Mapping[str, Sequence[str]],
+    start: Start,
+    found: Sequence[Mark],
+    series: Mapping[str, Sequence[Series]],
+    differences: list[Difference],
+    chained: Sequence[str],
+) -> Rerun:
+    processor, configuration = pair
+    of_units = {name for members in units.values() for name in members}
+    own = [mark for mark in found if mark.event.device is None or mark.event.device in of_units]
+    start = begun_within(store, start, processor, tuple(units), own, series[machine])
+    notes: list[str] = []
+    lives = restarts(store, processor, units, own, notes) if own else {}
+    comparison = Comparison(processor.name, processor.outputs, differences)
+    names = offers(own, series)
+    fed = {node for node in chained if processor.listens_to(node)}
+    rerun = Rerun(processor, configuration, machine, of_units, start, lives, names, comparison, fed=fed, is_chained=bool(chained))
+    rerun.notes += notes
+    return rerun
+
+
+def _run(stretch: Stretch, reruns: Sequence[Rerun], from_ms: int) -> None:
+    for place, (received_ms, event) in enumerate(stretch.messages(), start=1):
+        is_counted = received_ms >= from_ms
+        waiting: deque[HostEvent] = deque()
+        for rerun in reruns:
+            waiting += rerun.take(place, received_ms, event, is_counted=is_counted)
+        while waiting:
+            said = waiting.popleft()
+            for rerun in reruns:
+                waiting += rerun.chained(received_ms, said, is_counted=is_counted)
+    for rerun in reruns:
+        rerun.end()
+
+
+def _result(rerun: Rerun) -> ProcessorReplayed:
+    metrics = rerun.comparison.end()
+    if not rerun.comparison.is_heard:
+        rerun.notes.append("it published nothing then: there is nothing to compare with")
+    return ProcessorReplayed(
+        rerun.processor.name,
+        rerun.start.text,
+        rerun.comparison.values,
+        metrics,
+        rerun.restarts,
+        rerun.dead_letters,
+        rerun.comparison.sha256,
+        tuple(rerun.notes),
+    )

@@ -1,0 +1,73 @@
+"""A stretch of a store as a run log (formats, section 3), for gap diagnosis, identification and training."""
+
+import re
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cnctwin.memory.store.contract import Column, Query, Store, StoreError
+from sparkplug.quality import Quality
+from twin.runlog import AXIS_COLUMN, COLUMNS, TEXT_COLUMNS, RunLog, run_log
+
+_AXIS_POSITION = re.compile(r"^axis_([a-z][a-z0-9]?)_pos_mm$")
+_RENAMED = {"nc_line": "line"}
+
+
+def column_name(signal: str) -> str | None:
+    """The column of a run log that a signal is; None where it is none.
+
+    >>> column_name("axis_x_pos_mm"), column_name("nc_line"), column_name("spindle_rpm"), column_name("alarm")
+    ('x_pos_mm', 'line', 'spindle_rpm', None)
+    """
+    if match := _AXIS_POSITION.match(signal):
+        return f"{match[1]}_pos_mm"
+    name = _RENAMED.get(signal, signal)
+    return name if name in COLUMNS | TEXT_COLUMNS or AXIS_COLUMN.match(name) else None
+
+
+def run_of(store: Store, machine: str, from_ms: int, to_ms: int, *, every_ms: int | None = None, held: bool = False) -> RunLog:
+    """The run log of a machine in [from_ms, to_ms): a row for each time at which a signal said something.
+
+    every_ms: windows, with the mean of each. held: a signal that says nothing keeps what it said last (controls report what
+    changes); a value that is not good ends that. Raises StoreError where there is nothing.
+    """
+    names = {s.signal: name for s in store.series(machine) if (name := column_name(s.signal)) is not None}
+    if not names:
+        known = ", ".join(store.machines()) or "none"
+        raise StoreError(f"{machine}: the store has no signal of it that a run log knows; machines it has: {known}")
+    columns = [c for c in store.query(Query(machine, tuple(sorted(names)), from_ms, to_ms, every_ms)) if c.t_us]
+    if not columns:
+        raise StoreError(f"{machine}: the store has nothing from {from_ms} to {to_ms}; ask `cnctwin store status` what it has")
+    t_us = np.unique(np.concatenate([np.array(c.t_us, dtype=np.int64) for c in columns]))
+    told: dict[str, NDArray[np.generic]] = {"t_s": (t_us - t_us[0]) / 1e6}
+    for column in columns:
+        told[names[column.signal]] = _spread(column, t_us, is_text=names[column.signal] in TEXT_COLUMNS, held=held)
+    return run_log(_merged(told), f"{machine} from the store")
+
+
+def _spread(column: Column, t_us: NDArray[np.int64], *, is_text: bool, held: bool) -> NDArray[np.generic]:
+    good = [value if quality is Quality.GOOD else None for value, quality in zip(column.value, column.quality, strict=True)]
+    at = np.searchsorted(t_us, np.array(column.t_us, dtype=np.int64))
+    values = np.array([_text(v) if is_text else _number(v) for v in good], dtype=object if is_text else np.float64)
+    spread = np.full(len(t_us), None if is_text else np.nan, dtype=values.dtype)
+    if not held:
+        spread[at] = values
+        return spread
+    last = np.searchsorted(at, np.arange(len(t_us)), side="right") - 1
+    spread[last >= 0] = values[last[last >= 0]]
+    return spread
+
+
+def _text(value: object) -> str | None:
+    return None if value is None else str(value)
+
+
+def _number(value: object) -> float:
+    return float(value) if isinstance(value, bool | int | float) else float("nan")
+
+
+def _merged(told: Mapping[str, NDArray[np.generic]]) -> dict[str, NDArray[np.generic]]:
+    """Without columns that hold nothing."""
+    empty = {name for name, values in told.items() if all(v is None or v != v for v in values.tolist())}  # noqa: PLR0124
+    return {name: values for name, values in told.items() if name not in empty}

@@ -1,0 +1,124 @@
+"""Which series there are, and the last sample of each signal: what the writer has in memory, and in the same transaction on disk.
+
+A signal is what one node tells of one machine under one name. It has a series for each unit and kind of value that came, so that
+a series is of one type, and one for its nulls.
+"""
+
+import sqlite3
+from collections.abc import Iterable
+from enum import IntEnum
+from typing import Any
+
+from cnctwin.memory.store.contract import TWIN_PREFIX
+from cnctwin.memory.store.value_form import BLOCKS, Kind, given
+from sparkplug.quality import Quality
+from sparkplug.values import Value
+
+RANKS = (Quality.GOOD, Quality.STALE, Quality.BAD)
+RANK = {quality: rank for rank, quality in enumerate(RANKS)}
+"""How bad a quality is: the worst is the largest."""
+RANK_MASK, HISTORY_BIT, REASON_SHIFT = 3, 4, 3
+"""A flag is rank + 4 where it came as history + 8 times the number of its reason (0 = none)."""
+
+
+class StoredClass(IntEnum):
+    """What is kept together, and as long."""
+
+    RAW = 0
+    BLOCK = 1
+    TWIN = 2
+    ROLLUP = 3
+
+
+def class_of(signal: str, kind: Kind) -> StoredClass:
+    """Where a series belongs."""
+    if signal.startswith(TWIN_PREFIX):
+        return StoredClass.TWIN
+    return StoredClass.BLOCK if kind in BLOCKS else StoredClass.RAW
+
+
+class Signal:
+    """A signal, its series by unit and kind, and its last sample; `last_us` -1 = none yet."""
+
+    __slots__ = ("first_us", "id", "last", "last_flag", "last_ms", "last_sid", "last_us", "machine", "name", "sids")
+
+    def __init__(self, identity: int, machine: int, name: str) -> None:
+        self.id, self.machine, self.name = identity, machine, name
+        self.sids: dict[tuple[str | None, Kind], int] = {}
+        self.last: Value = None
+        self.last_flag, self.last_sid = 0, 0
+        self.first_us = self.last_us = self.last_ms = -1
+
+
+class SeriesTable:
+    """All signals. New ones are written at once, in the transaction that is under way; `load` forgets what was not committed."""
+
+    def __init__(self, db: sqlite3.Connection) -> None:
+        self._db = db
+        self.load()
+
+    def load(self) -> None:
+        """As it is on disk."""
+        ask = self._db.execute
+        self.machines: dict[str, int] = dict(ask("SELECT name, id FROM machines"))
+        self.nodes: dict[str, int] = dict(ask("SELECT name, id FROM nodes"))
+        self.reasons: dict[str | None, int] = {None: 0, **dict(ask("SELECT text, id FROM reasons"))}
+        self._of: dict[tuple[int, int], dict[str, Signal]] = {}
+        by_id: dict[int, Signal] = {}
+        for identity, machine, node, name in ask("SELECT id, machine, node, name FROM signals"):
+            by_id[identity] = self._of.setdefault((machine, node), {})[name] = Signal(identity, machine, name)
+        self.kinds = kinds = dict[int, Kind]()
+        for sid, signal, unit, kind in ask("SELECT sid, signal, unit, kind FROM series"):
+            kinds[sid] = Kind(kind)
+            by_id[signal].sids[unit, kinds[sid]] = sid
+        for identity, sid, first_us, last_us, value, flag in ask(
+            "SELECT signal, sid, first_us, last_us, value, flag FROM latest"
+        ):
+            signal = by_id[identity]
+            signal.first_us, signal.last_us, signal.last_ms = first_us, last_us, last_us // 1000
+            signal.last, signal.last_sid, signal.last_flag = given(kinds[sid], value), sid, flag
+
+    def machine(self, name: str) -> int:
+        """The number of a machine."""
+        return self._number(self.machines, "machines(name)", name)
+
+    def node(self, name: str) -> int:
+        """The number of a node."""
+        return self._number(self.nodes, "nodes(name)", name)
+
+    def reason(self, text: str) -> int:
+        """The number of a reason."""
+        return self._number(self.reasons, "reasons(text)", text)
+
+    def _number(self, known: dict[Any, int], column: str, text: str) -> int:
+        number = known.get(text)
+        if number is None:
+            number = known[text] = int(self._db.execute(f"INSERT INTO {column} VALUES (?)", (text,)).lastrowid or 0)  # noqa: S608
+        return number
+
+    def signals(self, machine: int, node: int) -> dict[str, Signal]:
+        """What a node tells of a machine, by name."""
+        return self._of.setdefault((machine, node), {})
+
+    def signal(self, machine: int, node: int, name: str) -> Signal:
+        """A signal that nobody told before."""
+        done = self._db.execute("INSERT INTO signals(machine, node, name) VALUES (?, ?, ?)", (machine, node, name))
+        made = self.signals(machine, node)[name] = Signal(int(done.lastrowid or 0), machine, name)
+        return made
+
+    def series(self, signal: Signal, unit: str | None, kind: Kind) -> int:
+        """The series of a signal for a unit and kind."""
+        sid = signal.sids.get((unit, kind))
+        if sid is None:
+            columns = "INSERT INTO series(signal, unit, kind, class) VALUES (?, ?, ?, ?)"
+            done = self._db.execute(columns, (signal.id, unit, int(kind), int(class_of(signal.name, kind))))
+            sid = signal.sids[unit, kind] = int(done.lastrowid or 0)
+            self.kinds[sid] = kind
+        return sid
+
+    def keep_latest(self, signals: Iterable[tuple[Signal, Any]]) -> None:
+        """Write the last samples; with each its value as SQLite is given it."""
+        self._db.executemany(
+            "INSERT OR REPLACE INTO latest VALUES (?, ?, ?, ?, ?, ?)",
+            [(s.id, s.last_sid, s.first_us, s.last_us, value, s.last_flag) for s, value in signals],
+        )

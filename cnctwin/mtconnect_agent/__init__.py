@@ -1,8 +1,0 @@
-"""An MTConnect agent that replays a recording: for the demo, for tests, and for trying a client without a machine."""
-
-from cnctwin.mtconnect_agent.adapter_socket import ShdrAdapter
-from cnctwin.mtconnect_agent.errors import DeviceModelError, RecordingError, ReplayError
-from cnctwin.mtconnect_agent.ledger import ReplayLedger
-from cnctwin.mtconnect_agent.replay_agent import ReplayAgent
-
-__all__ = ["DeviceModelError", "RecordingError", "ReplayAgent", "ReplayError", "ReplayLedger", "ShdrAdapter"]

@@ -1,0 +1,1 @@
+"""A running plant as seen on its broker: live view, terminal screen, doctor."""

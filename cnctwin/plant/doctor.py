@@ -1,0 +1,104 @@
+"""`cnctwin doctor`: is everything connected, in order and accounted for?"""
+
+import time
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from cnctwin.plant.view import StageLedger, health, ledgers, machines
+from cnctwin.plant.watch import viewer
+from sparkplug.broker import BrokerAddress
+from sparkplug.host import HostApplication
+from sparkplug.metric import Reading
+from sparkplug.quality import Quality
+
+COME_AND_GO = ("twin-validation",)  # nodes that tell what they have found, and end
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing that was looked at."""
+
+    good: bool
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """All findings, and the ledgers behind them."""
+
+    findings: tuple[Finding, ...]
+    ledgers: tuple[StageLedger, ...]
+
+    @property
+    def good(self) -> bool:
+        """Whether every finding is good."""
+        return all(finding.good for finding in self.findings)
+
+    def as_json(self) -> dict[str, Any]:
+        """For a program to read."""
+        stages = [{**asdict(ledger), "balances": ledger.balances} for ledger in self.ledgers]
+        return {"good": self.good, "findings": [asdict(finding) for finding in self.findings], "ledgers": stages}
+
+
+def examine(broker: BrokerAddress, group: str, seconds: float) -> Report:
+    """Listen to a broker for a while and report; asks nodes for their births where it has to."""
+    host = viewer(broker, group)
+    host.start()
+    try:
+        deadline_s = time.monotonic() + seconds
+        while time.monotonic() < deadline_s:
+            host.poll(0.1)
+        return diagnose(host, broker.url)
+    finally:
+        host.stop()
+
+
+def diagnose(host: HostApplication, url: str) -> Report:
+    """What a host application that has listened for a while can say."""
+    if not host.online:
+        return Report((Finding(False, host.last_error or f"no connection to {url}"),), ())
+    findings = [Finding(True, f"{url} answers")]
+    stages = ledgers(host)
+    for node in host.nodes():
+        picture = host.picture(node)
+        online = picture is not None and picture.online
+        if not online and node.node in COME_AND_GO:
+            findings.append(Finding(True, f"{node} has told what it had to tell, and is gone"))
+        else:
+            findings.append(Finding(online, f"{node} is {'online' if online else 'offline, or gives no birth'}"))
+    if not host.nodes():
+        findings.append(Finding(False, "no edge node was heard of; start one with `cnctwin edge run CONFIG`"))
+    for machine in machines(host):
+        bad = [name for name, reading in machine.measured.items() if reading.quality is not Quality.GOOD]
+        state = "its control is connected" if machine.online else "its control is not connected; its values are stale"
+        findings.append(Finding(machine.online, f"{machine.name}: {state}; {len(machine.measured)} signals, {len(bad)} not good"))
+    for ledger in stages:
+        sums = f"{ledger.received} = {ledger.emitted} emitted + {ledger.dropped} dropped + {ledger.buffered} buffered"
+        findings.append(Finding(ledger.balances, f"{ledger.node}: {sums}" if ledger.balances else f"{ledger.node}: not {sums}"))
+    for node_id, metrics in health(host).items():
+        connected, why = metrics.get("control_online"), metrics.get("last_error")
+        if connected is not None and connected.value is False:
+            reason = f": {why.value}" if why is not None and isinstance(why.value, str) and why.value else ""
+            findings.append(Finding(False, f"{node_id} has no control{reason}"))
+        for name in ("holes", "dead_letters"):
+            count = metrics[name].value if name in metrics else 0
+            if isinstance(count, int) and count:
+                findings.append(Finding(True, f"{node_id}: {count} {name.replace('_', ' ')} so far, counted"))
+        findings += of_store(node_id, metrics)
+    counts = host.counts
+    order = f"{counts.get('lost', 0)} messages lost, {counts.get('malformed', 0)} malformed while listening"
+    findings.append(Finding(not counts.get("lost") and not counts.get("malformed"), order))
+    return Report(tuple(findings), tuple(stages))
+
+
+def of_store(node_id: str, metrics: Mapping[str, Reading]) -> list[Finding]:
+    """What a historian says of its store; nothing of any other node."""
+    if not {"store_samples", "store_dropped", "store_trouble"} <= metrics.keys():
+        return []
+    counts = [metrics[f"store_{name}"].value if f"store_{name}" in metrics else 0 for name in ("samples", "waiting", "dropped")]
+    stored, waiting, dropped = (count if isinstance(count, int) else 0 for count in counts)
+    told = metrics["store_trouble"].value
+    trouble = f"; {told}" if isinstance(told, str) and told else ""
+    text = f"{node_id}: {stored} samples stored, {waiting} waiting, {dropped} messages without room{trouble}"
+    return [Finding(not trouble and not dropped, text)]

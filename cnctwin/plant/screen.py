@@ -1,0 +1,115 @@
+"""The terminal view: each machine with the twin beside it, and the ledger of each stage.
+
+Whatever comes from the broker is shown as it is: a bracket in a name is a bracket, no markup.
+"""
+
+from collections.abc import Sequence
+from datetime import UTC, datetime
+
+from rich.console import Group, RenderableType
+from rich.markup import escape
+from rich.panel import Panel
+from rich.table import Table
+from rich.text import Text
+
+from cnctwin.plant.view import TWIN_PREFIX, MachineView, StageLedger, text
+from sparkplug.metric import Reading
+from sparkplug.quality import Quality
+
+# Most telling first; what is not in the list follows by name.
+FIRST = (
+    "exec_state",
+    "program",
+    "nc_block",
+    "tool_number",
+    "tool_change_active",
+    "tool_change_source",
+    "spindle_rpm",
+    "spindle_load_pct",
+    "feed_mm_min",
+    "spindle_temp_c",
+    "ambient_temp_c",
+)
+_STYLE = {Quality.GOOD: "", Quality.STALE: "dim", Quality.BAD: "red"}
+_VALUE_WIDTH_MAX = 60
+
+
+def screen(machines: Sequence[MachineView], ledgers: Sequence[StageLedger], note: str) -> RenderableType:
+    """The whole view."""
+    parts: list[RenderableType] = [_machine(machine) for machine in machines]
+    if not machines:
+        parts.append(Panel("waiting for a machine to be born", title="no machine yet"))
+    if ledgers:
+        parts.append(_ledgers(ledgers))
+    parts.append(Text(note, style="dim"))
+    return Group(*parts)
+
+
+def line(machines: Sequence[MachineView], ledgers: Sequence[StageLedger]) -> str:
+    """One line for a place that is no terminal."""
+    if not machines:
+        return "no machine yet"
+    parts = []
+    for machine in machines:
+        values = {**machine.measured, **machine.twin}
+        shown = ("exec_state", "tool_number", "spindle_rpm", "spindle_load_pct", "twin/spindle_temp_c", "twin/cutting_force_n")
+        told = ", ".join(f"{name} {text(values[name])}" for name in shown if name in values)
+        change = values.get("tool_change_active")
+        parts.append(f"{machine.name}: {told}{', TOOL CHANGE' if change is not None and change.value is True else ''}")
+    counted = ", ".join(f"{ledger.node} {ledger.received}" for ledger in ledgers)
+    return "; ".join(parts) + f" [{counted}]"
+
+
+def ledger_table(ledgers: Sequence[StageLedger]) -> Table:
+    """The ledger of each stage: received = emitted + dropped + buffered."""
+    table = Table(title="received = emitted + dropped + buffered", title_justify="left", expand=False)
+    table.add_column("stage", no_wrap=True)
+    for name in ("received", "emitted", "dropped", "buffered"):
+        table.add_column(name, justify="right", no_wrap=True)
+    table.add_column("balances", no_wrap=True)
+    table.add_column("dropped because")
+    for ledger in ledgers:
+        table.add_row(
+            Text(ledger.node + ("" if ledger.online else " (offline)")),
+            *(f"{n:,}" for n in (ledger.received, ledger.emitted, ledger.dropped, ledger.buffered)),
+            Text("yes", style="green") if ledger.balances else Text(f"no, {ledger.missing:+d}", style="bold red"),
+            Text(", ".join(f"{reason} {n:,}" for reason, n in sorted(ledger.reasons.items(), key=lambda item: -item[1]))),
+        )
+    return table
+
+
+def _machine(machine: MachineView) -> Panel:
+    table = Table(show_edge=False, expand=True)
+    for title, ratio in (("measured", 3), ("", 4), ("time (UTC)", 2), ("twin", 4), ("", 4)):
+        table.add_column(title, ratio=ratio, no_wrap=True, overflow="ellipsis")
+    order = [name for name in FIRST if name in machine.measured] + sorted(machine.measured.keys() - set(FIRST))
+    twin = sorted(machine.twin.values(), key=lambda reading: reading.value is None)  # what is known stands first
+    for row in range(max(len(order), len(twin))):
+        reading = machine.measured[order[row]] if row < len(order) else None
+        beside = twin[row] if row < len(twin) else None
+        table.add_row(
+            Text(order[row] if reading else ""),
+            _cell(reading),
+            _clock(reading),
+            Text(beside.name.removeprefix(TWIN_PREFIX) if beside else ""),
+            _cell(beside),
+        )
+    state = "[green]online[/]" if machine.online else "[red]offline: values are stale[/]"
+    return Panel(table, title=f"[bold]{escape(machine.name)}[/] {state}", title_align="left")
+
+
+def _cell(reading: Reading | None) -> Text:
+    if reading is None:
+        return Text("")
+    changing = reading.name == "tool_change_active" and reading.value is True
+    return Text(text(reading)[:_VALUE_WIDTH_MAX], style="bold yellow" if changing else _STYLE[reading.quality])
+
+
+def _clock(reading: Reading | None) -> str:
+    if reading is None or not reading.timestamp_ms:
+        return ""
+    return datetime.fromtimestamp(reading.timestamp_ms / 1000, UTC).strftime("%H:%M:%S.%f")[:-5]
+
+
+def _ledgers(ledgers: Sequence[StageLedger]) -> Panel:
+    return Panel(ledger_table(ledgers), title="accounted for", title_align="left")

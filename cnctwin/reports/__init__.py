@@ -1,0 +1,1 @@
+"""Reports for people: one HTML page for a diagnosis, one for an optimisation."""

@@ -1,0 +1,82 @@
+"""What came out, in one sentence, and the figures that matter. The sign has a shape of its own, so that it needs no colour."""
+
+from cnctwin.reports.gap.markup import Markup, joined, tag
+from cnctwin.reports.optimisation.quantity import change, column, length_of_time, limit_text, percent, probability, shortened, to
+from twin.optimisation.answer import Optimised
+
+_TICK = "M8.5 16.8l5 5 10-11"
+_WARNING = "M16 8.5v10M16 22.6v.4"
+
+
+def headline(answer: Optimised) -> Markup:
+    """What was optimised, whether every limit is kept, and the sentence."""
+    kept = answer.after.over == 0 and not answer.collisions
+    mean = answer.sensitivity is not None and answer.sensitivity.asked is None
+    sure = f" by the mean twin, that of force with {probability(answer.sensitivity.kept)}" if mean and answer.sensitivity else ""
+    word = f"All limits kept{sure}" if kept else f"{counted(answer.after.over, 'line')} above a limit"
+    if answer.collisions:
+        word = f"A rapid goes into material in line {answer.collisions[0]:,}"
+    machine = f"by the twin of {shortened(answer.machine)}" if answer.machine else ""
+    return tag(
+        "header",
+        tag(
+            "p",
+            tag("span", "Feed and speed for each line", class_="kind"),
+            tag("span", shortened(answer.name, 120), class_="title"),
+            tag("span", f"{machine}, least {answer.objective}" if answer.objective != "pareto" else f"{machine}, time and cost"),
+            class_="eyebrow",
+        ),
+        tag("div", _sign(kept), tag("p", word, tag("span", ", as modelled", class_="quiet"), class_="word"), class_="called"),
+        tag("h1", shortened(answer.sentence, 600).replace(" %", "\u00a0%") or word),
+        class_=f"verdict {'healthy' if kept else 'over'}",
+    )
+
+
+def _sign(kept: bool) -> Markup:
+    """A ring with a tick, or a diamond with an exclamation mark."""
+    shape = (
+        joined([tag("circle", cx=16, cy=16, r=13.5, class_="ring"), tag("path", d=_TICK, class_="stroke")])
+        if kept
+        else joined([tag("path", d="M16 .6 31.4 16 16 31.4.6 16z", class_="disc"), tag("path", d=_WARNING, class_="stroke on")])
+    )
+    return tag("svg", shape, viewBox="0 0 32 32", class_="sign", aria_hidden="true", focusable="false")
+
+
+def counted(count: int, noun: str) -> str:
+    """
+    >>> counted(1, "line"), counted(5000, "line")
+    ('1 line', '5,000 lines')
+    """
+    return f"{count:,} {noun}{'' if count == 1 else 's'}"
+
+
+def figures(answer: Optimised) -> Markup:
+    """Time, cost, force, how far from the bound, and how surely the limit is kept; those that there are."""
+    before, after = answer.before, answer.after
+    spoken = length_of_time(after.seconds)
+    tiles = [
+        _tile(
+            "Time, s",
+            to(column(before.seconds), column(after.seconds)),
+            change(before.seconds, after.seconds) + (f", now {spoken}" if spoken else ""),
+        )
+    ]
+    if after.cost is not None:
+        cost = to(column(before.cost), column(after.cost))
+        tiles.append(_tile(f"Cost, {answer.currency}", cost, f"{change(before.cost, after.cost)}, tool wear included"))
+    limit = limit_text(answer.limits, "force")
+    force = to(column(before.force_n, 3), column(after.force_n, 3))
+    tiles.append(
+        _tile("Greatest cutting force, N", force, f"limit {shortened(limit, 60)}" if limit else "no limit of force was set")
+    )
+    reached = "which a program reaches: exact" if answer.bound.exact else "which no program need reach"
+    tiles.append(_tile("Above the bound", percent(answer.bound.distance), reached))
+    if answer.sensitivity is not None:
+        asked = answer.sensitivity.asked
+        wanted = "planned by the mean twin" if asked is None else f"{probability(asked)} was asked for"
+        tiles.append(_tile("Force limit kept with", probability(answer.sensitivity.kept), wanted))
+    return tag("dl", *tiles, class_="figures tiles")
+
+
+def _tile(term: str, value: str, meaning: str) -> Markup:
+    return tag("div", tag("dt", term), tag("dd", value, class_="value"), tag("dd", meaning, class_="meaning"))

@@ -1,0 +1,1 @@
+"""What stands in for a control or a machine: agents, servers, the simulated and the reference machine."""

@@ -1,0 +1,46 @@
+"""`cnctwin simulate-control focas`: a FANUC control without a machine, as a program of its own."""
+
+from pathlib import Path
+from threading import Event
+
+from cnctwin.errors import UsageError
+from cnctwin.standins.focas_server.server import FocasServer
+from cnctwin.standins.focas_server.shown import ControlDescription, coded
+from cnctwin.standins.mtconnect_agent.serve import STATE_S, keep
+from cnctwin.standins.simulated_control.control import SimulatedControl
+from cnctwin.standins.simulated_control.state import production
+from cnctwin.standins.simulated_machine.description import PROGRAM
+
+DAY_S = 24 * 3600.0
+PORT = 8193
+
+
+def simulate_focas(
+    stop: Event,
+    *,
+    speed: float = 1.0,
+    port: int = PORT,
+    clock_offset_s: float = 0.0,
+    tool_number: bool = False,
+    state_file: Path | None = None,
+) -> None:
+    """Serve a working day until stopped; says where, and keeps `state_file` up to date for a program that started us.
+
+    clock_offset_s: how far the control's clock is ahead; tool_number: whether the control has the option for the tool number
+    """
+    if not 0 < speed <= 1000:
+        raise UsageError(f"--speed {speed:g} is not between 0 and 1000; 1 is real time")
+    control = SimulatedControl(coded(production(DAY_S)), speed=speed, clock_offset_s=clock_offset_s)
+    lines = tuple(PROGRAM.read_text(encoding="utf-8").splitlines())
+    server = FocasServer(control, ControlDescription(has_tool_number=tool_number, program_lines=lines), port=port)
+    with server:
+        print(f"{server.url} shows a FANUC control, which runs {PROGRAM.name}; Ctrl-C ends it", flush=True)
+        while not stop.wait(STATE_S):
+            _keep(state_file, server, control)
+        _keep(state_file, server, control)
+    print(", ".join(f"{name} {count}" for name, count in server.ledger.as_dict().items()), flush=True)
+
+
+def _keep(state_file: Path | None, server: FocasServer, control: SimulatedControl) -> None:
+    state = {"url": server.url, "finished": control.is_over, "ledger": server.ledger.as_dict()}
+    keep(state_file, state)

@@ -1,0 +1,62 @@
+"""`cnctwin simulate-control lsv2`: a HEIDENHAIN control on LSV2, as a program of its own."""
+
+from pathlib import Path
+from threading import Event
+
+from cnctwin.errors import ProgramError, UsageError
+from cnctwin.standins.lsv2_server.answers import Model
+from cnctwin.standins.lsv2_server.server import Lsv2Server
+from cnctwin.standins.mtconnect_agent.serve import STATE_S, keep
+from cnctwin.standins.simulated_control.control import SimulatedControl
+from cnctwin.standins.simulated_control.state import production
+
+WEEK_S = 7 * 86_400.0
+
+
+def simulate_lsv2(
+    stop: Event,
+    *,
+    speed: float = 1.0,
+    port: int = 19000,
+    model: str = Model.TNC640,
+    clock_offset_s: float = 0.0,
+    program: Path | None = None,
+    state_file: Path | None = None,
+) -> None:
+    """Serve until stopped. `program` is shown in place of the program that is run; its blocks should have the same numbers."""
+    if not 0 < speed <= 1000:
+        raise UsageError(f"--speed {speed:g} is not between 0 and 1000")
+    if model not in {known.value for known in Model}:
+        raise UsageError(f"--model {model!r} is not known; there are {' and '.join(Model)}")
+    control = SimulatedControl(production(WEEK_S), speed=speed, clock_offset_s=clock_offset_s)
+    server = Lsv2Server(control, model=Model(model), port=port)
+    if program is not None:
+        try:
+            server.answers.program_text = program.read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise UsageError(f"--program {program}: cannot be read: {error}") from error
+    try:
+        server.start()
+    except OSError as error:
+        raise ProgramError(f"port {port} cannot be used: {error.strerror}; give another with --port") from error
+    try:
+        print(f"{server.url} is a {server.answers.model}, which runs O1701.H; Ctrl-C ends it", flush=True)
+        while not stop.wait(STATE_S):
+            keep(state_file, _state(server))
+        keep(state_file, _state(server))
+    finally:
+        server.stop()
+    counters = server.answers.counters
+    print(f"telegrams {counters.telegrams}, writes refused {counters.writes_refused}", flush=True)
+
+
+def _state(server: Lsv2Server) -> dict[str, object]:
+    counters = server.answers.counters
+    return {
+        "url": server.url,
+        "model": server.answers.model,
+        "finished": server.control.is_over,
+        "telegrams": counters.telegrams,
+        "writes_refused": counters.writes_refused,
+        "parts": server.control.now().part_count,
+    }

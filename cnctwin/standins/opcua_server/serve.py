@@ -1,0 +1,45 @@
+"""`cnctwin simulate-control opcua`: the simulated control behind an OPC UA server, as a program of its own."""
+
+import importlib.util
+import json
+import logging
+from pathlib import Path
+from threading import Event
+
+from cnctwin.errors import ProgramError
+from cnctwin.standins.simulated_control.control import SimulatedControl
+from cnctwin.standins.simulated_control.state import production
+from edge.state_dir import state_dir
+
+STATE_S = 0.5
+DAY_S = 8 * 3600.0
+PORT = 4840
+
+
+def simulate_opcua(
+    stop: Event,
+    *,
+    speed: float = 1.0,
+    port: int = PORT,
+    clock_offset_s: float = 0.0,
+    is_open: bool = False,
+    state_file: Path | None = None,
+) -> None:
+    """Serve until stopped; says where, and what to pin. `is_open`: also without security, for those who ask for that."""
+    if importlib.util.find_spec("asyncua") is None:
+        raise ProgramError("an OPC UA server needs the library asyncua; install it with: pip install 'cnctwin[opcua]'")
+    from cnctwin.standins.opcua_server.server import OpcUaServer  # noqa: PLC0415  asyncua is an extra
+
+    logging.getLogger("asyncua.server.server").setLevel(logging.CRITICAL)  # why it can't start is told below, without a traceback
+    control = SimulatedControl(production(DAY_S), speed=speed, clock_offset_s=clock_offset_s)
+    with OpcUaServer(control, state_dir() / "simulated-opcua", port=port, open_too=is_open) as server:
+        discover = f"cnctwin edge discover '{server.url}?server_fingerprint={server.fingerprint}'"
+        print(f"{server.url} serves a simulated control; Ctrl-C ends it\nto draft a configuration: {discover}", flush=True)
+        while not stop.wait(STATE_S) and server.error is None:
+            if state_file is not None:
+                fresh = state_file.with_name(state_file.name + ".new")
+                fresh.write_text(json.dumps({"url": server.url, "fingerprint": server.fingerprint, "writes": server.writes}))
+                fresh.replace(state_file)
+        if server.error is not None:
+            raise ProgramError(f"the OPC UA server broke down: {server.error}") from server.error
+    print(f"written to by clients {server.writes} times, methods called {server.calls} times", flush=True)

@@ -1,0 +1,23 @@
+"""The machine as it really is: what `machine.toml` tells, and where it is otherwise, what `as_built.toml` says."""
+
+import tomllib
+from typing import Any
+
+from cnctwin.standins.simulated_machine.description import AS_BUILT, TOLD
+from twin.machine import MachineFile
+
+
+def machine_as_built() -> MachineFile:
+    """The machine that is simulated."""
+    told, built = (tomllib.loads(path.read_text(encoding="utf-8")) for path in (TOLD, AS_BUILT))
+    return MachineFile.model_validate(_over(told, built))
+
+
+def _over(told: dict[str, Any], built: dict[str, Any]) -> dict[str, Any]:
+    """The one table with the values of the other laid over it.
+
+    >>> _over({"spindle": {"efficiency": 0.85, "rated_power_kw": 7.5}}, {"spindle": {"efficiency": 0.83}})
+    {'spindle': {'efficiency': 0.83, 'rated_power_kw': 7.5}}
+    """
+    laid = {key: _over(told[key], value) if isinstance(told.get(key), dict) else value for key, value in built.items()}
+    return told | laid

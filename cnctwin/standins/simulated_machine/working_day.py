@@ -1,0 +1,135 @@
+"""A working day: one part after the other, with the door open in between, until somebody ends it.
+
+A part is computed while the one before it is cut, in a thread of its own; what it starts from (the heat left in the spindle, the
+air of the shop) is known by then. Where it is not ready in time, the machine waits for it as for an operator. Where the first one
+takes long, since the kernels have to be compiled on this computer, a spare one that was computed before is shown meanwhile.
+"""
+
+import math
+from collections.abc import Callable, Iterator
+from random import Random
+from typing import Protocol
+
+from cnctwin.standins.simulated_machine.as_built import machine_as_built
+from cnctwin.standins.simulated_machine.description import program_text
+from cnctwin.standins.simulated_machine.moment import Moment
+from cnctwin.standins.simulated_machine.part import Part, warmer
+from twin.thermal import ThermalNetwork, rise_after
+
+START_TEMPERATURE_C = 23.0
+SPARE_START_C = 23.0
+"""What the spare part was begun with, to the tenth that it shows."""
+CLOSED_S, COMPLETED_S, IDLE_SHOWN_S = 2.0, 1.0, 1.0
+CHANGE_S = (7.0, 12.0)
+"""From READY to the closed door: an operator, or a robot."""
+AT_REST = dict.fromkeys(("Srpm", "Fact", "Xabs", "Yabs", "Zabs"), "0")
+"""Spindle and feed stand still, the axes are at the reference point."""
+
+
+class Pending(Protocol):
+    """A part that is being computed."""
+
+    @property
+    def ready(self) -> bool:
+        """Whether it is there."""
+
+    def result(self) -> Part:
+        """It; waits for it, and raises what it raised."""
+
+
+Begin = Callable[[int, float, float], Pending]
+"""Begins to compute a part: its number, the spindle's temperature at its start, that of the air."""
+
+
+def working_day(begin: Begin, spare: Callable[[], Part], patience_s: float) -> Iterator[Moment]:
+    """What the control shows, from the moment that it is switched on.
+
+    spare: gives the part to show where the first one is not computed `patience_s` after the machine is ready for it
+    """
+    network = network_as_built()
+    at_s, number, warm_c, pause_s = 0.0, 1, START_TEMPERATURE_C, _pause_s(1)
+    ambient_c = ambient_temp_c(pause_s)
+    start_c = cooled_c(network, warm_c, ambient_c, pause_s)
+    pending = begin(number, start_c, ambient_c)
+    yield Moment(at_s, switched_on())
+    while True:
+        yield from _pause(at_s, pause_s, network, warm_c, ambient_c)
+        at_s += pause_s
+        late_s = 0.0
+        while not pending.ready and (number > 1 or late_s < patience_s):
+            late_s += IDLE_SHOWN_S
+            yield Moment(at_s + late_s, _temperatures(cooled_c(network, start_c, ambient_c, late_s), ambient_c), waits=True)
+        part, expected_c = (pending.result(), start_c) if pending.ready else (spare(), SPARE_START_C)
+        part = warmer(part, cooled_c(network, start_c, ambient_c, late_s) - expected_c, network.time_constant_s)
+        begun_s = at_s + late_s
+        at_s, warm_c, pause_s = begun_s + part.seconds + COMPLETED_S, part.temperature_c, _pause_s(number + 1)
+        ambient_c = ambient_temp_c(at_s + pause_s)
+        start_c = cooled_c(network, warm_c, ambient_c, pause_s)
+        pending = begin(number + 1, start_c, ambient_c)
+        yield Moment(begun_s, {"execution": "ACTIVE"})
+        yield from (shown._replace(at_s=begun_s + shown.at_s) for shown in part.moments)
+        yield Moment(begun_s + part.seconds, {"execution": "PROGRAM_COMPLETED", "part_count": str(number)})
+        yield Moment(at_s, {"execution": "READY", **AT_REST, **_rewound()})
+        number += 1
+
+
+def switched_on() -> dict[str, str]:
+    """What the control shows before the first part. The last tool of the part is in the spindle, the drives are off."""
+    modes = {"avail": "AVAILABLE", "mode": "AUTOMATIC", "execution": "READY", "program": "O1701", "part_count": "0"}
+    overrides = {"Fovr": "100", "Frapidovr": "100", "Sovr": "100"}
+    rest = {"Tool_number": "5", "door_state": "OPEN", "coolant": "OFF"}
+    return modes | _rewound() | overrides | rest | AT_REST | dict.fromkeys(("Sload", "Xload", "Yload", "Zload"), "0")
+
+
+def _rewound() -> dict[str, str]:
+    """The program stands at its beginning."""
+    blocks = program_text().splitlines()
+    line = next(line for line, block in enumerate(blocks) if block.startswith("O"))
+    return {"block": blocks[line], "line": str(line)}
+
+
+def _pause_s(number: int) -> float:
+    """How long the change of the workpiece before part `number` takes, each time a little different. The first is in the vice."""
+    if number == 1:
+        return CLOSED_S
+    return round(Random(number).uniform(*CHANGE_S), 1) + CLOSED_S  # noqa: S311 — no secret
+
+
+def _pause(at_s: float, seconds: float, network: ThermalNetwork, warm_c: float, ambient_c: float) -> Iterator[Moment]:
+    """The door is open, then closed, and the spindle cools."""
+    since_s, closes_s = 0.0, seconds - CLOSED_S
+    yield Moment(at_s, {"door_state": "OPEN"})
+    closed = False
+    while since_s < seconds:
+        if since_s >= closes_s and not closed:
+            closed = True
+            yield Moment(at_s + closes_s, {"door_state": "CLOSED"})
+        yield Moment(at_s + since_s, _temperatures(cooled_c(network, warm_c, ambient_c, since_s), ambient_c))
+        since_s += IDLE_SHOWN_S
+
+
+def ambient_temp_c(at_s: float) -> float:
+    """The air of the shop: half a degree up and down in an hour.
+
+    >>> ambient_temp_c(0.0), ambient_temp_c(900.0)
+    (21.5, 22.0)
+    """
+    return round(21.5 + 0.5 * math.sin(at_s * math.pi / 1800.0), 1)
+
+
+def _temperatures(spindle_c: float, ambient_c: float) -> dict[str, str]:
+    return {"Stemp": f"{spindle_c:.1f}", "room_temp": f"{ambient_c:.1f}"}
+
+
+def cooled_c(network: ThermalNetwork, warm_c: float, ambient_c: float, seconds: float) -> float:
+    """Temperature of a standing spindle after so long, °C."""
+    return ambient_c + rise_after(network, warm_c - ambient_c, 0.0, seconds)
+
+
+def network_as_built() -> ThermalNetwork:
+    """The heat of the spindle, as the machine is."""
+    thermal = machine_as_built().thermal
+    assert thermal is not None
+    return ThermalNetwork(
+        thermal.alpha_w_per_pct_rpm2, thermal.beta_w_per_rpm, thermal.resistance_k_per_w, thermal.capacity_j_per_k
+    )
