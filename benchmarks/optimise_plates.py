@@ -23,8 +23,8 @@ import sys
 from collections.abc import Sequence
 from dataclasses import asdict
 
-from program_time import cover_ramp, data_folder, is_fitted, plates
-from proven_choices import REFERENCE, Savings, Study, study, wholes
+from benchmarks.program_time import cover_ramp, data_folder, is_fitted, plates
+from benchmarks.proven_choices import REFERENCE, Savings, Study, study, wholes
 
 
 def print_times(found: Study) -> None:

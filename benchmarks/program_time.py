@@ -28,7 +28,7 @@ import sys
 from pathlib import Path
 from time import perf_counter
 
-from twin.identification.program_spindle import SpindleRamp, run_ups, spindle_ramp
+from benchmarks.program_spindle import SpindleRamp, run_ups, spindle_ramp
 from twin.identification.programs.recording import RecordedProgram, recorded_programs
 from twin.identification.programs.time import PARAMETERS, Comparison, ProgramTimes, compare, ideal_limits, identify_program_times
 from twin.recording.observations import read_observations

@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 from sklearn.ensemble import IsolationForest, RandomForestRegressor
 
+from benchmarks.simulated_days import ORDINARY, Day, ordinary_days, simulated_days
 from cnctwin.standins.simulated_machine.description import TOLD
-from cnctwin.training.residual.simulated_days import ORDINARY, Day, ordinary_days, simulated_days
 from twin.errors import TwinError
 from twin.machine import Thermal, read_machine
 from twin.recording.observations import read_observations

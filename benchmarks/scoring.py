@@ -14,8 +14,8 @@ for each machine by itself, as `cnctwin train anomaly` does. Ticks of a second, 
     features         smoothed features, what peers share subtracted feature by feature (twin/anomaly/common_features.py)
     random, constant, vibration: what a detector has to beat
 
-Size 1 of a fault is stated in cnctwin/simulated_cell/fault.py, and was before anything was judged. Seeds 1 to 3 were used to
-develop the method; others are for reporting. Nothing is point-adjusted (twin/evaluation).
+Size 1 of a fault is stated in benchmarks/simulated_cell/fault.py, and was before anything was judged. Seeds 1 to 3 were used to
+develop the method; others are for reporting. Nothing is point-adjusted (benchmarks/evaluation).
 """
 
 import argparse
@@ -27,10 +27,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cnctwin.simulated_cell.cell import Cell, draw_cell, machine_signals
-from cnctwin.simulated_cell.fault import SIZES, Fault, FaultKind, Overlap
-from cnctwin.simulated_cell.schedule import DAY_S, Schedule
-from cnctwin.simulated_cell.signals import FEATURES
+from benchmarks.evaluation.baselines import constant_score, one_feature_score, random_score
+from benchmarks.evaluation.events import Event, Found, delays_s, false_alerts_a_week, found, recall
+from benchmarks.evaluation.range_based import Range, range_based, ranges
+from benchmarks.evaluation.volume import vus_pr
+from benchmarks.simulated_cell.cell import Cell, draw_cell, machine_signals
+from benchmarks.simulated_cell.fault import SIZES, Fault, FaultKind, Overlap
+from benchmarks.simulated_cell.schedule import DAY_S, Schedule
+from benchmarks.simulated_cell.signals import FEATURES
 from twin.anomaly.alarm import AlarmRule, is_alarm, onsets
 from twin.anomaly.common_features import left_over_rows, lengths, with_tails
 from twin.anomaly.common_mode import CommonModeRule, Method, adjust_frames
@@ -46,11 +50,7 @@ from twin.anomaly.preparation import (
     standardised_rows,
 )
 from twin.anomaly.threshold import fit_threshold
-from twin.evaluation.baselines import constant_score, one_feature_score, random_score
-from twin.evaluation.events import Event, Found, delays_s, false_alerts_a_week, found, recall
-from twin.evaluation.intervals import bootstrapped
-from twin.evaluation.range_based import Range, range_based, ranges
-from twin.evaluation.volume import vus_pr
+from twin.intervals import bootstrapped
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -16,12 +16,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.evaluation.range_based import Range, ranges
 from cnctwin.memory.importing.shdr import recorded_runs
 from cnctwin.training.anomaly.held_rows import held_rows
 from twin.anomaly.alarm import AlarmRule, dwell_score, is_alarm, onsets
 from twin.anomaly.detector import Detector, trained_model
 from twin.anomaly.gate import gate, held
-from twin.evaluation.range_based import Range, ranges
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]

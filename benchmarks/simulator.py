@@ -34,8 +34,8 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from plain_loop import PERIOD_S, Motion, PlainLoop, Run, motion_of
 
+from benchmarks.plain_loop import PERIOD_S, Motion, PlainLoop, Run, motion_of
 from twin.effects.catalogue import catalogue, effect_named
 from twin.effects.effect import Effect, On
 from twin.heat.run import Warming, spindle_temperature_c, thermal_constants, thermal_quantities

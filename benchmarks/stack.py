@@ -20,7 +20,7 @@ from pathlib import Path
 
 import httpx
 
-from benchmarks.edge_runs import cpu_s
+from benchmarks.edges.cost import cpu_s
 from cnctwin.plant.view import ledgers
 from cnctwin.plant.watch import viewer
 from cnctwin.processes.child import Child

@@ -31,8 +31,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import correlate, lfilter
 from scipy.stats import chi2
-from synthetic_changes import PERIOD_S, learned_from, null_stream, stream_of_changes, synthetic_change
 
+from benchmarks.synthetic_changes import PERIOD_S, learned_from, null_stream, stream_of_changes, synthetic_change
 from cnctwin.training.detector.recorded_streams import streams_of_run
 from twin.recording.observations import read_observations
 from twin.recording.program_run import program_runs

@@ -10,7 +10,7 @@ takes, in place of its zero at z = 1, the zero of the integrator, whose pole tha
 
     v[n] = (w[n] + w[n-1]) b0 + (w[n-1] + w[n-2]) b1
 
-So a sample costs four sections and not eight, 1 % of a core at 10 kHz (`benchmarks/accelerometer.py`).
+So a sample costs four sections and not eight, 1 % of a core at 10 kHz (`benchmarks/edges/accelerometer.py`).
 """
 
 import cmath

@@ -8,11 +8,11 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from cnctwin.simulated_cell.cell import Cell, draw_cell, machine_signals
-from cnctwin.simulated_cell.fault import SIZES, FaultKind, Overlap
-from cnctwin.simulated_cell.part_program import Work
-from cnctwin.simulated_cell.schedule import DAY_S
-from cnctwin.simulated_cell.signals import FEATURES
+from benchmarks.simulated_cell.cell import Cell, draw_cell, machine_signals
+from benchmarks.simulated_cell.fault import SIZES, FaultKind, Overlap
+from benchmarks.simulated_cell.part_program import Work
+from benchmarks.simulated_cell.schedule import DAY_S
+from benchmarks.simulated_cell.signals import FEATURES
 
 SOURCE = Path(__file__).parent.parent.parent / "benchmarks" / "scoring.py"
 LOAD, RPM, FEED, TEMP, VIBRATION = range(5)

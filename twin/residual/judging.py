@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.evaluation.intervals import bootstrapped
+from twin.intervals import bootstrapped
 from twin.residual.held_out import Interval
 
 Floats = NDArray[np.float64]

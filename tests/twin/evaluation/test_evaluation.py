@@ -8,13 +8,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from twin.evaluation import events, intervals, range_based, volume
-from twin.evaluation.baselines import constant_score, one_feature_score, random_score
-from twin.evaluation.events import Event, delays_s, false_alerts_a_week, found, recall
-from twin.evaluation.intervals import bootstrapped, rate, share
-from twin.evaluation.range_based import Bias, Range, ranges
-from twin.evaluation.range_based import range_based as measured
-from twin.evaluation.volume import area_pr, vus_pr
+from benchmarks.evaluation import events, range_based, volume
+from benchmarks.evaluation.baselines import constant_score, one_feature_score, random_score
+from benchmarks.evaluation.events import Event, delays_s, false_alerts_a_week, found, recall
+from benchmarks.evaluation.range_based import Bias, Range, ranges
+from benchmarks.evaluation.range_based import range_based as measured
+from benchmarks.evaluation.volume import area_pr, vus_pr
+from twin import intervals
+from twin.intervals import bootstrapped, rate, share
 
 EVENTS = [Event(100.0, 200.0), Event(1000.0, 1100.0)]
 

@@ -5,11 +5,11 @@ import doctest
 import numpy as np
 import pytest
 
-import twin.identification.program_spindle
+import benchmarks.program_spindle
+from benchmarks.program_spindle import RunUp, run_ups, spindle_ramp
 from tests.recordings import recording
 from twin.errors import RunLogError
 from twin.gcode import Settings, interpret
-from twin.identification.program_spindle import RunUp, run_ups, spindle_ramp
 from twin.identification.programs.recording import NOMINAL, RecordedProgram, SetUp, rapid_rate_mm_min, recorded_programs
 from twin.identification.programs.time import PARAMETERS, ProgramTimes, compare, ideal_limits, identify_program_times, windows
 from twin.motion.limits import Limits
@@ -104,7 +104,7 @@ def test_the_base_speed_of_a_spindle_is_read_off_its_run_ups_to_several_speeds()
     assert (ramp.acceleration_rpm_s, ramp.base_rpm) == pytest.approx((alpha, base))
     with pytest.raises(RunLogError, match="two speeds"):
         spindle_ramp(seen[2:])
-    assert doctest.testmod(twin.identification.program_spindle).failed == 0
+    assert doctest.testmod(benchmarks.program_spindle).failed == 0
 
 
 def test_the_cover_shows_run_ups_that_the_plates_share() -> None:

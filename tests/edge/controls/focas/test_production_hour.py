@@ -1,5 +1,5 @@
 """An hour of production with tool changes, over a real connection, while the server of the control is killed, hung, restarted,
-slow, wrong and partial. In the suite eight minutes of it; the whole hour with CNCTWIN_FULL=1, and in `benchmarks/edge_focas.py`.
+slow, wrong and partial. In the suite eight minutes of it; the whole hour with CNCTWIN_FULL=1, and in `benchmarks/edges/focas.py`.
 """
 
 import pytest

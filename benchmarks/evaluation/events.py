@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from twin.evaluation.intervals import Estimate, rate, share
+from twin.intervals import Estimate, rate, share
 
 WEEK_S = 604_800.0
 

@@ -1,6 +1,6 @@
 """What vibration at the edge costs: one sensor's stream through the fold, beside scipy's filter on the same samples.
 
-    python -m benchmarks.accelerometer [--seconds 20]
+    python -m benchmarks.edges.accelerometer [--seconds 20]
 
 Prints the share of one core (CPU time over the signal's own time) for each sample rate: the frame's decoding, and the fold with
 all that it gives. The processor's filter (numpy, scipy) does the same work in the same run.

@@ -1,7 +1,7 @@
 """A day of one machine in the store: ten quantised signals at 10 Hz, 8.6 million samples, beside bare SQLite and bare DuckDB.
 
-    python -m benchmarks.store              # some minutes
-    python -m benchmarks.store --quick      # three hours of a machine
+    python -m benchmarks.store.embedded              # some minutes
+    python -m benchmarks.store.embedded --quick      # three hours of a machine
 
 What is measured, in one run: samples appended a second (SQLite `executemany` of the same rows beside it), bytes a sample, what
 sealing an hour takes, the last five minutes at 1 s and a day at 1 min (mean, low, high) of three signals, the last of every

@@ -1,6 +1,6 @@
-"""Up to a hundred MTConnect agents in one process, as light as they can be: what `benchmarks/edge.py` has a gateway read.
+"""Up to a hundred MTConnect agents in one process, as light as they can be: what `benchmarks/edges/cost.py` has a gateway read.
 
-    python -m benchmarks.edge_load 10        # documents a second of each; prints its port
+    python -m benchmarks.edges.load 10        # documents a second of each; prints its port
 
 Each streams documents of eight changed values, as /m00/…, /m01/…; a tool change each minute.
 """

@@ -1,6 +1,6 @@
 """How well the clock fold finds a control's clock, and how often the truth lies in the spread that it states.
 
-    python -m benchmarks.clock [--hours 2] [--runs 40] [--seed 1] [--recording okuma.txt]
+    python -m benchmarks.edges.clock [--hours 2] [--runs 40] [--seed 1] [--recording okuma.txt]
 
 Simulated clocks of any offset and a drift of up to 100 ppm, read by each of our protocols as they are: a full second or a
 millisecond, over a round trip or one way, with the latency of a quiet network or of one that stalls now and then. Each estimate

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Where recorded parts take longer than length over feed, which effects cause it, and how far the gap shrinks on other parts.
 
-    .venv/bin/python benchmarks/gap_program_time.py [--without-overrides] [--withheld] [--json]
+    .venv/bin/python benchmarks/gap/program_time.py [--without-overrides] [--withheld] [--json]
 
 Recordings: ten plates of the NIST Smart Manufacturing Systems Test Bed (CNCTWIN_DATA or ../shared/data), imported as run logs
 into a case. The twin knows nothing of the control; effects are fitted on plates 13, 14 and 15 and judged on all other runs of the
@@ -52,7 +52,7 @@ WITHHELD: Mapping[str, Mapping[str, Mapping[str, float]]] = {
 
 def data_folder() -> Path:
     """Where the recordings are."""
-    return Path(os.environ.get("CNCTWIN_DATA") or Path(__file__).resolve().parent.parent.parent / "shared" / "data")
+    return Path(os.environ.get("CNCTWIN_DATA") or Path(__file__).resolve().parents[3] / "shared" / "data")
 
 
 def plates_case(

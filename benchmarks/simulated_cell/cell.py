@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from cnctwin.simulated_cell.disturbance import Disturbance, Kind, draw_disturbance, draw_disturbances
-from cnctwin.simulated_cell.fault import LASTS_S, SIZES, Fault, FaultKind, Overlap, draw_bursts
-from cnctwin.simulated_cell.part_program import Work
-from cnctwin.simulated_cell.schedule import DAY_S, SHIFTS_S, WORK_DAYS, Machine, Schedule, draw_machine, draw_schedule
-from cnctwin.simulated_cell.signals import signals, weather
+from benchmarks.simulated_cell.disturbance import Disturbance, Kind, draw_disturbance, draw_disturbances
+from benchmarks.simulated_cell.fault import LASTS_S, SIZES, Fault, FaultKind, Overlap, draw_bursts
+from benchmarks.simulated_cell.part_program import Work
+from benchmarks.simulated_cell.schedule import DAY_S, SHIFTS_S, WORK_DAYS, Machine, Schedule, draw_machine, draw_schedule
+from benchmarks.simulated_cell.signals import signals, weather
 
 SLOTS_A_DAY = 3
 FAULTS_A_DAY = 9

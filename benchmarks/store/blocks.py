@@ -1,6 +1,6 @@
 """What vibration costs: blocks of a second of three axes at 1 kHz, noise of some least significant bits, sealed; bytes a sample.
 
-python -m benchmarks.store_blocks
+python -m benchmarks.store.blocks
 """
 
 import shutil

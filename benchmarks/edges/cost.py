@@ -1,8 +1,8 @@
 """What an edge costs: the store, a day without a broker, and a gateway of many machines.
 
-    .venv/bin/python benchmarks/edge.py store            # append and drain, beside what SQLite can do at most
-    .venv/bin/python benchmarks/edge.py gateway          # 50 machines at 10 Hz in one process, share of a core
-    .venv/bin/python benchmarks/edge.py outage --hours 24 --kills 10
+    .venv/bin/python benchmarks/edges/cost.py store            # append and drain, beside what SQLite can do at most
+    .venv/bin/python benchmarks/edges/cost.py gateway          # 50 machines at 10 Hz in one process, share of a core
+    .venv/bin/python benchmarks/edges/cost.py outage --hours 24 --kills 10
 
 Figures of one run belong together; on a busy computer only their ratios mean something.
 """
@@ -20,7 +20,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
-from benchmarks.edge_load import observations
+from benchmarks.edges.load import observations
 from edge.config import StoreSection
 from edge.place import Place
 from edge.running.ring import Ring
@@ -31,7 +31,7 @@ from tests.edge.controls.mtconnect.agent_documents import streams
 from tests.edge.host_watch import HostWatch
 from tests.wire.mosquitto import Mosquitto
 
-PROJECT = Path(__file__).parents[1]
+PROJECT = Path(__file__).parents[2]
 ROW = "x" * 600
 TICKS = os.sysconf("SC_CLK_TCK")
 
@@ -149,7 +149,7 @@ def gateway(machines: int, rate_hz: float, seconds: float, pin: bool) -> None:
     with (
         tempfile.TemporaryDirectory() as temporary,
         Mosquitto() as mosquitto,
-        child("-m", "benchmarks.edge_load", str(rate_hz)) as load,
+        child("-m", "benchmarks.edges.load", str(rate_hz)) as load,
     ):
         assert load.stdout is not None
         port, folder = load.stdout.readline().strip(), Path(temporary)
@@ -191,13 +191,13 @@ def xml_floor_us() -> float:
 
 
 def outage(hours: float, kills: int, rows_per_s: int, seed: int) -> None:
-    """An edge at 10 Hz, its day sped up; the broker comes back at its end. The control is `benchmarks.edge_outage`."""
+    """An edge at 10 Hz, its day sped up; the broker comes back at its end. The control is `benchmarks.edges.outage`."""
     chance = random.Random(seed)
     looks = round(hours * 36_000)
     with tempfile.TemporaryDirectory() as temporary, Mosquitto() as mosquitto:
         mosquitto.kill()
         folder, began_s = Path(temporary), time.monotonic()
-        command = ["-m", "benchmarks.edge_outage", str(folder), str(mosquitto.port), str(looks), str(rows_per_s)]
+        command = ["-m", "benchmarks.edges.outage", str(folder), str(mosquitto.port), str(looks), str(rows_per_s)]
         died = 0
         for kill in range(kills):
             upto = round(looks * (kill + chance.random()) / kills)

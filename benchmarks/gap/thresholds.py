@@ -1,6 +1,6 @@
 """Where the thresholds of the gap diagnosis come from: healthy machines, and machines whose effect is not in the catalogue.
 
-    .venv/bin/python benchmarks/gap_thresholds.py --healthy 16 --each 1 --seed 501
+    .venv/bin/python benchmarks/gap/thresholds.py --healthy 16 --each 1 --seed 501
 
 * healthy machines of the reference plant: for each candidate the largest decrease of a signal's mean square (floors²), how many
   sigmas it had, and whether `twin.gap.null` would have accepted it

@@ -1,6 +1,6 @@
 """An hour of production over FOCAS with faults, what it has to hold, and what a look costs.
 
-    python -m benchmarks.edge_focas [--seconds 3600] [--seeds 1 2 3]
+    python -m benchmarks.edges.focas [--seconds 3600] [--seeds 1 2 3]
 
 The edge's connection, parser and pipeline read our FOCAS server over TCP; the machine's time is simulated, so an hour takes about
 a minute. Prints how many looks, holes and tool changes there were, how many of each check failed, and the CPU time of a look in

@@ -18,7 +18,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from cnctwin.simulated_cell.schedule import DAY_S, SHIFTS_S, WORK_DAYS
+from benchmarks.simulated_cell.schedule import DAY_S, SHIFTS_S, WORK_DAYS
 
 Floats = NDArray[np.float64]
 OF_MACHINE, OF_EVENT = 0.35, 0.20

@@ -1,6 +1,7 @@
 """The blind check as a study: the gap diagnosis beside three baselines, on the same sealed cases.
 
-    .venv/bin/python benchmarks/blind_check.py --cases 600 --seed 1 --workers 2 [--only ours bic lasso forest] [--out result.txt]
+    .venv/bin/python benchmarks/gap/blind_check.py --cases 600 --seed 1 --workers 2 [--only ours bic lasso forest] [--out
+    result.txt]
 
 Prints accuracy as a curve over the size of the effect, with intervals, method by method. Takes a minute a case and worker or so;
 the baselines some seconds of it. The forest is trained on machines that the twin simulates, of other seeds than the check's.
@@ -11,8 +12,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-import gap_baselines
-
+from benchmarks.gap import baselines as gap_baselines
 from cnctwin.blind_check.case_folder import write_case
 from cnctwin.blind_check.check import Diagnose, run_checks
 from cnctwin.blind_check.question import Sort, draw

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.evaluation.range_based import Range
+from benchmarks.evaluation.range_based import Range
 
 Floats = NDArray[np.float64]
 THRESHOLDS = 250

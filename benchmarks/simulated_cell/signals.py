@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from cnctwin.simulated_cell import disturbance, fault
-from cnctwin.simulated_cell.disturbance import Disturbance, Kind
-from cnctwin.simulated_cell.fault import Fault, FaultKind
-from cnctwin.simulated_cell.part_program import Work
-from cnctwin.simulated_cell.schedule import DAY_S, Machine, Schedule
+from benchmarks.simulated_cell import disturbance, fault
+from benchmarks.simulated_cell.disturbance import Disturbance, Kind
+from benchmarks.simulated_cell.fault import Fault, FaultKind
+from benchmarks.simulated_cell.part_program import Work
+from benchmarks.simulated_cell.schedule import DAY_S, Machine, Schedule
 
 Floats = NDArray[np.float64]
 FEATURES = ("spindle_load_pct", "spindle_rpm", "feed_mm_min", "spindle_temp_c", "vibration_rms_g")

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cnctwin.simulated_cell.part_program import Operation, Work, draw_program
+from benchmarks.simulated_cell.part_program import Operation, Work, draw_program
 
 Floats = NDArray[np.float64]
 DAY_S = 86400

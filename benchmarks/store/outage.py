@@ -1,6 +1,6 @@
 """A store on a server that is away for an hour: what waits, what that costs, and whether everything is there afterwards, once.
 
-    .venv/bin/python benchmarks/store_outage.py [--server victoria|influxd] [--hours 1] [--machines 4]
+    .venv/bin/python benchmarks/store/outage.py [--server victoria|influxd] [--hours 1] [--machines 4]
 
 The hour is one by volume: each machine tells 20 signals ten times a second, as fast as the store takes them, while the server is
 cut off. Then it comes back, and is killed with -9 and started again in the middle of the draining. At the end each sample is
@@ -18,7 +18,7 @@ from random import Random
 
 import httpx
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT))
 
 from cnctwin.memory.store.contract import Message, Query  # noqa: E402

@@ -1,6 +1,7 @@
-"""The edge of `benchmarks/edge.py outage`: a control that shows a look each 0.1 s of its own time, as fast as they are taken.
+"""The edge of `benchmarks/edges/cost.py outage`: a control that shows a look each 0.1 s of its own time, as fast as they are
+taken.
 
-    python -m benchmarks.edge_outage FOLDER PORT LOOKS ROWS_PER_S
+    python -m benchmarks.edges.outage FOLDER PORT LOOKS ROWS_PER_S
 
 It is the whole edge but for the wire to the control: sweeps, parse, tool change, store, session. Each look changes, and is one
 row, so the number of a row is the number of its look plus one, whatever happened in between. Where it is started again it goes on
