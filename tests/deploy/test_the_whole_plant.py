@@ -19,7 +19,7 @@ from sparkplug.host import EventKind, HostApplication
 from sparkplug.metric import Change, MetricSpec, NodeId
 from tests.deploy.plant import Plant, need_programs
 from tests.deploy.wire_client import WireClient
-from tests.processors.courier.receiving_server import ReceivingServer
+from tests.processors.alerts.courier.receiving_server import ReceivingServer
 
 pytestmark = pytest.mark.broker
 NODE = NodeId("cnc", "edge-okuma")

@@ -18,7 +18,7 @@ from sparkplug.metric import Change, MetricSpec, NodeId
 from tests.cnctwin.api.served_plant import PATIENCE_S, Stream, get, post, served
 from tests.cnctwin.api.small_plant import client_of, small_plant
 from tests.edge.host_watch import wait
-from tests.processors.courier.alert_shop import VIBRATION
+from tests.processors.alerts.courier.alert_shop import VIBRATION
 from tests.wire.mosquitto import Mosquitto
 
 PROXIED = Access(proxy_header="X-Remote-User", proxy="127.0.0.1")

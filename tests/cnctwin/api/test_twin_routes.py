@@ -14,7 +14,7 @@ from cnctwin.api.store_reader import StoreReader
 from cnctwin.memory.store.opening import open_store
 from processors.discovery import find
 from tests.cnctwin.api.small_plant import birth, client_of, data, small_plant
-from tests.cnctwin.replay.simulated_day import T0_MS, Day
+from tests.cnctwin.memory.replay.simulated_day import T0_MS, Day
 from twin.forest.forest import forest_of_arrays
 from twin.forest.regression import RegressionForest
 from twin.residual.features import feature

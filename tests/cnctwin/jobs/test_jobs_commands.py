@@ -16,9 +16,9 @@ from cnctwin.errors import UsageError
 from cnctwin.jobs.client import JobsClient
 from cnctwin.jobs.consumer import Setting
 from sparkplug.broker import BrokerAddress
+from tests.cnctwin.commands.test_gap import written
 from tests.cnctwin.jobs.conftest import PatientClient, Start, over
 from tests.cnctwin.jobs.consumer_on_trial import setting
-from tests.cnctwin.test_gap_commands import written
 from tests.twin.gap.small_case import warm_case
 from twin.machine import read_machine
 

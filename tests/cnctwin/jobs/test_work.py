@@ -7,8 +7,8 @@ import pytest
 
 from cnctwin.jobs.child import attempt
 from cnctwin.jobs.files_root import FilesRoot
+from tests.cnctwin.commands.test_gap import SECOND, written
 from tests.cnctwin.jobs.counting import register
-from tests.cnctwin.test_gap_commands import SECOND, written
 from tests.twin.gap.small_case import warm_case
 from twin.machine import read_machine
 

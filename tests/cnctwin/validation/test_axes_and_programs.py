@@ -14,7 +14,7 @@ from cnctwin.validation.following_error import judged_following_error
 from cnctwin.validation.force import judged_force
 from cnctwin.validation.model import Twin
 from tests.recordings import recording
-from tests.twin.gap.programs import made, plate_runs, shop_program
+from tests.twin.gap.programs.written import made, plate_runs, shop_program
 from twin.machine import MachineFile, machine_from_toml
 from twin.runlog import RunLog, run_log
 from twin.simulator.simulation import simulate

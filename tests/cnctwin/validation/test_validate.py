@@ -25,7 +25,7 @@ from sparkplug.host import HostApplication
 from sparkplug.host_session import EventKind
 from tests.cnctwin.validation.made_night import START_S, told_twin, warm_night, working_spindle
 from tests.cnctwin.validation.stored_night import stored, told, twin_told
-from tests.twin.gap.programs import made, shop_program
+from tests.twin.gap.programs.written import made, shop_program
 from tests.wire.mosquitto import Mosquitto
 from twin.runlog import RunLog, run_log, write_run
 

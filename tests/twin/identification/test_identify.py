@@ -7,7 +7,7 @@ import pytest
 
 from tests.depth import IS_FULL
 from tests.recordings import recordings_folder
-from tests.twin.test_simulation import MACHINE
+from tests.twin.simulator.test_simulation import MACHINE
 from twin.case import Case, Run, RunEntry, RunKind, read_case
 from twin.errors import CaseError
 from twin.identification.axis_fit import AxisModel, AxisRecording, fit_axis

@@ -1,0 +1,148 @@
+"""`cnctwin alerts` against a real broker, the real processor and a courier with a receiver on loopback."""
+
+import json
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from cnctwin.commands.alerts import alerts_app, duration_s
+from cnctwin.errors import UsageError
+from processors.alerts.config import AlertsConfig
+from processors.alerts.courier.thread import Courier
+from processors.config import read_tables
+from processors.running.runtime import run
+from sparkplug.broker import BrokerAddress
+from sparkplug.datatype import DataType
+from sparkplug.edge_node import EdgeNode
+from sparkplug.metric import Change, MetricSpec, NodeId
+from tests.processors.alerts.courier.alert_shop import VIBRATION
+from tests.processors.alerts.courier.receiving_server import Answer, ReceivingServer
+from tests.wire.mosquitto import Mosquitto
+
+pytestmark = pytest.mark.broker
+TABLE = '[alerts]\ngroup_wait_s = 0.0\n[alerts.receivers.desk]\ntype = "webhook"\nurl = "{url}/desk"\n'
+
+
+class Cnctwin:
+    """The command, run in this process to its end."""
+
+    def __init__(self, broker: BrokerAddress, patch: pytest.MonkeyPatch, captured: pytest.CaptureFixture[str]) -> None:
+        self._broker, self._patch, self._captured = broker, patch, captured
+
+    def __call__(self, *arguments: str) -> tuple[int, str, str]:
+        """Exit code, stdout, stderr; an error of ours is exit code 2, as in cnctwin.cli."""
+        self._captured.readouterr()
+        self._patch.setenv("CNCTWIN_BROKER", self._broker.url)
+        try:
+            code = alerts_app(list(arguments), standalone_mode=False)
+        except UsageError as error:
+            print(f"cnctwin: {error}", file=sys.stderr)
+            code = 2
+        return int(code or 0), *self._captured.readouterr()
+
+
+@pytest.fixture
+def broker(mosquitto: Mosquitto) -> BrokerAddress:
+    return BrokerAddress(*mosquitto.address)
+
+
+@pytest.fixture
+def cnctwin(broker: BrokerAddress, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Cnctwin:
+    return Cnctwin(broker, monkeypatch, capfd)
+
+
+@pytest.fixture
+def server() -> Iterator[ReceivingServer]:
+    with ReceivingServer() as server:
+        yield server
+
+
+@pytest.fixture
+def edge(broker: BrokerAddress, server: ReceivingServer, tmp_path: Path) -> Iterator[EdgeNode]:
+    """A machine, with the processor and the courier at work."""
+    file = tmp_path / "alerts.toml"
+    file.write_text(TABLE.format(url=server.url))
+    edge = EdgeNode(broker, NodeId("cnc", "edge-okuma"), [MetricSpec("health/beat", DataType.INT64)])
+    edge.declare_device("okuma", [MetricSpec(VIBRATION, DataType.BOOLEAN, value=False)])
+    edge.start()
+    stop = threading.Event()
+    processor = threading.Thread(target=run, args=(("alerts",), broker, file, stop))
+    processor.start()
+    courier = Courier(broker, AlertsConfig.model_validate(read_tables(file)["alerts"]))
+    courier.start()
+    yield edge
+    stop.set()
+    processor.join(20)
+    courier.stop()
+    edge.stop()
+
+
+def fire(edge: EdgeNode, value: bool = True) -> None:
+    while not edge.publish("okuma", [Change(VIBRATION, value, time.time_ns() // 1_000_000)]):
+        time.sleep(0.05)
+
+
+def test_list_acknowledge_silence_and_test(cnctwin: Cnctwin, edge: EdgeNode, server: ReceivingServer) -> None:
+    code, out, err = cnctwin("list")
+    assert (code, err) == (0, "")
+    assert "no alert fires" in out
+    fire(edge)
+    deadline_s = time.monotonic() + 60.0
+    while cnctwin("list")[0] != 1:
+        assert time.monotonic() < deadline_s
+    code, out, _ = cnctwin("list")
+    assert "rule_vibration" in out
+    assert "firing" in out
+    (alert,) = json.loads(cnctwin("list", "--json")[1])["alerts"]
+    code, out, err = cnctwin("ack", alert["fingerprint"][:6], "--by", "ada", "--comment", "on my way")
+    assert (code, out, err) == (0, "rule_vibration on okuma is acknowledged\n", "")
+    code, out, _ = cnctwin("list")
+    assert code == 0  # somebody takes care of it
+    assert "ada" in out
+    code, out, _ = cnctwin("silence", "--machine", "okuma", "--for", "2h", "--by", "ada", "--comment", "[new] tool")
+    assert code == 0
+    silence = out.split()[1]
+    assert f"silence {silence}: machine okuma, until " in cnctwin("list")[1]
+    assert "[new] tool" in cnctwin("list")[1]
+    assert cnctwin("unsilence", silence, "--by", "ada") == (0, f"silence {silence} has ended\n", "")
+    assert cnctwin("test", "desk") == (0, "desk: delivered\n", "")
+    assert server.received[-1].json["groupKey"] == "test"
+    server.answers.append(Answer(401))
+    assert cnctwin("test", "desk") == (1, "", "desk: failed: 127.0.0.1 answered 401\n")
+
+
+def test_wrong_input_is_one_line_and_exit_code_2(cnctwin: Cnctwin, edge: EdgeNode) -> None:
+    for arguments, said in (
+        (("ack", "0123", "--by", "ada"), "no alerts fire whose fingerprint begins with '0123'; there are: none"),
+        (("silence", "--for", "2h", "--by", "ada"), "a silence needs --machine, --alert or --severity"),
+        (("silence", "--machine", "m", "--for", "soon", "--by", "ada"), "'soon' is no duration"),
+        (("unsilence", "nothing", "--by", "ada"), "there is no silence nothing"),
+        (("test", "nobody"), "there is no receiver 'nobody'; there are: desk"),
+    ):
+        code, out, err = cnctwin(*arguments)
+        assert (code, out) == (2, "")
+        assert said in err
+        assert len(err.splitlines()) == 1
+
+
+def test_without_the_processor_it_says_so(cnctwin: Cnctwin, broker: BrokerAddress) -> None:
+    code, _, err = cnctwin("list", "--wait", "1")
+    assert code == 2
+    assert "does the processor run? (cnctwin process alerts)" in err
+
+
+def test_without_a_broker_it_says_so(mosquitto: Mosquitto, cnctwin: Cnctwin) -> None:
+    mosquitto.kill()
+    code, _, err = cnctwin("list", "--wait", "1")
+    assert code == 2
+    assert "no connection to mqtt://127.0.0.1" in err
+
+
+@pytest.mark.parametrize("text", ["", "0", "-1h", "1w", "1e3", "31d", "h"])
+def test_what_is_no_duration(text: str) -> None:
+    with pytest.raises(UsageError):
+        duration_s(text)

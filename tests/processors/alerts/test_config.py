@@ -1,0 +1,50 @@
+"""A wrong configuration of the alerts is refused, and no secret is repeated."""
+
+from typing import Any
+
+import pytest
+
+from processors.alerts.config import AlertsConfig
+from processors.config import Configuration
+from processors.errors import ConfigurationError
+from tests.processors.alerts.courier.alert_shop import DESK
+
+
+@pytest.mark.parametrize(
+    ("table", "said"),
+    [
+        ({"signals": {"twin/nonsense": {"severity": "high"}}}, "'twin/nonsense' is no alarm signal"),
+        ({"routes": [{"receivers": ["nobody"]}]}, "there is no receiver 'nobody'"),
+        ({"heartbeat": {"receiver": "nobody"}}, "heartbeat: there is no receiver"),
+        ({"cells": {"a": ["okuma"]}}, "alerts watch all machines together"),
+        ({"labels": {"machine": "x"}}, "labels: 'machine'"),
+        ({"quiet_hours": [{"time_zone": "Mars/Olympus", "start": "22:00", "end": "06:00"}]}, "no time zone 'Mars/Olympus'"),
+        ({"quiet_hours": [{"time_zone": "UTC", "start": "25:00", "end": "06:00"}]}, "'25:00' is no time of the day"),
+        ({"receivers": {"a b": DESK["desk"]}}, "receivers: 'a b'"),
+    ],
+)
+def test_a_wrong_configuration_says_what_is_wrong(table: dict[str, Any], said: str) -> None:
+    with pytest.raises(ConfigurationError) as error:
+        Configuration(AlertsConfig, table, name="alerts")
+    assert said in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("receiver", "said"),
+    [
+        ({"type": "pushover", "token": "hunter2", "user": "$U"}, "a secret does not stand in the configuration"),
+        ({"type": "pushover", "token": "$T", "user": "$U", "password": "hunter2"}, "Extra inputs are not permitted"),
+        ({"type": "webhook", "url": "https://ada:hunter2@plant.example/x"}, "holds a user name or a password"),
+        ({"type": "webhook", "url": "https://plant.example/x?key=hunter2"}, "has a query"),
+        ({"type": "webhook", "url": "http://plant.example/hunter2"}, "is not encrypted: use https://"),
+        ({"type": "webhook", "url": "ftp://plant.example/hunter2"}, "is not https://"),
+        ({"type": "apprise", "url": "pover://hunter2@hunter2"}, "a secret does not stand in the configuration"),
+        ({"type": "hunter2"}, "receivers.x"),
+    ],
+)
+def test_a_secret_in_the_configuration_is_refused_and_not_repeated(receiver: dict[str, Any], said: str) -> None:
+    with pytest.raises(ConfigurationError) as error:
+        Configuration(AlertsConfig, {"receivers": {"x": receiver}}, name="alerts")
+    assert said in str(error.value)
+    if receiver["type"] != "hunter2":
+        assert "hunter2" not in str(error.value)
