@@ -20,8 +20,8 @@ from tempfile import TemporaryDirectory
 
 import httpx
 
-from cnctwin.api.live_plant import LivePlant
-from cnctwin.api.trace import SAMPLES_MAX
+from cnctwin.api.live.plant import LivePlant
+from cnctwin.api.live.trace import SAMPLES_MAX
 from cnctwin.processes.private_broker import PrivateBroker
 from sparkplug.broker import BrokerAddress
 from sparkplug.datatype import DataType

@@ -13,7 +13,7 @@ import numpy as np
 
 from cnctwin.memory.store.contract import Message
 from cnctwin.memory.store.embedded import EmbeddedStore
-from cnctwin.memory.store.manifest import DAY_MS, HOUR_MS
+from cnctwin.memory.store.sealed.manifest import DAY_MS, HOUR_MS
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId, Reading
 from sparkplug.quality import Quality

@@ -7,20 +7,20 @@ from importlib.metadata import version
 
 from fastapi import FastAPI
 
-from cnctwin.api.alert_routes import alert_routes
 from cnctwin.api.errors import handle_errors
 from cnctwin.api.failures import Failures
-from cnctwin.api.fan_out import FanOut
-from cnctwin.api.gap_routes import gap_routes
 from cnctwin.api.guard import Guard
-from cnctwin.api.health_routes import health_routes
-from cnctwin.api.history_routes import history_routes
-from cnctwin.api.job_routes import job_routes
-from cnctwin.api.metrics_routes import metrics_routes
-from cnctwin.api.page_routes import page_routes, serve_page
-from cnctwin.api.past_routes import past_routes
-from cnctwin.api.plant_routes import plant_routes
-from cnctwin.api.prediction_routes import prediction_routes
+from cnctwin.api.live.fan_out import FanOut
+from cnctwin.api.routes.alerts import alert_routes
+from cnctwin.api.routes.gap import gap_routes
+from cnctwin.api.routes.health import health_routes
+from cnctwin.api.routes.history import history_routes
+from cnctwin.api.routes.jobs import job_routes
+from cnctwin.api.routes.metrics import metrics_routes
+from cnctwin.api.routes.page import page_routes, serve_page
+from cnctwin.api.routes.past import past_routes
+from cnctwin.api.routes.plant import plant_routes
+from cnctwin.api.routes.prediction import prediction_routes
 from cnctwin.api.sources import Sources
 
 ABOUT = "A digital twin of CNC machines: state, predictions, history, gaps, alerts. Times are ms since 1970, UTC."

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
-from cnctwin.api.trace import Sample
+from cnctwin.api.live.trace import Sample
 from cnctwin.plant.view import TWIN_PREFIX
 from sparkplug.quality import Quality
 

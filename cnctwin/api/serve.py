@@ -43,10 +43,10 @@ def serve(options: ServeOptions, broker: BrokerAddress, stop: Event) -> None:
     """Serve until stopped. Raises UsageError for what must not be (an open address without a token) or cannot be."""
     try:
         from cnctwin.api.application import create_app  # noqa: PLC0415  with the extra that it needs
-        from cnctwin.api.live_plant import LivePlant  # noqa: PLC0415
+        from cnctwin.api.live.plant import LivePlant  # noqa: PLC0415
+        from cnctwin.api.live.viewer import Viewer  # noqa: PLC0415
         from cnctwin.api.server import Server  # noqa: PLC0415
         from cnctwin.api.sources import Sources  # noqa: PLC0415
-        from cnctwin.api.viewer import Viewer  # noqa: PLC0415
     except ModuleNotFoundError as missing:
         raise UsageError(f"the page needs the package {missing.name}; {EXTRA}") from None
     from cnctwin.api.constants import Constants  # noqa: PLC0415

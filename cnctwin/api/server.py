@@ -9,7 +9,7 @@ from typing import Self
 import uvicorn
 from fastapi import FastAPI
 
-from cnctwin.api.fan_out import FanOut
+from cnctwin.api.live.fan_out import FanOut
 from cnctwin.errors import ProgramError, UsageError
 
 CONNECTIONS_MAX = 300

@@ -5,11 +5,11 @@ from pathlib import Path
 
 from cnctwin.api.access import Access
 from cnctwin.api.constants import Constants
-from cnctwin.api.live_plant import LivePlant
+from cnctwin.api.live.plant import LivePlant
+from cnctwin.api.live.viewer import Viewer
 from cnctwin.api.nights import Nights
 from cnctwin.api.residual import Models
 from cnctwin.api.store_reader import StoreReader
-from cnctwin.api.viewer import Viewer
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,7 +18,7 @@ from fastapi import FastAPI
 
 from cnctwin.api.access import Access
 from cnctwin.api.application import create_app
-from cnctwin.api.live_plant import LivePlant
+from cnctwin.api.live.plant import LivePlant
 from cnctwin.api.sources import Sources
 from cnctwin.jobs.client import JobsClient
 from cnctwin.memory.store.influx.address import parse

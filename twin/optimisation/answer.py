@@ -14,7 +14,7 @@ class Objective(StrEnum):
 
 
 class SpeedChanges(StrEnum):
-    """Where the spindle may change its speed between two lines (`twin.optimisation.speed_groups`)."""
+    """Where the spindle may change its speed between two lines (`twin.optimisation.speeds.groups`)."""
 
     ANYWHERE = "anywhere"
     IN_AIR = "in_air"

@@ -16,8 +16,8 @@ from twin.optimisation.reasons import what_binds
 from twin.optimisation.rewriting import Rewritten
 from twin.optimisation.seeds import by_itself, closed_form
 from twin.optimisation.shown import ShownLines, advance_of_cuts, limits_shown, shown_lines, totals
-from twin.optimisation.speed_notes import speed_notes
-from twin.optimisation.stretches import changes_in_material
+from twin.optimisation.speeds.notes import speed_notes
+from twin.optimisation.speeds.stretches import changes_in_material
 from twin.optimisation.uncertainty import PRICED, sensitivity
 from twin.optimisation.words import source_lines
 

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.optimisation.allowed import Allowed
-from twin.optimisation.speed_groups import SpeedGroups
+from twin.optimisation.speeds.groups import SpeedGroups
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

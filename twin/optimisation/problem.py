@@ -25,7 +25,7 @@ from twin.optimisation.allowed import Allowed, Span
 from twin.optimisation.closed_form import Worth
 from twin.optimisation.economy import Economy
 from twin.optimisation.program import Programmed
-from twin.optimisation.speed_groups import NOBODY, SpeedGroups
+from twin.optimisation.speeds.groups import NOBODY, SpeedGroups
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -15,7 +15,7 @@ from twin.optimisation.economy import Economy
 from twin.optimisation.forces import CutForces
 from twin.optimisation.problem import Problem, control_of
 from twin.optimisation.program import Programmed, programmed
-from twin.optimisation.speed_groups import speed_groups
+from twin.optimisation.speeds.groups import speed_groups
 from twin.simulator.response import check_effects
 
 POPULATION_MAX, EVOLUTIONS_MAX, ISLANDS_MAX = 10_000, 100_000, 64

@@ -17,7 +17,7 @@ from twin.gcode import interpret
 from twin.motion.path import EventKind, Kind, Path, path_from_moves
 from twin.optimisation.answer import SpeedChanges
 from twin.optimisation.problem import Problem
-from twin.optimisation.stretches import changes_in_material
+from twin.optimisation.speeds.stretches import changes_in_material
 from twin.optimisation.words import (
     INCH_MM,
     branches,

@@ -17,7 +17,7 @@ from twin.optimisation.allowed import Span
 from twin.optimisation.answer import Objective, SpeedChanges
 from twin.optimisation.closed_form import Worth, best_together
 from twin.optimisation.problem import Problem
-from twin.optimisation.speed_groups import speed_groups
+from twin.optimisation.speeds.groups import speed_groups
 
 Floats = NDArray[np.float64]
 COMMON = 12

@@ -13,12 +13,12 @@ from cnctwin.memory.store import hot, message_log
 from cnctwin.memory.store.contract import Column, Message, Query, StoreError
 from cnctwin.memory.store.database import Readers
 from cnctwin.memory.store.extra import MISSING, extra_is_there
-from cnctwin.memory.store.manifest import Checked, File, State, files
+from cnctwin.memory.store.sealed.manifest import Checked, File, State, files
 from cnctwin.memory.store.series_table import StoredClass
 from cnctwin.memory.store.windows import Told, Windows, raw_column
 
 if TYPE_CHECKING:
-    from cnctwin.memory.store.sealed_answers import SealedAnswers
+    from cnctwin.memory.store.sealed.answers import SealedAnswers
 
 ATTEMPTS_MAX = 5
 MINUTE_MS = 60_000
@@ -81,14 +81,14 @@ class Answering:
         if not any(f.state != State.SEALED for f in there) or not any(f.stored_class == StoredClass.ROLLUP for f in there):
             return
         self._sealed()
-        from cnctwin.memory.store.rollup import Span, fill_gone  # noqa: PLC0415
+        from cnctwin.memory.store.sealed.rollup import Span, fill_gone  # noqa: PLC0415
 
         fill_gone(self.checked, by_sid, every.values(), there, Span(query.from_ms, query.to_ms))
 
     def messages(self, machine: str, from_ms: int, to_ms: int) -> Iterator[Message]:
         """What came of a machine, in order."""
         if extra_is_there():
-            from cnctwin.memory.store.sealed_messages import SealedMessages  # noqa: PLC0415
+            from cnctwin.memory.store.sealed.messages import SealedMessages  # noqa: PLC0415
 
             sealed: message_log.SealedPage = SealedMessages(self.checked)
         else:
@@ -121,7 +121,7 @@ class Answering:
             if self._answers is None:
                 if not extra_is_there():
                     raise StoreError(f"{self._folder}: {MISSING}: sealed hours of this store cannot be read without them")
-                from cnctwin.memory.store.sealed_answers import SealedAnswers  # noqa: PLC0415
+                from cnctwin.memory.store.sealed.answers import SealedAnswers  # noqa: PLC0415
 
                 self._answers = SealedAnswers(self._folder)
             return self._answers

@@ -2,8 +2,8 @@
 
 from cnctwin.memory.store.contract import StoreError
 from cnctwin.memory.store.database import Readers
-from cnctwin.memory.store.manifest import DAY_MS
 from cnctwin.memory.store.plan import BLOCK_BYTES, SLOW_BYTES, TWIN_BYTES, Load
+from cnctwin.memory.store.sealed.manifest import DAY_MS
 from cnctwin.memory.store.series_table import StoredClass
 
 WEEK_MS = 7 * DAY_MS

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from cnctwin.memory.store.contract import Status
 from cnctwin.memory.store.extra import MISSING, extra_is_there
-from cnctwin.memory.store.manifest import DAY_MS, State
 from cnctwin.memory.store.retention import Retention
+from cnctwin.memory.store.sealed.manifest import DAY_MS, State
 from cnctwin.memory.store.series_table import StoredClass
 
 FREE_BYTES_MIN = 200_000_000

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from cnctwin.memory.store.intake import STAMP_MS_MAX
-from cnctwin.memory.store.manifest import DAY_MS, HOUR_MS, File, State
 from cnctwin.memory.store.retention import Retention
+from cnctwin.memory.store.sealed.manifest import DAY_MS, HOUR_MS, File, State
 from cnctwin.memory.store.series_table import StoredClass
 
 FILES_AT_ONCE = 200

@@ -19,7 +19,7 @@ from cnctwin.memory.store.store_status import FREE_BYTES_MIN
 from cnctwin.memory.store.writer_lock import WriterLock
 
 if TYPE_CHECKING:
-    from cnctwin.memory.store.sealed_tier import SealedTier
+    from cnctwin.memory.store.sealed.tier import SealedTier
 
 MARGIN_MS = 600_000
 _log = logging.getLogger(__name__)
@@ -81,7 +81,7 @@ class Writer:
         """A database that was never used, in a folder that holds sealed hours: they are taken over."""
         if self.db.execute("SELECT 1 FROM machines LIMIT 1").fetchone() or not extra_is_there():
             return
-        from cnctwin.memory.store.adoption import adopt  # noqa: PLC0415
+        from cnctwin.memory.store.sealed.adoption import adopt  # noqa: PLC0415
 
         with transaction(self.db, self.file):
             if taken := adopt(self.db, self.folder):
@@ -101,7 +101,7 @@ class Writer:
             if self.db.execute("SELECT 1 FROM files WHERE state = 0 LIMIT 1").fetchone():
                 raise StoreError(f"{self.folder}: {MISSING}: sealed hours of this store cannot be read without them")
             return None
-        from cnctwin.memory.store.sealed_tier import SealedTier  # noqa: PLC0415
+        from cnctwin.memory.store.sealed.tier import SealedTier  # noqa: PLC0415
 
         tier = SealedTier(self.db, self.file, self.table, margin_ms=margin_ms, free_bytes=self._free_bytes)
         tier.put_in_order()

@@ -11,10 +11,10 @@ from typing import Any, NamedTuple
 import httpx
 
 from cnctwin.api.application import create_app
-from cnctwin.api.live_plant import LivePlant
+from cnctwin.api.live.plant import LivePlant
+from cnctwin.api.live.viewer import Viewer
 from cnctwin.api.server import Server
 from cnctwin.api.sources import Sources
-from cnctwin.api.viewer import Viewer
 from sparkplug.broker import BrokerAddress
 from sparkplug.datatype import DataType
 from sparkplug.edge_node import EdgeNode

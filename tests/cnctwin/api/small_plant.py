@@ -9,7 +9,7 @@ import httpx
 from fastapi import FastAPI
 
 from cnctwin.api.application import create_app
-from cnctwin.api.live_plant import LivePlant
+from cnctwin.api.live.plant import LivePlant
 from cnctwin.api.sources import Sources
 from sparkplug.datatype import DataType
 from sparkplug.host_session import EventKind, HostEvent

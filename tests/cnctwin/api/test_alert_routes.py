@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from cnctwin.api import alert_routes
 from cnctwin.api.access import Access
+from cnctwin.api.routes import alerts as alert_routes
 from cnctwin.api.server import Server
 from processors.running.runtime import run
 from sparkplug.broker import BrokerAddress

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from cnctwin.api.gap_routes import folder_of
+from cnctwin.api.routes.gap import folder_of
 from sparkplug.quality import Quality
 from tests.cnctwin.api.small_plant import THERMAL, Client, birth, client_of, reading, small_plant
 

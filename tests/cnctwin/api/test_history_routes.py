@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from cnctwin.api.event_list import events_of, part_records
+from cnctwin.api.live.trace import AGE_MS_MAX, SAMPLES_MAX, Sample, Trace
 from cnctwin.api.store_reader import StoreReader
-from cnctwin.api.trace import AGE_MS_MAX, SAMPLES_MAX, Sample, Trace
 from cnctwin.memory.store.contract import Message, Pinned
 from cnctwin.memory.store.opening import open_store
 from sparkplug.quality import Quality

@@ -5,9 +5,9 @@ import json
 
 import pytest
 
-from cnctwin.api import job_routes
-from cnctwin.api.live_plant import LivePlant
-from cnctwin.api.viewer import Viewer
+from cnctwin.api.live.plant import LivePlant
+from cnctwin.api.live.viewer import Viewer
+from cnctwin.api.routes import jobs as job_routes
 from cnctwin.jobs.topics import STATE, state_topic
 from sparkplug.broker import BrokerAddress
 from tests.cnctwin.api.small_plant import client_of

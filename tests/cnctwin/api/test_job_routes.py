@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from cnctwin.api import job_routes
 from cnctwin.api.access import Access
+from cnctwin.api.routes import jobs as job_routes
 from cnctwin.api.server import Server
 from cnctwin.jobs.consumer import Consumer
 from cnctwin.jobs.topics import STATE

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
-from cnctwin.api.metrics_text import PHASES
 from cnctwin.api.nights import Nights
+from cnctwin.api.prometheus.text import PHASES
 from cnctwin.validation.history import file_of
 from tests.cnctwin.api.small_plant import EDGE, THERMAL, birth, client_of, death, now, small_plant
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from cnctwin.api.live_plant import LivePlant
+from cnctwin.api.live.plant import LivePlant
 from sparkplug.quality import Quality
 from tests.cnctwin.api.small_plant import EDGE, THERMAL, Client, birth, client_of, data, death, now, reading, small_plant
 
@@ -107,8 +107,8 @@ def test_history_that_comes_late_does_not_change_what_is_so_now() -> None:
 
 
 def test_machines_and_signals_have_limits_and_what_is_beyond_is_counted(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cnctwin.api.live_plant.MACHINES_MAX", 1)
-    monkeypatch.setattr("cnctwin.api.live_plant.SIGNALS_MAX", 2)
+    monkeypatch.setattr("cnctwin.api.live.plant.MACHINES_MAX", 1)
+    monkeypatch.setattr("cnctwin.api.live.plant.SIGNALS_MAX", 2)
     live = LivePlant()
     live.take([birth({"a": 1.0, "b": 1.0, "c": 1.0}, now()), birth({"a": 1.0}, now(), EDGE, "lathe")], now())
     assert live.machines() == ["vmc"]

@@ -5,11 +5,11 @@ import time
 
 import pytest
 
-from cnctwin.api import event_stream, fan_out
 from cnctwin.api.application import create_app
-from cnctwin.api.batches import machine_rows
-from cnctwin.api.fan_out import FanOut
-from cnctwin.api.live_plant import LivePlant
+from cnctwin.api.live import event_stream, fan_out
+from cnctwin.api.live.batches import machine_rows
+from cnctwin.api.live.fan_out import FanOut
+from cnctwin.api.live.plant import LivePlant
 from cnctwin.api.server import Server
 from cnctwin.api.sources import Sources
 from tests.cnctwin.api.served_plant import LOAD, Stream, get, machine, served, streamed, tell, wait_until_known
@@ -90,7 +90,7 @@ def test_a_server_that_is_started_anew_tells_a_reader_all_again(mosquitto: Mosqu
 
 
 def test_a_stream_is_never_silent_for_long(monkeypatch: pytest.MonkeyPatch, mosquitto: Mosquitto) -> None:
-    monkeypatch.setattr("cnctwin.api.live_plant.SILENCE_MS_MAX", 300)
+    monkeypatch.setattr("cnctwin.api.live.plant.SILENCE_MS_MAX", 300)
     monkeypatch.setattr(event_stream, "KEEP_ALIVE_S", 0.2)
     with machine(mosquitto) as edge, served(mosquitto) as server:
         wait_until_known(server, edge)
@@ -153,7 +153,7 @@ def test_streams_are_bounded_and_one_that_goes_makes_room(monkeypatch: pytest.Mo
 def test_a_message_is_encoded_once_for_all_who_read_it(monkeypatch: pytest.MonkeyPatch) -> None:
     encoded: list[str] = []
     monkeypatch.setattr(
-        "cnctwin.api.live_plant.machine_rows", lambda name, *a, **k: encoded.append(name) or machine_rows(name, *a, **k)
+        "cnctwin.api.live.plant.machine_rows", lambda name, *a, **k: encoded.append(name) or machine_rows(name, *a, **k)
     )
     live = small_plant()
     for _ in range(10):
@@ -174,7 +174,7 @@ def test_nothing_is_collected_for_a_machine_that_nobody_reads() -> None:
 
 
 def test_rows_that_wait_are_bounded_and_what_is_left_out_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cnctwin.api.live_plant.ROWS_MAX", 10)
+    monkeypatch.setattr("cnctwin.api.live.plant.ROWS_MAX", 10)
     live = small_plant()
     live.watch("vmc")
     live.flush(now())

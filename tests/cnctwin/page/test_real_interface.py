@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import Browser, expect
 
 from cnctwin.api.application import create_app
-from cnctwin.api.live_plant import LivePlant
+from cnctwin.api.live.plant import LivePlant
 from cnctwin.api.server import Server
 from cnctwin.api.sources import Sources
 from sparkplug.datatype import DataType

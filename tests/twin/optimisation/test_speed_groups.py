@@ -21,8 +21,8 @@ from twin.optimisation.problem import Problem
 from twin.optimisation.program import tool_numbers
 from twin.optimisation.question import Question, problem
 from twin.optimisation.seeds import closed_form, worth_of
-from twin.optimisation.speed_groups import Kept, speed_groups
-from twin.optimisation.stretches import changes_in_material
+from twin.optimisation.speeds.groups import Kept, speed_groups
+from twin.optimisation.speeds.stretches import changes_in_material
 
 SHORT = {"evolutions": 5, "population": 8, "islands": 1}
 HEAD = "G21 G90\nS8000 M3\nG0 Z10.\nX-10. Y0.\nZ-0.4\n"

@@ -21,7 +21,7 @@ MIDNIGHT_MS = T0_MS // DAY_MS * DAY_MS
 
 @pytest.fixture(autouse=True)
 def _a_file_an_hour(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cnctwin.memory.store.sealing.SAMPLES_MIN", 1)
+    monkeypatch.setattr("cnctwin.memory.store.sealed.sealing.SAMPLES_MIN", 1)
 
 
 def three_hours(*, later_ms: int = 0) -> list[Message]:
@@ -70,7 +70,7 @@ def test_the_hour_that_runs_is_not_sealed_for_being_quiet(tmp_path: Path) -> Non
 def test_a_birth_that_is_past_its_time_does_not_stand_in_the_way_of_its_samples(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("cnctwin.memory.store.sealing.SAMPLES_MIN", 20_000)
+    monkeypatch.setattr("cnctwin.memory.store.sealed.sealing.SAMPLES_MIN", 20_000)
     store = EmbeddedStore(tmp_path, writable=True, retention=Retention(raw_days=1.0))
     at_ms = MIDNIGHT_MS - T0_MS + 60_000
     store.append([told([reading("x_mm", 1.0, at_ms)], at_ms, kind=EventKind.BIRTH), *steady(at_ms + 1000, 20)])
@@ -147,7 +147,7 @@ def test_what_a_kill_has_left_over_goes(tmp_path: Path, monkeypatch: pytest.Monk
         raise KeyboardInterrupt
 
     with monkeypatch.context() as dying:
-        dying.setattr("cnctwin.memory.store.sealing.Sealer._remove", killed)
+        dying.setattr("cnctwin.memory.store.sealed.sealing.Sealer._remove", killed)
         with pytest.raises(KeyboardInterrupt):
             store.tidy(T0_MS + 5 * HOUR_MS)
     assert named(tmp_path, ".parquet") == 1
@@ -176,7 +176,7 @@ def test_sqlite_that_fails_while_tidying_is_a_store_that_fails(tmp_path: Path, m
     def full(*_: Any) -> None:
         raise sqlite3.OperationalError("database or disk is full")
 
-    monkeypatch.setattr("cnctwin.memory.store.sealing.Sealer.due", full)
+    monkeypatch.setattr("cnctwin.memory.store.sealed.sealing.Sealer.due", full)
     with pytest.raises(StoreError, match="disk is full"):
         store.tidy(T0_MS)
 

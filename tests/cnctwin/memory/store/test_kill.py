@@ -61,7 +61,7 @@ class Killed(BaseException):
 
 @pytest.mark.parametrize("at", ["before the file is there", "when it is there, before the commit", "after the commit"])
 def test_a_kill_while_an_hour_is_sealed(tmp_path: Path, at: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cnctwin.memory.store.sealing.SAMPLES_MIN", 1)
+    monkeypatch.setattr("cnctwin.memory.store.sealed.sealing.SAMPLES_MIN", 1)
     store = EmbeddedStore(tmp_path, writable=True)
     messages = steady(0, 700, every_ms=5000)
     store.append(messages)
@@ -74,9 +74,9 @@ def test_a_kill_while_an_hour_is_sealed(tmp_path: Path, at: str, monkeypatch: py
         if at == "before the file is there":
             patched.setattr(Path, "replace", die)
         elif at == "when it is there, before the commit":
-            patched.setattr("cnctwin.memory.store.sealing.Sealer._remove", die)
+            patched.setattr("cnctwin.memory.store.sealed.sealing.Sealer._remove", die)
         else:
-            patched.setattr("cnctwin.memory.store.sealed_tier.SealedTier._remove", die)
+            patched.setattr("cnctwin.memory.store.sealed.tier.SealedTier._remove", die)
         with pytest.raises(Killed):
             store.tidy(T0_MS + HOUR_MS + 600_000)
     writer._lock._file.close()  # as the kernel does

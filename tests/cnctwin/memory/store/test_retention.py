@@ -20,7 +20,7 @@ HOURS = 6
 @pytest.fixture
 def filled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> EmbeddedStore:
     """Six hours of a machine with what its twin says, and a pin in the third hour; all sealed, a file for each hour."""
-    monkeypatch.setattr("cnctwin.memory.store.sealing.SAMPLES_MIN", 1)
+    monkeypatch.setattr("cnctwin.memory.store.sealed.sealing.SAMPLES_MIN", 1)
     store = EmbeddedStore(tmp_path, writable=True, retention=Retention(raw_days=2.0, block_days=1.0, disk_bytes=None))
     for hour in range(HOURS):
         store.append(steady(hour * HOUR_MS, 600, every_ms=6000, start=hour))

@@ -30,7 +30,7 @@ def everything(store: EmbeddedStore) -> tuple[object, ...]:
 
 
 def test_sealing_changes_no_answer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cnctwin.memory.store.sealing.SAMPLES_MIN", 1)
+    monkeypatch.setattr("cnctwin.memory.store.sealed.sealing.SAMPLES_MIN", 1)
     store = EmbeddedStore(tmp_path, writable=True)
     odd = [
         told(
@@ -108,7 +108,7 @@ def test_late_history_is_merged_into_its_hour(tmp_path: Path) -> None:
 
 
 def test_two_readers_see_each_sample_once_while_it_is_sealed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cnctwin.memory.store.sealing.SAMPLES_MIN", 1)
+    monkeypatch.setattr("cnctwin.memory.store.sealed.sealing.SAMPLES_MIN", 1)
     store = EmbeddedStore(tmp_path, writable=True)
     for hour in range(4):
         store.append(steady(hour * HOUR_MS, 1000, every_ms=3500))
@@ -144,7 +144,7 @@ def test_two_readers_see_each_sample_once_while_it_is_sealed(tmp_path: Path, mon
 def test_a_damaged_file_is_named_and_the_rest_is_read(
     tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("cnctwin.memory.store.sealing.SAMPLES_MIN", 1)
+    monkeypatch.setattr("cnctwin.memory.store.sealed.sealing.SAMPLES_MIN", 1)
     store = EmbeddedStore(tmp_path, writable=True)
     store.append(steady(0, 2_000, every_ms=3500))
     store.tidy(T0_MS + 30 * HOUR_MS)
@@ -171,7 +171,7 @@ def test_a_damaged_file_is_named_and_the_rest_is_read(
 def test_a_damaged_database_is_set_aside_and_sealed_hours_are_taken_over(
     tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("cnctwin.memory.store.sealing.SAMPLES_MIN", 1)
+    monkeypatch.setattr("cnctwin.memory.store.sealed.sealing.SAMPLES_MIN", 1)
     store = EmbeddedStore(tmp_path, writable=True)
     store.append(
         [told([reading("x_mm", None, 0, BAD, "not known yet")], 0, kind=EventKind.BIRTH), *steady(50, 2000, every_ms=3500)]

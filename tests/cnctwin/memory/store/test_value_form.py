@@ -9,7 +9,7 @@ from hypothesis import given as drawn
 from hypothesis import settings
 from hypothesis import strategies as st
 
-from cnctwin.memory.store.sealed_column import forms_of, sealed_column
+from cnctwin.memory.store.sealed.column import forms_of, sealed_column
 from cnctwin.memory.store.value_form import CannotKeepError, Kind, given, kept, same
 from sparkplug.datatype import DataType
 from sparkplug.values import DataSet

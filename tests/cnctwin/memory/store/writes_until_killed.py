@@ -8,8 +8,9 @@ import os
 import sys
 from pathlib import Path
 
-from cnctwin.memory.store import sealed_tier, sealing
 from cnctwin.memory.store.embedded import EmbeddedStore
+from cnctwin.memory.store.sealed import sealing
+from cnctwin.memory.store.sealed import tier as sealed_tier
 from tests.cnctwin.memory.store.told import HOUR_MS, T0_MS, steady
 
 EVERY_MS, BATCH = 10_000, 200

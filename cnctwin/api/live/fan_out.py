@@ -6,9 +6,9 @@ Everything here runs in the event loop but `send`, which other threads call.
 import asyncio
 from collections.abc import Sequence
 
-from cnctwin.api.batches import ALL, Batch
 from cnctwin.api.errors import ApiError
-from cnctwin.api.live_plant import LivePlant
+from cnctwin.api.live.batches import ALL, Batch
+from cnctwin.api.live.plant import LivePlant
 
 READERS_MAX = 64
 BEHIND_MAX = 50  # messages, so 5 s at ten a second

@@ -10,9 +10,9 @@ import numpy as np
 import pyarrow.parquet as pq
 
 from cnctwin.memory.store import hot
-from cnctwin.memory.store.manifest import Checked, File
 from cnctwin.memory.store.message_log import Header, Parts, Sealed
-from cnctwin.memory.store.sealed_rows import HeaderOf, Ints, Part, read_rows
+from cnctwin.memory.store.sealed.manifest import Checked, File
+from cnctwin.memory.store.sealed.rows import HeaderOf, Ints, Part, read_rows
 from cnctwin.memory.store.series_table import HISTORY_BIT, RANK_MASK, RANKS, REASON_SHIFT
 from cnctwin.memory.store.value_form import PLAIN, Kind, given
 from sparkplug.metric import Reading

@@ -11,7 +11,7 @@ import numpy as np
 
 from cnctwin.memory.store.contract import StoreError
 from cnctwin.memory.store.hot import SeriesOf
-from cnctwin.memory.store.manifest import File
+from cnctwin.memory.store.sealed.manifest import File
 from cnctwin.memory.store.value_form import ARRAYS, NUMBERS, PLAIN, Kind, given
 from cnctwin.memory.store.windows import Numbers, Told, Windows
 from sparkplug.values import Value

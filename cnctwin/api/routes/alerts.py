@@ -13,9 +13,9 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from cnctwin.api.answers import Answer, Problem
 from cnctwin.api.errors import ApiError
-from cnctwin.api.health_routes import state_age_s
-from cnctwin.api.live_plant import LivePlant
-from cnctwin.api.viewer import Viewer
+from cnctwin.api.live.plant import LivePlant
+from cnctwin.api.live.viewer import Viewer
+from cnctwin.api.routes.health import state_age_s
 from cnctwin.commands.alerts import COMMAND, FRESH_S_MAX
 from sparkplug.connection import now_ms
 

@@ -16,11 +16,11 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from cnctwin.api.answers import Answer, Problem
 from cnctwin.api.errors import ApiError
-from cnctwin.api.gap_routes import REPORT_POLICY
-from cnctwin.api.health_routes import jobs_trouble
-from cnctwin.api.live_jobs import LiveJobs
+from cnctwin.api.live.jobs import LiveJobs
+from cnctwin.api.live.viewer import Viewer
+from cnctwin.api.routes.gap import REPORT_POLICY
+from cnctwin.api.routes.health import jobs_trouble
 from cnctwin.api.sources import Sources
-from cnctwin.api.viewer import Viewer
 from cnctwin.jobs.kinds import KINDS
 from cnctwin.jobs.request import RequestError, is_id, read_request
 from cnctwin.jobs.topics import CANCEL, REQUEST

@@ -9,9 +9,9 @@ from fastapi.responses import Response
 
 from cnctwin.api.answers import History
 from cnctwin.api.errors import ApiError
-from cnctwin.api.live_plant import LivePlant
-from cnctwin.api.memory_column import column
-from cnctwin.api.plant_routes import BUSY, UNKNOWN, Machine, unknown_machine
+from cnctwin.api.live.memory_column import column
+from cnctwin.api.live.plant import LivePlant
+from cnctwin.api.routes.plant import BUSY, UNKNOWN, Machine, unknown_machine
 from cnctwin.api.store_reader import StoreReader
 from cnctwin.api.value_object import QUALITY_NAMES, plain
 from cnctwin.memory.store.contract import Column, Store, StoreError

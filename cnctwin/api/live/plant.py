@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 from math import isfinite
 from typing import Any, NamedTuple
 
-from cnctwin.api.batches import Batch, Row, alerts_batch, fleet_rows, machine_rows, state_batch
 from cnctwin.api.fleet import fleet_item, is_key_signal
-from cnctwin.api.trace import Sample, Trace
+from cnctwin.api.live.batches import Batch, Row, alerts_batch, fleet_rows, machine_rows, state_batch
+from cnctwin.api.live.trace import Sample, Trace
 from cnctwin.api.value_object import plain, value_object
 from cnctwin.jobs.announcer import NODE as JOBS_NODE
 from cnctwin.plant.view import TWIN_PREFIX

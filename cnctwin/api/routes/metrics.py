@@ -4,8 +4,8 @@ from fastapi import APIRouter
 from fastapi.responses import Response
 
 from cnctwin.api.errors import ApiError
-from cnctwin.api.fan_out import FanOut
-from cnctwin.api.metrics_text import PlantCollector, text
+from cnctwin.api.live.fan_out import FanOut
+from cnctwin.api.prometheus.text import PlantCollector, text
 from cnctwin.api.sources import Sources
 from cnctwin.errors import ProgramError
 from cnctwin.memory.store.contract import Status

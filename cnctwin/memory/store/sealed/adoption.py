@@ -15,8 +15,8 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
-from cnctwin.memory.store.manifest import FOLDERS, State
-from cnctwin.memory.store.sealed_rows import METADATA, read_rows, sid_and_ending
+from cnctwin.memory.store.sealed.manifest import FOLDERS, State
+from cnctwin.memory.store.sealed.rows import METADATA, read_rows, sid_and_ending
 from cnctwin.memory.store.series_table import StoredClass, class_of
 from cnctwin.memory.store.value_form import Kind, given, kept
 

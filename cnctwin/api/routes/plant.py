@@ -6,11 +6,11 @@ from fastapi import APIRouter, Path, Query
 from fastapi.responses import Response
 
 from cnctwin.api.answers import FleetItem, Problem, State
-from cnctwin.api.batches import event
 from cnctwin.api.errors import ApiError
-from cnctwin.api.event_stream import EventStream
-from cnctwin.api.fan_out import FanOut
-from cnctwin.api.live_plant import LivePlant
+from cnctwin.api.live.batches import event
+from cnctwin.api.live.event_stream import EventStream
+from cnctwin.api.live.fan_out import FanOut
+from cnctwin.api.live.plant import LivePlant
 from sparkplug.connection import now_ms
 
 NAMES_SHOWN = 20

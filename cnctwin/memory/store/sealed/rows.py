@@ -16,7 +16,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from cnctwin.memory.store.sealed_column import forms_of, sealed_column
+from cnctwin.memory.store.sealed.column import forms_of, sealed_column
 from cnctwin.memory.store.series_table import HISTORY_BIT, RANK_MASK, REASON_SHIFT
 from cnctwin.memory.store.value_form import Kind
 

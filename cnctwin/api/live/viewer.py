@@ -8,9 +8,9 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from cnctwin.api.batches import Batch
-from cnctwin.api.live_jobs import LiveJobs
-from cnctwin.api.live_plant import LivePlant
+from cnctwin.api.live.batches import Batch
+from cnctwin.api.live.jobs import LiveJobs
+from cnctwin.api.live.plant import LivePlant
 from cnctwin.commands.alerts import STATE as ALERTS_TOPIC
 from cnctwin.plant.watch import viewer
 from sparkplug.broker import BrokerAddress

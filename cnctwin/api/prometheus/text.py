@@ -8,8 +8,8 @@ from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metri
 from prometheus_client.registry import Collector
 
 from cnctwin.api.fleet import GATE, GROWING, is_gap_figure
-from cnctwin.api.live_plant import NodeView
-from cnctwin.api.metrics_validation import validation_metrics
+from cnctwin.api.live.plant import NodeView
+from cnctwin.api.prometheus.validation import validation_metrics
 from cnctwin.api.sources import Sources
 from cnctwin.memory.store.contract import Status
 from cnctwin.plant.view import TWIN_PREFIX

@@ -10,8 +10,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from cnctwin.memory.store.intake import WITHIN_MS_MAX, Known
-from cnctwin.memory.store.manifest import HOUR_MS, Checked, File, State, files
-from cnctwin.memory.store.sealed_rows import Part, read_rows
+from cnctwin.memory.store.sealed.manifest import HOUR_MS, Checked, File, State, files
+from cnctwin.memory.store.sealed.rows import Part, read_rows
 from cnctwin.memory.store.series_table import SeriesTable, Signal, StoredClass
 
 HOURS_KEPT = 4

@@ -13,8 +13,8 @@ from twin.optimisation.problem import Problem
 from twin.optimisation.program import tool_numbers
 from twin.optimisation.question import Question
 from twin.optimisation.seeds import in_sequence
-from twin.optimisation.speed_groups import speed_groups
-from twin.optimisation.stretches import changes_in_material, executions
+from twin.optimisation.speeds.groups import speed_groups
+from twin.optimisation.speeds.stretches import changes_in_material, executions
 
 SMALL = 5e-4
 """Of time or cost; what is less than this is nothing to be told."""

@@ -20,8 +20,8 @@ import pyarrow.parquet as pq
 
 from cnctwin.memory.store.database import transaction
 from cnctwin.memory.store.intake import DATA_CODE
-from cnctwin.memory.store.manifest import DAY_MS, HOUR_MS, Checked, File, State, file_name, files, put
-from cnctwin.memory.store.sealed_rows import HeaderOf, Made, Part, Rows, made, read_rows
+from cnctwin.memory.store.sealed.manifest import DAY_MS, HOUR_MS, Checked, File, State, file_name, files, put
+from cnctwin.memory.store.sealed.rows import HeaderOf, Made, Part, Rows, made, read_rows
 from cnctwin.memory.store.series_table import SeriesTable, StoredClass
 from cnctwin.memory.store.value_form import Kind
 

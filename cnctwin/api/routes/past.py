@@ -10,11 +10,11 @@ from pydantic import BaseModel, ConfigDict, Field
 from cnctwin.api.answers import Events, Parts, Replayed, Validation
 from cnctwin.api.errors import ApiError
 from cnctwin.api.event_list import EVENTS_MAX, PART_RECORD, event_signals, events_of, part_records
-from cnctwin.api.history_routes import MS_MAX, FromMs, ToMs
-from cnctwin.api.plant_routes import BUSY, UNKNOWN, Machine, unknown_machine
+from cnctwin.api.live.trace import Sample
 from cnctwin.api.replay_child import replayed
+from cnctwin.api.routes.history import MS_MAX, FromMs, ToMs
+from cnctwin.api.routes.plant import BUSY, UNKNOWN, Machine, unknown_machine
 from cnctwin.api.sources import Sources
-from cnctwin.api.trace import Sample
 from cnctwin.api.value_object import plain
 from cnctwin.memory.store.contract import Query as StoreQuery
 from cnctwin.memory.store.contract import Store, StoreError

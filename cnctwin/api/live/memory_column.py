@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
 from typing import Any
 
-from cnctwin.api.trace import Sample
+from cnctwin.api.live.trace import Sample
 from cnctwin.api.value_object import QUALITY_NAMES
 from sparkplug.quality import Quality
 
@@ -14,7 +14,7 @@ _WORST = (Quality.BAD, Quality.STALE, Quality.GOOD)
 def column(signal: str, unit: str | None, samples: Sequence[Sample], every_ms: int | None) -> dict[str, Any]:
     """One column as JSON.
 
-    >>> from cnctwin.api.trace import Sample
+    >>> from cnctwin.api.live.trace import Sample
     >>> column("spindle_load_pct", "%", [Sample(0, 1.0, 192, None), Sample(900, 2.0, 192, None)], 1000)["value"]
     [1.5]
     """

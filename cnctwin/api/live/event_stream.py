@@ -10,7 +10,7 @@ from contextlib import suppress
 from starlette.responses import Response
 from starlette.types import Receive, Scope, Send
 
-from cnctwin.api.fan_out import FanOut, Reader
+from cnctwin.api.live.fan_out import FanOut, Reader
 
 KEEP_ALIVE_S = 15.0
 SEND_S_MAX = 10.0

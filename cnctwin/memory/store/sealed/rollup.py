@@ -12,10 +12,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from cnctwin.memory.store.hot import SeriesOf
-from cnctwin.memory.store.manifest import DAY_MS, Checked, File, State, files
-from cnctwin.memory.store.sealed_answers import SealedAnswers
-from cnctwin.memory.store.sealed_rows import Made, parquet
-from cnctwin.memory.store.sealing import Job, add_file
+from cnctwin.memory.store.sealed.answers import SealedAnswers
+from cnctwin.memory.store.sealed.manifest import DAY_MS, Checked, File, State, files
+from cnctwin.memory.store.sealed.rows import Made, parquet
+from cnctwin.memory.store.sealed.sealing import Job, add_file
 from cnctwin.memory.store.series_table import StoredClass
 from cnctwin.memory.store.value_form import BLOCKS, Kind, given, kept
 from cnctwin.memory.store.windows import Numbers, Window, Windows

@@ -10,13 +10,13 @@ import pyarrow as pa
 
 from cnctwin.memory.store.contract import StoreError, Tidied
 from cnctwin.memory.store.database import transaction
-from cnctwin.memory.store.late_history import LateHistory
-from cnctwin.memory.store.left_over import LeftOver
-from cnctwin.memory.store.manifest import DAY_MS, FOLDERS, Checked, File
 from cnctwin.memory.store.retention import Retention
-from cnctwin.memory.store.rollup import roll_up
-from cnctwin.memory.store.sealed_answers import SealedAnswers
-from cnctwin.memory.store.sealing import Sealer, set_aside
+from cnctwin.memory.store.sealed.answers import SealedAnswers
+from cnctwin.memory.store.sealed.late_history import LateHistory
+from cnctwin.memory.store.sealed.left_over import LeftOver
+from cnctwin.memory.store.sealed.manifest import DAY_MS, FOLDERS, Checked, File
+from cnctwin.memory.store.sealed.rollup import roll_up
+from cnctwin.memory.store.sealed.sealing import Sealer, set_aside
 from cnctwin.memory.store.series_table import SeriesTable, StoredClass
 from cnctwin.memory.store.store_status import SPARE_FREE_BYTES
 from cnctwin.memory.store.sweep import beyond, past, sweep, sweep_log

@@ -9,7 +9,7 @@ from fastapi.responses import JSONResponse, Response
 
 from cnctwin.api.answers import Health, Part, Ready
 from cnctwin.api.errors import ApiError
-from cnctwin.api.live_plant import LivePlant
+from cnctwin.api.live.plant import LivePlant
 from cnctwin.api.residual import models_part
 from cnctwin.api.sources import Sources
 from cnctwin.commands.alerts import FRESH_S_MAX

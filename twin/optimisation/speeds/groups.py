@@ -1,8 +1,8 @@
 """Which lines share one speed, and the speeds that suit all of them.
 
 A group is what has to have one speed: a line with all its executions, and beside it every line that a stretch
-(`twin.optimisation.stretches`) joins to one of these. A line of a subprogram is in the stretches of all its callers, and joins
-them. A group may have the speeds that each of its lines may have by itself.
+(`twin.optimisation.speeds.stretches`) joins to one of these. A line of a subprogram is in the stretches of all its callers, and
+joins them. A group may have the speeds that each of its lines may have by itself.
 
 A line that is left alone runs at the speed that it was written for, so that its stretch keeps that speed. It does not join
 stretches: it may be run at another speed in each.
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from twin.optimisation.allowed import Allowed, Span
 from twin.optimisation.answer import SpeedChanges
 from twin.optimisation.program import Programmed
-from twin.optimisation.stretches import Stretch, stretches
+from twin.optimisation.speeds.stretches import Stretch, stretches
 from twin.optimisation.words import find_word, source_lines
 
 Ints = NDArray[np.int64]

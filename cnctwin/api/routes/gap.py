@@ -13,7 +13,7 @@ from pydantic import BaseModel, Field
 from cnctwin.api.answers import Answer, Problem, ValueObject
 from cnctwin.api.errors import ApiError
 from cnctwin.api.fleet import GAP, GROWING
-from cnctwin.api.plant_routes import UNKNOWN, Machine, known_state
+from cnctwin.api.routes.plant import UNKNOWN, Machine, known_state
 from cnctwin.api.sources import Sources
 
 FILE_BYTES_MAX = 20_000_000

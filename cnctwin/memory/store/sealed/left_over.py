@@ -12,8 +12,8 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from cnctwin.memory.store.manifest import State
-from cnctwin.memory.store.sealed_rows import METADATA
+from cnctwin.memory.store.sealed.manifest import State
+from cnctwin.memory.store.sealed.rows import METADATA
 from cnctwin.memory.store.series_table import StoredClass
 
 _HOT = """

@@ -1,0 +1,1 @@
+"""The plant as it is now: what the interface hears from the broker and hands to its readers."""
