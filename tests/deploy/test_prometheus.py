@@ -85,7 +85,7 @@ def test_what_a_rule_says_names_only_labels_that_it_has() -> None:
 
 def exported() -> set[str]:
     """The names in the source of the runtime interface; of counters, as a scrape shows them."""
-    source = "\n".join(path.read_text() for path in (PROJECT / "cnctwin" / "api").glob("metrics_*.py"))
+    source = "\n".join(path.read_text() for path in (PROJECT / "cnctwin" / "api" / "prometheus").glob("*.py"))
     names = set(METRIC.findall(source)) | {"twin_received", "twin_emitted"}
     return names | {f"{name}_total" for name in names}
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-FOLDER = Path(__file__).parents[4] / "cnctwin" / "reference_machine"
+FOLDER = Path(__file__).parents[4] / "cnctwin" / "standins" / "reference_machine"
 OURS = ("twin", "cnctwin", "sparkplug", "edge", "processors")
 SOURCES = sorted(FOLDER.rglob("*.py"))
 
