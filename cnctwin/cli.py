@@ -33,7 +33,7 @@ from cnctwin.commands.train.residual import train_residual
 from cnctwin.commands.validate import validate
 from cnctwin.demo import demo as demo_command
 from cnctwin.demo.parts import DemoOptions
-from cnctwin.errors import BrokerStartError, ProgramError, UsageError
+from cnctwin.errors import ApplicationError, BrokerStartError, UsageError
 from cnctwin.processes.given_broker import address, broker_or_own
 from cnctwin.processes.stopping import stopped_by_signals
 from edge.errors import EdgeError
@@ -321,7 +321,7 @@ def main() -> None:
         _explain(error)
     except BrokerStartError as error:
         _fail(error, 1)
-    except (ProgramError, EdgeError, ProcessorError, SparkplugError, TwinError) as error:
+    except (ApplicationError, EdgeError, ProcessorError, SparkplugError, TwinError) as error:
         _fail(error, 2)
     raise SystemExit(code)
 

@@ -5,10 +5,10 @@ import hmac
 import secrets
 from dataclasses import dataclass
 
-from cnctwin.errors import ProgramError
+from cnctwin.errors import ApplicationError
 
 
-class SealError(ProgramError):
+class SealError(ApplicationError):
     """Answers that are not the ones which were sealed."""
 
 

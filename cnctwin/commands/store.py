@@ -177,7 +177,7 @@ def seal_command(where: Where = None) -> None:
 def export(
     where: str | Path, machine: str, span_ms: tuple[int, int], out: Path, *, every_ms: int | None = None, held: bool = False
 ) -> int:
-    """Write a stretch of a store as a run log; how many rows it has. Raises ProgramError in one line."""
+    """Write a stretch of a store as a run log; how many rows it has. Raises ApplicationError in one line."""
     if out.suffix not in (".parquet", ".csv"):
         raise UsageError(f"{out}: a run log is written as .parquet or .csv, by the ending of its name")
     try:

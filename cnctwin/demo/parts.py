@@ -10,7 +10,7 @@ from typing import Any
 from urllib.parse import urlsplit
 from xml.etree import ElementTree
 
-from cnctwin.errors import ProgramError, UsageError
+from cnctwin.errors import ApplicationError, UsageError
 from cnctwin.processes.child import Child
 from cnctwin.processes.private_broker import PrivateBroker, is_free
 from cnctwin.standins.simulated_machine import description
@@ -209,7 +209,7 @@ class Demo:
                 return str(url)
             time.sleep(0.05)
         what = f"replay of {self.options.recording}" if self.options.recording else "simulated machine"
-        raise ProgramError(f"the {what} does not start: {self.children[0].last_words()}")
+        raise ApplicationError(f"the {what} does not start: {self.children[0].last_words()}")
 
     def _state(self) -> dict[str, Any]:
         return _read(self._agent_state)

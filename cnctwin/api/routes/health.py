@@ -13,7 +13,7 @@ from cnctwin.api.live.plant import LivePlant
 from cnctwin.api.residual import models_part
 from cnctwin.api.sources import Sources
 from cnctwin.commands.alerts import FRESH_S_MAX
-from cnctwin.errors import ProgramError
+from cnctwin.errors import ApplicationError
 from cnctwin.jobs.announcer import NODE as JOBS_NODE
 from cnctwin.jobs.client import FRESH_S_MAX as JOBS_FRESH_S_MAX
 from cnctwin.page import WEB
@@ -97,7 +97,7 @@ async def _store(sources: Sources) -> Part:
         return Part(part="store", state="missing", reason=line, do="cnctwin process historian, and cnctwin serve --store WHERE")
     try:
         status = await sources.store.status()
-    except (ApiError, ProgramError) as error:
+    except (ApiError, ApplicationError) as error:
         return Part(part="store", state="missing", reason=str(error), do="cnctwin process historian")
     if status.trouble:
         return Part(part="store", state="degraded", reason=status.trouble, do="cnctwin store status")

@@ -3,13 +3,13 @@
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from cnctwin.errors import ProgramError
+from cnctwin.errors import ApplicationError
 from sparkplug.values import Value
 
 DIFFERENCES_MAX = 100  # that are listed; all are counted
 
 
-class ReplayRefusedError(ProgramError):
+class ReplayRefusedError(ApplicationError):
     """This stretch cannot be replayed; the text says why, and what can."""
 
 

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
-from cnctwin.errors import ProgramError
+from cnctwin.errors import ApplicationError
 from sparkplug.host_session import HostEvent
 from sparkplug.quality import Quality
 from sparkplug.values import Value
@@ -22,7 +22,7 @@ RAW, DERIVED = "cnc_raw", "cnc_twin_state"
 TWIN_PREFIX = "twin/"
 
 
-class StoreError(ProgramError):
+class StoreError(ApplicationError):
     """The store cannot do what it is asked; the text names the place, the trouble and the way out."""
 
 

@@ -6,7 +6,7 @@ import threading
 from types import TracebackType
 from typing import Self
 
-from cnctwin.errors import ProgramError
+from cnctwin.errors import ApplicationError
 from cnctwin.standins.focas_server.faults import Faults, Refusal
 from cnctwin.standins.focas_server.ledger import ServerLedger
 from cnctwin.standins.focas_server.session import Session
@@ -72,7 +72,7 @@ class FocasServer:
         try:
             self._listener = socket.create_server((LOOPBACK, self.port), backlog=self._connections_max)
         except OSError as error:
-            raise ProgramError(
+            raise ApplicationError(
                 f"can't listen on {LOOPBACK} port {self.port}: {error.strerror}; give another port, or 0"
             ) from error
         self._listener.settimeout(ACCEPT_S)

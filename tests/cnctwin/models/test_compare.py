@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from cnctwin.commands.model import model_app
-from cnctwin.errors import ProgramError, UsageError
+from cnctwin.errors import ApplicationError, UsageError
 from cnctwin.memory.store.opening import open_store
 from cnctwin.models import contest, golden, losses, registry
 from cnctwin.models.contest import Losses, outcome
@@ -115,7 +115,7 @@ def seeded(own: Shelf, seed: int) -> str:
 
 def model(*arguments: str) -> tuple[int, str]:
     done = CliRunner().invoke(model_app, [*arguments, "--models", "models"])
-    if isinstance(done.exception, ProgramError):
+    if isinstance(done.exception, ApplicationError):
         raise done.exception
     assert done.exception is None or isinstance(done.exception, SystemExit), done.exception
     return done.exit_code, done.stdout
