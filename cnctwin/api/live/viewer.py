@@ -11,7 +11,7 @@ from typing import Any
 from cnctwin.api.live.batches import Batch
 from cnctwin.api.live.jobs import LiveJobs
 from cnctwin.api.live.plant import LivePlant
-from cnctwin.commands.alerts import STATE as ALERTS_TOPIC
+from cnctwin.plant.alert_desk import STATE as ALERTS_TOPIC
 from cnctwin.plant.watch import viewer
 from sparkplug.broker import BrokerAddress
 from sparkplug.connection import now_ms

@@ -16,7 +16,7 @@ from cnctwin.api.errors import ApiError
 from cnctwin.api.live.plant import LivePlant
 from cnctwin.api.live.viewer import Viewer
 from cnctwin.api.routes.health import state_age_s
-from cnctwin.commands.alerts import COMMAND, FRESH_S_MAX
+from cnctwin.plant.alert_desk import COMMAND, FRESH_S_MAX
 from sparkplug.connection import now_ms
 
 ANSWER_S_MAX = 5.0
