@@ -200,7 +200,7 @@ def import_(
     elif devices is None:
         _twin().import_recording(Path(recording), out, _console())
     else:
-        from cnctwin.memory.importing.shdr import import_shdr
+        from cnctwin.importing.shdr import import_shdr
 
         import_shdr(Path(recording), devices, device, out, _console())
 

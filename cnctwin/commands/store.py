@@ -145,7 +145,7 @@ def import_command(
         if path is not None and not path.is_file():
             raise UsageError(f"{path}: no such file; give a recording, and its device model with --devices")
     try:
-        from cnctwin.memory.importing.into_store import import_recording
+        from cnctwin.importing.into_store import import_recording
     except ModuleNotFoundError as missing:
         raise UsageError(f"a recording needs the package {missing.name}; pip install 'cnctwin[twin]' brings it") from None
     store = open_store(where or default_place(), writable=True)
