@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from cnctwin.commands.twin import write
+from cnctwin.files.output import write
 from cnctwin.reports.optimisation.page import report_html
 from twin.optimisation.answer import Objective, Optimised, SpeedChanges
 from twin.optimisation.optimise import Hooks, Progress, Spread, optimise

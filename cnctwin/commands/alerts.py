@@ -14,6 +14,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from cnctwin.commands.options import AsJson, Broker, Wait
 from cnctwin.errors import UsageError
 from cnctwin.plant.alert_desk import alert_desk
 from cnctwin.processes.given_broker import address
@@ -25,11 +26,8 @@ _SECONDS = {"": 1.0, "s": 1.0, "m": 60.0, "h": 3600.0, "d": 86_400.0}
 
 alerts_app = typer.Typer(no_args_is_help=True, help="What fires, who knows of it, and who takes care of it.")
 
-Broker = Annotated[str | None, typer.Option(help="mqtt[s]://[user@]host[:port]; else $CNCTWIN_BROKER", show_default=False)]
 By = Annotated[str, typer.Option(help="Who says so")]
 Comment = Annotated[str, typer.Option(help="Why")]
-Wait = Annotated[float, typer.Option("--wait", help="Seconds to wait for an answer", min=0.5, max=600.0)]
-AsJson = Annotated[bool, typer.Option("--json", help="For a program to read")]
 
 
 @alerts_app.command("list")

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
-from cnctwin.commands.twin import check_suffix, write
 from cnctwin.errors import UsageError
+from cnctwin.files.output import check_suffix, write
 from cnctwin.standins.mtconnect_agent.agent import Agent
 from cnctwin.standins.mtconnect_agent.dialect import dialect
 from cnctwin.standins.mtconnect_agent.errors import ReplayError

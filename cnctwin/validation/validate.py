@@ -11,9 +11,9 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from cnctwin.commands.twin import working
 from cnctwin.errors import UsageError
 from cnctwin.memory.store.opening import default_place, open_store
+from cnctwin.terminal.spinner import working
 from cnctwin.validation.budgets import TABLE, Budgets, budgets_of, tables_of
 from cnctwin.validation.cycle_time import Cycle, Cycles, texts_of
 from cnctwin.validation.cycles import cycle_of_run, cycles_of, names_of

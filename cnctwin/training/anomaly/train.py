@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from cnctwin.commands.twin import working
 from cnctwin.errors import UsageError
+from cnctwin.terminal.spinner import working
 from cnctwin.training.anomaly.calibrated_cell import Asked, Calibrated, calibrated_cell
 from cnctwin.training.anomaly.frozen_week import segments
 from cnctwin.training.anomaly.recorded_cell import recorded_cell, shared_features

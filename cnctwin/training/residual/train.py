@@ -11,10 +11,10 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table as Printed
 
-from cnctwin.commands.twin import working
 from cnctwin.errors import UsageError
 from cnctwin.memory.store.opening import default_place, open_store
 from cnctwin.models.registry import add, shelf
+from cnctwin.terminal.spinner import working
 from cnctwin.training.residual.recording import from_files, from_store
 from processors.config import Configuration, read_tables
 from processors.errors import ConfigurationError
