@@ -95,7 +95,7 @@ def promote(
     models: Models = None,
 ) -> None:
     """Let a version count. The one before is kept warm for 48 h."""
-    from cnctwin.models.comparing import won
+    from cnctwin.challenge.comparing import won
 
     own = registry.shelf(_place(models), kind, machine)
     folder, before = own.named(version), own.pointer()
@@ -170,7 +170,7 @@ def compare(
 ) -> None:
     """Champion against challenger on data that neither has seen, and on the golden week. Exit code 1: the champion stays."""
     with needed_by("comparing", "twin"):
-        from cnctwin.models.comparing import Test, compared, sha256_of
+        from cnctwin.challenge.comparing import Test, compared, sha256_of
     own = registry.shelf(_place(models), kind, machine)
     logs = _stretches(machine, runs or [], store, from_, to)
     data = tuple(sha256_of(path) for path in runs or [])
@@ -218,8 +218,8 @@ def export(
 def _stretches(machine: str, runs: list[Path], store: str | None, from_: str | None, to: str | None) -> list[Any]:
     """The data that was named: run logs, or a stretch of a store."""
     with needed_by("reading data", "twin,historian"):
+        from cnctwin.challenge.stretch import read_stretch, stretch_of_store
         from cnctwin.memory.store.opening import default_place, open_store
-        from cnctwin.models.stretch import read_stretch, stretch_of_store
     if runs:
         if store is not None or from_ is not None:
             raise UsageError("run logs and a stretch of the store: give one of them")

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
+from cnctwin.challenge.contest import Losses
 from cnctwin.errors import UsageError
-from cnctwin.models.contest import Losses
 from cnctwin.validation.track import Floats
 from twin.errors import TwinError
 from twin.runlog import RunLog

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from cnctwin.challenge.contest import HOURS_MIN, TOLERANCE, Losses, Outcome, outcome
+from cnctwin.challenge.losses import losses
 from cnctwin.errors import UsageError
 from cnctwin.models.card import Card
-from cnctwin.models.contest import HOURS_MIN, TOLERANCE, Losses, Outcome, outcome
 from cnctwin.models.golden import golden_of
-from cnctwin.models.losses import losses
 from cnctwin.models.registry import Shelf, keep_comparison
 from twin.models.pointer import seconds
 from twin.runlog import RunLog
