@@ -29,7 +29,7 @@ SHOWN = {
 _KEYS = frozenset(SHOWN.values())
 
 
-class Told(Protocol):
+class SignalReading(Protocol):
     """A signal with its last reading."""
 
     reading: Reading
@@ -49,7 +49,7 @@ def is_key_signal(name: str) -> bool:
     return name in _KEYS or is_gap_figure(name)
 
 
-def fleet_item(machine: str, online: bool, signals: Mapping[str, Told]) -> dict[str, Any]:
+def fleet_item(machine: str, online: bool, signals: Mapping[str, SignalReading]) -> dict[str, Any]:
     """One machine of the overview: last known values, null where one is bad or not known."""
     item: dict[str, Any] = {"machine": machine, "online": online}
     for title, name in SHOWN.items():

@@ -11,7 +11,7 @@ import numpy as np
 import tomli_w
 
 from cnctwin.blind_check.answer import Answer, Answered
-from cnctwin.blind_check.question import Asked, Question, effect_on
+from cnctwin.blind_check.question import DrawnEffect, Question, effect_on
 from cnctwin.standins.reference_machine.effect import Parameters
 from cnctwin.standins.reference_machine.physics import Physics, physics_of
 from cnctwin.standins.reference_machine.program import air_program, cut_program, nc_text
@@ -31,7 +31,8 @@ from cnctwin.standins.reference_machine.trajectory import Dynamics
 
 FIT, REPEAT, CHECK, UNSEEN = 1, 2, 3, 4
 """Seeds of the chances of each run; a fit and its repeat are runs of one program."""
-Told = Motion | WarmUp
+Course = Motion | WarmUp
+"""What a program makes the reference machine do."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +42,7 @@ class Machine:
     question: Question
     stated: MachineFigures
     healthy: Physics
-    told: Mapping[tuple[str, int], Told]
+    courses: Mapping[tuple[str, int], Course]
 
 
 def machine_of(question: Question) -> Machine:
@@ -50,16 +51,16 @@ def machine_of(question: Question) -> Machine:
     stated = drawn_machine(chance)
     healthy = physics_of(scattered(stated, chance))
     dynamics = Dynamics(float(chance.uniform(1800.0, 2800.0)), float(chance.uniform(0.025, 0.06)))
-    told: dict[tuple[str, int], Told] = {}
+    courses: dict[tuple[str, int], Course] = {}
     for kind in question.kinds:
         for run in (FIT, CHECK, UNSEEN):
-            told[kind, run] = _drawn(kind, stated, dynamics, question.warm, chance)
-        told[kind, REPEAT] = _drawn(kind, stated, dynamics, question.warm, chance) if kind == "warmup" else told[kind, FIT]
+            courses[kind, run] = _drawn(kind, stated, dynamics, question.warm, chance)
+        courses[kind, REPEAT] = _drawn(kind, stated, dynamics, question.warm, chance) if kind == "warmup" else courses[kind, FIT]
     restless = replace(healthy, disturbance_n=float(chance.uniform(0.7, 1.3)), disturbance_s=float(chance.uniform(0.03, 0.08)))
-    return Machine(question, stated, restless, told)
+    return Machine(question, stated, restless, courses)
 
 
-def _drawn(kind: str, stated: MachineFigures, dynamics: Dynamics, warm: bool, chance: np.random.Generator) -> Told:
+def _drawn(kind: str, stated: MachineFigures, dynamics: Dynamics, warm: bool, chance: np.random.Generator) -> Course:
     if kind == "warmup":
         return warmup_of(chance)
     if kind == "cut":
@@ -69,7 +70,7 @@ def _drawn(kind: str, stated: MachineFigures, dynamics: Dynamics, warm: bool, ch
 
 def recorded(machine: Machine, physics: Physics, kind: str, run: int, axes: str = "xyz", *, seed: int | None = None) -> Columns:
     """What `physics` makes of a run of the machine; with another seed, with other chances."""
-    told = machine.told[kind, run]
+    told = machine.courses[kind, run]
     number = int(np.random.default_rng([machine.question.seed, 3, run if seed is None else seed]).integers(2**31))
     return warmup_run(physics, told, number) if isinstance(told, WarmUp) else motion_run(physics, told, number, axes)
 
@@ -95,12 +96,12 @@ def physics_with(machine: Machine, answer: Answer) -> Physics:
     """The machine's physics with the effects of an answer, whose sizes need not be searched for again."""
     physics = machine.healthy
     for effect in answer.effects:
-        asked = Asked(effect.effect, effect.on, 0.0, effect.named)
+        asked = DrawnEffect(effect.effect, effect.on, 0.0, effect.named)
         physics = effect_on(asked).acts(physics, effect.on, effect.stated)
     return physics
 
 
-def _moved(asked: Asked) -> str:
+def _moved(asked: DrawnEffect) -> str:
     """The axes whose signals the effect changes: its own, or any."""
     return asked.on if asked.on in ("x", "y", "z") else "xyz"
 
@@ -114,7 +115,7 @@ def _floors(machine: Machine, kind: str) -> dict[str, float]:
 
 def _amplitude(
     machine: Machine,
-    asked: Asked,
+    asked: DrawnEffect,
     traits: Parameters,
     kinds: list[str],
     floors: Mapping[str, Mapping[str, float]],
@@ -185,7 +186,7 @@ def _write_folder(folder: Path, machine: Machine, physics: Physics, runs: list[t
         stem = f"runs/{kind}_{NAMES[run]}"
         write(recorded(machine, physics, kind, run), folder / f"{stem}.parquet")
         entry = {"file": f"{stem}.parquet", "kind": kind, "role": "fit" if run in (FIT, REPEAT) else "check"}
-        told = machine.told[kind, run]
+        told = machine.courses[kind, run]
         if isinstance(told, Motion):
             (folder / f"{stem}.nc").write_text(nc_text(told.blocks), encoding="utf-8")
             entry["program"] = f"{stem}.nc"

@@ -48,7 +48,7 @@ def validate(
         raise UsageError("--runs and --store: give one of them")
     with needed_by("validation", "twin,historian"):
         from cnctwin.validation import validate as command
-    asked = command.Asked(
+    asked = command.ValidationRequest(
         *(machine, store, tuple(runs or ()), tuple(truth or ()), from_ms, to_ms, programs, config, twin),
         *(out or state_dir() / "validation", keep, group),
     )

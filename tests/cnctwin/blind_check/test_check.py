@@ -10,7 +10,7 @@ from cnctwin.blind_check import check as check_module
 from cnctwin.blind_check.answer import answers_from_json, answers_json
 from cnctwin.blind_check.case_folder import FIT, answer_of, machine_of, recorded, write_case, write_unseen
 from cnctwin.blind_check.check import diagnosed, run_check
-from cnctwin.blind_check.question import SHARES, SIZES, Asked, Question, Sort, draw, names
+from cnctwin.blind_check.question import SHARES, SIZES, DrawnEffect, Question, Sort, draw, names
 from cnctwin.blind_check.sealed import SealError, opened, seal
 from cnctwin.blind_check.table import table
 from cnctwin.blind_check.write import main
@@ -22,7 +22,7 @@ from twin.errors import TwinError
 from twin.gap.diagnosis import Diagnosed, Diagnosis, GapNumbers, Verdict
 from twin.machine import MachineFile
 
-WARM = Question("case_001", Sort.SINGLE, 5, ("warmup",), (Asked("coolant_cooling", "", 8.0),))
+WARM = Question("case_001", Sort.SINGLE, 5, ("warmup",), (DrawnEffect("coolant_cooling", "", 8.0),))
 
 
 def nothing_found(case: Case) -> Diagnosed:
