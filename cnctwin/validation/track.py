@@ -1,6 +1,5 @@
 """A signal over time, and what is known of it at evenly spaced times."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,9 +26,6 @@ class Track:
     def moved(self, by_s: float) -> "Track":
         """The same, told so much later."""
         return Track(self.t_s + by_s, self.value)
-
-
-Tracks = Mapping[str, Track]
 
 
 @dataclass(frozen=True, slots=True)

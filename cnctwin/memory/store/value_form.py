@@ -14,7 +14,6 @@ from typing import Any
 from sparkplug.values import Value
 
 INT_MAX = 2**63 - 1
-_NAN_BYTES = 8
 Kept = int | float | str | bytes | None
 """What SQLite holds."""
 

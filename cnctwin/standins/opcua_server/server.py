@@ -35,7 +35,6 @@ T = TypeVar("T")
 LOOK_S = 0.02
 START_S_MAX = 60.0
 CONNECTIONS_MAX = 20
-_CURRENT_TIME = ua.NodeId(ua.Int32(ObjectIds.Server_ServerStatus_CurrentTime))
 _SECURE = [
     ua.SecurityPolicyType.Basic256Sha256_SignAndEncrypt,
     ua.SecurityPolicyType.Aes256Sha256RsaPss_SignAndEncrypt,

@@ -14,7 +14,6 @@ from cnctwin.memory.store.influx.spool import Batch, PinnedCopy, Spool
 
 SLICE_MS = 60_000
 SLICES_AT_ONCE = 30
-PINS_MAX = 100_000
 Samples = Callable[[str, str, int, int], list[SampleRow]]
 
 

@@ -20,7 +20,6 @@ from cnctwin.memory.store.influx.plain_http import PlainHttp
 from cnctwin.memory.store.influx.sample_row import QUALITY, SampleRow, SeriesKey
 
 _FIELDS = ("value", "held", "flag", "text", "quality", "reason")
-_LABELS = ("flag", "text", "reason")
 _EVER = "1"
 """For 0 the last minutes are meant."""
 _WINDOWS_AT_ONCE = 20_000
