@@ -181,6 +181,22 @@ def test_every_room_says_what_it_is(package: str) -> None:
     assert silent == []
 
 
+DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
+NO_FILES = {"processors/chip_load.py", "processors/chip_load.toml", "cnctwin/alerts/"}
+"""An example that docs/processors.md shows how to write, and a topic."""
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_a_file_that_a_document_names_is_there(document: Path) -> None:
+    text = document.read_text()
+    links = re.findall(r"\]\((?!\w+:)([^)#\s]+)(?:#[^)\s]*)?\)", text)
+    missing = [link for link in links if not (document.parent / link).exists()]
+    tops = "|".join((*PACKAGES, "tests", "benchmarks", "scripts", "deploy", "docs"))
+    named = re.findall(rf"`((?:{tops})/[\w./-]*?(?:\.(?:py|js|css|toml|md|nc|c|xml|html)|/))(?=[`:#\s])", text)
+    missing += [name for name in named if not (ROOT / name).exists() and name not in NO_FILES]
+    assert missing == []
+
+
 def test_the_lock_pins_by_hash_and_names_no_address() -> None:
     lock = (ROOT / "requirements.lock").read_text()
     pinned = re.findall(r"^[a-z0-9._-]+==\S+", lock, re.M | re.I)
