@@ -1,4 +1,4 @@
-"""What can go wrong in the program.
+"""The errors of the program.
 
 ApplicationError
 ├── UsageError         wrong input: exit code 2

@@ -1,4 +1,4 @@
-"""What the interface answers when it cannot do what it is asked: one JSON, `{"error": "<culprit, value, way out>"}`."""
+"""Answers of the interface when it cannot do what it is asked: one JSON, `{"error": "<culprit, value, way out>"}`."""
 
 import json
 from typing import Any

@@ -36,7 +36,7 @@ class SignalReading(Protocol):
 
 
 def is_gap_figure(name: str) -> bool:
-    """Whether a metric is the standing gap of a signal over all its regimes.
+    """Return True if a metric is the standing gap of a signal over all its regimes.
 
     >>> is_gap_figure("twin/gap_spindle_rpm"), is_gap_figure("twin/gap_spindle_load_pct/air"), is_gap_figure("twin/gap_basis")
     (True, False, False)
@@ -45,7 +45,7 @@ def is_gap_figure(name: str) -> bool:
 
 
 def is_key_signal(name: str) -> bool:
-    """Whether the overview follows a metric."""
+    """Return True if the overview follows a metric."""
     return name in _KEYS or is_gap_figure(name)
 
 

@@ -56,13 +56,13 @@ class Server:
 
     @property
     def url(self) -> str:
-        """Where a browser on this machine finds it."""
+        """The address at which a browser on this machine finds it."""
         name = "127.0.0.1" if self.host in ("0.0.0.0", "") else "[::1]" if self.host == "::" else self.host  # noqa: S104
         return f"http://[{name}]:{self.port}" if ":" in name and not name.startswith("[") else f"http://{name}:{self.port}"
 
     @property
     def alive(self) -> bool:
-        """Whether it serves."""
+        """True if it serves."""
         return self._thread.is_alive()
 
     def start(self) -> None:

@@ -26,5 +26,5 @@ def diagnosed_alone(case: Case) -> Diagnosed:
 
 
 def diagnosis_files(found: Diagnosed, case: str) -> dict[str, str]:
-    """What is written of the diagnosis of a case: the text of each of its files."""
+    """Return the text of each file that is written of the diagnosis of a case."""
     return dict(zip(FILES, (found.diagnosis.to_json(), report_html(found, case), machine_to_toml(found.twin)), strict=True))

@@ -32,7 +32,7 @@ from cnctwin.standins.reference_machine.trajectory import Dynamics
 FIT, REPEAT, CHECK, UNSEEN = 1, 2, 3, 4
 """Seeds of the chances of each run; a fit and its repeat are runs of one program."""
 Course = Motion | WarmUp
-"""What a program makes the reference machine do."""
+"""The motion that a program makes, or a warm-up."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +69,7 @@ def _drawn(kind: str, stated: MachineFigures, dynamics: Dynamics, warm: bool, ch
 
 
 def recorded(machine: Machine, physics: Physics, kind: str, run: int, axes: str = "xyz", *, seed: int | None = None) -> Columns:
-    """What `physics` makes of a run of the machine; with another seed, with other chances."""
+    """Return the recording of a run of the machine with `physics`; another seed gives other chances."""
     told = machine.courses[kind, run]
     number = int(np.random.default_rng([machine.question.seed, 3, run if seed is None else seed]).integers(2**31))
     return warmup_run(physics, told, number) if isinstance(told, WarmUp) else motion_run(physics, told, number, axes)
@@ -107,7 +107,7 @@ def _moved(asked: DrawnEffect) -> str:
 
 
 def _floors(machine: Machine, kind: str) -> dict[str, float]:
-    """What healthy runs of the fit program differ by, over √2: three of them, as two can agree by luck."""
+    """Return what healthy runs of the fit program differ by, over √2: three of them, as two can agree by luck."""
     one, other, third = (recorded(machine, machine.healthy, kind, FIT, seed=seed) for seed in (FIT, 10, 11))
     differ = rms_by_signal([one, other, third], [other, third, one])
     return {name: value / np.sqrt(2.0) for name, value in differ.items()}

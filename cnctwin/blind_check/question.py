@@ -17,7 +17,7 @@ KINDS = ("air", "cut", "warmup")
 
 
 class Sort(StrEnum):
-    """How many effects a machine has, and whether they are in the catalogue."""
+    """The number of effects that a machine has, and whether they are in the catalogue."""
 
     SINGLE = "single"
     PAIR = "pair"

@@ -14,14 +14,14 @@ class SealError(ApplicationError):
 
 @dataclass(frozen=True, slots=True)
 class Seal:
-    """What is shown before: SHA-256 of salt and text, in hexadecimal."""
+    """The hash that is shown before: SHA-256 of salt and text, in hexadecimal."""
 
     digest: str
 
 
 @dataclass(frozen=True, slots=True)
 class Sealed:
-    """What is kept until the seal is opened."""
+    """The salt and text kept until the seal is opened."""
 
     seal: Seal
     salt: str

@@ -24,7 +24,7 @@ Loss = Callable[[Path, RunLog, str], tuple[Floats, Floats, float]]
 
 
 def losses(kind: str, models: tuple[Path, Path], log: RunLog, machine: str) -> Losses:
-    """Of champion and challenger, at the same moments. Raises UsageError where the kind has none, or a model cannot be judged."""
+    """Return the losses of champion and challenger, at the same moments. Raises UsageError where they cannot be judged."""
     loss = LOSSES.get(kind)
     if loss is None:
         raise UsageError(

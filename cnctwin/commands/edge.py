@@ -63,7 +63,7 @@ def discover(
 
 
 def _table(rows: "Sequence[Row]") -> Table:
-    """What an edge would publish, for a person to read."""
+    """Return the signals that an edge would publish, for a person to read."""
     signals = sum(not row.signal.startswith("(") for row in rows)  # "(warning)" is none
     shown = Table(title=f"{signals} signals would be published", title_justify="left")
     for column in ("signal", "from", "unit", "native unit", "value now", "why not"):

@@ -1,4 +1,4 @@
-"""What a command needs and not every installation has."""
+"""Packages that a command needs and not every installation has."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager

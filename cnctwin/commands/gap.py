@@ -127,7 +127,7 @@ def _print(answer: "Diagnosed", files: Iterable[str], out: Path, console: Consol
 
 
 def _causes_table(found: "Diagnosis") -> Table:
-    """What was found, with intervals."""
+    """Return the table of causes, with intervals."""
     causes = Table(title="causes", title_justify="left")
     for column in ("effect", "on", "parameters (90 %)", "share", "not to be told from"):
         causes.add_column(column, justify="right" if column == "share" else "left")

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class Method(StrEnum):
-    """How `identify` searches."""
+    """The search that `identify` uses."""
 
     LSQ = "least-squares"
     GA = "ga"

@@ -35,7 +35,7 @@ GONE_S_MAX = 60.0
 
 
 class Kind(StrEnum):
-    """What can be asked for."""
+    """The kinds of jobs that can be asked for."""
 
     OPTIMISE = "optimise"
     IDENTIFY = "identify"

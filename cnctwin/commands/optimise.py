@@ -100,7 +100,7 @@ def _check_out(out: Path, *inputs: Path) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """How a question is worked out and shown: the options that are not part of it."""
+    """The options that are not part of the question: how it is worked out and shown."""
 
     out: Path
     encoding: str

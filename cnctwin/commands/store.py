@@ -231,14 +231,14 @@ def _bytes(text: str) -> int:
 
 
 def _free(where: str | None) -> int:
-    """What the disk has left."""
+    """Return the free bytes of the disk."""
     place = Path(where or default_place())
     there = next((p for p in (place, *place.absolute().parents) if p.exists()), Path("/"))
     return shutil.disk_usage(there).free
 
 
 def _measured(where: str | None) -> Load | None:
-    """What the store has seen; None where there is none."""
+    """Return the load that the store has seen; None where there is no store."""
     from cnctwin.memory.store.database import FILE_NAME, Readers
     from cnctwin.memory.store.measured_load import measured_load
 

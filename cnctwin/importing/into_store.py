@@ -27,7 +27,7 @@ NOT_YET = "not known yet"
 
 
 class Imported(NamedTuple):
-    """What came into the store."""
+    """The account of an import into the store."""
 
     machine: str
     messages: int

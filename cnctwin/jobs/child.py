@@ -102,7 +102,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _be_modest() -> None:
-    """What is live goes first; where memory is short, this process is the one to go. Whoever started it says when it ends."""
+    """Give way to what is live; where memory is short, this process is the one to go. Whoever started it says when it ends."""
     with suppress(OSError):  # a supervisor may forbid it
         os.nice(NICE)
     with suppress(OSError):

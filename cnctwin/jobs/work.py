@@ -1,4 +1,4 @@
-"""What the kinds of jobs do; each writes its files into `bench.out` and gives back a summary of a few lines.
+"""The work of each kind of job; each writes its files into `bench.out` and gives back a summary of a few lines.
 
 Loaded in the process of one job only: it needs all that the twin needs.
 """
@@ -19,7 +19,7 @@ STEPS = 12
 
 @dataclass(frozen=True, slots=True)
 class Bench:
-    """What a job is given.
+    """The means that a job is given.
 
     files: below which lie those that it names; folder: its own; out: empty, for its result
     checkpoint: a file that outlives an attempt; progress: 0…1, and what is being done; workers, dask: as `spread_over` takes them

@@ -54,14 +54,14 @@ class Cycles:
 
 @dataclass(frozen=True, slots=True)
 class Timed:
-    """Of one run: what the twin says, and what it took, s."""
+    """The times of one run: what the twin says, and what it took, s."""
 
     predicted_s: float
     taken_s: float
 
 
 class ControlModel(NamedTuple):
-    """What is told of the control: how it moves, and what it makes of a program beside its text."""
+    """The model of the control: how it moves, and what it makes of a program beside its text."""
 
     model: Model
     settings: Settings

@@ -30,7 +30,7 @@ from twin.runlog import read_run
 
 @dataclass(frozen=True, slots=True)
 class ValidationRequest:
-    """What the command was asked: see its options. from_ms, to_ms: of a store; out: folder of the history"""
+    """The command's request: see its options. from_ms, to_ms: of a store; out: folder of the history"""
 
     machine: str
     store: str | None
@@ -143,7 +143,7 @@ def _print(night: Mapping[str, Any], figures: Sequence[Figure], told: Mapping[st
 
 
 def _reasons(figures: Sequence[Figure]) -> list[str]:
-    """What each rests on or lacks, said once for those that share it."""
+    """Return what each rests on or lacks, once for those that share it."""
     said: dict[str, list[str]] = {}
     for one in figures:
         if text := "; ".join(part for part in (one.reason, one.basis) if part):

@@ -25,7 +25,7 @@ _FINGERPRINT = re.compile(r"[0-9a-f]{4,64}")
 
 
 class Acknowledgement(BaseModel):
-    """Who takes care, and why. Behind a proxy that names its users, `by` is the user, whatever stands here."""
+    """The person who takes care, and why. Behind a proxy that names its users, `by` is the user, whatever stands here."""
 
     model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"by": "ada", "comment": "on my way"}]})
     by: str = Field("", max_length=100)
@@ -36,7 +36,7 @@ class Acknowledgement(BaseModel):
 
 
 class Outcome(Answer):
-    """What became of it."""
+    """The outcome of a command."""
 
     done: bool
     text: str = Field(examples=["rule_vibration of vmc is acknowledged by ada"])

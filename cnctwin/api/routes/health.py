@@ -164,7 +164,7 @@ def _page() -> Part:
 
 
 def state_age_s(state: dict[str, Any], now_s: float) -> float:
-    """How old a state is that says when it was written; for ever, where it does not say.
+    """Return the age of a state that says when it was written; infinite where it does not say.
 
     >>> state_age_s({"at": "1970-01-01T00:01:00.000Z"}, 90.0)
     30.0

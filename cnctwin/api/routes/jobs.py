@@ -45,7 +45,7 @@ class JobRequest(BaseModel):
 
 
 class JobAnswer(Answer):
-    """What the consumer answered."""
+    """The consumer's answer."""
 
     id: str = Field(examples=["optimise-4f1d2a90c3b7"])
     answer: str = Field(description="accepted, known (it was asked for before) or cancelled", examples=["accepted"])
@@ -146,7 +146,7 @@ def job_routes(sources: Sources) -> APIRouter:
 
 
 def caution_of(job: dict[str, Any]) -> str:
-    """What the result of a job in full exceeds, in words; such a job is done all the same.
+    """Return in words what the result of a job in full exceeds; such a job is done all the same.
 
     >>> caution_of({"result": {"lines_over": 2, "collisions": []}})
     '2 lines are above a limit'

@@ -116,7 +116,7 @@ def _parameter(text: str) -> tuple[str, Any]:
 
 
 def _training() -> ModuleType:
-    """What trains, which needs what the twin needs."""
+    """Return the module that trains, which needs what the twin needs."""
     try:
         from cnctwin.training.anomaly import train as command
     except ImportError as error:

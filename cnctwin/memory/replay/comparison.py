@@ -1,4 +1,4 @@
-"""What was published then beside what is recomputed now, metric by metric and in order, as both come in.
+"""A comparison of what was published then with what is recomputed now, metric by metric and in order, as both come in.
 
 Two values stand for each other when they are of the same metric and moment. Then they are the same, bit for bit, with quality and
 reason, or they differ. A value whose moment the other side has passed is missing (published then only) or extra.
@@ -92,7 +92,7 @@ class Comparison:
                     metric.unheard += 1
 
     def recomputed(self, machine: str, changes: Iterable[Change], *, is_counted: bool) -> None:
-        """What the fold gives now."""
+        """Take what the fold gives now."""
         for change in changes:
             self.values += 1
             value = as_sent(change.value, self._types[change.name])

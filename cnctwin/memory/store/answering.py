@@ -86,7 +86,7 @@ class Answering:
         fill_gone(self.checked, by_sid, every.values(), there, Span(query.from_ms, query.to_ms))
 
     def messages(self, machine: str, from_ms: int, to_ms: int) -> Iterator[Message]:
-        """What came of a machine, in order."""
+        """Yield the messages of a machine, in order."""
         if extra_is_there():
             from cnctwin.memory.store.sealed.messages import SealedMessages  # noqa: PLC0415
 

@@ -1,4 +1,4 @@
-"""What is past its time goes, and beyond the disk's budget the oldest raw; what is pinned, derived or rolled up never.
+"""Sweeping: what is past its time goes, and beyond the disk's budget the oldest raw; what is pinned, derived or rolled up never.
 
 A file is swept or kept whole: a pin keeps the files that it touches. A swept file stays in the manifest without its bytes, so
 that history which comes for it later is known to be too late.

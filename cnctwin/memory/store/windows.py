@@ -25,7 +25,7 @@ class Numbers(NamedTuple):
 
 
 class Window:
-    """What is known of one window. A number counts for mean, low and high where it is good and finite."""
+    """The sums of one window. A number counts for mean, low and high where it is good and finite."""
 
     __slots__ = ("count", "good", "high", "is_number", "last", "last_us", "low", "reason", "total", "worst", "worst_us")
 

@@ -42,7 +42,7 @@ _SECURE = [
 
 
 class _Users:
-    """Who may come in: those with a password or a certificate; whoever comes without a name, where that is allowed."""
+    """The users who may come in: those with a password or a certificate; whoever comes without a name, where that is allowed."""
 
     def __init__(self, passwords: Mapping[str, str], certificates: Collection[bytes], anonymous: bool) -> None:
         self._passwords, self._certificates, self._anonymous = dict(passwords), set(certificates), anonymous

@@ -37,7 +37,7 @@ MAD_TO_SD = 1.4826
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrainingSettings:
-    """What is to be trained. Durations in s; the settings of the processor are to be the same on the day."""
+    """The settings of a training. Durations in s; the settings of the processor are to be the same on the day."""
 
     features: tuple[str, ...]
     detector: Detector = field(default_factory=Detector)
@@ -55,7 +55,7 @@ class TrainingSettings:
 
     @property
     def ticks(self) -> Ticks:
-        """How recordings become rows."""
+        """The way recordings become rows."""
         return Ticks(
             features=self.features,
             tick_ms=round(self.tick_s * 1000),
@@ -66,7 +66,7 @@ class TrainingSettings:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Of the processor joint_anomaly."""
+        """The settings of the processor joint_anomaly."""
         names = ("tick_s", "dwell_ticks", "clear_fraction", "common_mode", "common_mode_factor", "exclude_gated_peers")
         return {name: getattr(self, name) for name in (*names, "tail_s", "look_back_s")}
 
@@ -116,7 +116,7 @@ def calibrated_cell(
 
 
 def _preparations(machines: Sequence[str], training: Sequence[Stretch], asked: TrainingSettings) -> dict[str, Preparation]:
-    """What is usual in each operation of each machine, where features are judged and not scores."""
+    """Return what is usual in each operation of each machine, where features are judged and not scores."""
     if asked.common_mode != "features":
         return {}
     found = {}

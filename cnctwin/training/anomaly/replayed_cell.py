@@ -55,7 +55,7 @@ class _Times(NamedTuple):
 
 @dataclass(slots=True)
 class _MachineScores:
-    """What came out of the fold for one machine; rows of (time, adjusted, gated)."""
+    """The fold's output for one machine; rows of (time, adjusted, gated)."""
 
     raw: dict[int, float] = field(default_factory=dict)
     judged: list[list[Any]] = field(default_factory=list)

@@ -53,7 +53,7 @@ def train_anomaly(arguments: Sequence[str], asked: TrainingSettings, out: Path, 
 
 
 def configuration(asked: TrainingSettings, out: Path) -> str:
-    """What belongs into the processor's configuration: a threshold holds for the settings that it was fitted with."""
+    """Return what belongs in the processor's configuration: a threshold holds for the settings that it was fitted with."""
     lines = [f"{name} = {json.dumps(value)}" for name, value in {"models": str(out), **asked.settings}.items()]
     return "\n".join(["[joint_anomaly]", *lines])
 
@@ -147,7 +147,7 @@ def _sentences(line: dict[str, Any]) -> list[str]:
 
 
 def _models(folder: Path) -> dict[str, tuple[Path, AnomalyModel]]:
-    """Of a folder with models, of one machine's, or of one version."""
+    """Return the models of a folder with models, of one machine's, or of one version."""
     if (folder / MANIFEST).exists() or (folder / CURRENT).exists():
         model = load_model(folder)
         return {model.trained.machine or folder.name: (folder, model)}

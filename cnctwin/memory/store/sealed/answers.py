@@ -94,7 +94,7 @@ class SealedAnswers:
         *,
         with_last: bool,
     ) -> None:
-        """Of files that keep all series that are asked for in the same way, so that they are summed up as they are kept."""
+        """Sum up files that keep all series that are asked for in the same way, so that they are summed up as they are kept."""
         every_ms = next(iter(windows.values())).every_us // 1000
         sums = {sid: _sums(sid, ending, with_last=with_last) for sid, ending in layout}
         wanted = "".join(f", {part} AS {name}{sid}" for sid, some in sums.items() for name, part in some.items())
@@ -154,7 +154,7 @@ class SealedAnswers:
 
 
 def _endings(files: Iterable[File], series: Iterable[SeriesOf]) -> dict[int, list[str]]:
-    """How each of these series is kept in these files; those that are in none are left out."""
+    """Return how each of these series is kept in these files; those that are in none are left out."""
     wanted = {s.sid for s in series}
     found: dict[int, list[str]] = {}
     for file in files:
@@ -189,7 +189,7 @@ def _layouts(files: Iterable[File], series: Iterable[SeriesOf]) -> dict[tuple[tu
 
 
 def _sums(sid: int, ending: str, *, with_last: bool) -> dict[str, str]:
-    """What is summed up of a series, by name; as whole numbers where they are kept as such. good: where not all may be finite."""
+    """Return the sums of a series by name; as whole numbers where they are kept as such. good: where not all may be finite."""
     name, value, digits = f"s{sid}{ending}", _value(sid, [ending]), ending[1:]
     if ending[0] in "ezi":
         whole = f"({name} & -2)" if ending[0] == "z" else name
