@@ -164,21 +164,15 @@ def write_case(folder: Path, question: Question, answer: Answer | None = None) -
     answer = answer_of(question) if answer is None else answer
     machine = machine_of(question)
     runs = [(kind, run) for kind in question.kinds for run in (FIT, REPEAT, CHECK)]
-    _write_folder(folder, machine, physics_with(machine, answer), runs)
+    write_folder(folder, machine, physics_with(machine, answer), runs)
     return answer
-
-
-def write_unseen(folder: Path, question: Question, answer: Answer | None = None) -> None:
-    """Writes a case of the same machine whose only runs are of programs that the case of `write_case` has not got."""
-    machine = machine_of(question)
-    physics = physics_with(machine, answer_of(question) if answer is None else answer)
-    _write_folder(folder, machine, physics, [(kind, UNSEEN) for kind in question.kinds])
 
 
 NAMES = {FIT: "fit", REPEAT: "fit_2", CHECK: "check", UNSEEN: "check"}
 
 
-def _write_folder(folder: Path, machine: Machine, physics: Physics, runs: list[tuple[str, int]]) -> None:
+def write_folder(folder: Path, machine: Machine, physics: Physics, runs: list[tuple[str, int]]) -> None:
+    """Write the case of a machine with `physics` whose runs are these; the folder is made."""
     (folder / "runs").mkdir(parents=True)
     (folder / "machine.toml").write_text(machine_toml(machine.stated), encoding="utf-8")
     entries = []
