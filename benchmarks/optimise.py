@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cnctwin.commands.gap import in_threads
+from cnctwin.batch.diagnosis import in_threads
 from twin.case import read_case
 from twin.genetic import GeneticSettings, evolve
 from twin.machine import Limits, machine_to_toml

@@ -2,7 +2,7 @@
 
     .venv/bin/python benchmarks/replay.py RECORDING --devices Devices.xml
 
-The recording goes into a store of its own first (cnctwin/memory/importing/into_store.py). Then each processor alone: what costs
+The recording goes into a store of its own first (cnctwin/importing/into_store.py). Then each processor alone: what costs
 how much.
 """
 
@@ -12,7 +12,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from cnctwin.memory.importing.into_store import import_recording
+from cnctwin.importing.into_store import import_recording
 from cnctwin.memory.replay import replay
 from cnctwin.memory.store.opening import open_store
 from processors.discovery import discover

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.evaluation.range_based import Range, ranges
-from cnctwin.memory.importing.shdr import recorded_runs
+from cnctwin.importing.shdr import recorded_runs
 from cnctwin.training.anomaly.held_rows import held_rows
 from twin.anomaly.alarm import AlarmRule, dwell_score, is_alarm, onsets
 from twin.anomaly.detector import Detector, trained_model

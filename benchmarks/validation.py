@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from cnctwin.models.contest import Losses, outcome
+from cnctwin.challenge.contest import Losses, outcome
 from cnctwin.validation.block_bootstrap import block_samples, block_sums, bootstrapped
 from cnctwin.validation.clock import Clock, Pair, placed
 from cnctwin.validation.history import retraining

@@ -1,1 +1,1 @@
-"""The program: command line, demo, and the parts that it starts when they are not given."""
+"""The program: commands over services, over what is kept and what stands in; the ground is files, terminal and processes."""

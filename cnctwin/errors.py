@@ -1,23 +1,23 @@
-"""What can go wrong in the program.
+"""The errors of the program.
 
-ProgramError
+ApplicationError
 ├── UsageError         wrong input: exit code 2
 ├── BrokerStartError   the private broker cannot be started
 └── SpreadError        pieces of a job that are lost: nobody is there to compute them, or each who tried was killed
 """
 
 
-class ProgramError(Exception):
+class ApplicationError(Exception):
     """The root of all errors of this package; its text is the one line that a user sees."""
 
 
-class UsageError(ProgramError):
+class UsageError(ApplicationError):
     """Input that cannot be used, with the way out."""
 
 
-class BrokerStartError(ProgramError):
+class BrokerStartError(ApplicationError):
     """The private broker cannot be started."""
 
 
-class SpreadError(ProgramError):
+class SpreadError(ApplicationError):
     """Pieces of a job that are lost: nobody is there to compute them, or each who tried was killed."""

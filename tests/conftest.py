@@ -48,7 +48,7 @@ LONG = (
     "cnctwin/memory/store_influx/test_outage.py",
     "cnctwin/page/test_views.py",
     "cnctwin/page/test_connection.py",
-    "cnctwin/models/test_compare.py",
+    "cnctwin/challenge/test_compare.py",
     "processors/alerts/test_laws.py",
     "cnctwin/memory/replay/test_replay_of_a_live_plant.py",
 )

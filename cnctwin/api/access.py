@@ -1,4 +1,4 @@
-"""Who may ask: decided from the address that asks, the headers, and what the server was started with. No I/O, no clock.
+"""Access to the interface: decided from the address that asks, the headers, and the options of the server. No I/O, no clock.
 
 * On loopback, without a token, whoever is on this machine may.
 * With a token, who has it: as `Authorization: Bearer …`, or as the cookie that a log-in sets. Never in an address.
@@ -25,7 +25,7 @@ SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
 
 
 class Asking(NamedTuple):
-    """What access is decided by. `headers` have lower-case names."""
+    """The facts that access is decided by. `headers` have lower-case names."""
 
     method: str
     path: str
@@ -58,7 +58,7 @@ class Access:
     hosts: frozenset[str] = frozenset()
 
     def judge(self, asking: Asking, now_s: float) -> Verdict:
-        """Whether this may be answered."""
+        """Return True if this may be answered."""
         by_proxy = self.proxy is not None and same_address(asking.peer, self.proxy)
         host = asking.headers.get("host", "")
         if not by_proxy and not self._is_ours(host):
@@ -77,7 +77,7 @@ class Access:
         return f"{until_s}.{self._proof(until_s)}"
 
     def is_token(self, given: str) -> bool:
-        """Whether this is the token, in a time that does not tell how much of it is right."""
+        """Return True if this is the token, in a time that does not tell how much of it is right."""
         return self.token is not None and hmac.compare_digest(_digest(given), _digest(self.token))
 
     def _known(self, asking: Asking, now_s: float, *, by_proxy: bool) -> Verdict:
@@ -125,7 +125,7 @@ def host_name(host: str) -> str:
 
 
 def same_address(one: str, other: str) -> bool:
-    """Whether two addresses are one, an IPv4 one that is written as IPv6 included."""
+    """Return True if two addresses are one, an IPv4 one that is written as IPv6 included."""
     try:
         return _address(one) == _address(other)
     except ValueError:
@@ -133,7 +133,7 @@ def same_address(one: str, other: str) -> bool:
 
 
 def is_loopback(address: str) -> bool:
-    """Whether only this machine reaches an address.
+    """Return True if only this machine reaches an address.
 
     >>> is_loopback("127.0.0.1"), is_loopback("::1"), is_loopback("localhost"), is_loopback("0.0.0.0")
     (True, True, True, False)

@@ -1,4 +1,4 @@
-"""What the routes answer, as pydantic models: the contracts of the OpenAPI document."""
+"""The routes' answers as pydantic models: the contracts of the OpenAPI document."""
 
 from typing import Annotated, Any, Literal
 
@@ -82,7 +82,7 @@ class Health(Answer):
 
 
 class Ready(Answer):
-    """Whether it can serve; 503 where it cannot."""
+    """The state of the server; 503 where it cannot serve."""
 
     ready: bool
 
@@ -115,7 +115,7 @@ class History(BaseModel):
 
 
 class Events(Answer):
-    """What happened to a machine, oldest first. `left_out` oldest ones there was no room for."""
+    """The events of a machine, oldest first. `left_out` oldest ones there was no room for."""
 
     machine: MachineName
     source: Literal["store", "memory"]
@@ -145,7 +145,7 @@ class Validation(Answer):
 
 
 class Replayed(Answer):
-    """What the processors give now, beside what they published then (docs/replay.md); at most a hundred differences."""
+    """The processors run again, beside what they published then (docs/replay.md); at most a hundred differences."""
 
     machine: MachineName
     equal: bool

@@ -9,7 +9,7 @@ from processors.thermal import Config as ThermalConfig
 
 
 class OfMachine(NamedTuple):
-    """What a prediction for a machine is made with, and where each table is from."""
+    """The constants of a prediction for a machine, and where each table is from."""
 
     thermal: ThermalConfig
     force: ForceConfig

@@ -1,4 +1,4 @@
-"""What the interface answers when it cannot do what it is asked: one JSON, `{"error": "<culprit, value, way out>"}`."""
+"""Answers of the interface when it cannot do what it is asked: one JSON, `{"error": "<culprit, value, way out>"}`."""
 
 import json
 from typing import Any
@@ -8,12 +8,12 @@ from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 
 from cnctwin.api.security_headers import HEADERS
-from cnctwin.errors import ProgramError
+from cnctwin.errors import ApplicationError
 
 LINE_MAX = 500
 
 
-class ApiError(ProgramError):
+class ApiError(ApplicationError):
     """A refusal with its HTTP status and its one line."""
 
     def __init__(self, status: int, line: str, headers: dict[str, str] | None = None) -> None:
@@ -56,7 +56,7 @@ def handle_errors(app: FastAPI) -> None:
         return error_response(500, "the server failed at this; its log says how", HEADERS)  # outside the guard
 
     app.add_exception_handler(ApiError, refused)
-    app.add_exception_handler(ProgramError, trouble)
+    app.add_exception_handler(ApplicationError, trouble)
     app.add_exception_handler(RequestValidationError, wrong)
     app.add_exception_handler(HTTPException, http)
     app.add_exception_handler(Exception, bug)

@@ -1,4 +1,4 @@
-"""What happened to a machine, out of signals over time: `{"t", "until", "kind", "text", "detail"?}`, oldest first.
+"""The events of a machine, out of signals over time: `{"t", "until", "kind", "text", "detail"?}`, oldest first.
 
 An event lasts until its signal says something else; `until` is None where that is still so at the end. Of what was so before the
 stretch began nothing is known: an event begins with the first sample in it.
@@ -92,7 +92,7 @@ def _stretches(kind: str, held: Sequence[Sample], text_of: Any) -> Iterator[Even
 
 
 def _holes(held: Sequence[Sample]) -> Iterator[Event]:
-    """Where the machine was not heard: its control's state was marked stale."""
+    """Yield the stretches in which the machine was not heard: its control's state was marked stale."""
     current: Event | None = None
     for sample in held:
         if sample.quality == Quality.STALE:

@@ -1,4 +1,4 @@
-"""How many wrong tokens came lately: guessing is made slow, for each address and for all together."""
+"""Recent wrong tokens: guessing is made slow, for each address and for all together."""
 
 from collections import deque
 
@@ -19,7 +19,7 @@ class Failures:
         self._of_all.append((now_s, peer))
 
     def wait_s(self, peer: str, now_s: float) -> float:
-        """How long this address has to wait before it may try again; 0 = not at all."""
+        """Return how long this address has to wait before it may try again; 0 = not at all."""
         while self._of_all and now_s - self._of_all[0][0] >= WINDOW_S:
             self._of_all.popleft()
         of_one = [at_s for at_s, one in self._of_all if one == peer]

@@ -29,14 +29,14 @@ SHOWN = {
 _KEYS = frozenset(SHOWN.values())
 
 
-class Told(Protocol):
+class SignalReading(Protocol):
     """A signal with its last reading."""
 
     reading: Reading
 
 
 def is_gap_figure(name: str) -> bool:
-    """Whether a metric is the standing gap of a signal over all its regimes.
+    """Return True if a metric is the standing gap of a signal over all its regimes.
 
     >>> is_gap_figure("twin/gap_spindle_rpm"), is_gap_figure("twin/gap_spindle_load_pct/air"), is_gap_figure("twin/gap_basis")
     (True, False, False)
@@ -45,11 +45,11 @@ def is_gap_figure(name: str) -> bool:
 
 
 def is_key_signal(name: str) -> bool:
-    """Whether the overview follows a metric."""
+    """Return True if the overview follows a metric."""
     return name in _KEYS or is_gap_figure(name)
 
 
-def fleet_item(machine: str, online: bool, signals: Mapping[str, Told]) -> dict[str, Any]:
+def fleet_item(machine: str, online: bool, signals: Mapping[str, SignalReading]) -> dict[str, Any]:
     """One machine of the overview: last known values, null where one is bad or not known."""
     item: dict[str, Any] = {"machine": machine, "online": online}
     for title, name in SHOWN.items():

@@ -1,4 +1,4 @@
-"""What stands before every route: who may ask, and the headers that tell a browser what a page of ours may do."""
+"""The guard before every route: who may ask, and the headers that tell a browser what a page of ours may do."""
 
 import time
 from http.cookies import CookieError, SimpleCookie

@@ -16,7 +16,7 @@ class Nights:
         self._known: dict[str, tuple[int, dict[str, Any]]] = {}
 
     def of(self, machine: str) -> dict[str, Any]:
-        """What there is to be told of a machine; `t` is None where it was never judged. Raises UsageError."""
+        """Return the validation of a machine; `t` is None where it was never judged. Raises UsageError."""
         try:
             changed_ns = file_of(machine, self.folder).stat().st_mtime_ns
         except (OSError, ValueError):

@@ -1,4 +1,4 @@
-"""What the twin expects: temperature and cutting force for a planned course of speed and load.
+"""The twin's expectation: temperature and cutting force for a planned course of speed and load.
 
 C dT/dt = alpha · load · rpm² + beta · rpm − (T − T_ambient) / R          (twin.thermal, exact in each step)
 F = η · (load/100 · P_rated − P_idle) / v_c                               (twin.cutting)
@@ -67,7 +67,7 @@ class Plan(BaseModel):
 
 
 class Forecast(BaseModel):
-    """What comes of it. Lists have one value for each step, as of its end; a force is null where power over speed means nothing.
+    """The result. Lists have one value for each step, as of its end; a force is null where power over speed means nothing.
 
     force_reasons: why it is null, by stretches of steps: `[first, last, reason]`
     corrected_temp_c: with what a residual model has learned of this machine; null where there is none, or outside its region

@@ -13,7 +13,7 @@ STDOUT_MAX = 16_000_000
 
 
 async def replayed(store: str, machine: str, from_ms: int, to_ms: int, config: Path | None) -> dict[str, Any]:
-    """What the processors give now, beside what they published then. Raises ApiError."""
+    """Return what the processors give now, beside what they published then. Raises ApiError."""
     options = [f"--machine={machine}", f"--from={from_ms}", f"--to={to_ms}", f"--store={store}", "--json"]
     options += [] if config is None else [f"--config={config}"]
     child = await asyncio.create_subprocess_exec(

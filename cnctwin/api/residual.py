@@ -20,7 +20,7 @@ EXTRA = "pip install 'cnctwin[twin]' brings it"
 
 
 class Correction(NamedTuple):
-    """What a model makes of the physics, °C, and which model that is; None, or None for a step, with why not in `basis`."""
+    """A model's correction of the physics, °C, and which model that is; None, or None for a step, with why not in `basis`."""
 
     temp_c: list[float | None] | None
     basis: str
@@ -72,7 +72,7 @@ class Models:
 
 
 def models_part(models: Models) -> Part:
-    """How it stands with the models."""
+    """Return the state of the models."""
     folder = models.folder
     if folder is None:
         line = "no folder of models: predictions are the physics alone"

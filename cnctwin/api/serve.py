@@ -21,7 +21,7 @@ EXTRA = "pip install 'cnctwin[page]' brings it"
 
 @dataclass(frozen=True, slots=True)
 class ServeOptions:
-    """What the command is given. `store` '' = none, `port` 0 = a free one."""
+    """The options of the command. `store` '' = none, `port` 0 = a free one."""
 
     group: str = "cnc"
     store: str = ""
@@ -81,7 +81,7 @@ def serve(options: ServeOptions, broker: BrokerAddress, stop: Event) -> None:
 
 
 def access_of(options: ServeOptions, variable: str | None) -> Any:
-    """Who may ask, as the options say. Raises UsageError where they would leave the plant open to a network."""
+    """Return who may ask, by the options. Raises UsageError where they would leave the plant open to a network."""
     from cnctwin.api.access import TOKEN_CHARACTERS_MIN, Access, is_loopback  # noqa: PLC0415
 
     token = variable if options.token_file is None else _token(options.token_file)

@@ -10,7 +10,7 @@ import uvicorn
 from fastapi import FastAPI
 
 from cnctwin.api.live.fan_out import FanOut
-from cnctwin.errors import ProgramError, UsageError
+from cnctwin.errors import ApplicationError, UsageError
 
 CONNECTIONS_MAX = 300
 KEEP_ALIVE_S = 20
@@ -56,22 +56,22 @@ class Server:
 
     @property
     def url(self) -> str:
-        """Where a browser on this machine finds it."""
+        """The address at which a browser on this machine finds it."""
         name = "127.0.0.1" if self.host in ("0.0.0.0", "") else "[::1]" if self.host == "::" else self.host  # noqa: S104
         return f"http://[{name}]:{self.port}" if ":" in name and not name.startswith("[") else f"http://{name}:{self.port}"
 
     @property
     def alive(self) -> bool:
-        """Whether it serves."""
+        """True if it serves."""
         return self._thread.is_alive()
 
     def start(self) -> None:
-        """Serve; returns when it does. Raises ProgramError."""
+        """Serve; returns when it does. Raises ApplicationError."""
         self._thread.start()
         deadline_s = time.monotonic() + START_S_MAX
         while not self._server.started:
             if not self._thread.is_alive() or time.monotonic() > deadline_s:
-                raise ProgramError(f"the server on {self.host}:{self.port} did not start; the lines before say why")
+                raise ApplicationError(f"the server on {self.host}:{self.port} did not start; the lines before say why")
             time.sleep(0.01)
 
     def stop(self) -> None:

@@ -1,4 +1,4 @@
-"""What an application stands on. Each part but the live plant may be missing; /health says which, and what to do."""
+"""The parts an application stands on. Each but the live plant may be missing; /health says which, and what to do."""
 
 from dataclasses import dataclass, field
 from pathlib import Path

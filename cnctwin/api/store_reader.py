@@ -57,7 +57,7 @@ class StoreReader:
 
     @property
     def configured(self) -> bool:
-        """Whether a store was named."""
+        """True if a store was named."""
         return bool(self.where)
 
     async def ask(self, question: Callable[[Store], T]) -> T:
@@ -76,7 +76,7 @@ class StoreReader:
             raise ApiError(503, f"no answer within {self._query_s_max:g} s; ask for a shorter stretch or wider windows") from None
 
     async def status(self) -> Status:
-        """How the store is, at most five seconds old."""
+        """Return the state of the store, at most five seconds old."""
         if self._status is None or time.monotonic() - self._status[0] > STATUS_S:
             status = await self.ask(lambda store: store.status())
             self._status = (time.monotonic(), status)

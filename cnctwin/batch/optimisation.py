@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from cnctwin.commands.twin import write
+from cnctwin.files.output import write
 from cnctwin.reports.optimisation.page import report_html
 from twin.optimisation.answer import Objective, Optimised, SpeedChanges
 from twin.optimisation.optimise import Hooks, Progress, Spread, optimise
@@ -18,7 +18,7 @@ DEFAULTS = Question("", "")
 
 @dataclass(frozen=True, slots=True)
 class OptimiseRequest:
-    """What a job or a command asks for; None = the default of `twin.optimisation.question.Question`.
+    """A request by a job or a command; None = the default of `twin.optimisation.question.Question`.
 
     encoding: of the program's file, in which it is written again
     """
@@ -53,7 +53,7 @@ class OptimiseRequest:
 
 @dataclass(frozen=True, slots=True)
 class Files:
-    """Where the answer goes."""
+    """The files that the answer goes into."""
 
     program: Path
     answer: Path

@@ -21,7 +21,7 @@ class Answered:
 
     @property
     def size(self) -> float:
-        """Of its largest signal."""
+        """The size of its largest signal."""
         return max(self.size_over_floor.values(), default=0.0)
 
 
@@ -36,7 +36,7 @@ class Answer:
 
     @property
     def size(self) -> float:
-        """Of the largest signal of the smallest effect: what has to be seen for a right answer; 0 where it is healthy."""
+        """The size of the smallest effect by its largest signal: it has to be seen for a right answer; 0 where healthy."""
         return min((effect.size for effect in self.effects), default=0.0)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import tomli_w
 
 from cnctwin.blind_check.answer import Answer, Answered
-from cnctwin.blind_check.question import Asked, Question, effect_on
+from cnctwin.blind_check.question import DrawnEffect, Question, effect_on
 from cnctwin.standins.reference_machine.effect import Parameters
 from cnctwin.standins.reference_machine.physics import Physics, physics_of
 from cnctwin.standins.reference_machine.program import air_program, cut_program, nc_text
@@ -31,7 +31,8 @@ from cnctwin.standins.reference_machine.trajectory import Dynamics
 
 FIT, REPEAT, CHECK, UNSEEN = 1, 2, 3, 4
 """Seeds of the chances of each run; a fit and its repeat are runs of one program."""
-Told = Motion | WarmUp
+Course = Motion | WarmUp
+"""The motion that a program makes, or a warm-up."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +42,7 @@ class Machine:
     question: Question
     stated: MachineFigures
     healthy: Physics
-    told: Mapping[tuple[str, int], Told]
+    courses: Mapping[tuple[str, int], Course]
 
 
 def machine_of(question: Question) -> Machine:
@@ -50,16 +51,16 @@ def machine_of(question: Question) -> Machine:
     stated = drawn_machine(chance)
     healthy = physics_of(scattered(stated, chance))
     dynamics = Dynamics(float(chance.uniform(1800.0, 2800.0)), float(chance.uniform(0.025, 0.06)))
-    told: dict[tuple[str, int], Told] = {}
+    courses: dict[tuple[str, int], Course] = {}
     for kind in question.kinds:
         for run in (FIT, CHECK, UNSEEN):
-            told[kind, run] = _drawn(kind, stated, dynamics, question.warm, chance)
-        told[kind, REPEAT] = _drawn(kind, stated, dynamics, question.warm, chance) if kind == "warmup" else told[kind, FIT]
+            courses[kind, run] = _drawn(kind, stated, dynamics, question.warm, chance)
+        courses[kind, REPEAT] = _drawn(kind, stated, dynamics, question.warm, chance) if kind == "warmup" else courses[kind, FIT]
     restless = replace(healthy, disturbance_n=float(chance.uniform(0.7, 1.3)), disturbance_s=float(chance.uniform(0.03, 0.08)))
-    return Machine(question, stated, restless, told)
+    return Machine(question, stated, restless, courses)
 
 
-def _drawn(kind: str, stated: MachineFigures, dynamics: Dynamics, warm: bool, chance: np.random.Generator) -> Told:
+def _drawn(kind: str, stated: MachineFigures, dynamics: Dynamics, warm: bool, chance: np.random.Generator) -> Course:
     if kind == "warmup":
         return warmup_of(chance)
     if kind == "cut":
@@ -68,8 +69,8 @@ def _drawn(kind: str, stated: MachineFigures, dynamics: Dynamics, warm: bool, ch
 
 
 def recorded(machine: Machine, physics: Physics, kind: str, run: int, axes: str = "xyz", *, seed: int | None = None) -> Columns:
-    """What `physics` makes of a run of the machine; with another seed, with other chances."""
-    told = machine.told[kind, run]
+    """Return the recording of a run of the machine with `physics`; another seed gives other chances."""
+    told = machine.courses[kind, run]
     number = int(np.random.default_rng([machine.question.seed, 3, run if seed is None else seed]).integers(2**31))
     return warmup_run(physics, told, number) if isinstance(told, WarmUp) else motion_run(physics, told, number, axes)
 
@@ -95,18 +96,18 @@ def physics_with(machine: Machine, answer: Answer) -> Physics:
     """The machine's physics with the effects of an answer, whose sizes need not be searched for again."""
     physics = machine.healthy
     for effect in answer.effects:
-        asked = Asked(effect.effect, effect.on, 0.0, effect.named)
+        asked = DrawnEffect(effect.effect, effect.on, 0.0, effect.named)
         physics = effect_on(asked).acts(physics, effect.on, effect.stated)
     return physics
 
 
-def _moved(asked: Asked) -> str:
+def _moved(asked: DrawnEffect) -> str:
     """The axes whose signals the effect changes: its own, or any."""
     return asked.on if asked.on in ("x", "y", "z") else "xyz"
 
 
 def _floors(machine: Machine, kind: str) -> dict[str, float]:
-    """What healthy runs of the fit program differ by, over √2: three of them, as two can agree by luck."""
+    """Return what healthy runs of the fit program differ by, over √2: three of them, as two can agree by luck."""
     one, other, third = (recorded(machine, machine.healthy, kind, FIT, seed=seed) for seed in (FIT, 10, 11))
     differ = rms_by_signal([one, other, third], [other, third, one])
     return {name: value / np.sqrt(2.0) for name, value in differ.items()}
@@ -114,7 +115,7 @@ def _floors(machine: Machine, kind: str) -> dict[str, float]:
 
 def _amplitude(
     machine: Machine,
-    asked: Asked,
+    asked: DrawnEffect,
     traits: Parameters,
     kinds: list[str],
     floors: Mapping[str, Mapping[str, float]],
@@ -163,21 +164,15 @@ def write_case(folder: Path, question: Question, answer: Answer | None = None) -
     answer = answer_of(question) if answer is None else answer
     machine = machine_of(question)
     runs = [(kind, run) for kind in question.kinds for run in (FIT, REPEAT, CHECK)]
-    _write_folder(folder, machine, physics_with(machine, answer), runs)
+    write_folder(folder, machine, physics_with(machine, answer), runs)
     return answer
-
-
-def write_unseen(folder: Path, question: Question, answer: Answer | None = None) -> None:
-    """Writes a case of the same machine whose only runs are of programs that the case of `write_case` has not got."""
-    machine = machine_of(question)
-    physics = physics_with(machine, answer_of(question) if answer is None else answer)
-    _write_folder(folder, machine, physics, [(kind, UNSEEN) for kind in question.kinds])
 
 
 NAMES = {FIT: "fit", REPEAT: "fit_2", CHECK: "check", UNSEEN: "check"}
 
 
-def _write_folder(folder: Path, machine: Machine, physics: Physics, runs: list[tuple[str, int]]) -> None:
+def write_folder(folder: Path, machine: Machine, physics: Physics, runs: list[tuple[str, int]]) -> None:
+    """Write the case of a machine with `physics` whose runs are these; the folder is made."""
     (folder / "runs").mkdir(parents=True)
     (folder / "machine.toml").write_text(machine_toml(machine.stated), encoding="utf-8")
     entries = []
@@ -185,7 +180,7 @@ def _write_folder(folder: Path, machine: Machine, physics: Physics, runs: list[t
         stem = f"runs/{kind}_{NAMES[run]}"
         write(recorded(machine, physics, kind, run), folder / f"{stem}.parquet")
         entry = {"file": f"{stem}.parquet", "kind": kind, "role": "fit" if run in (FIT, REPEAT) else "check"}
-        told = machine.told[kind, run]
+        told = machine.courses[kind, run]
         if isinstance(told, Motion):
             (folder / f"{stem}.nc").write_text(nc_text(told.blocks), encoding="utf-8")
             entry["program"] = f"{stem}.nc"

@@ -125,7 +125,7 @@ def _batch(
 
 
 def diagnosed(folder: Path, diagnose: Diagnose) -> tuple[Given, str]:
-    """What the diagnosis of a folder gives, and its twin as TOML; empty where it failed."""
+    """Return the diagnosis of a folder and its twin as TOML; empty where it failed."""
     begin = time.perf_counter()
     try:
         found = diagnose(read_case(folder))

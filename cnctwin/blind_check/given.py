@@ -1,4 +1,4 @@
-"""What a diagnosis gave for a case, reduced to what is scored."""
+"""A diagnosis of a case, reduced to what is scored."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ class GivenCause:
 
 @dataclass(frozen=True, slots=True)
 class Given:
-    """What came. closure_unseen: on runs the diagnosis never had; failed: why there is no diagnosis."""
+    """The diagnosis as it came. closure_unseen: on runs the diagnosis never had; failed: why there is no diagnosis."""
 
     verdict: Verdict
     causes: tuple[GivenCause, ...]

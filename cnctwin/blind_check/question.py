@@ -17,7 +17,7 @@ KINDS = ("air", "cut", "warmup")
 
 
 class Sort(StrEnum):
-    """How many effects a machine has, and whether they are in the catalogue."""
+    """The number of effects that a machine has, and whether they are in the catalogue."""
 
     SINGLE = "single"
     PAIR = "pair"
@@ -31,7 +31,7 @@ COUNT = {Sort.SINGLE: 1, Sort.PAIR: 2, Sort.TRIPLE: 3, Sort.HEALTHY: 0, Sort.OUT
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class DrawnEffect:
     """An effect by name, what it is on, and how large its largest signal shall be over the floor."""
 
     effect: str
@@ -48,11 +48,11 @@ class Question:
     sort: Sort
     seed: int
     kinds: tuple[str, ...]
-    asked: tuple[Asked, ...]
+    asked: tuple[DrawnEffect, ...]
     warm: bool = False
 
 
-def effect_on(asked: Asked) -> Effect:
+def effect_on(asked: DrawnEffect) -> Effect:
     """The effect of the reference machine that is asked for."""
     table = NAMED if asked.named else UNNAMED
     found: list[Effect] = [effect for effect in table if effect.name == asked.effect and asked.on in effect.places]
@@ -131,7 +131,7 @@ def _one_of(effects: Sequence[Effect], chance: Chance) -> Effect:
     return bearing[int(chance.integers(len(bearing)))]
 
 
-def _asked(effect: Effect, kinds: set[str], chance: Chance, named: bool) -> Asked:
+def _asked(effect: Effect, kinds: set[str], chance: Chance, named: bool) -> DrawnEffect:
     places = [on for on in effect.places if not (on == "z" and "air" not in kinds)]
     target = float(np.exp(chance.uniform(*np.log(SIZES))))
-    return Asked(effect.name, str(chance.choice(places)), target, named)
+    return DrawnEffect(effect.name, str(chance.choice(places)), target, named)

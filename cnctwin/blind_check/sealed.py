@@ -5,23 +5,23 @@ import hmac
 import secrets
 from dataclasses import dataclass
 
-from cnctwin.errors import ProgramError
+from cnctwin.errors import ApplicationError
 
 
-class SealError(ProgramError):
+class SealError(ApplicationError):
     """Answers that are not the ones which were sealed."""
 
 
 @dataclass(frozen=True, slots=True)
 class Seal:
-    """What is shown before: SHA-256 of salt and text, in hexadecimal."""
+    """The hash that is shown before: SHA-256 of salt and text, in hexadecimal."""
 
     digest: str
 
 
 @dataclass(frozen=True, slots=True)
 class Sealed:
-    """What is kept until the seal is opened."""
+    """The salt and text kept until the seal is opened."""
 
     seal: Seal
     salt: str

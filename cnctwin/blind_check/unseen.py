@@ -1,4 +1,4 @@
-"""How much of the gap a diagnosed twin closes on runs of its machine that the diagnosis never had.
+"""The share of the gap that a diagnosed twin closes on runs of its machine that the diagnosis never had.
 
 Before is what the effects change in a run; what is left is twin minus recording where the twin is compared
 (`twin.gap.stages.shown`); both over what repeated runs of the same machine differ by, which is all that the twin with the

@@ -4,31 +4,21 @@ Exit codes: 0 = done, or nothing fires unacknowledged; 1 = something does, or th
 """
 
 import json
-import os
 import re
 import sys
-import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass, field
-from datetime import UTC, datetime
+from collections.abc import Mapping
 from typing import Annotated, Any
-from uuid import uuid4
 
 import typer
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from cnctwin.commands.options import AsJson, Broker, Wait
 from cnctwin.errors import UsageError
+from cnctwin.plant.alert_desk import alert_desk
 from cnctwin.processes.given_broker import address
-from sparkplug.broker import BrokerAddress
-from sparkplug.host import HostApplication
-from sparkplug.host_session import EventKind
 
-STATE = "cnctwin/alerts/state"
-COMMAND = "cnctwin/alerts/command/"
-FRESH_S_MAX = 150.0  # the state comes once a minute
 TEST_S_MAX = 30.0
 ID_SHOWN = 8
 _DURATION = re.compile(r"(\d+(?:\.\d+)?)([smhd]?)")
@@ -36,53 +26,14 @@ _SECONDS = {"": 1.0, "s": 1.0, "m": 60.0, "h": 3600.0, "d": 86_400.0}
 
 alerts_app = typer.Typer(no_args_is_help=True, help="What fires, who knows of it, and who takes care of it.")
 
-Broker = Annotated[str | None, typer.Option(help="mqtt[s]://[user@]host[:port]; else $CNCTWIN_BROKER", show_default=False)]
 By = Annotated[str, typer.Option(help="Who says so")]
 Comment = Annotated[str, typer.Option(help="Why")]
-Wait = Annotated[float, typer.Option("--wait", help="Seconds to wait for an answer", min=0.5, max=600.0)]
-AsJson = Annotated[bool, typer.Option("--json", help="For a program to read")]
-
-
-@dataclass
-class Desk:
-    """A connection to the alerts processor: its state as it comes, and a way to give it a command."""
-
-    host: HostApplication
-    url: str
-    state: dict[str, Any] = field(default_factory=dict)
-
-    def until(self, true: Callable[[], Any], seconds: float) -> Any:
-        """Read until something is so; what was not false, or None."""
-        deadline_s = time.monotonic() + seconds
-        while True:
-            for event in self.host.poll(0.05):
-                if event.kind is EventKind.PLAIN and event.topic == STATE and event.payload:
-                    self.state = _parsed(event.payload)
-            if (value := true()) or time.monotonic() > deadline_s:
-                return value or None
-
-    def command(self, name: str, wait_s: float, **fields: Any) -> str:
-        """Give a command and wait for what becomes of it. Raises UsageError where it is not done."""
-        key = uuid4().hex[:16]
-        payload = json.dumps({"id": key, **fields}, ensure_ascii=False).encode()
-        if not self.host.publish_plain(COMMAND + name, payload, qos=1):
-            raise UsageError(f"the connection to {self.url} was lost; try again")
-
-        def outcome() -> Any:
-            return next((one for one in self.state.get("commands", ()) if one.get("id") == key), None)
-
-        found = self.until(outcome, wait_s)
-        if found is None:
-            raise UsageError(f"no answer within {wait_s:g} s; does the processor `alerts` run? (cnctwin process alerts)")
-        if not found["done"]:
-            raise UsageError(str(found["text"]))
-        return str(found["text"])
 
 
 @alerts_app.command("list")
 def list_alerts(broker: Broker = None, wait_s: Wait = 5.0, as_json: AsJson = False) -> None:
     """All alerts, silences and receivers. Exit code 1: something fires that nobody has acknowledged."""
-    with _desk(broker, wait_s) as desk:
+    with alert_desk(address(broker), wait_s) as desk:
         state = desk.state
     if as_json:
         sys.stdout.write(json.dumps(state) + "\n")
@@ -100,7 +51,7 @@ def ack(
     wait_s: Wait = 5.0,
 ) -> None:
     """Say that somebody takes care of an alert: it is not repeated and goes to nobody else."""
-    with _desk(broker, wait_s) as desk:
+    with alert_desk(address(broker), wait_s) as desk:
         alert = _one(desk.state, fingerprint)
         fields = {"fingerprint": alert["fingerprint"], "episode": alert["episode"]}
         print(desk.command("ack", wait_s, by=by, comment=comment, **fields))
@@ -123,7 +74,7 @@ def silence(
     if not matchers:
         raise UsageError("a silence needs --machine, --alert or --severity; --machine '*' is all of them")
     for_s = duration_s(for_)
-    with _desk(broker, wait_s) as desk:
+    with alert_desk(address(broker), wait_s) as desk:
         print(desk.command("silence", wait_s, by=by, comment=comment, matchers=matchers, for_s=for_s))
 
 
@@ -132,7 +83,7 @@ def unsilence(
     silence: Annotated[str, typer.Argument(help="Its id, as `list` shows it")], by: By, broker: Broker = None, wait_s: Wait = 5.0
 ) -> None:
     """End a silence now."""
-    with _desk(broker, wait_s) as desk:
+    with alert_desk(address(broker), wait_s) as desk:
         print(desk.command("unsilence", wait_s, by=by, silence=silence))
 
 
@@ -144,7 +95,7 @@ def try_receiver(
     wait_s: Wait = 5.0,
 ) -> None:
     """Send a test to a receiver, and say what became of it. Exit code 1: it was not delivered."""
-    with _desk(broker, wait_s) as desk:
+    with alert_desk(address(broker), wait_s) as desk:
         before = _counts(desk.state, receiver)
         key = desk.command("test", wait_s, by=by, receiver=receiver)
         desk.until(lambda: _counts(desk.state, receiver) != before, max(wait_s, TEST_S_MAX))
@@ -169,42 +120,6 @@ def duration_s(text: str) -> float:
     if not 0.0 < seconds <= 30 * 86_400.0:
         raise UsageError(f"{text!r} is no duration of up to 30 days; write 90s, 30m, 2h or 1d")
     return seconds
-
-
-@contextmanager
-def _desk(broker: str | None, wait_s: float) -> Iterator[Desk]:
-    """A connection, and the state. Raises UsageError where there is none, or one that is not kept up."""
-    where = address(broker) or BrokerAddress()
-    host = HostApplication(where, f"alerts-{os.getpid()}", (), publish_state=False)
-    host.subscribe_plain(STATE)
-    host.start()
-    try:
-        desk = Desk(host, where.url)
-        if desk.until(lambda: desk.state, wait_s) is None:
-            if not host.online:
-                raise UsageError(host.last_error or f"no connection to {where.url}")
-            raise UsageError(f"{where.url} knows nothing of alerts; does the processor run? (cnctwin process alerts)")
-        age_s = _age_s(desk.state)
-        if age_s > FRESH_S_MAX:
-            raise UsageError(f"the state of alerts is {age_s:.0f} s old: the processor `alerts` does not run any more")
-        yield desk
-    finally:
-        host.stop()
-
-
-def _parsed(payload: bytes) -> dict[str, Any]:
-    try:
-        state = json.loads(payload)
-    except (ValueError, RecursionError):
-        return {}
-    return state if isinstance(state, dict) else {}
-
-
-def _age_s(state: Mapping[str, Any]) -> float:
-    try:
-        return time.time() - datetime.fromisoformat(str(state["at"])).astimezone(UTC).timestamp()
-    except (KeyError, ValueError, OverflowError):
-        return float("inf")
 
 
 def _one(state: Mapping[str, Any], start: str) -> Mapping[str, Any]:

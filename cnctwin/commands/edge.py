@@ -1,63 +1,69 @@
-"""`cnctwin edge run` and the table of `cnctwin edge check`."""
+"""`cnctwin edge`: run an edge, check its configuration, draft one."""
 
+import json
 import sys
-import tomllib
 from collections.abc import Sequence
-from contextlib import nullcontext, suppress
-from dataclasses import replace
+from dataclasses import asdict
 from pathlib import Path
-from threading import Event
-from typing import Any
+from typing import TYPE_CHECKING, Annotated
 
+import typer
 from rich.table import Table
 from rich.text import Text
 
-from cnctwin.processes.given_broker import broker_or_own
-from edge.adapter import Row
-from edge.config import EdgeConfig
-from edge.config_file import load
-from edge.errors import ConfigError
-from edge.running.gateway import Gateway
-from edge.running.run import broker_address, edge_runtime
-from edge.running.runtime import EdgeRuntime
-from edge.state_dir import state_dir
-from sparkplug.broker import BrokerAddress
-from sparkplug.errors import SparkplugError
+from cnctwin.commands.options import AsJson, Broker
+from cnctwin.errors import UsageError
+from cnctwin.processes.given_broker import address
+from cnctwin.processes.stopping import stopped_by_signals
+from cnctwin.terminal.console import standard_output
+
+if TYPE_CHECKING:
+    from edge.adapter import Row
+
+edge_app = typer.Typer(no_args_is_help=True, help="Turn what a control says into Sparkplug B metrics.")
 
 
-def run(path: Path, given: BrokerAddress | None, stop: Event) -> dict[str, int]:
-    """Run the edge of this file, or those of a folder of files, until stopped; the last ledger, or the sum of them.
+@edge_app.command()
+def run(
+    config: Annotated[Path, typer.Argument(help="The TOML file of one machine, or a folder with one for each")],
+    broker: Broker = None,
+) -> None:
+    """Run an edge, or one for each file of a folder, until SIGTERM or Ctrl-C; changes of the files are taken up."""
+    from cnctwin.running.edges import run as run_edges
 
-    `given` takes the place of the brokers in the files; where neither names one, one of our own is started.
-    """
-    files = sorted(path.glob("*.toml")) if path.is_dir() else [path]
-    if not path.is_dir():
-        load(path)  # what is wrong with it is said before a broker of our own is started
-    needs_own = given is None and not all(map(_names_broker, files))
-    with broker_or_own(given) if needs_own or given is not None else nullcontext() as broker:
-
-        def begin(config: EdgeConfig[Any], restarts: int) -> EdgeRuntime:
-            named = given is None and "url" in config.broker.model_fields_set  # not by the file, which may be in pieces by now
-            address = broker_address(config.broker, config.path) if named or broker is None else broker
-            try:
-                runtime = edge_runtime(_with_session_file(config), address, restarts=restarts)
-            except SparkplugError as error:  # such as a certificate's file that is not there
-                raise ConfigError(f"{config.path}: {error}") from error
-            print(f"{config.path}: the edge of {config.machine.name} begins, to {address.url}", file=sys.stderr, flush=True)
-            return runtime
-
-        return Gateway(path, begin).run(stop)
+    with stopped_by_signals() as stop:
+        run_edges(config, address(broker), stop)
 
 
-def _with_session_file(config: EdgeConfig[Any]) -> EdgeConfig[Any]:
-    if config.broker.session_file:
-        return config
-    file = state_dir() / f"{config.broker.group}.{config.node}.json"
-    return replace(config, broker=config.broker.model_copy(update={"session_file": str(file)}))
+@edge_app.command()
+def check(config: Annotated[Path, typer.Argument(help="The TOML file of one machine")], as_json: AsJson = False) -> None:
+    """Check a configuration against its control and show what would be published, without a broker."""
+    from edge.check import check as rows_of
+
+    if config.is_dir():
+        raise UsageError(f"{config}: is a folder; check one of its files at a time")
+    rows = rows_of(config)
+    if as_json:
+        sys.stdout.write(json.dumps([asdict(row) for row in rows], default=str) + "\n")
+    else:
+        standard_output().print(_table(rows))
 
 
-def table(rows: Sequence[Row]) -> Table:
-    """What an edge would publish, for a person to read."""
+@edge_app.command()
+def discover(
+    url: Annotated[str, typer.Argument(help="http://host:port (MTConnect), focas://host, opc.tcp://host:port, lsv2://host")],
+    device: Annotated[
+        str, typer.Option(help="MTConnect: which of several devices, else the first. All others: the machine's name")
+    ] = "",
+) -> None:
+    """Draft a configuration from a control's own description."""
+    from edge.check import discover as draft
+
+    sys.stdout.write(draft(url, device=device))
+
+
+def _table(rows: "Sequence[Row]") -> Table:
+    """Return the signals that an edge would publish, for a person to read."""
     signals = sum(not row.signal.startswith("(") for row in rows)  # "(warning)" is none
     shown = Table(title=f"{signals} signals would be published", title_justify="left")
     for column in ("signal", "from", "unit", "native unit", "value now", "why not"):
@@ -67,9 +73,3 @@ def table(rows: Sequence[Row]) -> Table:
         cells = (row.signal, row.source, row.unit or "", row.native_unit or "", value, row.reason or "")
         shown.add_row(*(Text(cell) for cell in cells))  # as text: a bracket in a block of the program is no markup
     return shown
-
-
-def _names_broker(path: Path) -> bool:
-    with suppress(OSError, ValueError, AttributeError):
-        return "url" in tomllib.loads(path.read_text()).get("broker", {})
-    return False

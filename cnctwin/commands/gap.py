@@ -1,53 +1,103 @@
-"""`cnctwin gap diagnose`, `gap score` and `gap check`: the sim-to-real gap from the command line."""
+"""`cnctwin gap`: the sim-to-real gap from the command line."""
 
 import json
 import sys
-import time
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, Any
 
+import typer
 from rich.console import Console
 from rich.table import Table
 
-from cnctwin.commands.twin import working, write
+from cnctwin.commands.extras import needed_by
+from cnctwin.commands.options import AsJson
 from cnctwin.errors import UsageError
-from cnctwin.reports.gap.page import report_html
-from twin.case import Case, read_case
-from twin.gap.diagnose import diagnose as diagnosed
-from twin.gap.diagnosis import Diagnosed, Diagnosis, Verdict
-from twin.gap.score_of import Score, score_of
-from twin.machine import machine_to_toml, read_machine
+from cnctwin.files.output import write
+from cnctwin.terminal.console import standard_output
+from cnctwin.terminal.spinner import working
 
-CORES = 2
-FILES = ("diagnosis.json", "report.html", "twin.toml")
+if TYPE_CHECKING:
+    from twin.gap.diagnosis import Diagnosed, Diagnosis
+    from twin.gap.score_of import Score
+
+gap_app = typer.Typer(no_args_is_help=True, help="The sim-to-real gap: where it lies, what causes it, how far it shrinks.")
 
 
-def diagnose(folder: Path, out: Path, *, as_json: bool, console: Console) -> int:
-    """Diagnose a case and write diagnosis.json, report.html and twin.toml; exit code 1 where a gap is left unknown."""
-    case = read_case(folder)
+@gap_app.command()
+def diagnose(
+    case: Annotated[Path, typer.Argument(help="The folder with case.toml, machine.toml and the recorded runs")],
+    out: Annotated[Path, typer.Option(help="The folder for diagnosis.json, report.html and twin.toml")],
+    as_json: AsJson = False,
+) -> None:
+    """Say where the gap lies, what causes it, how far it shrinks. Exit code 1: a gap without a name is left."""
+    with needed_by("the twin", "twin"):
+        from cnctwin.batch.diagnosis import diagnosis_files, in_threads
+        from twin.case import read_case
+        from twin.gap.diagnosis import Verdict
+    recorded = read_case(case)
     with working("diagnosing") as say:
-        found = in_threads(case, lambda what: say(f"diagnosing: {what}"))
-    texts = (found.diagnosis.to_json(), report_html(found, case.name), machine_to_toml(found.twin))
+        found = in_threads(recorded, lambda what: say(f"diagnosing: {what}"))
+    files = diagnosis_files(found, recorded.name)
     write(lambda: out.mkdir(parents=True, exist_ok=True), out)
-    for name, text in zip(FILES, texts, strict=True):
+    for name, text in files.items():
         write(partial((out / name).write_text, text, encoding="utf-8"), out / name)
     if as_json:
-        sys.stdout.write(texts[0])
+        sys.stdout.write(found.diagnosis.to_json())
     else:
-        _print(found, out, console)
-    return 1 if found.diagnosis.verdict in (Verdict.UNKNOWN, Verdict.PARTLY) else 0
+        _print(found, files, out, standard_output())
+    raise typer.Exit(1 if found.diagnosis.verdict in (Verdict.UNKNOWN, Verdict.PARTLY) else 0)
 
 
-def in_threads(case: Case, progress: Callable[[str], None] = lambda _: None) -> Diagnosed:
-    """The diagnosis of a case, its axes side by side: the kernels let go of the interpreter."""
-    with ThreadPoolExecutor(CORES) as pool:
-        return diagnosed(case, clock=time.monotonic, progress=progress, side_by_side=pool.map)
+@gap_app.command()
+def score(
+    twin: Annotated[Path, typer.Argument(help="The twin: a machine.toml, or the twin.toml of a diagnosis")],
+    case: Annotated[Path, typer.Argument(help="The folder with the recorded runs")],
+    as_json: AsJson = False,
+) -> None:
+    """Print the gap of any twin on all runs of a case: rms over what repeats, of all signals and by signal."""
+    with needed_by("the twin", "twin"):
+        from twin.case import read_case
+        from twin.gap.score_of import score_of
+        from twin.machine import read_machine
+    console = standard_output()
+    recorded = read_case(case)
+    machine = read_machine(twin)
+    with working("scoring"):
+        found = score_of(machine, recorded)
+    if as_json or not console.is_terminal:
+        sys.stdout.write(json.dumps(score_json(found)) + "\n")
+        return
+    signals = Table(title=f"{machine.machine.name} on {recorded.name}: {found.gap:.3g} × what repeats", title_justify="left")
+    for column in ("signal", "rms", "floor", "unit", "×"):
+        signals.add_column(column, justify="left" if column in ("signal", "unit") else "right")
+    for signal, one in found.by_signal.items():
+        signals.add_row(signal, f"{one.rms:.4g}", f"{one.floor:.4g}", one.unit, f"{one.rms / one.floor:.2f}")
+    console.print(signals)
 
 
-def _print(answer: Diagnosed, out: Path, console: Console) -> None:
+@gap_app.command()
+def check(
+    cases: Annotated[int, typer.Option(help="Machines to draw", min=1)] = 40,
+    seed: Annotated[int, typer.Option(help="Of the machines; another one, other machines", min=0)] = 1,
+    workers: Annotated[int, typer.Option(help="Processes", min=0)] = 2,
+    as_json: AsJson = False,
+) -> None:
+    """The blind check: an independent plant withholds its effects, answers sealed by hash; accuracy over effect size."""
+    with needed_by("the twin", "twin"):
+        from cnctwin.batch.diagnosis import diagnosed_alone
+        from cnctwin.blind_check.check import run_check
+        from cnctwin.blind_check.table import check_json, missed, table
+    if cases < 1:
+        raise UsageError(f"--cases {cases}: at least one")
+    with working("blind check") as say:
+        result = run_check(cases, seed, diagnosed_alone, workers=workers, progress=say)
+    sys.stdout.write(json.dumps(check_json(result)) + "\n" if as_json else table(result) + "\n")
+    raise typer.Exit(1 if missed(result) else 0)
+
+
+def _print(answer: "Diagnosed", files: Iterable[str], out: Path, console: Console) -> None:
     found = answer.diagnosis
     unseen = "that were not fitted" if any(not trace.fitted for trace in answer.traces) else "that were fitted, which flatters"
     console.print(found.sentence, style="bold", highlight=False, soft_wrap=True)
@@ -69,15 +119,15 @@ def _print(answer: Diagnosed, out: Path, console: Console) -> None:
         for sentence in sentences:
             console.print(f"· {sentence}", markup=False, highlight=False, soft_wrap=True)
     if found.causes:
-        console.print(causes_table(found))
+        console.print(_causes_table(found))
     if found.next_experiment is not None:
         console.print("\n[bold]next experiment[/]")
         console.print(found.next_experiment.why, markup=False, highlight=False, soft_wrap=True)
-    console.print(f"\n{', '.join(FILES)} in {out} ({found.seconds:.0f} s)", markup=False, highlight=False, soft_wrap=True)
+    console.print(f"\n{', '.join(files)} in {out} ({found.seconds:.0f} s)", markup=False, highlight=False, soft_wrap=True)
 
 
-def causes_table(found: Diagnosis) -> Table:
-    """What was found, with intervals."""
+def _causes_table(found: "Diagnosis") -> Table:
+    """Return the table of causes, with intervals."""
     causes = Table(title="causes", title_justify="left")
     for column in ("effect", "on", "parameters (90 %)", "share", "not to be told from"):
         causes.add_column(column, justify="right" if column == "share" else "left")
@@ -90,24 +140,7 @@ def causes_table(found: Diagnosis) -> Table:
     return causes
 
 
-def score(twin: Path, folder: Path, *, as_json: bool, console: Console) -> None:
-    """The gap of a twin on all runs of a case."""
-    case = read_case(folder)
-    machine = read_machine(twin)
-    with working("scoring"):
-        found = score_of(machine, case)
-    if as_json or not console.is_terminal:
-        sys.stdout.write(json.dumps(score_json(found)) + "\n")
-        return
-    signals = Table(title=f"{machine.machine.name} on {case.name}: {found.gap:.3g} × what repeats", title_justify="left")
-    for column in ("signal", "rms", "floor", "unit", "×"):
-        signals.add_column(column, justify="left" if column in ("signal", "unit") else "right")
-    for signal, one in found.by_signal.items():
-        signals.add_row(signal, f"{one.rms:.4g}", f"{one.floor:.4g}", one.unit, f"{one.rms / one.floor:.2f}")
-    console.print(signals)
-
-
-def score_json(found: Score) -> dict[str, Any]:
+def score_json(found: "Score") -> dict[str, Any]:
     """As `cli.md` has it."""
     by_signal = {s: {"rms": _digits(v.rms), "floor": _digits(v.floor), "unit": v.unit} for s, v in found.by_signal.items()}
     return {"gap": _digits(found.gap), "by_signal": by_signal}
@@ -115,21 +148,3 @@ def score_json(found: Score) -> dict[str, Any]:
 
 def _digits(value: float) -> float:
     return float(f"{value:.6g}")
-
-
-def diagnosed_alone(case: Case) -> Diagnosed:
-    """As a worker of the blind check does it, which has one core."""
-    return diagnosed(case, clock=time.monotonic)
-
-
-def check(cases: int, seed: int, *, workers: int, as_json: bool, console: Console) -> int:
-    """The blind check: cases of an independent plant whose effects are withheld; exit code 1 where a target is missed."""
-    from cnctwin.blind_check.check import run_check
-    from cnctwin.blind_check.table import check_json, missed, table
-
-    if cases < 1:
-        raise UsageError(f"--cases {cases}: at least one")
-    with working("blind check") as say:
-        result = run_check(cases, seed, diagnosed_alone, workers=workers, progress=say)
-    sys.stdout.write(json.dumps(check_json(result)) + "\n" if as_json else table(result) + "\n")
-    return 1 if missed(result) else 0

@@ -16,6 +16,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from rich.table import Table
 from rich.text import Text
 
+from cnctwin.commands.options import AsJson, Broker, Group, Wait
 from cnctwin.errors import UsageError
 from cnctwin.files.program_text import decoded
 from cnctwin.jobs.client import JobsClient, NoAnswerError
@@ -32,13 +33,9 @@ jobs_app = typer.Typer(
 )
 GONE_S_MAX = 60.0
 
-Broker = Annotated[str | None, typer.Option(help="mqtt[s]://[user@]host[:port]; else $CNCTWIN_BROKER", show_default=False)]
-Wait = Annotated[float, typer.Option("--wait", help="Seconds to wait for an answer", min=0.5, max=600.0)]
-AsJson = Annotated[bool, typer.Option("--json", help="For a program to read")]
-
 
 class Kind(StrEnum):
-    """What can be asked for."""
+    """The kinds of jobs that can be asked for."""
 
     OPTIMISE = "optimise"
     IDENTIFY = "identify"
@@ -52,7 +49,7 @@ def run(
     ] = None,
     folder: Annotated[Path | None, typer.Option("--dir", help="Keeps jobs and results; else jobs in the state folder")] = None,
     broker: Broker = None,
-    group: Annotated[str, typer.Option(help="Sparkplug group: the plant")] = "cnc",
+    group: Group = "cnc",
     workers: Annotated[int, typer.Option(help="Processes that a job is spread over", min=1, max=256)] = 1,
     dask: Annotated[str | None, typer.Option(help="tcp://host:8786 or tls://…: a Dask scheduler", show_default=False)] = None,
     hours_max: Annotated[float, typer.Option(help="A job that takes longer is ended", min=0.001, max=8760.0)] = 24.0,

@@ -8,15 +8,17 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from cnctwin.commands.extras import needed_by
 from cnctwin.commands.moment import moment_ms
+from cnctwin.commands.options import AsJson
 from cnctwin.commands.validate import TIME
 from cnctwin.errors import UsageError
 from cnctwin.models import registry
 from cnctwin.models.card import DIGITS, faults_of
+from cnctwin.terminal.console import standard_output
 from edge.state_dir import state_dir
 
 VARIABLE = "CNCTWIN_MODELS"
@@ -27,7 +29,6 @@ Kind = Annotated[str, typer.Argument(help="residual, anomaly, detector")]
 Machine = Annotated[str, typer.Argument(help="Whose model")]
 Version = Annotated[str, typer.Argument(help="Its digits, or the first of them")]
 Models = Annotated[Path | None, typer.Option(help=f"Folder of the registry; else ${VARIABLE} or `models` in the state folder")]
-AsJson = Annotated[bool, typer.Option("--json", help="For a program to read")]
 Runs = Annotated[list[Path] | None, typer.Option(help="Run logs")]
 StorePlace = Annotated[str | None, typer.Option(help="Folder or URL of the store, with --from and --to", show_default=False)]
 From = Annotated[str | None, typer.Option("--from", help=TIME, show_default=False)]
@@ -50,7 +51,7 @@ def list_models(models: Models = None, as_json: AsJson = False) -> None:
         mark = "*" if row["champion"] else "~" if row["warm"] else ""
         cells = (mark, row["kind"], row["machine"], row["version"], trained, str(len(row["features"])), row["added_at"][:16])
         table.add_row(*map(Text, cells))
-    _console().print(table)
+    standard_output().print(table)
 
 
 @model_app.command()
@@ -94,7 +95,7 @@ def promote(
     models: Models = None,
 ) -> None:
     """Let a version count. The one before is kept warm for 48 h."""
-    from cnctwin.models.comparing import won
+    from cnctwin.challenge.comparing import won
 
     own = registry.shelf(_place(models), kind, machine)
     folder, before = own.named(version), own.pointer()
@@ -168,10 +169,8 @@ def compare(
     as_json: AsJson = False,
 ) -> None:
     """Champion against challenger on data that neither has seen, and on the golden week. Exit code 1: the champion stays."""
-    try:
-        from cnctwin.models.comparing import Test, compared, sha256_of
-    except ModuleNotFoundError as missing:
-        raise UsageError(f"comparing needs the package {missing.name}; pip install 'cnctwin[twin]' brings it") from None
+    with needed_by("comparing", "twin"):
+        from cnctwin.challenge.comparing import Test, compared, sha256_of
     own = registry.shelf(_place(models), kind, machine)
     logs = _stretches(machine, runs or [], store, from_, to)
     data = tuple(sha256_of(path) for path in runs or [])
@@ -218,13 +217,9 @@ def export(
 
 def _stretches(machine: str, runs: list[Path], store: str | None, from_: str | None, to: str | None) -> list[Any]:
     """The data that was named: run logs, or a stretch of a store."""
-    try:
+    with needed_by("reading data", "twin,historian"):
+        from cnctwin.challenge.stretch import read_stretch, stretch_of_store
         from cnctwin.memory.store.opening import default_place, open_store
-        from cnctwin.models.stretch import read_stretch, stretch_of_store
-    except ModuleNotFoundError as missing:
-        raise UsageError(
-            f"reading data needs the package {missing.name}; pip install 'cnctwin[twin,historian]' brings it"
-        ) from None
     if runs:
         if store is not None or from_ is not None:
             raise UsageError("run logs and a stretch of the store: give one of them")
@@ -257,14 +252,7 @@ def _turned(own: registry.Shelf, champion: str, previous: str | None, warm_until
 
 
 def _say(text: str) -> None:
-    _console().print(text, markup=False, highlight=False, soft_wrap=True)
-
-
-def _console() -> Console:
-    console = Console()
-    if not console.is_terminal:
-        console.width = 120
-    return console
+    standard_output().print(text, markup=False, highlight=False, soft_wrap=True)
 
 
 def _json(value: Any) -> None:

@@ -15,7 +15,10 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from cnctwin.commands.extras import needed_by
+from cnctwin.commands.options import AsJson
 from cnctwin.errors import UsageError
+from cnctwin.files.program_text import read_encoded
 from cnctwin.processes.stopping import stopped_by_signals
 
 if TYPE_CHECKING:
@@ -55,18 +58,15 @@ def optimise(
         bool, typer.Option("--no-resimulation", help="Do not run both programs on the whole twin")
     ] = False,
     paper: Annotated[bool, typer.Option("--paper", help="Show the reference paper's own search beside it")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="For a program to read")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Find feed and spindle speed for each line, by time or cost, within the limits. Exit code 1: limits that cannot be kept."""
-    try:
+    with needed_by("the optimiser", "twin"):
         import twin.optimisation.question as asked
-        from cnctwin.commands import twin as files
-    except ModuleNotFoundError as missing:
-        raise UsageError(f"the optimiser needs the package {missing.name}; pip install 'cnctwin[twin]' brings it") from None
     from twin.machine import machine_to_toml, read_machine
 
     described = _with_ranges(read_machine(machine), feed_range, speed_range)
-    text, encoding = files.read_encoded(program)
+    text, encoding = read_encoded(program)
     question = asked.Question(
         program_text=text,
         machine_toml=machine_to_toml(described),
@@ -100,7 +100,7 @@ def _check_out(out: Path, *inputs: Path) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """How a question is worked out and shown: the options that are not part of it."""
+    """The options that are not part of the question: how it is worked out and shown."""
 
     out: Path
     encoding: str

@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.table import Table
 
 from cnctwin.commands.moment import moment_ms
+from cnctwin.commands.options import StorePlace
 from cnctwin.errors import UsageError
 from cnctwin.memory.parts.journal import Journal
 from cnctwin.memory.parts.record_log import parts
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
 
 parts_app = typer.Typer(no_args_is_help=True, help="As-built records of parts: list, export, deliver to an MES or a PLM.")
 Machine = Annotated[str | None, typer.Option(help="Only this machine", show_default=False)]
-StorePlace = Annotated[str | None, typer.Option("--store", help="Folder or address; else $CNCTWIN_STORE", show_default=False)]
 Begin = Annotated[str | None, typer.Option("--from", help="ISO 8601 or ms; else all", show_default=False)]
 End = Annotated[str | None, typer.Option("--to", help="ISO 8601 or ms; else now", show_default=False)]
 EVERY_S = 5.0

@@ -1,58 +1,29 @@
-"""`cnctwin process`: processors at work, beside `alerts` the courier that sends what its receivers are to be told, and beside
-`historian` the store that it keeps."""
+"""`cnctwin process`: processors until they are stopped."""
 
-import threading
-from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from typing import Annotated
 
-from processors.running.ports import Recorder
-from processors.running.runtime import Configured, run_configured
-from sparkplug.broker import BrokerAddress
+import typer
 
-
-def process(pairs: Sequence[Configured], broker: BrokerAddress, stop: threading.Event, *, group: str, state_dir: Path) -> None:
-    """Run configured processors until `stop` is set. Raises ConfigurationError where a secret is missing, StoreError where the
-    store cannot be used."""
-    with ExitStack() as stack:
-        recorder = stack.enter_context(_recorder(pairs, group))
-        stack.enter_context(_courier(pairs, broker, group))
-        run_configured(pairs, broker, stop, group=group, session_dir=state_dir, recorder=recorder)
+from cnctwin.commands.options import Broker, Group
+from cnctwin.processes.given_broker import address, broker_or_own
+from cnctwin.processes.stopping import stopped_by_signals
+from edge.state_dir import state_dir as folder_for_state
 
 
-@contextmanager
-def _recorder(pairs: Sequence[Configured], group: str) -> Iterator[Recorder | None]:
-    """The store's recorder, where the historian runs; else nothing, and no store is loaded."""
-    from processors.historian import HistorianConfig
+def process(
+    names: Annotated[list[str], typer.Argument(help="thermal, cutting_force, mirror, …")],
+    config: Annotated[Path | None, typer.Option(help="TOML with a table for each processor")] = None,
+    broker: Broker = None,
+    group: Group = "cnc",
+    state_dir: Annotated[
+        Path | None, typer.Option(help="Keeps birth/death numbers; else $CNCTWIN_STATE_DIR or ~/.local/state/cnctwin")
+    ] = None,
+) -> None:
+    """Run processors until SIGTERM or Ctrl-C; beside alerts the courier that sends, beside historian the store that it keeps."""
+    from cnctwin.running.processors import process as run_processors
+    from processors.running.runtime import configured
 
-    config = next((one.default for _, one in pairs if isinstance(one.default, HistorianConfig)), None)
-    if config is None:
-        yield None
-        return
-    from cnctwin.memory.historian import StoreRecorder, store_of
-
-    recorder = StoreRecorder(store_of(config), group)
-    recorder.start()
-    try:
-        yield recorder
-    finally:
-        recorder.stop()
-
-
-@contextmanager
-def _courier(pairs: Sequence[Configured], broker: BrokerAddress, group: str) -> Iterator[None]:
-    """The courier, where alerts run and somebody is to be told; else nothing, and httpx is not loaded."""
-    from processors.alerts.config import AlertsConfig
-
-    config = next((one.default for _, one in pairs if isinstance(one.default, AlertsConfig)), None)
-    if config is None or not config.receivers:
-        yield
-        return
-    from processors.alerts.courier.thread import Courier
-
-    courier = Courier(broker, config, group)
-    courier.start()
-    try:
-        yield
-    finally:
-        courier.stop()
+    pairs = configured(names, config)
+    with stopped_by_signals() as stop, broker_or_own(address(broker)) as where:
+        run_processors(pairs, where, stop, group=group, state_dir=folder_for_state(state_dir))

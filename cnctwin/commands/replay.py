@@ -9,6 +9,7 @@ import typer
 from rich.console import Console
 
 from cnctwin.commands.moment import moment_ms
+from cnctwin.commands.options import AsJson, StorePlace
 from cnctwin.memory.replay import replay
 from cnctwin.memory.replay.report import shown
 from cnctwin.memory.store.opening import default_place, open_store
@@ -19,7 +20,7 @@ def replay_history(
     machine: Annotated[str, typer.Option(help="The machine, as the store names it")],
     begin: Annotated[str, typer.Option("--from", help="ISO 8601, or ms since 1970")],
     end: Annotated[str, typer.Option("--to", help="ISO 8601, or ms since 1970; not in it any more")],
-    store: Annotated[str | None, typer.Option(help="Folder or address; else $CNCTWIN_STORE", show_default=False)] = None,
+    store: StorePlace = None,
     processors: Annotated[
         str | None, typer.Option(help="thermal,gap,…; else all that published then", show_default=False)
     ] = None,
@@ -27,7 +28,7 @@ def replay_history(
     chain: Annotated[
         bool, typer.Option("--chain", help="Feed each with what the others give now, not with what they gave")
     ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="For a program to read")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Run the processors again over history and compare with what they published then. Exit code 1: it differs."""
     from_ms, to_ms = moment_ms(begin, "--from"), moment_ms(end, "--to")

@@ -5,15 +5,14 @@ from typing import Annotated
 
 import typer
 
+from cnctwin.commands.options import Broker, Group
 from cnctwin.processes.given_broker import address, broker_or_own
 from cnctwin.processes.stopping import stopped_by_signals
 
 
 def serve(
-    broker: Annotated[
-        str | None, typer.Option(help="mqtt[s]://[user@]host[:port]; else $CNCTWIN_BROKER", show_default=False)
-    ] = None,
-    group: Annotated[str, typer.Option(help="Sparkplug group: the plant")] = "cnc",
+    broker: Broker = None,
+    group: Group = "cnc",
     store: Annotated[
         str | None, typer.Option(help="Folder or address of the store; else $CNCTWIN_STORE or the default", show_default=False)
     ] = None,

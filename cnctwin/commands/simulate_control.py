@@ -16,7 +16,7 @@ StateFile = Annotated[Path | None, typer.Option(help="Keep address and ledger in
 
 
 class HeidenhainModel(StrEnum):
-    """Which control an LSV2 server is."""
+    """The control that an LSV2 server stands in for."""
 
     TNC640 = "TNC640"
     ITNC530 = "iTNC530"

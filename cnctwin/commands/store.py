@@ -18,16 +18,17 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from cnctwin.commands.extras import needed_by
 from cnctwin.commands.moment import moment_ms
+from cnctwin.commands.options import AsJson, StorePlace
 from cnctwin.errors import UsageError
+from cnctwin.files.output import check_suffix
 from cnctwin.memory.store.contract import Column, Query, Store, StoreError
 from cnctwin.memory.store.opening import default_place, open_store
 from cnctwin.memory.store.plan import Load, Plan, load_of, plan
 
 store_app = typer.Typer(no_args_is_help=True, help="The store: what it holds, what it costs, a stretch of it.")
 
-Where = Annotated[str | None, typer.Option("--store", help="Folder or address; else $CNCTWIN_STORE", show_default=False)]
-AsJson = Annotated[bool, typer.Option("--json", help="For a program to read")]
 Machine = Annotated[str, typer.Argument(help="Name of the machine")]
 From = Annotated[str, typer.Option("--from", help="2026-11-22T06:00 (UTC where no zone is given), ms since 1970, or -15m")]
 To = Annotated[str, typer.Option("--to", help="The same; now where it is left out")]
@@ -38,7 +39,7 @@ _POWERS = {"": 0, "k": 1, "m": 2, "g": 3, "t": 4}
 
 @store_app.command("plan")
 def plan_command(
-    where: Where = None,
+    where: StorePlace = None,
     machines: Annotated[int | None, typer.Option(help="How many machines; else as the store has seen", min=1)] = None,
     signals: Annotated[int, typer.Option(help="Slow signals of each", min=1)] = 20,
     rate_hz: Annotated[float, typer.Option("--rate-hz", help="How often each changes a second", min=0.001)] = 10.0,
@@ -62,7 +63,7 @@ def plan_command(
 
 
 @store_app.command("status")
-def status_command(where: Where = None, as_json: AsJson = False) -> None:
+def status_command(where: StorePlace = None, as_json: AsJson = False) -> None:
     """Say what a store holds, by machine, and what is wrong with it."""
     with _opened(where) as store:
         status = store.status()
@@ -96,7 +97,7 @@ def query_command(
     from_: From,
     to: To = "",
     every: Annotated[str | None, typer.Option(help="Windows, as 1s or 1m; else samples as they came")] = None,
-    where: Where = None,
+    where: StorePlace = None,
     as_json: AsJson = False,
 ) -> None:
     """Print samples or windows as CSV, or JSON."""
@@ -125,7 +126,7 @@ def export_command(
     out: Annotated[Path, typer.Option(help="Run log to write, .parquet or .csv")],
     every: Annotated[str | None, typer.Option(help="Windows, as 100ms; else each sample as it came")] = None,
     held: Annotated[bool, typer.Option("--held", help="A signal that says nothing keeps what it said last")] = False,
-    where: Where = None,
+    where: StorePlace = None,
 ) -> None:
     """Write a stretch of a machine as a run log, which gap diagnosis, identification and training read."""
     rows = export(where or default_place(), machine, (moment_ms(from_), moment_ms(to)), out, every_ms=_every_ms(every), held=held)
@@ -138,16 +139,14 @@ def import_command(
     devices: Annotated[Path | None, typer.Option(help="The Devices.xml that belongs to it")] = None,
     machine: Annotated[str | None, typer.Option(help="Under which name; else the device's, else the file's")] = None,
     device: Annotated[str | None, typer.Option(help="Which device of the model, where there are several")] = None,
-    where: Where = None,
+    where: StorePlace = None,
 ) -> None:
     """Put a recording into a store as if an edge had said it, and pin it; then it can be replayed."""
     for path in (recording, devices):
         if path is not None and not path.is_file():
             raise UsageError(f"{path}: no such file; give a recording, and its device model with --devices")
-    try:
-        from cnctwin.memory.importing.into_store import import_recording
-    except ModuleNotFoundError as missing:
-        raise UsageError(f"a recording needs the package {missing.name}; pip install 'cnctwin[twin]' brings it") from None
+    with needed_by("a recording", "twin"):
+        from cnctwin.importing.into_store import import_recording
     store = open_store(where or default_place(), writable=True)
     try:
         done = import_recording(store, recording, devices, machine, device)
@@ -159,7 +158,7 @@ def import_command(
 
 
 @store_app.command("seal")
-def seal_command(where: Where = None) -> None:
+def seal_command(where: StorePlace = None) -> None:
     """Seal, roll up and sweep at once what is due, while no historian runs."""
     store = open_store(where or default_place(), writable=True)
     try:
@@ -177,9 +176,8 @@ def seal_command(where: Where = None) -> None:
 def export(
     where: str | Path, machine: str, span_ms: tuple[int, int], out: Path, *, every_ms: int | None = None, held: bool = False
 ) -> int:
-    """Write a stretch of a store as a run log; how many rows it has. Raises ProgramError in one line."""
-    if out.suffix not in (".parquet", ".csv"):
-        raise UsageError(f"{out}: a run log is written as .parquet or .csv, by the ending of its name")
+    """Write a stretch of a store as a run log; how many rows it has. Raises ApplicationError in one line."""
+    check_suffix(out)
     try:
         from cnctwin.memory.store.run_export import run_of
         from twin.errors import RunLogError
@@ -233,14 +231,14 @@ def _bytes(text: str) -> int:
 
 
 def _free(where: str | None) -> int:
-    """What the disk has left."""
+    """Return the free bytes of the disk."""
     place = Path(where or default_place())
     there = next((p for p in (place, *place.absolute().parents) if p.exists()), Path("/"))
     return shutil.disk_usage(there).free
 
 
 def _measured(where: str | None) -> Load | None:
-    """What the store has seen; None where there is none."""
+    """Return the load that the store has seen; None where there is no store."""
     from cnctwin.memory.store.database import FILE_NAME, Readers
     from cnctwin.memory.store.measured_load import measured_load
 

@@ -5,11 +5,13 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
+from cnctwin.commands.extras import needed_by
 from cnctwin.commands.moment import moment_ms
+from cnctwin.commands.options import AsJson, Group
 from cnctwin.errors import UsageError
 from cnctwin.processes.given_broker import address
+from cnctwin.terminal.console import standard_output
 from edge.state_dir import state_dir
 
 DAY_MS = 86_400_000
@@ -33,8 +35,8 @@ def validate(
     out: Annotated[Path | None, typer.Option(help="Folder of the history; else `validation` in the state folder")] = None,
     keep: Annotated[bool, typer.Option(help="Keep this night in the history")] = True,
     broker: Annotated[str | None, typer.Option(help="Publish there: mqtt[s]://[user@]host[:port]", show_default=False)] = None,
-    group: Annotated[str, typer.Option(help="Sparkplug group: the plant")] = "cnc",
-    as_json: Annotated[bool, typer.Option("--json", help="For a program to read")] = False,
+    group: Group = "cnc",
+    as_json: AsJson = False,
 ) -> None:
     """Twin against ground truth: temperature, force, vibration, following error, cycle time. Exit code 1: over a budget."""
     now_ms = round(1000.0 * time.time())
@@ -44,19 +46,12 @@ def validate(
         raise UsageError(f"--from {from_} is not before --to {to or 'now'}")
     if runs and store is not None:
         raise UsageError("--runs and --store: give one of them")
-    try:
+    with needed_by("validation", "twin,historian"):
         from cnctwin.validation import validate as command
-    except ModuleNotFoundError as missing:
-        raise UsageError(
-            f"validation needs the package {missing.name}; pip install 'cnctwin[twin,historian]' brings it"
-        ) from None
-    asked = command.Asked(
+    asked = command.ValidationRequest(
         *(machine, store, tuple(runs or ()), tuple(truth or ()), from_ms, to_ms, programs, config, twin),
         *(out or state_dir() / "validation", keep, group),
     )
-    console = Console()
-    if not console.is_terminal:
-        console.width = 120
     where = None if broker is None else address(broker)
     session_file = None if where is None else state_dir() / "twin-validation.json"
-    raise typer.Exit(command.validate(asked, where, session_file, as_json=as_json, console=console))
+    raise typer.Exit(command.validate(asked, where, session_file, as_json=as_json, console=standard_output()))

@@ -32,7 +32,7 @@ SETTLE_S_MAX = 12.0
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """What went through. `recording_ended` is None for the simulated machine, `parts` for a recording."""
+    """The account of a demo. `recording_ended` is None for the simulated machine, `parts` for a recording."""
 
     machine: str
     tool_changes: int
@@ -45,7 +45,7 @@ class Summary:
 
     @property
     def balances(self) -> bool:
-        """Whether every stage published a ledger, each saw something, and each balances."""
+        """True if every stage published a ledger, each saw something, and each balances."""
         whole = len(self.ledgers) == 1 + len(PROCESSORS) and all(ledger.received for ledger in self.ledgers)
         return whole and all(ledger.balances for ledger in self.ledgers)
 
@@ -117,7 +117,7 @@ def run(options: DemoOptions, stop: Event) -> int:
 
 
 def greeting(demo: Demo) -> str:
-    """What a user needs to know at the start."""
+    """Return the lines that a user needs to know at the start."""
     port = demo.broker.port
     at = "" if port == 1883 else f" -p {port}"
     speed = demo.options.speed

@@ -10,7 +10,7 @@ from typing import Any
 from urllib.parse import urlsplit
 from xml.etree import ElementTree
 
-from cnctwin.errors import ProgramError, UsageError
+from cnctwin.errors import ApplicationError, UsageError
 from cnctwin.processes.child import Child
 from cnctwin.processes.private_broker import PrivateBroker, is_free
 from cnctwin.standins.simulated_machine import description
@@ -50,7 +50,7 @@ _HISTORIAN_TOML = "\n[historian]\nstore = {store}\nraw_days = 36500.0\n"  # a re
 
 @dataclass(frozen=True, slots=True)
 class DemoOptions:
-    """What a user may choose. `seconds` None runs until Ctrl-C; `port` is the private broker's; `recording` None simulates."""
+    """A user's choices. `seconds` None runs until Ctrl-C; `port` is the private broker's; `recording` None simulates."""
 
     recording: Path | None = None
     devices: Path | None = None
@@ -130,26 +130,26 @@ class Demo:
 
     @property
     def recording_ended(self) -> bool | None:
-        """Whether the agent has played the whole recording; None where there is none."""
+        """True once the agent has played the whole recording; None where there is none."""
         return bool(self._state().get("finished")) if self.options.recording else None
 
     @property
     def parts(self) -> int | None:
-        """How many parts the simulated machine has made since it was switched on."""
+        """The number of parts that the simulated machine has made since it was switched on."""
         return None if self.options.recording else int(self._state().get("parts", 0))
 
     @property
     def notice(self) -> str:
-        """What the simulated machine has to say of itself, where it is not as it should be."""
+        """The simulated machine's own notice where it is not as it should be."""
         return str(self._state().get("notice", ""))
 
     @property
     def agent_ledger(self) -> dict[str, Any]:
-        """What the agent says of its recording's lines."""
+        """The agent's account of its recording's lines."""
         return dict(self._state().get("ledger", {}))
 
     def restarts(self) -> dict[str, int]:
-        """How often each part was started again."""
+        """Return how often each part was started again."""
         parts = [self.broker.child, *self.children]
         return {child.name: child.restarts for child in parts if child.restarts}
 
@@ -163,7 +163,7 @@ class Demo:
         return folder
 
     def _as_described(self) -> str:
-        """What the processors are told of the simulated machine, and of the model of its scores."""
+        """Return the processors' settings for the simulated machine, and for the model of its scores."""
         return description.PROCESSORS.read_text() + place_model(self._folder / "models", self.machine)
 
     def _agent(self) -> list[str]:
@@ -209,7 +209,7 @@ class Demo:
                 return str(url)
             time.sleep(0.05)
         what = f"replay of {self.options.recording}" if self.options.recording else "simulated machine"
-        raise ProgramError(f"the {what} does not start: {self.children[0].last_words()}")
+        raise ApplicationError(f"the {what} does not start: {self.children[0].last_words()}")
 
     def _state(self) -> dict[str, Any]:
         return _read(self._agent_state)
@@ -225,7 +225,7 @@ class Demo:
 
 
 def _read(state_file: Path) -> dict[str, Any]:
-    """What a child says of itself; nothing while it has said nothing."""
+    """Return a child's state as it writes it; empty before it has written any."""
     try:
         state: dict[str, Any] = json.loads(state_file.read_text())
     except (OSError, ValueError):

@@ -1,6 +1,9 @@
 """The text of a part program, and the encoding in which it goes back to the control byte for byte."""
 
 from codecs import BOM_UTF8
+from pathlib import Path
+
+from cnctwin.errors import UsageError
 
 
 def decoded(raw: bytes) -> tuple[str, str]:
@@ -14,3 +17,17 @@ def decoded(raw: bytes) -> tuple[str, str]:
         return raw.decode(encoding), encoding
     except UnicodeDecodeError:
         return raw.decode("latin-1"), "latin-1"
+
+
+def read_text(path: Path) -> str:
+    """The text of a file that the user named; what is not UTF-8 is read as Latin-1, as controls write it. Raises UsageError."""
+    return read_encoded(path)[0]
+
+
+def read_encoded(path: Path) -> tuple[str, str]:
+    """The text of a file, and the encoding in which it is written again byte for byte. Raises UsageError."""
+    try:
+        raw = path.read_bytes()
+    except OSError as error:
+        raise UsageError(f"{path}: cannot be read: {error.strerror}") from None
+    return decoded(raw)

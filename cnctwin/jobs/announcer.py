@@ -1,4 +1,4 @@
-"""What is said of jobs: replies to who asked, retained JSON for the page and the command line, twin metrics for the plant.
+"""Announcements of jobs: replies to who asked, retained JSON for the page and the command line, twin metrics for the plant.
 
 Plain: `cnc/jobs/state` (all in short), `cnc/jobs/<id>/state` (one in full), both retained. Sparkplug: the node `twin-jobs` with a
 device for each machine that a job concerns, and the device `jobs`, which shows the last change of any and takes commands.
@@ -77,7 +77,7 @@ class Announcer:
 
     @property
     def is_quiet(self) -> bool:
-        """Whether all is said."""
+        """True once everything has been published."""
         return not (self._replies or self._due or self._state_is_due or self._queue.changed)
 
     def reply(self, topic: str, document: dict[str, Any]) -> None:
@@ -97,7 +97,7 @@ class Announcer:
         self._host.publish_plain(state_topic(job_id), b"", qos=1, retain=True)
 
     def tell(self) -> None:
-        """What is due."""
+        """Publish what is due."""
         queue = self._queue
         changed, queue.changed = queue.changed, set()
         for job in sorted((queue[job_id] for job_id in changed if job_id in queue), key=lambda job: (job.changed_ms, job.number)):

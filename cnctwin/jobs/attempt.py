@@ -37,16 +37,16 @@ class Attempt:
 
     @property
     def pid(self) -> int:
-        """Of the process."""
+        """The id of the process."""
         return self._process.pid
 
     @property
     def seconds(self) -> float:
-        """How long it has run."""
+        """The seconds it has run."""
         return time.monotonic() - self._began_s
 
     def ended(self) -> str | None:
-        """How it ended; None while it runs.
+        """Return how it ended; None while it runs.
 
         >>> how_ended(-9), how_ended(1)
         ('killed by SIGKILL', 'ended with exit code 1')

@@ -19,7 +19,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from cnctwin.errors import ProgramError, SpreadError
+from cnctwin.errors import ApplicationError, SpreadError
 from cnctwin.jobs.durable import EXIT_DISK, settle, write_json
 from cnctwin.jobs.files_root import FilesRoot
 from cnctwin.jobs.left_over import JOB_VARIABLE, kill, left_over
@@ -61,7 +61,7 @@ def attempt(folder: Path, files: FilesRoot, workers: int, dask: str | None) -> d
         told = getattr(import_module(module), function)(request.parameters, bench)
     except SpreadError as error:
         return {"state": "interrupted", "reason": str(error)}
-    except (TwinError, ProgramError) as error:
+    except (TwinError, ApplicationError) as error:
         return {"state": "failed", "reason": files.shown(str(error))}
     except MemoryError:
         return {"state": "interrupted", "reason": "the memory was not enough"}
@@ -102,7 +102,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _be_modest() -> None:
-    """What is live goes first; where memory is short, this process is the one to go. Whoever started it says when it ends."""
+    """Give way to what is live; where memory is short, this process is the one to go. Whoever started it says when it ends."""
     with suppress(OSError):  # a supervisor may forbid it
         os.nice(NICE)
     with suppress(OSError):

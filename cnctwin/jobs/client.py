@@ -13,7 +13,7 @@ from types import TracebackType
 from typing import Any
 from uuid import uuid4
 
-from cnctwin.errors import ProgramError, UsageError
+from cnctwin.errors import ApplicationError, UsageError
 from cnctwin.jobs.request import read_request
 from cnctwin.jobs.topics import CANCEL, REPLY, REQUEST, STATE, state_topic
 from sparkplug.broker import BrokerAddress
@@ -24,7 +24,7 @@ REPEAT_S = 2.0
 FRESH_S_MAX = 35.0  # the state comes every ten seconds
 
 
-class NoAnswerError(ProgramError):
+class NoAnswerError(ApplicationError):
     """Nobody has answered: whether anything was done is not known."""
 
 

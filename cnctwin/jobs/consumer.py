@@ -46,7 +46,7 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """How a consumer works.
+    """The settings of a consumer.
 
     files: below which lie those that requests name; session_file: keeps bdSeq; child: the command of a job
     """
@@ -61,7 +61,7 @@ class Setting:
 
     @property
     def command(self) -> list[str]:
-        """Of the process of a job, but for its folder."""
+        """The command line of the process of a job, but for its folder."""
         files = [] if self.files is None else ["--files", str(self.files.resolve())]
         dask = [] if self.dask is None else ["--dask", self.dask]
         return [*self.child, *files, "--workers", str(self.workers), *dask]
@@ -159,7 +159,7 @@ class Consumer:
         self.announcer.answer(command.device, answer.document())
 
     def _take(self, payload: bytes) -> tuple[Answer, str]:
-        """What becomes of a request, and where to say so (empty: nobody asks to be told)."""
+        """Return the outcome of a request, and the topic for it (empty: nobody asks to be told)."""
         try:
             request = read_request(payload)
         except RequestError as error:
@@ -194,7 +194,7 @@ class Consumer:
     # The job that runs.
 
     def _recover(self) -> None:
-        """What an earlier consumer left running: take over what came of it, else it is queued again."""
+        """Take over what came of a job that an earlier consumer left running, else queue it again."""
         for job in [job for job in self.queue if job.state is JobState.RUNNING]:
             end_left_over(self._folder.of(job.id))
             self._conclude(job, "cut short, since the consumer ended")

@@ -20,12 +20,12 @@ from cnctwin.jobs.piece import name_of, opened, run_piece
 _FILES = ("ca_file", "certificate_file", "key_file")
 _PORT = 8786
 LOOK_S = 1.0
-"""How often we look whether scheduler and workers are there while an answer is awaited."""
+"""Seconds between looks whether scheduler and workers are there, while an answer is awaited."""
 
 
 @dataclass(frozen=True, slots=True)
 class DaskCluster:
-    """Where a Dask scheduler is and how to get in.
+    """The address of a Dask scheduler, and the way in.
 
     insecure: whether a plain address of another machine is taken
     patience_s: how long the scheduler may not answer, or have no worker, before a job is given up
@@ -90,7 +90,7 @@ class DaskCluster:
 def connected(
     cluster: DaskCluster, packages: tuple[str, ...]
 ) -> Iterator[Callable[[Callable[[str], str], Sequence[str]], Iterable[str]]]:
-    """What computes pieces there. Raises UsageError where Dask is not installed, SpreadError where nobody answers."""
+    """Connect to the workers. Raises UsageError where Dask is not installed, SpreadError where none answers."""
     try:
         import distributed  # noqa: PLC0415 — an extra, and it takes a second
     except ModuleNotFoundError as error:
@@ -130,7 +130,7 @@ def connected(
 
 
 def _awaited(client: Any, cluster: DaskCluster, future: Any, piece: str) -> str:
-    """What the future holds. Raises SpreadError where it will hold nothing."""
+    """Return the future's result. Raises SpreadError where it will hold nothing."""
     alone_since: float | None = None
     while True:
         try:

@@ -26,11 +26,11 @@ class FilesRoot:
         return path
 
     def text(self, name: str, key: str, bytes_max: int = TEXT_BYTES_MAX) -> str:
-        """What stands in it."""
+        """Return the text of the file."""
         return self.encoded_text(name, key, bytes_max)[0]
 
     def encoded_text(self, name: str, key: str, bytes_max: int = TEXT_BYTES_MAX) -> tuple[str, str]:
-        """What stands in it, and in which encoding."""
+        """Return the text of the file and its encoding."""
         path = self.file(name, key)
         try:
             with path.open("rb") as source:

@@ -7,7 +7,7 @@ from pydantic import BaseModel, ConfigDict
 
 
 class JobState(StrEnum):
-    """Where a job stands."""
+    """The state of a job."""
 
     QUEUED = "queued"
     RUNNING = "running"
@@ -17,7 +17,7 @@ class JobState(StrEnum):
 
     @property
     def is_over(self) -> bool:
-        """Whether nothing more becomes of it."""
+        """True if nothing more becomes of it."""
         return self not in (JobState.QUEUED, JobState.RUNNING)
 
 

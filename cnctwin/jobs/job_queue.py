@@ -1,4 +1,4 @@
-"""Who is next: jobs are accepted in order, done one at a time, and kept for a while when they are over.
+"""The queue: jobs are accepted in order, done one at a time, and kept for a while when they are over.
 
 What is accepted is on the disk before anybody is told. Where the disk takes nothing, a new job is refused; how an old one stands
 is known all the same, and written when there is room.
@@ -22,7 +22,7 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Of what there may be.
+    """The bounds of the queue.
 
     queued_max: jobs that wait; kept_max, kept_days: jobs that are over; attempts_max: starts of a job; seconds_max: of them all
     pause_s: before an attempt is repeated
@@ -38,7 +38,7 @@ class Limits:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What becomes of a request.
+    """The answer to a request.
 
     answer: accepted, known (the same was asked before), refused, cancelled; place: as in `Job.shown`
     """
@@ -134,7 +134,7 @@ class JobQueue:
         self.changed.add(job.id)
 
     def told(self, job_id: str) -> None:
-        """Who asked for it has been told of its end."""
+        """Note that whoever asked for a job has been told of its end."""
         self._jobs[job_id] = self._jobs[job_id].model_copy(update={"is_told": True})
         self._unsaved.add(job_id)
 

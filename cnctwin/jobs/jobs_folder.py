@@ -100,7 +100,7 @@ class JobsFolder:
         return (round(100.0 * float(fraction), 1) if known and fraction is not None else 0.0), clean(str(doing or ""), 200)
 
     def outcome(self, job: Job) -> dict[str, Any] | None:
-        """What the process said at the end of this attempt."""
+        """Return the outcome that the process wrote at the end of this attempt."""
         told = read_json(self.of(job.id) / "outcome.json")
         return told if told is not None and told.get("attempt") == job.attempt else None
 

@@ -15,7 +15,7 @@ Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 
 
 class Parameters(BaseModel):
-    """What a request says beyond job, id and reply_to; nothing but the keys that exist, nothing of another type."""
+    """The keys of a request beyond job, id and reply_to; nothing but the keys that exist, nothing of another type."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 

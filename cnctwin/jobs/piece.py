@@ -15,7 +15,7 @@ from cnctwin.errors import SpreadError, UsageError
 from twin.errors import TwinError
 
 PACKAGES = ("sparkplug", "twin", "edge", "processors", "cnctwin")
-"""Whose functions may be sent."""
+"""The packages whose functions may be sent."""
 _BLAMED: dict[str, type[Exception]] = {"TwinError": TwinError, "UsageError": UsageError}
 """Errors of the input: they come back as what they were."""
 _log = logging.getLogger(__name__)

@@ -24,7 +24,7 @@ _ID = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 _TAKEN = ("reply", "state", "request", "cancel")
 """Levels of topics of ours."""
 _RESERVED = ("spBv1.0/", "$", "cnctwin/", "cnc/")
-"""Where a reply would be taken for what somebody else says: by an edge for a command, by the mirror's readers for a value."""
+"""Topics on which a reply would be taken for something else: by an edge for a command, by the mirror's readers for a value."""
 
 
 class RequestError(UsageError):
@@ -36,7 +36,7 @@ class RequestError(UsageError):
 
     @property
     def reply_topic(self) -> str:
-        """Where the refusal goes; empty where nobody can be told."""
+        """The topic for the refusal; empty where nobody can be told."""
         return self.reply_to or (REPLY + self.job_id if self.job_id else "")
 
 
@@ -63,7 +63,7 @@ class Request:
 
     @property
     def reply_topic(self) -> str:
-        """Where answers go."""
+        """The topic for answers."""
         return self.reply_to or REPLY + self.id
 
 
@@ -137,7 +137,7 @@ def _head(document: dict[str, Any]) -> tuple[str, str]:
 
 
 def is_id(text: str) -> bool:
-    """Whether a job may have this name, which is a folder's and a level of a topic.
+    """Return True if a job may have this name, which is a folder's and a level of a topic.
 
     >>> is_id("night-7"), is_id(".."), is_id("reply")
     (True, False, False)

@@ -30,12 +30,12 @@ DEATHS_MAX = 3
 IDLE_S = 60
 """So long a worker process waits for another piece."""
 LOOK_S = 1.0
-"""How often one looks whether we are still there: it ends so long after us, also where we are killed."""
+"""Seconds between a process's looks whether we are still there: it ends so long after us, also where we are killed."""
 
 
 @contextmanager
 def spread_over(workers: int = 1, dask: DaskCluster | None = None, packages: tuple[str, ...] = PACKAGES) -> Iterator[Spread]:
-    """How to compute pieces: in this process (1), in that many processes, or on a Dask cluster, which knows how many it has.
+    """Compute pieces in this process (1), in that many processes, or on a Dask cluster, which knows how many it has.
 
     packages: whose functions may be sent. Raises UsageError where something is missing, SpreadError where the cluster is.
     """

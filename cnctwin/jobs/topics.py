@@ -12,7 +12,7 @@ STATES = "cnc/jobs/+/state"
 
 
 def state_topic(job_id: str) -> str:
-    """Where one job is shown in full; retained.
+    """Return the retained topic that shows one job in full.
 
     >>> state_topic("night-7")
     'cnc/jobs/night-7/state'

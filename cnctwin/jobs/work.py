@@ -1,4 +1,4 @@
-"""What the kinds of jobs do; each writes its files into `bench.out` and gives back a summary of a few lines.
+"""The work of each kind of job; each writes its files into `bench.out` and gives back a summary of a few lines.
 
 Loaded in the process of one job only: it needs all that the twin needs.
 """
@@ -19,7 +19,7 @@ STEPS = 12
 
 @dataclass(frozen=True, slots=True)
 class Bench:
-    """What a job is given.
+    """The means that a job is given.
 
     files: below which lie those that it names; folder: its own; out: empty, for its result
     checkpoint: a file that outlives an attempt; progress: 0…1, and what is being done; workers, dask: as `spread_over` takes them
@@ -81,7 +81,7 @@ def identify(parameters: "IdentifyParameters", bench: Bench) -> dict[str, Any]:
     """As `cnctwin identify`: machine.toml, identification.json."""
     import json  # noqa: PLC0415
 
-    from cnctwin.commands.twin import identification_json  # noqa: PLC0415  with all of the twin
+    from cnctwin.batch.identification import identification_json  # noqa: PLC0415  with all of the twin
     from twin.case import read_case  # noqa: PLC0415
     from twin.identification.identify import identify as identified  # noqa: PLC0415
     from twin.machine import machine_to_toml  # noqa: PLC0415
@@ -100,15 +100,12 @@ def identify(parameters: "IdentifyParameters", bench: Bench) -> dict[str, Any]:
 
 def diagnose(parameters: "CaseParameters", bench: Bench) -> dict[str, Any]:
     """As `cnctwin gap diagnose`: diagnosis.json, report.html, twin.toml."""
-    from cnctwin.commands.gap import FILES, in_threads  # noqa: PLC0415  with all of the twin
-    from cnctwin.reports.gap.page import report_html  # noqa: PLC0415
+    from cnctwin.batch.diagnosis import diagnosis_files, in_threads  # noqa: PLC0415  with all of the twin
     from twin.case import read_case  # noqa: PLC0415
-    from twin.machine import machine_to_toml  # noqa: PLC0415
 
     case = read_case(bench.files.case(parameters.case, "case")[0])
     found = in_threads(case, bench.steps())
-    texts = (found.diagnosis.to_json(), report_html(found, case.name), machine_to_toml(found.twin))
-    for name, text in zip(FILES, texts, strict=True):
+    for name, text in diagnosis_files(found, case.name).items():
         (bench.out / name).write_text(text, encoding="utf-8")
     told = found.diagnosis
     causes = [f"{cause.effect} on {cause.on}" for cause in told.causes[:10]]

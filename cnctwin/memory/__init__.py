@@ -1,1 +1,1 @@
-"""What is kept: the store, replay over it, as-built records of parts, recordings from elsewhere."""
+"""The memory: the store, replay over it, as-built records of parts."""

@@ -1,4 +1,4 @@
-"""What the processor `historian` hears, on its way into a store: a bounded queue, and a thread that writes batches.
+"""The historian's way into a store: a bounded queue, and a thread that writes batches.
 
 What is in the queue is not safe yet; what the store has taken is. So the thread writes as soon as anything waits. Where the store
 cannot write (a full disk), the batch is kept and tried again, and what does not fit into the queue meanwhile is counted.
@@ -54,7 +54,7 @@ class _Queue:
         self._lock = threading.Lock()
 
     def put(self, item: Message | Pinned | Snapshot) -> bool:
-        """Whether there was room."""
+        """Put it in; return True if there was room."""
         size = _size(item)
         with self._lock:
             if self.samples + size > QUEUE_MAX:
@@ -65,7 +65,7 @@ class _Queue:
         return True
 
     def take(self) -> "_Batch":
-        """What goes in one transaction: messages up to the first pin or snapshot, or that one alone."""
+        """Return what goes in one transaction: messages up to the first pin or snapshot, or that one alone."""
         messages: list[Message] = []
         samples = 0
         with self._lock:
@@ -139,7 +139,7 @@ class StoreRecorder:
         self._put(Pinned(pin.machine, pin.from_ms, pin.to_ms, pin.reason))
 
     def health(self) -> Mapping[str, int | float | str]:
-        """How it is, by the names that `processors.running.health` declares."""
+        """Return its state, by the names that `processors.running.health` declares."""
         health: dict[str, int | float | str] = {
             "store_samples": self._stored,
             "store_repeated": self._repeated,
@@ -281,7 +281,7 @@ class StoreRecorder:
             self._store.keep_snapshot(batch.other)
 
     def _note_kept(self, messages: Sequence[Message]) -> None:
-        """Which devices wait for receipts, and the numbers of their rows; a birth shows the state after a row, and is not it."""
+        """Note which devices wait for receipts, and the numbers of their rows; a birth shows the state after a row, not it."""
         with self._receipts_lock:
             for _, event in messages:
                 if event.device is None or not event.readings:
@@ -296,7 +296,7 @@ class StoreRecorder:
                         self._receipts[key].add(number, number)
 
     def _tidy(self) -> bool:
-        """Whether hours were sealed."""
+        """Tidy; return True if hours were sealed."""
         try:
             return self._store.tidy(time.time_ns() // 1_000_000).sealed > 0
         except StoreError as error:

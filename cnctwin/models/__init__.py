@@ -1,1 +1,1 @@
-"""The model registry: versions of each kind and machine, which of them counts, and what a challenger has to show."""
+"""The model registry: versions of each kind and machine, which of them counts, and the golden week that each is judged on."""

@@ -1,4 +1,4 @@
-"""What is known of a version: read from the manifest that its trainer wrote, whatever the kind, and from its files."""
+"""The card of a version: read from the manifest that its trainer wrote, whatever the kind, and from its files."""
 
 import hashlib
 import json
@@ -20,7 +20,7 @@ KINDS = {
     "cnctwin tool-change detector": "detector",
     "cnctwin residual model": "residual",
 }
-"""What a manifest says it is → the kind that it is kept under."""
+"""The kind of a manifest → the kind that it is kept under."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +90,7 @@ def registered(folder: Path, card: Card, at_s: float) -> None:
 
 
 def faults_of(folder: Path) -> list[str]:
-    """What is not as it was registered: files that are missing, more, or other than then."""
+    """Return what is not as it was registered: files that are missing, more, or other than then."""
     if not (folder / CARD).exists():
         return []
     then, now = _table(_read(folder / CARD).get("files")), sums_of(folder)
@@ -111,7 +111,7 @@ def sums_of(folder: Path) -> dict[str, str]:
 
 
 def manifest_of(folder: Path) -> dict[str, Any]:
-    """What the trainer wrote. Raises UsageError where there is none."""
+    """Return the trainer's manifest. Raises UsageError where there is none."""
     if not (folder / MANIFEST).is_file():
         raise UsageError(f"{folder}: holds no {MANIFEST}; a model is a folder that a cnctwin train command wrote")
     return _read(folder / MANIFEST)

@@ -42,7 +42,7 @@ class Shelf:
 
     @property
     def folder(self) -> Path:
-        """Where they stand."""
+        """The folder of the versions."""
         return self.models / self.kind / self.machine
 
     def versions(self) -> tuple[str, ...]:
@@ -59,11 +59,11 @@ class Shelf:
         return self.folder / found[0]
 
     def card(self, version: str) -> Card:
-        """What is known of a version."""
+        """Return the card of a version."""
         return card_of(self.folder / version, self.kind, self.machine)
 
     def pointer(self) -> Pointer | None:
-        """Which version counts; None where none does. The link is right where it says otherwise."""
+        """Return the version that counts; None where none does. The link is right where it says otherwise."""
         try:
             text = (self.folder / POINTER).read_text(encoding="utf-8")
             told: Pointer | None = pointer_of(text, str(self.folder / POINTER))
@@ -165,7 +165,7 @@ def keep_comparison(own: Shelf, told: Mapping[str, Any]) -> None:
 
 
 def comparisons(own: Shelf) -> list[dict[str, Any]]:
-    """What was compared, oldest first."""
+    """Return the comparisons, oldest first."""
     try:
         lines = (own.folder / COMPARISONS).read_text(encoding="utf-8").splitlines()
         return [one for line in lines if isinstance(one := json.loads(line), dict)]

@@ -3,4 +3,4 @@
 from pathlib import Path
 
 WEB = Path(__file__).parent / "web"
-"""What is served: `index.html` at `/`, the folder at `/page/`."""
+"""The files that are served: `index.html` at `/`, the folder at `/page/`."""

@@ -32,7 +32,7 @@ class Report:
 
     @property
     def good(self) -> bool:
-        """Whether every finding is good."""
+        """True if every finding is good."""
         return all(finding.good for finding in self.findings)
 
     def as_json(self) -> dict[str, Any]:
@@ -55,7 +55,7 @@ def examine(broker: BrokerAddress, group: str, seconds: float) -> Report:
 
 
 def diagnose(host: HostApplication, url: str) -> Report:
-    """What a host application that has listened for a while can say."""
+    """Return what a host application that has listened for a while can say."""
     if not host.online:
         return Report((Finding(False, host.last_error or f"no connection to {url}"),), ())
     findings = [Finding(True, f"{url} answers")]
@@ -93,7 +93,7 @@ def diagnose(host: HostApplication, url: str) -> Report:
 
 
 def of_store(node_id: str, metrics: Mapping[str, Reading]) -> list[Finding]:
-    """What a historian says of its store; nothing of any other node."""
+    """Return a historian's findings on its store; nothing of any other node."""
     if not {"store_samples", "store_dropped", "store_trouble"} <= metrics.keys():
         return []
     counts = [metrics[f"store_{name}"].value if f"store_{name}" in metrics else 0 for name in ("samples", "waiting", "dropped")]

@@ -1,4 +1,4 @@
-"""What a viewer sees on the broker: machines, what the twin says of them, and the ledger of each stage."""
+"""A viewer's picture of the broker: machines, what the twin says of them, and the ledger of each stage."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -14,13 +14,13 @@ _REASON = "ledger/dropped/"
 
 
 class Pictures(Protocol):
-    """Where pictures of edge nodes come from: a `HostApplication`."""
+    """The source of pictures of edge nodes: a `HostApplication`."""
 
     def nodes(self) -> tuple[NodeId, ...]:
         """All nodes that were heard of."""
 
     def picture(self, node: NodeId) -> NodePicture | None:
-        """What is known of one."""
+        """Return the picture of one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,12 +47,12 @@ class StageLedger:
 
     @property
     def missing(self) -> int:
-        """What the stage cannot account for; 0 when its ledger balances."""
+        """The difference that the stage cannot account for; 0 when its ledger balances."""
         return self.received - self.emitted - self.dropped - self.buffered
 
     @property
     def balances(self) -> bool:
-        """Whether everything is accounted for, reasons included."""
+        """True if everything is accounted for, reasons included."""
         return self.missing == 0 and sum(self.reasons.values()) == self.dropped
 
 

@@ -1,4 +1,4 @@
-"""Which broker a command uses: the one that is given, else one that answers on the default port, else one of our own."""
+"""The broker of a command: the one that is given, else one that answers on the default port, else one of our own."""
 
 import os
 import sys

@@ -59,7 +59,7 @@ class PrivateBroker:
 
     @property
     def address(self) -> BrokerAddress:
-        """Where clients find it."""
+        """The address at which clients find it."""
         return BrokerAddress("127.0.0.1", self.port)
 
     def start(self) -> None:
@@ -94,7 +94,7 @@ def find_mosquitto() -> str:
 
 
 def answers(host: str, port: int) -> bool:
-    """Whether something accepts TCP connections there."""
+    """Return True if something accepts TCP connections there."""
     try:
         with socket.create_connection((host, port), timeout=0.5):
             return True
@@ -103,7 +103,7 @@ def answers(host: str, port: int) -> bool:
 
 
 def is_free(port: int) -> bool:
-    """Whether nobody on this computer listens on it."""
+    """Return True if nobody on this computer listens on it."""
     with socket.socket() as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:

@@ -1,1 +1,1 @@
-"""What stands in for a control or a machine: agents, servers, the simulated and the reference machine."""
+"""The stand-ins for a control or a machine: agents, servers, the simulated and the reference machine."""

@@ -1,4 +1,4 @@
-"""Where a truth file lies on the machine's clock: cross-correlation of what both have seen.
+"""The place of a truth file on the machine's clock: cross-correlation of what both have seen.
 
 Normalised over the samples that both have at each lag (Padfield 2012, IEEE Trans. Image Process. 21(5)). An offset stands where
 its correlation is far from chance, for as many lags as were tried, and no other offset away from it comes close: a part that is
@@ -19,7 +19,7 @@ from twin.gap.significance import correlation_time
 Floats = NDArray[np.float64]
 R_MIN = 0.5
 RIVAL_MAX = 0.95
-"""Of the best one."""
+"""The share of the best one that a rival may reach."""
 Z_MIN = 5.0
 OVERLAP_MIN = 0.5
 SAMPLES_MIN = 20

@@ -54,14 +54,14 @@ class Cycles:
 
 @dataclass(frozen=True, slots=True)
 class Timed:
-    """Of one run: what the twin says, and what it took, s."""
+    """The times of one run: what the twin says, and what it took, s."""
 
     predicted_s: float
     taken_s: float
 
 
-class Told(NamedTuple):
-    """What is told of the control: how it moves, and what it makes of a program beside its text."""
+class ControlModel(NamedTuple):
+    """The model of the control: how it moves, and what it makes of a program beside its text."""
 
     model: Model
     settings: Settings
@@ -76,7 +76,7 @@ def judged_cycle_time(twin: Twin, given: Cycles, budgets: Budgets) -> list[Figur
     if twin.file is None or twin.file.program is None:
         return unseen(QUANTITY, measure, "[program] of machine.toml does not state how the control moves")
     model = Model(Limits.of(twin.file.program), program_effects(twin.file))
-    control = Told(model, replace(twin.file.settings, optional_stop=True))
+    control = ControlModel(model, replace(twin.file.settings, optional_stop=True))
     figures: list[Figure] = []
     for program in sorted({cycle.program for cycle in cycles}):
         own = [cycle for cycle in cycles if cycle.program == program]
@@ -89,7 +89,7 @@ def judged_cycle_time(twin: Twin, given: Cycles, budgets: Budgets) -> list[Figur
     return figures
 
 
-def _of_program(control: Told, program: str, cycles: Sequence[Cycle], path: Path, budgets: Budgets) -> Figure:
+def _of_program(control: ControlModel, program: str, cycles: Sequence[Cycle], path: Path, budgets: Budgets) -> Figure:
     timed: list[Timed] = []
     refused: list[str] = []
     references = False
@@ -125,7 +125,7 @@ def _timed(model: Model, trial: Trial) -> Timed:
     return Timed(float(plan.total_s), float(trial.recorded.run.active_s))
 
 
-def whole_of(log: RunLog, path: Path, control: Told) -> Timed | str:
+def whole_of(log: RunLog, path: Path, control: ControlModel) -> Timed | str:
     """A run as a whole, where its lines do not ascend to the end of the text, as with subprograms below M30; else why not.
 
     It has to have told the lines on which the twin says that most time is spent, and overrides of 100 %.

@@ -17,7 +17,7 @@ OVERRIDES = ("feed_override_pct", "rapid_override_pct", "spindle_override_pct")
 TOLD = (LINE, "feed_mm_min", "tool_number")
 BEGUN_AFTER = (None, "READY", "PROGRAM_COMPLETED")
 CYCLES_MAX = 200
-"""Of a night; the first ones."""
+"""The cycles of a night that are judged; the first ones."""
 CYCLE_S_MAX = 8 * 3600
 
 
@@ -63,7 +63,7 @@ def _spans(states: Column) -> Iterator[tuple[int, int]]:
 
 
 def _at(column: Column, at_us: int) -> Value:
-    """What was told last until a moment, or first after it."""
+    """Return what was told last until a moment, or first after it."""
     place = max(int(np.searchsorted(np.array(column.t_us, dtype=np.int64), at_us, side="right")) - 1, 0)
     return column.value[place] if column.value else None
 
@@ -93,5 +93,5 @@ def _held(column: Column, stamps: NDArray[np.int64]) -> NDArray[np.float64]:
 
 
 def names_of(cycles: Sequence[Cycle]) -> list[str]:
-    """Of the programs that ran."""
+    """Return the names of the programs that ran."""
     return sorted({cycle.program for cycle in cycles})

@@ -1,4 +1,4 @@
-"""What a night is judged by: what the machine told, what the twin said, and what somebody else has measured."""
+"""The evidence of a night: what the machine told, what the twin said, and what somebody else has measured."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -47,7 +47,7 @@ class Evidence:
     truth_reason: str | None = None
 
     def knows(self, *names: str) -> bool:
-        """Whether the machine told each of these."""
+        """Return True if the machine told each of these."""
         return all(name in self.told and self.told[name].is_known for name in names)
 
 
@@ -106,7 +106,7 @@ def with_truth(evidence: Evidence, truth: RunLog, offset_s_max: float) -> Eviden
 
 
 def truth_tracks(truth: RunLog) -> dict[str, Track]:
-    """What a truth file tells, by signal; the resultant of a dynamometer beside its axes."""
+    """Return the signals of a truth file; the resultant of a dynamometer beside its axes."""
     tracks = dict(of_run(truth, "").told)
     both = resultant_of(truth)
     if both is not None:
@@ -125,7 +125,7 @@ def resultant_of(log: RunLog) -> Track | None:
 
 
 def _alike(evidence: Evidence) -> Sequence[tuple[str, str, Track | None]]:
-    """What the truth may have seen, beside what the machine or its twin tells of the same."""
+    """Return what the truth may have seen, beside what the machine or its twin tells of the same."""
     told, twin = evidence.told, evidence.twin
     own = None if evidence.run is None else resultant_of(evidence.run)
     return (

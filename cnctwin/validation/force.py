@@ -23,7 +23,7 @@ STORE_EVERY_S, RUN_EVERY_S = 1.0, 0.1
 HELD_S = 10.0
 SPEED_CHANGE = 0.02
 SHOWN_MIN = 0.5
-"""Of the windows that cut, so many the twin has to have a force for: else its figure is of another cut than that measured."""
+"""The share of the cutting windows for which the twin has to have a force: else its figure is of another cut than measured."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -23,7 +23,7 @@ Night = Mapping[str, Any]
 
 
 def default_folder() -> Path:
-    """Where nights are kept, if nothing else is said."""
+    """Return the folder where nights are kept, if nothing else is said."""
     return state_dir() / "validation"
 
 
@@ -103,7 +103,7 @@ def retraining(nights: Sequence[Night]) -> str | None:
 
 
 def validation_of(machine: str, folder: Path, nights: int = 30) -> dict[str, Any]:
-    """What there is to be told of a machine: its newest night, those before it, and whether it has to be trained again.
+    """Return the validation of a machine: its newest night, those before it, and whether it has to be trained again.
 
     `t` is None and there are no figures where it was never judged.
     """

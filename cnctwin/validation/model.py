@@ -26,7 +26,7 @@ from twin.simulator.response import RunInput, respond
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Twin:
-    """What is known of the twin. file: machine.toml; tables: of the processors' configuration"""
+    """The twin as far as it is known. file: machine.toml; tables: of the processors' configuration"""
 
     file: MachineFile | None
     tables: Mapping[str, Mapping[str, Any]]
@@ -44,7 +44,7 @@ class Twin:
         return Configuration(thermal_processor.Config, self.tables.get("thermal"), name="thermal").of(machine)
 
     def ambient_c(self, machine: str) -> float | None:
-        """Of the surroundings, where no signal tells it."""
+        """Return the temperature of the surroundings, where no signal tells it."""
         return self._thermal(machine).ambient_temp_c
 
     def force(self, machine: str) -> force_processor.Config | None:

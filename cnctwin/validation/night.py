@@ -34,7 +34,7 @@ def figures_of(twin: Twin, evidence: Evidence, cycles: Cycles, budgets: Budgets)
 
 
 def worst(found: Sequence[Sequence[Figure]]) -> list[Figure]:
-    """Of several runs one figure each: of those judged the one nearest to or furthest over its budget, else the first."""
+    """Return one figure each of several runs: of those judged the one nearest to or furthest over its budget, else the first."""
     best: dict[str, Figure] = {}
     for figure in (one for figures in found for one in figures):
         known = best.get(figure.key)

@@ -27,11 +27,11 @@ NAMES = (
     *("temperature_mae", "temperature_rmse", "temperature_mae_worst_hour", "temperature_rmse_worst_hour"),
     *("force_mape", "vibration_r", "following_error_rms_pct", "cycle_time_error_pct"),
 )
-"""Of several axes or programs the worst one is published; all are in the plain JSON."""
+"""The published names: of several axes or programs the worst one is published; all are in the plain JSON."""
 
 
 def metrics(told: Mapping[str, Any]) -> tuple[list[MetricSpec], list[Change]]:
-    """What is declared and what is published of `validation_of`'s answer."""
+    """Return what is declared and what is published of `validation_of`'s answer."""
     stamp_ms, figures = int(told["t"]), told["figures"]
     inferred = {"provenance": Provenance.INFERRED.value}
     specs: list[MetricSpec] = []

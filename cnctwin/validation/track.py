@@ -1,6 +1,5 @@
 """A signal over time, and what is known of it at evenly spaced times."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +10,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Track:
-    """What was told of a signal. t_s: (n,) increasing; value: (n,), NaN where it was told that it is not known."""
+    """A signal over time. t_s: (n,) increasing; value: (n,), NaN where it was told that it is not known."""
 
     t_s: Floats
     value: Floats
@@ -21,15 +20,12 @@ class Track:
 
     @property
     def is_known(self) -> bool:
-        """Whether anything was ever known."""
+        """True if anything was ever known."""
         return bool(np.isfinite(self.value).any())
 
     def moved(self, by_s: float) -> "Track":
         """The same, told so much later."""
         return Track(self.t_s + by_s, self.value)
-
-
-Tracks = Mapping[str, Track]
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +48,7 @@ class Grid:
 
     @property
     def hours(self) -> float:
-        """Of all windows."""
+        """The hours of all windows."""
         return self.count * self.every_s / 3600.0
 
 

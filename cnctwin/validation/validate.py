@@ -11,9 +11,9 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from cnctwin.commands.twin import working
 from cnctwin.errors import UsageError
 from cnctwin.memory.store.opening import default_place, open_store
+from cnctwin.terminal.spinner import working
 from cnctwin.validation.budgets import TABLE, Budgets, budgets_of, tables_of
 from cnctwin.validation.cycle_time import Cycle, Cycles, texts_of
 from cnctwin.validation.cycles import cycle_of_run, cycles_of, names_of
@@ -29,8 +29,8 @@ from twin.runlog import read_run
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
-    """What the command was asked: see its options. from_ms, to_ms: of a store; out: folder of the history"""
+class ValidationRequest:
+    """The command's request: see its options. from_ms, to_ms: of a store; out: folder of the history"""
 
     machine: str
     store: str | None
@@ -46,7 +46,9 @@ class Asked:
     group: str
 
 
-def validate(asked: Asked, broker: BrokerAddress | None, session_file: Path | None, *, as_json: bool, console: Console) -> int:
+def validate(
+    asked: ValidationRequest, broker: BrokerAddress | None, session_file: Path | None, *, as_json: bool, console: Console
+) -> int:
     """The exit code: 1 where a figure is over its budget."""
     tables = tables_of(asked.config)
     budgets = budgets_of(tables.get(TABLE, {}), str(asked.config))
@@ -82,7 +84,7 @@ def _head(night: Mapping[str, Any]) -> dict[str, Any]:
     return {name: night[name] for name in ("t", "verdict", "figures")}
 
 
-def _of_runs(asked: Asked, twin: Twin, budgets: Budgets) -> list[tuple[Evidence, list[Figure]]]:
+def _of_runs(asked: ValidationRequest, twin: Twin, budgets: Budgets) -> list[tuple[Evidence, list[Figure]]]:
     found = []
     for place, path in enumerate(asked.runs):
         log = read_run(path)
@@ -101,7 +103,7 @@ def _beside(path: Path, cycles: Sequence[Cycle]) -> dict[str, Path]:
     return dict.fromkeys(names_of(cycles), text) if text.is_file() else {}
 
 
-def _of_store(asked: Asked, twin: Twin, budgets: Budgets, say: Any) -> list[tuple[Evidence, list[Figure]]]:
+def _of_store(asked: ValidationRequest, twin: Twin, budgets: Budgets, say: Any) -> list[tuple[Evidence, list[Figure]]]:
     where = asked.store or str(default_place())
     store = open_store(where, writable=False)
     try:
@@ -141,7 +143,7 @@ def _print(night: Mapping[str, Any], figures: Sequence[Figure], told: Mapping[st
 
 
 def _reasons(figures: Sequence[Figure]) -> list[str]:
-    """What each rests on or lacks, said once for those that share it."""
+    """Return what each rests on or lacks, once for those that share it."""
     said: dict[str, list[str]] = {}
     for one in figures:
         if text := "; ".join(part for part in (one.reason, one.basis) if part):

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from cnctwin.commands.alerts import alerts_app
-from cnctwin.commands.process import process
+from cnctwin.running.processors import process
 from processors.running.runtime import configured
 from sparkplug.datatype import DataType
 from sparkplug.edge_node import EdgeNode

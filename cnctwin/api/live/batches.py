@@ -32,7 +32,7 @@ def state_batch(machine: str, state: dict[str, Any]) -> Batch:
 
 
 def machine_rows(machine: str, now_ms: int, rows: Sequence[Row], *, online: bool, left_out: int) -> Batch:
-    """What has changed of a machine; `left_out` says how many rows there was no room for."""
+    """Return the changed rows of a machine; `left_out` says how many rows there was no room for."""
     names = QUALITY_NAMES
     said: dict[str, Any] = {
         "now": now_ms,
@@ -45,7 +45,7 @@ def machine_rows(machine: str, now_ms: int, rows: Sequence[Row], *, online: bool
 
 
 def fleet_rows(now_ms: int, rows: Sequence[tuple[str, Row]]) -> Batch:
-    """What has changed of the fleet's key signals."""
+    """Return the changed rows of the fleet's key signals."""
     names = QUALITY_NAMES
     said = [(machine, row[0], row[1], row[2], names.get(row[3], "bad")) for machine, row in rows]
     return Batch(None, event("fleet_rows", {"now": now_ms, "rows": said}))

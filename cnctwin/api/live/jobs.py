@@ -1,4 +1,4 @@
-"""What the batch consumer says of its jobs, as it was heard last: all in short, each in full, and answers to what we asked."""
+"""The batch consumer's jobs as last heard: all in short, each in full, and answers to what we asked."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""What the interface knows of the plant: last readings, the last minutes of each signal, what its readers are still to be told.
+"""The interface's view of the plant: last readings, the last minutes of each signal, and changes not yet sent to its readers.
 
 One thread feeds it (`take`, `flush`); any thread may ask. A lock is held for as long as it takes to read or write tables, never
 over an encoding or a wait. Readings that an edge sends late, as history, are not in it: they are in the store.
@@ -66,7 +66,7 @@ class NodeView(NamedTuple):
 
 @dataclass(slots=True)
 class _Waiting:
-    """What the readers of a machine have still to be told."""
+    """Changes of a machine that its readers have not been sent yet."""
 
     rows: list[Row] = field(default_factory=list)
     left_out: int = 0
@@ -114,7 +114,7 @@ class LivePlant:
             self._alerts, self._alerts_are_new = state, True
 
     def flush(self, now_ms: int) -> list[Batch]:
-        """What is to be sent to readers now: each message is encoded once, however many read it."""
+        """Return what is to be sent to readers now: each message is encoded once, however many read it."""
         with self._lock:
             jobs = [job for machine, waiting in self._waiting.items() if (job := self._job(machine, waiting, now_ms)) is not None]
             fleet, silent = list(self._fleet.items()), now_ms - self._fleet_told_ms >= SILENCE_MS_MAX
@@ -167,7 +167,7 @@ class LivePlant:
         return found
 
     def remembers(self, machine: str, signals: Sequence[str], from_ms: int) -> bool:
-        """Whether the last minutes of these signals reach back to `from_ms`."""
+        """Return True if the last minutes of these signals reach back to `from_ms`."""
         with self._lock:
             known = self._merged(machine)[1]
             asked = [known.get(name) for name in signals]
@@ -337,7 +337,7 @@ class LivePlant:
         return lambda: machine_rows(machine, now_ms, rows, online=online, left_out=left_out)
 
     def _merged(self, machine: str) -> tuple[bool, dict[str, Signal]]:
-        """Whether the control is connected, and the signals of all nodes that speak of the machine."""
+        """Return the state of the connection to the control, and the signals of all nodes that speak of the machine."""
         signals: dict[str, Signal] = {}
         for owner in self._machines.get(machine, {}).values():
             signals.update(owner.signals)

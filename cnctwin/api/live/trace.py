@@ -100,7 +100,7 @@ class Trace:
 
     @property
     def is_stale(self) -> bool:
-        """Whether the last sample is one that a death made stale."""
+        """True if the last sample is one that a death made stale."""
         return bool(self._noted) and self._notes[self._noted[-1]][0] == Quality.STALE
 
     def _value(self, index: int) -> Plain:

@@ -11,7 +11,7 @@ from typing import Any
 from cnctwin.api.live.batches import Batch
 from cnctwin.api.live.jobs import LiveJobs
 from cnctwin.api.live.plant import LivePlant
-from cnctwin.commands.alerts import STATE as ALERTS_TOPIC
+from cnctwin.plant.alert_desk import STATE as ALERTS_TOPIC
 from cnctwin.plant.watch import viewer
 from sparkplug.broker import BrokerAddress
 from sparkplug.connection import now_ms
@@ -55,12 +55,12 @@ class Viewer:
 
     @property
     def alive(self) -> bool:
-        """Whether the thread runs."""
+        """True if the thread runs."""
         return self._thread.is_alive()
 
     @property
     def online(self) -> bool:
-        """Whether the broker has accepted us."""
+        """True if the broker has accepted us."""
         return self._host.online
 
     @property
@@ -69,7 +69,7 @@ class Viewer:
         return "" if self._host.online else self._host.last_error or f"no connection to {self.url} yet"
 
     def counts(self) -> dict[str, int]:
-        """What the session has counted, with what the inbox dropped, how much waits in it, and connections made again."""
+        """Return the counts of the session, with what the inbox dropped, how much waits in it, and connections made again."""
         host = self._host
         return {**host.counts, "dropped": host.dropped, "queue": host.queue_depth, "reconnects": host.reconnects}
 

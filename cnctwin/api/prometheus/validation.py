@@ -16,7 +16,7 @@ class _Figure(NamedTuple):
 
 
 def validation_metrics(told: Iterable[Mapping[str, Any]]) -> Iterator[Metric]:
-    """Of what `/validation/{machine}` answers for each machine that was judged."""
+    """Yield the metrics of `/validation/{machine}`'s answer for each machine that was judged."""
     labels = ["machine", "quantity", "measure"]
     value = GaugeMetricFamily("twin_validation", "figure of the newest night that was judged", labels=labels)
     budget = GaugeMetricFamily("twin_validation_budget", "what the figure may be", labels=labels)

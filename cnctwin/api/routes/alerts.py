@@ -16,7 +16,7 @@ from cnctwin.api.errors import ApiError
 from cnctwin.api.live.plant import LivePlant
 from cnctwin.api.live.viewer import Viewer
 from cnctwin.api.routes.health import state_age_s
-from cnctwin.commands.alerts import COMMAND, FRESH_S_MAX
+from cnctwin.plant.alert_desk import COMMAND, FRESH_S_MAX
 from sparkplug.connection import now_ms
 
 ANSWER_S_MAX = 5.0
@@ -25,7 +25,7 @@ _FINGERPRINT = re.compile(r"[0-9a-f]{4,64}")
 
 
 class Acknowledgement(BaseModel):
-    """Who takes care, and why. Behind a proxy that names its users, `by` is the user, whatever stands here."""
+    """The person who takes care, and why. Behind a proxy that names its users, `by` is the user, whatever stands here."""
 
     model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"by": "ada", "comment": "on my way"}]})
     by: str = Field("", max_length=100)
@@ -36,7 +36,7 @@ class Acknowledgement(BaseModel):
 
 
 class Outcome(Answer):
-    """What became of it."""
+    """The outcome of a command."""
 
     done: bool
     text: str = Field(examples=["rule_vibration of vmc is acknowledged by ada"])

@@ -82,7 +82,7 @@ def gap_routes(sources: Sources) -> APIRouter:
 
 
 def standing(state: dict[str, Any]) -> dict[str, Any]:
-    """What the gap processor says of a machine, sorted out of its state.
+    """Return the gap processor's figures of a machine, sorted out of its state.
 
     >>> value = {"value": 1.5, "t": 0, "quality": "good", "provenance": "inferred"}
     >>> found = standing({"machine": "vmc", "now": 0, "twin": {"twin/gap_spindle_load_pct/air": value}})
@@ -140,7 +140,7 @@ def folder_of(folder: Path | None, machine: str) -> Path:
 
 
 def _is_of_no_axis(value: dict[str, Any]) -> bool:
-    """Whether a figure is null because the machine has no such signal: most machines have no axis a, b or c."""
+    """Return True if a figure is null because the machine has no such signal: most machines have no axis a, b or c."""
     return value["value"] is None and str(value.get("reason", "")).endswith("is not offered")
 
 

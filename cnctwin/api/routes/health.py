@@ -12,11 +12,11 @@ from cnctwin.api.errors import ApiError
 from cnctwin.api.live.plant import LivePlant
 from cnctwin.api.residual import models_part
 from cnctwin.api.sources import Sources
-from cnctwin.commands.alerts import FRESH_S_MAX
-from cnctwin.errors import ProgramError
+from cnctwin.errors import ApplicationError
 from cnctwin.jobs.announcer import NODE as JOBS_NODE
 from cnctwin.jobs.client import FRESH_S_MAX as JOBS_FRESH_S_MAX
 from cnctwin.page import WEB
+from cnctwin.plant.alert_desk import FRESH_S_MAX
 from cnctwin.plant.doctor import COME_AND_GO
 from processors.contract import TWIN_NODE_PREFIX
 from sparkplug.connection import now_ms
@@ -97,7 +97,7 @@ async def _store(sources: Sources) -> Part:
         return Part(part="store", state="missing", reason=line, do="cnctwin process historian, and cnctwin serve --store WHERE")
     try:
         status = await sources.store.status()
-    except (ApiError, ProgramError) as error:
+    except (ApiError, ApplicationError) as error:
         return Part(part="store", state="missing", reason=str(error), do="cnctwin process historian")
     if status.trouble:
         return Part(part="store", state="degraded", reason=status.trouble, do="cnctwin store status")
@@ -164,7 +164,7 @@ def _page() -> Part:
 
 
 def state_age_s(state: dict[str, Any], now_s: float) -> float:
-    """How old a state is that says when it was written; for ever, where it does not say.
+    """Return the age of a state that says when it was written; infinite where it does not say.
 
     >>> state_age_s({"at": "1970-01-01T00:01:00.000Z"}, 90.0)
     30.0

@@ -25,7 +25,6 @@ LAST_MS = 300_000
 JSON = "application/json"
 MS_MAX = 32_503_680_000_000  # the year 3000
 
-Ms = Annotated[int, Query(ge=0, le=MS_MAX, description="ms since 1970")]
 FromMs = Annotated[int | None, Query(alias="from", ge=0, le=MS_MAX, description="ms since 1970; else five minutes before `to`")]
 ToMs = Annotated[int | None, Query(alias="to", ge=0, le=MS_MAX, description="ms since 1970; else now")]
 

@@ -33,7 +33,7 @@ FILE_BYTES_MAX = 50_000_000
 JobId = Annotated[str, Path(description="As GET /jobs has it", max_length=64, examples=["optimise-4f1d2a90c3b7"])]
 
 
-class Asked(BaseModel):
+class JobRequest(BaseModel):
     """A request for a job: its kind, and the parameters of that kind (docs/jobs.md). Files lie below the consumer's folder."""
 
     model_config = ConfigDict(
@@ -44,8 +44,8 @@ class Asked(BaseModel):
     id: str | None = Field(None, max_length=64, description="the caller's own, if any; the same id twice is the same job")
 
 
-class Told(Answer):
-    """What the consumer answered."""
+class JobAnswer(Answer):
+    """The consumer's answer."""
 
     id: str = Field(examples=["optimise-4f1d2a90c3b7"])
     answer: str = Field(description="accepted, known (it was asked for before) or cancelled", examples=["accepted"])
@@ -123,8 +123,8 @@ def job_routes(sources: Sources) -> APIRouter:
         headers["Content-Disposition"] = f'attachment; filename="{job_id}-{name}"'
         return Response(content, media_type="application/octet-stream", headers=headers)
 
-    @router.post("/jobs", response_model=Told, responses=refusals)
-    async def ask(body: Asked) -> Any:
+    @router.post("/jobs", response_model=JobAnswer, responses=refusals)
+    async def ask(body: JobRequest) -> Any:
         """Have something computed. It is accepted when this is answered, and is not lost from then on."""
         document = body.model_dump(exclude_none=True)
         document.setdefault("id", f"{body.job}-{uuid4().hex[:12]}")
@@ -136,7 +136,7 @@ def job_routes(sources: Sources) -> APIRouter:
             raise ApiError(400, str(error)) from None
         return await _answer(viewer, REQUEST, document)
 
-    @router.post("/jobs/{job_id}/cancel", response_model=Told, responses={**missing, **refusals})
+    @router.post("/jobs/{job_id}/cancel", response_model=JobAnswer, responses={**missing, **refusals})
     async def cancel(job_id: JobId) -> Any:
         """Cancel a job that waits or runs."""
         _known(viewer, job_id)
@@ -146,7 +146,7 @@ def job_routes(sources: Sources) -> APIRouter:
 
 
 def caution_of(job: dict[str, Any]) -> str:
-    """What the result of a job in full exceeds, in words; such a job is done all the same.
+    """Return in words what the result of a job in full exceeds; such a job is done all the same.
 
     >>> caution_of({"result": {"lines_over": 2, "collisions": []}})
     '2 lines are above a limit'

@@ -7,7 +7,7 @@ from cnctwin.api.errors import ApiError
 from cnctwin.api.live.fan_out import FanOut
 from cnctwin.api.prometheus.text import PlantCollector, text
 from cnctwin.api.sources import Sources
-from cnctwin.errors import ProgramError
+from cnctwin.errors import ApplicationError
 from cnctwin.memory.store.contract import Status
 from sparkplug.connection import now_ms
 
@@ -25,7 +25,7 @@ def metrics_routes(sources: Sources, fan_out: FanOut) -> APIRouter:
         if sources.store.configured:
             try:
                 status = await sources.store.status()
-            except (ApiError, ProgramError):
+            except (ApiError, ApplicationError):
                 status = None
         collector = PlantCollector(sources, status, len(fan_out), fan_out.dropped, now_ms())
         return Response(await sources.store.work(lambda: text(collector)), media_type=MEDIA_TYPE)

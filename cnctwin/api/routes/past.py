@@ -1,4 +1,4 @@
-"""What the past tells: GET /events/{machine}, /parts/{machine}, /validation/{machine}, POST /twin/replay."""
+"""Routes to the past: GET /events/{machine}, /parts/{machine}, /validation/{machine}, POST /twin/replay."""
 
 import asyncio
 from collections.abc import Mapping, Sequence

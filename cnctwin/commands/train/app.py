@@ -59,7 +59,7 @@ def train_anomaly(
         raise UsageError("--features is empty: name at least one signal")
     if common_mode not in (methods := [method.value for method in training.Method]):
         raise UsageError(f"--common-mode {common_mode}: it is one of {', '.join(methods)}")
-    asked = training.Asked(
+    asked = training.TrainingSettings(
         features=names,
         detector=training.Detector(detector, dict(_parameter(one) for one in parameter or ()), seed),
         alerts_per_week=alerts_per_week,
@@ -116,7 +116,7 @@ def _parameter(text: str) -> tuple[str, Any]:
 
 
 def _training() -> ModuleType:
-    """What trains, which needs what the twin needs."""
+    """Return the module that trains, which needs what the twin needs."""
     try:
         from cnctwin.training.anomaly import train as command
     except ImportError as error:

@@ -26,7 +26,7 @@ PAUSE_S_MIN, PAUSE_S_MAX = 1.0, 300.0
 
 @dataclass(frozen=True, slots=True)
 class Receiver:
-    """Where records go. The secrets have been read."""
+    """The receiver of records. Its secrets have been read."""
 
     url: str
     bearer: str | None = None
@@ -36,7 +36,7 @@ class Receiver:
 
 
 class Delivered(NamedTuple):
-    """What a round has done; `waits_s`: None = all are settled, else when to try again, and why."""
+    """The outcome of a round; `waits_s`: None = all are settled, else when to try again, and why."""
 
     delivered: int
     refused: int
@@ -78,7 +78,7 @@ class Delivery:
         )
 
     def _one(self, machine: str, part: Part, now_s: float) -> tuple[str | None, float, str]:
-        """What became of a part (None: it waits), the pause until the next try, and why."""
+        """Return the outcome for a part (None: it waits), the pause until the next try, and why."""
         outcome = self._send(self._receiver, part)
         if outcome.verdict is Verdict.DELIVERED:
             return "delivered", 0.0, ""
@@ -106,7 +106,7 @@ def sent(receiver: Receiver, part: Part) -> Outcome:
 
 
 def signature(secret: str, body: bytes) -> str:
-    """What a receiver compares, in constant time, with its own.
+    """Return the signature, which a receiver compares with its own in constant time.
 
     >>> signature("key", b"The quick brown fox jumps over the lazy dog")[:23]
     'sha256=f7bc83f430538424'

@@ -1,4 +1,4 @@
-"""What was published then beside what is recomputed now, metric by metric and in order, as both come in.
+"""A comparison of what was published then with what is recomputed now, metric by metric and in order, as both come in.
 
 Two values stand for each other when they are of the same metric and moment. Then they are the same, bit for bit, with quality and
 reason, or they differ. A value whose moment the other side has passed is missing (published then only) or extra.
@@ -22,7 +22,7 @@ from sparkplug.values import Value
 AHEAD_MAX = 20_000  # values that one side may be ahead of the other
 
 
-class _Told(NamedTuple):
+class _PublishedValue(NamedTuple):
     t: int
     value: Value
     quality: Quality
@@ -36,9 +36,9 @@ class _Metric:
 
     name: str
     processor: str
-    then: deque[_Told] = field(default_factory=deque)
-    now: deque[_Told] = field(default_factory=deque)
-    restated: dict[int, _Told] = field(default_factory=dict)  # what births have told
+    then: deque[_PublishedValue] = field(default_factory=deque)
+    now: deque[_PublishedValue] = field(default_factory=deque)
+    restated: dict[int, _PublishedValue] = field(default_factory=dict)  # what births have told
     known_ms: int = -1  # published before the state that was restored, up to here
     same: int = 0
     differing: int = 0
@@ -70,7 +70,7 @@ class Comparison:
             metric = self._metric(reading.name)
             if reading.timestamp_ms > metric.known_ms or not metric.known_ms:
                 metric.known_ms = 0
-                told = _Told(reading.timestamp_ms, reading.value, reading.quality, reading.reason, is_counted)
+                told = _PublishedValue(reading.timestamp_ms, reading.value, reading.quality, reading.reason, is_counted)
                 metric.then.append(told)
                 self._settle(metric)
 
@@ -82,7 +82,7 @@ class Comparison:
             if reading.reason == NOTHING_YET:
                 continue
             metric = self._metric(reading.name)
-            told = _Told(reading.timestamp_ms, reading.value, reading.quality, reading.reason, False)
+            told = _PublishedValue(reading.timestamp_ms, reading.value, reading.quality, reading.reason, False)
             metric.restated = {told.t: told}
             while metric.now and metric.now[0].t <= told.t:
                 now = metric.now.popleft()
@@ -92,14 +92,14 @@ class Comparison:
                     metric.unheard += 1
 
     def recomputed(self, machine: str, changes: Iterable[Change], *, is_counted: bool) -> None:
-        """What the fold gives now."""
+        """Take what the fold gives now."""
         for change in changes:
             self.values += 1
             value = as_sent(change.value, self._types[change.name])
             line = (machine, change.name, change.timestamp_ms, value, int(change.quality), change.reason, change.is_historical)
             self._hash.update(repr(line).encode())
             metric = self._metric(change.name)
-            metric.now.append(_Told(change.timestamp_ms, value, change.quality, change.reason, is_counted))
+            metric.now.append(_PublishedValue(change.timestamp_ms, value, change.quality, change.reason, is_counted))
             if self.is_heard:
                 self._settle(metric)
             elif len(metric.now) > AHEAD_MAX:
@@ -164,7 +164,7 @@ class Comparison:
         in_birth = metric.restated.get(told.t)
         self._count(metric, in_birth if in_birth is not None and _is_same(in_birth, told) else None, told)
 
-    def _count(self, metric: _Metric, then: _Told | None, now: _Told | None) -> None:
+    def _count(self, metric: _Metric, then: _PublishedValue | None, now: _PublishedValue | None) -> None:
         if not ((then is not None and then.is_counted) or (now is not None and now.is_counted)):
             return
         if then is not None and now is not None and _is_same(then, now):
@@ -202,7 +202,7 @@ def as_sent(value: Value, datatype: DataType) -> Value:
     return value
 
 
-def _is_same(then: _Told, now: _Told) -> bool:
+def _is_same(then: _PublishedValue, now: _PublishedValue) -> bool:
     return then.quality is now.quality and then.reason == now.reason and _bits(then.value) == _bits(now.value)
 
 

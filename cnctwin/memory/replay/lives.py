@@ -30,7 +30,7 @@ Births = Mapping[tuple[str, str], int]
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """Where the state comes from: a snapshot, to go on from; the first birth that it heard; or nothing.
+    """The origin of the state: a snapshot, to go on from; the first birth that it heard; or nothing.
 
     received_ms: of the snapshot; hears_from: by machine, the first message that it may have heard; snapshots: by unit
     births: as `Restart.births`
@@ -152,12 +152,12 @@ def _utc(at_ms: int) -> str:
 
 
 def _is_of_process(event: HostEvent) -> bool:
-    """Whether a twin device died with its edge node, and not with its machine."""
+    """Return True if a twin device died with its edge node, and not with its machine."""
     return event.kind is EventKind.DEATH and NODE_OFFLINE in event.detail
 
 
 def _next_death(of_twin: Sequence[Mark], place: int) -> int:
-    """Where it died again, of the marks of a processor; beyond all where it did not."""
+    """Return the next death, of the marks of a processor; beyond all where there is none."""
     deaths = (one.place for one in of_twin if one.place > place and _is_of_process(one.event))
     return next((death for death in deaths), of_twin[-1].place + 1)
 
@@ -178,7 +178,7 @@ def _heard_from(found: Sequence[Mark], begin: int, end: int, processor: AnyProce
 def births_of_life(  # noqa: PLR0917
     store: Store, processor: AnyProcessor, units: Collection[str], found: Sequence[Mark], begin_ms: int, end: int
 ) -> tuple[dict[tuple[str, str], int], int]:
-    """What a snapshot that was saved in a life tells, that of its end or the last one that is kept; and when it was saved."""
+    """Return what a snapshot that was saved in a life tells, that of its end or the last one kept; and when it was saved."""
     # No later than what is at hand: a snapshot that was saved after it may be of a later life.
     end_ms = next((mark.received_ms for mark in found if mark.place == end), found[-1].received_ms if found else begin_ms)
     result: dict[tuple[str, str], int] = {}
@@ -199,7 +199,7 @@ def births_of(payload: bytes) -> dict[tuple[str, str], int]:
 
 
 def offers(found: Sequence[Mark], series: Mapping[str, Sequence[Series]]) -> dict[str, dict[NodeId, list[str]]]:
-    """Which node offers which signals of each machine, edges first."""
+    """Return the nodes that offer each signal of each machine, edges first."""
     nodes = {(mark.event.device or "", mark.event.node) for mark in found if mark.event.kind is not EventKind.HOLE}
     result: dict[str, dict[NodeId, list[str]]] = {}
     for machine, node in sorted(nodes, key=lambda pair: (pair[0], pair[1].node.startswith("twin-"), pair[1])):

@@ -66,7 +66,7 @@ def marks(stretch: Stretch) -> tuple[list[Mark], int, int]:
 
 
 def is_twin(event: HostEvent) -> bool:
-    """Whether a processor says it."""
+    """Return True if a processor says it."""
     return event.node.node.startswith(TWIN_NODE_PREFIX)
 
 

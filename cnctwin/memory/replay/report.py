@@ -11,7 +11,7 @@ LISTED_MAX = 10
 
 
 def shown(replayed: Replayed, console: Console) -> None:
-    """What came out, by processor and by metric that differs."""
+    """Print the result, by processor and by metric that differs."""
     table = Table(title=f"{replayed.machine}, {_at(replayed.from_ms)} to {_at(replayed.to_ms)}", title_justify="left")
     for column in ("processor", "same", "differing", "missing", "extra", "restarts", "start"):
         table.add_column(column, justify="left" if column in {"processor", "start"} else "right")

@@ -95,7 +95,7 @@ class Rerun:
         return self._produced
 
     def chained(self, received_ms: int, event: HostEvent, *, is_counted: bool) -> list[HostEvent]:
-        """What another processor, run again, has just said."""
+        """Return what another processor, run again, has just said."""
         self._produced = []
         self._is_counted = is_counted
         if event.node.node in self._fed and self._window is None and event.device in self._machines:
@@ -181,7 +181,7 @@ class Rerun:
                 self._feed(received_ms, event)
 
     def _has_seen(self, event: HostEvent) -> bool:
-        """Whether a value that the restored state holds is of this message."""
+        """Return True if a value that the restored state holds is of this message."""
         lane = None if event.device is None else self._engine.lane_of(event.device)
         if lane is None or event.kind is not EventKind.DATA:
             return False
@@ -207,7 +207,7 @@ class Rerun:
             self._took(self._engine.beat(at_ms))
 
     def _hears(self, event: HostEvent) -> bool:
-        """Whether it had heard the birth. Where it was started from nothing in the middle, one is made up, without any value."""
+        """True if it had heard the birth. Where it was started from nothing in the middle, one is made up, without any value."""
         key = event.node, event.device
         if self._heard is not None:
             if event.kind is EventKind.BIRTH and key not in self._heard:

@@ -1,15 +1,15 @@
-"""What a replay found: by processor and metric, with the first place where it differs."""
+"""The result of a replay: by processor and metric, with the first place where it differs."""
 
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from cnctwin.errors import ProgramError
+from cnctwin.errors import ApplicationError
 from sparkplug.values import Value
 
 DIFFERENCES_MAX = 100  # that are listed; all are counted
 
 
-class ReplayRefusedError(ProgramError):
+class ReplayRefusedError(ApplicationError):
     """This stretch cannot be replayed; the text says why, and what can."""
 
 
@@ -84,7 +84,7 @@ class Replayed:
 
     @property
     def is_equal(self) -> bool:
-        """Whether every value came out as it was published then, and none more or less."""
+        """True if every value came out as it was published then, and none more or less."""
         return all(sum(processor.totals[1:]) == 0 for processor in self.processors)
 
     @property
@@ -94,7 +94,7 @@ class Replayed:
 
     @property
     def speed(self) -> float:
-        """How many times faster than the day itself."""
+        """The factor by which it was faster than the day itself."""
         return (self.to_ms - self.from_ms) / 1000 / self.seconds if self.seconds > 0.0 else 0.0
 
     def as_json(self) -> dict[str, Any]:

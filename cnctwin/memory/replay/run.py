@@ -85,7 +85,7 @@ def _found(name: str) -> AnyProcessor:
 
 
 def _units(configuration: Configuration[ProcessorConfig], machine: str, known: Sequence[str]) -> dict[str, list[str]]:
-    """What has a state, with its machines: the machine, or all cells that are needed to run its own."""
+    """Return the units that have a state, with their machines: the machine, or all cells that are needed to run its own."""
     config = configuration.default
     if not isinstance(config, CellConfig):
         return {machine: [machine]}

@@ -15,7 +15,7 @@ from cnctwin.memory.store.database import Readers
 from cnctwin.memory.store.extra import MISSING, extra_is_there
 from cnctwin.memory.store.sealed.manifest import Checked, File, State, files
 from cnctwin.memory.store.series_table import StoredClass
-from cnctwin.memory.store.windows import Told, Windows, raw_column
+from cnctwin.memory.store.windows import StoredSample, Windows, raw_column
 
 if TYPE_CHECKING:
     from cnctwin.memory.store.sealed.answers import SealedAnswers
@@ -53,7 +53,7 @@ class Answering:
             found = db.execute("SELECT id FROM machines WHERE name = ?", (query.machine,)).fetchone()
             there = [] if found is None else files(db, found[0], query.from_ms, query.to_ms)
             if query.every_ms is None:
-                told: dict[str, list[Told]] = {
+                told: dict[str, list[StoredSample]] = {
                     name: [one for s in asked.series for one in hot.told(db, s, *span_us)] for name, asked in wanted.items()
                 }
                 windows: dict[str, Windows] = {}
@@ -86,7 +86,7 @@ class Answering:
         fill_gone(self.checked, by_sid, every.values(), there, Span(query.from_ms, query.to_ms))
 
     def messages(self, machine: str, from_ms: int, to_ms: int) -> Iterator[Message]:
-        """What came of a machine, in order."""
+        """Yield the messages of a machine, in order."""
         if extra_is_there():
             from cnctwin.memory.store.sealed.messages import SealedMessages  # noqa: PLC0415
 

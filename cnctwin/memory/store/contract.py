@@ -1,4 +1,4 @@
-"""What a store is, wherever the bytes lie: a log of messages, and questions to it.
+"""The contract of a store, wherever the bytes lie: a log of messages, and questions to it.
 
 A message is kept whole and in the order in which it came, so that the processors can be run over it again and give what they gave
 then. A sample of it is kept once: what comes again (a birth repeats what is known, an edge sends again what nobody confirmed) is
@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
-from cnctwin.errors import ProgramError
+from cnctwin.errors import ApplicationError
 from sparkplug.host_session import HostEvent
 from sparkplug.quality import Quality
 from sparkplug.values import Value
@@ -22,19 +22,19 @@ RAW, DERIVED = "cnc_raw", "cnc_twin_state"
 TWIN_PREFIX = "twin/"
 
 
-class StoreError(ProgramError):
+class StoreError(ApplicationError):
     """The store cannot do what it is asked; the text names the place, the trouble and the way out."""
 
 
 class Message(NamedTuple):
-    """What came of one device (or, with `event.device` None, of a node: a hole), and when, ms since 1970 by our clock."""
+    """A message of one device (or, with `event.device` None, of a node: a hole), and when it came, ms since 1970 by our clock."""
 
     received_ms: int
     event: HostEvent
 
 
 class Appended(NamedTuple):
-    """What became of the samples of a batch. stored + repeated + refused = all of them.
+    """The account of the samples of a batch. stored + repeated + refused = all of them.
 
     repeated: were there already
     refused: cannot be kept (of another type than a store has); counted, never silent
@@ -131,7 +131,7 @@ class Snapshot(NamedTuple):
 
 
 class Tidied(NamedTuple):
-    """What `tidy` did: hours sealed, hours swept, bytes given back, pins honoured."""
+    """The account of `tidy`: hours sealed, hours swept, bytes given back, pins honoured."""
 
     sealed: int
     swept: int
@@ -141,7 +141,7 @@ class Tidied(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """How the store is: samples and bytes on the disk, oldest and newest sample, for how long nothing has to be swept before its
+    """The store: samples and bytes on the disk, oldest and newest sample, for how long nothing has to be swept before its
     time at the present rate (None: not known yet), samples that wait to be written, and in one line what is wrong ('' = nothing).
     """
 
@@ -185,15 +185,15 @@ class Store(Protocol):
         """A column for each signal asked for, in that order."""
 
     def messages(self, machine: str, from_ms: int, to_ms: int) -> Iterator[Message]:
-        """What came of a machine (and of nodes that it hangs on: their holes) with received_ms in [from_ms, to_ms), in the order
-        in which it came: a BIRTH whole, of DATA what was not there already. Raises StoreError where the store keeps no messages,
-        only samples."""
+        """Yield messages of a machine (and of nodes that it hangs on: their holes) with received_ms in [from_ms, to_ms), in the
+        order in which they came: a BIRTH whole, of DATA what was not there already. Raises StoreError where the store keeps no
+        messages, only samples."""
 
     def tidy(self, now_ms: int) -> Tidied:
-        """What is due, once a minute: seal whole hours, roll up, sweep what is past its time or beyond the disk's budget."""
+        """Do what is due, once a minute: seal whole hours, roll up, sweep what is past its time or beyond the disk's budget."""
 
     def status(self) -> Status:
-        """How the store is; cheap."""
+        """Return the state of the store; cheap."""
 
     def close(self) -> None:
         """Write what waits, and close."""

@@ -128,11 +128,11 @@ class EmbeddedStore:
         return self._answering.query(query)
 
     def messages(self, machine: str, from_ms: int, to_ms: int) -> Iterator[Message]:
-        """What came of a machine with received_ms in [from_ms, to_ms), in the order in which it came."""
+        """Yield the messages of a machine with received_ms in [from_ms, to_ms), in the order in which they came."""
         return self._answering.messages(machine, from_ms, to_ms)
 
     def status(self) -> Status:
-        """How the store is."""
+        """Return the state of the store."""
         retention = None if self._writing is None else self._writing.retention
         with self._readers.snapshot() as db:
             return status(db, self.folder, retention, self._free_bytes, self._answering.checked.damaged.values())

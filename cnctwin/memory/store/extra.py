@@ -1,4 +1,4 @@
-"""Whether the extra `historian` is installed, which sealing needs; looked up without importing it."""
+"""The extra `historian`, which sealing needs: looked up without importing it."""
 
 from importlib.util import find_spec
 
@@ -7,5 +7,5 @@ MISSING = "numpy, pyarrow and duckdb are not installed (pip install 'cnctwin[his
 
 
 def extra_is_there() -> bool:
-    """Whether all of it can be imported."""
+    """Return True if all of it can be imported."""
     return all(find_spec(name) is not None for name in NEEDED)

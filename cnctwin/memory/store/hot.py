@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from cnctwin.memory.store.contract import Sample, Series
 from cnctwin.memory.store.series_table import RANK_MASK, RANKS, REASON_SHIFT
 from cnctwin.memory.store.value_form import NUMBERS, Kind, given
-from cnctwin.memory.store.windows import Numbers, Told, Windows
+from cnctwin.memory.store.windows import Numbers, StoredSample, Windows
 
 _VALUES_MAX = 500
 
@@ -22,7 +22,7 @@ class SeriesOf(NamedTuple):
     stored_class: int
 
 
-class Asked(NamedTuple):
+class SignalSeries(NamedTuple):
     """A signal that was asked for: its series, and the unit it has now."""
 
     series: tuple[SeriesOf, ...]
@@ -48,7 +48,7 @@ SELECT t / ?1, count(*), total(value), min(value), max(value) FROM samples WHERE
 _SAMPLES = "SELECT t, value, flag FROM samples WHERE sid = ? AND t >= ? AND t < ?"
 
 
-def asked(db: sqlite3.Connection, machine: str, signals: Sequence[str]) -> dict[str, Asked]:
+def asked(db: sqlite3.Connection, machine: str, signals: Sequence[str]) -> dict[str, SignalSeries]:
     """The series of each signal, of all nodes that tell it."""
     wanted = set(signals)
     found: dict[str, list[SeriesOf]] = {name: [] for name in signals}
@@ -58,7 +58,7 @@ def asked(db: sqlite3.Connection, machine: str, signals: Sequence[str]) -> dict[
             found[name].append(SeriesOf(sid, unit, Kind(kind), stored_class))
             if is_last and last_us > units.get(name, (-1, None))[0]:
                 units[name] = (last_us, unit)
-    return {name: Asked(tuple(series), units.get(name, (0, None))[1]) for name, series in found.items()}
+    return {name: SignalSeries(tuple(series), units.get(name, (0, None))[1]) for name, series in found.items()}
 
 
 def reasons(db: sqlite3.Connection, numbers: Iterable[int]) -> dict[int, str | None]:
@@ -71,7 +71,7 @@ def reasons(db: sqlite3.Connection, numbers: Iterable[int]) -> dict[int, str | N
     return texts
 
 
-def told(db: sqlite3.Connection, series: SeriesOf, from_us: int, to_us: int) -> list[Told]:
+def told(db: sqlite3.Connection, series: SeriesOf, from_us: int, to_us: int) -> list[StoredSample]:
     """The samples of a series in [from_us, to_us)."""
     rows = db.execute(_SAMPLES, (series.sid, from_us, to_us)).fetchall()
     texts = reasons(db, {flag >> REASON_SHIFT for _, _, flag in rows})

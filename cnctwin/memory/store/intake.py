@@ -43,7 +43,7 @@ _STALE = RANK[Quality.STALE]
 Known = tuple[int, Kind, Any, int]
 """Time in µs, kind, value as SQLite has it, flag."""
 Sealed = Callable[[Signal, StoredClass, int], Sequence[Known] | None]
-"""What the sealed hours hold of a signal within a millisecond; None: they were swept, and take no more."""
+"""The sealed hours' readings of a signal within a millisecond; None: they were swept, and take no more."""
 
 
 class Batch:
@@ -170,7 +170,7 @@ class Batch:
         return t if t // 1000 == stamp_ms else REFUSED
 
     def _stored(self, signal: Signal, stamp_ms: int) -> list[Known] | None:
-        """What is known of a signal within a millisecond; None where it was swept."""
+        """Return the stored readings of a signal within a millisecond; None where it was swept."""
         found: list[Known] = []
         for (_, kind), sid in signal.sids.items():
             asked = "SELECT t, value, flag FROM samples WHERE sid = ? AND t BETWEEN ? AND ?"
@@ -185,7 +185,7 @@ class Batch:
 
 
 def _order(places: Sequence[tuple[int, int]]) -> bytes | None:
-    """Where the readings stood in their message, in the order of time and series; None where that is the same."""
+    """Return the places of the readings in their message, in the order of time and series; None where that is the same."""
     if all(a <= b for a, b in pairwise(places)):
         return None
     return pack(f"<{len(places)}I", *sorted(range(len(places)), key=places.__getitem__))

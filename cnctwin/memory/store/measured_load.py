@@ -1,4 +1,4 @@
-"""What a store has been writing a day, by what is kept together; from its sealed hours, or from what is still in SQLite."""
+"""The daily load of a store, by what is kept together; from its sealed hours, or from what is still in SQLite."""
 
 from cnctwin.memory.store.contract import StoreError
 from cnctwin.memory.store.database import Readers

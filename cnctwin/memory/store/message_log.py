@@ -23,7 +23,7 @@ PAGE_FIRST, PAGE_MESSAGES, PAGE_NUMBERS_MAX = 2_000, 4_000, 1_000_000
 RECORDER_NODE = "twin-historian"
 """Its holes say that nobody wrote down what came: they concern every machine."""
 Parts = dict[int, list[tuple[int, int, Reading]]]
-"""Of each message, by number: time, series and reading of its samples."""
+"""The parts of each message, by number: time, series and reading of its samples."""
 
 
 class Header(NamedTuple):
@@ -37,7 +37,7 @@ class Header(NamedTuple):
 
 
 class Sealed(NamedTuple):
-    """What the sealed hours hold of a page."""
+    """The sealed hours' part of a page."""
 
     headers: dict[int, Header]
     parts: Parts
@@ -53,7 +53,7 @@ def messages(
     asked: tuple[str, int, int],
     again: Callable[[Callable[[], list[Message]]], list[Message]],
 ) -> Iterator[Message]:
-    """What came of a machine with received_ms in [from_ms, to_ms): asked = these three.
+    """Yield the messages of a machine with received_ms in [from_ms, to_ms): asked = these three.
 
     again: repeats what met a file that was removed meanwhile
     """

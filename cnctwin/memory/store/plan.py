@@ -1,4 +1,4 @@
-"""What a year of these machines costs on this disk, and what to keep: from what a store has seen, or from figures.
+"""A plan for a year of these machines on this disk, and what to keep: from what a store has seen, or from figures.
 
 Bytes a sample are measured (docs/store.md): of slow signals with few decimals, of vibration in blocks, of features.
 """
@@ -16,12 +16,12 @@ ROLLUP_BYTES_A_SIGNAL_AND_DAY = 12_000
 TWIN_SAMPLES_A_MACHINE_AND_SECOND = 5.0
 BLOCK_DAYS_LEAST, RAW_DAYS_MOST = 1.0, 365.0
 SPARE = 0.85
-"""Of the disk; the rest is for pins, for the hot tier and for what nobody thought of."""
+"""The share of the disk that may be used; the rest is for pins, for the hot tier and for what nobody thought of."""
 
 
 @dataclass(frozen=True, slots=True)
 class Load:
-    """What all machines together write, bytes a day: slow signals, blocks (vibration), features, roll-ups; and its basis."""
+    """The bytes that all machines together write a day: slow signals, blocks (vibration), features, roll-ups; and its basis."""
 
     slow: float
     blocks: float

@@ -1,4 +1,4 @@
-"""How long what is kept. What a processor says (`twin/…`), roll-ups, pins and what is pinned stay for ever."""
+"""Retention: how long what is kept. What a processor says (`twin/…`), roll-ups, pins and what is pinned stay for ever."""
 
 import math
 from dataclasses import dataclass

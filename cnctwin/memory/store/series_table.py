@@ -1,4 +1,4 @@
-"""Which series there are, and the last sample of each signal: what the writer has in memory, and in the same transaction on disk.
+"""The series, and the last sample of each signal: what the writer has in memory, and in the same transaction on disk.
 
 A signal is what one node tells of one machine under one name. It has a series for each unit and kind of value that came, so that
 a series is of one type, and one for its nulls.
@@ -16,13 +16,13 @@ from sparkplug.values import Value
 
 RANKS = (Quality.GOOD, Quality.STALE, Quality.BAD)
 RANK = {quality: rank for rank, quality in enumerate(RANKS)}
-"""How bad a quality is: the worst is the largest."""
+"""Ranks of quality: the worst is the largest."""
 RANK_MASK, HISTORY_BIT, REASON_SHIFT = 3, 4, 3
 """A flag is rank + 4 where it came as history + 8 times the number of its reason (0 = none)."""
 
 
 class StoredClass(IntEnum):
-    """What is kept together, and as long."""
+    """A class of series that are kept together, and as long."""
 
     RAW = 0
     BLOCK = 1
@@ -31,7 +31,7 @@ class StoredClass(IntEnum):
 
 
 def class_of(signal: str, kind: Kind) -> StoredClass:
-    """Where a series belongs."""
+    """Return the class that a series belongs to."""
     if signal.startswith(TWIN_PREFIX):
         return StoredClass.TWIN
     return StoredClass.BLOCK if kind in BLOCKS else StoredClass.RAW
@@ -97,7 +97,7 @@ class SeriesTable:
         return number
 
     def signals(self, machine: int, node: int) -> dict[str, Signal]:
-        """What a node tells of a machine, by name."""
+        """Return the signals that a node tells of a machine, by name."""
         return self._of.setdefault((machine, node), {})
 
     def signal(self, machine: int, node: int, name: str) -> Signal:

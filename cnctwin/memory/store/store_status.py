@@ -1,4 +1,4 @@
-"""How a store is, in a few look-ups."""
+"""The state of a store, in a few look-ups."""
 
 import json
 import sqlite3

@@ -1,4 +1,4 @@
-"""What is past its time goes, and beyond the disk's budget the oldest raw; what is pinned, derived or rolled up never.
+"""Sweeping: what is past its time goes, and beyond the disk's budget the oldest raw; what is pinned, derived or rolled up never.
 
 A file is swept or kept whole: a pin keeps the files that it touches. A swept file stays in the manifest without its bytes, so
 that history which comes for it later is known to be too late.
@@ -6,7 +6,6 @@ that history which comes for it later is known to be too late.
 
 import sqlite3
 from collections.abc import Sequence
-from typing import NamedTuple
 
 from cnctwin.memory.store.intake import STAMP_MS_MAX
 from cnctwin.memory.store.retention import Retention
@@ -17,14 +16,6 @@ FILES_AT_ONCE = 200
 EVENTS_AT_ONCE = 2_000
 SNAPSHOTS_FULL_DAYS = 7
 """Older snapshots of processors are kept once a day, as long as the raw is, those before a pin all."""
-
-
-class Swept(NamedTuple):
-    """What went: files that are not needed any more, their bytes, and how many were kept because of a pin."""
-
-    left_over: tuple[str, ...]
-    bytes: int
-    pinned: int
 
 
 _PAST = """

@@ -1,4 +1,4 @@
-"""How a value lies in SQLite: as it is where SQLite keeps it exactly, else as bytes or JSON; each kind has a series of its own.
+"""The form of a value in SQLite: as it is where SQLite keeps it exactly, else as bytes or JSON; each kind has its own series.
 
 SQLite makes NaN a null, knows no whole numbers beyond 64 bits and no arrays. Arrays are little-endian: one letter that says how
 wide an element is, as `struct` names it, and the elements. Floats are four bytes wide where that loses nothing.
@@ -14,13 +14,12 @@ from typing import Any
 from sparkplug.values import Value
 
 INT_MAX = 2**63 - 1
-_NAN_BYTES = 8
 Kept = int | float | str | bytes | None
-"""What SQLite holds."""
+"""A value that SQLite holds."""
 
 
 class Kind(IntEnum):
-    """What the values of a series are; a null is of the series NULL beside it."""
+    """The kind of the values of a series; a null is of the series NULL beside it."""
 
     NULL = 0
     FLOAT = 1
@@ -39,9 +38,9 @@ class Kind(IntEnum):
 NUMBERS = frozenset({Kind.FLOAT, Kind.INT})
 ARRAYS = frozenset({Kind.FLOATS, Kind.INTS, Kind.BOOLS})
 PLAIN = frozenset({Kind.FLOAT, Kind.INT, Kind.BOOL, Kind.TEXT})
-"""What Parquet gives back as it is."""
+"""Kinds that Parquet gives back as they are."""
 BLOCKS = ARRAYS | {Kind.BYTES}
-"""What is much, and is kept for days only."""
+"""Kinds that take much room, and are kept for days only."""
 
 
 class CannotKeepError(ValueError):
@@ -73,7 +72,7 @@ def given(kind: Kind, value: Any) -> Value:
 
 
 def same(a: Value, b: Value) -> bool:
-    """Whether two values are the very same, type and bits.
+    """Return True if two values are the very same, type and bits.
 
     >>> same(1, True), same(0.0, -0.0), same(math.nan, math.nan), same((1.0,), (1.0,))
     (False, False, True, True)

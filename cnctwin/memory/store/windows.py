@@ -8,7 +8,7 @@ from cnctwin.memory.store.contract import Column
 from cnctwin.memory.store.series_table import RANKS
 from sparkplug.values import Value
 
-Told = tuple[int, Value, int, str | None]
+StoredSample = tuple[int, Value, int, str | None]
 """A sample: time in µs, value, rank of its quality, reason."""
 
 
@@ -25,7 +25,7 @@ class Numbers(NamedTuple):
 
 
 class Window:
-    """What is known of one window. A number counts for mean, low and high where it is good and finite."""
+    """The sums of one window. A number counts for mean, low and high where it is good and finite."""
 
     __slots__ = ("count", "good", "high", "is_number", "last", "last_us", "low", "reason", "total", "worst", "worst_us")
 
@@ -47,7 +47,7 @@ class Window:
         if numbers.last_us > self.last_us:
             self.last_us, self.last, self.is_number = numbers.last_us, numbers.last, True
 
-    def add(self, told: Told) -> None:
+    def add(self, told: StoredSample) -> None:
         """One sample."""
         t, value, rank, reason = told
         self.count += 1
@@ -113,7 +113,7 @@ class Windows:
         for number, one in known.items():
             self.put(number, one)
 
-    def add(self, told: Iterable[Told]) -> None:
+    def add(self, told: Iterable[StoredSample]) -> None:
         """Samples, one by one."""
         every_us = self.every_us
         for one in told:
@@ -147,7 +147,7 @@ def _row(window: Window | Numbers) -> tuple[Value, int, str | None, float | None
     return window.value, window.worst, window.reason, low, high, window.count
 
 
-def raw_column(signal: str, unit: str | None, told: list[Told]) -> Column:
+def raw_column(signal: str, unit: str | None, told: list[StoredSample]) -> Column:
     """Samples as they came; sorted here."""
     told.sort(key=lambda one: one[0])
     return Column(

@@ -88,7 +88,7 @@ class Writer:
                 _log.warning("%s: %d sealed files were found here, and taken over", self.folder, taken)
 
     def _retention(self, told: Retention | None) -> Retention:
-        """What was told; else what was told last."""
+        """Return the retention that was given; else the one that was given last."""
         if told is None:
             found = self.db.execute("SELECT value FROM meta WHERE name = 'retention'").fetchone()
             return Retention() if found is None else Retention(**json.loads(found[0]))
@@ -163,7 +163,7 @@ class Writer:
             self.db.execute("INSERT OR REPLACE INTO snapshots VALUES (?, ?, ?, ?)", snapshot)
 
     def tidy(self, now_ms: int) -> Tidied:
-        """What is due; without the extra `historian` nothing is, since SQLite keeps all."""
+        """Do what is due; without the extra `historian` nothing is, since SQLite keeps all."""
         if self._tier is None:
             return Tidied(0, 0, 0, 0)
         if self._must_load:
@@ -184,5 +184,5 @@ class Writer:
 
 
 def is_damage(error: BaseException | None) -> bool:
-    """Whether SQLite says that the file is not what it wrote; its other errors are of classes of their own."""
+    """Return True if SQLite says that the file is not what it wrote; its other errors are of classes of their own."""
     return type(error) is sqlite3.DatabaseError

@@ -123,7 +123,7 @@ def plot(frame: Frame, inside: str, columns: int = 8) -> Markup:
 
 
 def row_count(frame: Frame) -> int:
-    """How many labels there is room for."""
+    """Return how many labels there is room for."""
     return max(2, frame.height // 30)
 
 
@@ -150,7 +150,7 @@ def x_axis(frame: Frame, unit: str, columns: int = 8) -> Markup:
 
 
 def anchor(place: float) -> str:
-    """How a label at this place, 0 to 1000, is held so that it stays within the plot."""
+    """Return how a label at this place, 0 to 1000, is held so that it stays within the plot."""
     return "start" if place < 15 else "end" if place > 985 else "middle"
 
 

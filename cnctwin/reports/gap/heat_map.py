@@ -1,4 +1,4 @@
-"""Where the gap is: signal by regime, rms over the floor, before and after. One hue from light to dark, and the figure itself.
+"""The gap by place: signal by regime, rms over the floor, before and after. One hue from light to dark, and the figure itself.
 
 A cell that stands after the control of false discoveries has a dot and a bold figure. Signals are grouped with those that have
 the same regimes, so that no table is mostly empty.

@@ -58,5 +58,5 @@ def section(identity: str, title: str, lead: str | None, *inside: str | None) ->
 
 
 def scrollable(label: str, inside: str) -> Markup:
-    """What may be wider than a small screen; it can be scrolled with the keyboard too."""
+    """Return markup that may be wider than a small screen; it can be scrolled with the keyboard too."""
     return tag("div", inside, class_="scroll", tabindex="0", role="region", aria_label=label)

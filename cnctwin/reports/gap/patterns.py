@@ -1,4 +1,4 @@
-"""How the gap goes with position, phase, time or section, and the contrasts; a small profile where there is one."""
+"""The gap over position, phase, time or section, and the contrasts; a small profile where there is one."""
 
 from collections.abc import Sequence
 

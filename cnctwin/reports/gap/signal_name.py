@@ -38,12 +38,12 @@ def signal_name(signal: str) -> str:
 
 
 def is_position(signal: str) -> bool:
-    """Whether its gap is micrometres in strokes of hundreds of millimetres, so that nobody sees it in the signal itself."""
+    """Return True if its gap is micrometres in strokes of hundreds of millimetres, not to be seen in the signal itself."""
     return signal.endswith(("_pos_mm", "_table_mm"))
 
 
 def is_of_axis(signal: str) -> bool:
-    """Whether it is a column of an axis."""
+    """Return True if it is a column of an axis."""
     return AXIS_COLUMN.match(signal) is not None
 
 
@@ -89,7 +89,7 @@ def effect_phrase(effect: str, on: str = "") -> str:
 
 
 def effect_words(name: str) -> tuple[str, Effect | None]:
-    """What an effect is, in a sentence, and the effect; of one that the catalogue has not got, neither.
+    """Return an effect in words for a sentence, and the effect; of one that the catalogue has not got, neither.
 
     The sentence is the first one of the effect's file: a file begins with what it is.
     """

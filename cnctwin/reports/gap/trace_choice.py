@@ -1,4 +1,4 @@
-"""Which signals are worth a look, and which part of the run: where the gap is seen best."""
+"""The choice of signals that are worth a look, and of the part of the run where the gap is seen best."""
 
 from collections.abc import Sequence
 
@@ -73,7 +73,7 @@ def _place(signal: str) -> str:
 
 
 def changed(trace: Trace) -> bool:
-    """Whether the causes make another twin at all."""
+    """Return True if the causes make another twin at all."""
     return not np.array_equal(trace.before, trace.after, equal_nan=True)
 
 
@@ -103,7 +103,7 @@ def window_s(trace: Trace) -> tuple[float, float]:
 
 
 def _regimes_in(trace: Trace, first: NDArray[np.int64], last: NDArray[np.int64]) -> Floats:
-    """How many regimes make up at least a twentieth of each part."""
+    """Return how many regimes make up at least a twentieth of each part."""
     counts = np.zeros(len(first))
     for regime in range(len(trace.regimes)):
         seen = np.concatenate([[0], np.cumsum(trace.regime == regime)])

@@ -18,7 +18,7 @@ from twin.gap.diagnosis import Trace
 Floats = NDArray[np.float64]
 
 BYTES_MAX = 900_000
-"""Of all samples of a page together."""
+"""The bytes of all samples of a page together."""
 STEPS_MAX = 2000
 MISSING = 65535
 
@@ -44,7 +44,7 @@ def thinned(trace: Trace, rows_max: int) -> Trace:
 
 
 def rows_max(traces: int, series: int = 3) -> int:
-    """How many samples each of so many traces may have: 16 bit a sample, in base64, and the time of each if they are thinned."""
+    """Return the most samples for each of so many traces: 16 bit each, in base64, and the time of each if they are thinned."""
     return int(BYTES_MAX / max(traces, 1) / (series * 2 * 4 / 3))
 
 

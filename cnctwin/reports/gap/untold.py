@@ -1,4 +1,4 @@
-"""What cannot be told, what to run next, what else was found, and how it was judged."""
+"""The rest of a diagnosis: what cannot be told, what to run next, what else was found, and how it was judged."""
 
 from collections.abc import Iterable
 

@@ -30,7 +30,7 @@ def sign(verdict: Verdict) -> Markup:
 
 
 def headline(diagnosis: Diagnosis, title: str) -> Markup:
-    """What was looked at, the verdict in a word, and in one sentence."""
+    """Return what was looked at, the verdict in a word, and in one sentence."""
     return tag(
         "header",
         tag("p", tag("span", "Sim-to-real gap", class_="kind"), tag("span", title, class_="title"), class_="eyebrow"),

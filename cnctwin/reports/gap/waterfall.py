@@ -1,4 +1,4 @@
-"""How far: the gap step by step down to the floor, and by signal.
+"""The closure: the gap step by step down to the floor, and by signal.
 
 The length of a step is its share of the reducible gap, before² − floor², so that the steps add up; beside it stands the rms over
 the floor that is left, √(floor² + rest · (before² − floor²)).

@@ -1,4 +1,4 @@
-"""How figures are written: few digits, true minus signs, a dash for what there is none of.
+"""Figures in writing: few digits, true minus signs, a dash for what there is none of.
 
 >>> times(12.37), share(0.9962), figure(-0.000123), p_value(2e-4)
 ('12.4', '99.6 %', '−0.000123', '2 · 10⁻⁴')
@@ -13,7 +13,7 @@ _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def known(value: float | None) -> bool:
-    """Whether there is a number at all."""
+    """Return True if there is a number at all."""
     return value is not None and math.isfinite(value)
 
 

@@ -1,4 +1,4 @@
-"""Where the limits bind: what the time goes to by what keeps it from being less."""
+"""The limits that bind: what the time goes to by what keeps it from being less."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -84,7 +84,7 @@ def binding(answer: Optimised) -> Markup | None:
 
 
 def meaning_of(reason: str) -> str:
-    """What a reason says, or several of them.
+    """Return the meaning of a reason, or of several of them.
 
     >>> meaning_of("cutting force and axis dynamics")
     'more feed a tooth would exceed the force; the line is too short for the axes to reach its feed'

@@ -29,7 +29,7 @@ BLOCKS = 10
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """What a panel shows of each line. of: as its limit is called in `quantity`."""
+    """A panel's curve over the lines. of: as its limit is called in `quantity`."""
 
     of: str
     name: str
@@ -73,7 +73,7 @@ def course(answer: Optimised) -> Markup:
 
 
 def edges_of(lines: Sequence[LineAnswer]) -> tuple[Floats, bool]:
-    """Where each line begins and the last one ends, (n + 1,), in time before; False: where that is nothing, in lines."""
+    """Return the edges of the lines, (n + 1,), in time before; False: where that is nothing, in lines."""
     wide = np.array([line.before.seconds for line in lines])
     wide = np.where(np.isfinite(wide) & (wide > 0.0), wide, 0.0)
     if wide.sum() <= 0.0:

@@ -91,7 +91,7 @@ def _chart(answer: Optimised, points: Sequence[FrontPoint]) -> list[Markup]:
 
 
 def _near(points: Sequence[FrontPoint], seconds: float, cost: float) -> bool:
-    """Whether this program leaves the front room enough in the chart, in both directions."""
+    """Return True if this program leaves the front room enough in the chart, in both directions."""
     for own, other in (([p.seconds for p in points], seconds), ([p.cost for p in points], cost)):
         wide = max(own) - min(own)
         if max(*own, other) - min(*own, other) > FAR * wide > 0.0:

@@ -1,4 +1,4 @@
-"""What came out, in one sentence, and the figures that matter. The sign has a shape of its own, so that it needs no colour."""
+"""The result in one sentence, and the figures that matter. The sign has a shape of its own, so that it needs no colour."""
 
 from cnctwin.reports.gap.markup import Markup, joined, tag
 from cnctwin.reports.optimisation.quantity import change, column, length_of_time, limit_text, percent, probability, shortened, to
@@ -9,7 +9,7 @@ _WARNING = "M16 8.5v10M16 22.6v.4"
 
 
 def headline(answer: Optimised) -> Markup:
-    """What was optimised, whether every limit is kept, and the sentence."""
+    """Return what was optimised, whether every limit is kept, and the sentence."""
     kept = answer.after.over == 0 and not answer.collisions
     mean = answer.sensitivity is not None and answer.sensitivity.asked is None
     sure = f" by the mean twin, that of force with {probability(answer.sensitivity.kept)}" if mean and answer.sensitivity else ""

@@ -1,4 +1,4 @@
-"""What was left alone and why, what is to be known beside, and the limits as they were kept."""
+"""The lines that were left alone and why, what is to be known beside, and the limits as they were kept."""
 
 from collections.abc import Sequence
 

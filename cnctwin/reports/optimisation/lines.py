@@ -56,12 +56,12 @@ def limits_of(answer: Optimised) -> Limits:
 
 
 def above(line: LineAnswer, kept: Limits) -> list[str]:
-    """What of the line is above its limit, after."""
+    """Return which quantities of the line are above their limit, after."""
     return [name for name, value, limit in kept if value(line.after) > limit * (1.0 + ROUNDED)]
 
 
 def chosen(given: Sequence[LineAnswer], kept: Limits) -> list[LineAnswer]:
-    """What is shown, in the order of the program: first those above a limit, then those whose time changed most."""
+    """Return the lines that are shown, in the order of the program: those above a limit, then those whose time changed most."""
 
     def rank(index: int) -> tuple[bool, float, int]:
         line = given[index]

@@ -1,4 +1,4 @@
-"""How quantities of an optimisation are written, and the figures that its limits, which are words, hold.
+"""Quantities of an optimisation in writing, and the figures that its limits, which are words, hold.
 
 >>> quantity(29.481, "s"), change(29.48, 24.51), change(1.0, 1.0052), percent(0.00042)
 ('29.48 s', '−16.9 %', '+0.52 %', '0.042 %')
@@ -19,7 +19,7 @@ NAMED = {
     "feed": ("feed", r"mm/min"),
     "speed": ("spindle speed|spindle_rpm", r"(?:rev/min|rpm|/min)"),
 }
-"""What a limit is of → how its name is recognised, and its unit."""
+"""The quantity of a limit → how its name is recognised, and its unit."""
 
 
 def quantity(value: float | None, unit: str, digits: int = 4) -> str:

@@ -1,4 +1,4 @@
-"""How it was found: the course of the search, and what it would take to do it again."""
+"""The search: its course, and what it would take to do it again."""
 
 import numpy as np
 
@@ -63,7 +63,7 @@ def _chart(answer: Optimised) -> list[Markup]:
 
 
 def _same_digits(frame: Frame) -> int:
-    """How many leading digits the labels share, so that they can be told apart.
+    """Return how many leading digits the labels share, so that they can be told apart.
 
     >>> _same_digits(Frame(0, 1, 24.50, 24.60, 100))
     2

@@ -1,4 +1,4 @@
-"""What the twin's uncertainty makes of the limit of force: how surely it is kept, what that costs, and which constant matters."""
+"""The twin's uncertainty and the limit of force: how surely it is kept, what that costs, and which constant matters."""
 
 import math
 
@@ -44,7 +44,7 @@ def _facts(answer: Optimised, given: Sensitivity) -> Markup:
 
 
 def _verdict(given: Sensitivity, off: float) -> str:
-    """Whether what was asked for is kept, as far as so many draws tell."""
+    """Return True if what was asked for is kept, as far as so many draws tell."""
     if given.asked is None or not known(given.kept):
         return ""
     if given.kept >= given.asked:

@@ -67,7 +67,7 @@ def totals(answer: Optimised) -> Markup:
 
 
 def bounds(answer: Optimised) -> str:
-    """Of which total the bound is: "seconds", "cost", or "" where it is of neither (of a front).
+    """Return the total that the bound is of: "seconds", "cost", or "" where it is of neither (of a front).
 
     Of a front it is told by the figures: value · (1 + distance) is the total that the bound is of.
     """
@@ -118,7 +118,7 @@ def _limit(answer: Optimised, row: Compared, of: str) -> tuple[str, str]:
 
 
 def place(value: float, limit: float) -> str:
-    """Where a value is to its limit, in words.
+    """Return in words where a value is to its limit.
 
     >>> place(59.99, 60.0), place(30.0, 60.0), place(66.0, 60.0)
     ('at the limit', '50 % below', '▲ 10 % above')

@@ -1,4 +1,4 @@
-"""What can go wrong with a control's FOCAS server, to be switched on and off while it runs."""
+"""Faults of a control's FOCAS server, to be switched on and off while it runs."""
 
 import random
 from dataclasses import dataclass, field
@@ -8,14 +8,14 @@ from cnctwin.standins.focas_server.frames import HEADER_BYTES, FrameType
 
 
 class Refusal(Enum):
-    """How a client is turned away: the connection is closed at once, or the session is answered with "all in use"."""
+    """The ways a client is turned away: the connection is closed at once, or the session is answered with "all in use"."""
 
     CONNECTION = "connection"
     SESSION = "session"
 
 
 class Wrong(Enum):
-    """What is wrong with an answer. A wrong figure in a right frame is not among them: nobody could know."""
+    """The ways an answer can be wrong. A wrong figure in a right frame is not among them: nobody could know."""
 
     GARBAGE = "garbage"  # as many bytes, none of them right
     SYNC = "sync"  # the first bytes are not those of a frame

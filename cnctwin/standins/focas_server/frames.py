@@ -27,7 +27,7 @@ _ANSWERED = struct.Struct(">HHHHhhhH")
 
 
 class FrameType(IntEnum):
-    """What a frame is."""
+    """The types of frames."""
 
     OPEN = 0x0101
     OPENED = 0x0102
@@ -39,7 +39,7 @@ class FrameType(IntEnum):
 
 
 class Code(IntEnum):
-    """What a control answers instead of data; the names are the vendor's."""
+    """A control's answer instead of data; the names are the vendor's."""
 
     OK = 0
     BUSY = -1

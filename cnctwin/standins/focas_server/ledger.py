@@ -1,4 +1,4 @@
-"""What became of each block that was asked for: asked = answered + refused, at any time; and of the clients."""
+"""The account of each block that was asked for: asked = answered + refused, at any time; and of the clients."""
 
 import threading
 from collections import Counter
@@ -22,7 +22,7 @@ class ServerLedger:
 
     @property
     def balances(self) -> bool:
-        """Whether each block asked for was answered or refused."""
+        """True if each block asked for was answered or refused."""
         with self._lock:
             return self._counts["asked"] == self._counts["answered"] + self._counts["refused"]
 

@@ -6,7 +6,7 @@ import threading
 from types import TracebackType
 from typing import Self
 
-from cnctwin.errors import ProgramError
+from cnctwin.errors import ApplicationError
 from cnctwin.standins.focas_server.faults import Faults, Refusal
 from cnctwin.standins.focas_server.ledger import ServerLedger
 from cnctwin.standins.focas_server.session import Session
@@ -49,22 +49,22 @@ class FocasServer:
 
     @property
     def url(self) -> str:
-        """Where `cnctwin edge discover` finds it."""
+        """The address at which `cnctwin edge discover` finds it."""
         return f"focas://{LOOPBACK}:{self.port}"
 
     @property
     def is_listening(self) -> bool:
-        """Whether it has been started and not stopped."""
+        """True if it has been started and not stopped."""
         return self._listener is not None
 
     @property
     def clients(self) -> int:
-        """How many connections there are."""
+        """The number of connections."""
         with self._lock:
             return len(self._sessions)
 
     def moment(self) -> Moment:
-        """What the control shows now."""
+        """Return what the control shows now."""
         return Moment(self._control.now(), self._control.calendar_s(), self._description)
 
     def start(self) -> None:
@@ -72,7 +72,7 @@ class FocasServer:
         try:
             self._listener = socket.create_server((LOOPBACK, self.port), backlog=self._connections_max)
         except OSError as error:
-            raise ProgramError(
+            raise ApplicationError(
                 f"can't listen on {LOOPBACK} port {self.port}: {error.strerror}; give another port, or 0"
             ) from error
         self._listener.settimeout(ACCEPT_S)

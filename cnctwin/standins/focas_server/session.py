@@ -28,7 +28,7 @@ from cnctwin.standins.focas_server.shown import Moment
 IDLE_S_MAX = 300.0
 HANG_LOOK_S = 0.01
 COMMANDS = 2
-"""What a client says at the open that wants to send commands; 1 wants to transfer files, which this server has not got."""
+"""A client's word at the open that wants to send commands; 1 wants to transfer files, which this server has not got."""
 
 
 @dataclass
@@ -143,7 +143,7 @@ class Session:
 
 
 def _opened(moment: Moment) -> bytes:
-    """What a 0i-M answered to an open request (captured; 40 bytes, then 10 records of 32, one for each path), with our axes."""
+    """Return a 0i-M's answer to an open request (captured; 40 bytes, then 10 records of 32, one for each path), with our axes."""
     axes = len(moment.description.axis_names)
     head = bytes.fromhex("000600050001002000 08000a0003000300020002 00000001000100000001 00000000000000000000")
     path = moment.description.mt_type.encode("ascii") + b"".join(n.to_bytes(2, "big") for n in (1, 0, axes, axes, 0, 1, 1))

@@ -1,4 +1,4 @@
-"""What a FANUC control shows of a state: status words, modal codes, signals of the PMC. Pure functions.
+"""A FANUC control's view of a state: status words, modal codes, signals of the PMC. Pure functions.
 
 Modal codes are a fold over the states (`coded`), because a code stands until the next one of its kind: after a tool change M
 stays at 6 until the next M code, and T is the tool that was called for next, long before it is in the spindle. So neither says by
@@ -20,7 +20,7 @@ _WORD = re.compile(r"(?<![A-Z#\[])([MTSFG])(\d{1,6})")
 _GROUPS = ((0, 1, 2, 3), (17, 18, 19), (90, 91))  # G codes of the groups 0, 1, 2 as `cnc_rdgcode` numbers them
 _RAPID_OVERRIDE_CODES = ((100.0, 0), (50.0, 1), (25.0, 2))  # ROV2, ROV1; anything less is F0
 PMC_BYTES = {0: 768, 1: 768, 2: 128, 3: 128, 4: 125, 5: 8000, 6: 500, 7: 100, 8: 400, 9: 10_000}
-"""How many bytes there are of G, F, Y, X, A, R, T, K, C and D."""
+"""The number of bytes of G, F, Y, X, A, R, T, K, C and D."""
 CHANGE_RELAY = 100
 """The byte R whose bit 0 says that a tool change is in progress, as a machine builder's ladder would have it."""
 SPINDLE_TOOL = 100
@@ -134,7 +134,7 @@ def _as_keywords(codes: Codes) -> dict[str, Any]:
 
 
 def codes_of(state: ControlState) -> Codes:
-    """What stands at this state; of one that no fold has seen, what its block says."""
+    """Return the codes that stand at this state; of one that no fold has seen, what its block says."""
     return state if isinstance(state, CodedState) else _after(Codes(), state.block)
 
 

@@ -1,4 +1,4 @@
-"""What the simulated control answers to one telegram. No I/O.
+"""The simulated control's answer to one telegram. No I/O.
 
 The telegrams are those that the package pyLSV2 and its `docs/protocol.rst` know. Two generations are shown: the iTNC 530 tells
 the tool in the spindle and its error messages (R_RI 51, 27, 28), the TNC 640 does not. Nothing can be written: each telegram that
@@ -21,7 +21,7 @@ BLOCK_BYTES = {3: 1024, 4: 512, 5: 2048, 6: 3072, 7: 4096}
 
 
 class Model(StrEnum):
-    """Which control is shown."""
+    """The control that is shown."""
 
     ITNC530 = "iTNC530"
     TNC640 = "TNC640"

@@ -3,7 +3,7 @@
 from pathlib import Path
 from threading import Event
 
-from cnctwin.errors import ProgramError, UsageError
+from cnctwin.errors import ApplicationError, UsageError
 from cnctwin.standins.lsv2_server.answers import Model
 from cnctwin.standins.lsv2_server.server import Lsv2Server
 from cnctwin.standins.mtconnect_agent.serve import STATE_S, keep
@@ -38,7 +38,7 @@ def simulate_lsv2(
     try:
         server.start()
     except OSError as error:
-        raise ProgramError(f"port {port} cannot be used: {error.strerror}; give another with --port") from error
+        raise ApplicationError(f"port {port} cannot be used: {error.strerror}; give another with --port") from error
     try:
         print(f"{server.url} is a {server.answers.model}, which runs O1701.H; Ctrl-C ends it", flush=True)
         while not stop.wait(STATE_S):

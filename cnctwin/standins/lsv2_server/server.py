@@ -21,7 +21,7 @@ _GARBAGE_SEED = 19000
 
 
 class Fault(StrEnum):
-    """What goes wrong, with each telegram while it is switched on."""
+    """A fault with each telegram while it is switched on."""
 
     NONE = "none"
     HANG = "hang"  # it does not answer
@@ -148,7 +148,7 @@ class Lsv2Server:
                 self._clients.pop(client, None)
 
     def _answer(self, client: socket.socket, session: Session, telegram: Telegram, stopped: threading.Event) -> bool:
-        """Whether the connection stays open."""
+        """Answer; return True if the connection stays open."""
         fault = self.fault
         if fault is Fault.HANG:
             self._pause(self.fault_s)

@@ -90,7 +90,7 @@ class Agent:
             self.changed.notify_all()
 
     def has_ended(self, instance_id: int) -> bool:
-        """Whether a stream that began in this instance must end: the agent stopped, or started anew."""
+        """Return True if a stream that began in this instance must end: the agent stopped, or started anew."""
         return self.is_closed or self.instance_id != instance_id
 
     @property

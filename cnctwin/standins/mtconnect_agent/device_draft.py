@@ -16,7 +16,7 @@ KEYS_MAX = 5_000
 
 
 class Known(NamedTuple):
-    """What a key of this name is."""
+    """The meaning of a key of this name."""
 
     pattern: re.Pattern[str]
     category: str

@@ -18,7 +18,7 @@ class Style(StrEnum):
 
 @dataclass(frozen=True)
 class Dialect:
-    """How one generation speaks. `schema` is the version in the namespace, such as (2, 3)."""
+    """The dialect of one generation. `schema` is the version in the namespace, such as (2, 3)."""
 
     style: Style
     schema: tuple[int, int]

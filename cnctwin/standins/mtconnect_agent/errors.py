@@ -1,4 +1,4 @@
-"""What can go wrong with a replay.
+"""The errors of a replay.
 
 ReplayError
  ├─ RecordingError     the recording can't be opened or no device of the model fits it

@@ -1,4 +1,4 @@
-"""What became of each entry of the recording: accepted + dropped by reason = entries, at any time."""
+"""The account of each entry of the recording: accepted + dropped by reason = entries, at any time."""
 
 from collections import Counter
 from dataclasses import dataclass, field

@@ -5,7 +5,7 @@ from pathlib import Path
 from threading import Event
 from typing import Any
 
-from cnctwin.errors import ProgramError, UsageError
+from cnctwin.errors import ApplicationError, UsageError
 from cnctwin.standins.mtconnect_agent.errors import ReplayError
 from cnctwin.standins.mtconnect_agent.replay_agent import ReplayAgent
 
@@ -38,7 +38,7 @@ def replay(
         )
         agent.start()
     except (OSError, ValueError, ReplayError) as error:
-        raise ProgramError(f"{recording}: cannot be replayed: {error}") from error
+        raise ApplicationError(f"{recording}: cannot be replayed: {error}") from error
     try:
         print(f"{agent.url} serves {recording.name} as {agent.device_name}; Ctrl-C ends it", flush=True)
         while not stop.wait(STATE_S if state_file is not None else None):

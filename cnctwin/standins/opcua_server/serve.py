@@ -6,7 +6,7 @@ import logging
 from pathlib import Path
 from threading import Event
 
-from cnctwin.errors import ProgramError
+from cnctwin.errors import ApplicationError
 from cnctwin.standins.simulated_control.control import SimulatedControl
 from cnctwin.standins.simulated_control.state import production
 from edge.state_dir import state_dir
@@ -27,7 +27,7 @@ def simulate_opcua(
 ) -> None:
     """Serve until stopped; says where, and what to pin. `is_open`: also without security, for those who ask for that."""
     if importlib.util.find_spec("asyncua") is None:
-        raise ProgramError("an OPC UA server needs the library asyncua; install it with: pip install 'cnctwin[opcua]'")
+        raise ApplicationError("an OPC UA server needs the library asyncua; install it with: pip install 'cnctwin[opcua]'")
     from cnctwin.standins.opcua_server.server import OpcUaServer  # noqa: PLC0415  asyncua is an extra
 
     logging.getLogger("asyncua.server.server").setLevel(logging.CRITICAL)  # why it can't start is told below, without a traceback
@@ -41,5 +41,5 @@ def simulate_opcua(
                 fresh.write_text(json.dumps({"url": server.url, "fingerprint": server.fingerprint, "writes": server.writes}))
                 fresh.replace(state_file)
         if server.error is not None:
-            raise ProgramError(f"the OPC UA server broke down: {server.error}") from server.error
+            raise ApplicationError(f"the OPC UA server broke down: {server.error}") from server.error
     print(f"written to by clients {server.writes} times, methods called {server.calls} times", flush=True)

@@ -25,7 +25,7 @@ from asyncua.ua.attribute_ids import AttributeIds
 from asyncua.ua.object_ids import ObjectIds
 from asyncua.ua.status_codes import StatusCodes
 
-from cnctwin.errors import ProgramError
+from cnctwin.errors import ApplicationError
 from cnctwin.standins.opcua_server.address_space import build, variant
 from cnctwin.standins.opcua_server.shown import MODELS, Shown, Value, shown
 from cnctwin.standins.simulated_control.control import SimulatedControl
@@ -35,7 +35,6 @@ T = TypeVar("T")
 LOOK_S = 0.02
 START_S_MAX = 60.0
 CONNECTIONS_MAX = 20
-_CURRENT_TIME = ua.NodeId(ua.Int32(ObjectIds.Server_ServerStatus_CurrentTime))
 _SECURE = [
     ua.SecurityPolicyType.Basic256Sha256_SignAndEncrypt,
     ua.SecurityPolicyType.Aes256Sha256RsaPss_SignAndEncrypt,
@@ -43,7 +42,7 @@ _SECURE = [
 
 
 class _Users:
-    """Who may come in: those with a password or a certificate; whoever comes without a name, where that is allowed."""
+    """The users who may come in: those with a password or a certificate; whoever comes without a name, where that is allowed."""
 
     def __init__(self, passwords: Mapping[str, str], certificates: Collection[bytes], anonymous: bool) -> None:
         self._passwords, self._certificates, self._anonymous = dict(passwords), set(certificates), anonymous
@@ -116,7 +115,7 @@ class OpcUaServer:
         self.stop()
 
     def start(self) -> None:
-        """Serve; ProgramError where it cannot."""
+        """Serve; ApplicationError where it cannot."""
         self._ready.clear()
         self._stop.clear()
         self.error = None
@@ -124,7 +123,7 @@ class OpcUaServer:
         self._thread.start()
         if not self._ready.wait(START_S_MAX) or self.error is not None:
             why = self.error or "it took too long"
-            raise ProgramError(f"port {self.port}: no OPC UA server can be started: {why}; give another with --port")
+            raise ApplicationError(f"port {self.port}: no OPC UA server can be started: {why}; give another with --port")
 
     def stop(self) -> None:
         """End it; the control goes on."""

@@ -1,4 +1,4 @@
-"""What the server shows of a control, model by model: where it hangs in the address space, its type, and its value.
+"""The server's view of a control, model by model: where it hangs in the address space, its type, and its value.
 
 The types of the companion models are built here with their namespaces and browse names, only those that are needed, no nodeset.
 SINUMERIK names are those of `edge/controls/opcua/maps/sinumerik.toml`, so what is said there of their certainty holds here too.

@@ -55,7 +55,7 @@ def _radius_mm(p: CutPhysics, tooth: int) -> float:
 
 @njit(cache=True)
 def _chip_mm(p: CutPhysics, tooth: int, advance_sine: float) -> float:
-    """What a tooth takes beyond the teeth before it, each of which passed an advance earlier."""
+    """Return the chip that a tooth takes beyond the teeth before it, each of which passed an advance earlier."""
     if p.runout_mm == 0.0 and p.chipped_mm == 0.0:
         return max(advance_sine, 0.0)
     own = _radius_mm(p, tooth)

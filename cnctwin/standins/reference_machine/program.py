@@ -76,7 +76,7 @@ UP = (0.0, pi / 2.0)
 
 
 FORCE_N = 260.0
-"""Of the roughest chip that a program takes, about: below what moves an axis that rests."""
+"""The force of the roughest chip that a program takes, about: below what moves an axis that rests."""
 ROUGHEST_MM = 0.15
 
 

@@ -137,7 +137,7 @@ def _disturbance(physics: Physics, count: int, chance: np.random.Generator) -> F
 
 
 def _from_outside(physics: Physics, motion: Motion, letter: str) -> Floats:
-    """What a pump and another axis do to this one, (count · STEPS,), N."""
+    """Return the force of a pump and another axis on this one, (count · STEPS,), N."""
     count = len(motion.path.block)
     force = np.zeros(count * axis.STEPS)
     if letter in physics.pump:

@@ -1,4 +1,4 @@
-"""How large an effect is: rms of what it changes in a signal, over what two healthy runs of a program differ by (over √2)."""
+"""The size of an effect: rms of what it changes in a signal, over what two healthy runs of a program differ by (over √2)."""
 
 from collections.abc import Callable, Mapping, Sequence
 from math import exp, log
@@ -13,7 +13,7 @@ RIGHT = 0.03
 
 
 def signals(columns: Columns) -> tuple[str, ...]:
-    """What sensors read: the columns in single precision."""
+    """Return the readings of the sensors: the columns in single precision."""
     return tuple(name for name, values in columns.items() if values.dtype == np.float32)
 
 

@@ -1,4 +1,4 @@
-"""What the reference machine states about itself, and what it truly is: the same figures, the physical ones a few percent off.
+"""The reference machine's own statement, and what it truly is: the same figures, the physical ones a few percent off.
 
 A stated machine is drawn anew for each question, so that no figure of one can be learned.
 """
@@ -93,7 +93,7 @@ EXACT = {
     *("screw_lead_mm", "position_gain_per_s", "velocity_gain_a_s_per_mm", "velocity_integral_gain_a_per_mm", "torque_limit_a"),
     *("diameter_mm", "teeth", "rated_power_kw"),
 }
-"""What a machine knows of itself: gains, leads, counts, what is written on a plate."""
+"""The figures that a machine knows of itself: gains, leads, counts, what is written on a plate."""
 
 
 def drawn_machine(chance: np.random.Generator) -> MachineFigures:
@@ -174,7 +174,7 @@ FRICTION = ("coulomb_n", "static_n", "stribeck_velocity_mm_s", "viscous_n_s_per_
 
 
 def machine_toml(machine: MachineFigures, name: str = "reference") -> str:
-    """What the twin is told: formats, section 4."""
+    """Return the machine.toml that the twin is given: formats, section 4."""
     axes = {}
     for letter, axis in machine.axes.items():
         figures = asdict(axis)

@@ -1,4 +1,4 @@
-"""Where the control wants the axes: blocks of a program turned into positions, eight to a millisecond.
+"""The course that the control wants of the axes: blocks of a program turned into positions, eight to a millisecond.
 
 The speed of a block is a trapezium, smoothed by its mean over a stretch of time, which bounds the jerk. With the displacement
 s(t) of the trapezium and S its integral, the smoothed one is (S(t) − S(t − w)) / w: both are sums of powers of the times since

@@ -1,1 +1,1 @@
-"""What a simulated control shows over a working day; the servers of FOCAS, OPC UA and LSV2 ask it."""
+"""A simulated control over a working day; the servers of FOCAS, OPC UA and LSV2 ask it."""

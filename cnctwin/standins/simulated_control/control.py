@@ -32,7 +32,7 @@ class SimulatedControl:
         self._coming = next(self._shown, None)
 
     def now(self) -> ControlState:
-        """What it shows. After the last state of the day it stays at that."""
+        """Return what it shows. After the last state of the day it stays at that."""
         with self._lock:
             now_s = self._machine_s()
             while self._coming is not None and self._coming.at_s <= now_s:
@@ -41,7 +41,7 @@ class SimulatedControl:
 
     @property
     def is_over(self) -> bool:
-        """Whether the last state of the day has been shown."""
+        """True if the last state of the day has been shown."""
         return self._coming is None
 
     def calendar_s(self) -> float:

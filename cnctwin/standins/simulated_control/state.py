@@ -1,4 +1,4 @@
-"""What a control shows at one time, in typed values: the working day of the simulated machine without its SHDR clothes."""
+"""A control's state at one time, in typed values: the working day of the simulated machine without its SHDR clothes."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace

@@ -17,10 +17,10 @@ from cnctwin.standins.simulated_machine.part import Part, spare_part
 from cnctwin.standins.simulated_machine.working_day import Begin, Pending, working_day
 
 PATIENCE_S = 10.0
-"""Of our time, for the first part; the imports and kernels that are compiled already take a few seconds."""
+"""Seconds of our time for the first part; the imports and kernels that are compiled already take a few seconds."""
 WAITING_SAID_S = 5.0
 COMPUTING_S_MAX = 1.5
-"""What a stop waits for a part that is being computed; one whose kernels are being compiled takes longer."""
+"""Seconds that a stop waits for a part that is being computed; one whose kernels are being compiled takes longer."""
 COMPILING = "the simulation is being compiled, once on a computer, for about a minute; this part was computed before"
 WAITING = "the machine waits for its next part, which is still being computed"
 
@@ -37,7 +37,7 @@ class Computation:
 
     @property
     def ready(self) -> bool:
-        """Whether it is done, or has failed."""
+        """True if it is done, or has failed."""
         return not self._thread.is_alive()
 
     def result(self) -> Part:
@@ -128,7 +128,7 @@ class SimulatedMachine:
 
     @property
     def notice(self) -> str:
-        """What somebody who looks should be told: why the machine stands still, or shows a part that was computed before."""
+        """The notice for somebody who looks: why the machine stands still, or shows a part that was computed before."""
         if self._shows_spare:
             return COMPILING
         since_s = self._waiting_since_s

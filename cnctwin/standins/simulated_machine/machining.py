@@ -37,7 +37,7 @@ def machined(number: int, start_temperature_c: float, ambient_temp_c: float) -> 
 
 
 def moments_of_run(run: RunLog, blocks: list[str], torque_limits_a: Mapping[str, float]) -> Iterator[Moment]:
-    """What the control shows of a run every 0.1 s and at its end; `blocks`: lines of the program, `torque_limits_a`: by axis."""
+    """Yield the control's states of a run every 0.1 s and at its end; `blocks`: program lines, `torque_limits_a`: by axis."""
     step = round(SHOWN_S / float(run.t_s[1] - run.t_s[0]))
     seldom = round(TEMPERATURE_SHOWN_S / SHOWN_S)
     ticks = np.unique([*range(0, len(run), step), len(run) - 1])

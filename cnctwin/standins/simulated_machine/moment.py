@@ -8,7 +8,7 @@ from cnctwin.standins.mtconnect_agent.stamp import stamp_text
 
 
 class Moment(NamedTuple):
-    """What the control shows at one time.
+    """The control's state at one time.
 
     at_s: time of the machine since it was switched on; values: text by key; waits: it stands still for a part not computed yet
     """

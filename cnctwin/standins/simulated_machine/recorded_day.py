@@ -26,7 +26,7 @@ class OnDemand(NamedTuple):
 
 
 def recorded_day(parts: int, spare: Callable[[], Part]) -> Iterator[str]:
-    """What the control shows until so many parts are made, from a morning of March 2026 on."""
+    """Yield what the control shows until so many parts are made, from a morning of March 2026 on."""
     adapter, readies = Adapter(START.timestamp()), 0
     for moment in working_day(OnDemand, spare, 0.0):
         if (line := adapter.line(moment)) is not None:

@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 from threading import Event
 
-from cnctwin.errors import ProgramError
+from cnctwin.errors import ApplicationError
 from cnctwin.standins.mtconnect_agent.errors import ReplayError
 from cnctwin.standins.mtconnect_agent.serve import STATE_S, keep
 from cnctwin.standins.simulated_machine.agent import SimulatedMachine
@@ -17,7 +17,7 @@ def simulate_machine(stop: Event, *, speed: float = 1.0, port: int = 0, state_fi
     try:
         machine = SimulatedMachine(speed=speed, port=port)
     except ReplayError as error:
-        raise ProgramError(str(error)) from error
+        raise ApplicationError(str(error)) from error
     machine.start()
     try:
         print(f"{machine.url} serves {machine.device_name}, which runs {PROGRAM.name}; Ctrl-C ends it", flush=True)
@@ -31,7 +31,7 @@ def simulate_machine(stop: Event, *, speed: float = 1.0, port: int = 0, state_fi
     finally:
         is_idle = machine.stop()
     if machine.error is not None:
-        raise ProgramError(f"the simulated machine broke down: {machine.error}") from machine.error
+        raise ApplicationError(f"the simulated machine broke down: {machine.error}") from machine.error
     print(", ".join(f"{name} {count}" for name, count in machine.ledger.as_dict().items()), flush=True)
     if not is_idle:  # A kernel that is being compiled would be torn down under its thread.
         sys.stdout.flush()

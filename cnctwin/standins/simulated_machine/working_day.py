@@ -18,7 +18,7 @@ from twin.thermal import ThermalNetwork, rise_after
 
 START_TEMPERATURE_C = 23.0
 SPARE_START_C = 23.0
-"""What the spare part was begun with, to the tenth that it shows."""
+"""The temperature that the spare part was begun with, to the tenth that it shows."""
 CLOSED_S, COMPLETED_S, IDLE_SHOWN_S = 2.0, 1.0, 1.0
 CHANGE_S = (7.0, 12.0)
 """From READY to the closed door: an operator, or a robot."""
@@ -31,7 +31,7 @@ class Pending(Protocol):
 
     @property
     def ready(self) -> bool:
-        """Whether it is there."""
+        """True if it is there."""
 
     def result(self) -> Part:
         """It; waits for it, and raises what it raised."""
@@ -42,7 +42,7 @@ Begin = Callable[[int, float, float], Pending]
 
 
 def working_day(begin: Begin, spare: Callable[[], Part], patience_s: float) -> Iterator[Moment]:
-    """What the control shows, from the moment that it is switched on.
+    """Yield what the control shows, from the moment that it is switched on.
 
     spare: gives the part to show where the first one is not computed `patience_s` after the machine is ready for it
     """
@@ -74,7 +74,7 @@ def working_day(begin: Begin, spare: Callable[[], Part], patience_s: float) -> I
 
 
 def switched_on() -> dict[str, str]:
-    """What the control shows before the first part. The last tool of the part is in the spindle, the drives are off."""
+    """Return what the control shows before the first part. The last tool of the part is in the spindle, the drives are off."""
     modes = {"avail": "AVAILABLE", "mode": "AUTOMATIC", "execution": "READY", "program": "O1701", "part_count": "0"}
     overrides = {"Fovr": "100", "Frapidovr": "100", "Sovr": "100"}
     rest = {"Tool_number": "5", "door_state": "OPEN", "coolant": "OFF"}
@@ -89,7 +89,7 @@ def _rewound() -> dict[str, str]:
 
 
 def _pause_s(number: int) -> float:
-    """How long the change of the workpiece before part `number` takes, each time a little different. The first is in the vice."""
+    """Return how long the workpiece change before part `number` takes, a little different each time. The first is in the vice."""
     if number == 1:
         return CLOSED_S
     return round(Random(number).uniform(*CHANGE_S), 1) + CLOSED_S  # noqa: S311 — no secret

@@ -36,8 +36,8 @@ MAD_TO_SD = 1.4826
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Asked:
-    """What is to be trained. Durations in s; the settings of the processor are to be the same on the day."""
+class TrainingSettings:
+    """The settings of a training. Durations in s; the settings of the processor are to be the same on the day."""
 
     features: tuple[str, ...]
     detector: Detector = field(default_factory=Detector)
@@ -55,7 +55,7 @@ class Asked:
 
     @property
     def ticks(self) -> Ticks:
-        """How recordings become rows."""
+        """The way recordings become rows."""
         return Ticks(
             features=self.features,
             tick_ms=round(self.tick_s * 1000),
@@ -66,7 +66,7 @@ class Asked:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Of the processor joint_anomaly."""
+        """The settings of the processor joint_anomaly."""
         names = ("tick_s", "dwell_ticks", "clear_fraction", "common_mode", "common_mode_factor", "exclude_gated_peers")
         return {name: getattr(self, name) for name in (*names, "tail_s", "look_back_s")}
 
@@ -87,7 +87,9 @@ class Calibrated:
     alerts: int
 
 
-def calibrated_cell(cell: RecordedCell, asked: Asked, say: Callable[[str], None] = lambda _: None) -> tuple[Calibrated, ...]:
+def calibrated_cell(
+    cell: RecordedCell, asked: TrainingSettings, say: Callable[[str], None] = lambda _: None
+) -> tuple[Calibrated, ...]:
     """All machines of the cell. Raises UsageError or ModelError where there is too little to train or calibrate on."""
     training, calibrating = split(cell, asked.train_share)
     say("learning what is usual")
@@ -113,8 +115,8 @@ def calibrated_cell(cell: RecordedCell, asked: Asked, say: Callable[[str], None]
     return tuple(found)
 
 
-def _preparations(machines: Sequence[str], training: Sequence[Stretch], asked: Asked) -> dict[str, Preparation]:
-    """What is usual in each operation of each machine, where features are judged and not scores."""
+def _preparations(machines: Sequence[str], training: Sequence[Stretch], asked: TrainingSettings) -> dict[str, Preparation]:
+    """Return what is usual in each operation of each machine, where features are judged and not scores."""
     if asked.common_mode != "features":
         return {}
     found = {}
@@ -130,7 +132,7 @@ def _preparations(machines: Sequence[str], training: Sequence[Stretch], asked: A
         raise UsageError(f"{', '.join(machines)}: {error}") from None
 
 
-def rows_to_score(machine: str, stretches: Sequence[Stretch], preparation: Preparation | None, asked: Asked) -> Floats:
+def rows_to_score(machine: str, stretches: Sequence[Stretch], preparation: Preparation | None, asked: TrainingSettings) -> Floats:
     """The rows of a machine that are wholly known and not gated, as the model takes them."""
     rows = [np.empty((0, len(asked.features)))]
     for stretch in stretches:
@@ -142,7 +144,7 @@ def rows_to_score(machine: str, stretches: Sequence[Stretch], preparation: Prepa
 
 
 def _trained(
-    machine: str, cell: RecordedCell, training: Sequence[Stretch], preparation: Preparation | None, asked: Asked
+    machine: str, cell: RecordedCell, training: Sequence[Stretch], preparation: Preparation | None, asked: TrainingSettings
 ) -> tuple[AnomalyModel, float]:
     runs = [stretch[machine] for stretch in training if machine in stretch]
     rows = rows_to_score(machine, training, preparation, asked)
@@ -155,7 +157,7 @@ def _trained(
     return replace(model, preparation=preparation), len(rows) * asked.tick_s / HOUR_S
 
 
-def _provisional(machine: str, raw: Floats, asked: Asked) -> Calibration:
+def _provisional(machine: str, raw: Floats, asked: TrainingSettings) -> Calibration:
     """Centre and spread of the raw score, from which z comes; the threshold is to be fitted yet."""
     if len(raw) < HOUR_TICKS_MIN:
         raise UsageError(
@@ -172,7 +174,7 @@ def _provisional(machine: str, raw: Floats, asked: Asked) -> Calibration:
     return Calibration(**asked.settings, **unfitted, alerts_per_week=asked.alerts_per_week, raw_center=center, raw_spread=spread)
 
 
-def _calibration(machine: str, model: AnomalyModel, tracks: list[Track], asked: Asked) -> Calibration:
+def _calibration(machine: str, model: AnomalyModel, tracks: list[Track], asked: TrainingSettings) -> Calibration:
     before = model.calibration
     assert before is not None
     pieces = [(track.adjusted[piece], track.skipped[piece]) for track in tracks for piece in segments(track, asked.tick_s)]

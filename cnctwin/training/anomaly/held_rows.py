@@ -1,4 +1,4 @@
-"""What a machine's signals were at each tick: as last reported before it, as the stream's clock has it
+"""A machine's signals at each tick: as last reported before it, as the stream's clock has it
 (processors/running/lane.py).
 
 A tick is at each multiple of tick_s, after the first message, up to the last; a silence longer than gap_s_max has the ticks of

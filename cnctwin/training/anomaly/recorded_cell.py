@@ -26,7 +26,7 @@ class RecordedCell:
 
     @property
     def hours(self) -> float:
-        """Of all stretches, from the first to the last sample of any machine."""
+        """The hours of all stretches, from the first to the last sample of any machine."""
         return sum(span_s(stretch)[1] - span_s(stretch)[0] for stretch in self.stretches) / 3600.0
 
 

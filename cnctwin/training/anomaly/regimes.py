@@ -1,4 +1,4 @@
-"""Which operation a machine was in at each tick, by the signals that name it, and its features beside what is usual in that."""
+"""The operation of a machine at each tick, by the signals that name it, and its features beside what is usual in that."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ticks:
-    """How a recording becomes ticks, and which of them are gated. All in s, but tick and gap."""
+    """The way a recording becomes ticks, and which of them are gated. All in s, but tick and gap."""
 
     features: tuple[str, ...]
     tick_ms: int
@@ -114,7 +114,7 @@ def tailed_preparations(
 
 
 def left_in(preparations: Mapping[str, Preparation], held: Mapping[str, Held], ticks: Ticks) -> dict[str, Floats]:
-    """What is left of each machine's features beside the others', at its judged ticks (T, F)."""
+    """Return what is left of each machine's features beside the others', at its judged ticks (T, F)."""
     first = min(int(one.at_ms[0]) for one in held.values() if len(one.at_ms))
     last = max(int(one.at_ms[-1]) for one in held.values() if len(one.at_ms))
     count, width = (last - first) // ticks.tick_ms + 1, len(ticks.features)

@@ -54,8 +54,8 @@ class _Times(NamedTuple):
 
 
 @dataclass(slots=True)
-class _Told:
-    """What came out of the fold for one machine; rows of (time, adjusted, gated)."""
+class _MachineScores:
+    """The fold's output for one machine; rows of (time, adjusted, gated)."""
 
     raw: dict[int, float] = field(default_factory=dict)
     judged: list[list[Any]] = field(default_factory=list)
@@ -64,7 +64,7 @@ class _Told:
 
 def replayed(stretch: Stretch, models: Mapping[str, AnomalyModel], settings: Mapping[str, Any]) -> dict[str, Track]:
     """The scores of each machine. `settings` are the processor's. Raises UsageError where a sample cannot be folded."""
-    told = {name: _Told() for name in stretch}
+    told = {name: _MachineScores() for name in stretch}
     configuration = Configuration(Config, dict(settings), name=PROCESSOR.name)
     configuration.default.__dict__["loaded"] = dict(models)
 
@@ -90,7 +90,7 @@ def replayed(stretch: Stretch, models: Mapping[str, AnomalyModel], settings: Map
     return tracks
 
 
-def _note(told: _Told, output: Output, at_s: float) -> None:
+def _note(told: _MachineScores, output: Output, at_s: float) -> None:
     if output.name == RAW:
         told.raw[round(at_s * 1000)] = np.nan if output.value is None else float(output.value)  # type: ignore[arg-type]
     elif output.name == ADJUSTED:
@@ -101,7 +101,7 @@ def _note(told: _Told, output: Output, at_s: float) -> None:
         told.judged[-1][2] = told.is_gated
 
 
-def _track(told: _Told, at_ms: NDArray[np.int64], start_ms: int, stands: NDArray[np.bool_]) -> Track:
+def _track(told: _MachineScores, at_ms: NDArray[np.int64], start_ms: int, stands: NDArray[np.bool_]) -> Track:
     gated = np.array([row[2] for row in told.judged], dtype=np.bool_)
     raw = np.array([told.raw.get(at + start_ms, np.nan) for at in at_ms.tolist()], dtype=np.float64)
     return Track(at_ms / 1000.0, raw, np.array([row[1] for row in told.judged], dtype=np.float64), gated, gated | stands)

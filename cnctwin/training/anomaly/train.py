@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from cnctwin.commands.twin import working
 from cnctwin.errors import UsageError
-from cnctwin.training.anomaly.calibrated_cell import Asked, Calibrated, calibrated_cell
+from cnctwin.terminal.spinner import working
+from cnctwin.training.anomaly.calibrated_cell import Calibrated, TrainingSettings, calibrated_cell
 from cnctwin.training.anomaly.frozen_week import segments
 from cnctwin.training.anomaly.recorded_cell import recorded_cell, shared_features
 from cnctwin.training.anomaly.replayed_cell import replayed
@@ -29,10 +29,10 @@ from twin.forest.artefact import MANIFEST
 
 FEATURES = ("spindle_load_pct", "spindle_rpm", "feed_mm_min", "spindle_temp_c", "vibration_rms_g")
 """The published ones, of which those are taken that all files have."""
-__all__ = ["Asked", "Detector", "Method", "check_models", "promote_model", "train_anomaly"]
+__all__ = ["Detector", "Method", "TrainingSettings", "check_models", "promote_model", "train_anomaly"]
 
 
-def train_anomaly(arguments: Sequence[str], asked: Asked, out: Path, *, as_json: bool, console: Console) -> None:
+def train_anomaly(arguments: Sequence[str], asked: TrainingSettings, out: Path, *, as_json: bool, console: Console) -> None:
     """Train and calibrate the machines of a cell. A model that fails on the golden week of the one before is not promoted."""
     if not asked.features:
         asked = replace(asked, features=shared_features(arguments, FEATURES))
@@ -52,8 +52,8 @@ def train_anomaly(arguments: Sequence[str], asked: Asked, out: Path, *, as_json:
     console.print(f"\n{configuration(asked, out)}", markup=False, highlight=False, soft_wrap=True)
 
 
-def configuration(asked: Asked, out: Path) -> str:
-    """What belongs into the processor's configuration: a threshold holds for the settings that it was fitted with."""
+def configuration(asked: TrainingSettings, out: Path) -> str:
+    """Return what belongs in the processor's configuration: a threshold holds for the settings that it was fitted with."""
     lines = [f"{name} = {json.dumps(value)}" for name, value in {"models": str(out), **asked.settings}.items()]
     return "\n".join(["[joint_anomaly]", *lines])
 
@@ -147,7 +147,7 @@ def _sentences(line: dict[str, Any]) -> list[str]:
 
 
 def _models(folder: Path) -> dict[str, tuple[Path, AnomalyModel]]:
-    """Of a folder with models, of one machine's, or of one version."""
+    """Return the models of a folder with models, of one machine's, or of one version."""
     if (folder / MANIFEST).exists() or (folder / CURRENT).exists():
         model = load_model(folder)
         return {model.trained.machine or folder.name: (folder, model)}

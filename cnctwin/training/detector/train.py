@@ -83,7 +83,7 @@ def summary_of(done: Trained) -> dict[str, Any]:
 
 
 def sentences_of(done: Trained, asked: Asked) -> list[str]:
-    """What a person should know before it is used."""
+    """Return what a person should know before it is used."""
     detector, rate = done.detector, done.rate
     said = [
         f"learned from {len(done.captured)} of {done.changes} changes: {detector.template.seconds:.1f} s long, stretched by "

@@ -1,4 +1,4 @@
-"""What a residual is learned from: run logs of a machine, or a stretch of the store, a second apart."""
+"""The data that a residual is learned from: run logs of a machine, or a stretch of the store, a second apart."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -17,7 +17,7 @@ TICK_S = 1.0
 APART_S = 3600.0
 """Between two run logs, of which nobody says how far they are apart."""
 ASKED_MS = 6 * 3_600_000
-"""Of the store at a time."""
+"""The stretch of the store that is read at a time."""
 Say = Callable[[str], None]
 
 

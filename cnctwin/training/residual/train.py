@@ -11,10 +11,10 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table as Printed
 
-from cnctwin.commands.twin import working
 from cnctwin.errors import UsageError
 from cnctwin.memory.store.opening import default_place, open_store
 from cnctwin.models.registry import add, shelf
+from cnctwin.terminal.spinner import working
 from cnctwin.training.residual.recording import from_files, from_store
 from processors.config import Configuration, read_tables
 from processors.errors import ConfigurationError
@@ -28,13 +28,13 @@ from twin.residual.training import Asked, Outcome, trained
 
 __all__ = ["Asked", "Wanted", "train_residual"]
 HOURS_MIN = 40.0
-"""Of cutting, as the published recipe asks for."""
+"""Hours of cutting, as the published recipe asks for."""
 HELD_SHARE_MIN, HELD_SHARE_MAX = 0.1, 0.6
 
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """Whose residual, from what: run logs, or a store with a stretch of it (ms since 1970; None = all)."""
+    """The residual that is wanted: of which machine, from run logs, or a stretch of a store (ms since 1970; None = all)."""
 
     machine: str
     files: tuple[Path, ...] = ()

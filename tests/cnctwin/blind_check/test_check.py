@@ -8,9 +8,18 @@ import pytest
 
 from cnctwin.blind_check import check as check_module
 from cnctwin.blind_check.answer import answers_from_json, answers_json
-from cnctwin.blind_check.case_folder import FIT, answer_of, machine_of, recorded, write_case, write_unseen
+from cnctwin.blind_check.case_folder import (
+    FIT,
+    UNSEEN,
+    answer_of,
+    machine_of,
+    physics_with,
+    recorded,
+    write_case,
+    write_folder,
+)
 from cnctwin.blind_check.check import diagnosed, run_check
-from cnctwin.blind_check.question import SHARES, SIZES, Asked, Question, Sort, draw, names
+from cnctwin.blind_check.question import SHARES, SIZES, DrawnEffect, Question, Sort, draw, names
 from cnctwin.blind_check.sealed import SealError, opened, seal
 from cnctwin.blind_check.table import table
 from cnctwin.blind_check.write import main
@@ -22,7 +31,7 @@ from twin.errors import TwinError
 from twin.gap.diagnosis import Diagnosed, Diagnosis, GapNumbers, Verdict
 from twin.machine import MachineFile
 
-WARM = Question("case_001", Sort.SINGLE, 5, ("warmup",), (Asked("coolant_cooling", "", 8.0),))
+WARM = Question("case_001", Sort.SINGLE, 5, ("warmup",), (DrawnEffect("coolant_cooling", "", 8.0),))
 
 
 def nothing_found(case: Case) -> Diagnosed:
@@ -85,6 +94,13 @@ def test_the_same_question_has_the_same_answer_and_the_same_recording() -> None:
     one, other = (machine_of(WARM) for _ in range(2))
     first, second = (recorded(m, m.healthy, "warmup", FIT)["spindle_temp_c"] for m in (one, other))
     assert (first == second).all()
+
+
+def write_unseen(folder: Path, question: Question) -> None:
+    """Write a case of the same machine whose only runs are of programs that the case of `write_case` has not got."""
+    machine = machine_of(question)
+    physics = physics_with(machine, answer_of(question))
+    write_folder(folder, machine, physics, [(kind, UNSEEN) for kind in question.kinds])
 
 
 def test_runs_of_a_program_are_repeated_and_others_differ(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from cnctwin.cli import main
-from cnctwin.commands.edge import run
+from cnctwin.running.edges import run
 from cnctwin.standins.mtconnect_agent.replay_agent import ReplayAgent
 from cnctwin.standins.mtconnect_agent.serve import replay
 from cnctwin.standins.simulated_machine.description import DEVICES

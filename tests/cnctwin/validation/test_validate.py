@@ -11,7 +11,7 @@ import typer
 from typer.testing import CliRunner
 
 from cnctwin.commands.validate import validate
-from cnctwin.errors import ProgramError
+from cnctwin.errors import ApplicationError
 from cnctwin.memory.store.opening import open_store
 from cnctwin.standins.simulated_machine.description import PROCESSORS, TOLD
 from cnctwin.validation.budgets import Budgets, budgets_of, tables_of
@@ -38,7 +38,7 @@ def run(*arguments: str) -> tuple[int, dict[str, Any]]:
     app = typer.Typer()
     app.command()(validate)
     done = CliRunner().invoke(app, ["--machine", "vmc", "--json", *arguments])
-    if isinstance(done.exception, ProgramError | ConfigurationError):
+    if isinstance(done.exception, ApplicationError | ConfigurationError):
         raise done.exception
     return done.exit_code, json.loads(done.stdout) if done.stdout else {}
 
@@ -220,14 +220,14 @@ def test_wrong_input_is_one_line(arguments: list[str], said: str, tmp_path: Path
 def test_a_budget_that_is_none_is_refused_with_what_there_is(tmp_path: Path) -> None:
     (tmp_path / "p.toml").write_text("[validation]\ntemperature_k = 2.0\n")
     write_run(warm_night(0.1), tmp_path / "r.parquet")
-    with pytest.raises(ProgramError, match=r"\[validation\] temperature_k = 2\.0.*known: temperature_mae_k"):
+    with pytest.raises(ApplicationError, match=r"\[validation\] temperature_k = 2\.0.*known: temperature_mae_k"):
         run("--runs", str(tmp_path / "r.parquet"), "--config", str(tmp_path / "p.toml"))
 
 
 def test_a_machine_that_the_store_does_not_hold_is_said(store: Path) -> None:
     opened = open_store(store)
     try:
-        with pytest.raises(ProgramError, match="holds no machine mill; there are vmc"):
+        with pytest.raises(ApplicationError, match="holds no machine mill; there are vmc"):
             of_store(opened, "mill", 0, 1000, "the store")
     finally:
         opened.close()

@@ -1,4 +1,4 @@
-"""Where the server is and how it is spoken to: a URL without secrets, and the secret from the environment or a file.
+"""The address of a server: a URL without secrets, and the secret from the environment or a file.
 
 influx+https://host:8086?org=plant&bucket_prefix=hall1_&ca=/etc/ssl/plant.pem&also=/var/lib/cnctwin/store
 influx1+http://host:8086

@@ -109,7 +109,7 @@ class Both:
         return [_joined(first, second) for first, second in zip(before, since, strict=True)]
 
     def _before(self, query: Query) -> list[Column]:
-        """What the server says; of what it does not keep (arrays, long texts, stamps beyond its retention), and where it is
+        """Return the server's answer; of what it does not keep (arrays, long texts, stamps beyond its retention), and where it is
         away, what the embedded store has."""
         try:
             found = self._server.query(query)
@@ -133,7 +133,7 @@ class Both:
         return border_ms // every_ms * every_ms
 
     def messages(self, machine: str, from_ms: int, to_ms: int) -> Iterator[Message]:
-        """What came of a machine, as far back as the embedded store goes."""
+        """Yield the messages of a machine, as far back as the embedded store goes."""
         return self._embedded.messages(machine, from_ms, to_ms)
 
     def tidy(self, now_ms: int) -> Tidied:

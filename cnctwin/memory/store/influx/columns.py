@@ -10,7 +10,7 @@ from sparkplug.quality import Quality
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """What a server says of one window of a signal; `worst` is a code of quality, `count` counts all samples."""
+    """A server's answer for one window of a signal; `worst` is a code of quality, `count` counts all samples."""
 
     t_us: int
     mean: float | None
@@ -24,7 +24,7 @@ class Window:
 
 @dataclass(frozen=True, slots=True)
 class Answered:
-    """What a server says to a question: samples, or windows, of a signal each, and units as they stand now."""
+    """A server's answer to a question: samples, or windows, of a signal each, and units as they stand now."""
 
     rows: dict[str, list[SampleRow]]
     windows: dict[str, list[Window]]

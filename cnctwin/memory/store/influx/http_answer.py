@@ -1,4 +1,4 @@
-"""What the status of an answer to a write means, the same for all servers: every text fits one line and holds no secret."""
+"""The meaning of the status of an answer to a write, the same for all servers: every text fits one line and holds no secret."""
 
 import json
 import math
@@ -14,7 +14,7 @@ _LEFT_OUT = re.compile(r"points beyond retention policy")
 _CONTENT = re.compile(
     r"unable to parse|partial write|field type conflict|beyond retention|invalid (field|tag|number|boolean)|missing"
 )
-"""What a 400 says where lines are at fault; any other may come of a proxy or a wrong address, and then no line is."""
+"""Texts of a 400 where lines are at fault; any other may come of a proxy or a wrong address, and then no line is."""
 
 
 def one_line(text: str, token: str) -> str:

@@ -57,7 +57,7 @@ class InfluxReader:
         return [_sample(machine, tags, row) for tags, row in told]
 
     def answer(self, query: Query) -> Answered:
-        """What a question asks for: of its own bucket and of the pinned one, whose samples outlive those."""
+        """Return the answer to a question: of its own bucket and of the pinned one, whose samples outlive those."""
         answered = Answered({}, {}, {})
         for name in (RAW, DERIVED):
             signals = [signal for signal in query.signals if signal.startswith(TWIN_PREFIX) is (name == DERIVED)]

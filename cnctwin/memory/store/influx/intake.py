@@ -30,7 +30,7 @@ class _Lines:
 
 @dataclass(slots=True)
 class _Taken:
-    """What becomes of the samples of one call."""
+    """The account of the samples of one call."""
 
     stored: int = 0
     repeated: int = 0
@@ -52,7 +52,7 @@ class _Taken:
 
 
 class Intake:
-    """What is before the ring; one thread. `complain` is told why a sample is refused.
+    """The intake before the ring; one thread. `complain` is told why a sample is refused.
 
     vocabulary: where the server knows no texts, what texts are kept as labels; None = it knows them
     """

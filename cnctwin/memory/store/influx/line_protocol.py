@@ -88,4 +88,4 @@ def victoria_line(series: str, row: SampleRow) -> str:
 
 
 EMPTY = "''"
-"""How an empty text stands in a label, which cannot be empty."""
+"""An empty text as a label, which cannot be empty."""

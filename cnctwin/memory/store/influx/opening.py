@@ -29,9 +29,9 @@ def open_influx(url: str, *, writable: bool, spool: Path, retention: "Retention 
     if address.also is None:
         return store
     try:
-        from cnctwin.memory.store.opening import open_store  # noqa: PLC0415 — opens us in turn
+        from cnctwin.memory.store.embedded import EmbeddedStore  # noqa: PLC0415 — only where its folder is named
 
-        return Both(open_store(str(address.also), writable=writable, retention=retention), store)
+        return Both(EmbeddedStore(address.also, writable=writable, retention=retention), store)
     except BaseException:
         store.close()
         raise

@@ -14,7 +14,6 @@ from cnctwin.memory.store.influx.spool import Batch, PinnedCopy, Spool
 
 SLICE_MS = 60_000
 SLICES_AT_ONCE = 30
-PINS_MAX = 100_000
 Samples = Callable[[str, str, int, int], list[SampleRow]]
 
 
@@ -41,7 +40,7 @@ class Pins:
             self._stretches.setdefault(pinned.machine, []).append((pinned.from_ms, pinned.to_ms))
 
     def holds(self, machine: str, t_ms: int) -> bool:
-        """Whether a sample lies in a pinned stretch."""
+        """Return True if a sample lies in a pinned stretch."""
         if not self._stretches:
             return False
         return any(from_ms <= t_ms < to_ms for from_ms, to_ms in reversed(self._stretches.get(machine, ())))

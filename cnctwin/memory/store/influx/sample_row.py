@@ -11,7 +11,7 @@ from sparkplug.quality import Quality
 from sparkplug.values import Value
 
 TEXT_BYTES_MAX = 32_000
-"""Of a text or a reason; InfluxDB takes 64 KiB."""
+"""The longest text or reason; InfluxDB takes 64 KiB."""
 _TOLD = frozenset({EventKind.BIRTH, EventKind.DATA, EventKind.DEATH})
 CODE = {Quality.GOOD: 0.0, Quality.STALE: 1.0, Quality.BAD: 2.0}
 """The field `quality`: the worst of a window is its greatest."""
@@ -21,7 +21,7 @@ Plain = bool | float | str | None
 
 
 class SeriesKey(NamedTuple):
-    """Who tells what; `unit` is not part of who it is, and may change."""
+    """The source of a sample; `unit` is not part of who it is, and may change."""
 
     machine: str
     node: str

@@ -24,7 +24,7 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class Patience:
-    """How often a server is asked again, and how many samples a request holds."""
+    """The retries of a server, and the samples that a request holds."""
 
     delay_s_min: float = 0.5
     delay_s_max: float = 60.0

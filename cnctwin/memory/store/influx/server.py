@@ -1,4 +1,4 @@
-"""What the sender needs of a server, and what a server may answer.
+"""The sender's view of a server, and what a server may answer.
 
 ServerAnswer
 ├── ServerAwayError    not now: down, too busy, or it does not let us in; everything is kept and tried again

@@ -36,7 +36,7 @@ CREATE TABLE IF NOT EXISTS pins(machine TEXT, from_ms INTEGER, to_ms INTEGER, re
 
 @dataclass(frozen=True, slots=True)
 class RingLimits:
-    """How much may wait for the server; less than `free_bytes_min` is never left on the disk."""
+    """The room for what waits for the server; less than `free_bytes_min` is never left on the disk."""
 
     bytes_max: int = 4_000_000_000
     age_s_max: float = 7 * 86_400.0
@@ -249,7 +249,7 @@ class Spool:
             return samples
 
     def account(self) -> dict[str, int]:
-        """How many samples went where, since the folder was made; `held` is what is in the ring now."""
+        """Return how many samples went where, since the folder was made; `held` is what is in the ring now."""
         with self._lock:
             return {**dict(self._ask("SELECT name, samples FROM account")), "held": self.held}
 

@@ -23,7 +23,7 @@ _SERIES_MAX = 200_000
 
 
 def digest(told: str) -> bytes:
-    """What a sample says, in eight bytes."""
+    """Return what a sample says, in eight bytes."""
     return blake2b(told.encode(), digest_size=DIGEST_BYTES).digest()
 
 
@@ -75,7 +75,7 @@ class Stamps:
         return recent.newest if recent.is_stale else None
 
     def take_changed(self) -> list[tuple[int, int, bytes, bool]]:
-        """What is to be committed."""
+        """Return what is to be committed."""
         taken = [(*place, *told) for place, told in self.changed.items()]
         self.changed.clear()
         if len(self._recent) > _SERIES_MAX:

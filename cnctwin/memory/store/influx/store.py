@@ -57,7 +57,7 @@ def steady_wall_ms() -> Callable[[], int]:
 
 
 class ReadOnlyServer:
-    """What a reader has of a store on a server; `folder` is that of the writer's ring, where that is on the same machine."""
+    """A reader's view of a store on a server; `folder` is that of the writer's ring, where that is on the same machine."""
 
     def __init__(self, reader: Reader, where: str, folder: Path) -> None:
         self._reader, self._where, self._folder = reader, where, folder
@@ -102,7 +102,7 @@ class ReadOnlyServer:
         return None if not found or found[0][0] is None else int(found[0][0])
 
     def status(self) -> Status:
-        """How the store is, as far as the ring tells."""
+        """Return the state of the store, as far as the ring tells."""
         found = self._ring("SELECT coalesce(sum(samples), 0), coalesce(sum(bytes), 0) FROM rows", ())
         waiting, size = (int(found[0][0]), int(found[0][1])) if found else (0, 0)
         sent = self._ring("SELECT samples FROM account WHERE name = 'sent'", ())
@@ -221,7 +221,7 @@ class ServerStore(ReadOnlyServer):
         return self._sender.drain(timeout_s)
 
     def status(self) -> Status:
-        """How the store is: `samples` that the server has, `bytes` of the ring, samples that wait for the server."""
+        """Return the state of the store: `samples` that the server has, `bytes` of the ring, samples that wait for the server."""
         account = self._spool.account()
         evicted = ", ".join(f"{n} samples lost ({name})" for name, n in account.items() if name.startswith("evicted") and n)
         pins = (

@@ -55,7 +55,7 @@ class Victoria:
 
 
 def deduplicates(metrics: str) -> bool:
-    """Whether the server's flags say that it keeps a sample once that comes twice.
+    """Return True if the server's flags say that it keeps a sample once that comes twice.
 
     >>> deduplicates('flag{name="dedup.minScrapeInterval", value="1ms", is_set="true"} 1')
     True

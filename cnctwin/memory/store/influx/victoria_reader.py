@@ -20,7 +20,6 @@ from cnctwin.memory.store.influx.plain_http import PlainHttp
 from cnctwin.memory.store.influx.sample_row import QUALITY, SampleRow, SeriesKey
 
 _FIELDS = ("value", "held", "flag", "text", "quality", "reason")
-_LABELS = ("flag", "text", "reason")
 _EVER = "1"
 """For 0 the last minutes are meant."""
 _WINDOWS_AT_ONCE = 20_000
@@ -30,7 +29,7 @@ _Place = tuple[str, str, str, str]  # signal, node, unit, nth
 
 @dataclass(slots=True)
 class _Moment:
-    """What the series of one sample say of it."""
+    """The values of the series of one sample."""
 
     number: float | None = None
     label: str | None = None
@@ -39,7 +38,7 @@ class _Moment:
     reason: str | None = None
 
     def take(self, name: str, labels: dict[str, str], value: float) -> None:
-        """What the series of one field says."""
+        """Take what the series of one field says."""
         if name in {"value", "held"}:
             self.number = float(value)
         elif name == "quality":
@@ -66,7 +65,7 @@ class _Moment:
 
 @dataclass(slots=True)
 class _Part:
-    """What is gathered of the windows of one signal; a window is known by its beginning, ms since 1970."""
+    """The windows of one signal as they are gathered; a window is known by its beginning, ms since 1970."""
 
     figures: dict[str, dict[int, float]] = field(default_factory=dict)
     last: dict[int, tuple[float, bool | str]] = field(default_factory=dict)
@@ -89,7 +88,7 @@ class _Part:
             self.figures[figure] = told
 
     def windows(self) -> Iterator[Window]:
-        """What is in each window that holds a sample."""
+        """Yield each window that holds a sample."""
         sums, goods, lows, highs, worsts = (self.figures.get(name, {}) for name in ("sum", "good", "low", "high", "worst"))
         for begin_ms, count in self.figures.get("count", {}).items():
             good, worst, last = goods.get(begin_ms), worsts.get(begin_ms, 0.0), self.last.get(begin_ms)
@@ -170,7 +169,7 @@ class VictoriaReader:
         return list(self._samples(machine, None, (measurement,), from_ms, to_ms))
 
     def answer(self, query: Query) -> Answered:
-        """What a question asks for."""
+        """Return the answer to a question."""
         answered = Answered({}, {}, self._units(query))
         if query.every_ms is None:
             self._fill(answered.rows, query, query.from_ms, query.to_ms)

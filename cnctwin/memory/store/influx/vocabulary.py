@@ -1,4 +1,4 @@
-"""Which texts a server without texts keeps, as labels: those of signals that say few different short ones.
+"""Texts that a server without texts keeps as labels: those of signals that say few different short ones.
 
 Each text is a series of its own there, so block texts (`nc_block`) would make millions of them. A signal that says more than
 TEXTS_MAX different texts, or a longer one than TEXT_CHARACTERS_MAX, is not kept from then on, and that is counted and said.

@@ -23,7 +23,7 @@ from cnctwin.memory.store.value_form import Kind, given, kept
 _log = logging.getLogger(__name__)
 
 
-class Found(NamedTuple):
+class SealedFile(NamedTuple):
     """A file and what it says of itself."""
 
     path: Path
@@ -34,7 +34,7 @@ class Found(NamedTuple):
 
 def adopt(db: sqlite3.Connection, folder: Path) -> int:
     """Name all sealed files of a folder in an empty database, within a transaction; how many there are."""
-    newest: dict[tuple[int, str, int], Found] = {}
+    newest: dict[tuple[int, str, int], SealedFile] = {}
     highest = 0
     for found in _all(folder):
         highest = max(highest, found.number)
@@ -55,18 +55,18 @@ def adopt(db: sqlite3.Connection, folder: Path) -> int:
     return taken
 
 
-def _all(folder: Path) -> Iterator[Found]:
+def _all(folder: Path) -> Iterator[SealedFile]:
     for place in FOLDERS.values():
         for path in sorted((folder / place).rglob("*.parquet")):
             try:
                 about = json.loads(pq.read_metadata(path).metadata[METADATA])
-                yield Found(path, str(path.relative_to(folder)), int(path.name.split(".")[1]), about)
+                yield SealedFile(path, str(path.relative_to(folder)), int(path.name.split(".")[1]), about)
             except (OSError, pa.ArrowException, KeyError, TypeError, ValueError, IndexError) as error:
                 _log.warning("%s: cannot be read (%s); it is left out", path, str(error).splitlines()[0])
                 path.rename(path.with_name(path.name + ".damaged"))
 
 
-def _take(db: sqlite3.Connection, found: Found) -> None:
+def _take(db: sqlite3.Connection, found: SealedFile) -> None:
     about, body = found.about, found.path.read_bytes()
     machine = _number(db, "machines", "name", about["machine"])
     sids = {int(sid): told for sid, told in about["series"].items()}

@@ -13,7 +13,7 @@ from cnctwin.memory.store.contract import StoreError
 from cnctwin.memory.store.hot import SeriesOf
 from cnctwin.memory.store.sealed.manifest import File
 from cnctwin.memory.store.value_form import ARRAYS, NUMBERS, PLAIN, Kind, given
-from cnctwin.memory.store.windows import Numbers, Told, Windows
+from cnctwin.memory.store.windows import Numbers, StoredSample, Windows
 from sparkplug.values import Value
 
 THREADS, MEMORY = 2, "256MB"
@@ -45,7 +45,7 @@ class SealedAnswers:
             if self._duck is not None:
                 self._duck.close()
 
-    def told(self, files: Sequence[File], series: Iterable[SeriesOf], from_ms: int, to_ms: int) -> dict[int, list[Told]]:
+    def told(self, files: Sequence[File], series: Iterable[SeriesOf], from_ms: int, to_ms: int) -> dict[int, list[StoredSample]]:
         """The samples of these series in [from_ms, to_ms), by series. FileNotFoundError where a file is gone by now."""
         return self._rows(files, series, from_ms, to_ms)
 
@@ -94,7 +94,7 @@ class SealedAnswers:
         *,
         with_last: bool,
     ) -> None:
-        """Of files that keep all series that are asked for in the same way, so that they are summed up as they are kept."""
+        """Sum up files that keep all series that are asked for in the same way, so that they are summed up as they are kept."""
         every_ms = next(iter(windows.values())).every_us // 1000
         sums = {sid: _sums(sid, ending, with_last=with_last) for sid, ending in layout}
         wanted = "".join(f", {part} AS {name}{sid}" for sid, some in sums.items() for name, part in some.items())
@@ -112,7 +112,7 @@ class SealedAnswers:
 
     def _rows(
         self, files: Sequence[File], series: Iterable[SeriesOf], from_ms: int, to_ms: int, where: str = ""
-    ) -> dict[int, list[Told]]:
+    ) -> dict[int, list[StoredSample]]:
         every = {s.sid: s for s in series}
         endings = _endings(files, every.values())
         nulls = {sid for file in files for sid in file.nulls} & every.keys()
@@ -126,7 +126,7 @@ class SealedAnswers:
         found = list(self._ask(text, having, from_ms, to_ms).fetchnumpy().values())
         t = (np.asarray(found[0], dtype=np.int64) * 1000 + np.asarray(found[1], dtype=np.int64)).tolist()
         ranks, reasons = np.ma.filled(found[2], 0).tolist(), _objects(found[3])
-        answer: dict[int, list[Told]] = {}
+        answer: dict[int, list[StoredSample]] = {}
         for sid, column in zip(endings, found[5:], strict=True):
             kind, values = every[sid].kind, column.tolist()
             at = np.flatnonzero(~np.ma.getmaskarray(column)).tolist()
@@ -154,7 +154,7 @@ class SealedAnswers:
 
 
 def _endings(files: Iterable[File], series: Iterable[SeriesOf]) -> dict[int, list[str]]:
-    """How each of these series is kept in these files; those that are in none are left out."""
+    """Return how each of these series is kept in these files; those that are in none are left out."""
     wanted = {s.sid for s in series}
     found: dict[int, list[str]] = {}
     for file in files:
@@ -189,7 +189,7 @@ def _layouts(files: Iterable[File], series: Iterable[SeriesOf]) -> dict[tuple[tu
 
 
 def _sums(sid: int, ending: str, *, with_last: bool) -> dict[str, str]:
-    """What is summed up of a series, by name; as whole numbers where they are kept as such. good: where not all may be finite."""
+    """Return the sums of a series by name; as whole numbers where they are kept as such. good: where not all may be finite."""
     name, value, digits = f"s{sid}{ending}", _value(sid, [ending]), ending[1:]
     if ending[0] in "ezi":
         whole = f"({name} & -2)" if ending[0] == "z" else name

@@ -26,7 +26,7 @@ _LETTERS = {"b": np.int8, "h": np.int16, "i": np.int32, "q": np.int64, "f": np.f
 
 
 class SealedColumn(NamedTuple):
-    """How it is kept (the ending of its name), its values, and Parquet's encoding where it is not the usual one."""
+    """A column as it is kept (the ending of its name), its values, and Parquet's encoding where it is not the usual one."""
 
     ending: str
     values: Any
@@ -34,7 +34,7 @@ class SealedColumn(NamedTuple):
 
 
 def decimals(values: NDArray[np.float64]) -> int | None:
-    """How many decimals all of these have, exactly; None where that is not so.
+    """Return how many decimals all of these have, exactly; None where that is not so.
 
     >>> decimals(np.array([0.125, -3.5, 7.0])), decimals(np.array([0.1 + 0.2])), decimals(np.array([-0.0]))
     (3, None, None)

@@ -1,4 +1,4 @@
-"""What the sealed hours hold of a signal within a millisecond: asked of each sample that comes late for one of them."""
+"""The sealed hours' readings of a signal within a millisecond: asked of each sample that comes late for one of them."""
 
 import logging
 import sqlite3

@@ -34,7 +34,7 @@ class LeftOver:
         self._db, self._folder = db, folder
 
     def is_here(self, name: str) -> bool:
-        """Whether all that a file holds is in the database or in files that it names."""
+        """Return True if all that a file holds is in the database or in files that it names."""
         if name.endswith(".part") or self._db.execute("SELECT 1 FROM files WHERE name = ?", (name,)).fetchone():
             return True
         try:

@@ -1,4 +1,4 @@
-"""Which sealed files there are, and where: `<class>/machine=<name>/day=<day>/<from>-<to>.<number>.parquet` below the store.
+"""The manifest of sealed files: `<class>/machine=<name>/day=<day>/<from>-<to>.<number>.parquet` below the store.
 
 A file is written under another name, forced to the disk, renamed, and counts from the moment in which the manifest names it,
 which is the transaction in which its samples leave the hot tier. What is not named is left over from a kill, and removed.
@@ -32,7 +32,7 @@ _NAME_MAX = 180
 
 
 class State(IntEnum):
-    """What became of a file."""
+    """The state of a file."""
 
     SEALED = 0
     SWEPT = 1  # past its time; late history for it is refused
@@ -60,7 +60,7 @@ class File(NamedTuple):
 
     @property
     def endings(self) -> Mapping[int, str]:
-        """How each series is kept."""
+        """The way each series is kept."""
         return _columns(self.columns)[0]
 
     @property
@@ -70,7 +70,7 @@ class File(NamedTuple):
 
     @property
     def is_odd(self) -> bool:
-        """Whether anything in it is not good."""
+        """True if anything in it is not good."""
         return _columns(self.columns)[2]
 
 
@@ -88,7 +88,7 @@ def files(db: sqlite3.Connection, machine: int, from_ms: int, to_ms: int) -> lis
 
 
 def file_name(stored_class: StoredClass, machine: str, from_ms: int, to_ms: int, number: int) -> str:
-    """Where a file lies.
+    """Return the path of a file.
 
     >>> file_name(StoredClass.RAW, "vmc/1", 1_790_046_000_000, 1_790_049_600_000, 7)
     'cnc_raw/machine=vmc%2F1/day=2026-09-22/03-04.7.parquet'

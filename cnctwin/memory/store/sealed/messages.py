@@ -25,7 +25,7 @@ SELECT * FROM files WHERE machine = (SELECT id FROM machines WHERE name = ?) AND
 
 
 class SealedMessages:
-    """What one walk through the messages reads of the sealed hours; each file is read once where the walk goes on in time."""
+    """The messages that one walk reads of the sealed hours; each file is read once where the walk goes on in time."""
 
     def __init__(self, checked: Checked) -> None:
         self._checked = checked

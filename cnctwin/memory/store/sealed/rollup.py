@@ -69,7 +69,7 @@ class Minute(NamedTuple):
 
 
 def minute_of(sid: int, minute: int, window: Window) -> Minute:
-    """What is kept of a window of a minute."""
+    """Return what is kept of a window of a minute."""
     kind, form = kept(window.last)
     text = form if isinstance(form, str) else None
     last = None if text is not None or form is None or isinstance(form, bytes) else float(form)

@@ -38,7 +38,7 @@ class Part(NamedTuple):
 
 
 class HeaderOf(NamedTuple):
-    """What is kept of a message with its samples."""
+    """The part of a message that is kept with its samples."""
 
     received_ms: int
     stamp_ms: int
@@ -175,7 +175,7 @@ def _null_rows(column: Any) -> dict[int, list[int]]:
 
 
 def sid_and_ending(name: str) -> tuple[int, str]:
-    """What a column's name says.
+    """Return what a column's name says.
 
     >>> sid_and_ending("s12e3"), sid_and_ending("s7lf")
     ((12, 'e3'), (7, 'lf'))

@@ -26,7 +26,7 @@ from cnctwin.memory.store.series_table import SeriesTable, StoredClass
 from cnctwin.memory.store.value_form import Kind
 
 SAMPLES_MIN = 20_000
-"""What a file is worth; a quiet machine's hours wait for one another up to the end of the day."""
+"""The samples that a file is worth; a quiet machine's hours wait for one another up to the end of the day."""
 AHEAD_MS = DAY_MS
 """An hour that is still to come (of a machine whose clock is ahead) is due when nothing came into it for so long."""
 _log = logging.getLogger(__name__)
@@ -41,7 +41,7 @@ class Job(NamedTuple):
 
 
 class Done(NamedTuple):
-    """What became of a job."""
+    """The outcome of a job."""
 
     samples: int
     files: int
@@ -67,7 +67,7 @@ class Sealer:
         self._not_before_ms: dict[int, int] = {}
 
     def due(self, now_ms: int) -> Iterable[Job]:
-        """What is due, machine by machine; nothing is looked at again before something can have changed."""
+        """Yield the jobs that are due, machine by machine; nothing is looked at again before something can have changed."""
         for machine in list(self._table.machines.values()):
             if self._not_before_ms.get(machine, 0) <= now_ms:
                 jobs, self._not_before_ms[machine] = self._due_of(machine, now_ms)
@@ -200,7 +200,7 @@ class Sealer:
         return found
 
     def _read(self, file: File) -> Rows | None:
-        """What a file holds; one that is damaged is set aside, and what is new begins another."""
+        """Return what a file holds; one that is damaged is set aside, and what is new begins another."""
         try:
             if self._checked.sound([file]):
                 table = pq.read_table(self._checked.folder / file.name, partitioning=None)

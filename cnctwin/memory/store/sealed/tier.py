@@ -47,7 +47,7 @@ class SealedTier:
         self._answers.close()
 
     def tidy(self, retention: Retention, now_ms: int) -> Tidied:
-        """What is due, in bounded steps. Raises StoreError."""
+        """Do what is due, in bounded steps. Raises StoreError."""
         try:
             return self._tidy(retention, now_ms)
         except FileNotFoundError as error:
@@ -110,7 +110,7 @@ class SealedTier:
         return len(chosen), freed, pinned
 
     def _over_bytes(self, retention: Retention) -> int:
-        """How many bytes the store is beyond its budget, or the disk short of its spare."""
+        """Return how many bytes the store is beyond its budget, or the disk short of its spare."""
         (sealed,) = self._db.execute("SELECT value FROM meta WHERE name = 'file_bytes'").fetchone()
         pages, spare, size = self._db.execute(
             "SELECT page_count, freelist_count, page_size FROM pragma_page_count, pragma_freelist_count, pragma_page_size"

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from cnctwin.commands.train.app import train_app
 from cnctwin.errors import UsageError
-from cnctwin.training.anomaly.calibrated_cell import Asked, Calibrated, calibrated_cell
+from cnctwin.training.anomaly.calibrated_cell import Calibrated, TrainingSettings, calibrated_cell
 from cnctwin.training.anomaly.recorded_cell import part, recorded_cell
 from cnctwin.training.anomaly.replayed_cell import replayed
 from cnctwin.training.anomaly.time_split import split
@@ -44,7 +44,7 @@ def named(folder: Path, names: str = "abc") -> list[str]:
 
 
 def trained(folder: Path, **asked: Any) -> tuple[Calibrated, ...]:
-    given = Asked(features=FEATURES, detector=SMALL, **{"alerts_per_week": OFTEN, **asked})
+    given = TrainingSettings(features=FEATURES, detector=SMALL, **{"alerts_per_week": OFTEN, **asked})
     return calibrated_cell(recorded_cell(named(folder), FEATURES, given.tick_s), given)
 
 
@@ -120,7 +120,10 @@ def test_the_golden_week_is_what_the_processor_made_of_the_recordings(folder: Pa
 
 
 def test_raw_scores_of_the_golden_week_are_those_of_the_stream(folder: Path) -> None:
-    cell, asked = recorded_cell(named(folder), FEATURES, 1.0), Asked(features=FEATURES, detector=SMALL, alerts_per_week=OFTEN)
+    cell, asked = (
+        recorded_cell(named(folder), FEATURES, 1.0),
+        TrainingSettings(features=FEATURES, detector=SMALL, alerts_per_week=OFTEN),
+    )
     models = {found.machine: found.model for found in calibrated_cell(cell, asked)}
     _, calibrating = split(cell, asked.train_share)
     tracks = replayed(calibrating[0], models, {**asked.settings, "threshold": 1.0})

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from cnctwin.memory.importing.into_store import recorded_messages
-from cnctwin.memory.importing.shdr import recorded_rows
+from cnctwin.importing.into_store import recorded_messages
+from cnctwin.importing.shdr import recorded_rows
 from cnctwin.memory.store.contract import Message
 from tests.recordings import recording
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from cnctwin.errors import UsageError
-from cnctwin.memory.importing.into_store import import_recording
+from cnctwin.importing.into_store import import_recording
 from cnctwin.memory.replay import replay
 from cnctwin.memory.store.opening import open_store
 from sparkplug.host_session import EventKind

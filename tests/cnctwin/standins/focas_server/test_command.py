@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from cnctwin.errors import ProgramError, UsageError
+from cnctwin.errors import ApplicationError, UsageError
 from cnctwin.standins.focas_server.serve import simulate_focas
 from tests.cnctwin.standins.focas_server.client import RawClient, ask
 from tests.cnctwin.standins.focas_server.moments import Serve
@@ -49,5 +49,5 @@ def test_a_speed_that_makes_no_sense_is_wrong_input(speed: float) -> None:
 
 
 def test_a_port_that_is_taken_is_told_in_one_line(serve: Serve) -> None:
-    with pytest.raises(ProgramError, match="give another port, or 0"):
+    with pytest.raises(ApplicationError, match="give another port, or 0"):
         simulate_focas(threading.Event(), port=serve().port)

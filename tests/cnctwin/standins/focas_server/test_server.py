@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cnctwin.errors import ProgramError
+from cnctwin.errors import ApplicationError
 from cnctwin.standins.focas_server.functions import FUNCTIONS, WRITES
 from cnctwin.standins.focas_server.server import FocasServer
 from tests.cnctwin.standins.focas_server import captured
@@ -164,7 +164,7 @@ def test_it_starts_again_on_the_same_port_with_the_same_control(serve: Serve) ->
 
 
 def test_a_port_that_is_taken_is_an_error_of_one_line(serve: Serve) -> None:
-    with pytest.raises(ProgramError, match=r"can't listen on 127\.0\.0\.1 port \d+: .+; give another port, or 0"):
+    with pytest.raises(ApplicationError, match=r"can't listen on 127\.0\.0\.1 port \d+: .+; give another port, or 0"):
         serve(port=serve().port)
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pyLSV2
 import pytest
 
-from cnctwin.errors import ProgramError, UsageError
+from cnctwin.errors import ApplicationError, UsageError
 from cnctwin.standins.lsv2_server.serve import simulate_lsv2
 
 
@@ -44,5 +44,5 @@ def test_its_mistakes_are_one_line_each(tmp_path: Path) -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
-        with pytest.raises(ProgramError, match="give another with --port"):
+        with pytest.raises(ApplicationError, match="give another with --port"):
             simulate_lsv2(threading.Event(), port=taken.getsockname()[1])

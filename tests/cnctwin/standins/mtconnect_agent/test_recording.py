@@ -6,11 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from cnctwin.standins.mtconnect_agent import DeviceModelError, RecordingError, ReplayAgent, ReplayError, ShdrAdapter
+from cnctwin.standins.mtconnect_agent import DeviceModelError, RecordingError, ReplayAgent, ReplayError
 from cnctwin.standins.mtconnect_agent.recording import Recording
 from cnctwin.standins.mtconnect_agent.replay import Pace
 from tests.cnctwin.program import until
 from tests.cnctwin.small_machine import DEVICES, at, elements, fetch, observations, played, values, write_machine
+from tests.cnctwin.standins.mtconnect_agent.adapter_socket import ShdrAdapter
 from tests.recordings import recording
 
 FILES = {

@@ -16,7 +16,7 @@ pytest.importorskip("asyncua")
 from asyncua import ua
 from asyncua.client.client import Client
 
-from cnctwin.errors import ProgramError
+from cnctwin.errors import ApplicationError
 from cnctwin.standins.opcua_server.serve import simulate_opcua
 from cnctwin.standins.opcua_server.shown import MODELS, shown
 from cnctwin.standins.simulated_control.state import ControlState
@@ -106,5 +106,5 @@ def test_a_value_is_shown_for_each_state_that_a_control_may_be_in() -> None:
 
 def test_without_the_library_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
-    with pytest.raises(ProgramError, match=r"install it with: pip install 'cnctwin\[opcua\]'"):
+    with pytest.raises(ApplicationError, match=r"install it with: pip install 'cnctwin\[opcua\]'"):
         simulate_opcua(threading.Event())

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cnctwin.memory.importing.shdr import recorded_runs
+from cnctwin.importing.shdr import recorded_runs
 from cnctwin.standins.simulated_machine.anomaly_model import FEATURES, place_model
 from cnctwin.standins.simulated_machine.description import DEVICES, SPARE_PART
 from cnctwin.training.anomaly.replayed_cell import replayed

@@ -2,7 +2,7 @@
 
 import { drawn, el, say, symbol } from "../dom.js";
 import { number, recorded, sentence, share, words } from "../text.js";
-import { shade } from "./gap.js";
+import { shade } from "./gap_shade.js";
 
 const VERDICTS = {
   healthy: ["Healthy", "s-ack"],

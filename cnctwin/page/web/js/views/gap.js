@@ -6,16 +6,12 @@ import { age, coarse, moment, number, plain, signed, title } from "../text.js";
 import { serverNow } from "../clock.js";
 import { TILES, tileOf } from "../charted.js";
 import { diagnosisSections } from "./diagnosis.js";
+import { shade } from "./gap_shade.js";
 import { machineHead } from "./machine_head.js";
 import { noMachine } from "./no_machine.js";
 
 const AGAIN_MS = 15000;
 const REGIMES = ["warm_up", "steady", "cool_down", "air"];
-const LEVELS = [1.3, 2, 3, 6, 12, 24];
-
-/** The shade of a gap in floors, as in the report. */
-export const shade = (floors) =>
-  `h${LEVELS.findIndex((level) => floors < level) < 0 ? 6 : LEVELS.findIndex((level) => floors < level)}`;
 
 const regimeWord = (regime) => (regime === null ? "overall" : regime.replaceAll("_", " ").replace(/^cutting[: ]?/, "cutting "));
 

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
+from cnctwin.challenge.contest import Losses
 from cnctwin.errors import UsageError
-from cnctwin.models.contest import Losses
 from cnctwin.validation.track import Floats
 from twin.errors import TwinError
 from twin.runlog import RunLog
@@ -24,7 +24,7 @@ Loss = Callable[[Path, RunLog, str], tuple[Floats, Floats, float]]
 
 
 def losses(kind: str, models: tuple[Path, Path], log: RunLog, machine: str) -> Losses:
-    """Of champion and challenger, at the same moments. Raises UsageError where the kind has none, or a model cannot be judged."""
+    """Return the losses of champion and challenger, at the same moments. Raises UsageError where they cannot be judged."""
     loss = LOSSES.get(kind)
     if loss is None:
         raise UsageError(

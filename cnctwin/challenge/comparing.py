@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from cnctwin.challenge.contest import HOURS_MIN, TOLERANCE, Losses, Outcome, outcome
+from cnctwin.challenge.losses import losses
 from cnctwin.errors import UsageError
 from cnctwin.models.card import Card
-from cnctwin.models.contest import HOURS_MIN, TOLERANCE, Losses, Outcome, outcome
 from cnctwin.models.golden import golden_of
-from cnctwin.models.losses import losses
 from cnctwin.models.registry import Shelf, keep_comparison
 from twin.models.pointer import seconds
 from twin.runlog import RunLog
@@ -22,7 +22,7 @@ DATED_S = 1e9
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Test:
-    """What both are judged by.
+    """The data and bounds that both are judged by.
 
     logs: the holdout, stretch by stretch; sha256: of its files (none of a store's)
     tolerance: on the golden week, 0.05 = 5 %; hours_min: that the holdout has to have
@@ -67,7 +67,7 @@ def compared(own: Shelf, version: str, test: Test, now_s: float) -> tuple[str, O
 
 
 def won(own: Shelf, version: str, comparisons: list[dict[str, Any]]) -> bool:
-    """Whether the last comparison of this version with the present champion was won."""
+    """Return True if the last comparison of this version with the present champion was won."""
     pointer = own.pointer()
     champion = None if pointer is None else pointer.champion
     last = [one for one in comparisons if one.get("challenger") == version and one.get("champion") == champion]
@@ -75,7 +75,7 @@ def won(own: Shelf, version: str, comparisons: list[dict[str, Any]]) -> bool:
 
 
 def _seen(card: Card, test: Test) -> list[str]:
-    """What is to be said of how a model was trained. Raises UsageError where it was trained on what it is to be judged on."""
+    """Return notes on how a model was trained. Raises UsageError where it was trained on what it is to be judged on."""
     notes: list[str] = []
     if card.data_sha256 and card.data_sha256 in test.sha256:
         raise UsageError(f"{card.version} was trained on this very data: judge on time that neither model has seen")
@@ -114,7 +114,7 @@ def _together(parts: list[Losses]) -> Losses:
 
 
 def sha256_of(path: Path) -> str:
-    """Of a file. Raises UsageError where there is none."""
+    """Return the SHA-256 of a file. Raises UsageError where there is none."""
     try:
         return hashlib.sha256(path.read_bytes()).hexdigest()
     except OSError as error:

@@ -31,16 +31,16 @@ class Losses:
 
     @property
     def both(self) -> NDArray[np.bool_]:
-        """Where both have one."""
+        """The moments at which both have a loss."""
         return np.asarray(np.isfinite(self.champion) & np.isfinite(self.challenger))
 
     @property
     def hours(self) -> float:
-        """Of moments that count."""
+        """The hours of moments that count."""
         return float(self.both.sum()) * self.every_s / 3600.0
 
     def means(self) -> tuple[float, float]:
-        """Of champion and challenger, on the moments that count. Raises UsageError where there is none."""
+        """Return the mean loss of champion and challenger on the moments that count. Raises UsageError where there is none."""
         both = self.both
         if not both.any():
             raise UsageError("there is no moment at which both models can be judged: other data, or other features")
@@ -68,7 +68,7 @@ class Outcome:
 
 
 def outcome(holdout: Losses, golden: Losses | None, *, tolerance: float = TOLERANCE, hours_min: float = HOURS_MIN) -> Outcome:
-    """Who wins. Raises UsageError where nothing can be judged.
+    """Decide who wins. Raises UsageError where nothing can be judged.
 
     A challenger whose loss is lower at each moment wins; one that is the same does not.
 

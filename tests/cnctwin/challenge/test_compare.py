@@ -10,14 +10,15 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from cnctwin.challenge import contest, losses
+from cnctwin.challenge.contest import Losses, outcome
+from cnctwin.challenge.stretch import read_stretch, stretch_of_store
 from cnctwin.commands.model import model_app
-from cnctwin.errors import ProgramError, UsageError
+from cnctwin.errors import ApplicationError, UsageError
 from cnctwin.memory.store.opening import open_store
-from cnctwin.models import contest, golden, losses, registry
-from cnctwin.models.contest import Losses, outcome
+from cnctwin.models import golden, registry
 from cnctwin.models.golden import freeze, golden_of
 from cnctwin.models.registry import Shelf
-from cnctwin.models.stretch import read_stretch, stretch_of_store
 from cnctwin.standins.simulated_machine.description import ANOMALY_MODEL
 from tests.cnctwin.models.made_model import made_model
 from tests.cnctwin.validation.made_night import START_S, warm_night
@@ -115,7 +116,7 @@ def seeded(own: Shelf, seed: int) -> str:
 
 def model(*arguments: str) -> tuple[int, str]:
     done = CliRunner().invoke(model_app, [*arguments, "--models", "models"])
-    if isinstance(done.exception, ProgramError):
+    if isinstance(done.exception, ApplicationError):
         raise done.exception
     assert done.exception is None or isinstance(done.exception, SystemExit), done.exception
     return done.exit_code, done.stdout

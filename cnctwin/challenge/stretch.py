@@ -1,4 +1,4 @@
-"""What models are compared on: a run log, or a stretch of the store, once a second, the twin's signals among it."""
+"""The data that models are compared on: a run log, or a stretch of the store, once a second, the twin's signals among it."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -36,7 +36,7 @@ def read_stretch(path: Path) -> RunLog:
 
 
 def stretch_of_store(store: Store, machine: str, from_ms: int, to_ms: int, source: str) -> RunLog:
-    """What models look at, once a second; its time counts from 1970. Raises UsageError where nothing was told."""
+    """Return the signals that models look at, once a second; time counts from 1970. Raises UsageError where nothing was told."""
     if machine not in (there := store.machines()):
         raise UsageError(f"{source}: holds no machine {machine}; there are {', '.join(there[:20]) or 'none'}")
     every_ms = round(1000.0 * EVERY_S)

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
-from cnctwin.commands.twin import check_suffix, write
 from cnctwin.errors import UsageError
+from cnctwin.files.output import check_suffix, write
 from cnctwin.standins.mtconnect_agent.agent import Agent
 from cnctwin.standins.mtconnect_agent.dialect import dialect
 from cnctwin.standins.mtconnect_agent.errors import ReplayError
@@ -40,11 +40,11 @@ COUNT = 100_000
 PAUSE_S_MAX = 600.0
 STEP_BACK_S = 10.0
 SETTLED_S = 60.0
-"""Of silence at the end, so that a tool change is told whose number has stood long enough."""
+"""Silence at the end, so that a tool change is told whose number has stood long enough."""
 
 
 def recorded_rows(recording: Path, devices: Path | None, device: str | None = None) -> Iterator[tuple[EdgeSample, ...]]:
-    """What an edge would have published of a recording, a row for each moment. Raises ReplayError, EdgeError."""
+    """Yield what an edge would have published of a recording, a row for each moment. Raises ReplayError, EdgeError."""
     source, spoken = Recording(recording), dialect("2.3", None)
     model, chosen = source.device_model(devices, device, spoken.schema)
     agent = Agent(model, chosen, spoken, buffer_size=BUFFER_SIZE, assets_max=1024, now=lambda: 0.0)
@@ -108,7 +108,7 @@ def import_shdr(recording: Path, devices: Path, device: str | None, out: Path, c
 
 
 def _changes(run: RunLog) -> int:
-    """How many tool changes begin in a run."""
+    """Return the number of tool changes that begin in a run."""
     active = run.columns.get("tool_change_active", np.array([]))
     return int((np.diff(active[np.isfinite(active)]) > 0.0).sum())
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cnctwin.memory.importing.shdr import recorded_runs
+from cnctwin.importing.shdr import recorded_runs
 from cnctwin.standins.simulated_machine.description import DEVICES, SPARE_PART
 from tests.recordings import recording
 from twin.runlog import read_run

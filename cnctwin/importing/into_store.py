@@ -1,6 +1,6 @@
 """A recording into a store, as if an edge had said it on the day: a birth, then a message for each row, received at its own time.
 
-The way is that of `cnctwin/memory/importing/shdr.py`: agent, parser, mapping, tool-change machine. A row that is stamped before
+The way is that of `cnctwin/importing/shdr.py`: agent, parser, mapping, tool-change machine. A row that is stamped before
 the one ahead of it (a control's clock steps back) is received with it, since what is received is in order.
 """
 
@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from cnctwin.errors import UsageError
-from cnctwin.memory.importing.shdr import recorded_rows
+from cnctwin.importing.shdr import recorded_rows
 from cnctwin.memory.store.contract import Message, Pinned, Store
 from cnctwin.standins.mtconnect_agent.errors import ReplayError
 from edge.running.birth import DATATYPES
@@ -27,7 +27,7 @@ NOT_YET = "not known yet"
 
 
 class Imported(NamedTuple):
-    """What came into the store."""
+    """The account of an import into the store."""
 
     machine: str
     messages: int

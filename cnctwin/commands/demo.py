@@ -1,0 +1,29 @@
+"""`cnctwin demo`: a machine, its edge, a broker, the twin and the page, started together."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cnctwin.commands.options import AsJson
+from cnctwin.processes.stopping import stopped_by_signals
+
+
+def demo(
+    recording: Annotated[Path | None, typer.Option(help="SHDR log or time|key|value text; else the simulated machine")] = None,
+    devices: Annotated[Path | None, typer.Option(help="The Devices.xml that belongs to it")] = None,
+    speed: Annotated[float, typer.Option(help="How many times faster than real time, or than recorded")] = 1.0,
+    seconds: Annotated[float | None, typer.Option(help="Stop by itself after so long; else at Ctrl-C")] = None,
+    port: Annotated[int | None, typer.Option(help="The private broker's port; else 1883 or a free one", min=1, max=65535)] = None,
+    machine: Annotated[str | None, typer.Option(help="The device's name; else that of the device model")] = None,
+    no_open: Annotated[bool, typer.Option("--no-open", help="Do not open the page in a browser")] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Show a machine, its edge, a real broker and the twin, and account for everything that went through."""
+    from cnctwin.demo.demo import run
+    from cnctwin.demo.parts import DemoOptions
+
+    options = DemoOptions(recording, devices, speed, seconds, port, machine, as_json, no_open)
+    with stopped_by_signals() as stop:
+        code = run(options, stop)
+    raise typer.Exit(code)

@@ -1,0 +1,58 @@
+"""Processors at work: beside `alerts` the courier that sends what its receivers are to be told, and beside
+`historian` the store that it keeps."""
+
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+from processors.running.ports import Recorder
+from processors.running.runtime import Configured, run_configured
+from sparkplug.broker import BrokerAddress
+
+
+def process(pairs: Sequence[Configured], broker: BrokerAddress, stop: threading.Event, *, group: str, state_dir: Path) -> None:
+    """Run configured processors until `stop` is set. Raises ConfigurationError where a secret is missing, StoreError where the
+    store cannot be used."""
+    with ExitStack() as stack:
+        recorder = stack.enter_context(_recorder(pairs, group))
+        stack.enter_context(_courier(pairs, broker, group))
+        run_configured(pairs, broker, stop, group=group, session_dir=state_dir, recorder=recorder)
+
+
+@contextmanager
+def _recorder(pairs: Sequence[Configured], group: str) -> Iterator[Recorder | None]:
+    """The store's recorder, where the historian runs; else nothing, and no store is loaded."""
+    from processors.historian import HistorianConfig  # noqa: PLC0415  only what runs is loaded
+
+    config = next((one.default for _, one in pairs if isinstance(one.default, HistorianConfig)), None)
+    if config is None:
+        yield None
+        return
+    from cnctwin.memory.historian import StoreRecorder, store_of  # noqa: PLC0415
+
+    recorder = StoreRecorder(store_of(config), group)
+    recorder.start()
+    try:
+        yield recorder
+    finally:
+        recorder.stop()
+
+
+@contextmanager
+def _courier(pairs: Sequence[Configured], broker: BrokerAddress, group: str) -> Iterator[None]:
+    """The courier, where alerts run and somebody is to be told; else nothing, and httpx is not loaded."""
+    from processors.alerts.config import AlertsConfig  # noqa: PLC0415  only what runs is loaded
+
+    config = next((one.default for _, one in pairs if isinstance(one.default, AlertsConfig)), None)
+    if config is None or not config.receivers:
+        yield
+        return
+    from processors.alerts.courier.thread import Courier  # noqa: PLC0415
+
+    courier = Courier(broker, config, group)
+    courier.start()
+    try:
+        yield
+    finally:
+        courier.stop()

@@ -1,0 +1,13 @@
+"""Standard output as a console."""
+
+from rich.console import Console
+
+WIDTH_ELSEWHERE = 120
+
+
+def standard_output() -> Console:
+    """Return standard output; into a file or a pipe it is as wide as the tables need."""
+    console = Console()
+    if not console.is_terminal:
+        console.width = WIDTH_ELSEWHERE
+    return console
