@@ -18,7 +18,7 @@ from itertools import islice
 from pathlib import Path
 from random import Random
 
-from cnctwin.memory.importing.shdr import recorded_rows
+from cnctwin.importing.shdr import recorded_rows
 from edge.running.birth import device_metrics
 from edge.sample import EdgeSample, Offer
 from processors.config import Configuration
