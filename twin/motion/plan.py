@@ -1,4 +1,7 @@
-"""The plan of a program: the speed along every segment and the time of every event; sampled, the reference of every tick."""
+"""The plan of a program: the speed along every segment and the time of every event.
+
+`twin.motion.sampling` turns it into the reference of every tick.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,7 +14,6 @@ from twin.kernels.compiling import kernel
 from twin.machine import Program
 from twin.motion.limits import Bounds, Limits, bounds
 from twin.motion.look_ahead import stretches_with_times
-from twin.motion.motion import Motion, sampled
 from twin.motion.path import Event, Kind, Path
 from twin.motion.s_curve import along_profile, ramp_time, time_at_distance
 from twin.motion.timeline import timeline
@@ -67,10 +69,6 @@ class Plan:
     spindle_ramps: Floats
     spindle_base_rpm: float
     total_s: float
-
-    def sample(self, period_s: float, average_s: tuple[float, ...] = ()) -> Motion:
-        """The motion at t = 0, T, 2T, … until the first tick at or after the end. See `motion.sampled`."""
-        return sampled(self, period_s, average_s)
 
     def seconds_by_line(self) -> Floats:
         """Seconds (highest line + 1,) spent on each source line: its segments, waits and events. Their sum is total_s."""
