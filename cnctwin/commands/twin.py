@@ -17,7 +17,7 @@ from rich.table import Table
 from cnctwin.errors import UsageError
 from cnctwin.files.program_text import decoded
 from twin.case import read_case
-from twin.errors import EffectError, ProgramError
+from twin.errors import EffectError, PartProgramError
 from twin.gap.table import GapRow
 from twin.identification import identify as identification
 from twin.identification import paper
@@ -63,7 +63,7 @@ def simulate(program: Path, machine: Path, out: Path | None, *, seed: int | None
     with working("simulating"):
         try:
             done = simulated(described, text, seed=seed, name=program.name)
-        except ProgramError as error:
+        except PartProgramError as error:
             raise UsageError(f"{program}: {error}") from None
         if out is not None:
             write(lambda: write_run(done.run, out), out)

@@ -69,7 +69,7 @@ class Candidates:
 
         feed_mm_min: (candidates, segments), of any value on rapids; event_value: (candidates, events), as `events` has them
 
-        Raises ProgramError where a feed is none.
+        Raises PartProgramError where a feed is none.
         """
         caps = speed_caps(self.path, self.allowed, np.atleast_2d(feed_mm_min), self.feed_ratio, self.rapid_ratio)
         segment, kind, _, line = event_arrays(self.events)

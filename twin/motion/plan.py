@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.errors import ProgramError
+from twin.errors import PartProgramError
 from twin.kernels.compiling import kernel
 from twin.machine import Program
 from twin.motion.limits import Bounds, Limits, bounds
@@ -82,7 +82,7 @@ class Plan:
 def plan(path: Path, times: Program | Limits, feed_override: Override = 1.0, rapid_override: Override = 1.0) -> Plan:
     """The plan of `path` under the limits `times`. Overrides act on the programmed feed and the rapid rate, on no other limit.
 
-    Raises ProgramError where a cutting move has no feed, MachineError where the limits are for another number of axes.
+    Raises PartProgramError where a cutting move has no feed, MachineError where the limits are for another number of axes.
 
     1200 mm at 6000 mm/min with 1000 mm/s² take 12 s and another v/a = 0.1 s to start and stop:
 
@@ -140,7 +140,7 @@ def speed_caps(path: Path, allowed: Bounds, feed_mm_min: Floats, feed_override: 
     if not np.all(fastest > 0.0):
         k = int(np.argmin(np.min(np.atleast_2d(fastest), axis=0)))
         given = f"the feed at segment {k} is {feed_mm_min[..., k]} mm/min and the overrides leave nothing of it"
-        raise ProgramError(int(path.line[k]) + 1, "F", f"{given}; a cutting move needs a feed above 0")
+        raise PartProgramError(int(path.line[k]) + 1, "F", f"{given}; a cutting move needs a feed above 0")
     return np.ascontiguousarray(fastest)
 
 

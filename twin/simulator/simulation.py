@@ -71,7 +71,7 @@ def simulate(
     seed: None = the machine's mean course, free of noise; a number = one course as its sensors would record it
     start_temperature_c: of the spindle; None = ambient
 
-    Raises ProgramError where a control would refuse the program, MachineError where the machine has not got its axes or the run
+    Raises PartProgramError where a control would refuse the program, MachineError where the machine lacks its axes or the run
     would be longer than 8 million ticks, EffectError where its effects do not fit.
     """
     notes: list[str] = []

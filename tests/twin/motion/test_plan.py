@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import twin.motion.path
 import twin.motion.plan
 from benchmarks.program_columns import program_columns
-from twin.errors import MachineError, ProgramError
+from twin.errors import MachineError, PartProgramError
 from twin.gcode import canonical
 from twin.machine import Program
 from twin.motion.candidates import plan_times
@@ -97,7 +97,7 @@ def test_overrides_scale_feed_and_rapid_apart() -> None:
 
 
 def test_a_feed_of_nothing_is_refused_by_line() -> None:
-    with pytest.raises(ProgramError, match="line 1: F: the feed at segment 0"):
+    with pytest.raises(PartProgramError, match="line 1: F: the feed at segment 0"):
         plan(line((1.0, 0.0, 0.0), feed=0.0), LIMITS)
 
 
