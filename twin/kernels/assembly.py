@@ -1,6 +1,8 @@
 """The assembly of a stage's kernel: the effects that act in it, the constants that it takes, its text, and the function to call.
 
-Servo, process, spindle, heat and sensor are assembled here; each brings its physics and the loop around it.
+Servo, process, spindle, heat and sensor are assembled here; each brings its physics and the loop around it. Their functions take
+numbers and arrays, no named tuples: numba keeps a compiled function with the types of its arguments under the hash of the text,
+which would stay the same where the class of a tuple changes or moves.
 """
 
 from collections.abc import Callable, Iterable, Mapping

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.kernels.compiling import kernel
+from twin.motion.look_ahead import Stretches
 from twin.motion.motion import ExecState, Motion
 from twin.motion.path import EventKind
 from twin.motion.plan import Plan
@@ -23,22 +24,11 @@ Ints = NDArray[np.int64]
 
 def sampled(plan: Plan, period_s: float, average_s: tuple[float, ...] = ()) -> Motion:
     """The motion of `plan` every `period_s`; `average_s` are the lengths of the moving averages after interpolation."""
-    path, made = plan.path, plan.stretches
+    path = plan.path
     windows = [max(1, round(length / period_s)) for length in average_s]
     ticks = int(np.ceil(plan.total_s / period_s - 1e-9)) + 1 + sum(window - 1 for window in windows)
     t: Floats = np.arange(ticks, dtype=np.float64) * np.float64(period_s)
-    segment, s, speed = _places(
-        t,
-        made.first,
-        made.length_mm,
-        made.acceleration_mm_s2,
-        made.jerk_mm_s3,
-        made.speed_mm_s,
-        made.peak_mm_s,
-        made.start_s,
-        made.offset_mm,
-        path.length_mm,
-    )
+    segment, s, speed = _places(t, plan.stretches, plan.stretch_start_s, plan.offset_mm, path.length_mm)
     reference = path.at(segment, s) if len(path) else np.zeros((ticks, len(path.axes)))
     for window in windows:
         reference = moving_average(reference, window)
@@ -62,18 +52,10 @@ def sampled(plan: Plan, period_s: float, average_s: tuple[float, ...] = ()) -> M
 
 @kernel
 def _places(
-    t: Floats,
-    first: Ints,
-    length: Floats,
-    a: Floats,
-    j: Floats,
-    v: Floats,
-    peak: Floats,
-    start: Floats,
-    offset: Floats,
-    segment_length: Floats,
+    t: Floats, stretches: Stretches, start: Floats, offset: Floats, segment_length: Floats
 ) -> tuple[Ints, Floats, Floats]:
     """Segment, distance in it and speed at each of the times `t`, which ascend. Between stretches the axes stand."""
+    first, length, a, j, v, peak, _seconds = stretches
     n, m = len(t), len(length)
     segment, s, speed = np.zeros(n, dtype=np.int64), np.zeros(n), np.zeros(n)
     i, k = 0, 0
@@ -145,7 +127,7 @@ def _tools(plan: Plan, t: Floats) -> tuple[Ints, NDArray[np.bool_]]:
 
 def _with_waits(plan: Plan) -> Floats:
     """When the block of each segment (n,) begins: with its wait for the spindle, after all that happens before."""
-    begun, wait = plan.start_s.copy(), plan.stretches.wait_s
+    begun, wait = plan.start_s.copy(), plan.wait_s
     at = plan.stretches.first[:-1][wait > 0.0]
     event = np.searchsorted([event.segment for event in plan.path.events], at, side="right") - 1
     ended = plan.event_start_s[event] + plan.event_duration_s[event]
