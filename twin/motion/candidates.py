@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.kernels.compiling import kernel
-from twin.machine import Program
 from twin.motion.geometry import Segments
 from twin.motion.limits import Bounds, Limits, bounds
 from twin.motion.look_ahead import stretches_with_times
@@ -21,7 +20,6 @@ from twin.motion.plan import segment_times, speed_caps
 from twin.motion.timeline import ControlTimes, EventRows, control_times, event_rows, timeline
 
 Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 SPINDLE = 2
 
@@ -84,14 +82,6 @@ class Candidates:
             wear or no_wear(len(self.path)),
             wear is not None,
         )
-
-
-def plan_times(path: Path, times: Program | Limits, feed_mm_min: Floats) -> Floats:
-    """Total seconds (candidates,) of the path at each row of `feed_mm_min` (candidates, n): `plan(…).total_s`, nothing else."""
-    limits = Limits.of(times) if isinstance(times, Program) else times
-    feeds = np.atleast_2d(np.asarray(feed_mm_min, dtype=np.float64))
-    values = event_rows(path.events).value
-    return Candidates.of(path, limits).seconds_and_wear(feeds, np.broadcast_to(values, (len(feeds), len(values))))[0]
 
 
 def no_wear(segments: int) -> Wear:

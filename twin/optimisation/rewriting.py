@@ -31,7 +31,6 @@ from twin.optimisation.words import (
 )
 
 Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 ROUNDS_MAX = 4
 SAME = 1e-9
 S_IS_NO_SPEED_G = frozenset({100, 500, 650, 660, 670, 920, 960})

@@ -14,7 +14,7 @@ from benchmarks.program_columns import program_columns
 from twin.errors import MachineError, PartProgramError
 from twin.gcode import canonical
 from twin.machine import Program
-from twin.motion.candidates import plan_times
+from twin.motion.candidates import Candidates
 from twin.motion.limits import Limits
 from twin.motion.motion import ExecState
 from twin.motion.path import Path, path_from_moves
@@ -230,7 +230,8 @@ def test_a_batch_of_feeds_takes_what_each_of_them_takes(path: Path, jerk: float,
     limits = LIMITS.with_(jerk_mm_s3=jerk)
     feeds = np.outer(factors, path.feed_mm_min)
     alone = [plan(path, limits, feed_override=factor).total_s for factor in factors]
-    assert plan_times(path, limits, feeds) == pytest.approx(alone, rel=1e-12)
+    values = np.broadcast_to([event.value for event in path.events], (len(feeds), len(path.events)))
+    assert Candidates.of(path, limits).seconds_and_wear(feeds, values)[0] == pytest.approx(alone, rel=1e-12)
 
 
 def test_short_blocks_are_joined_where_their_corners_do_not_bind() -> None:
