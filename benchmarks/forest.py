@@ -28,10 +28,10 @@ from sklearn.ensemble import IsolationForest, RandomForestRegressor
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
+from benchmarks.saved_regression import load_regression, save_regression
 from twin.anomaly.detector import flattened
 from twin.anomaly.model import load_model, save_model
 from twin.forest import IsolationScorer, flatten_isolation, flatten_regression
-from twin.forest.regression import load_regression, save_regression
 
 Floats = NDArray[np.float64]
 Score = Callable[[Floats], Floats]

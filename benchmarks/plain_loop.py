@@ -15,6 +15,7 @@ from twin.machine import MachineFile
 from twin.motion.path import Path as ToolPath
 from twin.motion.path import path_from_moves
 from twin.motion.plan import plan
+from twin.motion.sampling import sampled
 from twin.servo.constants import axis_constants
 
 Floats = NDArray[np.float64]
@@ -45,7 +46,7 @@ def motion_of(machine: MachineFile, text: str, ticks: int) -> Motion:
         if planned.total_s >= ticks * PERIOD_S:
             break
         repeats = max(repeats + 1, math.ceil(repeats * ticks * PERIOD_S / planned.total_s))
-    reference = planned.sample(PERIOD_S).reference_mm[:ticks]
+    reference = sampled(planned, PERIOD_S).reference_mm[:ticks]
     return Motion(path, {a: np.ascontiguousarray(reference[:, i]) for i, a in enumerate("xyz")}, ticks)
 
 

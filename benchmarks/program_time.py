@@ -28,11 +28,13 @@ import sys
 from pathlib import Path
 from time import perf_counter
 
+import numpy as np
+
 from benchmarks.program_spindle import SpindleRamp, run_ups, spindle_ramp
 from twin.identification.programs.recording import RecordedProgram, recorded_programs
 from twin.identification.programs.time import PARAMETERS, Comparison, ProgramTimes, compare, ideal_limits, identify_program_times
 from twin.recording.observations import read_observations
-from twin.recording.program_run import program_runs
+from twin.recording.program_run import OVERRIDES, ProgramRun, program_runs
 
 PLATES = ("01", "02", "03", "04", "10", "11", "13", "14", "15", "19")
 FITTED = ("13", "14", "15")
@@ -112,12 +114,23 @@ def fitted(programs: list[RecordedProgram], parameters: tuple[str, ...], overrid
     return identify_program_times(programs, parameters, limits, overrides)
 
 
+def overrides_moved(run: ProgramRun) -> tuple[str, ...]:
+    """Return the overrides that were turned during the run."""
+    moved = []
+    for name in OVERRIDES.values():
+        values = np.asarray(run.columns[name], dtype=np.float64)
+        known = values[~np.isnan(values)]
+        if len(known) and np.ptp(known) > 0.0:
+            moved.append(name.removesuffix("_override_pct"))
+    return tuple(moved)
+
+
 def runs_table(programs: list[RecordedProgram]) -> None:
     """Print what the recordings themselves say of each run."""
     print(f"{'run':12} {'lasted s':>9} {'active s':>9} {'pauses':>6}  overrides moved; judged?")
     for program in programs:
         run = program.run
-        moved = ", ".join(run.overrides_moved) or "none"
+        moved = ", ".join(overrides_moved(run)) or "none"
         why = program.refusal()
         judged = f"no: {why}" if why else "yes"
         print(f"{program.name:12} {run.duration_s:9.1f} {run.active_s:9.1f} {len(run.pauses):6d}  {moved}; {judged}")

@@ -36,7 +36,7 @@ from twin.residual.recorded_run import Samples, recorded_of
 from twin.residual.region_fit import region_of
 from twin.residual.split import blocks_of
 from twin.residual.table import Recorded, Table, offered, table_of
-from twin.residual.training import Asked, Outcome, fitted, trained
+from twin.residual.training import Outcome, TrainingSettings, fitted, trained
 
 Floats = NDArray[np.float64]
 NEW_PROGRAM, TWICE = (0.7, 0.95), (2.0, 2.0)
@@ -55,7 +55,7 @@ def days(thermal: Thermal, seed: int) -> Recorded:
     return simulated_days((*ordinary_days(6), *late), thermal, seed)
 
 
-def by_set(recorded: Recorded, asked: Asked, about: Trained) -> dict[str, Any]:
+def by_set(recorded: Recorded, asked: TrainingSettings, about: Trained) -> dict[str, Any]:
     """Each feature set, judged alike."""
     found: dict[str, Any] = {}
     for name in SETS:
@@ -65,7 +65,7 @@ def by_set(recorded: Recorded, asked: Asked, about: Trained) -> dict[str, Any]:
     return found
 
 
-def shuffled_hours(done: Outcome, name: str, asked: Asked) -> dict[str, float]:
+def shuffled_hours(done: Outcome, name: str, asked: TrainingSettings) -> dict[str, float]:
     """Gain of a forest whose held-out hours are drawn by lot, beside that on later time; rows and trees alike."""
     table = done.table
     x, y = table.of(SETS[name]), table.residual_k
@@ -134,7 +134,7 @@ def regions(train: Table, held: Table, fars: dict[str, Table], seed: int) -> dic
     return found
 
 
-def nulls(recorded: Recorded, count: int, asked: Asked, about: Trained) -> dict[str, Any]:
+def nulls(recorded: Recorded, count: int, asked: TrainingSettings, about: Trained) -> dict[str, Any]:
     """Residuals that wander by themselves, whatever the machine does: how many of such models are accepted."""
     accepted, unjudged, gains = 0, 0, []
     for seed in range(count):
@@ -168,7 +168,7 @@ def cost(done: Outcome, rows: Floats) -> float:
     return (time.perf_counter() - began) / len(listed) * 1e6
 
 
-def mazak(path: Path, asked: Asked) -> dict[str, Any]:
+def mazak(path: Path, asked: TrainingSettings) -> dict[str, Any]:
     """The second spindle of a real machine: its temperature swings with its spindles at rest (ambient: not recorded, 24 °C)."""
     told: dict[str, list[tuple[float, float]]] = {}
     names = {"S2rpm": SPEED, "S2load": LOAD, "S2temp": MEASURED, "Fact": "feed_mm_min", "Xabs": "axis_x_pos_mm"}
@@ -195,7 +195,7 @@ def mazak(path: Path, asked: Asked) -> dict[str, Any]:
     return {"hours": recorded.hours, "cutting_hours": recorded.cutting_hours, **held.model_dump(), "refused": held.why_refused}
 
 
-def all_the_same(recorded: Recorded, asked: Asked) -> dict[str, float]:
+def all_the_same(recorded: Recorded, asked: TrainingSettings) -> dict[str, float]:
     """RMSE on the second half of a forest that was trained on the first, whatever such a figure is worth, K."""
     table = table_of(recorded, offered(recorded, SETS["published"]), asked.row_s)
     half = len(table.t_s) // 2
@@ -211,7 +211,7 @@ def _number(text: str) -> float:
         return np.nan
 
 
-def measured(asked: Asked, null_count: int, data: Path) -> dict[str, Any]:
+def measured(asked: TrainingSettings, null_count: int, data: Path) -> dict[str, Any]:
     """Everything."""
     thermal, physics = machine()
     about = Trained(machine="vmc", physics=physics)
@@ -255,7 +255,7 @@ def main() -> None:
     parser.add_argument("--data", type=Path, default=Path(os.environ.get("CNCTWIN_DATA", here)))
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
-    found = measured(Asked(trees=options.trees), options.nulls, options.data)
+    found = measured(TrainingSettings(trees=options.trees), options.nulls, options.data)
     if options.json:
         print(json.dumps(found))
         return

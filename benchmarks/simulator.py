@@ -41,6 +41,7 @@ from twin.effects.effect import Effect, On
 from twin.heat.run import Warming, spindle_temperature_c, thermal_constants, thermal_quantities
 from twin.machine import AddedEffect, MachineFile, machine_from_toml
 from twin.motion.plan import plan
+from twin.motion.sampling import sampled
 from twin.process.kernel import process_quantities
 from twin.process.milling import milling_force, tool_constants
 from twin.servo.constants import axis_constants, effect_constants
@@ -259,7 +260,7 @@ def stage_rows(machine: MachineFile, motion: Motion, repeats: int) -> dict[str, 
     pulls = np.concatenate([-force.mean_force_x_n, -force.mean_force_y_n, np.zeros((1, motion.ticks))])
     runs: dict[str, Run] = {
         "plan": lambda: plan(motion.path, machine.program),
-        "sample": lambda: planned.sample(PERIOD_S),
+        "sample": lambda: sampled(planned, PERIOD_S),
         "servo": axes_call(machine, motion, 1, disturbance=lambda: pulls),
         "force": lambda: milling_force(tool, machine.tool.teeth, milling, period_s=PERIOD_S),
         "load": lambda: spindle_load_pct(spindle, power, told.spindle_rpm, period_s=PERIOD_S),

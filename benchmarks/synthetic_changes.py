@@ -12,7 +12,7 @@ from scipy.signal import lfilter
 
 from twin.transient.evidence import UNKNOWN
 from twin.transient.stream import Stream
-from twin.transient.training import Asked, Trained, trained
+from twin.transient.training import Trained, TrainingSettings, trained
 
 Floats = NDArray[np.float64]
 PERIOD_S = 0.1
@@ -106,5 +106,5 @@ def _stream(values: Floats) -> Stream:
 def learned_from(captures: int, null_hours: float, snr_db: float, rng: np.random.Generator) -> Trained:
     """A detector from a few captures in noise, and a null stream."""
     given = stream_of_changes(captures, snr_db, rng, stretched=False, stalled=False)
-    asked = Asked("spindle_current_a", before_s=9.0, after_s=9.0)
+    asked = TrainingSettings("spindle_current_a", before_s=9.0, after_s=9.0)
     return trained([given, null_stream(null_hours, snr_db, rng)], asked, rng)

@@ -42,7 +42,7 @@ from twin.transient.evidence import UNKNOWN
 from twin.transient.replay import replayed
 from twin.transient.stream import Stream, held, resting, standing
 from twin.transient.template import Template
-from twin.transient.training import Asked, trained
+from twin.transient.training import TrainingSettings, trained
 
 Floats = NDArray[np.float64]
 DATA = Path(os.environ.get("CNCTWIN_DATA", Path(__file__).parent.parent.parent / "shared" / "data"))
@@ -234,7 +234,7 @@ class Tally:
 
 def nist() -> dict[str, Any]:
     """Recall and precision by part, detector and slack; onsets and how the gate stood at the label."""
-    done = trained(training_streams(), Asked("spindle_rpm"), np.random.default_rng(0))
+    done = trained(training_streams(), TrainingSettings("spindle_rpm"), np.random.default_rng(0))
     alone = replace(done.detector, weighing=None)
     tallies: dict[str, Tally] = {}
     begun, opened, confirmed, at_label, hours = [], [], [], [], 0.0

@@ -1,7 +1,7 @@
 """What can go wrong in the twin, in one tree. Each message names the culprit, its value and the way out.
 
 TwinError
-├── ProgramError      a part program that the control would refuse: line, word, reason
+├── PartProgramError  a part program that the control would refuse: line, word, reason
 ├── MachineError      a machine.toml that does not describe a machine
 ├── RunLogError       a recording that is not a run log
 ├── CaseError         a case folder that is not a case
@@ -49,7 +49,7 @@ class LimitsError(OptimisationError):
     """Limits that leave a line nothing: the answer is bad news, the question was not wrong."""
 
 
-class ProgramError(TwinError):
+class PartProgramError(TwinError):
     """A part program that cannot be run.
 
     line: 1-based, as an editor counts

@@ -22,12 +22,14 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.program_columns import program_columns
 from twin.case import Case, read_case
 from twin.gap.diagnosis import Diagnosed
 from twin.gap.programs.diagnose import diagnose_programs
 from twin.gcode import interpret
 from twin.motion.control import LENGTH_OVER_FEED, changed
 from twin.motion.path import path_from_moves
+from twin.motion.sampling import sampled
 from twin.recording.observations import last_values, read_observations
 from twin.recording.program_run import OVERRIDES, program_runs
 from twin.runlog import run_log, write_run
@@ -99,8 +101,8 @@ def withheld_case(folder: Path, effects: Mapping[str, Mapping[str, float]], peri
     entries = []
     for number, (feed, role) in enumerate([(1200, "fit"), (2400, "fit"), (4000, "fit"), (1700, "check"), (3200, "check")]):
         text = shop_program(feed, number)
-        motion = changed(LENGTH_OVER_FEED, effects).plan(path_from_moves(interpret(text))).sample(period_s)
-        columns: dict[str, NDArray[np.generic]] = motion.program_columns()
+        motion = sampled(changed(LENGTH_OVER_FEED, effects).plan(path_from_moves(interpret(text))), period_s)
+        columns: dict[str, NDArray[np.generic]] = program_columns(motion)
         write_run(run_log(columns, f"made_{number}"), folder / f"made_{number}.parquet")
         (folder / f"made_{number}.nc").write_text(text, encoding="utf-8")
         entries.append(RUN.format(f"made_{number}.parquet", role, f"made_{number}.nc"))

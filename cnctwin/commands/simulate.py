@@ -29,7 +29,7 @@ def simulate(
 ) -> None:
     """Run a part program on the twin as on a machine: time, peak force, following error, and a run log."""
     with needed_by("the twin", "twin"):
-        from twin.errors import EffectError, ProgramError
+        from twin.errors import EffectError, PartProgramError
         from twin.machine import read_machine
         from twin.runlog import write_run
         from twin.simulator.response import check_effects
@@ -44,7 +44,7 @@ def simulate(
     with working("simulating"):
         try:
             done = simulated(described, text, seed=seed, name=program.name)
-        except ProgramError as error:
+        except PartProgramError as error:
             raise UsageError(f"{program}: {error}") from None
         if out is not None:
             write(lambda: write_run(done.run, out), out)

@@ -84,14 +84,6 @@ def left_over_rows(
     return left
 
 
-def lengths(preparation: Preparation, left: "NDArray[np.float64]") -> "NDArray[np.float64]":
-    """`length` of rows (T, F)."""
-    import numpy as np  # noqa: PLC0415
-
-    shares = left / np.where(left > 0.0, np.array(preparation.up), np.array(preparation.down))
-    return np.asarray(np.sqrt((shares**2).sum(axis=1)), dtype=np.float64)
-
-
 def with_tails(preparation: Preparation, left: "NDArray[np.float64]") -> Preparation:
     """The preparation with the tails of what was left in the training data, rows (T, F) that are judged.
 

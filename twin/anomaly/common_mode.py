@@ -84,30 +84,6 @@ def standardised(raw: float, center: float, spread: float) -> float:
     return (raw - center) / spread
 
 
-def adjust_one(
-    rule: CommonModeRule, own: float | None, is_gated: bool, peers: Sequence[float | None], are_peers_gated: Sequence[bool]
-) -> Adjusted:
-    """Judge one machine beside its peers. Scores are raw ones for `source`, z for `residual`; None = not known.
-
-    A peer whose score is not known does not count. The own score is 0.2, a peer has 0.15, which is more than half of it:
-
-    >>> adjust_one(CommonModeRule(), 0.2, False, [0.15, -0.1], [False, False])
-    Adjusted(score=0.0, is_common=True, peer=0, peers=2)
-    >>> adjust_one(CommonModeRule(exclude_gated_peers=True), 0.2, False, [0.15, -0.1], [True, False])
-    Adjusted(score=0.2, is_common=False, peer=1, peers=1)
-    """
-    leaves_out = rule.leaves_gated_peers_out
-    counted = [
-        (score, place) for place, score in enumerate(peers) if score is not None and not (leaves_out and are_peers_gated[place])
-    ]
-    largest, peer = max(counted, key=lambda pair: pair[0]) if counted else (0.0, None)
-    if rule.method is Method.SOURCE or len(counted) < MEDIAN_PEERS_MIN:
-        return _left(rule, own, is_gated, largest, peer, len(counted))
-    scores = sorted(pair[0] for pair in counted)
-    centre = 0.5 * (scores[(len(scores) - 1) // 2] + scores[len(scores) // 2])
-    return _left(rule, own, is_gated, centre, peer, len(counted))
-
-
 def _left(rule: CommonModeRule, own: float | None, is_gated: bool, centre: float, peer: int | None, peers: int) -> Adjusted:
     """What is left of a score; centre: of the peers' for the residual, the largest of them for `source`."""
     if own is None:

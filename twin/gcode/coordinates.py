@@ -7,15 +7,12 @@ S is G51 (about its centre, a factor an axis, negative = mirror), R is G68 (in i
 """
 
 import math
-from collections.abc import Mapping
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 from twin.gcode.canonical import Position
+from twin.gcode.planes import PLANES
 from twin.gcode.refusal import RefusedError
 from twin.gcode.settings import Settings
-
-PLANES: Final[Mapping[int, tuple[int, int, int]]] = {17: (0, 1, 2), 18: (2, 0, 1), 19: (1, 2, 0)}
-"""First and second axis and normal of G17, G18, G19, so that first to second is counter-clockwise about the normal."""
 
 EXTENDED_MAX = 48
 

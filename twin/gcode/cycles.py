@@ -13,7 +13,7 @@ from twin.gcode import motion
 from twin.gcode.block import Words
 from twin.gcode.canonical import Dwell, Linear, ProgramStop, Rapid, SpindleOrient
 from twin.gcode.codes import written
-from twin.gcode.coordinates import PLANES
+from twin.gcode.planes import PLANES
 from twin.gcode.refusal import RefusedError
 from twin.gcode.settings import DwellUnit
 from twin.gcode.spindle import follow_surface_speed, turn

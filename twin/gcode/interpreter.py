@@ -7,7 +7,7 @@ out at once; everything else is compiled to a `Block` once and run by `modes.exe
 import re
 from typing import Final
 
-from twin.errors import ProgramError
+from twin.errors import PartProgramError
 from twin.gcode import compensation, flow, modes
 from twin.gcode.arcs import by_centre
 from twin.gcode.block import Kind, Words, parse
@@ -49,7 +49,7 @@ class Interpreter:
         self.blocks_run = 0
 
     def run(self) -> list[Move]:
-        """All moves of the program; ProgramError at the first block that cannot be run."""
+        """All moves of the program; PartProgramError at the first block that cannot be run."""
         try:
             running = True
             while running:
@@ -61,7 +61,7 @@ class Interpreter:
             self.no_open_corner()
         except RefusedError as refused:
             line, program = refused.place or (self.state.line, self.state.program)
-            raise ProgramError(line + 1, refused.word, refused.reason, program) from None
+            raise PartProgramError(line + 1, refused.word, refused.reason, program) from None
         return self.state.moves
 
     def no_open_corner(self) -> None:
@@ -234,7 +234,7 @@ def interpret(text: str, settings: Settings | None = None) -> list[Move]:
     text: FANUC-type mill dialect; lines may end in any way
     settings: what is not in the text; None = `Settings()`
 
-    Raises ProgramError (line, word, reason) where the control would refuse a block.
+    Raises PartProgramError (line, word, reason) where the control would refuse a block.
 
     >>> for move in interpret("G21 G90\\nG1 X10. F600\\nM30"):
     ...     print(move)

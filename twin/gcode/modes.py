@@ -7,7 +7,7 @@ from twin.gcode import compensation, cycles, motion, offsets, spindle
 from twin.gcode.block import Words
 from twin.gcode.canonical import Coolant, Dwell, ExactStop, LookAhead, ProgramStop, ToolChange
 from twin.gcode.codes import M_CODES
-from twin.gcode.coordinates import PLANES
+from twin.gcode.planes import PLANES
 from twin.gcode.refusal import RefusedError
 from twin.gcode.settings import DwellUnit, IntegerWords
 from twin.gcode.state import State

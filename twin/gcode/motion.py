@@ -8,7 +8,7 @@ from twin.gcode.arcs import Sweep, arc_length, by_centre, by_radius
 from twin.gcode.block import Words
 from twin.gcode.canonical import Arc, ExactStop, Linear, Position, Rapid
 from twin.gcode.codes import written
-from twin.gcode.coordinates import PLANES
+from twin.gcode.planes import PLANES
 from twin.gcode.refusal import RefusedError
 from twin.gcode.spindle import follow_surface_speed
 from twin.gcode.state import Motion, PolarPole, State

@@ -5,9 +5,10 @@ from typing import Final
 
 from twin.gcode.block import Words
 from twin.gcode.compensation import in_force
-from twin.gcode.coordinates import EXTENDED_MAX, PLANES, Scaling
+from twin.gcode.coordinates import EXTENDED_MAX, Scaling
 from twin.gcode.coordinates import rotation as rotated
 from twin.gcode.motion import axis_letters
+from twin.gcode.planes import PLANES
 from twin.gcode.refusal import RefusedError
 from twin.gcode.settings import OffsetLookup
 from twin.gcode.state import State

@@ -2,8 +2,8 @@
 
 from twin.gcode.arcs import Point
 from twin.gcode.canonical import Arc, Linear, Position, Rapid
-from twin.gcode.coordinates import PLANES
 from twin.gcode.planar import Piece
+from twin.gcode.planes import PLANES
 from twin.gcode.refusal import RefusedError
 from twin.gcode.state import Motion
 

@@ -6,29 +6,27 @@ A sample that an input has not got is the last one that it had, so signals of se
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from twin.effects.catalogue import effect_named
 from twin.effects.effect import Effect
-from twin.errors import EffectError, TwinError
+from twin.errors import TwinError
 from twin.heat import network
-from twin.kernels.generated import compiled, in_python
-from twin.kernels.weave import quantities, weave
+from twin.kernels.assembly import KERNEL, Assembly, Scalars, kernel_function, kernel_text
+from twin.kernels.weave import weave
 from twin.machine import Thermal
 
 Array = NDArray[np.float64]
-PHYSICS = (network.heat, network.step)
+HEAT = Assembly((network.heat, network.step), acts_on="the spindle's heat", owner="the spindle's heat")
 INPUTS = ("spindle_load_pct", "spindle_rpm", "ambient_c", "coolant_on")
-FED = {*INPUTS, "temperature_c", "duration_s", "time_s"}
+FED = (*INPUTS, "temperature_c", "duration_s", "time_s")
 
 
 @cache
 def thermal_quantities() -> dict[str, str]:
     """The quantities of the spindle's heat that an effect can change, with their sites."""
-    return quantities(PHYSICS)
+    return HEAT.quantities()
 
 
 def thermal_constants(thermal: Thermal) -> dict[str, float]:
@@ -84,16 +82,10 @@ def spindle_temperature_c(
     Raises TwinError where times do not increase, an input has no sample at all or does not fit; EffectError where a constant is
     missing or an effect does not act on the spindle's heat.
     """
-    acting = tuple(effect_named(name) for name in effects)
-    for effect in acting:
-        if not set(effect.changes) & set(thermal_quantities()):
-            raise EffectError(f"{effect.name} does not act on the spindle's heat; it acts at the {effect.site} site")
-    text, names = _kernel(acting)
-    for name in names:
-        if name not in constants:
-            raise EffectError(f"the constant {name} of the spindle's heat is missing")
+    text, names = _kernel(HEAT.effects(effects))
+    given = HEAT.taken(constants, names)
     times, inputs = _held_inputs(warming)
-    columns = [np.asarray(column, dtype=np.float64).reshape(-1) for column in (start_c, *(constants[name] for name in names))]
+    columns = [np.asarray(column, dtype=np.float64).reshape(-1) for column in (start_c, *given)]
     try:
         start, *rest = np.broadcast_arrays(*columns)
     except ValueError:
@@ -101,14 +93,9 @@ def spindle_temperature_c(
         raise TwinError(f"{sizes} do not fit each other; each has one value, or one for each lane") from None
     rows = np.array(rest).T.reshape(len(start), len(names))
     out = np.empty((len(start), len(times)))
-    warm: Any = in_python(text)["warm"] if reference_run else compiled(text).warm
+    warm = kernel_function(text, "warm", reference_run=reference_run)
     for lane in range(len(start)):
-        if reference_run:
-            shown = [0.0] * len(times)
-            warm(rows[lane].tolist(), float(start[lane]), times.tolist(), *[x.tolist() for x in inputs], shown)
-            out[lane] = shown
-        else:
-            warm(np.ascontiguousarray(rows[lane]), float(start[lane]), times, *inputs, out[lane])
+        warm(np.ascontiguousarray(rows[lane]), float(start[lane]), times, *inputs, out[lane])
     return out
 
 
@@ -144,24 +131,20 @@ def _held_inputs(warming: Warming) -> tuple[Array, list[Array]]:
 @cache
 def _kernel(effects: tuple[Effect, ...]) -> tuple[str, tuple[str, ...]]:
     """The text that defines `warm`, and the constants that it takes, in order."""
-    woven = weave(PHYSICS, effects)
-    states = {f"{effect.name}__{name}": value for effect in effects for name, value in effect.states.items()}
-    states = {name: value for name, value in states.items() if name in woven.takes}
-    names = tuple(name for name in woven.takes if name not in FED | set(states))
+    woven = weave(HEAT.physics, effects)
+    scalars = Scalars.of(woven, effects, FED)
     arguments = ", ".join(f"{name}_in" for name in INPUTS)
-    start = [f"given__{name} = constants[{row}]" for row, name in enumerate(names)]
-    start += ["temperature_c = start_c", *(f"{name} = {value}" for name, value in states.items())]
+    start = [*scalars.before_loop(), "temperature_c = start_c", *scalars.states_at_start()]
     tick = ["shown_c[sample] = temperature_c", "if sample + 1 < len(t_s):"]
     body = ["time_s = t_s[sample]", "duration_s = t_s[sample + 1] - time_s"]
-    body += [f"{name} = {name}_in[sample]" for name in INPUTS] + [f"{name} = given__{name}" for name in names]
+    body += [f"{name} = {name}_in[sample]" for name in INPUTS] + scalars.in_loop()
     body += [*woven.body.splitlines(), "temperature_c = temperature_next_c"]
     lines = [
-        "@njit(cache=True, nogil=True, error_model='numpy')",
+        KERNEL,
         f"def warm(constants, start_c, t_s, {arguments}, shown_c):",
         *(f"    {line}" for line in start),
         "    for sample in range(len(t_s)):",
         *(f"        {line}" for line in tick),
         *(f"            {line}" for line in body),
     ]
-    functions = [f"@njit(error_model='numpy')\n{text}" for text in woven.functions]
-    return "\n\n\n".join(["from math import exp, sqrt", *functions, "\n".join(lines)]) + "\n", names
+    return kernel_text("from math import exp, sqrt", woven.functions, ["\n".join(lines)]), scalars.constants

@@ -8,7 +8,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from twin.case import Case, Run, RunKind
 from twin.errors import CaseError
@@ -23,7 +22,6 @@ from twin.machine import MachineFile
 from twin.simulator.recorded import noise_of, told_of
 from twin.simulator.response import milling_of
 
-Floats = NDArray[np.float64]
 Progress = Callable[[str], None]
 
 

@@ -6,26 +6,25 @@ none, and the axes do not stop for it.
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from twin.kernels.compiling import kernel
-from twin.machine import Program
+from twin.motion.geometry import Segments
 from twin.motion.limits import Bounds, Limits, bounds
 from twin.motion.look_ahead import stretches_with_times
 from twin.motion.path import Event, Path
-from twin.motion.plan import event_arrays, segment_times, speed_caps, stopping_rpm_s
-from twin.motion.timeline import timeline
+from twin.motion.plan import segment_times, speed_caps
+from twin.motion.timeline import ControlTimes, EventRows, control_times, event_rows, timeline
 
 Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 SPINDLE = 2
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Wear:
+class Wear(NamedTuple):
     """How the tool wears: `factor` |n|^exponent a second at n rev/min.
 
     factor: (segments,) on a segment, 0 = nothing is cut there
@@ -69,45 +68,20 @@ class Candidates:
 
         feed_mm_min: (candidates, segments), of any value on rapids; event_value: (candidates, events), as `events` has them
 
-        Raises ProgramError where a feed is none.
+        Raises PartProgramError where a feed is none.
         """
         caps = speed_caps(self.path, self.allowed, np.atleast_2d(feed_mm_min), self.feed_ratio, self.rapid_ratio)
-        segment, kind, _, line = event_arrays(self.events)
-        stated, limits = wear or no_wear(len(self.path)), self.limits
         return _evaluated(
             caps,
             np.ascontiguousarray(np.atleast_2d(event_value)),
-            self.allowed.acceleration_mm_s2,
-            self.allowed.jerk_mm_s3,
-            self.allowed.junction_mm_s,
-            self.path.length_mm,
-            self.path.kind,
-            segment,
-            kind,
-            line,
+            self.allowed,
+            self.path.segments(),
+            event_rows(self.events),
             self.is_optional,
-            self.path.line,
-            (
-                limits.tool_change_s,
-                limits.spindle_acceleration_rpm_s,
-                stopping_rpm_s(limits),
-                limits.spindle_base_rpm,
-                limits.in_position_s,
-                stated.exponent,
-            ),
-            limits.rapid_waits_for_spindle,
-            stated.factor,
-            stated.share,
+            control_times(self.limits),
+            wear or no_wear(len(self.path)),
             wear is not None,
         )
-
-
-def plan_times(path: Path, times: Program | Limits, feed_mm_min: Floats) -> Floats:
-    """Total seconds (candidates,) of the path at each row of `feed_mm_min` (candidates, n): `plan(…).total_s`, nothing else."""
-    limits = Limits.of(times) if isinstance(times, Program) else times
-    feeds = np.atleast_2d(np.asarray(feed_mm_min, dtype=np.float64))
-    values = event_arrays(path.events)[2]
-    return Candidates.of(path, limits).seconds_and_wear(feeds, np.broadcast_to(values, (len(feeds), len(values))))[0]
 
 
 def no_wear(segments: int) -> Wear:
@@ -119,29 +93,23 @@ def no_wear(segments: int) -> Wear:
 def _evaluated(
     caps: Floats,
     event_value: Floats,
-    acceleration: Floats,
-    jerk: Floats,
-    junction: Floats,
-    length: Floats,
-    kind: Ints,
-    event_segment: Ints,
-    event_kind: Ints,
-    event_line: Ints,
+    allowed: Bounds,
+    segments: Segments,
+    events: EventRows,
     optional: Flags,
-    segment_line: Ints,
-    control: tuple[float, float, float, float, float, float],
-    rapid_waits: bool,
-    factor: Floats,
-    share: Floats,
+    control: ControlTimes,
+    wear: Wear,
     wears: bool,
 ) -> tuple[Floats, Floats]:
-    tool_change_s, spindle_rpm_s, stopping_rpm_s, base_rpm, in_position_s, exponent = control
-    count, events = len(caps), len(event_segment)
+    """Return seconds and wear of each candidate; the values of `events` are those of the path, `event_value` the candidates'."""
+    _speed, acceleration, jerk, junction = allowed
+    event_segment, event_kind, _value, event_line = events
+    count, length = len(caps), segments.length_mm
     totals, worn = np.empty(count), np.zeros(count)
     for c in range(count):
-        value, meets, keep, kept = event_value[c].copy(), junction.copy(), np.empty(events, dtype=np.int64), 0
+        value, meets, keep, kept = event_value[c].copy(), junction.copy(), np.empty(len(optional), dtype=np.int64), 0
         rpm = 0.0
-        for e in range(events):
+        for e in range(len(optional)):
             if optional[e]:
                 if value[e] == rpm:
                     continue
@@ -151,42 +119,19 @@ def _evaluated(
             keep[kept] = e
             kept += 1
         mine = keep[:kept]
-        first, total, a, j, v, peak, seconds = stretches_with_times(caps[c], acceleration, jerk, meets, length)
-        _start, _wait, _event_start, _event_seconds, _ramps, totals[c] = timeline(
-            first,
-            seconds,
-            v[1:],
-            kind,
-            event_segment[mine],
-            event_kind[mine],
-            value[mine],
-            event_line[mine],
-            segment_line,
-            tool_change_s,
-            spindle_rpm_s,
-            stopping_rpm_s,
-            base_rpm,
-            rapid_waits,
-            in_position_s,
-        )
+        made = stretches_with_times(caps[c], acceleration, jerk, meets, length)
+        happening = EventRows(event_segment[mine], event_kind[mine], value[mine], event_line[mine])
+        totals[c] = timeline(made, segments, happening, control).total_s
         if wears:
-            moving = segment_times(first, length, total, a, j, v, peak, seconds)
-            worn[c] = _worn(event_segment[mine], event_kind[mine], value[mine], moving, totals[c], factor, share, exponent)
+            worn[c] = _worn(happening, segment_times(made, length), totals[c], wear)
     return totals, worn
 
 
 @kernel
-def _worn(
-    event_segment: Ints,
-    event_kind: Ints,
-    value: Floats,
-    moving: Floats,
-    total_s: float,
-    factor: Floats,
-    share: Floats,
-    exponent: float,
-) -> float:
+def _worn(events: EventRows, moving: Floats, total_s: float, wear: Wear) -> float:
     """The sum of factor · |n|^exponent · seconds, n the speed that is commanded, and what the rest of the time takes."""
+    event_segment, event_kind, value, _line = events
+    factor, share, exponent = wear
     worn, rate, cutting_s, power, at = 0.0, 0.0, 0.0, 0.0, 0
     for k in range(len(moving)):
         while at < len(event_segment) and event_segment[at] <= k:

@@ -1,5 +1,7 @@
 """Points, tangents and curvature along segments: the compiled part of a path. Formulas: see `path`."""
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -7,20 +9,24 @@ from twin.kernels.compiling import kernel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-LINEAR_AXES = 3
 ARC = 2
 
 
-@kernel
-def first_axis(plane: int) -> int:
-    """Index of the first axis of a plane: G17 x, G18 z, G19 y."""
-    return 0 if plane == 17 else (2 if plane == 18 else 1)
+class Segments(NamedTuple):
+    """The segments of a path, n rows.
 
+    line, kind, sweep_rad, length_mm: (n,); start_mm, end_mm, centre_mm: (n, axes)
+    plane_axes: (n, 2) first and second axis of the plane
+    """
 
-@kernel
-def second_axis(plane: int) -> int:
-    """Index of the second axis of a plane: G17 y, G18 x, G19 z."""
-    return 1 if plane == 17 else (0 if plane == 18 else 2)
+    line: Ints
+    kind: Ints
+    start_mm: Floats
+    end_mm: Floats
+    centre_mm: Floats
+    plane_axes: Ints
+    sweep_rad: Floats
+    length_mm: Floats
 
 
 @kernel
@@ -30,18 +36,9 @@ def _polar(point: Floats, centre: Floats, u: int, v: int) -> tuple[float, float]
 
 
 @kernel
-def points_at(
-    segment: Ints,
-    s_mm: Floats,
-    kind: Ints,
-    start_mm: Floats,
-    end_mm: Floats,
-    centre_mm: Floats,
-    plane: Ints,
-    sweep_rad: Floats,
-    length_mm: Floats,
-) -> Floats:
+def points_at(segments: Segments, segment: Ints, s_mm: Floats) -> Floats:
     """Points (n, axes) at distances `s_mm` (n,) of segments `segment` (n,); the ends of a segment are met exactly."""
+    _line, kind, start_mm, end_mm, centre_mm, plane_axes, sweep_rad, length_mm = segments
     axes = start_mm.shape[1]
     points = np.empty((len(segment), axes))
     for n in range(len(segment)):
@@ -53,7 +50,7 @@ def points_at(
         for a in range(axes):
             points[n, a] = start_mm[k, a] + (end_mm[k, a] - start_mm[k, a]) * f
         if kind[k] == ARC and f > 0.0:
-            u, v = first_axis(plane[k]), second_axis(plane[k])
+            u, v = plane_axes[k, 0], plane_axes[k, 1]
             r0, angle = _polar(start_mm[k], centre_mm[k], u, v)
             r1, _ = _polar(end_mm[k], centre_mm[k], u, v)
             radius = r0 + (r1 - r0) * f
@@ -63,18 +60,9 @@ def points_at(
 
 
 @kernel
-def tangents_at(
-    segment: Ints,
-    s_mm: Floats,
-    kind: Ints,
-    start_mm: Floats,
-    end_mm: Floats,
-    centre_mm: Floats,
-    plane: Ints,
-    sweep_rad: Floats,
-    length_mm: Floats,
-) -> Floats:
+def tangents_at(segments: Segments, segment: Ints, s_mm: Floats) -> Floats:
     """dp/ds (n, axes) at distances `s_mm` (n,) of segments `segment` (n,)."""
+    _line, kind, start_mm, end_mm, centre_mm, plane_axes, sweep_rad, length_mm = segments
     axes = start_mm.shape[1]
     tangents = np.empty((len(segment), axes))
     for n in range(len(segment)):
@@ -82,7 +70,7 @@ def tangents_at(
         for a in range(axes):
             tangents[n, a] = (end_mm[k, a] - start_mm[k, a]) / length_mm[k]
         if kind[k] == ARC:
-            u, v = first_axis(plane[k]), second_axis(plane[k])
+            u, v = plane_axes[k, 0], plane_axes[k, 1]
             r0, angle = _polar(start_mm[k], centre_mm[k], u, v)
             r1, _ = _polar(end_mm[k], centre_mm[k], u, v)
             angle += sweep_rad[k] * s_mm[n] / length_mm[k]
@@ -93,14 +81,13 @@ def tangents_at(
 
 
 @kernel
-def curvature_at(
-    kind: Ints, start_mm: Floats, end_mm: Floats, centre_mm: Floats, plane: Ints, sweep_rad: Floats, length_mm: Floats
-) -> Floats:
+def curvature_at(segments: Segments) -> Floats:
     """Curvature (n,) of each segment, 1/mm: r θ² / L²; a circle of 10 mm has 0.1, a line 0."""
+    _line, kind, start_mm, end_mm, centre_mm, plane_axes, sweep_rad, length_mm = segments
     curvature = np.zeros(len(kind))
     for k in range(len(kind)):
         if kind[k] == ARC:
-            u, v = first_axis(plane[k]), second_axis(plane[k])
+            u, v = plane_axes[k, 0], plane_axes[k, 1]
             r0, _ = _polar(start_mm[k], centre_mm[k], u, v)
             r1, _ = _polar(end_mm[k], centre_mm[k], u, v)
             curvature[k] = 0.5 * (r0 + r1) * (sweep_rad[k] / length_mm[k]) ** 2

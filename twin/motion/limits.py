@@ -7,14 +7,15 @@ sin(γ/2)). A limit that is infinite does not exist.
 """
 
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from twin.errors import MachineError
+from twin.gcode.planes import PLANES
 from twin.machine import Program
-from twin.motion.path import PLANE_AXES, Event, EventKind, Kind, Path
+from twin.motion.path import Event, EventKind, Kind, Path
 
 Floats = NDArray[np.float64]
 ACCELERATION_MAX_MM_S2 = 1e9
@@ -87,8 +88,7 @@ class Limits:
         return replace(self, **changes)  # type: ignore[arg-type]
 
 
-@dataclass(frozen=True, slots=True)
-class Bounds:
+class Bounds(NamedTuple):
     """What the limits allow on one path, whatever its feed. mm and s.
 
     speed_mm_s, acceleration_mm_s2, jerk_mm_s3: (n,) along each segment
@@ -135,7 +135,7 @@ def _axis_share(path: Path) -> Floats:
     """The largest |dp_i/ds| of each axis on each segment (n, axes)."""
     zero, every = np.zeros(len(path)), np.arange(len(path))
     share = np.abs(path.tangents(every, zero))
-    for plane, (u, v) in PLANE_AXES.items():
+    for plane, (u, v, _) in PLANES.items():
         arcs = (path.kind == Kind.ARC) & (path.plane == plane)
         share[arcs, u] = share[arcs, v] = np.hypot(share[arcs, u], share[arcs, v])
     return share
@@ -147,10 +147,10 @@ def _centripetal(path: Path, limits: Limits) -> Floats:
         return np.full(len(path), limits.centripetal_mm_s2)
     each = _each_axis(limits.acceleration_mm_s2, path)
     allowed = np.full(len(path), np.inf)
-    for plane, axes in PLANE_AXES.items():
+    for plane, (u, v, _) in PLANES.items():
         arcs = (path.kind == Kind.ARC) & (path.plane == plane)
         if np.any(arcs):
-            allowed[arcs] = np.min(each[list(axes)])
+            allowed[arcs] = np.min(each[[u, v]])
     return allowed
 
 

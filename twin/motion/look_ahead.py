@@ -8,6 +8,8 @@ both that feed and what the corner between them allows, as long as the joined pl
 the fastest is nearly reached.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,6 +22,22 @@ Flags = NDArray[np.bool_]
 JOININGS_MAX = 12
 """Rounds of joining; in practice two to five. If some corner were still passed too fast then, the plan without joining stands."""
 HAIR = 1e-9
+
+
+class Stretches(NamedTuple):
+    """Profiles, one row a stretch (m): ramp, cruise and ramp over consecutive segments. mm, mm/s, s.
+
+    first: (m + 1,) first segment of each, then the number of segments
+    speed_mm_s: (m + 1,) at the start of each and at the end of the last
+    """
+
+    first: Ints
+    length_mm: Floats
+    acceleration_mm_s2: Floats
+    jerk_mm_s3: Floats
+    speed_mm_s: Floats
+    peak_mm_s: Floats
+    seconds: Floats
 
 
 @kernel
@@ -76,10 +94,9 @@ def peaks_and_times(cap: Floats, first: Ints, length: Floats, a: Floats, j: Floa
 
 
 @kernel
-def _part_where_too_fast(
-    joined: Flags, junction: Floats, lengths: Floats, first: Ints, total: Floats, a: Floats, j: Floats, v: Floats, peak: Floats
-) -> int:
+def _part_where_too_fast(joined: Flags, junction: Floats, lengths: Floats, made: Stretches) -> int:
     """Take back each joining whose corner the plan passes too fast; how many."""
+    first, total, a, j, v, peak, _seconds = made
     parted = 0
     for i in range(len(total)):
         s = 0.0
@@ -95,24 +112,26 @@ def _part_where_too_fast(
 
 
 @kernel
-def stretches_with_times(
-    cap: Floats, acceleration: Floats, jerk: Floats, junction: Floats, length: Floats
-) -> tuple[Ints, Floats, Floats, Floats, Floats, Floats, Floats]:
-    """All of it: first segments (m + 1), length, acceleration, jerk (m), end speeds (m + 1), peaks, seconds (m)."""
-    joined = np.zeros(len(cap) + 1, dtype=np.bool_)
+def _profiles(cap: Floats, acceleration: Floats, jerk: Floats, junction: Floats, length: Floats, joined: Flags) -> Stretches:
     first, total, a, j = stretches(cap, acceleration, jerk, junction, length, joined)
     v = end_speeds(cap, junction, first, total, a, j)
     peak, seconds = peaks_and_times(cap, first, total, a, j, v)
-    plain = (first, total, a, j, v, peak, seconds)
-    for i in range(1, len(total)):
+    return Stretches(first, total, a, j, v, peak, seconds)
+
+
+@kernel
+def stretches_with_times(cap: Floats, acceleration: Floats, jerk: Floats, junction: Floats, length: Floats) -> Stretches:
+    """Return the stretches of the fastest plan: joined where that is faster."""
+    joined = np.zeros(len(cap) + 1, dtype=np.bool_)
+    plain = _profiles(cap, acceleration, jerk, junction, length, joined)
+    first, v = plain.first, plain.speed_mm_s
+    for i in range(1, len(plain.length_mm)):
         k = first[i]
         joined[k] = jerk[k] < np.inf and cap[k] == cap[k - 1] and 0.0 < v[i] < min(junction[k], cap[k]) * (1.0 - HAIR)
     if not np.any(joined):
         return plain
     for _ in range(JOININGS_MAX):
-        first, total, a, j = stretches(cap, acceleration, jerk, junction, length, joined)
-        v = end_speeds(cap, junction, first, total, a, j)
-        peak, seconds = peaks_and_times(cap, first, total, a, j, v)
-        if _part_where_too_fast(joined, junction, length, first, total, a, j, v, peak) == 0:
-            return plain if np.sum(seconds) > np.sum(plain[6]) else (first, total, a, j, v, peak, seconds)
+        made = _profiles(cap, acceleration, jerk, junction, length, joined)
+        if _part_where_too_fast(joined, junction, length, made) == 0:
+            return plain if np.sum(made.seconds) > np.sum(plain.seconds) else made
     return plain

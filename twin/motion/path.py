@@ -4,7 +4,7 @@ A line of length L from p₀ to p₁ is p(s) = p₀ + (p₁ − p₀) s / L. An 
 second axis (u, v) is, with the fraction f = s / L, p_u = c_u + r(f) cos(φ₀ + θ f), p_v = c_v + r(f) sin(φ₀ + θ f); the axes
 outside the plane move with f (helix). r(f) goes linearly from the radius of the start to that of the end, which differ by the
 rounding of the program, so that the end is met exactly; L = √((r θ)² + h²) with the mean radius r and the helix height h.
-Planes as ISO 6983 has them: G17 = x, y; G18 = z, x; G19 = y, z. A sweep is positive counter-clockwise seen from the positive
+Planes: `twin.gcode.planes`. A sweep is positive counter-clockwise seen from the positive
 normal of its plane.
 """
 
@@ -16,11 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.gcode import canonical
-from twin.motion.geometry import curvature_at, points_at, tangents_at
+from twin.gcode.planes import PLANES
+from twin.motion.geometry import Segments, curvature_at, points_at, tangents_at
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-PLANE_AXES = {17: (0, 1), 18: (2, 0), 19: (1, 2)}
+PLANE_AXES = np.array([PLANES[code][:2] for code in (17, 18, 19)], dtype=np.int64)
+"""First and second axis, by the number of the plane less 17."""
 LINEAR_AXES = 3
 UP = np.array([0.0, 0.0, 1.0])
 SHORTEST_MM = 1e-9
@@ -89,11 +91,14 @@ class Path:
     def __len__(self) -> int:
         return len(self.line)
 
+    def segments(self) -> Segments:
+        """Return the segments as the kernels take them."""
+        axes = PLANE_AXES[self.plane - 17]
+        return Segments(self.line, self.kind, self.start_mm, self.end_mm, self.centre_mm, axes, self.sweep_rad, self.length_mm)
+
     def at(self, segment: Ints, s_mm: Floats) -> Floats:
         """Points (n, axes) at the distances `s_mm` (n,) from the start of the segments `segment` (n,)."""
-        return points_at(
-            segment, s_mm, self.kind, self.start_mm, self.end_mm, self.centre_mm, self.plane, self.sweep_rad, self.length_mm
-        )
+        return points_at(self.segments(), segment, s_mm)
 
     def tip_at(self, segment: Ints, s_mm: Floats) -> Floats:
         """x, y, z of the tool's tip (n, 3) at these distances: the axes stand higher by the length of the tool."""
@@ -109,13 +114,11 @@ class Path:
 
     def tangents(self, segment: Ints, s_mm: Floats) -> Floats:
         """dp/ds (n, axes): of length 1 in the axes that the feed counts."""
-        return tangents_at(
-            segment, s_mm, self.kind, self.start_mm, self.end_mm, self.centre_mm, self.plane, self.sweep_rad, self.length_mm
-        )
+        return tangents_at(self.segments(), segment, s_mm)
 
     def curvature_per_mm(self) -> Floats:
         """Curvature (n,) of each segment, 1/mm: r θ² / L² of an arc (that of the helix), 0 of a line."""
-        return curvature_at(self.kind, self.start_mm, self.end_mm, self.centre_mm, self.plane, self.sweep_rad, self.length_mm)
+        return curvature_at(self.segments())
 
     def commanded_rpm(self) -> Floats:
         """The speed of the spindle that is commanded on each segment (n,), rev/min; negative = M4."""
@@ -168,10 +171,9 @@ def _length(
     """What the feed counts: the way of the linear axes, or that of the rotary ones where nothing else moves."""
     moved = [b - a for a, b in zip(start, end, strict=True)]
     if centre is not None:
-        u, v = PLANE_AXES[plane]
+        u, v, normal = PLANES[plane]
         radius = (_radius(start, centre, u, v) + _radius(end, centre, u, v)) / 2.0
-        height = next(moved[i] for i in range(LINEAR_AXES) if i not in {u, v})
-        return float(np.hypot(radius * sweep, height))
+        return float(np.hypot(radius * sweep, moved[normal]))
     linear = float(np.sqrt(sum(d * d for d in moved[:LINEAR_AXES])))
     return linear if linear >= SHORTEST_MM else float(np.sqrt(sum(d * d for d in moved[LINEAR_AXES:])))
 

@@ -1,20 +1,21 @@
-"""The plan of a program: the speed along every segment and the time of every event; sampled, the reference of every tick."""
+"""The plan of a program: the speed along every segment and the time of every event.
 
-from collections.abc import Sequence
+`twin.motion.sampling` turns it into the reference of every tick.
+"""
+
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.errors import ProgramError
+from twin.errors import PartProgramError
 from twin.kernels.compiling import kernel
 from twin.machine import Program
 from twin.motion.limits import Bounds, Limits, bounds
-from twin.motion.look_ahead import stretches_with_times
-from twin.motion.motion import Motion, sampled
-from twin.motion.path import Event, Kind, Path
+from twin.motion.look_ahead import Stretches, stretches_with_times
+from twin.motion.path import Kind, Path
 from twin.motion.s_curve import along_profile, ramp_time, time_at_distance
-from twin.motion.timeline import timeline
+from twin.motion.timeline import control_times, event_rows, timeline
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -23,32 +24,12 @@ Override = float | Floats
 
 
 @dataclass(frozen=True, slots=True)
-class Stretches:
-    """Profiles, one row a stretch (m): ramp, cruise and ramp over consecutive segments. mm, mm/s, s.
-
-    first: (m + 1,) first segment of each, then the number of segments
-    offset_mm: (n,) where each segment begins in its stretch
-    wait_s: (m,) standing for the spindle before `start_s`
-    halt_s: (m,) standing at the end until the axes are in position
-    """
-
-    first: Ints
-    length_mm: Floats
-    acceleration_mm_s2: Floats
-    jerk_mm_s3: Floats
-    speed_mm_s: Floats
-    peak_mm_s: Floats
-    seconds: Floats
-    start_s: Floats
-    wait_s: Floats
-    halt_s: Floats
-    offset_mm: Floats
-
-
-@dataclass(frozen=True, slots=True)
 class Plan:
     """When and how fast. Rows of `*_segment` arrays belong to segments, of `event_*` to the events of the path.
 
+    offset_mm: (n,) where each segment begins in its stretch
+    stretch_start_s: (m,) of each stretch; wait_s: (m,) standing for the spindle before
+    halt_s: (m,) standing at its end until the axes are in position
     start_s, duration_s: (n,) of each segment; entry_mm_s, peak_mm_s, exit_mm_s: (n,) its speeds
     event_start_s, event_duration_s: (e,)
     spindle_ramps: (r, 4) begin and end in s, speed before and after in rev/min, negative = M4
@@ -57,6 +38,10 @@ class Plan:
 
     path: Path
     stretches: Stretches
+    offset_mm: Floats
+    stretch_start_s: Floats
+    wait_s: Floats
+    halt_s: Floats
     start_s: Floats
     duration_s: Floats
     entry_mm_s: Floats
@@ -68,23 +53,19 @@ class Plan:
     spindle_base_rpm: float
     total_s: float
 
-    def sample(self, period_s: float, average_s: tuple[float, ...] = ()) -> Motion:
-        """The motion at t = 0, T, 2T, … until the first tick at or after the end. See `motion.sampled`."""
-        return sampled(self, period_s, average_s)
-
     def seconds_by_line(self) -> Floats:
         """Seconds (highest line + 1,) spent on each source line: its segments, waits and events. Their sum is total_s."""
         line, first = self.path.line, self.stretches.first
         events = np.array([event.line for event in self.path.events], dtype=np.int64)
         lines = np.concatenate([line, line[first[:-1]], line[first[1:] - 1], events])
-        each = np.concatenate([self.duration_s, self.stretches.wait_s, self.stretches.halt_s, self.event_duration_s])
+        each = np.concatenate([self.duration_s, self.wait_s, self.halt_s, self.event_duration_s])
         return np.asarray(np.bincount(lines, each), dtype=np.float64)
 
 
 def plan(path: Path, times: Program | Limits, feed_override: Override = 1.0, rapid_override: Override = 1.0) -> Plan:
     """The plan of `path` under the limits `times`. Overrides act on the programmed feed and the rapid rate, on no other limit.
 
-    Raises ProgramError where a cutting move has no feed, MachineError where the limits are for another number of axes.
+    Raises PartProgramError where a cutting move has no feed, MachineError where the limits are for another number of axes.
 
     1200 mm at 6000 mm/min with 1000 mm/s² take 12 s and another v/a = 0.1 s to start and stop:
 
@@ -97,40 +78,23 @@ def plan(path: Path, times: Program | Limits, feed_override: Override = 1.0, rap
     limits = Limits.of(times) if isinstance(times, Program) else times
     allowed = bounds(path, limits)
     cap = speed_caps(path, allowed, path.feed_mm_min, feed_override, rapid_override)
-    first, length, a, j, v, peak, seconds = stretches_with_times(
-        cap, allowed.acceleration_mm_s2, allowed.jerk_mm_s3, allowed.junction_mm_s, path.length_mm
-    )
-    start, wait, event_start, event_seconds, ramps, total = timeline(
-        first,
-        seconds,
-        v[1:],
-        path.kind,
-        *event_arrays(path.events),
-        path.line,
-        limits.tool_change_s,
-        limits.spindle_acceleration_rpm_s,
-        stopping_rpm_s(limits),
-        limits.spindle_base_rpm,
-        limits.rapid_waits_for_spindle,
-        limits.in_position_s,
-    )
-    offset = _offsets(first, path.length_mm)
-    halt = np.where(v[1:] == 0.0, limits.in_position_s, 0.0)
-    made = Stretches(first, length, a, j, v, peak, seconds, start, wait, halt, offset)
-    segment_start, duration, entry, top, leave = _by_segment(first, offset, path.length_mm, length, a, j, v, peak, seconds, start)
+    made = stretches_with_times(cap, allowed.acceleration_mm_s2, allowed.jerk_mm_s3, allowed.junction_mm_s, path.length_mm)
+    when = timeline(made, path.segments(), event_rows(path.events), control_times(limits))
+    offset = _offsets(made.first, path.length_mm)
+    halt = np.where(made.speed_mm_s[1:] == 0.0, limits.in_position_s, 0.0)
     return Plan(
         path,
         made,
-        segment_start,
-        duration,
-        entry,
-        top,
-        leave,
-        event_start,
-        event_seconds,
-        ramps,
+        offset,
+        when.start_s,
+        when.wait_s,
+        halt,
+        *_by_segment(made, when.start_s, offset, path.length_mm),
+        when.event_start_s,
+        when.event_duration_s,
+        when.spindle_ramps,
         limits.spindle_base_rpm,
-        float(total),
+        float(when.total_s),
     )
 
 
@@ -142,24 +106,8 @@ def speed_caps(path: Path, allowed: Bounds, feed_mm_min: Floats, feed_override: 
     if not np.all(fastest > 0.0):
         k = int(np.argmin(np.min(np.atleast_2d(fastest), axis=0)))
         given = f"the feed at segment {k} is {feed_mm_min[..., k]} mm/min and the overrides leave nothing of it"
-        raise ProgramError(int(path.line[k]) + 1, "F", f"{given}; a cutting move needs a feed above 0")
+        raise PartProgramError(int(path.line[k]) + 1, "F", f"{given}; a cutting move needs a feed above 0")
     return np.ascontiguousarray(fastest)
-
-
-def stopping_rpm_s(limits: Limits) -> float:
-    """The ramp of the spindle downwards, rev/min a second."""
-    down = limits.spindle_deceleration_rpm_s
-    return limits.spindle_acceleration_rpm_s if down is None else down
-
-
-def event_arrays(events: Sequence[Event]) -> tuple[Ints, Ints, Floats, Ints]:
-    """Segment, kind, value and line of each event, (events,)."""
-    return (
-        np.array([event.segment for event in events], dtype=np.int64),
-        np.array([event.kind for event in events], dtype=np.int64),
-        np.array([event.value for event in events], dtype=np.float64),
-        np.array([event.line for event in events], dtype=np.int64),
-    )
 
 
 @kernel
@@ -173,18 +121,10 @@ def _offsets(first: Ints, length: Floats) -> Floats:
 
 @kernel
 def _by_segment(
-    first: Ints,
-    offset: Floats,
-    length: Floats,
-    total: Floats,
-    a: Floats,
-    j: Floats,
-    v: Floats,
-    peak: Floats,
-    seconds: Floats,
-    start: Floats,
+    stretches: Stretches, start: Floats, offset: Floats, length: Floats
 ) -> tuple[Floats, Floats, Floats, Floats, Floats]:
     """Start, duration, entry, peak and exit speed (n) of each segment, read off the profile of its stretch."""
+    first, total, a, j, v, peak, seconds = stretches
     n = len(length)
     begin, duration, entry, top, leave = np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     for i in range(len(first) - 1):
@@ -202,10 +142,9 @@ def _by_segment(
 
 
 @kernel
-def segment_times(
-    first: Ints, length: Floats, total: Floats, a: Floats, j: Floats, v: Floats, peak: Floats, seconds: Floats
-) -> Floats:
+def segment_times(stretches: Stretches, length: Floats) -> Floats:
     """Seconds (n,) on each segment."""
+    first, total, a, j, v, peak, seconds = stretches
     duration = np.empty(len(length))
     for i in range(len(first) - 1):
         t, done = 0.0, 0.0

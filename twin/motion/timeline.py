@@ -8,15 +8,81 @@ those of its own block don't. A tool change stops the spindle first, and a progr
 A dwell and a tool change take their time, and so does every halt: the control waits until the axes are in position.
 """
 
+from collections.abc import Sequence
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from twin.kernels.compiling import kernel
+from twin.motion.geometry import Segments
+from twin.motion.limits import Limits
+from twin.motion.look_ahead import Stretches
+from twin.motion.path import Event
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 DWELL, TOOL_CHANGE, SPINDLE, PROGRAM_STOP, ORIENT = 0, 1, 2, 3, 6
 RAPID = 0
+
+
+class EventRows(NamedTuple):
+    """The events of a path, each (e,): the segment that it comes before, its kind, its value and its source line."""
+
+    segment: Ints
+    kind: Ints
+    value: Floats
+    line: Ints
+
+
+class ControlTimes(NamedTuple):
+    """How long the control and its spindle take. Ramps of the spindle in rev/min a second."""
+
+    tool_change_s: float
+    spindle_rpm_s: float
+    stopping_rpm_s: float
+    base_rpm: float
+    in_position_s: float
+    rapid_waits: bool
+
+
+class Timeline(NamedTuple):
+    """When everything happens, s.
+
+    start_s, wait_s: (m,) of each stretch, and for how long it waited for the spindle before
+    event_start_s, event_duration_s: (e,)
+    spindle_ramps: (r, 4) begin and end, speed before and after in rev/min, negative = M4
+    """
+
+    start_s: Floats
+    wait_s: Floats
+    event_start_s: Floats
+    event_duration_s: Floats
+    spindle_ramps: Floats
+    total_s: float
+
+
+def event_rows(events: Sequence[Event]) -> EventRows:
+    """Return the events as the kernels take them."""
+    return EventRows(
+        np.array([event.segment for event in events], dtype=np.int64),
+        np.array([event.kind for event in events], dtype=np.int64),
+        np.array([event.value for event in events], dtype=np.float64),
+        np.array([event.line for event in events], dtype=np.int64),
+    )
+
+
+def control_times(limits: Limits) -> ControlTimes:
+    """Return what the limits state; a spindle stops as it runs up where they do not say."""
+    up, down = limits.spindle_acceleration_rpm_s, limits.spindle_deceleration_rpm_s
+    return ControlTimes(
+        float(limits.tool_change_s),
+        float(up),
+        float(up if down is None else down),
+        float(limits.spindle_base_rpm),
+        float(limits.in_position_s),
+        bool(limits.rapid_waits_for_spindle),
+    )
 
 
 @kernel
@@ -29,28 +95,12 @@ def effort(rpm: float, base_rpm: float) -> float:
 
 
 @kernel
-def timeline(
-    first: Ints,
-    seconds: Floats,
-    leaving: Floats,
-    kind: Ints,
-    event_segment: Ints,
-    event_kind: Ints,
-    event_value: Floats,
-    event_line: Ints,
-    segment_line: Ints,
-    tool_change_s: float,
-    spindle_rpm_s: float,
-    stopping_rpm_s: float,
-    base_rpm: float,
-    rapid_waits: bool,
-    in_position_s: float,
-) -> tuple[Floats, Floats, Floats, Floats, Floats, float]:
-    """Start of each stretch (m) and its wait before that (m), start and seconds of each event (e), spindle ramps (r, 4), total.
-
-    `leaving` (m) is the speed at the end of each stretch. A row of the ramps is: when it begins, when it ends, speed before and
-    after (rev/min, signed by direction).
-    """
+def timeline(stretches: Stretches, segments: Segments, events: EventRows, control: ControlTimes) -> Timeline:
+    """Return when each stretch, event and spindle ramp happens."""
+    first, seconds, speed = stretches.first, stretches.seconds, stretches.speed_mm_s
+    kind, segment_line = segments.kind, segments.line
+    event_segment, event_kind, event_value, event_line = events
+    tool_change_s, spindle_rpm_s, stopping_rpm_s, base_rpm, in_position_s, rapid_waits = control
     m, e = len(seconds), len(event_segment)
     start, wait = np.empty(m), np.zeros(m)
     event_start, event_seconds = np.empty(e), np.zeros(e)
@@ -84,5 +134,5 @@ def timeline(
             wait[i] = ready - now
             now = ready
         start[i] = now
-        now += seconds[i] + (in_position_s if leaving[i] == 0.0 else 0.0)
-    return start, wait, event_start, event_seconds, ramps[:r].copy(), now
+        now += seconds[i] + (in_position_s if speed[i + 1] == 0.0 else 0.0)
+    return Timeline(start, wait, event_start, event_seconds, ramps[:r].copy(), now)

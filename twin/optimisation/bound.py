@@ -164,8 +164,8 @@ def _weighed(worth: Worth, rpm: Floats, rows: Ints, most: Floats) -> Floats:
 def _least_cost(problem: Problem, feed: Floats, rpm: Floats, seconds: float, ramps: tuple[Ramp, ...]) -> float:
     economy = problem.economy
     assert economy is not None
-    worth, beside = problem.worth(economy.per_second, economy.per_tool), problem.beside
-    wear = Worth(worth.length_mm, worth.beside_s, worth.wear, worth.wear_beside, 0.0, worth.exponent)
+    worth, fixed = problem.worth(economy.per_second, economy.per_tool), problem.fixed_time
+    wear = Worth(worth.length_mm, worth.fixed_s, worth.wear, worth.wear_fixed, 0.0, worth.exponent)
     starting = {int(problem.groups.of_row[ramp.row]) for ramp in ramps}
     own, tools, real = 0.0, 0.0, feed * problem.allowed.feed_ratio
     for group, rows in enumerate(problem.groups.rows):
@@ -176,6 +176,6 @@ def _least_cost(problem: Problem, feed: Floats, rpm: Floats, seconds: float, ram
             waits = economy.per_second * _waits_s(problem, ramps, group, cells.rpm)
             alone = max(alone, float((cells.sums(rows, partial(_weighed, worth, cells.rpm)) + waits).min()))
         own += alone
-    separate = own + beside.nobody_s * economy.per_second + beside.nobody_worn * economy.per_tool
-    together = seconds * economy.per_second + tools + beside.nobody_worn * economy.per_tool
+    separate = own + fixed.unshared_s * economy.per_second + fixed.unshared_worn * economy.per_tool
+    together = seconds * economy.per_second + tools + fixed.unshared_worn * economy.per_tool
     return max(separate, together)

@@ -38,12 +38,12 @@ BLOCK = 1_000_000
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Worth:
-    """What g weighs, (lines,): length_mm and beside_s of each; wear, wear_beside: w and v; per_second: R; exponent: m."""
+    """What g weighs, (lines,): length_mm and fixed_s of each; wear, wear_fixed: w and v; per_second: R; exponent: m."""
 
     length_mm: Floats
-    beside_s: Floats
+    fixed_s: Floats
     wear: Floats
-    wear_beside: Floats
+    wear_fixed: Floats
     per_second: float
     exponent: float
 
@@ -51,7 +51,7 @@ class Worth:
         """g of each line at feeds (mm/min of real feed) and speeds, both (…, lines)."""
         power = rpm**self.exponent
         first = 60.0 * self.length_mm / feed * (self.per_second + self.wear * power)
-        return np.asarray(first + self.beside_s * (self.per_second + self.wear_beside * power))
+        return np.asarray(first + self.fixed_s * (self.per_second + self.wear_fixed * power))
 
     def of(self, rows: Ints, feed: Floats, rpm: Floats) -> Floats:
         """Of some lines that share their speed: feeds (…, rows), speeds (…)."""
@@ -60,7 +60,7 @@ class Worth:
     def lines(self, rows: Ints) -> "Worth":
         """Some lines; each as often as it is named."""
         return Worth(
-            self.length_mm[rows], self.beside_s[rows], self.wear[rows], self.wear_beside[rows], self.per_second, self.exponent
+            self.length_mm[rows], self.fixed_s[rows], self.wear[rows], self.wear_fixed[rows], self.per_second, self.exponent
         )
 
 
@@ -174,7 +174,7 @@ def _stationary(made: _Pieces, worth: Worth) -> list[Floats]:
         power = n**m
         before = before_s * ((m - 1.0) * worth.wear * power - worth.per_second)
         beyond = beyond_s * m * worth.wear * power * n
-        return made.sums(np.where(n < corner, before, beyond) + worth.beside_s * m * worth.wear_beside * power * n)
+        return made.sums(np.where(n < corner, before, beyond) + worth.fixed_s * m * worth.wear_fixed * power * n)
 
     low, high = made.low.copy(), made.high.copy()
     rises = slope(low) >= 0.0

@@ -16,7 +16,6 @@ from twin.gcode import Arc, Linear, Settings, interpret
 from twin.optimisation.words import source_lines
 from twin.runlog import RunLog
 
-Floats = NDArray[np.float64]
 N_WORD = re.compile(r"^\s*/?\d?\s*N0*(\d+)", re.I)
 DIGITS = 6
 FITS = 0.98

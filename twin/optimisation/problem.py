@@ -47,12 +47,16 @@ class Speeds:
     owner: Ints
 
 
-class Beside(NamedTuple):
-    """seconds: (lines,) share of each; nobody_s: what no line has a share in; nobody_worn: tools that lines left alone take."""
+class FixedTime(NamedTuple):
+    """The time that no feed of a line changes, and the tools that it wears.
 
-    seconds: Floats
-    nobody_s: float
-    nobody_worn: float
+    by_line_s: (lines,) the share of each; unshared_s: what no line has a share in
+    unshared_worn: tools worn on lines that are left alone
+    """
+
+    by_line_s: Floats
+    unshared_s: float
+    unshared_worn: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,15 +221,15 @@ class Problem:
         """What a second and a tool are worth, for the closed form: (1, 0) is time, (per_second, per_tool) cost."""
         lines = [self.program.lines[int(k)] for k in self.allowed.index]
         length = np.array([line.length_mm for line in lines], dtype=np.float64)
-        beside = self.beside.seconds
+        fixed_s = self.fixed_time.by_line_s
         if self.economy is None or of_wear == 0.0:
             zero = np.zeros(len(lines))
-            return Worth(length, beside, zero, zero, per_second, 2.0)
+            return Worth(length, fixed_s, zero, zero, per_second, 2.0)
         factor = self.economy.wear_factor(self.allowed.diameter_mm) * of_wear
         if not self.economy.wears_in_cut:
-            return Worth(length, beside, factor, factor, per_second, self.economy.exponent)
+            return Worth(length, fixed_s, factor, factor, per_second, self.economy.exponent)
         part = np.array([line.cut_mm / max(line.length_mm, 1e-12) for line in lines])
-        return Worth(length, beside, factor * part, 0.0 * factor, per_second, self.economy.exponent)
+        return Worth(length, fixed_s, factor * part, 0.0 * factor, per_second, self.economy.exponent)
 
     def _brought(self, feed: Floats, rpm: Floats) -> tuple[Floats, Floats]:
         """Feeds of all segments and values of all events of each candidate."""
@@ -243,7 +247,7 @@ class Problem:
         return seconds * self.economy.per_second + worn * self.economy.per_tool
 
     @cached_property
-    def beside(self) -> "Beside":
+    def fixed_time(self) -> FixedTime:
         """The time that no line with a speed of its own cuts, shared out by the way that they cut; and what that leaves.
 
         Of a spindle that takes no time to change: the least there can be.
@@ -258,7 +262,7 @@ class Problem:
         np.add.at(seconds, self.row_of_segment[own], rest_s * wear.share[own])
         rate = wear.factor[fixed] * np.abs(path.commanded_rpm()[fixed]) ** wear.exponent
         worn = float(np.sum(rate * (made.duration_s[fixed] + rest_s * wear.share[fixed])))
-        return Beside(seconds, float(made.duration_s[fixed].sum() + rest_s - seconds.sum()), worn)
+        return FixedTime(seconds, float(made.duration_s[fixed].sum() + rest_s - seconds.sum()), worn)
 
 
 def control_of(machine: MachineFile) -> Control:

@@ -118,7 +118,7 @@ def programmed(
     engagement: what each line (from 0) cuts, taken in place of [stock]: `twin.optimisation.planned`
     left_alone: lines that may not be changed, and why, beyond those that are found out here
 
-    Raises ProgramError where a control would refuse it, MachineError where nothing is known of what it cuts.
+    Raises PartProgramError where a control would refuse it, MachineError where nothing is known of what it cuts.
     """
     moves = interpret(text, machine.settings)
     path = path_from_moves(moves, machine.settings.start_mm or None)
@@ -185,8 +185,8 @@ def _with_spring_passes(lines: list[FeedLine], near: Mapping[int, Ints], touches
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Found:
-    """rows: (cuts, 4) depth, entry, exit, heading; cut_mm: way in material; plunges: the end face cuts"""
+class _LineCuts:
+    """The cuts of a line. rows: (cuts, 4) depth, entry, exit, heading; cut_mm: way in material; plunges: the end face cuts"""
 
     rows: Floats
     cut_mm: float
@@ -262,7 +262,7 @@ def _executions(path: Path) -> dict[int, tuple[tuple[int, int], ...]]:
     return {line: tuple(spans) for line, spans in found.items()}
 
 
-def _cuts_of_segments(path: Path, rows: PathRows, segments: Ints, headed: bool) -> _Found:
+def _cuts_of_segments(path: Path, rows: PathRows, segments: Ints, headed: bool) -> _LineCuts:
     """headed: whether the heading of the feed matters: to chatter only."""
     every = np.concatenate([np.arange(rows.first[s], rows.first[s + 1]) for s in segments.tolist()])
     segment, mine = rows.segment[every], every[rows.axial_depth_mm[every] > 0.0]
@@ -274,16 +274,16 @@ def _cuts_of_segments(path: Path, rows: PathRows, segments: Ints, headed: bool) 
         own = rows.segment[mine]
         heading = _headings(path, own, (mine - rows.first[own] + 0.5) / (rows.first[own + 1] - rows.first[own]))
     columns = np.column_stack([rows.axial_depth_mm[mine], rows.entry_angle_rad[mine], rows.exit_angle_rad[mine], heading])
-    return _Found(_different(columns), float(rows.length_mm[mine].sum()), plunges)
+    return _LineCuts(_different(columns), float(rows.length_mm[mine].sum()), plunges)
 
 
-def _cuts_planned(planned: Sequence[Sequence[float]], path: Path, segments: Ints, headed: bool) -> _Found:
+def _cuts_planned(planned: Sequence[Sequence[float]], path: Path, segments: Ints, headed: bool) -> _LineCuts:
     rows = np.array(planned, dtype=np.float64).reshape(-1, 3)
     heading = _headings_of(path, segments) if headed else np.zeros(1)
     start, end = path.tip_ends_mm(segments)
     steep = np.maximum(start[:, 2] - end[:, 2], 0.0) > SHALLOW * path.length_mm[segments]
     each = np.hstack([np.repeat(rows, len(heading), axis=0), np.tile(heading, len(rows))[:, None]])
-    return _Found(each, float(path.length_mm[segments].sum()) if len(rows) else 0.0, len(rows) > 0 and bool(steep.any()))
+    return _LineCuts(each, float(path.length_mm[segments].sum()) if len(rows) else 0.0, len(rows) > 0 and bool(steep.any()))
 
 
 def _headings_of(path: Path, segments: Ints) -> Floats:
@@ -306,7 +306,7 @@ def _different(rows: Floats) -> Floats:
     return np.asarray(rows[np.unique(np.round(rows, DIGITS), axis=0, return_index=True)[1]])
 
 
-def _why_not(line: FeedLine, path: Path, tied: set[int], tools: Ints, found: _Found, rpm: Floats) -> str:
+def _why_not(line: FeedLine, path: Path, tied: set[int], tools: Ints, found: _LineCuts, rpm: Floats) -> str:
     """Why a line is left alone; empty = it is not."""
     if line.line in tied:
         return "its feed is tied to the spindle"

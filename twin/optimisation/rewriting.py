@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.errors import ProgramError
+from twin.errors import PartProgramError
 from twin.gcode import interpret
 from twin.motion.path import EventKind, Kind, Path, path_from_moves
 from twin.optimisation.answer import SpeedChanges
@@ -31,7 +31,6 @@ from twin.optimisation.words import (
 )
 
 Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 ROUNDS_MAX = 4
 SAME = 1e-9
 S_IS_NO_SPEED_G = frozenset({100, 500, 650, 660, 670, 920, 960})
@@ -73,7 +72,7 @@ def rewritten(problem: Problem, feed_mm_min: Floats, rpm: Floats) -> Rewritten:
         text = joined(program.text, _changed(source, wanted, forced_feed, forced_speed, speed_lines, problem))
         try:
             path = path_from_moves(interpret(text, settings), settings.start_mm or None)
-        except ProgramError as error:
+        except PartProgramError as error:
             return Rewritten(text, program.path, {error.line - 1: f"a control would refuse it rewritten: {error.reason}"})
         missed = _missed(problem, path, wanted)
         more_feed = {line for line, what in missed.items() if what == "feed"} - forced_feed

@@ -15,20 +15,21 @@ from dataclasses import dataclass
 from functools import cache
 
 from twin.effects.effect import Effect
-from twin.kernels.weave import Woven, function_text, quantities, weave
+from twin.kernels.assembly import KERNEL, Assembly, kernel_text
+from twin.kernels.weave import Woven, function_text, weave
 from twin.process import angle, tooth
 from twin.process.peak import AT, EVENTS, PEAK
 from twin.process.quadrature import NODES, NOTHING_KEPT, PASSED, STRETCHES, WEIGHTS, WINDOWS, indented
 
 AT_TICK = ("spindle_rpm", "speed_mm_s", "axial_depth_mm")
 """Quantities of the tick that an effect may ask for beside those of the tooth."""
-PHYSICS = (tooth.radius, tooth.lag, tooth.tooth_force)
+CUT = Assembly((tooth.radius, tooth.lag, tooth.tooth_force), acts_on="the cut", owner="the cut")
 
 
 @cache
 def process_quantities() -> dict[str, str]:
     """The quantities of the cut that an effect can change, with their sites."""
-    return quantities(PHYSICS)
+    return CUT.quantities()
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +51,7 @@ def milling_kernel(lanes: int, effects: tuple[Effect, ...] = ()) -> MillingKerne
     What no effect asks for (unequal radii, a lag) is not in the text.
     """
     given = {"tooth_rad", "advance_mm", "sine", "cosine", "radius_step_mm", *AT_TICK}
-    radius, lag, force = (weave((physics,), effects) for physics in PHYSICS)
+    radius, lag, force = (weave((physics,), effects) for physics in CUT.physics)
     stages = (radius, lag, force) if _lagging(effects) else (radius, force)
     taken = dict.fromkeys(name for stage in stages for name in stage.takes if name not in given)
     layout = _Layout(lanes, tuple(taken), "radius_step_mm" in _asked(force, effects), _lagging(effects), radius, lag, force)
@@ -59,8 +60,7 @@ def milling_kernel(lanes: int, effects: tuple[Effect, ...] = ()) -> MillingKerne
     texts += list(dict.fromkeys(text for stage in stages for text in stage.functions))
     head = "from math import atan2, cos, exp, floor, sin, sqrt, tan"
     kernels = [*([layout.radii()] if layout.stepped else []), layout.milling(), layout.peak()]
-    body = [f"@njit(error_model='numpy')\n{text}" for text in texts] + kernels
-    return MillingKernel("\n\n\n".join([head, *body]) + "\n", layout.constants, layout.stepped)
+    return MillingKernel(kernel_text(head, texts, kernels), layout.constants, layout.stepped)
 
 
 def _lagging(effects: tuple[Effect, ...]) -> bool:
@@ -99,7 +99,7 @@ class _Layout:
     def radii(self) -> str:
         """By how much the radius of each tooth exceeds that of the one before: `radii(teeth, constants, radius_steps_mm)`."""
         lines = [
-            "@njit(cache=True, error_model='numpy')",
+            KERNEL,
             "def radii(teeth, constants, radius_steps_mm):",
             *indented([f"for lane in range({self.lanes}):", "    for tooth in range(teeth):"], 1),
             *indented(["tooth_rad = 6.283185307179586 * tooth / teeth", *self._read(self.radius)], 3),
@@ -117,7 +117,7 @@ class _Layout:
         width = self.lanes
         rows = [f"work[{row * width} + lane] * axial_depth_mm{'' if row < 3 else ' * per_turn'}" for row in (0, 1, 3, 4, 5)]
         lines = [
-            "@njit(cache=True, nogil=True, error_model='numpy')",
+            KERNEL,
             "def milling(ticks, teeth, period_s, constants, radius_steps_mm, work, spindle_angle_rad, spindle_rpm_in,",
             "            velocity_x_mm_s, velocity_y_mm_s, axial_depth_mm_in, entry_angle_rad, exit_angle_rad,",
             "            outputs, first, stride):",
@@ -196,7 +196,7 @@ class _Layout:
         """
         assert self.lanes == 1 or not self.lagging
         lines = [
-            "@njit(cache=True, nogil=True, error_model='numpy')",
+            KERNEL,
             "def resultant_at(turn_rad, standing, shift, lane, lag_rad, teeth, advance_mm, spindle_rpm, speed_mm_s,",
             "                 axial_depth_mm, entry_rad, width_rad, constants, radius_steps_mm):",
             *indented(["along = across = 0.0", *NOTHING_KEPT, *self._standing()], 1),
@@ -204,6 +204,7 @@ class _Layout:
             "",
             "",
             PEAK.format(
+                kernel=KERNEL,
                 at=AT,
                 width=self.lanes,
                 turns="teeth" if self.stepped else "1",

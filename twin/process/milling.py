@@ -4,19 +4,18 @@ A lane is one candidate tool and material, on the motion of all or on one of its
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from twin.effects.catalogue import effect_named
 from twin.effects.effect import Effect
-from twin.errors import EffectError, TwinError
-from twin.kernels.generated import compiled, in_python
+from twin.errors import TwinError
+from twin.kernels.assembly import kernel_function
 from twin.machine import Tool
-from twin.process.kernel import milling_kernel, process_quantities
+from twin.process.kernel import CUT, milling_kernel
 
 Array = NDArray[np.float64]
 LANES = (1, 8, 32)
@@ -118,7 +117,7 @@ def milling_force(
     Raises TwinError where arrays do not fit, EffectError where a constant is missing or an effect does not act on the cut.
     """
     rows = motion.rows()
-    acting = _acting(effects)
+    acting = CUT.effects(effects)
     lanes = _lane_count(constants, rows[0].shape[0])
     ticks = rows[0].shape[1]
     out = np.zeros((5, ticks, lanes))
@@ -163,20 +162,12 @@ def peak_force(
     given += [np.asarray(values, dtype=np.float64) for values in (entry_angle_rad, exit_angle_rad)]
     rows = [np.ascontiguousarray(values) for values in np.broadcast_arrays(*map(np.atleast_1d, given))]
     rows[1] = rows[1] / 60.0
-    acting = _acting(effects)
+    acting = CUT.effects(effects)
     lanes = _lane_count(constants, 1)
     out = np.zeros((len(rows[0]), lanes))
     for chosen, width in _blocks(lanes, acting, shared=True):
         _Block(acting, width, teeth, reference_run).peak(constants, chosen, rows, out)
     return out.T
-
-
-def _acting(effects: Sequence[str]) -> tuple[Effect, ...]:
-    acting = tuple(effect_named(name) for name in effects)
-    for effect in acting:
-        if not set(effect.changes) & set(process_quantities()):
-            raise EffectError(f"{effect.name} does not act on the cut; it acts at the {effect.site} site")
-    return acting
 
 
 def _lane_count(constants: Mapping[str, ArrayLike], motions: int) -> int:
@@ -221,10 +212,8 @@ class _Block:
         """Constants and radius steps in the order of the kernel's rows."""
         kernel = milling_kernel(self.width, self.effects)
         rows = np.empty((len(kernel.constants), self.width))
-        for row, name in enumerate(kernel.constants):
-            if name not in constants:
-                raise EffectError(f"the constant {name} of the cut is missing")
-            value = np.asarray(constants[name], dtype=np.float64)
+        for row, taken in enumerate(CUT.taken(constants, kernel.constants)):
+            value = np.asarray(taken, dtype=np.float64)
             own = value.reshape(-1)[chosen] if value.size > 1 else value.reshape(-1)
             rows[row] = np.pad(own, (0, self.width - len(own)), mode="edge")
         radius_steps = np.zeros(self.teeth * self.width)
@@ -237,15 +226,9 @@ class _Block:
         fits = chosen.stop - chosen.start == self.width
         target = out if fits else np.zeros((*out.shape[:-1], self.width))
         first, stride = (chosen.start, lanes) if fits else (0, self.width)
-        if self.reference_run:
-            flat = target.reshape(-1).tolist()
-            self._function(name)(*[a.tolist() if isinstance(a, np.ndarray) else a for a in arguments], flat, first, stride)
-            target[...] = np.array(flat).reshape(target.shape)
-        else:
-            self._function(name)(*arguments, target.reshape(-1), first, stride)
+        self._function(name)(*arguments, target.reshape(-1), first, stride)
         if not fits:
             out[..., chosen] = target[..., : chosen.stop - chosen.start]
 
-    def _function(self, name: str) -> Any:
-        text = milling_kernel(self.width, self.effects).text
-        return in_python(text)[name] if self.reference_run else getattr(compiled(text), name)
+    def _function(self, name: str) -> Callable[..., None]:
+        return kernel_function(milling_kernel(self.width, self.effects).text, name, reference_run=self.reference_run)

@@ -14,7 +14,7 @@ EVENTS = [
     f"    value = resultant_at({AT})",
     "    greatest = value if lag_rad > 0.0 and value > greatest else greatest",
 ]
-PEAK = """@njit(cache=True, nogil=True, error_model='numpy')
+PEAK = """{kernel}
 def peak(cuts, teeth, constants, radius_steps_mm, spindle_rpm_in, speed_mm_s_in, axial_depth_mm_in, entry_angle_rad,
          exit_angle_rad, outputs, first, stride):
     pitch_rad = 6.283185307179586 / teeth

@@ -90,17 +90,6 @@ class ProgramRun:
         new = np.flatnonzero((line > np.maximum.accumulate(np.concatenate([[-1], line[:-1]]))) & (line >= 0))
         return self.active(self.t_s[new]), line[new]
 
-    @property
-    def overrides_moved(self) -> tuple[str, ...]:
-        """Overrides that were turned during the run."""
-        moved = []
-        for name in OVERRIDES.values():
-            values = np.asarray(self.columns[name], dtype=np.float64)
-            known = values[~np.isnan(values)]
-            if len(known) and np.ptp(known) > 0.0:
-                moved.append(name.removesuffix("_override_pct"))
-        return tuple(moved)
-
 
 def program_runs(recording: Observations, before: Mapping[str, str] | None = None) -> list[ProgramRun]:
     """The runs in `recording`, in order. `before`: the last values of the recording before this one (`last_values`).

@@ -39,8 +39,10 @@ CHOSEN = "published"
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
-    """What is asked for. row_s: a row of training every so long; held_share: the last part of the rows, held out
+class TrainingSettings:
+    """Settings of a training run.
+
+    row_s: seconds between two rows of training; held_share: the last part of the rows, held out
     feature_set: one of SETS, '' = the published one or a surely better one
     """
 
@@ -66,28 +68,28 @@ class Outcome:
     choosing: Mapping[str, float]
 
 
-def trained(recorded: Recorded, asked: Asked, about: Trained, say: Say = lambda _: None) -> Outcome:
+def trained(recorded: Recorded, settings: TrainingSettings, about: Trained, say: Say = lambda _: None) -> Outcome:
     """The model of a recording, judged. Raises ResidualError where there is too little to judge by."""
     wanted = tuple(dict.fromkeys(one for own in SETS.values() for one in own))
     say("features of each moment")
-    table = table_of(recorded, offered(recorded, wanted), asked.row_s)
-    split = split_by_time(table.t_s, table.residual_k, table.stretch, asked.held_share, about.physics.time_constant_s)
-    chosen, choosing = (asked.feature_set, {}) if asked.feature_set else _chosen(table, split, asked, say)
+    table = table_of(recorded, offered(recorded, wanted), settings.row_s)
+    split = split_by_time(table.t_s, table.residual_k, table.stretch, settings.held_share, about.physics.time_constant_s)
+    chosen, choosing = (settings.feature_set, {}) if settings.feature_set else _chosen(table, split, settings, say)
     if chosen not in SETS:
         raise ResidualError(f"feature set {chosen!r}: it is one of {', '.join(SETS)}")
     features = tuple(one for one in SETS[chosen] if one in table.features)
     x, y = table.of(features), table.residual_k
-    say(f"forest of {asked.trees} trees on {len(split.train)} rows")
-    forest = fitted(x[split.train], y[split.train], asked)
+    say(f"forest of {settings.trees} trees on {len(split.train)} rows")
+    forest = fitted(x[split.train], y[split.train], settings)
     say("region of training")
     region = region_of(x[split.train], blocks_of(table.t_s[split.train], split.gap_s))
     say("judging on held-out time")
-    held = judged(forest, region, features, table, split, asked.seed)
+    held = judged(forest, region, features, table, split, settings.seed)
     told = about.model_copy(
         update={
             "from_s": float(table.t_s[split.train[0]]),
             "to_s": float(table.t_s[split.train[-1]]),
-            "hours": len(split.train) * asked.row_s / 3600.0,
+            "hours": len(split.train) * settings.row_s / 3600.0,
             "cutting_hours": recorded.cutting_hours,
             "rows": len(split.train),
             "feature_set": chosen,
@@ -95,35 +97,35 @@ def trained(recorded: Recorded, asked: Asked, about: Trained, say: Say = lambda 
             "versions": versions(),
         }
     )
-    model = ResidualModel(features, forest, region, told, held, float(y[split.train].mean()), asked.seed)
+    model = ResidualModel(features, forest, region, told, held, float(y[split.train].mean()), settings.seed)
     return Outcome(model, table, split, choosing)
 
 
-def fitted(x: Floats, y: Floats, asked: Asked) -> RegressionForest:
+def fitted(x: Floats, y: Floats, settings: TrainingSettings) -> RegressionForest:
     """A random forest of rows (n, features), as arrays. Raises ResidualError where scikit-learn is not installed."""
     try:
         ensemble = import_module("sklearn.ensemble")
     except ImportError:
         raise ResidualError("scikit-learn is not installed, which trains forests: pip install 'cnctwin[anomaly]'") from None
     model: Any = ensemble.RandomForestRegressor(
-        n_estimators=asked.trees,
-        max_depth=asked.depth_max,
-        min_samples_leaf=asked.leaf_min,
-        random_state=asked.seed,
-        n_jobs=-1 if len(x) * asked.trees > 500_000 else 1,
+        n_estimators=settings.trees,
+        max_depth=settings.depth_max,
+        min_samples_leaf=settings.leaf_min,
+        random_state=settings.seed,
+        n_jobs=-1 if len(x) * settings.trees > 500_000 else 1,
     )
     return flatten_regression(model.fit(x, y))
 
 
-def _chosen(table: Table, split: Split, asked: Asked, say: Say) -> tuple[str, dict[str, float]]:
+def _chosen(table: Table, split: Split, settings: TrainingSettings, say: Say) -> tuple[str, dict[str, float]]:
     """The feature set, and the RMSE of each, on the last part of the training time."""
     part = split.train
     t_s = table.t_s[part]
-    cut_s = float(t_s[int((1.0 - asked.held_share) * len(t_s))])
+    cut_s = float(t_s[int((1.0 - settings.held_share) * len(t_s))])
     fit, test = part[t_s < cut_s - split.gap_s], part[t_s >= cut_s]
     if len(fit) < 100 or len(test) < 10:
         return CHOSEN, {}
-    smaller = replace(asked, trees=min(asked.trees, CHOOSING_TREES))
+    smaller = replace(settings, trees=min(settings.trees, CHOOSING_TREES))
     errors: dict[str, Floats] = {}
     for name, own in SETS.items():
         features = tuple(one for one in own if one in table.features)
@@ -186,13 +188,13 @@ def importance(forest: RegressionForest, features: tuple[Feature, ...], x: Float
     return dict(sorted(found.items(), key=lambda item: -item[1]))
 
 
-def ridge(x: Floats, y: Floats, asked: Floats) -> Floats:
-    """A line through the same features, with a little shrinking: what it predicts for the rows `asked`."""
+def ridge(x: Floats, y: Floats, rows: Floats) -> Floats:
+    """Return what a line through the same features predicts for `rows`, with a little shrinking."""
     centre, spread = x.mean(axis=0), x.std(axis=0)
     spread = np.where(spread > 0.0, spread, 1.0)
     z = (x - centre) / spread
     weights = np.linalg.solve(z.T @ z + RIDGE * np.eye(z.shape[1]), z.T @ (y - y.mean()))
-    return np.asarray(y.mean() + (asked - centre) / spread @ weights)
+    return np.asarray(y.mean() + (rows - centre) / spread @ weights)
 
 
 def versions() -> dict[str, str]:

@@ -3,19 +3,18 @@
 A series is read sample by sample, in the same woven text for all signals; samples that are not there stay away.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.effects.catalogue import effect_named
 from twin.effects.effect import Effect
 from twin.errors import EffectError
 from twin.kernels import elementary
-from twin.kernels.generated import compiled, in_python
-from twin.kernels.weave import Woven, function_text, quantities, weave
+from twin.kernels.assembly import KERNEL, Assembly, Scalars, kernel_function, kernel_text
+from twin.kernels.weave import function_text, weave
 from twin.sites import Site, at
 
 Floats = NDArray[np.float64]
@@ -37,9 +36,13 @@ def sense(value: float) -> Reading:
     return Reading(reading)
 
 
+SENSOR = Assembly((sense,), acts_on="a sensor", owner="a sensor")
+FED = ("value", "is_first", "since_s", "temperature_rise_k")
+
+
 def sensor_quantities() -> dict[str, str]:
-    """What effects can change of a sensor, with their sites."""
-    return quantities((sense,))
+    """The quantities of a sensor that an effect can change, with their sites."""
+    return SENSOR.quantities()
 
 
 def readings(
@@ -58,46 +61,30 @@ def readings(
     """
     if not effects:
         return values
-    acting = tuple(effect_named(name) for name in effects)
-    for effect in acting:
-        if not set(effect.changes) & set(sensor_quantities()):
-            raise EffectError(f"{effect.name} does not act on a sensor; it acts at the {effect.site} site")
-        if "temperature_rise_k" in effect.needs and temperature_rise_k is None:
-            raise EffectError(f"{effect.name} needs a spindle temperature, which this run has not got")
+    acting = SENSOR.effects(effects)
+    if temperature_rise_k is None and (warm := [effect.name for effect in acting if "temperature_rise_k" in effect.needs]):
+        raise EffectError(f"{warm[0]} needs a spindle temperature, which this run has not got")
     text, names = _kernel(acting)
-    given: dict[str, float] = {}
-    for effect in acting:
-        given |= {f"{effect.name}__{key}": value for key, value in effect.checked(effects[effect.name]).items()}
-        given |= {f"{effect.name}__{key}": float(value) for key, value in effect.states.items() if not isinstance(value, str)}
+    given = {f"{one.name}__{key}": value for one in acting for key, value in one.checked(effects[one.name]).items()}
     rise = np.zeros(len(values)) if temperature_rise_k is None else temperature_rise_k
     out = np.empty(len(values))
-    function: Any = in_python(text)["read"] if reference_run else compiled(text).read
-    function(
-        np.ascontiguousarray(values, dtype=np.float64),
-        np.ascontiguousarray(since_s, dtype=np.float64),
-        np.ascontiguousarray(rise, dtype=np.float64),
-        np.array([given[name] for name in names]),
-        out,
-    )
+    series = [np.ascontiguousarray(one, dtype=np.float64) for one in (values, since_s, rise)]
+    read = kernel_function(text, "read", reference_run=reference_run)
+    read(np.array(SENSOR.taken(given, names), dtype=np.float64), *series, out)
     return out
 
 
 @cache
-def _kernel(effects: Sequence[Effect]) -> tuple[str, tuple[str, ...]]:
-    woven = weave((sense,), effects)
-    own = tuple(f"{e.name}__{n}" for e in effects for n in [p.name for p in e.parameters] + list(e.states))
-    return _text(woven, own), own
-
-
-def _text(woven: Woven, own: Sequence[str]) -> str:
-    functions = [function_text(elementary.exp_of_minus), function_text(elementary.sine_of_turns), *woven.functions]
+def _kernel(effects: tuple[Effect, ...]) -> tuple[str, tuple[str, ...]]:
+    """The text that defines `read`, and the constants that it takes, in order."""
+    woven = weave(SENSOR.physics, effects)
+    scalars = Scalars.of(woven, effects, FED)
+    body = [*scalars.in_loop(), *woven.body.splitlines(), "out[sample] = reading"]
     lines = [
-        "@njit(cache=True, nogil=True, error_model='numpy')",
-        "def read(values, since, rise, given, out):",
+        KERNEL,
+        "def read(constants, values, since, rise, out):",
         "    first = True",
-    ]
-    lines += [f"    {name} = given[{row}]" for row, name in enumerate(own)]
-    lines += [
+        *(f"    {line}" for line in [*scalars.before_loop(), *scalars.states_at_start()]),
         "    for sample in range(len(values)):",
         "        value = values[sample]",
         "        if value != value:",
@@ -107,7 +94,7 @@ def _text(woven: Woven, own: Sequence[str]) -> str:
         "        first = False",
         "        since_s = since[sample]",
         "        temperature_rise_k = rise[sample]",
-        *(f"        {line}" for line in woven.body.splitlines()),
-        "        out[sample] = reading",
+        *(f"        {line}" for line in body),
     ]
-    return "\n\n\n".join([*(f"@njit(error_model='numpy')\n{text}" for text in functions), "\n".join(lines) + "\n"])
+    functions = [function_text(elementary.exp_of_minus), function_text(elementary.sine_of_turns), *woven.functions]
+    return kernel_text("from math import exp, sqrt", functions, ["\n".join(lines)]), scalars.constants

@@ -14,6 +14,7 @@ from functools import cache
 from twin.effects.effect import Effect
 from twin.errors import EffectError
 from twin.kernels import elementary
+from twin.kernels.assembly import Assembly, kernel_text
 from twin.kernels.weave import Physics, Woven, function_text, quantities, weave
 from twin.servo import controller, friction, mechanics, metrics, table
 from twin.servo.lanes import CLOCKS, INPUTS, LaneLoops, Stage, names_of, read_by
@@ -45,20 +46,24 @@ def move_stage(effects: Iterable[Effect]) -> tuple[Physics, ...]:
     return (mechanics.forces, friction.breakaway, friction.sliding, mechanics.slide, mechanics.bend if bent else mechanics.arrive)
 
 
-ALL_PHYSICS = (
-    *control_stage(measured=True),
-    mechanics.forces,
-    friction.breakaway,
-    friction.sliding,
-    mechanics.slide,
-    mechanics.bend,
+AXES = Assembly(
+    (
+        *control_stage(measured=True),
+        mechanics.forces,
+        friction.breakaway,
+        friction.sliding,
+        mechanics.slide,
+        mechanics.bend,
+    ),
+    acts_on="the loops or the mechanics of an axis",
+    owner="the axes",
 )
 
 
 @cache
 def axis_quantities() -> dict[str, str]:
     """The quantities of an axis that an effect can change or a recording replace, with their sites."""
-    return quantities(ALL_PHYSICS)
+    return AXES.quantities()
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,11 +137,11 @@ def axis_kernel(
     constants = tuple(sorted(taken - set(states) - fed))
     layout = LaneLoops(lanes, (*states, *constants), states, own_inputs, recorded, disturbed)
     loops = layout.kernel(control, move, outputs)
-    text = "\n\n\n".join(["from math import copysign", *_functions(at_tick, between), loops])
+    text = kernel_text("from math import copysign", _functions(at_tick, between), [loops])
     return AxisKernel(text, (*states, *constants), layout.rows, len(states), recorded)
 
 
 def _functions(*woven: Woven) -> list[str]:
     texts = [function_text(elementary.exp_of_minus), function_text(elementary.sine_of_turns)]
     texts += list(dict.fromkeys(text for stage in woven for text in stage.functions))
-    return [f"@njit(error_model='numpy')\n{text}" for text in texts]
+    return texts

@@ -8,6 +8,8 @@ import ast
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from twin.kernels.assembly import KERNEL
+
 CLOCKS = ("period_s", "step_s", "time_s")
 INPUTS = ("reference_mm", "disturbance_n")
 CUTS = ("following_error_mm", "speed_ratio", "inertia_kg", "bristle_compliance_mm_per_n")
@@ -86,7 +88,7 @@ class LaneLoops:
         here = [(row, name) for row, name in enumerate(outputs) if name in at_tick]
         later = [(row, name) for row, name in enumerate(outputs) if name not in at_tick]
         lines = [
-            "@njit(cache=True, nogil=True, error_model='numpy')",
+            KERNEL,
             f"def axes(first_tick, ticks, steps, period_s, scratch, {', '.join(arguments)}, lanes, first_lane, outputs):",
             "    step_s = period_s / steps",
             "    for tick in range(ticks):",
@@ -95,7 +97,7 @@ class LaneLoops:
             "        for step in range(steps):",
             *self._loops(move, later, 12, "tick_time_s + step * step_s"),
         ]
-        return "\n".join(lines) + "\n"
+        return "\n".join(lines)
 
     def _loops(self, stage: Stage, kept: list[tuple[int, str]], indent: int, time: str) -> list[str]:
         parts = _parts(stage) if self.lanes >= CUT_LANES_MIN else [stage]

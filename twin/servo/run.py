@@ -10,11 +10,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.effects.catalogue import effect_named
 from twin.effects.effect import Effect
-from twin.errors import EffectError
-from twin.kernels.generated import compiled, in_python
-from twin.servo.kernel import AxisKernel, axis_kernel, axis_quantities
+from twin.kernels.assembly import kernel_function
+from twin.servo.kernel import AXES, AxisKernel, axis_kernel
 from twin.servo.metrics import AxisMetrics
 
 Array = NDArray[np.float64]
@@ -80,12 +78,7 @@ def run_axes(
 
     Raises EffectError where a constant is missing, or an effect does not act on an axis.
     """
-    acting = tuple(effect_named(name) for name in effects)
-    for effect in acting:
-        if not set(effect.changes) & set(axis_quantities()):
-            raise EffectError(
-                f"{effect.name} does not act on the loops or the mechanics of an axis; it acts at the {effect.site} site"
-            )
+    acting = AXES.effects(effects)
     lanes = len(inputs.column)
     states: list[dict[str, Array]] = []
     blocks = _blocks(inputs.column)
@@ -104,7 +97,7 @@ def run_axes(
 
 
 def _width(lanes: int) -> int:
-    """Of the kernel that takes so many lanes."""
+    """Return the width of the narrowest kernel that takes so many lanes."""
     return next(width for width in LANES if width >= lanes)
 
 
@@ -159,13 +152,8 @@ class _Block:
         in_place = straight and (len(self.lanes) == width or whole.shape[1] == width)
         out = whole if in_place else np.empty((len(self.outputs), width, ticks))
         where = (out.shape[1], int(self.lanes[0]) if in_place else 0)
-        if self.reference_run:
-            cells, flat = scratch.tolist(), out.reshape(-1).tolist()
-            in_python(kernel.text)["axes"](first_tick, ticks, steps, period_s, cells, *[f.tolist() for f in fed], *where, flat)
-            out[...] = np.array(flat).reshape(out.shape)
-            scratch = np.array(cells)
-        else:
-            compiled(kernel.text).axes(first_tick, ticks, steps, period_s, scratch, *fed, *where, out.reshape(-1))
+        axes = kernel_function(kernel.text, "axes", reference_run=self.reference_run)
+        axes(first_tick, ticks, steps, period_s, scratch, *fed, *where, out.reshape(-1))
         if not in_place:
             whole[:, self.lanes] = out[:, : len(self.lanes)]
         rows = scratch.reshape(-1, width)
@@ -188,8 +176,6 @@ class _Block:
             elif row < kernel.states:
                 first = np.asarray(at_rest.get(name, 0.0))
                 rows[row] = first[filled] if first.ndim and len(first) != len(filled) else first
-            elif name in self.constants:
-                rows[row] = np.asarray(self.constants[name])[filled]
             else:
-                raise EffectError(f"the constant {name} of the axes is missing")
+                rows[row] = np.asarray(AXES.taken(self.constants, [name])[0])[filled]
         return rows

@@ -18,6 +18,7 @@ from twin.motion.control import RAPID_MM_MIN, control_of, effects_tell
 from twin.motion.motion import ExecState, Motion
 from twin.motion.path import EventKind, Kind, Path, path_from_moves
 from twin.motion.plan import Plan
+from twin.motion.sampling import sampled
 from twin.runlog import RunLog, run_log
 from twin.simulator.response import Response, RunInput, respond
 
@@ -70,7 +71,7 @@ def simulate(
     seed: None = the machine's mean course, free of noise; a number = one course as its sensors would record it
     start_temperature_c: of the spindle; None = ambient
 
-    Raises ProgramError where a control would refuse the program, MachineError where the machine has not got its axes or the run
+    Raises PartProgramError where a control would refuse the program, MachineError where the machine lacks its axes or the run
     would be longer than 8 million ticks, EffectError where its effects do not fit.
     """
     notes: list[str] = []
@@ -85,7 +86,7 @@ def simulate(
     period_s = machine.machine.servo_period_s
     if planned.total_s / period_s > TICKS_MAX:
         raise MachineError(f"{name} takes {planned.total_s:.0f} s, more than {TICKS_MAX} ticks of {period_s} s; split it")
-    motion = planned.sample(period_s)
+    motion = sampled(planned, period_s)
     engaged = _engagement(machine, path, motion, notes)
     angle = np.concatenate([[0.0], np.cumsum(motion.spindle_rpm)[:-1]]) * (2.0 * np.pi / 60.0 * period_s)
     told = RunInput(

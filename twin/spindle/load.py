@@ -7,27 +7,27 @@ not drift, and it is 0 again after a cut.
 
 from collections.abc import Mapping, Sequence
 from functools import cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from twin.effects.catalogue import effect_named
 from twin.effects.effect import Effect
-from twin.errors import EffectError, TwinError
-from twin.kernels.generated import compiled, in_python
-from twin.kernels.weave import quantities, weave
+from twin.errors import TwinError
+from twin.kernels.assembly import KERNEL, Assembly, Scalars, kernel_function, kernel_text
+from twin.kernels.weave import weave
 from twin.machine import SpindleDrive
 from twin.spindle import meter
 
 Array = NDArray[np.float64]
 WINDOW_S = 0.1
+SPINDLE = Assembly((meter.reading,), acts_on="the spindle", owner="the spindle")
+FED = ("cutting_power_kw", "spindle_rpm", "period_s")
 
 
 @cache
 def spindle_quantities() -> dict[str, str]:
     """The quantities of the spindle that an effect can change, with their sites."""
-    return quantities([meter.reading])
+    return SPINDLE.quantities()
 
 
 def spindle_constants(spindle: SpindleDrive) -> dict[str, float]:
@@ -66,21 +66,11 @@ def spindle_load_pct(
 
     Raises TwinError where shapes do not fit, EffectError where a constant is missing or an effect does not act on the spindle.
     """
-    acting = tuple(effect_named(name) for name in effects)
-    for effect in acting:
-        if not set(effect.changes) & set(spindle_quantities()):
-            raise EffectError(f"{effect.name} does not act on the spindle; it acts at the {effect.site} site")
-    text, names = _kernel(acting)
+    text, names = _kernel(SPINDLE.effects(effects))
     power_w, rpm, rows = _fitted(cutting_power_w, spindle_rpm, constants, names)
     window = max(round(WINDOW_S / period_s), 1)
     out = np.empty(power_w.shape)
-    load: Any = in_python(text)["load"] if reference_run else compiled(text).load
-    if reference_run:
-        for lane, (power, speed) in enumerate(zip(power_w.tolist(), rpm.tolist(), strict=True)):
-            shown = [0.0] * len(power)
-            load(rows[lane].tolist(), power, speed, window, period_s, [0.0] * (window + 1), shown)
-            out[lane] = shown
-        return out
+    load = kernel_function(text, "load", reference_run=reference_run)
     later = np.zeros(window + 1)
     for lane in range(len(power_w)):
         load(rows[lane], power_w[lane], rpm[lane], window, period_s, later, out[lane])
@@ -91,10 +81,7 @@ def _fitted(
     cutting_power_w: ArrayLike, spindle_rpm: ArrayLike, constants: Mapping[str, ArrayLike], names: tuple[str, ...]
 ) -> tuple[Array, Array, Array]:
     """Power and speed as (lanes, ticks), constants as (lanes, names)."""
-    for name in names:
-        if name not in constants:
-            raise EffectError(f"the constant {name} of the spindle is missing")
-    columns = [np.asarray(constants[name], dtype=np.float64).reshape(-1, 1) for name in names]
+    columns = [np.asarray(column, dtype=np.float64).reshape(-1, 1) for column in SPINDLE.taken(constants, names)]
     power_w = np.atleast_2d(np.asarray(cutting_power_w, dtype=np.float64))
     rpm = np.asarray(spindle_rpm, dtype=np.float64)
     try:
@@ -113,23 +100,18 @@ def _fitted(
 @cache
 def _kernel(effects: tuple[Effect, ...]) -> tuple[str, tuple[str, ...]]:
     """The text that defines `load`, and the constants that it takes, in order."""
-    woven = weave([meter.reading], effects)
-    states = {f"{effect.name}__{name}": value for effect in effects for name, value in effect.states.items()}
-    states = {name: value for name, value in states.items() if name in woven.takes}
-    assert all(isinstance(value, float) for value in states.values()), "the meter has no state to start from"
-    fed = {"cutting_power_kw", "spindle_rpm", "period_s", *states}
-    names = tuple(name for name in woven.takes if name not in fed)
-    constants = [f"given__{name} = constants[{row}]" for row, name in enumerate(names)]
-    body = [f"{name} = given__{name}" for name in names] + woven.body.splitlines()
+    woven = weave(SPINDLE.physics, effects)
+    scalars = Scalars.of(woven, effects, FED)
+    assert all(isinstance(value, float) for value in scalars.states.values()), "the meter has no state to start from"
+    body = [*scalars.in_loop(), *woven.body.splitlines()]
     lines = [
-        "@njit(cache=True, nogil=True, error_model='numpy')",
+        KERNEL,
         "def load(constants, cutting_power_w, spindle_rpm_in, window, period_s, later_w, shown_pct):",
-        *(f"    {line}" for line in [*constants, *(f"{name} = {value!r}" for name, value in states.items())]),
+        *(f"    {line}" for line in [*scalars.before_loop(), *scalars.states_at_start()]),
         *(f"    {line}" for line in _WINDOW),
         *(f"        {line}" for line in [*body, "shown_pct[tick] = spindle_load_pct"]),
     ]
-    functions = [f"@njit(error_model='numpy')\n{text}" for text in woven.functions]
-    return "\n\n\n".join(["from math import exp, sqrt", *functions, "\n".join(lines)]) + "\n", names
+    return kernel_text("from math import exp, sqrt", woven.functions, ["\n".join(lines)]), scalars.constants
 
 
 _WINDOW = [

@@ -66,7 +66,7 @@ class Limits:
     deviation_max: float
 
 
-class Found(NamedTuple):
+class PatternMatch(NamedTuple):
     """A pattern that ends now. begun_samples: since its beginning; features: as FEATURES, None = not known."""
 
     rho: float
@@ -166,7 +166,7 @@ class Detector:
         """Before so many have come, nothing can be said: a change may have been going on."""
         return round(self.template.seconds / self.template.period_s)
 
-    def advanced(self, state: State, value: float, feed_rest: float, block_stand: float) -> tuple[State, Found | None]:
+    def advanced(self, state: State, value: float, feed_rest: float, block_stand: float) -> tuple[State, PatternMatch | None]:
         """The state after one sample: `value` of the signal, and the run lengths as of now. With what was confirmed by it."""
         state, found = self.searched(state, value, feed_rest, block_stand)
         if found is None or not self.confirms(found):
@@ -174,17 +174,19 @@ class Detector:
         is_new = state.gate.after == 0 or state.history.seen - state.gate.after > self.samples_min
         return self._confirmed(state, found), found if is_new else None
 
-    def confirms(self, found: Found) -> bool:
+    def confirms(self, found: PatternMatch) -> bool:
         """Whether this is one."""
         if found.logit is not None:
             return found.logit >= 0.0
         return found.score >= self.limits.pattern_score and found.distance <= self.limits.distance_max
 
-    def searched(self, state: State, value: float, feed_rest: float, block_stand: float) -> tuple[State, Found | None]:
+    def searched(self, state: State, value: float, feed_rest: float, block_stand: float) -> tuple[State, PatternMatch | None]:
         """The state after one sample, unconfirmed, and the best pattern that ends now, whatever it is worth."""
         return self.searched_level(state, level(self.signal, value), feed_rest, block_stand)
 
-    def searched_level(self, state: State, level_now: float, feed_rest: float, block_stand: float) -> tuple[State, Found | None]:
+    def searched_level(
+        self, state: State, level_now: float, feed_rest: float, block_stand: float
+    ) -> tuple[State, PatternMatch | None]:
         """As `searched`, where the level is known already."""
         history, gate = state
         history = history.with_room()
@@ -231,14 +233,14 @@ class Detector:
             phase, until, opened, confidence = Phase.PROVISIONAL, now + self.patience, now, rho
         return Gate(phase, until, opened, after, not is_begun, confidence)
 
-    def _confirmed(self, state: State, found: Found) -> State:
+    def _confirmed(self, state: State, found: PatternMatch) -> State:
         confidence = found.score if found.logit is None else probability(found.logit)
         now = state.history.seen
         until = self.shown + max(now, now - found.begun_samples + self.samples_min)
         gate = state.gate._replace(phase=Phase.CONFIRMED, until=until, after=now, confidence=confidence, is_low=False)
         return State(state.history, gate)
 
-    def _found(self, state: State) -> Found | None:
+    def _found(self, state: State) -> PatternMatch | None:
         """The best pattern that ends now."""
         history, bank, template = state.history, self.template.bank, self.template
         low, high = self.limits_in_quanta
@@ -256,7 +258,7 @@ class Detector:
         if self.weighing is not None and feed is not None and block is not None:
             logit = self.weighing.logit((rho, 1.0 - distance / 2.0, feed, block))
         stalled = gap - len(template.between) * template.stretches[k]
-        return Found(rho, distance, template.stretches[k], d + gap + r, stalled, feed, block, logit)
+        return PatternMatch(rho, distance, template.stretches[k], d + gap + r, stalled, feed, block, logit)
 
 
 def restored(kept: Sequence[Sequence[float]], length: int, seen: int, gate: Sequence[Any]) -> State:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.transient.detector import OPEN, Detector, Found, Gate, Phase
+from twin.transient.detector import OPEN, Detector, Gate, PatternMatch, Phase
 from twin.transient.stream import Stream
 
 APART_S = 1.0
@@ -18,7 +18,7 @@ class Candidate(NamedTuple):
     """A pattern that ended at `at_s`, whatever it is worth."""
 
     at_s: float
-    found: Found
+    found: PatternMatch
 
 
 class Confirmed(NamedTuple):
@@ -32,7 +32,7 @@ class Confirmed(NamedTuple):
     opened_s: float | None
     at_s: float
     last_s: float
-    found: Found
+    found: PatternMatch
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.transient.copies import copies_of
-from twin.transient.detector import DISTANCE_ANY, FEATURES, HAVE_TYPICAL, Detector, Found, Limits
+from twin.transient.detector import DISTANCE_ANY, FEATURES, HAVE_TYPICAL, Detector, Limits, PatternMatch
 from twin.transient.errors import TransientError
 from twin.transient.evidence import UNKNOWN, Weighing, weighing_of
 from twin.transient.extremes import FalseRate, false_rate, threshold_for
@@ -38,8 +38,12 @@ SMALLER, LARGER = 0.5, 2.0
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
-    """before_s, after_s: of the window around a given time that holds the change; stall_s: how much longer it may take."""
+class TrainingSettings:
+    """Settings of a training run.
+
+    signal: the one that shows the change; before_s, after_s: of the window around a given time that holds the change
+    stall_s: how much longer the change may take; false_gates_per_day: the rate that the threshold aims at
+    """
 
     signal: str
     before_s: float = 12.0
@@ -71,18 +75,18 @@ class Trained:
     copies_found: float
 
 
-def trained(streams: Sequence[Stream], asked: Asked, rng: np.random.Generator) -> Trained:
+def trained(streams: Sequence[Stream], settings: TrainingSettings, rng: np.random.Generator) -> Trained:
     """A detector of the changes in `streams`. Raises TransientError where there are none, or they have nothing in common."""
     changes = [(stream, at_s) for stream in streams for at_s in stream.changes_s]
     if not changes:
         raise TransientError("no change is known in these runs: give times with --at, or runs with tool_change_active")
-    windows = [levels(asked.signal, stream.window(at_s, asked.before_s, asked.after_s)) for stream, at_s in changes]
-    found = learned(windows, streams[0].period_s, asked.stall_s)
+    windows = [levels(settings.signal, stream.window(at_s, settings.before_s, settings.after_s)) for stream, at_s in changes]
+    found = learned(windows, streams[0].period_s, settings.stall_s)
     copies = copies_of(found, COPIES, rng)
-    loose = _loose(asked, found, copies)
+    loose = _loose(settings, found, copies)
     seen = [(stream, list(candidates(loose, stream))) for stream in streams]
-    null = [one.found for stream, some in seen for one in some if not _is_near(stream, one.at_s, asked)]
-    hours = max(1e-6, sum(stream.hours for stream in streams) - len(changes) * (asked.before_s + asked.after_s) / 3600.0)
+    null = [one.found for stream, some in seen for one in some if not _is_near(stream, one.at_s, settings)]
+    hours = max(1e-6, sum(stream.hours for stream in streams) - len(changes) * (settings.before_s + settings.after_s) / 3600.0)
 
     held_out = [
         _best(_with(loose, found, n), window) for n, (window, fit) in enumerate(zip(windows, found.fits, strict=True)) if fit
@@ -91,15 +95,15 @@ def trained(streams: Sequence[Stream], asked: Asked, rng: np.random.Generator) -
     own = [one for one in held_out if one is not None]
     distance_max = _distance_max(own, [one for one in copied if one is not None])
     peaks = np.array([one.score for one in null if one.distance <= distance_max])
-    asked_score = threshold_for(peaks, hours, asked.false_gates_per_day)
+    asked_score = threshold_for(peaks, hours, settings.false_gates_per_day)
     passed_score = MARGIN * min((one.score for one in own if one.distance <= distance_max), default=1.0)
     limits = replace(
-        loose.limits, pattern_score=_pattern_score(asked_score, passed_score, hours, asked), distance_max=distance_max
+        loose.limits, pattern_score=_pattern_score(asked_score, passed_score, hours, settings), distance_max=distance_max
     )
-    weighing = _weighing(seen, asked)
+    weighing = _weighing(seen, settings)
     detector = replace(loose, limits=limits, weighing=weighing)
     outcomes = [(stream, replayed(detector, stream)) for stream in streams]
-    opened = sum(not _is_near(stream, at_s, asked) for stream, outcome in outcomes for at_s in outcome.opened_s)
+    opened = sum(not _is_near(stream, at_s, settings) for stream, outcome in outcomes for at_s in outcome.opened_s)
     return Trained(
         detector=detector,
         captured=tuple(at_s for (_, at_s), fit in zip(changes, found.fits, strict=True) if fit is not None),
@@ -109,7 +113,7 @@ def trained(streams: Sequence[Stream], asked: Asked, rng: np.random.Generator) -
         provisional_per_day=24.0 * opened / hours,
         changes=len(changes),
         confirmed=sum(
-            any(one.begun_s - asked.after_s <= at_s <= one.at_s + asked.after_s for one in outcome.confirmed)
+            any(one.begun_s - settings.after_s <= at_s <= one.at_s + settings.after_s for one in outcome.confirmed)
             for stream, outcome in outcomes
             for at_s in stream.changes_s
         ),
@@ -118,15 +122,15 @@ def trained(streams: Sequence[Stream], asked: Asked, rng: np.random.Generator) -
     )
 
 
-def _pattern_score(asked_score: float | None, passed_score: float, hours: float, asked: Asked) -> float:
+def _pattern_score(asked_score: float | None, passed_score: float, hours: float, settings: TrainingSettings) -> float:
     """The threshold: that of the rate; where the null stream is too short to know that, what captures pass, if it is lower."""
     if asked_score is None:
         return passed_score
-    is_known = hours * asked.false_gates_per_day / 24.0 >= KNOWN_FROM
+    is_known = hours * settings.false_gates_per_day / 24.0 >= KNOWN_FROM
     return min(asked_score, SCORE_MAX) if is_known else min(asked_score, passed_score)
 
 
-def _loose(asked: Asked, found: Learned, copies: Sequence[Floats]) -> Detector:
+def _loose(settings: TrainingSettings, found: Learned, copies: Sequence[Floats]) -> Detector:
     """A detector that finds all that could be one."""
     fits = [fit for fit in found.fits if fit is not None]
     copied = [fit for window in copies if (fit := fitted(found.template, window)) is not None]
@@ -144,7 +148,7 @@ def _loose(asked: Asked, found: Learned, copies: Sequence[Floats]) -> Detector:
         deviation_min=SMALLER * min(deviations),
         deviation_max=LARGER * max(deviations),
     )
-    return Detector(asked.signal, found.template, found.scale, limits)
+    return Detector(settings.signal, found.template, found.scale, limits)
 
 
 def _with(loose: Detector, found: Learned, n: int) -> Detector:
@@ -152,7 +156,7 @@ def _with(loose: Detector, found: Learned, n: int) -> Detector:
     return replace(loose, template=found.without(n))
 
 
-def _best(detector: Detector, window: Floats) -> Found | None:
+def _best(detector: Detector, window: Floats) -> PatternMatch | None:
     """The best pattern in a window of levels."""
     state, best = detector.begun(), None
     for value in window.tolist():
@@ -162,35 +166,35 @@ def _best(detector: Detector, window: Floats) -> Found | None:
     return best
 
 
-def _passes(limits: Limits, found: Found) -> bool:
+def _passes(limits: Limits, found: PatternMatch) -> bool:
     return found.score >= limits.pattern_score and found.distance <= limits.distance_max
 
 
-def _distance_max(own: Sequence[Found], copied: Sequence[Found]) -> float:
+def _distance_max(own: Sequence[PatternMatch], copied: Sequence[PatternMatch]) -> float:
     """The distance that nearly all captures and copies stay below."""
     of_copies = [float(np.quantile([one.distance for one in copied], 1.0 - FAILING))] if copied else []
     of_own = [float(np.median([one.distance for one in own])) * LARGER] if own else []
     return max([0.2, *of_copies, *of_own]) / MARGIN
 
 
-def _is_near(stream: Stream, at_s: float, asked: Asked) -> bool:
+def _is_near(stream: Stream, at_s: float, settings: TrainingSettings) -> bool:
     """Whether a known change may have caused what happened then."""
-    after_s = asked.after_s + asked.stall_s
-    return any(change_s - asked.before_s <= at_s <= change_s + after_s for change_s in stream.changes_s)
+    after_s = settings.after_s + settings.stall_s
+    return any(change_s - settings.before_s <= at_s <= change_s + after_s for change_s in stream.changes_s)
 
 
-def _is_taken(weighing: Weighing, found: Found) -> bool:
+def _is_taken(weighing: Weighing, found: PatternMatch) -> bool:
     features = _features(found)
     return features is not None and weighing.logit(features) >= 0.0
 
 
-def _features(found: Found) -> tuple[float, ...] | None:
+def _features(found: PatternMatch) -> tuple[float, ...] | None:
     if found.feed_at_rest is None or found.block_stands is None:
         return None
     return found.rho, 1.0 - found.distance / 2.0, found.feed_at_rest, found.block_stands
 
 
-def _weighing(seen: Sequence[tuple[Stream, Sequence[Candidate]]], asked: Asked) -> Weighing | None:
+def _weighing(seen: Sequence[tuple[Stream, Sequence[Candidate]]], settings: TrainingSettings) -> Weighing | None:
     """Of changes against all else; None where feed or block is not known, or there is too little of either.
 
     What ends before the given time of a change is not the change, but what looks like its beginning and end: as good an example
@@ -200,14 +204,16 @@ def _weighing(seen: Sequence[tuple[Stream, Sequence[Candidate]]], asked: Asked) 
     for stream, some in seen:
         taken: set[float] = set()
         for change_s in stream.changes_s:
-            after = [one for one in some if change_s <= one.at_s <= change_s + asked.after_s + asked.stall_s]
+            after = [one for one in some if change_s <= one.at_s <= change_s + settings.after_s + settings.stall_s]
             best = max(after, key=lambda one: one.found.score, default=None)
             if best is not None and (features := _features(best.found)) is not None:
                 taken.add(best.at_s)
                 rows.append(features)
                 is_change.append(True)
         for one in some:
-            is_after = any(change_s <= one.at_s <= change_s + asked.after_s + asked.stall_s for change_s in stream.changes_s)
+            is_after = any(
+                change_s <= one.at_s <= change_s + settings.after_s + settings.stall_s for change_s in stream.changes_s
+            )
             features = None if is_after else _features(one.found)
             if features is not None:
                 rows.append(features)

@@ -30,8 +30,8 @@ def train_detector(
     """Learn what a tool change of a control that reports none looks like, from captures or labels."""
     try:
         from cnctwin.training.detector.train import train_detector as train
-        from twin.transient.training import Asked
+        from twin.transient.training import TrainingSettings
     except ImportError as error:
         raise UsageError(f"{error.name} is not installed, which trains detectors: pip install 'cnctwin[twin]'") from None
-    asked = Asked(signal, before_s, after_s, stall_s, false_gates_per_day)
+    asked = TrainingSettings(signal, before_s, after_s, stall_s, false_gates_per_day)
     train(runs, asked, out, at or [], candidates, period_s, seed, as_json, Console())

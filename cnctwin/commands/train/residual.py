@@ -41,7 +41,7 @@ def train_residual(
     wanted = command.Wanted(
         machine, given, "" if given else store, _moment(from_, "--from"), _moment(to, "--to"), config, hours_min
     )
-    asked = command.Asked(trees, depth, leaf, row_s, held_share, features, seed)
+    asked = command.TrainingSettings(trees, depth, leaf, row_s, held_share, features, seed)
     raise typer.Exit(command.train_residual(wanted, asked, out, as_json=as_json, console=Console()))
 
 

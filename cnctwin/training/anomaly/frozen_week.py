@@ -11,7 +11,8 @@ from cnctwin.training.anomaly.regimes import Ticks, held_run, standardised
 from cnctwin.training.anomaly.replayed_cell import Track
 from twin.anomaly.alarm import AlarmRule, is_alarm, onsets
 from twin.anomaly.common_mode import CommonModeRule, Method
-from twin.anomaly.golden import GoldenWeek, frozen, peers_of
+from twin.anomaly.golden import GoldenWeek
+from twin.anomaly.golden_check import frozen, peers_of
 from twin.anomaly.model import AnomalyModel
 
 Floats = NDArray[np.float64]

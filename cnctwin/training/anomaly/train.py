@@ -21,7 +21,8 @@ from twin.anomaly.alarm import AlarmRule, is_alarm, onsets
 from twin.anomaly.common_mode import Method
 from twin.anomaly.detector import Detector
 from twin.anomaly.errors import ModelError
-from twin.anomaly.golden import WEEK_S, checked, most_alerts
+from twin.anomaly.golden import WEEK_S
+from twin.anomaly.golden_check import checked, most_alerts
 from twin.anomaly.model import CURRENT, AnomalyModel, load_golden, load_model, load_models
 from twin.anomaly.store import current_of, promote, stored
 from twin.errors import TwinError

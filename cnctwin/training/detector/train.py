@@ -18,14 +18,14 @@ from cnctwin.training.detector.recorded_streams import streams_of
 from twin.transient.artefact import save_detector
 from twin.transient.errors import TransientError
 from twin.transient.level import SIGNALS
-from twin.transient.training import Asked, Trained, trained
+from twin.transient.training import Trained, TrainingSettings, trained
 
 PERIOD_S_MIN = 0.01
 
 
 def train_detector(  # noqa: PLR0917 - the options of the command
     runs: Sequence[Path],
-    asked: Asked,
+    asked: TrainingSettings,
     out: Path | None,
     at_s: Sequence[float],
     candidates: Path | None,
@@ -82,7 +82,7 @@ def summary_of(done: Trained) -> dict[str, Any]:
     }
 
 
-def sentences_of(done: Trained, asked: Asked) -> list[str]:
+def sentences_of(done: Trained, asked: TrainingSettings) -> list[str]:
     """Return what a person should know before it is used."""
     detector, rate = done.detector, done.rate
     said = [

@@ -24,9 +24,9 @@ from twin.errors import TwinError
 from twin.residual.model import FOLDER, Trained, save_model
 from twin.residual.physics import Physics
 from twin.residual.table import Recorded
-from twin.residual.training import Asked, Outcome, trained
+from twin.residual.training import Outcome, TrainingSettings, trained
 
-__all__ = ["Asked", "Wanted", "train_residual"]
+__all__ = ["TrainingSettings", "Wanted", "train_residual"]
 HOURS_MIN = 40.0
 """Hours of cutting, as the published recipe asks for."""
 HELD_SHARE_MIN, HELD_SHARE_MAX = 0.1, 0.6
@@ -45,7 +45,7 @@ class Wanted:
     hours_min: float = HOURS_MIN
 
 
-def train_residual(wanted: Wanted, asked: Asked, out: Path, *, as_json: bool, console: Console) -> int:
+def train_residual(wanted: Wanted, asked: TrainingSettings, out: Path, *, as_json: bool, console: Console) -> int:
     """Train, judge, and put the model into the registry, unless it is worthless; exit code 1 where it is."""
     if not HELD_SHARE_MIN <= asked.held_share <= HELD_SHARE_MAX:
         raise UsageError(

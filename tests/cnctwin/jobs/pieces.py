@@ -6,7 +6,7 @@ import signal
 import time
 from pathlib import Path
 
-from twin.errors import MachineError, ProgramError
+from twin.errors import MachineError, PartProgramError
 
 TOGETHER_S_MAX = 60.0
 
@@ -30,7 +30,7 @@ def squared(text: str) -> str:
 
 def refused(text: str) -> str:
     """Blames the input, with an error whose arguments are not its text."""
-    raise ProgramError(7, "G2", f"a bow without {json.loads(text)}")
+    raise PartProgramError(7, "G2", f"a bow without {json.loads(text)}")
 
 
 def unknown_machine(text: str) -> str:

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.program_columns import program_columns
 from cnctwin.errors import UsageError
 from cnctwin.validation.budgets import Budgets
 from cnctwin.validation.cycle_time import Cycle, Cycles, judged_cycle_time, texts_of
@@ -16,6 +17,7 @@ from cnctwin.validation.model import Twin
 from tests.recordings import recording
 from tests.twin.gap.programs.written import made, plate_runs, shop_program
 from twin.machine import MachineFile, machine_from_toml
+from twin.motion.sampling import sampled
 from twin.runlog import RunLog, run_log
 from twin.simulator.simulation import simulate
 
@@ -132,7 +134,7 @@ def test_a_program_that_takes_what_the_twin_says_is_within(tmp_path: Path) -> No
     text, texts = shop(tmp_path)
     machine = machine_from_toml(MILL)
     plan = simulate(machine.model_copy(update={"stock": None}), text).plan
-    runs = [Cycle("O1", run_log(plan.sample(0.15).program_columns(), "run"))] * 3
+    runs = [Cycle("O1", run_log(program_columns(sampled(plan, 0.15)), "run"))] * 3
     (found,) = timed(texts, *runs)
     assert found.verdict is Verdict.WITHIN and found.on == "O1" and found.samples == 3 and (found.value or 99.0) < 0.5
 

@@ -201,7 +201,7 @@ def test_a_recorded_part_gives_what_the_replay_gives(tmp_path: Path) -> None:
     """Plate 15, which was not learned from, through the engine, report by report."""
     bench = benchmark()
     path = recording("nist/plate/Plate-Hurco04-15of20.txt")
-    done = bench.trained(bench.training_streams(), bench.Asked("spindle_rpm"), np.random.default_rng(0))
+    done = bench.trained(bench.training_streams(), bench.TrainingSettings("spindle_rpm"), np.random.default_rng(0))
     save_detector(tmp_path, done, (), {}, 1.0)
     stream = next(iter(bench.whole_recording(path)))
     offline = replayed(done.detector, stream).confirmed

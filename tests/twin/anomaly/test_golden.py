@@ -11,7 +11,7 @@ from tests.twin.anomaly.models import calibration, rows, small_model
 from twin.anomaly.alarm import AlarmRule, is_alarm, onsets
 from twin.anomaly.common_mode import CommonModeRule, Method, adjust_frames, standardised
 from twin.anomaly.errors import ModelError
-from twin.anomaly.golden import adjusted_by_peers, checked, frozen, most_alerts, peers_of
+from twin.anomaly.golden_check import adjusted_by_peers, checked, frozen, most_alerts, peers_of
 from twin.anomaly.model import load_golden, load_model, save_model
 
 COUNT = 2000

@@ -16,6 +16,7 @@ from twin.motion.control import LENGTH_OVER_FEED, QUANTITIES, changed
 from twin.motion.limits import Limits
 from twin.motion.path import path_from_moves
 from twin.motion.plan import Plan
+from twin.motion.sampling import sampled
 from twin.servo.kernel import axis_quantities
 from twin.servo.run import AxisInput, AxisRun, run_axes
 from twin.sites import Site
@@ -130,7 +131,7 @@ def test_at_its_null_value_a_program_is_planned_as_without_it_bit_for_bit(effect
     assert bare.total_s == null.total_s
     for one, other in ((bare.start_s, null.start_s), (bare.peak_mm_s, null.peak_mm_s), (bare.event_start_s, null.event_start_s)):
         np.testing.assert_array_equal(one, other)
-    np.testing.assert_array_equal(bare.sample(0.01).spindle_rpm, null.sample(0.01).spindle_rpm)
+    np.testing.assert_array_equal(sampled(bare, 0.01).spindle_rpm, sampled(null, 0.01).spindle_rpm)
 
 
 @pytest.mark.parametrize("limits", [LENGTH_OVER_FEED, STATED], ids=["length over feed", "a stated control"])

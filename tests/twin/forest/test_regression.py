@@ -1,8 +1,6 @@
-"""The flattened random forest predicts as scikit-learn does, to the last bit, and is kept in a folder."""
+"""The flattened random forest predicts as scikit-learn does, to the last bit."""
 
-import json
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,10 +11,8 @@ from sklearn.preprocessing import StandardScaler
 
 from tests.twin.forest.forests import regression, same_bits
 from twin.forest import ForestError, flatten_regression
-from twin.forest.regression import load_regression, save_regression
 
 ROWS = np.random.default_rng(5).normal(size=(3000, 8))
-NAMES = tuple("abcdefgh")
 
 
 @cache
@@ -46,26 +42,6 @@ def test_a_forest_on_many_threads_is_held_against_itself_on_one() -> None:
     flat = flatten_regression(model)
     assert model.n_jobs == 2
     assert np.allclose(flat.predict(ROWS), model.predict(ROWS), rtol=1e-12)
-
-
-def test_what_comes_back_from_a_folder_is_the_same(tmp_path: Path) -> None:
-    flat = flatten_regression(models()["random forest"])
-    save_regression(flat, tmp_path / "load", NAMES, "spindle_load_pct")
-    again = load_regression(tmp_path / "load", NAMES)
-    assert same_bits(again.predict(ROWS), flat.predict(ROWS))
-    assert sorted(path.name for path in (tmp_path / "load").iterdir()) == ["arrays.npz", "manifest.json"]
-    assert json.loads((tmp_path / "load" / "manifest.json").read_text())["target"] == "spindle_load_pct"
-    save_regression(flat, tmp_path / "again", NAMES, "spindle_load_pct")
-    assert (tmp_path / "again" / "arrays.npz").read_bytes() == (tmp_path / "load" / "arrays.npz").read_bytes()
-
-
-def test_other_features_or_another_order_are_refused(tmp_path: Path) -> None:
-    flat = flatten_regression(models()["random forest"])
-    save_regression(flat, tmp_path / "load", NAMES, "spindle_load_pct")
-    with pytest.raises(ForestError, match="give them in its order"):
-        load_regression(tmp_path / "load", NAMES[::-1])
-    with pytest.raises(ForestError, match="3 names for 8 features"):
-        save_regression(flat, tmp_path / "other", NAMES[:3], "spindle_load_pct")
 
 
 def test_what_is_no_forest_of_one_figure_is_refused() -> None:

@@ -1,4 +1,4 @@
-"""Whatever the text is, the answer is moves or a ProgramError that names a line of it."""
+"""Whatever the text is, the answer is moves or a PartProgramError that names a line of it."""
 
 import math
 from dataclasses import replace
@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.depth import examples
-from twin.errors import ProgramError
+from twin.errors import PartProgramError
 from twin.gcode import Arc, IntegerWords, Linear, Rapid, Settings, ToolOffset, interpret
 
 BOUNDED = Settings(
@@ -96,7 +96,7 @@ SENSE = st.sampled_from(
 def survives(text: str, chosen: Settings) -> None:
     try:
         moves = interpret(text, chosen)
-    except ProgramError as refused:
+    except PartProgramError as refused:
         assert refused.line >= 1
         assert refused.reason
         return
@@ -133,7 +133,7 @@ def test_a_program_runs_the_same_twice_and_with_any_line_ends(blocks: list[str])
     def outcome(text: str) -> object:
         try:
             return interpret(text, BOUNDED)
-        except ProgramError as refused:
+        except PartProgramError as refused:
             return str(refused)
 
     first = outcome("\n".join(blocks))

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.twin.gcode.contours import contour
-from twin.errors import ProgramError
+from twin.errors import PartProgramError
 from twin.gcode import Arc, LeadIn, Linear, OutsideCorner, Rapid, Settings, ToolOffset, interpret
 
 TOOLS = {1: ToolOffset(radius_mm=5.0), 2: ToolOffset(radius_mm=4.0, radius_wear_mm=1.0), 3: ToolOffset(radius_mm=-5.0)}
@@ -106,7 +106,7 @@ def test_a_cancelled_compensation_without_a_move_leaves_the_tool_where_it_is() -
     ],
 )
 def test_what_the_tool_cannot_do_is_refused(text: str, line: int, reason: str) -> None:
-    with pytest.raises(ProgramError, match=reason) as caught:
+    with pytest.raises(PartProgramError, match=reason) as caught:
         interpret(text, LINES)
     assert caught.value.line == line
 

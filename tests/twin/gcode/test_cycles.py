@@ -2,7 +2,7 @@
 
 import pytest
 
-from twin.errors import ProgramError
+from twin.errors import PartProgramError
 from twin.gcode import Dwell, Linear, Move, ProgramStop, Rapid, Settings, Spindle, SpindleOrient, interpret
 
 SETTINGS = Settings(peck_retract_mm=0.5, peck_clearance_mm=1.0)
@@ -71,7 +71,7 @@ def test_tapping_is_tied_to_the_spindle() -> None:
 
 def test_cycle_words_stay_until_the_cycle_is_cancelled() -> None:
     assert len(steps("G81 X1. Z-1. R1. F100.\nX2.\nG80\nX3.")) == 9
-    with pytest.raises(ProgramError, match="level R"):
+    with pytest.raises(PartProgramError, match="level R"):
         interpret("G81 X1. Z-1. R1. F100.\nG0 X5.\nG81 X1. Z-1.")
 
 
@@ -92,5 +92,5 @@ def test_a_rotated_pattern_of_holes_is_rotated() -> None:
     ],
 )
 def test_a_cycle_without_what_it_needs_says_so(block: str, reason: str) -> None:
-    with pytest.raises(ProgramError, match=reason):
+    with pytest.raises(PartProgramError, match=reason):
         interpret(block)

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from twin.errors import ProgramError
+from twin.errors import PartProgramError
 from twin.gcode import IntegerWords, Linear, Move, Rapid, Settings, ToolOffset, interpret
 
 
@@ -104,7 +104,7 @@ def test_null_is_not_zero_where_equality_is_asked(condition: str, holds: bool) -
 def test_a_word_whose_variable_is_null_is_not_there() -> None:
     assert interpret("G0 X1 Y2\nG0 X#1 Y5\nX#0") == [Rapid(0, (1.0, 2.0, 0.0)), Rapid(1, (1.0, 5.0, 0.0))]
     assert value("#5", "#4=1\n#5=#4\n#4=#0") == 1.0
-    with pytest.raises(ProgramError, match="#0"):
+    with pytest.raises(PartProgramError, match="#0"):
         interpret("#0=1")
 
 
@@ -179,7 +179,7 @@ def test_a_modal_call_follows_each_move_until_it_is_cancelled() -> None:
 def test_a_subprogram_of_its_own_text_names_itself() -> None:
     settings = Settings(subprograms={1000: "(HEAD)\nG0 X1\nM99"})
     assert interpret("M98 P1000", settings) == [Rapid(1, (1.0, 0.0, 0.0), "O1000")]
-    with pytest.raises(ProgramError) as caught:
+    with pytest.raises(PartProgramError) as caught:
         interpret("M98 P1001", Settings(subprograms={1001: "G0 X1\nG0 Q[\nM99"}))
     assert (caught.value.line, caught.value.program) == (2, "O1001")
 
@@ -238,7 +238,7 @@ def test_system_variables_show_the_control(before: str, expression: str, expecte
     ],
 )
 def test_a_wrong_macro_is_named(text: str, line: int, word: str, reason: str) -> None:
-    with pytest.raises(ProgramError) as caught:
+    with pytest.raises(PartProgramError) as caught:
         interpret(text, Settings(jumps_max=1000))
     assert (caught.value.line, caught.value.word) == (line, word)
     assert reason in caught.value.reason

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from twin.errors import ProgramError
+from twin.errors import PartProgramError
 from twin.gcode import (
     Arc,
     Coolant,
@@ -237,7 +237,7 @@ def test_rotary_axes_follow_in_degrees_whatever_the_unit() -> None:
     ],
 )
 def test_a_wrong_block_is_named_with_its_line_its_word_and_a_way_out(text: str, line: int, word: str, reason: str) -> None:
-    with pytest.raises(ProgramError) as caught:
+    with pytest.raises(PartProgramError) as caught:
         interpret(text)
     assert (caught.value.line, caught.value.word) == (line, word)
     assert reason in caught.value.reason

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from twin.errors import ProgramError, TwinError
+from twin.errors import PartProgramError, TwinError
 from twin.gcode import Arc, Linear, Move, Rapid, Settings, ToolOffset, interpret
 
 WORK = Settings(
@@ -40,7 +40,7 @@ def test_offsets_add_up(text: str, expected: list[tuple[float, ...]]) -> None:
 
 
 def test_a_length_that_the_table_has_not_got_is_refused_and_without_a_table_it_is_none() -> None:
-    with pytest.raises(ProgramError, match="no number 9"):
+    with pytest.raises(PartProgramError, match="no number 9"):
         interpret("G43 H9 G0 Z5", WORK)
     assert ends("G43 H9 G0 Z5") == [(0, 0, 5)]
 
@@ -66,7 +66,7 @@ def test_scaling_is_about_its_centre_and_a_mirror_turns_arcs_round() -> None:
 
 
 def test_a_circle_that_scaling_would_make_an_ellipse_is_refused() -> None:
-    with pytest.raises(ProgramError, match="ellipse"):
+    with pytest.raises(PartProgramError, match="ellipse"):
         interpret("G51 X0 Y0 I2000 J1000 K1000\nG3 X10. Y10. R10. F100.")
 
 

@@ -10,7 +10,7 @@ import pytest
 from tests.recordings import recordings_folder
 from tests.twin.gcode import rs274
 from tests.twin.gcode.contours import contour
-from twin.errors import ProgramError
+from twin.errors import PartProgramError
 from twin.gcode import Arc, Linear, Rapid, interpret
 from twin.gcode.pieces import piece
 from twin.gcode.planar import turn_between
@@ -29,7 +29,7 @@ def compared(text: str) -> tuple[int, str | None] | None:
         return None
     try:
         moves = interpret(text, rs274.LIKE_LINUXCNC)
-    except ProgramError:
+    except PartProgramError:
         return None
     theirs, own = rs274.read(printed), rs274.ours(moves)
     tolerance = TOLERANCE_INCH_MM if "INCHES" in printed else TOLERANCE_MM

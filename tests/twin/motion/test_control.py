@@ -9,6 +9,7 @@ from twin.machine import AddedEffect, MachineFile, machine_from_toml
 from twin.motion.control import LENGTH_OVER_FEED, Control, changed, control_of
 from twin.motion.limits import Limits
 from twin.motion.path import path_from_moves
+from twin.motion.sampling import sampled
 from twin.simulator.simulation import IDEAL_TIMES, simulate
 
 BARE = machine_from_toml("[machine]\nname = 'bare'\n")
@@ -61,7 +62,7 @@ def test_the_simulated_machine_honours_them() -> None:
 def test_sampled_lines_last_as_long_as_the_plan_says_a_wait_for_the_spindle_included() -> None:
     control = changed(LENGTH_OVER_FEED, {"tool_change_time": {"change_s": 2.0, "up_rpm_s": 2000.0}})
     planned = control.plan(path_from_moves(interpret(PROGRAM)))
-    motion = planned.sample(0.001)
+    motion = sampled(planned, 0.001)
     by_line = planned.seconds_by_line()
     assert by_line[2] > 2.0, "the rapid waits for the spindle"
     lasted = np.bincount(motion.line, minlength=len(by_line)) * 0.001

@@ -10,14 +10,16 @@ from hypothesis import strategies as st
 
 import twin.motion.path
 import twin.motion.plan
-from twin.errors import MachineError, ProgramError
+from benchmarks.program_columns import program_columns
+from twin.errors import MachineError, PartProgramError
 from twin.gcode import canonical
 from twin.machine import Program
-from twin.motion.candidates import plan_times
+from twin.motion.candidates import Candidates
 from twin.motion.limits import Limits
 from twin.motion.motion import ExecState
 from twin.motion.path import Path, path_from_moves
 from twin.motion.plan import plan
+from twin.motion.sampling import sampled
 
 LIMITS = Limits(rapid_mm_min=36000.0, acceleration_mm_s2=2500.0, jerk_mm_s3=60000.0, corner_speed_difference_mm_min=500.0)
 TRAPEZOID = LIMITS.with_(jerk_mm_s3=math.inf)
@@ -95,7 +97,7 @@ def test_overrides_scale_feed_and_rapid_apart() -> None:
 
 
 def test_a_feed_of_nothing_is_refused_by_line() -> None:
-    with pytest.raises(ProgramError, match="line 1: F: the feed at segment 0"):
+    with pytest.raises(PartProgramError, match="line 1: F: the feed at segment 0"):
         plan(line((1.0, 0.0, 0.0), feed=0.0), LIMITS)
 
 
@@ -145,7 +147,7 @@ def test_above_its_base_speed_a_spindle_accelerates_at_constant_power() -> None:
     moves = [canonical.Spindle(0, 4000.0, 1), canonical.Linear(1, (1.0, 0.0, 0.0), 600.0)]
     planned = plan(path_from_moves(moves), TRAPEZOID.with_(spindle_acceleration_rpm_s=1000.0, spindle_base_rpm=2000.0))
     assert planned.start_s[0] == pytest.approx(2.0 + (16.0 - 4.0) / 4.0)
-    motion = planned.sample(0.01)
+    motion = sampled(planned, 0.01)
     at = np.searchsorted(motion.t_s, [1.0, 2.0, 3.25, 5.0])
     assert motion.spindle_rpm[at] == pytest.approx([1000.0, 2000.0, math.sqrt(4e6 + 5e6), 4000.0], rel=1e-3)
 
@@ -193,7 +195,7 @@ def test_no_plan_breaks_a_limit(path: Path, jerk: float) -> None:
     jump = path.tangents(every, np.zeros(len(path)))[1:] - path.tangents(every, path.length_mm)[:-1]
     assert np.all(np.abs(jump) * planned.entry_mm_s[1:, None] <= 500.0 / 60.0 * (1.0 + 1e-6) + 1e-9)
     assert planned.entry_mm_s[1:] == pytest.approx(planned.exit_mm_s[:-1])
-    motion = planned.sample(1e-3)
+    motion = sampled(planned, 1e-3)
     along = np.diff(motion.feed_mm_min / 60.0) / 1e-3
     assert np.max(np.abs(along), initial=0.0) <= 2500.0 * math.sqrt(3.0) * (1.0 + 1e-6)  # all three axes at theirs
 
@@ -201,7 +203,7 @@ def test_no_plan_breaks_a_limit(path: Path, jerk: float) -> None:
 @settings(deadline=None)
 @given(path=WANDERING, jerk=st.sampled_from([math.inf, 60000.0]))
 def test_the_reference_is_continuous_and_exact_at_both_ends(path: Path, jerk: float) -> None:
-    motion = plan(path, LIMITS.with_(jerk_mm_s3=jerk)).sample(1e-3)
+    motion = sampled(plan(path, LIMITS.with_(jerk_mm_s3=jerk)), 1e-3)
     assert motion.reference_mm[0].tolist() == path.start_mm[0].tolist()
     assert motion.reference_mm[-1].tolist() == path.end_mm[-1].tolist()
     moved = np.linalg.norm(np.diff(motion.reference_mm, axis=0), axis=1)
@@ -228,7 +230,8 @@ def test_a_batch_of_feeds_takes_what_each_of_them_takes(path: Path, jerk: float,
     limits = LIMITS.with_(jerk_mm_s3=jerk)
     feeds = np.outer(factors, path.feed_mm_min)
     alone = [plan(path, limits, feed_override=factor).total_s for factor in factors]
-    assert plan_times(path, limits, feeds) == pytest.approx(alone, rel=1e-12)
+    values = np.broadcast_to([event.value for event in path.events], (len(feeds), len(path.events)))
+    assert Candidates.of(path, limits).seconds_and_wear(feeds, values)[0] == pytest.approx(alone, rel=1e-12)
 
 
 def test_short_blocks_are_joined_where_their_corners_do_not_bind() -> None:
@@ -242,7 +245,7 @@ def test_short_blocks_are_joined_where_their_corners_do_not_bind() -> None:
 
 def test_what_is_sampled_names_line_tool_spindle_and_state() -> None:
     planned = plan(program(), TRAPEZOID.with_(tool_change_s=2.0, spindle_acceleration_rpm_s=3000.0))
-    motion = planned.sample(0.001)
+    motion = sampled(planned, 0.001)
     assert motion.line[[0, 1999, 2001, 4001]].tolist() == [0, 0, 1, 2]
     assert motion.tool_change_active[:2000].all()
     assert not motion.tool_change_active[2000]
@@ -251,14 +254,14 @@ def test_what_is_sampled_names_line_tool_spindle_and_state() -> None:
     assert set(motion.spindle_direction.tolist()) == {-1, 0, 1}
     assert motion.exec_state[[0, -1]].tolist() == [ExecState.ACTIVE, ExecState.PROGRAM_COMPLETED]
     assert motion.tool_number[-1] == 4
-    columns = motion.program_columns()
+    columns = program_columns(motion)
     assert {len(column) for column in columns.values()} == {len(motion)}
     assert columns["exec_state"][[0, -1]].tolist() == ["ACTIVE", "PROGRAM_COMPLETED"]
 
 
 def test_averages_after_interpolation_round_the_corner_and_meet_the_end() -> None:
     planned = plan(line((20.0, 0.0, 0.0), (20.0, 20.0, 0.0)), LIMITS.with_(corner_speed_difference_mm_min=math.inf))
-    sharp, round_ = planned.sample(0.001), planned.sample(0.001, (0.064, 0.024))
+    sharp, round_ = sampled(planned, 0.001), sampled(planned, 0.001, (0.064, 0.024))
     assert len(round_) == len(sharp) + 63 + 23
     assert round_.reference_mm[-1].tolist() == [20.0, 20.0, 0.0]
     corner = np.min(np.linalg.norm(round_.reference_mm - [20.0, 0.0, 0.0], axis=1))
@@ -267,7 +270,7 @@ def test_averages_after_interpolation_round_the_corner_and_meet_the_end() -> Non
 
 def test_a_program_that_does_not_move_has_a_plan() -> None:
     planned = plan(path_from_moves([canonical.Dwell(0, 1.5)]), LIMITS)
-    motion = planned.sample(0.1)
+    motion = sampled(planned, 0.1)
     assert planned.total_s == 1.5
     assert motion.t_s[-1] == pytest.approx(1.5)
     assert not motion.reference_mm.any()

@@ -3,7 +3,7 @@
 import pytest
 
 from tests.twin.optimisation.benchmark import machine_with, second, text
-from twin.errors import ProgramError
+from twin.errors import PartProgramError
 from twin.optimisation.optimise import optimise
 from twin.optimisation.problem import Problem
 from twin.optimisation.question import problem
@@ -27,9 +27,9 @@ def test_offsets_of_the_table_count_as_those_of_the_program_do() -> None:
 
 
 def test_what_is_not_told_is_refused_and_the_way_out_is_a_key_of_the_file() -> None:
-    with pytest.raises(ProgramError, match=r"M13: is not known.*\[control\] builder_m_codes"):
+    with pytest.raises(PartProgramError, match=r"M13: is not known.*\[control\] builder_m_codes"):
         read(PROGRAM)
-    with pytest.raises(ProgramError, match=r"D1.*no number 1.*\[control\] tool_offsets"):
+    with pytest.raises(PartProgramError, match=r"D1.*no number 1.*\[control\] tool_offsets"):
         read(PROGRAM.replace("H1", ""), builder_m_codes=(13,))
 
 

@@ -10,12 +10,12 @@ from twin.residual.model import Trained
 from twin.residual.physics import Physics
 from twin.residual.recorded_run import Samples, recorded_of
 from twin.residual.table import Recorded
-from twin.residual.training import Asked, Outcome, trained
+from twin.residual.training import Outcome, TrainingSettings, trained
 
 Floats = NDArray[np.float64]
 PHYSICS_TOLD = Physics(alpha_w_per_pct_rpm2=2.2e-8, beta_w_per_rpm=1.6e-2, resistance_k_per_w=0.16, capacity_j_per_k=4000.0)
 TICK_S = 30.0
-SMALL = Asked(trees=8, depth_max=10, row_s=60.0)
+SMALL = TrainingSettings(trees=8, depth_max=10, row_s=60.0)
 
 
 def samples(hours: float, seed: int = 1, speed: float = 1.0) -> dict[str, Samples]:
@@ -68,5 +68,5 @@ def with_residual(plain: Recorded, residual_k: Floats) -> Recorded:
 @cache
 def small_model(seed: int = 1, feature_set: str = "") -> Outcome:
     about = Trained(machine="okuma", at="2026-01-01T00:00:00Z", source=("run.parquet",), physics=PHYSICS_TOLD)
-    asked = Asked(SMALL.trees, SMALL.depth_max, SMALL.leaf_min, SMALL.row_s, feature_set=feature_set, seed=seed)
+    asked = TrainingSettings(SMALL.trees, SMALL.depth_max, SMALL.leaf_min, SMALL.row_s, feature_set=feature_set, seed=seed)
     return trained(recorded(), asked, about)

@@ -12,14 +12,14 @@ from twin.forest.artefact import ARRAYS, MANIFEST
 from twin.residual.errors import ResidualError
 from twin.residual.model import load_model, load_models, save_model
 from twin.residual.prediction import predict_correction
-from twin.residual.training import Asked, fitted
+from twin.residual.training import TrainingSettings, fitted
 
 
 def test_the_flattened_forest_says_what_scikit_learn_says_to_the_last_bit() -> None:
     done = small_model()
     x, y = done.table.of(done.model.features), done.table.residual_k
     theirs = RandomForestRegressor(20, max_depth=14, min_samples_leaf=5, random_state=3).fit(x[:2000], y[:2000]).predict(x[:500])
-    ours = fitted(x[:2000], y[:2000], Asked(trees=20, seed=3))
+    ours = fitted(x[:2000], y[:2000], TrainingSettings(trees=20, seed=3))
     assert [ours.predict_one(row) for row in x[:500].tolist()] == theirs.tolist()
     assert ours.predict(x[:500]).tolist() == theirs.tolist()
 

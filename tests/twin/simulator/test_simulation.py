@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from twin.errors import EffectError, MachineError, ProgramError
+from twin.errors import EffectError, MachineError, PartProgramError
 from twin.machine import AddedEffect, MachineFile, Stock, Tool, machine_from_toml
 from twin.simulator.recorded import told_of
 from twin.simulator.response import respond
@@ -142,7 +142,7 @@ def test_temperature_goes_on_from_where_it_was() -> None:
 
 
 def test_a_wrong_program_is_refused_with_line_word_and_reason() -> None:
-    with pytest.raises(ProgramError, match="line 2"):
+    with pytest.raises(PartProgramError, match="line 2"):
         simulate(MACHINE, "G1 X10 F100\nG2 X20 R1\n")
 
 

@@ -23,6 +23,7 @@ from twin.machine import AddedEffect, MachineFile
 from twin.motion.motion import Motion
 from twin.motion.path import EventKind, path_from_moves
 from twin.motion.plan import Plan, plan
+from twin.motion.sampling import sampled
 from twin.runlog import AXIS_COLUMN
 from twin.simulator.response import RunInput, respond
 from twin.simulator.simulation import IDEAL_TIMES
@@ -72,7 +73,7 @@ def trial_of(snippet: Snippet, machine: MachineFile, envelope: Envelope) -> Tria
     """The program planned on the machine's control, or on a middling one where none is stated."""
     planned = plan(path_from_moves(interpret(snippet.program())), machine.program or IDEAL_TIMES)
     heat = snippet.shows is Shows.HEAT
-    motion = planned.sample(HEAT_PERIOD_S if heat else machine.machine.servo_period_s)
+    motion = sampled(planned, HEAT_PERIOD_S if heat else machine.machine.servo_period_s)
     block = motion.line - 1  # the first line is the %
     counts = block >= snippet.from_block
     reference = {a: np.ascontiguousarray(motion.reference_mm[:, i]) for i, a in enumerate(planned.path.axes)}

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.case import Run
-from twin.errors import ProgramError, TwinError
+from twin.errors import PartProgramError, TwinError
 from twin.gcode import Settings, interpret
 from twin.identification.programs.recording import NOMINAL, RecordedProgram
 from twin.motion.limits import stops
@@ -92,7 +92,7 @@ def trial_of(run: Run, settings: Settings) -> Trial | Refused:
         text = (run.folder / run.entry.program).read_text(encoding="utf-8")
         log = run.log
         return _compared(run.name, log, text, run.entry.role == "fit", settings)
-    except ProgramError as error:
+    except PartProgramError as error:
         return Refused(run.name, f"cannot be compared: the program given is refused, {error}")
     except (TwinError, OSError, UnicodeDecodeError) as error:
         return Refused(run.name, str(error))

@@ -21,7 +21,7 @@ from processors.joint_anomaly.config import Config
 from tests.cnctwin.training.anomaly.cells import FEATURES, machine_log
 from twin.anomaly.common_mode import Method
 from twin.anomaly.detector import Detector
-from twin.anomaly.golden import checked
+from twin.anomaly.golden_check import checked
 from twin.anomaly.model import load_golden, load_model, load_models
 from twin.runlog import run_log, write_run
 
@@ -161,7 +161,7 @@ def test_a_model_that_alerts_too_often_on_the_golden_week_is_kept_but_not_promot
     out = tmp_path / "models"
     run("anomaly", *named(folder, "a"), "--out", out, *QUICK)
     first = load_model(out / "a")
-    monkeypatch.setattr("twin.anomaly.golden.most_alerts", lambda expected: -1)
+    monkeypatch.setattr("twin.anomaly.golden_check.most_alerts", lambda expected: -1)
     done = run("anomaly", *named(folder, "a"), "--out", out, "--seed", "5", *QUICK)
     assert "NOT promoted" in done.output
     assert load_model(out / "a").trained == first.trained

@@ -17,9 +17,9 @@ from twin.runlog import run_log, write_run
 from twin.transient.artefact import load_detector
 from twin.transient.replay import replayed
 from twin.transient.stream import Stream
-from twin.transient.training import Asked
+from twin.transient.training import TrainingSettings
 
-ASKED = Asked("spindle_load_pct", before_s=9.0, after_s=9.0)
+ASKED = TrainingSettings("spindle_load_pct", before_s=9.0, after_s=9.0)
 
 
 def recorded(path: Path, seed: int, *, labelled: bool) -> Stream:
@@ -45,7 +45,7 @@ def trained(runs: list[Path], out: Path | None, *, at: tuple[float, ...] = (), a
     candidates = how.pop("candidates", None)
     assert candidates is None or isinstance(candidates, Path)
     asked = how.pop("asked", ASKED)
-    assert isinstance(asked, Asked)
+    assert isinstance(asked, TrainingSettings)
     train_detector(runs, asked, out, at, candidates, float(str(how.pop("period_s", 0.1))), 0, as_json, console)
     assert isinstance(console.file, io.StringIO)
     return console.file.getvalue()
@@ -117,8 +117,8 @@ def test_what_cannot_be_used_is_one_line(run: Path, tmp_path: Path) -> None:
     unlabelled = tmp_path / "unlabelled.parquet"
     recorded(unlabelled, 5, labelled=False)
     cases = [
-        (lambda: trained([run], model, asked=Asked("feed_mm_min")), "--signal"),
-        (lambda: trained([run], model, asked=Asked("spindle_rpm")), "there is no spindle_rpm"),
+        (lambda: trained([run], model, asked=TrainingSettings("feed_mm_min")), "--signal"),
+        (lambda: trained([run], model, asked=TrainingSettings("spindle_rpm")), "there is no spindle_rpm"),
         (lambda: trained([unlabelled], model), "--at"),
         (lambda: trained([unlabelled], model, at=(1e6,)), "outside"),
         (lambda: trained([run], None), "--out"),

@@ -25,7 +25,7 @@ from tests.recordings import recording
 from tests.twin.residual.days import PHYSICS_TOLD, recorded, wandering
 from twin.residual.features import MEASURED, PHYSICS
 from twin.residual.table import Recorded
-from twin.residual.training import Asked
+from twin.residual.training import TrainingSettings
 from twin.runlog import run_log, write_run
 
 app = typer.Typer()
@@ -154,6 +154,6 @@ def _benchmark() -> ModuleType:
 
 def test_of_the_real_mazak_no_model_is_made() -> None:
     """Its spindle temperature is not explained by speed and load: facts of the recording, not of the model."""
-    found = _benchmark().mazak(recording("nist/raw/Mazak01-20180718-20180719.txt"), Asked(trees=8, row_s=60.0))
+    found = _benchmark().mazak(recording("nist/raw/Mazak01-20180718-20180719.txt"), TrainingSettings(trees=8, row_s=60.0))
     assert found["cutting_hours"] < 40.0  # so the command refuses it before it is judged
     assert found["refused"]

@@ -16,6 +16,7 @@ from twin.gcode import interpret
 from twin.machine import AddedEffect, MachineFile, SpindleDrive, Thermal
 from twin.motion.path import path_from_moves
 from twin.motion.plan import plan
+from twin.motion.sampling import sampled
 from twin.runlog import run_log
 from twin.simulator.simulation import IDEAL_TIMES
 
@@ -73,7 +74,7 @@ def test_no_program_leaves_what_the_runs_have_done(box: dict[str, tuple[float, f
         if planned.total_s > 300.0:
             assert not len(planned.path)
             continue
-        motion = planned.sample(0.002)
+        motion = sampled(planned, 0.002)
         for column, axis in enumerate(planned.path.axes):
             low, high = box.get(axis, (0.0, 0.0))
             reference = motion.reference_mm[:, column]

@@ -6,11 +6,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.program_columns import program_columns
 from tests.recordings import recording
 from twin.case import Case, read_case
 from twin.gcode import interpret
 from twin.motion.control import LENGTH_OVER_FEED, changed
 from twin.motion.path import path_from_moves
+from twin.motion.sampling import sampled
 from twin.recording.observations import read_observations
 from twin.recording.program_run import program_runs
 from twin.runlog import RunLog, run_log, write_run
@@ -39,7 +41,8 @@ def shop_program(feed: float, tools: Sequence[int] = (1, 2)) -> str:
 
 def made(text: str, effects: Effects) -> dict[str, NDArray[np.generic]]:
     """Columns of a run log of the program on a control with these effects and no limit else."""
-    return changed(LENGTH_OVER_FEED, effects).plan(path_from_moves(interpret(text))).sample(PERIOD_S).program_columns()
+    planned = changed(LENGTH_OVER_FEED, effects).plan(path_from_moves(interpret(text)))
+    return program_columns(sampled(planned, PERIOD_S))
 
 
 def made_case(folder: Path, effects: Effects, feeds: Mapping[str, Sequence[float]], machine: str = "") -> Case:

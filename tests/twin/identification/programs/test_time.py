@@ -15,6 +15,7 @@ from twin.identification.programs.time import PARAMETERS, ProgramTimes, compare,
 from twin.motion.limits import Limits
 from twin.motion.path import path_from_moves
 from twin.motion.plan import plan
+from twin.motion.sampling import sampled
 from twin.recording.observations import Observation, Observations, read_observations
 from twin.recording.program_run import program_runs
 
@@ -44,7 +45,7 @@ def run_of(text: str, limits: Limits, set_up: SetUp, name: str = "made") -> Reco
         start_mm=(set_up.tool_change_x, set_up.tool_change_y, set_up.reference_z), references_mm=((0.0, 0.0, set_up.reference_z),)
     )
     path = path_from_moves(interpret(text, settings), settings.start_mm)
-    motion = plan(path, limits).sample(0.15)
+    motion = sampled(plan(path, limits), 0.15)
     rows = [Observation(0.0, "Program_Status", "ACTIVE")]
     for t, line, feed in zip(motion.t_s.tolist(), motion.line.tolist(), motion.feed_mm_min.tolist(), strict=True):
         rows += [Observation(t, "Block_Number", str(line + 1)), Observation(t, "Feed_Rate", str(feed / 60.0))]
