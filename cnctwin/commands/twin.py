@@ -18,7 +18,7 @@ from cnctwin.errors import UsageError
 from cnctwin.files.program_text import decoded
 from twin.case import read_case
 from twin.errors import EffectError, ProgramError
-from twin.gap.table import GapRow
+from twin.gap.free_run import GapRow
 from twin.identification import identify as identification
 from twin.identification import paper
 from twin.identification.identify import Identification

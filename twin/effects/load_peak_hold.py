@@ -8,7 +8,7 @@ A fall towards the present load leaves twice as much, a latch, a linear fall or 
 
 from math import exp
 
-from twin.effects.effect import Effect, On, Parameter
+from twin.effects.effect import Effect, Guesses, On, Parameter, Recorded
 from twin.sites import Site
 
 
@@ -19,6 +19,11 @@ def spindle_load_pct(load_pct: float, peak_pct: float, period_s: float, hold_s: 
     return shown_pct, shown_pct
 
 
+def first_guesses(_: Recorded) -> Guesses:
+    """Start from short, middling and long holds: a meter that holds its peaks is not linear in how long."""
+    return tuple({"hold_s": hold_s} for hold_s in (0.15, 0.5, 1.5))
+
+
 EFFECT = Effect(
     name="load_peak_hold",
     site=Site.SPINDLE,
@@ -27,6 +32,9 @@ EFFECT = Effect(
     states={"peak_pct": 0.0},
     changes={"spindle_load_pct": spindle_load_pct},
     shows_in=("spindle_load_pct",),
+    far_from_linear=True,
+    shows_only_fast=True,
+    first_guesses=first_guesses,
     equation="load = max(load, peak exp(−T / hold))",
     reference="the peak-hold load meters of FANUC spindle drives; a peak detector with exponential release",
 )

@@ -5,7 +5,7 @@ t = |Δτ| / α_down + (t_stated + t_change) + |Δτ| / α_up,   τ(ω) = ω up 
 
 from math import inf, isinf
 
-from twin.effects.effect import Effect, On, Parameter
+from twin.effects.effect import Effect, Excitation, On, Parameter
 from twin.sites import Site
 
 
@@ -52,6 +52,7 @@ EFFECT = Effect(
         "axes_wait": axes_wait,
     },
     shows_in=("line", "tool_number", "tool_change_active"),
+    excited_by=Excitation.TOOL_CHANGES,
     equation="t = Δτ/α_down + t_stated + t_change + Δτ/α_up; τ = ω up to ω_b, ω_b + (ω² − ω_b²)/(2 ω_b) above",
     reference="chip-to-chip time, VDI 2852-1; ISO 10791-9:2001, operating times of tool change",
 )

@@ -15,7 +15,7 @@ from twin.gap.evidence import advantage
 from twin.gap.intervals import parameter_intervals
 from twin.gap.null import Null
 from twin.gap.refitted import KNOWN_MIN
-from twin.gap.search import SENSING, Explained
+from twin.gap.search import Explained
 from twin.gap.verdict import Judged
 from twin.gap.wording import percent
 from twin.runlog import AXIS_COLUMN
@@ -73,7 +73,7 @@ def _probability(found: Explained, effected: Effected) -> float:
     tried = {t.effected: t for t in found.tried}
     weights = []
     for other in (effected, *found.rivals.get(effected, ())):
-        prior = 0.15 if other.effect in SENSING else 1.0
+        prior = 0.15 if effect_named(other.effect).is_of_measurement else 1.0
         one = tried.get(other)
         best = tried.get(effected)
         behind = 0.0

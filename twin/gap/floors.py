@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.case import Run
-from twin.gap.table import measured_signals, regimes_of
+from twin.gap.labels import measured_signals, regimes_of
 from twin.machine import MachineFile
 from twin.runlog import AXIS_COLUMN, RunLog
 from twin.simulator.recorded import noise_of

@@ -1,4 +1,4 @@
-"""What the machine was doing at each sample, as a signal of it feels it: every sample has one label, known before any twin runs.
+"""The regime of each sample of a recording, as a signal of it feels it: one label each, known before any twin runs.
 
 * of an axis: the regimes of its reference (`twin.regimes`); `rapid` where it keeps at least nine tenths of the rapid traverse
 * forces, load, speed: `cutting`, `spindle ramp` while the spindle's speed changes, `dwell` while nothing moves, else `air`
@@ -51,6 +51,19 @@ def regime_labels(log: RunLog, signal: str, machine: MachineFile) -> Labels:
     label[np.nan_to_num(log.columns.get("axial_depth_mm", np.zeros(len(log)))) > 0.0] = PROCESS.index("cutting")
     label[changing] = PROCESS.index("tool change")
     return PROCESS, label
+
+
+def measured_signals(log: RunLog) -> tuple[str, ...]:
+    """Return the columns that a machine answers with, where the run has samples of them."""
+    names = [c for c in log.columns if (m := AXIS_COLUMN.match(c)) and m[2] != "ref_mm"]
+    names += ["force_x_n", "force_y_n", "spindle_load_pct", "spindle_temp_c"]
+    return tuple(name for name in names if log.has(name))
+
+
+def regimes_of(log: RunLog, signal: str, machine: MachineFile) -> tuple[tuple[str, NDArray[np.bool_]], ...]:
+    """Return the regimes in which a signal is looked at, each with its samples, (n,)."""
+    names, label = regime_labels(log, signal, machine)
+    return tuple((name, label == number) for number, name in enumerate(names))
 
 
 def _filled(values: Floats) -> Floats:

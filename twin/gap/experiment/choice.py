@@ -141,10 +141,10 @@ def _snippets(hypotheses: Sequence[Hypothesis], envelope: Envelope) -> Iterator[
             letters += list(machine.axes)[:1]
         else:
             wanted |= _shows(effected)
-    effects = {effected.effect for effected, _ in hypotheses}
+    building_up = {effect_named(effected.effect).builds_up for effected, _ in hypotheses}
     for letter in dict.fromkeys(letters):
         for snippet in axis_menu(letter, envelope, machine.axes[letter].screw_lead_mm):
-            if not snippet.only_for or effects & snippet.only_for:
+            if snippet.only_for is None or snippet.only_for in building_up:
                 yield snippet
     for snippet in machine_menu(envelope):
         if snippet.shows in wanted:

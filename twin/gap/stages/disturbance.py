@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.gap.floors import Floors
+from twin.gap.labels import regimes_of
 from twin.gap.stages.axis import LANES, axis_effects
 from twin.gap.stages.axis_run import AxisRunData
-from twin.gap.table import regimes_of
 from twin.machine import MachineFile
 from twin.runlog import RunLog
 from twin.servo.constants import axis_constants

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.effects.catalogue import effect_named
+from twin.effects.effect import Guesses
 from twin.gap.diagnosis import Effected
 from twin.gap.stages.free import Free, effect_parameters
 
@@ -70,7 +71,7 @@ class Stage(Protocol):
     def predict(self, model: "Model", theta: Floats, run: int) -> Floats:
         """What the machine at each row of θ, (lanes, p), shows in run number `run`, (lanes, n)."""
 
-    def first_guesses(self, candidate: Effected) -> tuple[dict[str, float], ...]:
+    def first_guesses(self, candidate: Effected) -> Guesses:
         """Sets of values to start an effect's parameters from, where the recordings suggest them."""
 
 
