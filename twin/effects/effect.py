@@ -62,7 +62,7 @@ class BuildsUp(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Recorded:
-    """What the recordings suggest to an effect's first guesses.
+    """Hints that the recordings give to an effect's first guesses.
 
     period_s: of the samples; peak_of: column without its axis letter → its largest magnitude, 0 where it is not recorded
     over_modelled: size of the signal that the effect is on, as recorded over as modelled; NaN where that is not known
@@ -132,7 +132,7 @@ class Effect:
     Read by experiments and optimiser:
 
     likely_in: regime of an axis (`twin.gap.labels`, constant speed of either sign; `table` where only the table shows it) → its
-        place among the effects that an unnamed gap there most often is
+        place among the effects that an unnamed gap there most often is; two may share one
     builds_up: the minutes that it takes, worth the time of an experiment for such effects only
     lowers, multiplies: constant of the machine → the parameter that caps it, or multiplies it
     """

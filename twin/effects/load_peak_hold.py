@@ -13,7 +13,7 @@ from twin.sites import Site
 
 
 def spindle_load_pct(load_pct: float, peak_pct: float, period_s: float, hold_s: float) -> tuple[float, float]:
-    """What the meter shows, and remembers."""
+    """Return the load that the meter shows, and remembers."""
     held_pct = peak_pct * exp(-period_s / hold_s) if hold_s > 0.0 else load_pct
     shown_pct = held_pct if held_pct > load_pct else load_pct
     return shown_pct, shown_pct

@@ -3,13 +3,9 @@
 reading = scale · value
 """
 
-import numpy as np
-from numpy.typing import NDArray
-
 from twin.effects.effect import Effect, Guesses, On, Parameter, Recorded
 from twin.sites import Site
 
-Floats = NDArray[np.float64]
 UNIT, UNIT_MAX = 1.5, 5e3
 """Factors from which, and to which, a sensor may be in another unit."""
 
@@ -19,9 +15,10 @@ def reading(reading: float, scale: float) -> float:
     return reading * scale
 
 
-def undo(reading: Floats, scale: Floats) -> Floats:
-    """Return the value at which the sensor reads this at rest; a sensor that reads nothing says nothing of it."""
-    return np.asarray(reading / np.where(np.abs(scale) > 1e-9, scale, 1.0))
+def undo(reading: float, scale: float) -> float:
+    """Return the value at which the sensor reads this at rest; a scale of nothing counts as 1."""
+    nothing = abs(scale) <= 1e-9
+    return reading / (scale * (1.0 - nothing) + nothing)
 
 
 def first_guesses(recorded: Recorded) -> Guesses:

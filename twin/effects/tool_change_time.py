@@ -25,7 +25,7 @@ def spindle_deceleration_rpm_s(stated_rpm_s: float, down_rpm_s: float) -> float:
 
 
 def spindle_base_rpm(stated_rpm: float, up_rpm_s: float, down_rpm_s: float, base_rpm: float) -> float:
-    """Where a spindle that takes its time comes to constant power."""
+    """Return the speed at which a spindle that takes its time comes to constant power."""
     return stated_rpm if isinf(up_rpm_s) and isinf(down_rpm_s) else min(stated_rpm, base_rpm)
 
 

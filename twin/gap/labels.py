@@ -76,7 +76,7 @@ def _filled(values: Floats) -> Floats:
 
 
 def _rapid(t_s: Floats, reference_mm: Floats, label: NDArray[np.int8], machine: MachineFile) -> NDArray[np.bool_]:
-    """Where an axis keeps the rapid traverse, (n,)."""
+    """Return True where an axis keeps the rapid traverse, (n,)."""
     constant = (label == Regime.CONSTANT_MINUS) | (label == Regime.CONSTANT_PLUS)
     if machine.program is None or not constant.any():
         return np.zeros(len(t_s), dtype=bool)
@@ -85,7 +85,7 @@ def _rapid(t_s: Floats, reference_mm: Floats, label: NDArray[np.int8], machine: 
 
 
 def _still(log: RunLog) -> NDArray[np.bool_]:
-    """Where no axis is told to move, (n,); nowhere in a run that does not say."""
+    """Return True where no axis is told to move, (n,); nowhere in a run that does not say."""
     references = [_filled(log[name]) for name in (f"{a}_ref_mm" for a in log.axes()) if log.has(name)]
     if len(log) < 2:
         return np.zeros(len(log), dtype=bool)
@@ -96,7 +96,7 @@ def _still(log: RunLog) -> NDArray[np.bool_]:
 
 
 def _ramp(log: RunLog) -> NDArray[np.bool_]:
-    """Where the speed of the spindle is another than a tenth of a second before, (n,)."""
+    """Return True where the speed of the spindle is another than a tenth of a second before, (n,)."""
     if not log.has("spindle_rpm"):
         return np.zeros(len(log), dtype=bool)
     rpm = _filled(log["spindle_rpm"])

@@ -198,7 +198,7 @@ def _harmonic(
 
 
 def _step(phase: Floats) -> float:
-    """How far a phase goes from sample to sample where it goes fast, rad."""
+    """Return the step of a phase from sample to sample where it goes fast, rad."""
     return float(np.quantile(np.abs(np.angle(np.exp(1j * np.diff(phase)))), 0.9))
 
 
@@ -213,7 +213,7 @@ def _over_time(of: Covariates) -> Iterator[_TestedPattern]:
 
 
 def _smooth(at: Floats, mean: Floats) -> bool:
-    """Whether a parabola leaves less than 40 % of what varies."""
+    """Return True where a parabola leaves less than 40 % of what varies."""
     if len(at) < 4:
         return False
     left = mean - np.polyval(np.polyfit(at - at.mean(), mean, 2), at - at.mean())

@@ -1,4 +1,4 @@
-"""Which effects: added to the machine one by one, refitted with its constants, and judged on runs that were not fitted.
+"""The search for effects: added to the machine one by one, refitted with its constants, and judged on runs that were not fitted.
 
     base → screen all candidates by signature → fit those that survive, and those far from linear in any case → take the best
     that a healthy machine would not show → drop what is no longer needed → again, until nothing more is accepted; pairs where no
@@ -50,7 +50,7 @@ class Tried:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Explained:
-    """What was found in a stage.
+    """The effects found in a stage.
 
     base: the machine with its constants refitted; best: with the accepted effects; tried: in the first round, best first
     rivals: effect → what cannot be told from it; evidence: effect → its advantage over the same without it

@@ -15,7 +15,7 @@ from twin.gap.experiment.envelope import Envelope
 
 
 class Shows(StrEnum):
-    """What a program works with."""
+    """The part of the machine that a program works with."""
 
     AXIS = "axis"
     SPINDLE = "spindle"

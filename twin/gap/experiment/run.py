@@ -37,7 +37,7 @@ TICKS_MANY = 60_000
 HEAT_PERIOD_S = 2.0
 AMBIENT_C = 22.0
 PARAMETER_SIGMA = 0.1
-"""How well the parameters of an effect that was fitted are known, relative."""
+"""Relative standard deviation of the parameters of an effect that was fitted."""
 FRICTION = ("coulomb_n", "static_n", "stribeck_velocity_mm_s", "viscous_n_s_per_mm")
 MACHINE_PATHS = {
     Shows.AXIS: (),
@@ -119,7 +119,7 @@ def _coolant(planned: Plan, t_s: Floats) -> Floats:
 
 
 def shown(machine: MachineFile, trial: Trial) -> Columns:
-    """What a machine shows in the rows that count, by signal."""
+    """Return the signals of a machine in the rows that count."""
     courses = COURSES if len(trial.told.t_s) < TICKS_MANY else 1
     less = cut_down(machine, trial.snippet)
     # a machine is enabled, and its integrators hold what there is to hold, long before a program starts
@@ -157,7 +157,7 @@ def cut_down(machine: MachineFile, snippet: Snippet) -> MachineFile:
 def sensitivities(
     effected: Effected, machine: MachineFile, trial: Trial, base: Columns, nuisance: Mapping[str, float]
 ) -> list[Columns]:
-    """What the program shows more when each constant, and each parameter of the effect, is a standard deviation larger."""
+    """Return the change in the signals by a standard deviation of each constant, and of each parameter of the effect."""
     changed = [with_constant(machine, p, float(np.exp(s))) for p, s in _uncertain(machine, trial.snippet, nuisance).items()]
     changed += _other_parameters(effected, machine)
     found = []

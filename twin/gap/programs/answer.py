@@ -119,7 +119,7 @@ class Answer:
         return machine.model_copy(update={"program": program, "effects": (*machine.effects, *added)})
 
     def _section_floor(self, gaps: list[RunGap]) -> float:
-        """What runs of the same program differ by, per section, s; not less than what the recorder cannot tell."""
+        """Return the difference of runs of the same program, per section, s; not less than what the recorder cannot tell."""
         by_text: dict[str, list[Floats]] = {}
         for trial in {trial.name: trial for trial in (*self.trials.learnt, *self.trials.judged)}.values():
             by_text.setdefault(trial.text, []).append(Sections.in_run(trial).recorded_s)
@@ -157,7 +157,7 @@ class Answer:
         return Verdict.PARTLY if numbers.closure >= MOSTLY else Verdict.UNKNOWN
 
     def _closure(self, names: Names, gaps: list[RunGap], floor: float) -> float:
-        """Of one set of effects, over the sections of the runs judged on; not clipped at 0, so that shares add up."""
+        """Return the closure of a set of effects over the sections judged on; not clipped at 0, so that shares add up."""
         before = np.concatenate([gap.section_gap(False) for gap in gaps])
         if not names:
             return 0.0
@@ -232,7 +232,7 @@ class Answer:
 
 
 def _seconds_of_knobs(gaps: Sequence[RunGap]) -> float:
-    """What the recorded overrides change in a run, s, by the twin before."""
+    """Return the seconds that the recorded overrides change in a run, by the twin before."""
     apart = []
     for gap in gaps:
         feed, rapid = gap.watched.overrides
@@ -244,7 +244,7 @@ def _seconds_of_knobs(gaps: Sequence[RunGap]) -> float:
 
 
 def _recorder_s(gaps: Sequence[RunGap]) -> float:
-    """What the recorder cannot tell of a section or a window, s."""
+    """Return the seconds of a section or a window that the recorder cannot tell."""
     return _rms(np.array([gap.floor_s for gap in gaps]))
 
 

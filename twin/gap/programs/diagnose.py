@@ -26,7 +26,7 @@ from twin.motion.path import EventKind, Kind
 from twin.sites import Site
 
 SHORTEST_BLOCK_S = 1.0
-"""Where no cutting block is shorter, no block time can show."""
+"""A block time cannot show where no cutting block is shorter."""
 KNOB = 0.95
 """Long rapids below this part of the stated rate are said to be slow."""
 

@@ -62,13 +62,13 @@ class AxisStage:
 
     @property
     def name(self) -> str:
-        """What to call it."""
+        """Name in reports."""
         return f"axis {self.letter}"
 
     @property
     def healthy_rms(self) -> float:
-        """Where a cut pushes it, single teeth decide where it creeps to a stop, and the twin has their mean only; where position
-        or torque was not recorded, how it starts from there is not known."""
+        """Higher where a cut pushes the axis, since single teeth decide where it creeps to a stop and the twin has their mean,
+        and where position or torque was not recorded, since its start is not known then."""
         blind = not {"pos_mm", "torque_a"} <= set(self.outputs)
         return 2.0 if blind or any(run.disturbance_n is not None and run.disturbance_n.any() for run in self.runs) else 1.3
 
@@ -139,7 +139,7 @@ class AxisStage:
         return observed_of(run.name, parts, run.fitted)
 
     def predict(self, model: Model, theta: Floats, run: int) -> Floats:
-        """What the axis shows at each row of θ, (lanes, n)."""
+        """Return the outputs of the axis at each row of θ, (lanes, n)."""
         data = self.runs[run]
         outputs = self.simulate(model, theta, data)
         values = model.values(theta)

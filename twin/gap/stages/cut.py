@@ -114,7 +114,7 @@ class CutStage:
         return observed_of(run.name, parts, run.fitted)
 
     def _compared(self, milling: Milling) -> NDArray[np.bool_]:
-        """Where the tool cuts, but not where a tooth enters or leaves just then: who is a hair early decides there."""
+        """Return True where the tool cuts, but no tooth enters or leaves just then: who is a hair early decides there."""
         assert self.machine.tool is not None
         cutting = np.nan_to_num(milling.axial_depth_mm) > 0.0
         return np.asarray(cutting & ~at_a_jump(milling, self.machine.tool.teeth, 2e-4)[0])

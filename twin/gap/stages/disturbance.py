@@ -1,4 +1,4 @@
-"""How large and how slow the disturbance of a machine is, from how far its repeated runs differ.
+"""The size and slowness of a machine's disturbance, from how far its repeated runs differ.
 
 For each candidate (σ, τ) the axes are simulated over many courses; the spread that they have in each regime is compared with what
 the repeated runs differ by there, as a Gaussian log-likelihood over the cells. Differences of repeated runs know nothing of the

@@ -58,7 +58,7 @@ class HeatStage:
 
     @cached_property
     def effects(self) -> tuple[Effect, ...]:
-        """Those of the heat."""
+        """Effects that act on the heat."""
         return acting(thermal_quantities())
 
     @cached_property

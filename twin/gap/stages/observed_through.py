@@ -28,7 +28,7 @@ class Sensing:
         return Sensing({e.effect: v for e, v in values.items() if e.on == signal and effect_named(e.effect).on is On.SIGNAL})
 
     def readings(self, values: Floats, period_s: float) -> Floats:
-        """What is read of (lanes, n)."""
+        """Return the readings of values, (lanes, n)."""
         if not self.effects:
             return values
         since = np.full(values.shape[1], period_s)

@@ -34,7 +34,7 @@ AXES_TO_COMPARE = 2
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ground:
-    """What all stages of a case stand on. machine: with the disturbance in its [noise]"""
+    """The ground that all stages of a case stand on. machine: with the disturbance in its [noise]"""
 
     machine: MachineFile
     runs: tuple[Run, ...]
