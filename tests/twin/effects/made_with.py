@@ -30,7 +30,7 @@ from twin.sites import Site
 Floats = NDArray[np.float64]
 FEEDS = {"fit": (1200.0, 3000.0), "check": (2000.0,)}
 SIGNAL = "z_table_mm"
-CUT_SIGNALS = ("force_x_n", "force_y_n", "spindle_load_pct")
+NEAR, STEPS_MAX = 0.8, 8
 CUTTER = machine_from_toml(
     """
 [machine]
@@ -146,14 +146,16 @@ def size_in_floors(case: Case, make: Callable[..., Case]) -> float:
 
 
 def made_with(effect: Effect, floors: float) -> tuple[Case, float]:
-    """A case made with an effect near a size in floors, and its size, by steps in proportion."""
-    make, part = maker(effect), 0.3
+    """A case made with an effect near a size in floors, and its size: by steps in proportion, halved where one goes too far."""
+    make, part, low, high = maker(effect), 0.3, 0.0, math.inf
     case = make(added(effect, part))
     size = size_in_floors(case, make)
-    for _ in range(3):
-        if size > 0.0 and 0.8 < size / floors < 1.25:
+    for _ in range(STEPS_MAX):
+        if NEAR * floors < size < floors / NEAR:
             break
-        part = min(max(part * floors / size, part / 30.0), 30.0 * part) if size > 0.0 else 5.0 * part
+        low, high = (part, high) if size < floors else (low, part)
+        proportional = part * floors / size if size > 0.0 else 10.0 * part
+        part = proportional if low < proportional < high else math.sqrt(low * high)
         case = make(added(effect, part))
         size = size_in_floors(case, make)
     return case, size
