@@ -36,7 +36,7 @@ from benchmarks.simulated_cell.fault import SIZES, Fault, FaultKind, Overlap
 from benchmarks.simulated_cell.schedule import DAY_S, Schedule
 from benchmarks.simulated_cell.signals import FEATURES
 from twin.anomaly.alarm import AlarmRule, is_alarm, onsets
-from twin.anomaly.common_features import left_over_rows, lengths, with_tails
+from twin.anomaly.common_features import left_over_rows, with_tails
 from twin.anomaly.common_mode import CommonModeRule, Method, adjust_frames
 from twin.anomaly.detector import Detector, trained_model
 from twin.anomaly.errors import ModelError
@@ -181,12 +181,18 @@ def _standardised(frames: Frames) -> Floats:
     return z
 
 
+def _row_lengths(preparation: Preparation, left: Floats) -> Floats:
+    """Return `twin.anomaly.common_features.length` of rows (T, F)."""
+    shares = left / np.where(left > 0.0, np.array(preparation.up), np.array(preparation.down))
+    return np.asarray(np.sqrt((shares**2).sum(axis=1)), dtype=np.float64)
+
+
 def _lengths(frames: Frames, has_peers: bool) -> Floats:
     left = left_over_rows(frames.smooth, frames.last, frames.ticks, TICK_S) if has_peers else frames.smooth
     found = np.empty(frames.usual.shape)
     for place, usual in enumerate(frames.preparations):
         learned = left[frames.train, place][frames.judged[frames.train, place]]
-        found[:, place] = lengths(with_tails(usual, learned), left[:, place])
+        found[:, place] = _row_lengths(with_tails(usual, learned), left[:, place])
     return found
 
 

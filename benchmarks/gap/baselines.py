@@ -25,7 +25,7 @@ from twin.effects.catalogue import catalogue
 from twin.effects.effect import On
 from twin.errors import TwinError
 from twin.gap.diagnosis import Cause, Diagnosed, Diagnosis, GapNumbers, Verdict
-from twin.gap.table import measured_signals, regimes_of
+from twin.gap.labels import measured_signals, regimes_of
 from twin.machine import AddedEffect, MachineFile, machine_from_toml, machine_to_toml
 from twin.runlog import RunLog
 from twin.simulator.recorded import noise_of, told_of

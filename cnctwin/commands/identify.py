@@ -18,7 +18,7 @@ from cnctwin.terminal.console import standard_output
 from cnctwin.terminal.spinner import working
 
 if TYPE_CHECKING:
-    from twin.gap.table import GapRow
+    from twin.gap.free_run import GapRow
     from twin.identification.identify import Identification
 
 

@@ -21,6 +21,8 @@ EFFECT = Effect(
     parameters=(Parameter("gain", "", 0.0, 0.0, 1.5, 0.3, "1 = the torque that accelerates the stated mass"),),
     changes={"torque_command_a": torque_command_a},
     shows_in=("{a}_torque_a", "{a}_pos_mm"),
+    shows_only_fast=True,
+    likely_in={"acceleration": 2},
     equation="torque += gain M/k d²ref/dt²",
     reference="FANUC AC servo parameter manual B-65270EN, velocity-loop feed-forward",
 )

@@ -24,6 +24,8 @@ EFFECT = Effect(
     states={"engaged_mm": "position_mm"},
     changes={"table_mm": table_mm},
     shows_in=("{a}_table_mm",),
+    likely_in={"reversal": 2, "table": 1},
+    carried=("engaged_mm",),
     equation="table = clamp(table, motor − play/2, motor + play/2)",
     reference="ISO 230-2:2014, reversal value; the play operator of Krasnosel'skii and Pokrovskii 1989",
 )

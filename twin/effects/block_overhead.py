@@ -3,7 +3,7 @@
 v ≤ L / (t_stated + t)   for every cutting block of length L
 """
 
-from twin.effects.effect import Effect, On, Parameter
+from twin.effects.effect import Effect, Excitation, On, Parameter
 from twin.sites import Site
 
 
@@ -19,6 +19,7 @@ EFFECT = Effect(
     parameters=(Parameter("block_s", "s", 0.0, 0.0, 2.0, 0.02, "least time of a cutting block, beyond what is stated"),),
     changes={"block_time_s": block_time_s},
     shows_in=("line", "feed_mm_min"),
+    excited_by=Excitation.SHORT_BLOCKS,
     equation="v ≤ L / (t_stated + t) for every cutting block of length L",
     reference="block processing time, as makers of controls state it; length over it is the highest feed of short blocks",
 )

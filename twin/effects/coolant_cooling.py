@@ -6,7 +6,7 @@ The coolant carries heat off in proportion to the rise of the temperature. On re
 the noise of the sensor, at the stated gain; coolant that takes a part of the heat at its source leaves twice as much.
 """
 
-from twin.effects.effect import Effect, On, Parameter
+from twin.effects.effect import Effect, Excitation, On, Parameter
 from twin.sites import Site
 
 
@@ -22,6 +22,7 @@ EFFECT = Effect(
     parameters=(Parameter("gain", "", 0.0, 0.0, 20.0, 0.3, "part by which the cooling is more while the coolant is on"),),
     changes={"cooling_w_per_k": cooling_w_per_k},
     shows_in=("spindle_temp_c",),
+    excited_by=Excitation.COOLANT_SWITCHED,
     equation="1/R = 1/R (1 + gain · coolant_on)",
     reference="Newton's law of cooling with a second path in parallel",
 )

@@ -19,6 +19,7 @@ EFFECT = Effect(
     parameters=(Parameter("asymmetry", "", 0.0, -0.6, 0.6, 0.1, "part by which friction is larger in + and smaller in −"),),
     changes={"friction_n": by_direction, "breakaway_n": by_direction},
     shows_in=("{a}_torque_a", "{a}_pos_mm"),
+    likely_in={"rest": 3, "constant speed": 1},
     equation="F = (1 + asymmetry sgn v) F(v)",
     reference="Armstrong-Hélouvry, Dupont, Canudas de Wit 1994, Automatica 30(7), section 2",
 )

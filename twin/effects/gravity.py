@@ -12,6 +12,11 @@ def external_force_n(external_force_n: float, force_n: float) -> float:
     return external_force_n - force_n
 
 
+def load_n(force_n: float) -> float:
+    """Return what the drive holds at rest."""
+    return force_n
+
+
 EFFECT = Effect(
     name="gravity",
     site=Site.MECHANICS,
@@ -19,6 +24,9 @@ EFFECT = Effect(
     parameters=(Parameter("force_n", "N", 0.0, -8000.0, 8000.0, 400.0, "load that the drive has to hold, positive towards −"),),
     changes={"external_force_n": external_force_n},
     shows_in=("{a}_torque_a", "{a}_pos_mm"),
+    likely_in={"rest": 1},
+    usual_on=("z",),
+    at_rest={"load_n": load_n},
     equation="F_external = −force_n",
     reference="Mitsubishi MELDAS MDS-C1 manual, unbalance torque of vertical axes",
 )

@@ -23,6 +23,8 @@ EFFECT = Effect(
     parameters=(Parameter("angle_deg", "°", 0.0, 0.0, 60.0, 30.0, "β, angle of the edge to the axis of the tool"),),
     changes={"lag_rad": lag_rad},
     shows_in=("force_x_n", "force_y_n", "x_torque_a", "y_torque_a"),
+    far_from_linear=True,
+    shows_only_fast=True,
     equation="φ(z) = φ − 2 z tan β / D",
     reference="Altintas, Manufacturing Automation, 2nd ed. 2012, section 2.8",
 )

@@ -24,6 +24,8 @@ EFFECT = Effect(
     changes={"table_mm": table_mm},
     shows_in=("{a}_table_mm",),
     needs=("screw_lead_mm",),
+    shows_only_fast=True,
+    likely_in={"table": 3},
     equation="table = motor + amplitude sin(2π motor/lead + phase)",
     reference="ISO 3408-3:2006, travel variation within one revolution",
 )

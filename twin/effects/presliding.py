@@ -23,6 +23,11 @@ def viscous_n_s_per_mm(viscous_n_s_per_mm: float, damping_n_s_per_mm: float) -> 
     return viscous_n_s_per_mm + damping_n_s_per_mm
 
 
+def bristle_mm(held_n: float, stiffness_n_per_mm: float) -> float:
+    """Return how far the contact is bent at rest by the force that friction holds."""
+    return held_n / stiffness_n_per_mm
+
+
 EFFECT = Effect(
     name="presliding",
     site=Site.FRICTION,
@@ -36,6 +41,10 @@ EFFECT = Effect(
         "viscous_n_s_per_mm": viscous_n_s_per_mm,
     },
     shows_in=("{a}_torque_a", "{a}_pos_mm"),
+    far_from_linear=True,
+    shows_only_fast=True,
+    likely_in={"rest": 2, "reversal": 1},
+    at_rest={"bristle_mm": bristle_mm},
     equation="dz/dt = v − stiffness |v| z / F(v), F = stiffness z + damping v",
     reference="Canudas de Wit, Olsson, Åström, Lischinsky 1995, IEEE Trans. Automatic Control 40(3), eq. 1 to 4",
 )

@@ -37,6 +37,7 @@ EFFECT = Effect(
     ),
     changes={"tooth_radius_mm": tooth_radius_mm, "chip_mm": chip_mm},
     shows_in=("force_x_n", "force_y_n", "x_torque_a", "y_torque_a"),
+    shows_only_fast=True,
     equation="h_j = max(0, c sin φ_j + r_j − r_{j−1}), r_j = R + ρ cos(phase + 2π j / teeth)",
     reference="Kline, DeVor 1983, Int. J. Mach. Tool Des. Res. 23(2-3): the effect of runout on cutting geometry and forces",
 )

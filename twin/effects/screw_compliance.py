@@ -24,6 +24,8 @@ EFFECT = Effect(
     parameters=(Parameter("stiffness_n_per_mm", "N/mm", RIGID, 2000.0, 1e7, 8e4, "axial, from motor to table"),),
     changes={"table_mm": table_mm},
     shows_in=("{a}_table_mm",),
+    far_from_linear=True,
+    likely_in={"reversal": 3, "acceleration": 1, "table": 2},
     equation="table = motor − F_drive / stiffness",
     reference="Altintas et al. 2011, CIRP Annals 60(2), axial stiffness of ball-screw drives",
 )

@@ -8,7 +8,7 @@ d/dt (u, w) = A (u, w), A = [[−p, q], [r, −r]], and e^{At} = e^{mt} (cosh dt
 
 from math import exp, sqrt
 
-from twin.effects.effect import Effect, On, Parameter
+from twin.effects.effect import Effect, Guesses, On, Parameter, Recorded
 from twin.sites import Site
 
 
@@ -41,6 +41,11 @@ def temperature_next_c(
     return spindle_c if there else alone_c, column_next_c if there else column_c
 
 
+def first_guesses(_: Recorded) -> Guesses:
+    """Start from weak and strong paths into small and large masses: neither is linear in its size."""
+    return tuple({"conductance_w_per_k": g, "capacity_j_per_k": c} for g in (1.5, 5.0) for c in (1.5e4, 6e4))
+
+
 EFFECT = Effect(
     name="second_thermal_mass",
     site=Site.THERMAL,
@@ -52,6 +57,8 @@ EFFECT = Effect(
     states={"column_c": "temperature_c"},
     changes={"temperature_next_c": temperature_next_c},
     shows_in=("spindle_temp_c",),
+    far_from_linear=True,
+    first_guesses=first_guesses,
     equation="C dT/dt = P − (T − T_a)/R − g (T − T₂), C₂ dT₂/dt = g (T − T₂)",
     reference="the two-node lumped network; Incropera, DeWitt, Fundamentals of Heat and Mass Transfer, section 5.3",
 )

@@ -12,6 +12,11 @@ def reading(reading: float, bias: float) -> float:
     return reading + bias
 
 
+def undo(reading: float, bias: float) -> float:
+    """Return the value at which the sensor reads this at rest."""
+    return reading - bias
+
+
 EFFECT = Effect(
     name="sensor_bias",
     site=Site.SENSOR,
@@ -19,6 +24,7 @@ EFFECT = Effect(
     parameters=(Parameter("bias", "unit of the signal", 0.0, -1e6, 1e6, 1.0, "what it reads too much"),),
     changes={"reading": reading},
     shows_in=("{s}",),
+    undo=undo,
     equation="reading = value + bias",
     reference="JCGM 200:2012 (VIM) 4.20, instrumental bias",
 )

@@ -5,7 +5,7 @@
 Exact for a value that is held between samples. The first reading is settled.
 """
 
-from twin.effects.effect import Effect, On, Parameter
+from twin.effects.effect import Effect, Guesses, On, Parameter, Recorded
 from twin.kernels.elementary import exp_of_minus
 from twin.sites import Site
 
@@ -18,6 +18,11 @@ def reading(reading: float, lagging: float, is_first: float, since_s: float, tim
     return lagging, lagging
 
 
+def first_guesses(recorded: Recorded) -> Guesses:
+    """Start from half a period to forty: what a lag of one of 50 periods does says little of one of a half."""
+    return tuple({"time_constant_s": periods * recorded.period_s} for periods in (0.5, 2.0, 8.0, 40.0))
+
+
 EFFECT = Effect(
     name="sensor_lag",
     site=Site.SENSOR,
@@ -26,6 +31,8 @@ EFFECT = Effect(
     states={"lagging": 0.0},
     changes={"reading": reading},
     shows_in=("{s}",),
+    shows_only_fast=True,
+    first_guesses=first_guesses,
     equation="tau dreading/dt = value − reading",
     reference="JCGM 200:2012 (VIM) 4.23, step response time; first-order low pass",
 )

@@ -3,13 +3,28 @@
 reading = scale · value
 """
 
-from twin.effects.effect import Effect, On, Parameter
+from twin.effects.effect import Effect, Guesses, On, Parameter, Recorded
 from twin.sites import Site
+
+UNIT, UNIT_MAX = 1.5, 5e3
+"""Factors from which, and to which, a sensor may be in another unit."""
 
 
 def reading(reading: float, scale: float) -> float:
     """Scales the value."""
     return reading * scale
+
+
+def undo(reading: float, scale: float) -> float:
+    """Return the value at which the sensor reads this at rest; a scale of nothing counts as 1."""
+    nothing = abs(scale) <= 1e-9
+    return reading / (scale * (1.0 - nothing) + nothing)
+
+
+def first_guesses(recorded: Recorded) -> Guesses:
+    """Start from recorded over modelled where that looks like another unit."""
+    scale = recorded.over_modelled()
+    return ({"scale": scale},) if abs(scale) < UNIT_MAX and not 1.0 / UNIT < scale < UNIT else ()
 
 
 EFFECT = Effect(
@@ -19,6 +34,8 @@ EFFECT = Effect(
     parameters=(Parameter("scale", "", 1.0, -1e4, 1e4, 1.1, "reading over value"),),
     changes={"reading": reading},
     shows_in=("{s}",),
+    undo=undo,
+    first_guesses=first_guesses,
     equation="reading = scale value",
     reference="JCGM 200:2012 (VIM) 4.12, sensitivity of a measuring system",
 )

@@ -3,7 +3,7 @@
 table = table + um_per_k / 1000 · (T − T_start)
 """
 
-from twin.effects.effect import Effect, On, Parameter
+from twin.effects.effect import BuildsUp, Effect, On, Parameter
 from twin.sites import Site
 
 
@@ -20,6 +20,7 @@ EFFECT = Effect(
     changes={"reading": reading},
     shows_in=("{a}_table_mm",),
     needs=("temperature_rise_k",),
+    builds_up=BuildsUp.MOTION,
     equation="table += um_per_k/1000 (T − T_start)",
     reference="ISO 230-3:2020, environmental and thermal distortion tests",
 )

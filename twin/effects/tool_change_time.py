@@ -5,7 +5,7 @@ t = |Δτ| / α_down + (t_stated + t_change) + |Δτ| / α_up,   τ(ω) = ω up 
 
 from math import inf, isinf
 
-from twin.effects.effect import Effect, On, Parameter
+from twin.effects.effect import Effect, Excitation, On, Parameter
 from twin.sites import Site
 
 
@@ -25,7 +25,7 @@ def spindle_deceleration_rpm_s(stated_rpm_s: float, down_rpm_s: float) -> float:
 
 
 def spindle_base_rpm(stated_rpm: float, up_rpm_s: float, down_rpm_s: float, base_rpm: float) -> float:
-    """Where a spindle that takes its time comes to constant power."""
+    """Return the speed at which a spindle that takes its time comes to constant power."""
     return stated_rpm if isinf(up_rpm_s) and isinf(down_rpm_s) else min(stated_rpm, base_rpm)
 
 
@@ -52,6 +52,7 @@ EFFECT = Effect(
         "axes_wait": axes_wait,
     },
     shows_in=("line", "tool_number", "tool_change_active"),
+    excited_by=Excitation.TOOL_CHANGES,
     equation="t = Δτ/α_down + t_stated + t_change + Δτ/α_up; τ = ω up to ω_b, ω_b + (ω² − ω_b²)/(2 ω_b) above",
     reference="chip-to-chip time, VDI 2852-1; ISO 10791-9:2001, operating times of tool change",
 )

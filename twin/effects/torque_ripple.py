@@ -34,6 +34,8 @@ EFFECT = Effect(
     changes={"drive_force_n": drive_force_n},
     shows_in=("{a}_torque_a", "{a}_pos_mm"),
     needs=("screw_lead_mm",),
+    shows_only_fast=True,
+    likely_in={"constant speed": 2},
     equation="F = k (torque + amplitude sin(order 2π x/lead + phase))",
     reference="Holtz, Springob 1996, IEEE Trans. Industrial Electronics 43(2), torque ripple of PM drives",
 )

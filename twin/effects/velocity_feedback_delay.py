@@ -24,6 +24,8 @@ EFFECT = Effect(
     states={"previous_mm_s": "velocity_mm_s"},
     changes={"velocity_feedback_mm_s": velocity_feedback_mm_s},
     shows_in=("{a}_torque_a", "{a}_pos_mm"),
+    shows_only_fast=True,
+    likely_in={"acceleration": 3},
     equation="v_feedback = v − delay (v − v_previous)/T",
     reference="Brown, Schneider, Mulligan 1992, IEEE Trans. Industrial Electronics 39(1), velocity from encoder positions",
 )

@@ -19,6 +19,7 @@ EFFECT = Effect(
     parameters=(Parameter("gain", "", 0.0, 0.0, 1.2, 0.3, "1 = the whole velocity"),),
     changes={"velocity_command_mm_s": velocity_command_mm_s},
     shows_in=("{a}_torque_a", "{a}_pos_mm"),
+    likely_in={"constant speed": 3, "rapid": 2},
     equation="v_cmd = K_p (ref − pos) + gain dref/dt",
     reference="FANUC AC servo parameter manual B-65270EN, advanced preview feed-forward",
 )

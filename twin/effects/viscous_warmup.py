@@ -5,7 +5,7 @@
 Time runs from the start of the recording, at which the axis is taken to be cold.
 """
 
-from twin.effects.effect import Effect, On, Parameter
+from twin.effects.effect import BuildsUp, Effect, On, Parameter
 from twin.kernels.elementary import exp_of_minus
 from twin.sites import Site
 
@@ -25,6 +25,9 @@ EFFECT = Effect(
     ),
     changes={"viscous_n_s_per_mm": viscous_n_s_per_mm},
     shows_in=("{a}_torque_a", "{a}_pos_mm"),
+    far_from_linear=True,
+    likely_in={"constant speed": 4, "rapid": 3},
+    builds_up=BuildsUp.MOTION,
     equation="mu(t) = mu (1 − decay (1 − exp(−t/tau)))",
     reference="Altintas, Verl, Brecher, Uriarte, Pritschow 2011, CIRP Annals 60(2), section on friction",
 )

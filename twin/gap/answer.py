@@ -15,7 +15,7 @@ from twin.gap.evidence import advantage
 from twin.gap.intervals import parameter_intervals
 from twin.gap.null import Null
 from twin.gap.refitted import KNOWN_MIN
-from twin.gap.search import SENSING, Explained
+from twin.gap.search import Explained
 from twin.gap.verdict import Judged
 from twin.gap.wording import percent
 from twin.runlog import AXIS_COLUMN
@@ -32,14 +32,14 @@ def found_effects(stages: Sequence[Judged]) -> list[tuple[Effected, dict[str, fl
 
 
 def _is_nothing(effected: Effected, values: Mapping[str, float]) -> bool:
-    """Whether a fit ended where the effect is not there: at its null value, or stiffer than its file calls finite."""
+    """Return True where a fit ended at nothing: at the null value, or stiffer than the effect's file calls finite."""
     effect = effect_named(effected.effect)
     stiff = {p.name for p in effect.parameters if p.null is not None and np.isinf(p.null)}
     return effect.is_null(values) or any(values[p.name] > p.high for p in effect.parameters if p.name in stiff)
 
 
 def causes_of(stages: Sequence[Judged], shares: Mapping[Effected, float]) -> tuple[Cause, ...]:
-    """What was found, largest share first."""
+    """Return the causes, largest share first."""
     causes: dict[Effected, Cause] = {}
     for stage in stages:
         found = stage.explained
@@ -55,7 +55,7 @@ def causes_of(stages: Sequence[Judged], shares: Mapping[Effected, float]) -> tup
 
 
 def _joined(one: Cause, other: Cause) -> Cause:
-    """What two stages found of one effect: the mean, and an interval that holds both."""
+    """Join what two stages found of one effect: the mean, and an interval that holds both."""
     both = {
         name: Interval(
             (one.parameters[name].value + other.parameters[name].value) / 2.0,
@@ -69,11 +69,11 @@ def _joined(one: Cause, other: Cause) -> Cause:
 
 
 def _probability(found: Explained, effected: Effected) -> float:
-    """Of this effect among what cannot be told from it: by how well each follows the machine; sensors are wrong less often."""
+    """Weigh this effect against what cannot be told from it, by how well each follows; sensors are wrong less often."""
     tried = {t.effected: t for t in found.tried}
     weights = []
     for other in (effected, *found.rivals.get(effected, ())):
-        prior = 0.15 if other.effect in SENSING else 1.0
+        prior = 0.15 if effect_named(other.effect).is_of_measurement else 1.0
         one = tried.get(other)
         best = tried.get(effected)
         behind = 0.0
@@ -171,7 +171,7 @@ def _said(cause: Cause) -> str:
 
 
 def _clearness(interval: Interval, null: float | None) -> float:
-    """How many half-widths of its interval a figure is away from nothing."""
+    """Return the half-widths of its interval by which a figure is away from nothing."""
     if null is None or not np.isfinite(null):
         return np.inf
     return abs(interval.value - null) / max((interval.high - interval.low) / 2.0, 1e-12)

@@ -24,7 +24,7 @@ STEP = 2e-4
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bounds:
-    """Of θ, and the standard deviations of its prior around 0, (p,) each."""
+    """Bounds of θ, and the standard deviations of its prior around 0, (p,) each."""
 
     sigma: Floats
     low: Floats
@@ -32,8 +32,8 @@ class Bounds:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Found:
-    """Where the search ended. known: (p,) part of what is known that comes from the data; evaluations: candidates."""
+class Minimum:
+    """The end of a descent. known: (p,) part of what is known that comes from the data; evaluations: candidates."""
 
     theta: Floats
     covariance: Floats
@@ -44,8 +44,8 @@ class Found:
 
 def descend(
     residuals: Residuals, bounds: Bounds, blocks: NDArray[np.intp], start: Floats, *, steps_max: int = 30, tolerance: float = 1e-4
-) -> Found:
-    """From `start` to a minimum.
+) -> Minimum:
+    """Descend from `start` to a minimum.
 
     residuals: θ (candidates, p) → (candidates, n) in units of their noise; blocks: (n,) time block of each residual
     tolerance: relative decrease of the cost at which the search ends
@@ -72,7 +72,7 @@ def descend(
     if stale:
         slopes = _slopes(residuals, theta, here, bounds)
         evaluations += len(theta)
-    return _found(theta, here, slopes, bounds, blocks, cost, evaluations)
+    return _minimum(theta, here, slopes, bounds, blocks, cost, evaluations)
 
 
 def _cost(residual: Floats, theta: Floats, bounds: Bounds) -> float:
@@ -114,13 +114,13 @@ def _step(slopes: Floats, here: Floats, theta: Floats, bounds: Bounds, damping: 
     return theta
 
 
-def _found(
+def _minimum(
     theta: Floats, here: Floats, slopes: Floats, bounds: Bounds, blocks: NDArray[np.intp], cost: float, evaluations: int
-) -> Found:
+) -> Minimum:
     weight = (1.0 + (here / OUTLIER) ** 2) ** -0.25
     prior = np.diag(1.0 / bounds.sigma**2)
     weighted = slopes * weight[:, None]
     covariance = clustered_covariance(weighted, here * weight, blocks, prior)
     information = weighted.T @ weighted + prior
     variance = np.diag(np.linalg.pinv(information, hermitian=True))
-    return Found(theta, covariance, 1.0 - np.clip(variance / bounds.sigma**2, 0.0, 1.0), cost, evaluations)
+    return Minimum(theta, covariance, 1.0 - np.clip(variance / bounds.sigma**2, 0.0, 1.0), cost, evaluations)

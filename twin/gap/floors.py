@@ -1,4 +1,4 @@
-"""What the runs of a machine differ by when nothing has changed: the floor under every gap.
+"""The floor under every gap: the difference of runs of a machine when nothing has changed.
 
 Repeatability comes from repeated runs of a program (rms of their difference over √2, by signal and regime), or from the laps of a
 run that goes through the same motion again and again; it is never less than the noise of the sensor. Two runs with a few stops in
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.case import Run
-from twin.gap.table import measured_signals, regimes_of
+from twin.gap.labels import measured_signals, regimes_of
 from twin.machine import MachineFile
 from twin.runlog import AXIS_COLUMN, RunLog
 from twin.simulator.recorded import noise_of

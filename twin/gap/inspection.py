@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.case import Case, Run, RunAtHand, RunKind
+from twin.effects.catalogue import catalogue
 from twin.errors import CaseError, RunLogError
 from twin.gap.at_odds import with_known_cut, without_axes_at_odds
+from twin.gap.labels import measured_signals
 from twin.gap.servo_ticks import SlowRun, on_servo_ticks
 from twin.gap.stages.cut import cut_runs
 from twin.gap.stages.heat import heat_runs
-from twin.gap.table import measured_signals
 from twin.machine import MachineFile
 from twin.runlog import AXIS_COLUMN, RunLog
 
@@ -31,16 +32,9 @@ HEAT = ("spindle_rpm", "spindle_load_pct", "ambient_temp_c")
 NEARLY_K = 4.0
 """By which a spindle that starts cold may differ from its surroundings."""
 USUAL = (("spindle_rpm", "rev/min", 150.0), ("spindle_load_pct", "%", 1.0))
-"""What the drives of the heat reach in any warm-up."""
+"""Level that the drives of the heat reach in any warm-up."""
 ROWS_MIN, FEW = 10, 100
 """Rows of a warm-up below which it says nothing; samples below which a signal that does not change is nothing to wonder at."""
-NOT_WHEN_SLOW = frozenset(
-    {
-        *("presliding", "command_delay", "acceleration_feedforward", "payload", "velocity_feedback_delay", "torque_ripple"),
-        *("torque_limit", "lead_error", "sensor_lag", "runout", "helix", "load_peak_hold"),
-    }
-)
-"""Effects that show within a few milliseconds, or while an axis accelerates."""
 
 
 def inspected(case: Case) -> tuple[Case, tuple[str, ...]]:
@@ -65,11 +59,13 @@ def inspected(case: Case) -> tuple[Case, tuple[str, ...]]:
 def slow_effects(case: Case) -> frozenset[str]:
     """Effects that recordings as slow as these cannot show."""
     axes = [run for run in case.of(role="fit") if run.entry.kind is not RunKind.PROGRAM and run.log.axes()]
-    return NOT_WHEN_SLOW if axes and all(isinstance(run, SlowRun) for run in axes) else frozenset()
+    if not axes or not all(isinstance(run, SlowRun) for run in axes):
+        return frozenset()
+    return frozenset(effect.name for effect in catalogue().values() if effect.shows_only_fast)
 
 
 def _comparable(run: Run, machine: MachineFile) -> bool:
-    """Whether the machine can answer in a signal of the run."""
+    """Return True where the machine can answer in a signal of the run."""
     log = run.log
     axes = any(
         log.has(f"{a}_ref_mm") and any(log.has(f"{a}_{measured}") for measured in ("pos_mm", "table_mm", "torque_a"))
@@ -100,7 +96,7 @@ def _usable(run: Run, machine: MachineFile, notes: list[str]) -> Run:
 
 
 def _heat_unknown(run: Run, log: RunLog, machine: MachineFile) -> list[str]:
-    """What keeps the temperature from being compared, or makes it doubtful."""
+    """Note whatever keeps the temperature from being compared, or makes it doubtful."""
     missing = ([] if machine.thermal else ["[thermal] in the machine's file"]) + [name for name in HEAT if not log.has(name)]
     if not log.has(TEMPERATURE):
         return [f"{run.name}: {TEMPERATURE} is not recorded, nor is an axis"]
@@ -204,7 +200,7 @@ def _of_both(a: RunLog, b: RunLog) -> Iterable[str]:
 
 
 def _differ(name: str, a: RunLog, b: RunLog) -> str:
-    """How far a signal of repeated runs differs, where that is more than what repeats."""
+    """Return the difference of a signal of repeated runs, where that is more than what repeats."""
     match = AXIS_COLUMN.match(name)
     base = a.columns.get(f"{match[1]}_ref_mm") if match and match[2] != "torque_a" else None
     does = a[name] - (base if base is not None else np.nanmean(a[name]))

@@ -1,4 +1,4 @@
-"""What the machine was doing at each sample, as a signal of it feels it: every sample has one label, known before any twin runs.
+"""The regime of each sample of a recording, as a signal of it feels it: one label each, known before any twin runs.
 
 * of an axis: the regimes of its reference (`twin.regimes`); `rapid` where it keeps at least nine tenths of the rapid traverse
 * forces, load, speed: `cutting`, `spindle ramp` while the spindle's speed changes, `dwell` while nothing moves, else `air`
@@ -53,6 +53,19 @@ def regime_labels(log: RunLog, signal: str, machine: MachineFile) -> Labels:
     return PROCESS, label
 
 
+def measured_signals(log: RunLog) -> tuple[str, ...]:
+    """Return the columns that a machine answers with, where the run has samples of them."""
+    names = [c for c in log.columns if (m := AXIS_COLUMN.match(c)) and m[2] != "ref_mm"]
+    names += ["force_x_n", "force_y_n", "spindle_load_pct", "spindle_temp_c"]
+    return tuple(name for name in names if log.has(name))
+
+
+def regimes_of(log: RunLog, signal: str, machine: MachineFile) -> tuple[tuple[str, NDArray[np.bool_]], ...]:
+    """Return the regimes in which a signal is looked at, each with its samples, (n,)."""
+    names, label = regime_labels(log, signal, machine)
+    return tuple((name, label == number) for number, name in enumerate(names))
+
+
 def _filled(values: Floats) -> Floats:
     """A series whose missing samples hold the last one there was."""
     there = np.isfinite(values)
@@ -63,7 +76,7 @@ def _filled(values: Floats) -> Floats:
 
 
 def _rapid(t_s: Floats, reference_mm: Floats, label: NDArray[np.int8], machine: MachineFile) -> NDArray[np.bool_]:
-    """Where an axis keeps the rapid traverse, (n,)."""
+    """Return True where an axis keeps the rapid traverse, (n,)."""
     constant = (label == Regime.CONSTANT_MINUS) | (label == Regime.CONSTANT_PLUS)
     if machine.program is None or not constant.any():
         return np.zeros(len(t_s), dtype=bool)
@@ -72,7 +85,7 @@ def _rapid(t_s: Floats, reference_mm: Floats, label: NDArray[np.int8], machine: 
 
 
 def _still(log: RunLog) -> NDArray[np.bool_]:
-    """Where no axis is told to move, (n,); nowhere in a run that does not say."""
+    """Return True where no axis is told to move, (n,); nowhere in a run that does not say."""
     references = [_filled(log[name]) for name in (f"{a}_ref_mm" for a in log.axes()) if log.has(name)]
     if len(log) < 2:
         return np.zeros(len(log), dtype=bool)
@@ -83,7 +96,7 @@ def _still(log: RunLog) -> NDArray[np.bool_]:
 
 
 def _ramp(log: RunLog) -> NDArray[np.bool_]:
-    """Where the speed of the spindle is another than a tenth of a second before, (n,)."""
+    """Return True where the speed of the spindle is another than a tenth of a second before, (n,)."""
     if not log.has("spindle_rpm"):
         return np.zeros(len(log), dtype=bool)
     rpm = _filled(log["spindle_rpm"])

@@ -1,4 +1,4 @@
-"""What the gap goes with: position, phase of the screw, phase of the spindle, time, program section, speed, and contrasts.
+"""Patterns of the gap over position, phase of screw and spindle, time, program section and speed, and its contrasts.
 
 Over bins: share = Σ_b n_b m_b² / Σ ρ², with m_b the mean of a bin, in floors, of what is left of the gap once the means of
 stretches (position, phase) or of regimes (time) are taken out, so that a gap of one direction or speed is not taken for one of a
@@ -36,8 +36,8 @@ AHEAD = 0.1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Found:
-    """A pattern before it is known which stand. says: what goes into its sentence."""
+class _TestedPattern:
+    """A pattern with its p, before it is known whether it stands. says: what goes into its sentence."""
 
     over: str
     share: float
@@ -52,11 +52,11 @@ class _Found:
 def patterns(
     traces: Sequence[Trace], logs: Mapping[str, RunLog], machine: MachineFile, *, after: bool = False
 ) -> tuple[Pattern, ...]:
-    """What is worth saying: patterns of at least 5 % of their signal's gap that were discovered, largest share first.
+    """Return the patterns of at least 5 % of their signal's gap that were discovered, largest share first.
 
     logs: run → its recording; after: look at the twin with the causes added
     """
-    found: list[tuple[str, _Found]] = []
+    found: list[tuple[str, _TestedPattern]] = []
     for signal, of_signal in by_signal(trace for trace in traces if trace.run in logs):
         of = covariates(of_signal, logs, machine, after)
         if not of.known.any():
@@ -75,20 +75,20 @@ def patterns(
     return tuple(sorted(worth, key=lambda pattern: -pattern.share))
 
 
-def _ahead(vague: Iterator[_Found], others: Sequence[_Found]) -> list[_Found]:
+def _ahead(vague: Iterator[_TestedPattern], others: Sequence[_TestedPattern]) -> list[_TestedPattern]:
     """Those of the vague patterns that explain more than all others do."""
     best = max((other.share for other in others if other.p < 1.0), default=0.0)
     return [pattern for pattern in vague if pattern.share > best + AHEAD]
 
 
-def _pattern(signal: str, found: _Found) -> Pattern:
+def _pattern(signal: str, found: _TestedPattern) -> Pattern:
     sentence = f"{percent(found.share)} of the gap in {signal_words(signal)} {found.says}, {times_floor(found.size)}"
     return Pattern(signal, found.over, found.share, found.size, found.p, True, sentence, found.at_unit, found.at, found.mean)
 
 
-def _contrasts(of: Covariates) -> Iterator[_Found]:
+def _contrasts(of: Covariates) -> Iterator[_TestedPattern]:
     for found in contrasts(of, SHARE_MIN):
-        yield _Found(found.over, found.share, found.size, found.p, f"is the difference of {found.over} ({found.says})")
+        yield _TestedPattern(found.over, found.share, found.size, found.p, f"is the difference of {found.over} ({found.says})")
 
 
 def _bins(of: Covariates, in_floors: Floats, bins: NDArray[np.intp], count: int) -> tuple[float, float, float, Floats]:
@@ -109,16 +109,16 @@ def _bins(of: Covariates, in_floors: Floats, bins: NDArray[np.intp], count: int)
 
 def _over_bins(
     of: Covariates, over: str, values: Floats, edges: Floats, by: NDArray[np.generic], where: Bools, unit: str, says: str
-) -> Iterator[_Found]:
+) -> Iterator[_TestedPattern]:
     """A pattern over evenly spaced bins of a covariate."""
     if len(edges) < 3 or not where.any():
         return
     bins = np.where(where & np.isfinite(values), np.clip(np.searchsorted(edges, values, "right") - 1, 0, len(edges) - 2), -1)
     share, size, p, _ = _bins(of, of.without_means(of.in_floors, by, where), bins, len(edges) - 1)
     if p >= 1.0:
-        yield _Found(over, share, size, p, "")
+        yield _TestedPattern(over, share, size, p, "")
         return
-    yield _Found(over, share, size, p, *_curve(of, of.without_means(of.gap, by, where), bins, edges, unit, says))
+    yield _TestedPattern(over, share, size, p, *_curve(of, of.without_means(of.gap, by, where), bins, edges, unit, says))
 
 
 def _curve(
@@ -135,7 +135,7 @@ def _curve(
     return f"{says}: from {ends[0]} to {ends[1]}", unit, tuple(middle.tolist()), tuple(mean.tolist())
 
 
-def _over_places(of: Covariates) -> Iterator[_Found]:
+def _over_places(of: Covariates) -> Iterator[_TestedPattern]:
     """Position along the axis, at constant speed, within a stretch."""
     steady = of.constant_speed() & np.isfinite(of.position_mm)
     if steady.any():
@@ -143,7 +143,7 @@ def _over_places(of: Covariates) -> Iterator[_Found]:
         yield from _over_bins(of, "position", of.position_mm, edges, of.stretch, steady, "mm", "goes with the position")
 
 
-def _over_phases(of: Covariates) -> Iterator[_Found]:
+def _over_phases(of: Covariates) -> Iterator[_TestedPattern]:
     """Phase of the screw, in stretches at constant speed that are a turn long, and phase of the spindle."""
     steady = of.constant_speed() & np.isfinite(of.lead_rad)
     if steady.any():
@@ -158,7 +158,7 @@ def _over_phases(of: Covariates) -> Iterator[_Found]:
 
 def _harmonic(
     of: Covariates, over: str, phase: Floats, by: NDArray[np.generic], where: Bools, turn: str, apart: NDArray[np.generic]
-) -> Iterator[_Found]:
+) -> Iterator[_TestedPattern]:
     """The harmonic of a phase that has the largest share; its angle may be another for each label `apart`."""
     in_floors = of.without_means(of.in_floors, by, where)
     there = np.isfinite(in_floors)
@@ -180,7 +180,7 @@ def _harmonic(
     amplitude = 2.0 * float(np.sqrt(energy[order - 1] / many.sum()))
     share = float(2.0 * energy[order - 1]) / max(of.energy, 1e-300)
     if share < SHARE_MIN:
-        yield _Found(over, share, amplitude, 1.0, "")
+        yield _TestedPattern(over, share, amplitude, 1.0, "")
         return
     angle = np.zeros(len(phase))
     angle[there] = np.angle(vectors[order - 1])[group]
@@ -192,17 +192,17 @@ def _harmonic(
     in_unit = amplitude * float(np.nansum(np.abs(gap[there])) / max(np.nansum(np.abs(in_floors[there])), 1e-300))
     times = "once" if order == 1 else f"{order} times"
     _, unit, at, mean = _curve(of, gap, bins, edges, "rad", "")
-    yield _Found(
+    yield _TestedPattern(
         over, min(share, 1.0), amplitude, p, f"repeats {times} a {turn} (amplitude {figure(in_unit, of.unit)})", unit, at, mean
     )
 
 
 def _step(phase: Floats) -> float:
-    """How far a phase goes from sample to sample where it goes fast, rad."""
+    """Return the step of a phase from sample to sample where it goes fast, rad."""
     return float(np.quantile(np.abs(np.angle(np.exp(1j * np.diff(phase)))), 0.9))
 
 
-def _over_time(of: Covariates) -> Iterator[_Found]:
+def _over_time(of: Covariates) -> Iterator[_TestedPattern]:
     """A drift over the run, the means of the regimes in each direction taken out; among sections, one that a parabola follows."""
     sections = bool(np.isfinite(of.section).any())
     edges = np.linspace(0.0, float(of.time_s.max()) + 1e-9, TIME_BINS + 1)
@@ -213,14 +213,14 @@ def _over_time(of: Covariates) -> Iterator[_Found]:
 
 
 def _smooth(at: Floats, mean: Floats) -> bool:
-    """Whether a parabola leaves less than 40 % of what varies."""
+    """Return True where a parabola leaves less than 40 % of what varies."""
     if len(at) < 4:
         return False
     left = mean - np.polyval(np.polyfit(at - at.mean(), mean, 2), at - at.mean())
     return float(np.var(left)) < 0.4 * float(np.var(mean))
 
 
-def _over_sections(of: Covariates) -> Iterator[_Found]:
+def _over_sections(of: Covariates) -> Iterator[_TestedPattern]:
     """NC lines, neighbouring ones together where there are many."""
     there = of.known & ~of.resting & np.isfinite(of.section)
     lines = np.unique(of.section[there])
@@ -232,7 +232,7 @@ def _over_sections(of: Covariates) -> Iterator[_Found]:
     yield from _over_bins(of, "section", of.section, edges, everything, there, "line", "goes with the program section")
 
 
-def _odd_and_even(of: Covariates) -> Iterator[_Found]:
+def _odd_and_even(of: Covariates) -> Iterator[_TestedPattern]:
     """The parts of the gap that change sign with the direction, and that do not, over speed."""
     steady = of.constant_speed() & of.known
     speed = np.abs(of.velocity_mm_s)
@@ -256,11 +256,11 @@ def _odd_and_even(of: Covariates) -> Iterator[_Found]:
         part, part_in_unit = (mean[0] + sign * mean[1]) / 2.0, (in_unit[0] + sign * in_unit[1]) / 2.0
         share = float(np.sum(count * part**2)) / max(of.energy, 1e-300)
         if share < SHARE_MIN:
-            yield _Found(over, share, 0.0, 1.0, "")
+            yield _TestedPattern(over, share, 0.0, 1.0, "")
             continue
         error = np.hypot(*(means_of(of.in_floors, cells[side, both]).error for side in (0, 1))) / 2.0
         p = min(1.0, float(p_of(part, error).min()) * len(both))
         top = int(np.argmax(np.abs(part)))
         says = f"{words[over]} ({figure(float(part_in_unit[top]), of.unit)} at {figure(float(60 * middle[top]), 'mm/min')})"
         at, curve = tuple(middle.tolist()), tuple(part_in_unit.tolist())
-        yield _Found(over, min(share, 1.0), float(np.abs(part).max()), p, says, "mm/s", at, curve)
+        yield _TestedPattern(over, min(share, 1.0), float(np.abs(part).max()), p, says, "mm/s", at, curve)

@@ -1,4 +1,7 @@
-"""The gap of any twin on recorded runs: rms of twin minus recording over what repeated runs differ by, by signal and of all.
+"""The gap of a twin on recorded runs: rms of twin minus recording over what repeated runs differ by, by signal and of all.
+
+The twin is compared stretch by stretch (`twin.gap.stages.shown`), each from what was measured before it; `twin.gap.free_run`
+simulates the whole run.
 
 Regimes of a signal repeat differently well (a torque at constant speed ten times better than at a reversal), so each sample
 counts by its own floor:
@@ -15,8 +18,7 @@ from numpy.typing import NDArray
 from twin.case import Run
 from twin.gap.diagnosis import Trace
 from twin.gap.floors import Floors
-from twin.gap.labels import regime_labels
-from twin.gap.table import measured_signals
+from twin.gap.labels import measured_signals, regime_labels
 
 Floats = NDArray[np.float64]
 BLOCK_S = 0.5
@@ -42,11 +44,11 @@ class Squares:
         return float(np.sqrt(self.ratio.sum() / max(self.count.sum(), 1.0)))
 
     def floor(self) -> float:
-        """Of the signal, in its unit."""
+        """Floor of the signal, in its unit."""
         return float(np.sqrt(self.count.sum() / max(self.weight.sum(), 1e-300)))
 
     def rms(self) -> float:
-        """Of the error, in the unit of the signal."""
+        """Rms of the error, in the unit of the signal."""
         return self.over_floor() * self.floor()
 
 

@@ -1,4 +1,4 @@
-"""The gap of any twin on all runs of a case."""
+"""The gap of a twin on all runs of a case, over the floors that the case itself shows."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -14,7 +14,7 @@ from twin.machine import MachineFile
 
 @dataclass(frozen=True, slots=True)
 class SignalScore:
-    """Of one signal, in its unit."""
+    """The gap of one signal, in its unit."""
 
     rms: float
     floor: float

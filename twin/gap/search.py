@@ -1,7 +1,8 @@
-"""Which effects: added to the machine one by one, refitted with its constants, and judged on runs that were not fitted.
+"""The search for effects: added to the machine one by one, refitted with its constants, and judged on runs that were not fitted.
 
-    base → screen all candidates by signature → fit those that survive, thresholds always → take the best that a healthy machine
-    would not show → drop what is no longer needed → again, until nothing more is accepted; pairs where no single one is
+    base → screen all candidates by signature → fit those that survive, and those far from linear in any case → take the best
+    that a healthy machine would not show → drop what is no longer needed → again, until nothing more is accepted; pairs where no
+    single one is
 
 A candidate is accepted where it beats its parent on the judging runs by more sigmas, and takes away more of the gap, than it does
 on healthy machines (`twin.gap.null`).
@@ -15,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.effects.catalogue import effect_named
+from twin.effects.effect import On
 from twin.gap.diagnosis import Effected
 from twin.gap.evidence import Advantage, advantage
 from twin.gap.fitting import Fitted, fitted, settled
@@ -25,20 +27,15 @@ from twin.gap.stages.stage import Model, Stage
 Floats = NDArray[np.float64]
 SCREENED_MAX = 9
 CLOSES_LEAST = 0.02
-ALWAYS = frozenset(
-    ("torque_limit", "presliding", "load_peak_hold", "second_thermal_mass", "viscous_warmup", "screw_compliance", "helix")
-)
-"""Thresholds, saturations, and what is far from linear: a signature at one size says little about them."""
 ROUNDS_MAX = 4
 STEPS_FIRST, STEPS_MAX = 6, 14
 REFINED = 3
 SWAPPED_WITH = 3
 SWAP_SIGMAS = 2.0
-THERE = 1e-4
-"""θ below which an effect is not there."""
+THETA_NULL = 1e-4
+"""θ below which an effect is null: the fit has taken it away."""
 PAIR_GAP = 3.0
 PAIRS_OF = 6
-SENSING = ("sensor_bias", "sensor_scale", "sensor_lag", "clock_drift")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,7 +50,7 @@ class Tried:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Explained:
-    """What was found in a stage.
+    """The effects found in a stage.
 
     base: the machine with its constants refitted; best: with the accepted effects; tried: in the first round, best first
     rivals: effect → what cannot be told from it; evidence: effect → its advantage over the same without it
@@ -104,14 +101,14 @@ def _gap_left(best: Fitted, null: Null) -> bool:
 def _accepted(stage: Stage, tried: Tried, null: Null) -> bool:
     if tried.over is None or tried.found is None or not null.exceeded(tried.effected, tried.over, stage.healthy_rms):
         return False
-    return _is_there(tried.found, tried.effected)
+    return _is_not_null(tried.found, tried.effected)
 
 
-def _is_there(found: Fitted, effected: Effected) -> bool:
-    """Whether the fit did not end where the effect is nothing."""
+def _is_not_null(found: Fitted, effected: Effected) -> bool:
+    """Return True unless the fit ended where the effect is nothing."""
     place = dict(found.model.places())[effected]
     sizes = [i for i in range(place.start, place.stop) if not (found.model.free[i].is_shape or found.model.free[i].is_angle)]
-    return bool((np.abs(found.theta[sizes]) > THERE).any())
+    return bool((np.abs(found.theta[sizes]) > THETA_NULL).any())
 
 
 def _tried(stage: Stage, parent: Fitted, candidates: tuple[Effected, ...], null: Null) -> tuple[Tried, ...]:
@@ -121,7 +118,7 @@ def _tried(stage: Stage, parent: Fitted, candidates: tuple[Effected, ...], null:
     screened.sort(key=lambda g: -g[0].closes)
     wanted = [g for g in screened if g[0].closes > CLOSES_LEAST][:SCREENED_MAX]
     if _gap_left(parent, null):
-        wanted += [g for g in screened if g[0].effected.effect in ALWAYS and g not in wanted]
+        wanted += [g for g in screened if effect_named(g[0].effected.effect).far_from_linear and g not in wanted]
     scale = np.maximum(parent.left_fit.rms(), 1.0)
     fits = {g[0].effected: _best_fit(stage, parent, g, scale) for g in wanted}
     for effected in sorted(fits, key=lambda e: fits[e].left_fit.excess())[: REFINED if len(fits) > 1 else 0]:
@@ -141,7 +138,7 @@ def _best_fit(stage: Stage, parent: Fitted, found: tuple[Guess, ...], scale: Flo
     constants = len(model.constants)
     bounds = np.array([p.high for p in model.constants])
     driven = bool((np.abs(parent.theta[:constants]) > 0.95 * bounds).any())
-    if not driven and not (found[0].effected.effect in ALWAYS and len(found) > 1):
+    if not driven and not (effect_named(found[0].effected.effect).far_from_linear and len(found) > 1):
         return one
     again = (found[1] if len(found) > 1 and not driven else found[0]).theta.copy()
     if driven:
@@ -167,9 +164,9 @@ def _equal(one: Fitted, best: Fitted) -> bool:
 def _plainness(tried: Tried) -> tuple[bool, int, bool, float]:
     """The machine's own before its sensors, and what a loop acts on last: a drive does not misread its own command."""
     effect, on = effect_named(tried.effected.effect), tried.effected.on
-    in_the_loop = effect.name.startswith("sensor_") and on.endswith(("_pos_mm", "_torque_a"))
-    sensing = effect.name in SENSING or (effect.name == "gravity" and on != "z")
-    return (in_the_loop, len(effect.parameters), sensing, -(tried.over.gain if tried.over else 0.0))
+    in_the_loop = effect.on is On.SIGNAL and on.endswith(("_pos_mm", "_torque_a"))
+    unlikely = effect.is_of_measurement or not effect.is_usual_on(on)
+    return (in_the_loop, len(effect.parameters), unlikely, -(tried.over.gain if tried.over else 0.0))
 
 
 def _pair(stage: Stage, parent: Fitted, tried: tuple[Tried, ...], null: Null) -> Fitted | None:
@@ -206,7 +203,7 @@ def _swapped(stage: Stage, best: Fitted, first: tuple[Tried, ...]) -> Fitted:
             own = other.found.theta[len(other.found.model.constants) :]
             found = fitted(stage, model, np.concatenate([kept, own]), scale=scale, steps_max=STEPS_FIRST)
             over = advantage(best.left, found.left)
-            if over.sigmas > SWAP_SIGMAS and over.closes > 0.0 and _is_there(found, other.effected):
+            if over.sigmas > SWAP_SIGMAS and over.closes > 0.0 and _is_not_null(found, other.effected):
                 return settled(stage, found, rounds=1)
     return best
 

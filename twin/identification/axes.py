@@ -112,7 +112,7 @@ def _with_or_without_delay(model: AxisModel, notes: list[str], letter: str) -> A
         return nominal
     notes.append(
         f"axes.{letter}: the velocity in the loop is {1000 * delay:.3f} ± {1000 * INTERVAL_Z * deviation:.3f} ms old; with that "
-        f"in it the residual is {100 * part:.0f} % smaller, so the twin has velocity_feedback_delay on {letter}"
+        f"in it the residual is {100 * part:.0f} % smaller, so the twin has {effects_of((VELOCITY_DELAY,))[0]} on {letter}"
     )
     return delayed
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from twin.case import Case, Run, RunKind
 from twin.errors import CaseError
-from twin.gap.table import GapRow, gap_table
+from twin.gap.free_run import GapRow, free_run_gap
 from twin.heat.run import Warming
 from twin.identification.axes import identified_axes
 from twin.identification.batch_fit import Fit
@@ -76,7 +76,7 @@ def identify(case: Case, *, free_gains: bool = False, progress: Progress = lambd
     machine = machine.model_copy(update={"uncertainty": uncertainty})
     progress("checking")
     judged = case.of(role="check") or fits
-    gaps = gap_table(machine, judged, case.repeats())
+    gaps = free_run_gap(machine, judged, case.repeats())
     return Identification(machine, tuple(known), tuple(unknown), tuple(notes), gaps, _misfits(judged, gaps))
 
 

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from twin.effects.catalogue import effect_named
 from twin.errors import MachineError
 from twin.machine import Limits, MachineFile, Tool
 from twin.optimisation.answer import Binds
@@ -257,7 +258,8 @@ def _stable(
 
 def _hardness(machine: MachineFile) -> float:
     """K_t over the stated one, where the diagnosis found another material."""
-    return math.prod(e.parameters.get("scale", 1.0) for e in machine.effects if e.effect == "cutting_coefficient")
+    factors = ((e, effect_named(e.effect).multiplies.get("tangential_coefficient_n_per_mm2")) for e in machine.effects)
+    return math.prod(added.parameters.get(factor, 1.0) for added, factor in factors if factor)
 
 
 def _too_much(

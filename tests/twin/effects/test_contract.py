@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 from tests.twin.axes import constants, reference, with_effect
+from tests.twin.effects.made_with import between, diagnosed, outcome
 from twin.effects.catalogue import catalogue, effect_named
-from twin.effects.effect import Effect, On
+from twin.effects.effect import Effect, On, Recorded, called
 from twin.errors import EffectError
+from twin.gap.labels import AXIS
 from twin.gcode import interpret
 from twin.machine import Program
 from twin.motion.control import LENGTH_OVER_FEED, QUANTITIES, changed
@@ -64,13 +66,8 @@ def seconds_between(one: Plan, other: Plan) -> float:
     return float(np.abs(one.seconds_by_line() - other.seconds_by_line()).max())
 
 
-def between(effect: Effect, part: float) -> dict[str, float]:
-    """Parameters `part` of the way from null to typical."""
-    values = effect.typical_values()
-    for p in effect.parameters:
-        if p.null is not None:
-            values[p.name] = p.typical / part if math.isinf(p.null) else p.null + part * (p.typical - p.null)
-    return {p.name: min(max(values[p.name], p.low), p.high) for p in effect.parameters}
+FOUND = ("backlash", "cutting_coefficient", "coolant_cooling", "sensor_bias", "tool_change_time")
+"""One of each kind of stage, and cheap; `benchmarks/gap/effects_found.py` asks it of all."""
 
 
 def named(effect: Effect) -> str:
@@ -173,6 +170,36 @@ def test_effects_compose_without_knowing_of_each_other() -> None:
         nulled = run_with(typical | {effect.name: effect.null_values()}, reference_run=True)
         assert difference(without, nulled) == 0.0, f"{effect.name} is not nothing beside the others"
         assert difference(together, nulled) > 0.0
+
+
+@pytest.mark.parametrize("effect", [effect_named(name) for name in FOUND], ids=named)
+def test_a_machine_made_with_it_is_diagnosed_as_it_or_as_a_class_that_holds_it(effect: Effect) -> None:
+    found, size = diagnosed(effect, 10.0)
+    assert size > 5.0
+    assert outcome(effect, found) in ("named", "in the class"), found.sentence
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=named)
+def test_what_it_declares_for_the_diagnosis_is_of_this_effect_and_of_its_kind(effect: Effect) -> None:
+    parameters = {p.name for p in effect.parameters}
+    assert set(effect.carried) <= set(effect.states)
+    assert {*effect.lowers.values(), *effect.multiplies.values()} <= parameters
+    assert set(effect.at_rest) <= {"load_n", "bristle_mm"}
+    assert set(effect.likely_in) <= {*(name.rstrip(" -+") for name in AXIS), "table"}
+    assert effect.on is On.AXIS or not (effect.likely_in or effect.at_rest or effect.carried or effect.usual_on)
+    assert effect.on is On.SIGNAL or effect.undo is None
+    assert effect.site in (Site.REFERENCE, Site.CLOCK) or effect.late_s is None
+    guesses = effect.first_guesses(Recorded(0.001, lambda _: 10.0, lambda: 25.4))
+    assert all(set(guess) <= parameters for guess in guesses)
+    assert all(effect.checked(guess) for guess in guesses)
+    assert effect.first_guesses(Recorded(0.001)) in ((), guesses), "what is not recorded suggests nothing"
+
+
+@pytest.mark.parametrize("effect", [e for e in EFFECTS if e.undo is not None], ids=named)
+def test_what_a_sensor_at_rest_reads_is_taken_back(effect: Effect) -> None:
+    given = {name: np.array([value]) for name, value in between(effect, 0.5).items()}
+    read = called(effect.changes["reading"], given, np.array([21.5]))
+    assert called(effect.undo, given, read) == pytest.approx(21.5)  # type: ignore[arg-type]
 
 
 def test_an_unknown_effect_is_named_with_those_that_there_are() -> None:

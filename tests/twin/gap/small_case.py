@@ -101,8 +101,11 @@ HOT = MachineFile(
 )
 
 
-def warm_case(*effects: AddedEffect) -> Case:
-    """The spindle warms up, cools down and warms up again, for an hour and a half, at three sets of speeds."""
+def warm_case(*effects: AddedEffect, coolant: bool = False) -> Case:
+    """The spindle warms up, cools down and warms up again, for an hour and a half, at three sets of speeds.
+
+    coolant: it is switched on and off every ten minutes
+    """
     columns = {}
     for seed, name in enumerate(("fit", "fit again", "check")):
         draw = np.random.default_rng(seed)
@@ -113,9 +116,10 @@ def warm_case(*effects: AddedEffect) -> Case:
         thermal = (
             HOT.thermal.model_copy(update={"resistance_k_per_w": 0.122, "capacity_j_per_k": 8900.0}) if HOT.thermal else None
         )
-        told = RunInput(t_s, spindle_rpm=rpm, ambient_temp_c=ambient, start_temp_c=21.0)
+        coolant_on = (t_s // 600.0 % 2.0) * coolant
+        told = RunInput(t_s, spindle_rpm=rpm, coolant_on=coolant_on, ambient_temp_c=ambient, start_temp_c=21.0)
         real = HOT.model_copy(update={"thermal": thermal, "effects": effects})
         shown = respond(real, told, recorded={"spindle_load_pct": load}, seed=seed).columns["spindle_temp_c"]
         columns[name] = {"t_s": t_s, "spindle_rpm": rpm, "spindle_load_pct": load, "ambient_temp_c": ambient}
-        columns[name]["spindle_temp_c"] = shown
+        columns[name] |= {"spindle_temp_c": shown} | ({"coolant_on": coolant_on} if coolant else {})
     return case_of(HOT, columns, RunKind.WARMUP)

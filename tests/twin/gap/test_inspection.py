@@ -9,12 +9,18 @@ from numpy.typing import NDArray
 from tests.twin.gap.small_case import HOT, MACHINE, air_case, case_of, columns_of, warm_case
 from twin.case import Case, RunKind
 from twin.errors import CaseError, RunLogError, TwinError
-from twin.gap.inspection import NOT_WHEN_SLOW, inspected, slow_effects
+from twin.gap.inspection import inspected, slow_effects
 from twin.machine import Tool
 
 Floats = NDArray[np.float64]
 Columns = dict[str, dict[str, Floats]]
 GOOD = air_case()
+NOT_WHEN_SLOW = frozenset(
+    {
+        *("presliding", "command_delay", "acceleration_feedforward", "payload", "velocity_feedback_delay", "torque_ripple"),
+        *("torque_limit", "lead_error", "sensor_lag", "runout", "helix", "load_peak_hold"),
+    }
+)
 
 
 def mutilated(change: Callable[[dict[str, Floats]], object], only: str = "") -> Case:

@@ -11,8 +11,7 @@ from tests.recordings import recordings_folder
 from twin.case import Case, read_case
 from twin.gap.diagnosis import Trace
 from twin.gap.floors import repeatability
-from twin.gap.labels import regime_labels
-from twin.gap.table import measured_signals
+from twin.gap.labels import measured_signals, regime_labels
 from twin.machine import MachineFile, machine_from_toml
 from twin.runlog import RunLog, run_log
 from twin.simulator.recorded import noise_of, told_of

@@ -55,7 +55,7 @@ SENSORS = {
 
 @dataclass(frozen=True, slots=True)
 class Separation:
-    """How far two hypotheses are apart in a program. largest: of the differences in the signal that shows most, in floors."""
+    """The distance of two hypotheses in a program. largest: of the differences in the signal that shows most, in floors."""
 
     first: Effected
     second: Effected
@@ -65,7 +65,7 @@ class Separation:
 
     @property
     def tells(self) -> bool:
-        """Whether it tells them apart."""
+        """True where it tells them apart."""
         return self.floors >= SEPARATED and self.largest >= LARGEST_MIN
 
 
@@ -122,7 +122,7 @@ def next_experiment(
 
 
 def _is_long(snippet: Snippet) -> bool:
-    """Whether a program dwells or repeats for minutes."""
+    """Return True where a program dwells or repeats for minutes."""
     waits = sum(float(block.partition("P")[2]) for block, _ in snippet.blocks if block.startswith("G4 P"))
     return waits > 1000.0 * LONG_S or len(snippet.blocks) > 60
 
@@ -141,10 +141,10 @@ def _snippets(hypotheses: Sequence[Hypothesis], envelope: Envelope) -> Iterator[
             letters += list(machine.axes)[:1]
         else:
             wanted |= _shows(effected)
-    effects = {effected.effect for effected, _ in hypotheses}
+    building_up = {effect_named(effected.effect).builds_up for effected, _ in hypotheses}
     for letter in dict.fromkeys(letters):
         for snippet in axis_menu(letter, envelope, machine.axes[letter].screw_lead_mm):
-            if not snippet.only_for or effects & snippet.only_for:
+            if snippet.only_for is None or snippet.only_for in building_up:
                 yield snippet
     for snippet in machine_menu(envelope):
         if snippet.shows in wanted:
@@ -152,7 +152,7 @@ def _snippets(hypotheses: Sequence[Hypothesis], envelope: Envelope) -> Iterator[
 
 
 def _shows(effected: Effected) -> set[Shows]:
-    """Which programs show an effect that is on no axis."""
+    """Return the kinds of programs that show an effect that is on no axis."""
     effect = effect_named(effected.effect)
     signals = [effected.on] if effect.on is On.SIGNAL else list(effect.shows_in)
     kinds: set[Shows] = set()

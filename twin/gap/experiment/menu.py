@@ -10,11 +10,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
+from twin.effects.effect import BuildsUp
 from twin.gap.experiment.envelope import Envelope
 
 
 class Shows(StrEnum):
-    """What a program works with."""
+    """The part of the machine that a program works with."""
 
     AXIS = "axis"
     SPINDLE = "spindle"
@@ -28,7 +29,7 @@ class Snippet:
 
     does: what it does, in words; blocks: block and comment, one a line; cuts: numbers of the blocks that cut, from 0
     letters: the axes that it moves; from_block: the first block that counts, after the way to where it starts
-    only_for: effects that are worth its minutes; empty = any
+    only_for: effects that build up so are worth its minutes; None = any
     """
 
     does: str
@@ -37,7 +38,7 @@ class Snippet:
     letters: tuple[str, ...] = ()
     cuts: frozenset[int] = frozenset()
     from_block: int = 0
-    only_for: frozenset[str] = frozenset()
+    only_for: BuildsUp | None = None
 
     def program(self) -> str:
         """The program, numbered, a comment in each line."""
@@ -51,8 +52,6 @@ STROKE_MM_MIN = 1.0
 """A box smaller than this is no room to move in."""
 WARM_S = 180.0
 APART_MS = 120_000
-AGEING = frozenset({"clock_drift"})
-WARMING = frozenset({"viscous_warmup", "thermal_growth"})
 HEAT_S = (2400.0, 2400.0)
 COOLANT_S = 900.0
 
@@ -73,8 +72,10 @@ def axis_menu(axis: str, envelope: Envelope, lead_mm: float | None) -> Iterator[
     if lead_mm is not None:
         yield moves.snippet("slow traverses over many turns of the screw at two speeds", _traverses(moves, lead_mm))
     yield from _circles(moves)
-    yield replace(moves.snippet("the same strokes 2 minutes apart", _apart(moves)), only_for=AGEING)
-    yield replace(moves.snippet("the same strokes before and after 3 minutes of motion", _warming(moves)), only_for=WARMING)
+    yield replace(moves.snippet("the same strokes 2 minutes apart", _apart(moves)), only_for=BuildsUp.WAITING)
+    yield replace(
+        moves.snippet("the same strokes before and after 3 minutes of motion", _warming(moves)), only_for=BuildsUp.MOTION
+    )
 
 
 def machine_menu(envelope: Envelope) -> Iterator[Snippet]:

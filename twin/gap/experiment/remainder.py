@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from twin.effects.catalogue import effect_named
+from twin.effects.catalogue import catalogue, effect_named
 from twin.errors import TwinError
 from twin.gap.diagnosis import Cell, Effected, NextExperiment
 from twin.gap.experiment.choice import Hypothesis, next_experiment, sensor_floor
@@ -20,20 +20,8 @@ from twin.gap.experiment.run import Columns, Trial, shown, trial_of
 from twin.gap.stages.free import Form, effect_parameters
 from twin.gap.wording import regime_words
 from twin.machine import AddedEffect, MachineFile
-from twin.regimes import Regime
 from twin.runlog import AXIS_COLUMN
 
-COULD_BE: Mapping[str, tuple[str, ...]] = {
-    Regime.REST.title: ("gravity", "presliding", "direction_friction"),
-    Regime.REVERSAL.title: ("presliding", "backlash", "screw_compliance"),
-    Regime.ACCELERATION.title: ("screw_compliance", "acceleration_feedforward", "velocity_feedback_delay", "payload"),
-    Regime.CONSTANT_MINUS.title: ("direction_friction", "torque_ripple", "velocity_feedforward", "viscous_warmup"),
-    Regime.CONSTANT_PLUS.title: ("direction_friction", "torque_ripple", "velocity_feedforward", "viscous_warmup"),
-    "rapid": ("torque_limit", "velocity_feedforward", "viscous_warmup"),
-}
-"""What a gap in a regime of an axis is most often."""
-AT_THE_TABLE = ("backlash", "screw_compliance", "lead_error")
-"""What a gap is most often that only the table shows."""
 SIZES = (0.02, 20.0)
 
 
@@ -64,7 +52,7 @@ def remainder_experiment(
     largest = max((c for c in cells if c.regime == regime), key=lambda cell: cell.rms)
     there = {(added.effect, added.on) for added in machine.effects}
     only_table = all(cell.signal.endswith("_table_mm") for cell in cells)
-    could = AT_THE_TABLE if only_table else COULD_BE.get(regime, ())
+    could = likely_effects("table" if only_table else regime)
     names = [n for n in could if n not in without and (n, axis) not in there]
     snippet = next((s for s in axis_menu(axis, envelope, None) if s.does.startswith("full strokes")), None)
     if snippet is None:
@@ -77,6 +65,17 @@ def remainder_experiment(
         f"what is left on {axis} lies mostly {regime_words(regime)} and has no name; if it is of the catalogue, this {found.why}"
     )
     return NextExperiment(why, found.program, found.seconds, found.separation)
+
+
+def likely_effects(regime: str) -> tuple[str, ...]:
+    """Return the effects that a gap in a regime of an axis most often is, the likeliest first.
+
+    >>> likely_effects("table"), likely_effects("constant speed -") == likely_effects("constant speed +")
+    (('backlash', 'screw_compliance', 'lead_error'), True)
+    """
+    either_sign = regime.rstrip(" -+")
+    place = {effect.name: effect.likely_in[either_sign] for effect in catalogue().values() if either_sign in effect.likely_in}
+    return tuple(sorted(place, key=lambda name: place[name]))
 
 
 def _sized(
@@ -129,7 +128,6 @@ def _with_effect(machine: MachineFile, name: str, axis: str, size: float) -> Mac
     for free, parameter in zip(effect_parameters(effect), effect.parameters, strict=True):
         theta = 0.0 if free.form is Form.FACTOR else parameter.typical if free.is_angle else size
         values[parameter.name] = float(free.value(np.array(float(np.clip(theta, free.low, free.high)))))
-    if name == "torque_limit":
-        values = {"limit_a": given.torque_limit_a * 0.5}
+    values |= {parameter: getattr(given, constant) * 0.5 for constant, parameter in effect.lowers.items()}
     added = AddedEffect(effect=name, on=axis, parameters=values)
     return machine.model_copy(update={"effects": (*machine.effects, added)})

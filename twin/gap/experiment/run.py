@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.effects.catalogue import effect_named
-from twin.effects.effect import On
+from twin.effects.effect import On, called
 from twin.errors import TwinError
 from twin.gap.diagnosis import Effected
 from twin.gap.experiment.envelope import Envelope
@@ -38,7 +38,7 @@ TICKS_MANY = 60_000
 HEAT_PERIOD_S = 2.0
 AMBIENT_C = 22.0
 PARAMETER_SIGMA = 0.1
-"""How well the parameters of an effect that was fitted are known, relative."""
+"""Relative standard deviation of the parameters of an effect that was fitted."""
 FRICTION = ("coulomb_n", "static_n", "stribeck_velocity_mm_s", "viscous_n_s_per_mm")
 MACHINE_PATHS = {
     Shows.AXIS: (),
@@ -120,15 +120,24 @@ def _coolant(planned: Plan, t_s: Floats) -> Floats:
 
 
 def shown(machine: MachineFile, trial: Trial) -> Columns:
-    """What a machine shows in the rows that count, by signal."""
+    """Return the signals of a machine in the rows that count."""
     courses = COURSES if len(trial.told.t_s) < TICKS_MANY else 1
     less = cut_down(machine, trial.snippet)
     # a machine is enabled, and its integrators hold what there is to hold, long before a program starts
-    held = {e.on: e.parameters["force_n"] / less.axes[e.on].newton_per_command for e in less.effects if e.effect == "gravity"}
-    told = replace(trial.told, start={axis: {"integral_a": torque} for axis, torque in held.items()})
+    told = replace(trial.told, start={axis: {"integral_a": torque} for axis, torque in _held_a(less).items()})
     response = respond(less, told, recorded=trial.recorded, courses=courses)
     kept = trial.recorded.keys() | {"cutting_force_peak_n"}
     return {name: values[trial.counts] for name, values in response.columns.items() if name not in kept}
+
+
+def _held_a(machine: MachineFile) -> dict[str, float]:
+    """Axis → what its integrator holds at rest, for the loads that the machine's effects put on it."""
+    held: dict[str, float] = {}
+    for added in machine.effects:
+        if load_n := effect_named(added.effect).at_rest.get("load_n"):
+            torque = called(load_n, added.parameters) / machine.axes[added.on].newton_per_command
+            held[added.on] = held.get(added.on, 0.0) + torque
+    return held
 
 
 def cut_down(machine: MachineFile, snippet: Snippet) -> MachineFile:
@@ -149,7 +158,7 @@ def cut_down(machine: MachineFile, snippet: Snippet) -> MachineFile:
 def sensitivities(
     effected: Effected, machine: MachineFile, trial: Trial, base: Columns, nuisance: Mapping[str, float]
 ) -> list[Columns]:
-    """What the program shows more when each constant, and each parameter of the effect, is a standard deviation larger."""
+    """Return the change in the signals by a standard deviation of each constant, and of each parameter of the effect."""
     changed = [with_constant(machine, p, float(np.exp(s))) for p, s in _uncertain(machine, trial.snippet, nuisance).items()]
     changed += _other_parameters(effected, machine)
     found = []

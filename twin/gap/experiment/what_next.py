@@ -7,10 +7,10 @@ from twin.gap.diagnosis import Cell, Effected, NextExperiment, Verdict
 from twin.gap.experiment.choice import next_experiment
 from twin.gap.experiment.envelope import envelope_of
 from twin.gap.experiment.remainder import remainder_experiment
+from twin.gap.labels import measured_signals
 from twin.gap.refitted import with_effects
 from twin.gap.stages.axis import AxisStage
 from twin.gap.stages.plan import Ground
-from twin.gap.table import measured_signals
 from twin.gap.verdict import Judged
 from twin.machine import MachineFile
 

@@ -12,6 +12,8 @@ from math import factorial
 import numpy as np
 from numpy.typing import NDArray
 
+from twin.effects.catalogue import effect_named
+from twin.effects.effect import Excitation
 from twin.gap.diagnosis import (
     Candidate,
     Cause,
@@ -50,8 +52,11 @@ RUN_UPS = "G21 G90 G17\nG0 Z50\nS3000 M3\nG1 X1 F1000\nM5\nG4 P3000\nS9000 M3\nG
 
 
 @dataclass(frozen=True)
-class Asked:
-    """The question in hand: the machine's limits as stated or read off, its own effects, the runs and what was said of them."""
+class Trials:
+    """The runs of a case that can be compared with their programs, and the machine that they are to be explained by.
+
+    stated: its limits as stated or read off; already: its own effects; notes: on the runs and limits
+    """
 
     machine: MachineFile
     stated: Limits
@@ -65,16 +70,16 @@ class Asked:
 class Answer:
     """The search put into the form of a diagnosis."""
 
-    asked: Asked
+    trials: Trials
     found: Search
     absent: tuple[NotObservable, ...]
     rng: np.random.Generator
 
     def diagnosed(self) -> Diagnosed:
         """Everything."""
-        asked, after = self.asked, self.found.chosen.fitted.model
-        before = Model(asked.stated, asked.already, after.reference_mm)
-        gaps = [RunGap.of(trial, before, after) for trial in asked.judged]
+        trials, after = self.trials, self.found.chosen.fitted.model
+        before = Model(trials.stated, trials.already, after.reference_mm)
+        gaps = [RunGap.of(trial, before, after) for trial in trials.judged]
         floor = self._section_floor(gaps)
         numbers = self._numbers(gaps, floor)
         causes = self._causes(gaps, floor, numbers)
@@ -91,7 +96,7 @@ class Answer:
             not_observable=self.absent,
             not_identifiable=self._not_identifiable(),
             next_experiment=self._next(),
-            notes=(*asked.notes, *self._notes(gaps)),
+            notes=(*trials.notes, *self._notes(gaps)),
             seconds=0.0,
         )
         twin = with_uncertainty(self.twin(), {}, causes)
@@ -99,31 +104,31 @@ class Answer:
 
     def _all(self, gaps: list[RunGap], before: Model, after: Model) -> list[RunGap]:
         judged = {gap.watched.trial.name for gap in gaps}
-        more = [RunGap.of(trial, before, after) for trial in self.asked.learnt if trial.name not in judged]
+        more = [RunGap.of(trial, before, after) for trial in self.trials.learnt if trial.name not in judged]
         return [*gaps, *more]
 
     def twin(self) -> MachineFile:
         """The machine with the causes among its effects, and the rapid rate that was read off."""
-        machine, chosen = self.asked.machine, self.found.chosen
+        machine, chosen = self.trials.machine, self.found.chosen
         added = tuple(
             AddedEffect(effect=name, parameters=dict(chosen.fitted.model.effects[name])) for name in sorted(chosen.names)
         )
-        rate = self.asked.stated.rapid_mm_min
+        rate = self.trials.stated.rapid_mm_min
         assert machine.program is not None or isinstance(rate, float)
         program = machine.program or Program(rapid_mm_min=float(rate), acceleration_mm_s2=ACCELERATION_MAX_MM_S2)  # type: ignore[arg-type]
         return machine.model_copy(update={"program": program, "effects": (*machine.effects, *added)})
 
     def _section_floor(self, gaps: list[RunGap]) -> float:
-        """What runs of the same program differ by, per section, s; not less than what the recorder cannot tell."""
+        """Return the difference of runs of the same program, per section, s; not less than what the recorder cannot tell."""
         by_text: dict[str, list[Floats]] = {}
-        for trial in {trial.name: trial for trial in (*self.asked.learnt, *self.asked.judged)}.values():
+        for trial in {trial.name: trial for trial in (*self.trials.learnt, *self.trials.judged)}.values():
             by_text.setdefault(trial.text, []).append(Sections.in_run(trial).recorded_s)
         pairs = [one - other for same in by_text.values() for one, other in combinations(same, 2)]
         return max([_recorder_s(gaps), *(_rms(pair) / float(np.sqrt(2.0)) for pair in pairs)])
 
     def _numbers(self, gaps: list[RunGap], floor: float) -> GapNumbers:
         """rms over sections, over windows and over whole runs."""
-        as_stated = Model(self.asked.stated, self.asked.already, 0.0)
+        as_stated = Model(self.trials.stated, self.trials.already, 0.0)
         stated = np.concatenate([gap.sections.planned_s(gap.watched.plan(as_stated)) - gap.sections.recorded_s for gap in gaps])
         sections = [np.concatenate([gap.section_gap(after) for gap in gaps]) for after in (False, True)]
         totals = [np.array([gap.section_gap(after).sum() for gap in gaps]) for after in (False, True)]
@@ -152,7 +157,7 @@ class Answer:
         return Verdict.PARTLY if numbers.closure >= MOSTLY else Verdict.UNKNOWN
 
     def _closure(self, names: Names, gaps: list[RunGap], floor: float) -> float:
-        """Of one set of effects, over the sections of the runs judged on; not clipped at 0, so that shares add up."""
+        """Return the closure of a set of effects over the sections judged on; not clipped at 0, so that shares add up."""
         before = np.concatenate([gap.section_gap(False) for gap in gaps])
         if not names:
             return 0.0
@@ -196,12 +201,13 @@ class Answer:
         return tuple(f"{name}.{p}" for name in sorted(chosen.names) for p in chosen.fitted.unknown(name))
 
     def _next(self) -> NextExperiment | None:
-        """A program for what these could not tell."""
+        """Return a program for what these could not tell."""
+        chosen = self.found.chosen
         open_questions = [f"{name} from {other}" for name, others in self.found.alike.items() for other in others]
         if open_questions:
             why = f"tells {', '.join(open_questions)}: the same straight line in blocks of 0.2 mm and in one, no corner in either"
             return NextExperiment(why, STAIRS)
-        if any(name.startswith("tool_change_time.") for name in self._not_identifiable()):
+        if any(effect_named(e).excited_by is Excitation.TOOL_CHANGES for e in chosen.names if chosen.fitted.unknown(e)):
             return NextExperiment(
                 "run-ups of the spindle to two speeds tell torque from power; tool changes without them", RUN_UPS
             )
@@ -210,7 +216,7 @@ class Answer:
     def _notes(self, gaps: list[RunGap]) -> tuple[str, ...]:
         notes = []
         model = self.found.chosen.fitted.model
-        if any(trial.references for trial in self.asked.learnt):
+        if any(trial.references for trial in self.trials.learnt):
             notes.append(
                 f"the reference position of Z, which neither the machine nor the programs state, was taken to be "
                 f"{model.reference_mm:.0f} mm above the zero of the work; G28 goes there"
@@ -226,7 +232,7 @@ class Answer:
 
 
 def _seconds_of_knobs(gaps: Sequence[RunGap]) -> float:
-    """What the recorded overrides change in a run, s, by the twin before."""
+    """Return the seconds that the recorded overrides change in a run, by the twin before."""
     apart = []
     for gap in gaps:
         feed, rapid = gap.watched.overrides
@@ -238,7 +244,7 @@ def _seconds_of_knobs(gaps: Sequence[RunGap]) -> float:
 
 
 def _recorder_s(gaps: Sequence[RunGap]) -> float:
-    """What the recorder cannot tell of a section or a window, s."""
+    """Return the seconds of a section or a window that the recorder cannot tell."""
     return _rms(np.array([gap.floor_s for gap in gaps]))
 
 

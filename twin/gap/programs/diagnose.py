@@ -12,9 +12,10 @@ import numpy as np
 
 from twin.case import Case, RunKind
 from twin.effects.catalogue import catalogue
+from twin.effects.effect import Excitation
 from twin.errors import CaseError, RunLogError
 from twin.gap.diagnosis import Diagnosed, NotObservable
-from twin.gap.programs.answer import Answer, Asked
+from twin.gap.programs.answer import Answer, Trials
 from twin.gap.programs.search import search
 from twin.gap.programs.trial import Refused, Trial, trial_of
 from twin.identification.programs.recording import rapid_rate_mm_min
@@ -25,7 +26,7 @@ from twin.motion.path import EventKind, Kind
 from twin.sites import Site
 
 SHORTEST_BLOCK_S = 1.0
-"""Where no cutting block is shorter, no block time can show."""
+"""A block time cannot show where no cutting block is shorter."""
 KNOB = 0.95
 """Long rapids below this part of the stated rate are said to be slow."""
 
@@ -44,17 +45,17 @@ def diagnose_programs(
     Raises CaseError where no run can be compared with its program, naming what is amiss with each.
     """
     progress("time: reading programs and runs")
-    asked = _asked(case)
-    absent = _not_observable(asked)
-    gone = set(asked.already) | {one.effect for one in absent} | without
+    trials = _trials(case)
+    absent = _not_observable(trials)
+    gone = set(trials.already) | {one.effect for one in absent} | without
     candidates = [name for name, effect in catalogue().items() if effect.site is Site.PROGRAM and name not in gone]
     rng = np.random.default_rng(seed)
-    found = search(asked.learnt, asked.judged, asked.stated, asked.already, candidates, rng, progress)
+    found = search(trials.learnt, trials.judged, trials.stated, trials.already, candidates, rng, progress)
     progress("time: where the gap lies")
-    return Answer(asked, found, absent, rng).diagnosed()
+    return Answer(trials, found, absent, rng).diagnosed()
 
 
-def _asked(case: Case) -> Asked:
+def _trials(case: Case) -> Trials:
     """The runs that can be compared, and the limits to start from."""
     read = [trial_of(run, case.machine.settings) for run in case.of(RunKind.PROGRAM)]
     trials = tuple(one for one in read if isinstance(one, Trial))
@@ -74,7 +75,7 @@ def _asked(case: Case) -> Asked:
             f"overrides are not recorded in {len(trials) - told} of {len(trials)} runs: knobs are taken to stand at 100 %"
         )
     stated, said = _stated(case.machine, learnt, trials)
-    return Asked(case.machine, stated, program_effects(case.machine), learnt, judged, (*notes, *said))
+    return Trials(case.machine, stated, program_effects(case.machine), learnt, judged, (*notes, *said))
 
 
 def _stated(machine: MachineFile, learnt: Sequence[Trial], trials: Sequence[Trial]) -> tuple[Limits, tuple[str, ...]]:
@@ -104,13 +105,14 @@ def _knobs(program: Program, trials: Sequence[Trial]) -> tuple[str, ...]:
     return (f"{said}: {', '.join(slow)}",) if slow else ()
 
 
-def _not_observable(asked: Asked) -> tuple[NotObservable, ...]:
+def _not_observable(trials: Trials) -> tuple[NotObservable, ...]:
     """Effects that none of these programs can show."""
-    paths = [trial.recorded.path for trial in (*asked.learnt, *asked.judged)]
-    found = []
+    paths = [trial.recorded.path for trial in (*trials.learnt, *trials.judged)]
+    missing: dict[Excitation, str] = {}
     if not any(event.kind in (EventKind.TOOL_CHANGE, EventKind.SPINDLE) for path in paths for event in path.events):
-        found.append(NotObservable("tool_change_time", "no program changes a tool or starts a spindle"))
+        missing[Excitation.TOOL_CHANGES] = "no program changes a tool or starts a spindle"
     cutting = [60.0 * p.length_mm[p.kind != Kind.RAPID] / p.feed_mm_min[p.kind != Kind.RAPID] for p in paths]
     if not len(np.concatenate(cutting)) or np.concatenate(cutting).min() > SHORTEST_BLOCK_S:
-        found.append(NotObservable("block_overhead", f"no cutting block is shorter than {SHORTEST_BLOCK_S:g} s"))
-    return tuple(found)
+        missing[Excitation.SHORT_BLOCKS] = f"no cutting block is shorter than {SHORTEST_BLOCK_S:g} s"
+    effects = catalogue().values()
+    return tuple(NotObservable(e.name, why) for lacks, why in missing.items() for e in effects if e.excited_by is lacks)

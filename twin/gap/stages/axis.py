@@ -7,16 +7,17 @@ so that where the axis came to rest is not counted twice.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import reduce
 
 import numpy as np
 from numpy.typing import NDArray
 
 from twin.effects.catalogue import catalogue, effect_named
-from twin.effects.effect import Effect, On
+from twin.effects.effect import Effect, Guesses, On, Recorded, called
 from twin.gap.diagnosis import Effected
 from twin.gap.stages.axis_run import OUTPUTS, AxisRunData
 from twin.gap.stages.free import Free, constant
-from twin.gap.stages.observed_through import Sensing, lags_to_try, seen_earlier
+from twin.gap.stages.observed_through import Sensing, Values, seen_late
 from twin.gap.stages.stage import Model, Observed, observed_of
 from twin.identification.axis_parameters import AxisParameter, constants_at
 from twin.identification.batch_fit import time_blocks
@@ -26,14 +27,13 @@ from twin.servo.disturbance import Disturbance
 from twin.servo.kernel import axis_quantities
 from twin.servo.run import AxisInput, AxisRun, run_axes
 from twin.simulator.recorded import start_state
+from twin.sites import Site
 
 Floats = NDArray[np.float64]
 BLOCK_S = 0.5
 COURSES = 2
 """Pairs of courses, each with its opposite."""
 LANES = 32
-UNIT, UNIT_MAX = 1.5, 5e3
-"""Factors from which, and to which, a sensor may be in another unit: the search starts there then."""
 FACTORS = ("mass_kg", "newton_per_command", "coulomb_n", "static_n", "stribeck_velocity_mm_s", "viscous_n_s_per_mm")
 
 
@@ -62,13 +62,13 @@ class AxisStage:
 
     @property
     def name(self) -> str:
-        """What to call it."""
+        """Name in reports."""
         return f"axis {self.letter}"
 
     @property
     def healthy_rms(self) -> float:
-        """Where a cut pushes it, single teeth decide where it creeps to a stop, and the twin has their mean only; where position
-        or torque was not recorded, how it starts from there is not known."""
+        """Higher where a cut pushes the axis, since single teeth decide where it creeps to a stop and the twin has their mean,
+        and where position or torque was not recorded, since its start is not known then."""
         blind = not {"pos_mm", "torque_a"} <= set(self.outputs)
         return 2.0 if blind or any(run.disturbance_n is not None and run.disturbance_n.any() for run in self.runs) else 1.3
 
@@ -96,24 +96,24 @@ class AxisStage:
                 found += [Effected(effect.name, self.letter)] if shown and known else []
             elif effect.on is On.SIGNAL:
                 found += [Effected(effect.name, f"{self.letter}_{output}") for output in self.outputs]
-            elif effect.name == "clock_drift":
+            elif effect.site is Site.CLOCK:
                 found.append(Effected(effect.name))
         return tuple(found)
 
-    def first_guesses(self, candidate: Effected) -> tuple[dict[str, float], ...]:
-        """A limit shows as the largest torque there was."""
-        if candidate.effect == "torque_limit" and "torque_a" in self.outputs:
-            largest = max(float(np.nanmax(np.abs(run.measured["torque_a"]))) for run in self.runs if run.fitted)
-            return tuple({"limit_a": f * largest} for f in (1.0, 0.97, 0.9)) if largest > 0.0 else ()
-        if candidate.effect == "sensor_lag":
-            return lags_to_try(self.period_s)
-        if candidate.effect == "sensor_scale":
-            scale = self._scale(candidate.on.removeprefix(f"{self.letter}_"))
-            return ({"scale": scale},) if abs(scale) < UNIT_MAX and not 1.0 / UNIT < scale < UNIT else ()
-        return ()
+    def first_guesses(self, candidate: Effected) -> Guesses:
+        """Return the effect's own guesses."""
+        output = candidate.on.removeprefix(f"{self.letter}_")
+        recorded = Recorded(self.period_s, self._peak, lambda: self._over_modelled(output))
+        return effect_named(candidate.effect).first_guesses(recorded)
 
-    def _scale(self, output: str) -> float:
-        """What is recorded over what the machine as stated would show, started without the sensor; NaN where it does not say."""
+    def _peak(self, output: str) -> float:
+        """The largest magnitude of an output in the runs that are fitted; 0 where it is not recorded."""
+        if output not in self.outputs:
+            return 0.0
+        return max(float(np.nanmax(np.abs(run.measured[output]))) for run in self.runs if run.fitted)
+
+    def _over_modelled(self, output: str) -> float:
+        """An output as recorded over as the machine as stated shows it, started without its sensor; NaN where it does not say."""
         data = next(run for run in self.runs if run.fitted)
         blind = replace(data, measured={k: v for k, v in data.measured.items() if k not in (output, "pos_mm", "table_mm")})
         shown = self.simulate(Model((), ()), np.zeros((1, 0)), blind)[output][0]
@@ -139,7 +139,7 @@ class AxisStage:
         return observed_of(run.name, parts, run.fitted)
 
     def predict(self, model: Model, theta: Floats, run: int) -> Floats:
-        """What the axis shows at each row of θ, (lanes, n)."""
+        """Return the outputs of the axis at each row of θ, (lanes, n)."""
         data = self.runs[run]
         outputs = self.simulate(model, theta, data)
         values = model.values(theta)
@@ -147,19 +147,22 @@ class AxisStage:
         for output in self.outputs:
             sensing = Sensing.of(values, f"{self.letter}_{output}")
             modelled = sensing.readings(outputs[output], self.period_s)
-            shown.append(modelled + self._growth(values, data) if output == "table_mm" else modelled)
+            shown.append(self._grown(modelled, values, data) if output == "table_mm" else modelled)
         at = {output: i for i, output in enumerate(self.outputs)}
         if "table_mm" in at and "pos_mm" in at:
             shown[at["table_mm"]] = shown[at["table_mm"]] - shown[at["pos_mm"]]
         return np.concatenate(shown, axis=1)
 
-    def _growth(self, values: Mapping[Effected, Mapping[str, Floats]], data: AxisRunData) -> Floats:
-        """What the table grows by with the recorded temperature at each row of θ, (lanes, n); 0 where the model has it not."""
-        grown = values.get(Effected("thermal_growth", self.letter))
-        if grown is None or data.rise_k is None:
-            return np.zeros((1, 1))
-        rise_k = np.concatenate([data.rise_k[stretch] for stretch in data.stretches()])
-        return np.asarray(0.001 * np.atleast_1d(grown["um_per_k"])[:, None] * rise_k[None, :])
+    def _grown(self, table_mm: Floats, values: Values, data: AxisRunData) -> Floats:
+        """The table, (lanes, n), as the effects of the model make it grow with the recorded temperature."""
+        for effected, given in values.items():
+            reading = effect_named(effected.effect).changes.get("reading")
+            if reading is None or effected.on != self.letter or data.rise_k is None:
+                continue
+            rise_k = np.concatenate([data.rise_k[stretch] for stretch in data.stretches()])
+            known = {name: np.atleast_1d(value)[:, None] for name, value in given.items()} | {"temperature_rise_k": rise_k}
+            table_mm = np.asarray(called(reading, known, table_mm))
+        return table_mm
 
     def simulate(self, model: Model, theta: Floats, data: AxisRunData) -> dict[str, Floats]:
         """The outputs over the stretches one after another, each (lanes, n): before sensors, on the recording's clock."""
@@ -169,17 +172,24 @@ class AxisStage:
         courses = self._courses(len(data.t_s))
         parts: dict[str, list[Floats]] = {output: [] for output in self.outputs}
         carried: dict[str, Floats] = {}
-        own = () if "torque_a" in data.measured else ("integral_a",)  # what nobody has measured goes on as the twin left it
+        kept = {f"{effect.name}__{state}" for effect in axis_effects() for state in effect.carried}
+        if "torque_a" not in data.measured:  # an integral that was not measured goes on as the twin left it
+            kept.add("integral_a")
         for stretch in data.stretches():
             start = self._start(values, constants, data, stretch, lanes) | carried
-            reference = _late(data.reference_mm[stretch], data, values, self.letter, lanes)
+            reference = self._seen_reference(values, data, stretch, lanes)
             run, many = self._run(constants, reference, data, courses, stretch, start)
             for output in self.outputs:
                 whole = run.outputs[OUTPUTS[output]]
                 mean = whole.reshape(-1, many, whole.shape[1]).mean(axis=1)[:lanes]
-                parts[output].append(seen_earlier(mean, data.t_s[stretch], values))
-            carried = {k: v.reshape(-1, many)[:lanes, 0] for k, v in run.state.items() if k in own or k.startswith("backlash__")}
+                parts[output].append(_stamped(mean, data.t_s[stretch], values))
+            carried = {k: v.reshape(-1, many)[:lanes, 0] for k, v in run.state.items() if k in kept}
         return {output: np.concatenate(p, axis=1) for output, p in parts.items()}
+
+    def _seen_reference(self, values: Values, data: AxisRunData, stretch: slice, lanes: int) -> Floats:
+        """The reference that the loop sees: (n,), or (lanes, n) where it sees it late."""
+        period_s = float(data.t_s[1] - data.t_s[0])
+        return seen_late(data.reference_mm[stretch], data.t_s[stretch], period_s, values, Site.REFERENCE, self.letter, lanes)
 
     def _run(
         self,
@@ -237,7 +247,7 @@ class AxisStage:
 
     def _start(
         self,
-        values: Mapping[Effected, Mapping[str, Floats]],
+        values: Values,
         constants: Mapping[str, Floats],
         data: AxisRunData,
         where: slice,
@@ -249,17 +259,16 @@ class AxisStage:
         torque = data.measured["torque_a"][where] if "torque_a" in data.measured else np.zeros(len(reference))
         read = start_state(self.axis, reference, position, torque, self.period_s)
         state = {k: np.full(lanes, v) for k, v in read.items()} | self._start_of_loops(values, read, float(reference[0]), lanes)
+        load = _at_rest("load_n", constants, {}, lanes)
         if "torque_a" not in data.measured and self.axis.velocity_integral_gain_a_per_mm > 0.0:
-            state["integral_a"] = constants.get("gravity__force_n", np.zeros(lanes)) / constants["newton_per_command"]
-        held = constants["newton_per_command"] * state["integral_a"] - constants.get("gravity__force_n", 0.0)
+            state["integral_a"] = load / constants["newton_per_command"]
+        held = constants["newton_per_command"] * state["integral_a"] - load
         static = np.where(held > 0.0, constants["static_plus_n"], constants["static_minus_n"])
         held = np.clip(held, -static, static)
-        state["bristle_mm"] = held / constants["presliding__stiffness_n_per_mm"]
+        state["bristle_mm"] = _at_rest("bristle_mm", constants, {"held_n": held}, lanes)
         return state
 
-    def _start_of_loops(
-        self, values: Mapping[Effected, Mapping[str, Floats]], read: Mapping[str, float], reference_mm: float, lanes: int
-    ) -> dict[str, Floats]:
+    def _start_of_loops(self, values: Values, read: Mapping[str, float], reference_mm: float, lanes: int) -> dict[str, Floats]:
         """Position and integrals of the loops whose position and torque the sensors of each lane read as `read`."""
         position = Sensing.of(values, f"{self.letter}_pos_mm").value(np.full(lanes, read["position_mm"]))
         integral = np.full(lanes, read["integral_a"])
@@ -277,16 +286,21 @@ class AxisStage:
         return np.concatenate([half, -half])
 
 
-def _late(
-    reference: Floats, data: AxisRunData, values: Mapping[Effected, Mapping[str, Floats]], letter: str, lanes: int
-) -> Floats:
-    """The reference that the loop sees: (n,), or (lanes, n) where it sees it late."""
-    delay = values.get(Effected("command_delay", letter), {}).get("delay_s")
-    if delay is None or not delay.any():
-        return reference
-    ticks = np.arange(len(reference))
-    period_s = float(data.t_s[1] - data.t_s[0])
-    return np.stack([np.interp(ticks - d / period_s, ticks, reference) for d in np.broadcast_to(delay, (lanes,))])
+def _stamped(shown: Floats, t_s: Floats, values: Values) -> Floats:
+    """The outputs, (lanes, n), as the clock of the feedback stamps them."""
+    if len(t_s) < 2:
+        return shown
+    return seen_late(shown, t_s, float(t_s[1] - t_s[0]), values, Site.CLOCK, "", len(shown))
+
+
+def _at_rest(start: str, constants: Mapping[str, Floats], known: Mapping[str, Floats], lanes: int) -> Floats:
+    """The start of a stretch as the effects of the axis make it together, (lanes,)."""
+    parts = []
+    for effect in axis_effects():
+        if function := effect.at_rest.get(start):
+            own = {p.name: constants[f"{effect.name}__{p.name}"] for p in effect.parameters}
+            parts.append(np.asarray(called(function, {**known, **own})))
+    return reduce(np.add, parts) if parts else np.zeros(lanes)
 
 
 def standing_of(machine: MachineFile, letter: str) -> tuple[tuple[str, Mapping[str, float]], ...]:

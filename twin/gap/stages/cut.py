@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from twin.case import Run
-from twin.effects.catalogue import catalogue
-from twin.effects.effect import Effect, On
+from twin.effects.catalogue import catalogue, effect_named
+from twin.effects.effect import Effect, Guesses, On, Recorded
 from twin.gap.diagnosis import Effected
 from twin.gap.floors import Floors
 from twin.gap.labels import regime_labels
 from twin.gap.stages.free import Free, constant
-from twin.gap.stages.observed_through import Sensing, lags_to_try
+from twin.gap.stages.observed_through import Sensing
 from twin.gap.stages.stage import Model, Observed, observed_of
 from twin.identification.batch_fit import time_blocks
 from twin.machine import MachineFile
@@ -94,11 +94,9 @@ class CutStage:
                 found += [Effected(effect.name, signal) for signal in sorted(signals)]
         return tuple(dict.fromkeys(found))
 
-    def first_guesses(self, candidate: Effected) -> tuple[dict[str, float], ...]:
-        """A meter that holds its peaks is not linear in how long; nor is a slow one."""
-        if candidate.effect == "sensor_lag":
-            return lags_to_try(self.machine.machine.servo_period_s)
-        return tuple({"hold_s": s} for s in (0.15, 0.5, 1.5)) if candidate.effect == "load_peak_hold" else ()
+    def first_guesses(self, candidate: Effected) -> Guesses:
+        """Return the effect's own guesses."""
+        return effect_named(candidate.effect).first_guesses(Recorded(self.machine.machine.servo_period_s))
 
     def _observed(self, run: CutRun) -> Observed:
         log, parts = run.log, []
@@ -116,7 +114,7 @@ class CutStage:
         return observed_of(run.name, parts, run.fitted)
 
     def _compared(self, milling: Milling) -> NDArray[np.bool_]:
-        """Where the tool cuts, but not where a tooth enters or leaves just then: who is a hair early decides there."""
+        """Return True where the tool cuts, but no tooth enters or leaves just then: who is a hair early decides there."""
         assert self.machine.tool is not None
         cutting = np.nan_to_num(milling.axial_depth_mm) > 0.0
         return np.asarray(cutting & ~at_a_jump(milling, self.machine.tool.teeth, 2e-4)[0])

@@ -1,4 +1,4 @@
-"""How large and how slow the disturbance of a machine is, from how far its repeated runs differ.
+"""The size and slowness of a machine's disturbance, from how far its repeated runs differ.
 
 For each candidate (σ, τ) the axes are simulated over many courses; the spread that they have in each regime is compared with what
 the repeated runs differ by there, as a Gaussian log-likelihood over the cells. Differences of repeated runs know nothing of the
@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.gap.floors import Floors
+from twin.gap.labels import regimes_of
 from twin.gap.stages.axis import LANES, axis_effects
 from twin.gap.stages.axis_run import AxisRunData
-from twin.gap.table import regimes_of
 from twin.machine import MachineFile
 from twin.runlog import RunLog
 from twin.servo.constants import axis_constants

@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from twin.case import Run
-from twin.effects.catalogue import catalogue
-from twin.effects.effect import Effect, On
+from twin.effects.catalogue import catalogue, effect_named
+from twin.effects.effect import Effect, Excitation, Guesses, On, Recorded
 from twin.gap.diagnosis import Effected
 from twin.gap.floors import Floors
 from twin.gap.labels import regime_labels
 from twin.gap.stages.cut import acting
 from twin.gap.stages.free import Free, constant
-from twin.gap.stages.observed_through import Sensing, lags_to_try
+from twin.gap.stages.observed_through import Sensing
 from twin.gap.stages.stage import Model, Observed, observed_of
 from twin.heat.run import Warming, spindle_temperature_c, thermal_constants, thermal_quantities
 from twin.identification.batch_fit import time_blocks
@@ -58,7 +58,7 @@ class HeatStage:
 
     @cached_property
     def effects(self) -> tuple[Effect, ...]:
-        """Those of the heat."""
+        """Effects that act on the heat."""
         return acting(thermal_quantities())
 
     @cached_property
@@ -78,22 +78,19 @@ class HeatStage:
 
     @property
     def candidates(self) -> tuple[Effected, ...]:
-        """Effects that the temperature can show; coolant only where it was switched."""
+        """Return the effects that the temperature can show; those of the coolant only where it was switched."""
+        switched = any(len(set(np.nan_to_num(np.asarray(r.warming.coolant_on)).tolist())) > 1 for r in self.runs if r.fitted)
         found = []
         for effect in self.effects:
-            switched = any(len(set(np.nan_to_num(np.asarray(r.warming.coolant_on)).tolist())) > 1 for r in self.runs if r.fitted)
-            if effect.name not in self.left_out | set(self.standing) and (effect.name != "coolant_cooling" or switched):
+            excited = effect.excited_by is not Excitation.COOLANT_SWITCHED or switched
+            if effect.name not in self.left_out | set(self.standing) and excited:
                 found.append(Effected(effect.name))
         sensors = [e for e in catalogue().values() if e.on is On.SIGNAL and e.name not in self.left_out]
         return tuple(found + [Effected(e.name, SIGNAL) for e in sensors])
 
-    def first_guesses(self, candidate: Effected) -> tuple[dict[str, float], ...]:
-        """A second mass is not linear in its size, nor a slow sensor in its time."""
-        if candidate.effect == "sensor_lag":
-            return lags_to_try(float(np.median(np.diff(self.runs[0].log.t_s))))
-        if candidate.effect == "second_thermal_mass":
-            return tuple({"conductance_w_per_k": g, "capacity_j_per_k": c} for g in (1.5, 5.0) for c in (1.5e4, 6e4))
-        return ()
+    def first_guesses(self, candidate: Effected) -> Guesses:
+        """Return the effect's own guesses."""
+        return effect_named(candidate.effect).first_guesses(Recorded(float(np.median(np.diff(self.runs[0].log.t_s)))))
 
     def _observed(self, run: HeatRun) -> Observed:
         floor = self.floors.of(run.log, SIGNAL)

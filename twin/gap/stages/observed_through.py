@@ -1,4 +1,4 @@
-"""What sensors and clocks make of a signal in many candidate machines at once: `twin.sensor`, lane by lane."""
+"""Sensors and clocks in many candidate machines at once: `twin.sensor`, lane by lane."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -6,16 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from twin.effects.catalogue import effect_named
+from twin.effects.effect import On, called
 from twin.gap.diagnosis import Effected
 from twin.sensor.reading import readings
+from twin.sites import Site
 
 Floats = NDArray[np.float64]
 Values = Mapping[Effected, Mapping[str, Floats]]
-
-
-def lags_to_try(period_s: float) -> tuple[dict[str, float], ...]:
-    """Time constants of a slow sensor to start from: what one of 50 periods does says little of one of a half."""
-    return tuple({"time_constant_s": n * period_s} for n in (0.5, 2.0, 8.0, 40.0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,10 +25,10 @@ class Sensing:
     @staticmethod
     def of(values: Values, signal: str) -> "Sensing":
         """The sensor of `signal` among the effects of a model."""
-        return Sensing({e.effect: v for e, v in values.items() if e.on == signal and e.effect.startswith("sensor_")})
+        return Sensing({e.effect: v for e, v in values.items() if e.on == signal and effect_named(e.effect).on is On.SIGNAL})
 
     def readings(self, values: Floats, period_s: float) -> Floats:
-        """What is read of (lanes, n)."""
+        """Return the readings of values, (lanes, n)."""
         if not self.effects:
             return values
         since = np.full(values.shape[1], period_s)
@@ -42,22 +40,26 @@ class Sensing:
         return np.stack(rows)
 
     def value(self, reading: Floats) -> Floats:
-        """What is where the sensor at rest reads (lanes,): scale and bias undone."""
-        scale = self.effects.get("sensor_scale", {}).get("scale", np.ones(1))
-        bias = self.effects.get("sensor_bias", {}).get("bias", np.zeros(1))
-        return np.asarray((reading - bias) / np.where(np.abs(scale) > 1e-9, scale, 1.0))
+        """Return the values at which the sensor at rest reads these, (lanes,)."""
+        for name in sorted(self.effects):
+            if undo := effect_named(name).undo:
+                reading = np.asarray(called(undo, self.effects[name], reading))
+        return reading
 
 
-def seen_earlier(values: Floats, t_s: Floats, effects: Values) -> Floats:
-    """(lanes, n) as another clock stamps them, where the model has one."""
-    clock = effects.get(Effected("clock_drift"))
-    if clock is None or len(t_s) < 2:
-        return values
-    period_s = float(t_s[1] - t_s[0])
+def seen_late(series: Floats, t_s: Floats, period_s: float, values: Values, site: Site, on: str, lanes: int) -> Floats:
+    """A series, (n,) or (lanes, n), as it is seen late by the effects of a model at a site; as it is where none makes it late."""
+    here = [(effect_named(e.effect), given) for e, given in values.items() if e.on == on]
+    acting = [(effect.late_s, given) for effect, given in here if effect.late_s is not None and effect.site is site]
+    if not acting:
+        return series
+    late_s = np.zeros((lanes, len(t_s)))
+    for late, given in acting:
+        for lane in range(lanes):
+            own = {name: float(value[min(lane, len(value) - 1)]) for name, value in given.items()}
+            late_s[lane] += called(late, own | {"time_s": t_s})
+    if not late_s.any():
+        return series
     ticks = np.arange(len(t_s))
-    rows = []
-    for lane in range(len(values)):
-        ppm, offset = (float(clock[k][min(lane, len(clock[k]) - 1)]) for k in ("ppm", "offset_s"))
-        late = (offset + 1e-6 * ppm * t_s) / period_s
-        rows.append(np.interp(ticks - late, ticks, values[lane]))
-    return np.stack(rows)
+    rows = np.broadcast_to(series, (lanes, len(t_s)))
+    return np.stack([np.interp(ticks - own_s / period_s, ticks, row) for own_s, row in zip(late_s, rows, strict=True)])

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.case import Case, Run, RunKind
+from twin.effects.catalogue import effect_named
 from twin.gap.diagnosis import Effected, Verdict
 from twin.gap.floors import Floors, repeatability
 from twin.gap.null import NULL, Null
@@ -21,18 +22,19 @@ from twin.gap.verdict import judged
 from twin.machine import MachineFile
 from twin.runlog import RunLog
 from twin.servo.disturbance import Disturbance
+from twin.sites import Site
 
 Floats = NDArray[np.float64]
 Progress = Callable[[str], None]
 SideBySide = Callable[[Callable[[Stage], Explained], Iterable[Stage]], Iterable[Explained]]
 """As `map`."""
-CLOCK = Effected("clock_drift")
-MANY = 2
+AXES_TO_COMPARE = 2
+"""Axes from which on a clock that all share can be told from a delay of one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ground:
-    """What all stages of a case stand on. machine: with the disturbance in its [noise]"""
+    """The ground that all stages of a case stand on. machine: with the disturbance in its [noise]"""
 
     machine: MachineFile
     runs: tuple[Run, ...]
@@ -86,17 +88,22 @@ def with_one_clock(found: list[Explained], progress: Progress, null: Null) -> li
     Where all do, a delay of the command that each of them could have instead would be a coincidence.
     """
     axes = [e for e in found if isinstance(e.stage, AxisStage)]
-    showing = [e for e in axes if CLOCK in e.best.effects]
-    if len(axes) < MANY or len(showing) == len(axes):
+    showing = [e for e in axes if any(_is_clock(effected) for effected in e.best.effects)]
+    if len(axes) < AXES_TO_COMPARE or len(showing) == len(axes):
         return found
     settled = []
     for first in found:
         stage, answer = first.stage, first
         if first in showing and isinstance(stage, AxisStage):
-            answer = explain(replace(stage, left_out=stage.left_out | {CLOCK.effect}), null=null, progress=progress)
-        rivals = {e: tuple(r for r in others if r != CLOCK) for e, others in answer.rivals.items()}
+            clocks = {effected.effect for effected in stage.candidates if _is_clock(effected)}
+            answer = explain(replace(stage, left_out=stage.left_out | clocks), null=null, progress=progress)
+        rivals = {e: tuple(r for r in others if not _is_clock(r)) for e, others in answer.rivals.items()}
         settled.append(replace(answer, rivals=rivals))
     return settled
+
+
+def _is_clock(effected: Effected) -> bool:
+    return effect_named(effected.effect).site is Site.CLOCK
 
 
 def axis_stage(ground: Ground, letter: str, forces: dict[str, dict[str, Floats]]) -> AxisStage | None:

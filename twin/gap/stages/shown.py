@@ -1,4 +1,4 @@
-"""What a twin shows beside a recorded run, for judging it: the stages of the search, with the machine as it is and nothing free.
+"""A twin beside a recorded run, for judging it: the stages of the search, with the machine as it is and nothing free.
 
 Each stretch of an axis' motion starts from what was measured before it: while an axis sticks, its integrator creeps on an error
 below the sensor's resolution, so the torque of a long rest is chance, and where there is no motion nothing is compared (NaN).
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from twin.case import Run
 from twin.effects.catalogue import effect_named
+from twin.effects.effect import On
 from twin.gap.diagnosis import Effected
 from twin.gap.floors import Floors
 from twin.gap.stages.axis import AxisStage, standing_of
@@ -21,6 +22,7 @@ from twin.gap.stages.heat import HeatStage, heat_runs
 from twin.gap.stages.stage import Model
 from twin.machine import MachineFile
 from twin.simulator.response import check_effects, disturbance_of
+from twin.sites import Site
 
 Floats = NDArray[np.float64]
 PAIRS = 16
@@ -83,15 +85,16 @@ def _sensing(
     """The effects between what is and what is recorded, as a model with nothing free, and its θ, (1, p)."""
     effects, theta = [], list[float]()
     for added in machine.effects:
-        sensor = added.effect.startswith("sensor_") and is_seen(added.on)
-        timing = bool(letter) and (added.effect == "clock_drift" or (added.on == letter and added.effect not in fixed))
+        effect = effect_named(added.effect)
+        sensor = effect.on is On.SIGNAL and is_seen(added.on)
+        timing = bool(letter) and (effect.site is Site.CLOCK or (added.on == letter and added.effect not in fixed))
         if sensor or timing:
             effects.append(Effected(added.effect, added.on))
-            values = effect_named(added.effect).checked(added.parameters)
-            theta += [p.theta_of(values[p.name.partition("__")[2]]) for p in effect_parameters(effect_named(added.effect))]
+            values = effect.checked(added.parameters)
+            theta += [p.theta_of(values[p.name.partition("__")[2]]) for p in effect_parameters(effect)]
     return Model((), tuple(effects)), np.array([theta])
 
 
 def shown_by_run(machine: MachineFile, runs: tuple[Run, ...], floors: Floors) -> Mapping[str, Mapping[str, Floats]]:
-    """run → what the twin shows in it."""
+    """Return run → what the twin shows in it."""
     return {run.name: shown(machine, run, floors) for run in runs}

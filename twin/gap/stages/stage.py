@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.effects.catalogue import effect_named
+from twin.effects.effect import Guesses
 from twin.gap.diagnosis import Effected
 from twin.gap.stages.free import Free, effect_parameters
 
@@ -22,7 +23,7 @@ Regimes = NDArray[np.int8]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Observed:
-    """What a stage shows in one run, its signals one after another.
+    """The recording of one run that a stage is compared with, its signals one after another.
 
     measured: (n,), NaN where there is no sample; floor: (n,) what repeated runs differ by; sigma: (n,) of what is compared, less
     than the floor where repeated runs were averaged; signal: (n,) index into `signals`; block: (n,) number of the time block
@@ -45,11 +46,11 @@ class Stage(Protocol):
 
     @property
     def name(self) -> str:
-        """What to call it."""
+        """Name in reports."""
 
     @property
     def observed(self) -> tuple[Observed, ...]:
-        """What is compared, run by run."""
+        """The recordings to compare with, run by run."""
 
     @property
     def averaged(self) -> int:
@@ -57,7 +58,7 @@ class Stage(Protocol):
 
     @property
     def healthy_rms(self) -> float:
-        """What a healthy machine's twin leaves of a signal at worst, in floors."""
+        """The most that a healthy machine's twin leaves of a signal, in floors."""
 
     @property
     def constants(self) -> tuple[Free, ...]:
@@ -68,9 +69,9 @@ class Stage(Protocol):
         """The effects that what is observed here can show."""
 
     def predict(self, model: "Model", theta: Floats, run: int) -> Floats:
-        """What the machine at each row of θ, (lanes, p), shows in run number `run`, (lanes, n)."""
+        """Return the signals of the machine at each row of θ, (lanes, p), in run number `run`, (lanes, n)."""
 
-    def first_guesses(self, candidate: Effected) -> tuple[dict[str, float], ...]:
+    def first_guesses(self, candidate: Effected) -> Guesses:
         """Sets of values to start an effect's parameters from, where the recordings suggest them."""
 
 
@@ -87,7 +88,7 @@ class Model:
         return self.constants + tuple(p for e in self.effects for p in effect_parameters(effect_named(e.effect)))
 
     def places(self) -> tuple[tuple[Effected, slice], ...]:
-        """Where in θ the parameters of each effect are."""
+        """Return the places of each effect's parameters in θ."""
         at, places = len(self.constants), []
         for effected in self.effects:
             count = len(effect_named(effected.effect).parameters)

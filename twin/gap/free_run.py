@@ -1,4 +1,10 @@
-"""How far a twin is from a recording, signal by signal and regime by regime, beside what repeated runs differ by."""
+"""The gap of a twin that runs freely over a recording, by run, signal and regime, beside what repeated runs differ by.
+
+The twin is told what the machine was told and never put back to what was measured, so this is how far a simulation of the whole
+run ends up from it, and where an axis comes to rest counts. `twin.gap.score` is the other gap: there the twin starts each stretch
+of motion from what was measured, and only what it does within the stretch counts. Both look at the same signals, in the same
+regimes (`twin.gap.labels`), over the same repeatability (`twin.gap.floors`).
+"""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -7,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.case import Run
-from twin.gap.labels import regime_labels
+from twin.gap.floors import repeatability
+from twin.gap.labels import measured_signals, regimes_of
 from twin.machine import MachineFile
-from twin.runlog import AXIS_COLUMN, RunLog
 from twin.simulator.recorded import noise_of, told_of
 from twin.simulator.response import respond
 
@@ -39,22 +45,9 @@ class GapRow:
         return self.gap / self.repeatability if self.repeatability else None
 
 
-def measured_signals(log: RunLog) -> tuple[str, ...]:
-    """Columns that a machine answers with, where the run has samples of them."""
-    names = [c for c in log.columns if (m := AXIS_COLUMN.match(c)) and m[2] != "ref_mm"]
-    names += ["force_x_n", "force_y_n", "spindle_load_pct", "spindle_temp_c"]
-    return tuple(name for name in names if log.has(name))
-
-
-def regimes_of(log: RunLog, signal: str, machine: MachineFile) -> tuple[tuple[str, NDArray[np.bool_]], ...]:
-    """Regimes in which a signal is looked at (`twin.gap.labels`), each with its samples (n,)."""
-    names, label = regime_labels(log, signal, machine)
-    return tuple((name, label == number) for number, name in enumerate(names))
-
-
-def gap_table(machine: MachineFile, runs: Iterable[Run], repeats: Iterable[tuple[Run, Run]]) -> tuple[GapRow, ...]:
-    """The gap of `machine` on each run, by signal and regime; repeatability from the repeated runs, pooled over all of them."""
-    floors = _floors(machine, repeats)
+def free_run_gap(machine: MachineFile, runs: Iterable[Run], repeats: Iterable[tuple[Run, Run]]) -> tuple[GapRow, ...]:
+    """Return the gap of `machine` on each run, by signal and regime; repeatability is pooled over all repeated runs."""
+    floors = repeatability((), repeats, machine).repeated
     rows = []
     for run in runs:
         log = run.log
@@ -72,20 +65,3 @@ def gap_table(machine: MachineFile, runs: Iterable[Run], repeats: Iterable[tuple
                     expected = float(np.sqrt(noise_of(machine, log, signal) ** 2 + np.mean(spread**2)))
                     rows.append(GapRow(run.name, signal, regime, int(there.sum()), gap, floors.get((signal, regime)), expected))
     return tuple(rows)
-
-
-def _floors(machine: MachineFile, repeats: Iterable[tuple[Run, Run]]) -> dict[tuple[str, str], float]:
-    """(signal, regime) → repeatability."""
-    squares: dict[tuple[str, str], list[Floats]] = {}
-    for one, other in repeats:
-        if len(one.log) != len(other.log):
-            continue
-        for signal in measured_signals(one.log):
-            if not other.log.has(signal):
-                continue
-            difference = one.log[signal] - other.log[signal]
-            for regime, here in regimes_of(one.log, signal, machine):
-                kept = difference[here & np.isfinite(difference)]
-                if len(kept):
-                    squares.setdefault((signal, regime), []).append(kept**2 / 2.0)
-    return {key: float(np.sqrt(np.mean(np.concatenate(parts)))) for key, parts in squares.items()}
