@@ -102,3 +102,12 @@ def state_topic(host_id: str) -> str:
     'spBv1.0/STATE/scada'
     """
     return f"{NAMESPACE}/STATE/{check_id(host_id, 'host id')}"
+
+
+def group_filter(group: str) -> str:
+    """The filter that hears all messages of a group's edge nodes.
+
+    >>> group_filter("cnc")
+    'spBv1.0/cnc/#'
+    """
+    return f"{NAMESPACE}/{group}/#"

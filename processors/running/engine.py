@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from operator import itemgetter
 
 from processors.config import ALL, CellConfig, Configuration, ProcessorConfig
-from processors.contract import TWIN_NODE_PREFIX, CellProcessor
+from processors.contract import CellProcessor
 from processors.discovery import AnyProcessor
 from processors.effects import Declare, Effect, PublishPlain, Remove
 from processors.errors import SnapshotError
@@ -22,6 +22,7 @@ from processors.running.snapshot import SnapshotCodec
 from processors.sample import Sample, SampleKind
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId, Reading
+from twin.vocabulary.nodes import TWIN_NODE_PREFIX
 
 MACHINES_MAX = 1000
 SIGNALS_MAX = 5000
