@@ -11,6 +11,7 @@ from cnctwin.commands.moment import moment_ms
 from cnctwin.errors import UsageError
 from cnctwin.processes.given_broker import address
 from edge.state_dir import state_dir
+from twin.vocabulary.nodes import VALIDATION_NODE
 
 DAY_MS = 86_400_000
 TIME = "UTC, as 2026-11-21T06:00 or ms since 1970"
@@ -58,5 +59,5 @@ def validate(
     if not console.is_terminal:
         console.width = 120
     where = None if broker is None else address(broker)
-    session_file = None if where is None else state_dir() / "twin-validation.json"
+    session_file = None if where is None else state_dir() / f"{VALIDATION_NODE}.json"
     raise typer.Exit(command.validate(asked, where, session_file, as_json=as_json, console=console))

@@ -3,12 +3,12 @@
 from dataclasses import dataclass
 from typing import Protocol
 
-from cnctwin.jobs.announcer import NODE as JOBS_NODE
 from sparkplug.metric import NodeId, Reading
 from sparkplug.node_picture import NodePicture
 from sparkplug.quality import Quality
+from twin.vocabulary.nodes import JOBS_NODE, TWIN_NODE_PREFIX
+from twin.vocabulary.twin_signals import TWIN_PREFIX
 
-TWIN_PREFIX = "twin/"
 _LEDGER = "ledger/"
 _REASON = "ledger/dropped/"
 
@@ -93,7 +93,7 @@ def ledgers(pictures: Pictures) -> list[StageLedger]:
                 reasons={name.removeprefix(_REASON): n for name, n in counts.items() if name.startswith(_REASON) and n},
             )
         )
-    return sorted(found, key=lambda ledger: (ledger.node.startswith("twin-"), ledger.node))
+    return sorted(found, key=lambda ledger: (ledger.node.startswith(TWIN_NODE_PREFIX), ledger.node))
 
 
 def health(pictures: Pictures) -> dict[str, dict[str, Reading]]:

@@ -14,12 +14,11 @@ from cnctwin.api.residual import models_part
 from cnctwin.api.sources import Sources
 from cnctwin.commands.alerts import FRESH_S_MAX
 from cnctwin.errors import ProgramError
-from cnctwin.jobs.announcer import NODE as JOBS_NODE
 from cnctwin.jobs.client import FRESH_S_MAX as JOBS_FRESH_S_MAX
 from cnctwin.page import WEB
 from cnctwin.plant.doctor import COME_AND_GO
-from processors.contract import TWIN_NODE_PREFIX
 from sparkplug.connection import now_ms
+from twin.vocabulary.nodes import JOBS_NODE, TWIN_NODE_PREFIX
 
 
 def health_routes(sources: Sources) -> APIRouter:

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from cnctwin.memory.store.contract import Message, Store
-from processors.contract import TWIN_NODE_PREFIX
 from sparkplug.host_session import EventKind, HostEvent
+from twin.vocabulary.nodes import TWIN_NODE_PREFIX
 
-HISTORIAN = f"{TWIN_NODE_PREFIX}historian"
 NODE_OFFLINE = "edge node offline"
 """The detail of a device's death that came with its edge node's: of a processor that was killed, stopped or cut off."""
 NOTHING_YET = (

@@ -13,10 +13,10 @@ from cnctwin.memory.replay.rerun import Rerun
 from cnctwin.memory.replay.result import Difference, ProcessorReplayed, Replayed, ReplayRefusedError
 from cnctwin.memory.store.contract import Series, Store
 from processors.config import CellConfig, Configuration, ProcessorConfig
-from processors.contract import TWIN_NODE_PREFIX
 from processors.discovery import AnyProcessor, find
 from processors.errors import UnknownProcessorError
 from sparkplug.host_session import HostEvent
+from twin.vocabulary.nodes import TWIN_NODE_PREFIX
 
 WARM_UP_MS = 1_800_000
 NOT_COMPARED = frozenset({"historian", "mirror"})  # what they give is no metric, or is of the store itself
