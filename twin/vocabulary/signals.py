@@ -93,7 +93,7 @@ SIGNALS = {entry.name: entry for entry in _TABLE}
 DERIVED = ("tool_change_active", "tool_change_source", "tool_change_evidence")
 
 # An axis is a letter, with a digit where a control has several of one letter (Z and Z4 on a lathe with two carriages).
-_AXES = (
+AXES = (
     (re.compile(r"axis_[a-z]\d{0,2}_pos_mm"), _number("", "mm", -200_000, 200_000, "position of a linear axis")),
     (re.compile(r"axis_[a-z]\d{0,2}_pos_deg"), _number("", "deg", -1e9, 1e9, "position of a rotary axis")),
     (re.compile(r"axis_[a-z]\d{0,2}_load_pct"), _number("", "%", -500, 500, "load of an axis drive, of its rated load")),
@@ -105,4 +105,4 @@ def canonical(name: str) -> Signal | None:
     known = SIGNALS.get(name)
     if known is not None:
         return known
-    return next((replace(entry, name=name) for pattern, entry in _AXES if pattern.fullmatch(name)), None)
+    return next((replace(entry, name=name) for pattern, entry in AXES if pattern.fullmatch(name)), None)
