@@ -17,11 +17,12 @@ from processors.contract import Output, OutputSpec, Processor, Provenance, Sampl
 from processors.sample import why_unknown
 from sparkplug.datatype import DataType
 from twin.vocabulary import twin_signals
+from twin.vocabulary.signals import VIBRATION_BLOCK_G, VIBRATION_SAMPLE_RATE_HZ
 
 if TYPE_CHECKING:  # numpy is loaded with the first block
     from twin.vibration import Floats, Tally
 
-BLOCK, RATE = "vibration_block_g", "vibration_sample_rate_hz"
+BLOCK, RATE = VIBRATION_BLOCK_G, VIBRATION_SAMPLE_RATE_HZ
 RMS, VELOCITY, PEAK = twin_signals.VIBRATION_RMS_G, twin_signals.VIBRATION_VELOCITY_MM_S, "twin/vibration_peak_g"
 CREST, KURTOSIS = twin_signals.VIBRATION_CREST_FACTOR, twin_signals.VIBRATION_KURTOSIS
 NAMES = (RMS, VELOCITY, PEAK, CREST, KURTOSIS)

@@ -91,6 +91,8 @@ _TABLE = (
 )
 SIGNALS = {entry.name: entry for entry in _TABLE}
 DERIVED = ("tool_change_active", "tool_change_source", "tool_change_evidence")
+# Beside the canonical signals: raw samples of an accelerometer, an array, which the processor `vibration` reads.
+VIBRATION_BLOCK_G, VIBRATION_SAMPLE_RATE_HZ = "vibration_block_g", "vibration_sample_rate_hz"
 
 # An axis is a letter, with a digit where a control has several of one letter (Z and Z4 on a lathe with two carriages).
 AXES = (

@@ -14,9 +14,9 @@ from cnctwin.memory.store.contract import Status
 from sparkplug.metric import Reading
 from sparkplug.quality import Quality
 from twin.vocabulary import twin_signals
+from twin.vocabulary.node_ledger import DROPPED_PREFIX, LEDGER_PREFIX
 from twin.vocabulary.nodes import TWIN_NODE_PREFIX
 
-_LEDGER, _REASON = "ledger/", "ledger/dropped/"
 PHASES = ("pending", "firing", "acknowledged", "resolved")
 NODE_GAUGES = {
     "twin_processor_lag_seconds": ("health/lag_s", "age of the last message when it was taken"),
@@ -157,7 +157,7 @@ def _nodes(nodes: Iterable[NodeView]) -> Iterator[Metric]:
         online.add_metric([node], float(is_online))
         if (gaps := _count(values.get("health/holes"))) is not None:
             holes.add_metric(["sparkplug" if node.startswith(TWIN_NODE_PREFIX) else "mtconnect", node], gaps)
-        sums = {name: _count(values.get(f"{_LEDGER}{name}")) for name in ("received", "emitted", "buffered", "dropped")}
+        sums = {name: _count(values.get(f"{LEDGER_PREFIX}{name}")) for name in ("received", "emitted", "buffered", "dropped")}
         if sums["received"] is None:
             continue
         for name, family in ledger.items():
@@ -165,8 +165,8 @@ def _nodes(nodes: Iterable[NodeView]) -> Iterator[Metric]:
         depth.add_metric([node], sums["buffered"] or 0.0)
         difference.add_metric([node], sums["received"] - sum(sums[name] or 0.0 for name in ("emitted", "buffered", "dropped")))
         for name, value in values.items():
-            if name.startswith(_REASON) and (count := _count(value)) is not None:
-                dropped.add_metric([node, name.removeprefix(_REASON)], count)
+            if name.startswith(DROPPED_PREFIX) and (count := _count(value)) is not None:
+                dropped.add_metric([node, name.removeprefix(DROPPED_PREFIX)], count)
     yield from (online, *ledger.values(), depth, difference, dropped, holes)
     yield from _by_table(told, NODE_GAUGES, GaugeMetricFamily)
     yield from _by_table(told, NODE_COUNTERS, CounterMetricFamily)
