@@ -117,7 +117,9 @@ def test_the_pages_of_the_documentation_name_what_is_published() -> None:
             assert name in PUBLISHED or (ROOT / name).exists(), f"{page.name} names {name}"
 
 
-@pytest.mark.parametrize("path", [*ROOT.glob("deploy/mosquitto/*.acl"), ROOT / "deploy/hivemq/credentials.xml"], ids=str)
+@pytest.mark.parametrize(
+    "path", [*ROOT.glob("deploy/mosquitto/*.acl"), ROOT / "deploy/hivemq/credentials.xml"], ids=lambda path: path.name
+)
 def test_who_may_write_where_is_said_of_topics_that_there_are(path: Path) -> None:
     known = [value for name, value in vars(topics).items() if name.isupper() and isinstance(value, str)]
     known += [topics.edge_barrier("", ""), topics.dead_letters_of(""), topics.marker_of("")]
