@@ -21,7 +21,7 @@ from sparkplug.metric import MetricSpec
 from sparkplug.quality import Quality
 from sparkplug.topics import NAMESPACE
 from sparkplug.values import Value
-from twin.vocabulary.nodes import JOBS_NODE, TWIN_NODE_PREFIX, twin_node
+from twin.vocabulary.nodes import JOBS_NODE, is_twin_node, twin_node
 from twin.vocabulary.twin_signals import TWIN_PREFIX
 
 __all__ = [
@@ -175,7 +175,7 @@ class _Declaration(Generic[C, S]):
 
     def listens_to(self, node: str) -> bool:
         """Whether it reads what the node `node` says: never itself or jobs, other processors only where an input is theirs."""
-        if not node.startswith(TWIN_NODE_PREFIX):
+        if not is_twin_node(node):
             return True
         if node == JOBS_NODE:
             return False

@@ -7,7 +7,7 @@ from sparkplug.metric import NodeId, Reading
 from sparkplug.node_picture import NodePicture
 from sparkplug.quality import Quality
 from twin.vocabulary.node_ledger import BUFFERED, DROPPED, DROPPED_PREFIX, EMITTED, LEDGER_PREFIX, RECEIVED
-from twin.vocabulary.nodes import JOBS_NODE, TWIN_NODE_PREFIX
+from twin.vocabulary.nodes import JOBS_NODE, is_twin_node
 from twin.vocabulary.twin_signals import TWIN_PREFIX
 
 
@@ -93,7 +93,7 @@ def ledgers(pictures: Pictures) -> list[StageLedger]:
                 },
             )
         )
-    return sorted(found, key=lambda ledger: (ledger.node.startswith(TWIN_NODE_PREFIX), ledger.node))
+    return sorted(found, key=lambda ledger: (is_twin_node(ledger.node), ledger.node))
 
 
 def health(pictures: Pictures) -> dict[str, dict[str, Reading]]:

@@ -18,6 +18,11 @@ def twin_node(name: str) -> str:
     return f"{TWIN_NODE_PREFIX}{name}"
 
 
+def is_twin_node(node: str) -> bool:
+    """Return True if an edge node is a processor's or a service's, and no machine's."""
+    return node.startswith(TWIN_NODE_PREFIX)
+
+
 HISTORIAN_NODE = twin_node("historian")
 JOBS_NODE = twin_node("jobs")
 """Of the jobs consumer: what it publishes is about jobs, and no processor's input."""

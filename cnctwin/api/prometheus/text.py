@@ -15,7 +15,7 @@ from sparkplug.metric import Reading
 from sparkplug.quality import Quality
 from twin.vocabulary import twin_signals
 from twin.vocabulary.node_ledger import DROPPED_PREFIX, LEDGER_PREFIX
-from twin.vocabulary.nodes import TWIN_NODE_PREFIX
+from twin.vocabulary.nodes import is_twin_node
 
 PHASES = ("pending", "firing", "acknowledged", "resolved")
 NODE_GAUGES = {
@@ -156,7 +156,7 @@ def _nodes(nodes: Iterable[NodeView]) -> Iterator[Metric]:
     for node, is_online, values in told:
         online.add_metric([node], float(is_online))
         if (gaps := _count(values.get("health/holes"))) is not None:
-            holes.add_metric(["sparkplug" if node.startswith(TWIN_NODE_PREFIX) else "mtconnect", node], gaps)
+            holes.add_metric(["sparkplug" if is_twin_node(node) else "mtconnect", node], gaps)
         sums = {name: _count(values.get(f"{LEDGER_PREFIX}{name}")) for name in ("received", "emitted", "buffered", "dropped")}
         if sums["received"] is None:
             continue

@@ -15,7 +15,7 @@ from cnctwin.memory.store.contract import Series, Store
 from processors.discovery import AnyProcessor
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId
-from twin.vocabulary.nodes import HISTORIAN_NODE, TWIN_NODE_PREFIX
+from twin.vocabulary.nodes import HISTORIAN_NODE, is_twin_node
 
 SNAPSHOT_MS_MAX = 2 * 3_600_000
 """Older ones are no start: there is one an hour of a processor that works."""
@@ -203,7 +203,7 @@ def offers(found: Sequence[Mark], series: Mapping[str, Sequence[Series]]) -> dic
     """Which node offers which signals of each machine, edges first."""
     nodes = {(mark.event.device or "", mark.event.node) for mark in found if mark.event.kind is not EventKind.HOLE}
     result: dict[str, dict[NodeId, list[str]]] = {}
-    for machine, node in sorted(nodes, key=lambda pair: (pair[0], pair[1].node.startswith(TWIN_NODE_PREFIX), pair[1])):
+    for machine, node in sorted(nodes, key=lambda pair: (pair[0], is_twin_node(pair[1].node), pair[1])):
         names = [one.signal for one in series.get(machine, ()) if one.node in (node.node, str(node))]
         result.setdefault(machine, {})[node] = names
     return result
