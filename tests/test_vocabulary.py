@@ -126,3 +126,19 @@ def test_who_may_write_where_is_said_of_topics_that_there_are(path: Path) -> Non
     known = [one.rstrip("/") for one in known if one not in (topics.OWN, topics.ALERTS)]
     for topic in re.findall(rf"{topics.OWN}[a-z-]+(?:/[a-z]+)?", path.read_text()):
         assert any(topic == one or topic.startswith(one + "/") for one in known), topic
+
+
+def test_a_text_that_reads_like_a_canonical_signal_is_one() -> None:
+    """Canonical names are spelled where they are used; a slip of the pen among them would be a signal that nobody publishes."""
+    subjects = "|".join(sorted({name.split("_")[0] for name in SIGNALS if "_" in name} | {r"axis_[a-z]\d?"}))
+    like = re.compile(rf"({subjects})_([a-z_]+_)?(rpm|rpm_cmd|pct|kw|a|c|g|mm_min|mm_s|pos_mm|pos_deg|s)")
+    found = {text for path in SOURCES if ROOT / "twin" not in path.parents for text in texts(path) if like.fullmatch(text)}
+    found |= {
+        word
+        for path in PAGE.rglob("*.js")
+        for word in re.findall(r"(?<![\w/])[a-z_]+\b", path.read_text())
+        if like.fullmatch(word)
+    }
+    others = {name.removeprefix(twin_signals.TWIN_PREFIX) for name in PUBLISHED} | {signals.VIBRATION_BLOCK_G}
+    assert len(found) > 15
+    assert {name for name in found - others if canonical(name) is None} == set()
