@@ -13,8 +13,10 @@ from pydantic import AfterValidator, BaseModel, Field, ValidationError
 from edge.accelerometer.section import AccelerometerSection
 from edge.errors import ConfigError
 from edge.section import Section
-from edge.signals import DERIVED, Kind, signal
+from edge.signals import signal
 from edge.units import conversion
+from twin.vocabulary.nodes import edge_node
+from twin.vocabulary.signals import DERIVED, Kind
 
 BLOCK_PATTERN = r'(?<![A-Z_])M0*6(?![\d.])|\bTOOL CALL (?:\d|"|QS?\d)'
 
@@ -132,7 +134,7 @@ class EdgeConfig(Generic[SourceT]):
     @property
     def node(self) -> str:
         """The id of the edge node."""
-        return self.broker.node or f"edge-{self.machine.name}"
+        return self.broker.node or edge_node(self.machine.name)
 
 
 def one_line(path: Path, table: str, error: ValidationError) -> str:

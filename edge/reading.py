@@ -11,8 +11,9 @@ import re
 from dataclasses import dataclass, replace
 
 from edge.sample import EMPTY, UNAVAILABLE
-from edge.signals import Kind, Signal, signal
+from edge.signals import signal
 from sparkplug.quality import Quality
+from twin.vocabulary.signals import Kind, Signal
 
 TEXT_LENGTH_MAX = 8192
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?", re.ASCII)

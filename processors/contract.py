@@ -19,10 +19,12 @@ from processors.sample import Sample, SampleKind
 from sparkplug.datatype import DataType
 from sparkplug.metric import MetricSpec
 from sparkplug.quality import Quality
+from sparkplug.topics import NAMESPACE
 from sparkplug.values import Value
+from twin.vocabulary.nodes import JOBS_NODE, is_twin_node, twin_node
+from twin.vocabulary.twin_signals import TWIN_PREFIX
 
 __all__ = [
-    "TWIN_PREFIX",
     "CellConfig",
     "CellProcessor",
     "NoState",
@@ -36,10 +38,6 @@ __all__ = [
     "Sample",
     "SampleKind",
 ]
-
-TWIN_PREFIX = "twin/"  # of the metrics
-TWIN_NODE_PREFIX = "twin-"  # of the edge nodes that publish them
-JOBS_NODE = "twin-jobs"  # of the jobs consumer: what it says is of jobs, and no processor's input
 
 
 class Provenance(Enum):
@@ -101,8 +99,8 @@ class PlainSpec:
     qos: int = 0
 
     def __post_init__(self) -> None:
-        if not self.prefix.endswith("/") or self.prefix.startswith(("spBv1.0/", "$")) or set("+#") & set(self.prefix):
-            raise DeclarationError(f"plain prefix {self.prefix!r}: has to end in '/', outside spBv1.0/ and $, no wildcard")
+        if not self.prefix.endswith("/") or self.prefix.startswith((f"{NAMESPACE}/", "$")) or set("+#") & set(self.prefix):
+            raise DeclarationError(f"plain prefix {self.prefix!r}: has to end in '/', outside {NAMESPACE}/ and $, no wildcard")
 
 
 class Output(NamedTuple):
@@ -173,11 +171,11 @@ class _Declaration(Generic[C, S]):
     @property
     def node(self) -> str:
         """The id of its edge node and of its host application."""
-        return TWIN_NODE_PREFIX + self.name
+        return twin_node(self.name)
 
     def listens_to(self, node: str) -> bool:
         """Whether it reads what the node `node` says: never itself or jobs, other processors only where an input is theirs."""
-        if not node.startswith(TWIN_NODE_PREFIX):
+        if not is_twin_node(node):
             return True
         if node == JOBS_NODE:
             return False

@@ -15,11 +15,11 @@ from processors.config import ProcessorConfig
 from processors.contract import NoState, Output, OutputSpec, Processor, Provenance, Sample, SampleKind
 from sparkplug.datatype import DataType
 from twin.cutting import SpindleDrive, cutting_force
+from twin.vocabulary import twin_signals
+from twin.vocabulary.bounds import SPINDLE_LOAD_PCT_MAX, SPINDLE_RPM_MAX
 
 SPEED, LOAD, TOOL = "spindle_rpm", "spindle_load_pct", "tool_number"
-FORCE, BASIS = "twin/cutting_force_n", "twin/cutting_force_basis"
-RPM_MAX = 200_000.0  # beyond it a figure is no spindle speed, and would give a force of nothing
-LOAD_PCT_MAX = 1000.0
+FORCE, BASIS = twin_signals.CUTTING_FORCE_N, twin_signals.CUTTING_FORCE_BASIS
 DRIVE_FIELDS = {"rated power": "rated_power_kw", "efficiency": "efficiency"}
 
 
@@ -66,7 +66,7 @@ def step(config: Config, state: NoState, sample: Sample) -> tuple[NoState, Seque
     rpm, no_rpm = sample.number(SPEED)
     if load_pct is None or rpm is None:
         return state, (Output.null(FORCE, no_load or no_rpm or ""), Output(BASIS, basis))
-    if abs(rpm) > RPM_MAX or load_pct > LOAD_PCT_MAX:
+    if abs(rpm) > SPINDLE_RPM_MAX or load_pct > SPINDLE_LOAD_PCT_MAX:
         return state, (Output.null(FORCE, "spindle_rpm or spindle_load_pct is beyond any spindle"), Output(BASIS, basis))
     force_n, reason = cutting_force(config.drive, load_pct, rpm, diameter_mm)
     if force_n is None:

@@ -16,8 +16,9 @@ from processors.contract import Output, OutputSpec, Pin, Processor, Provenance, 
 from sparkplug.datatype import DataType
 from sparkplug.metric import Reading
 from sparkplug.quality import Quality
+from twin.vocabulary import twin_signals
 
-PINS, REASON, WINDOW = "twin/history_pins", "twin/history_pin_reason", "twin/gap_window"
+PINS, REASON, WINDOW = "twin/history_pins", "twin/history_pin_reason", twin_signals.GAP_WINDOW
 DAY_MS = 86_400_000
 
 
@@ -30,12 +31,9 @@ class HistorianConfig(ProcessorConfig):
     pin_s_max: float = Field(default=21_600.0, gt=0.0, le=604_800.0)
     pins_a_day_max: int = Field(default=50, ge=1, le=10_000)
     flags: tuple[str, ...] = (
-        "twin/anomaly_alarm",
-        "twin/gap_growing",
-        "twin/rule_load_over_limit",
-        "twin/rule_thermal_runaway",
-        "twin/rule_load_without_feed",
-        "twin/rule_vibration",
+        twin_signals.ANOMALY_ALARM,
+        twin_signals.GAP_GROWING,
+        *twin_signals.RULES,
     )
     raw_days: float = Field(default=365.0, gt=0.0, le=36_500.0)
     block_days: float = Field(default=7.0, gt=0.0, le=36_500.0)
@@ -86,11 +84,11 @@ def _see(config: HistorianConfig, state: HistorianState, machine: str, reading: 
         return state
     before_ms, after_ms = round(config.pin_before_s * 1000), round(config.pin_after_s * 1000)
     if since_ms is None:
-        pins.append(Pin(machine, at_ms - before_ms, at_ms + max(after_ms, 1), flag.removeprefix("twin/")))
+        pins.append(Pin(machine, at_ms - before_ms, at_ms + max(after_ms, 1), flag.removeprefix(twin_signals.TWIN_PREFIX)))
         return replace(state, risen=(*state.risen, Risen(flag, at_ms)))
     to_ms = min(at_ms + after_ms, since_ms + round(config.pin_s_max * 1000))
     if to_ms > since_ms + after_ms:  # what the rise has not pinned already
-        pins.append(Pin(machine, since_ms - before_ms, to_ms, flag.removeprefix("twin/")))
+        pins.append(Pin(machine, since_ms - before_ms, to_ms, flag.removeprefix(twin_signals.TWIN_PREFIX)))
     return replace(state, risen=tuple(risen for risen in state.risen if risen.flag != flag))
 
 

@@ -17,8 +17,9 @@ from processors.contract import NoState, PlainOutput, PlainSpec, Processor, Samp
 from processors.plain_topic import topic_level, topic_path
 from sparkplug.metric import Reading
 from sparkplug.quality import Quality
+from twin.vocabulary import topics
 
-PREFIX = "cnc/"
+PREFIX = topics.MIRROR
 ARRAY_MAX = 256
 _QUALITY = {Quality.GOOD: "good", Quality.STALE: "stale", Quality.BAD: "bad"}
 _ENCODE = json.JSONEncoder(ensure_ascii=False, allow_nan=False, separators=(",", ":")).encode

@@ -21,13 +21,14 @@ from processors.contract import Output, OutputSpec, Processor, Provenance, Sampl
 from sparkplug.datatype import DataType
 from twin.errors import TwinError
 from twin.residual.features import AMBIENT, MEASURED, PHYSICS, SIGNALS, Memory, row_after, signals_of
+from twin.vocabulary import twin_signals
 
 if TYPE_CHECKING:
     from twin.residual.model import ResidualModel
 
-CORRECTION, CORRECTED = "twin/spindle_temp_correction_k", "twin/spindle_temp_corrected_c"
-LEFT, IN_REGION = "twin/spindle_temp_corrected_residual_k", "twin/residual_in_region"
-GAIN, BASIS = "twin/residual_gain_pct", "twin/residual_basis"
+CORRECTION, CORRECTED = twin_signals.SPINDLE_TEMP_CORRECTION_K, twin_signals.SPINDLE_TEMP_CORRECTED_C
+LEFT, IN_REGION = twin_signals.SPINDLE_TEMP_CORRECTED_RESIDUAL_K, "twin/residual_in_region"
+GAIN, BASIS = "twin/residual_gain_pct", twin_signals.RESIDUAL_BASIS
 NO_MODEL = "no model; cnctwin train residual --machine … --out … makes one, [residual] models names its folder"
 BEYOND = 1e6
 """No signal of a machine is larger."""

@@ -18,12 +18,12 @@ from processors.config import ProcessorConfig
 from processors.contract import Output, OutputSpec, Processor, Provenance, Sample, SampleKind
 from sparkplug.datatype import DataType
 from twin.thermal import ThermalNetwork, heat_input_w, rise_after
+from twin.vocabulary import twin_signals
+from twin.vocabulary.bounds import SPINDLE_LOAD_PCT_MAX, SPINDLE_RPM_MAX
 
 SPEED, LOAD, AMBIENT, MEASURED = "spindle_rpm", "spindle_load_pct", "ambient_temp_c", "spindle_temp_c"
-TEMPERATURE, RESIDUAL = "twin/spindle_temp_c", "twin/spindle_temp_residual_k"
-RISE, BASIS = "twin/spindle_temp_rise_k", "twin/spindle_temp_basis"
-RPM_MAX = 200_000.0
-LOAD_PCT_MAX = 1000.0
+TEMPERATURE, RESIDUAL = twin_signals.SPINDLE_TEMP_C, twin_signals.SPINDLE_TEMP_RESIDUAL_K
+RISE, BASIS = twin_signals.SPINDLE_TEMP_RISE_K, twin_signals.SPINDLE_TEMP_BASIS
 
 
 class Config(ProcessorConfig):
@@ -134,7 +134,7 @@ def _heat(network: ThermalNetwork, sample: Sample) -> tuple[float | None, str]:
     load_pct, no_load = sample.number(LOAD)
     if rpm is None or load_pct is None:
         return None, no_rpm or no_load or ""
-    if abs(rpm) > RPM_MAX or abs(load_pct) > LOAD_PCT_MAX:
+    if abs(rpm) > SPINDLE_RPM_MAX or abs(load_pct) > SPINDLE_LOAD_PCT_MAX:
         return None, f"{SPEED} or {LOAD} is beyond any spindle"
     return heat_input_w(network, rpm, load_pct), ""
 

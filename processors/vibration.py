@@ -13,16 +13,18 @@ from typing import TYPE_CHECKING, Self
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
 
 from processors.config import ProcessorConfig
-from processors.contract import TWIN_PREFIX, Output, OutputSpec, Processor, Provenance, Sample, SampleKind
+from processors.contract import Output, OutputSpec, Processor, Provenance, Sample, SampleKind
 from processors.sample import why_unknown
 from sparkplug.datatype import DataType
+from twin.vocabulary import twin_signals
+from twin.vocabulary.signals import VIBRATION_BLOCK_G, VIBRATION_SAMPLE_RATE_HZ
 
 if TYPE_CHECKING:  # numpy is loaded with the first block
     from twin.vibration import Floats, Tally
 
-BLOCK, RATE = "vibration_block_g", "vibration_sample_rate_hz"
-RMS, VELOCITY, PEAK = f"{TWIN_PREFIX}vibration_rms_g", f"{TWIN_PREFIX}vibration_velocity_mm_s", f"{TWIN_PREFIX}vibration_peak_g"
-CREST, KURTOSIS = f"{TWIN_PREFIX}vibration_crest_factor", f"{TWIN_PREFIX}vibration_kurtosis"
+BLOCK, RATE = VIBRATION_BLOCK_G, VIBRATION_SAMPLE_RATE_HZ
+RMS, VELOCITY, PEAK = twin_signals.VIBRATION_RMS_G, twin_signals.VIBRATION_VELOCITY_MM_S, "twin/vibration_peak_g"
+CREST, KURTOSIS = twin_signals.VIBRATION_CREST_FACTOR, twin_signals.VIBRATION_KURTOSIS
 NAMES = (RMS, VELOCITY, PEAK, CREST, KURTOSIS)
 RATE_HZ_MAX = 200_000.0
 RATE_BANDS_MIN = 4.0

@@ -20,7 +20,7 @@ from sparkplug.metric import Change, NodeId, Reading
 from sparkplug.node_picture import NodePicture, Owner, tells_quality
 from sparkplug.rebirth import RebirthRequests
 from sparkplug.sequence import Delivery, Numbered, SequenceWindow, Verdict
-from sparkplug.topics import Topic, Verb, state_topic
+from sparkplug.topics import STATE_PREFIX, Topic, Verb, state_topic
 from sparkplug.values import Metric, Payload
 
 NODES_MAX = 10_000
@@ -139,7 +139,7 @@ class HostSession:
         try:
             if topic == self.state_topic:
                 return self._own_state(payload)
-            if topic.startswith("spBv1.0/STATE/"):
+            if topic.startswith(STATE_PREFIX):
                 return []
             return self._node_message(Topic.parse(topic), payload, now_ms)
         except (PayloadError, TopicError):

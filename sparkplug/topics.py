@@ -13,6 +13,7 @@ from typing import NamedTuple
 from sparkplug.errors import TopicError
 
 NAMESPACE = "spBv1.0"
+STATE_PREFIX = f"{NAMESPACE}/STATE/"
 _FORBIDDEN = ("+", "/", "#")
 
 
@@ -101,4 +102,13 @@ def state_topic(host_id: str) -> str:
     >>> state_topic("scada")
     'spBv1.0/STATE/scada'
     """
-    return f"{NAMESPACE}/STATE/{check_id(host_id, 'host id')}"
+    return f"{STATE_PREFIX}{check_id(host_id, 'host id')}"
+
+
+def group_filter(group: str) -> str:
+    """The filter that hears all messages of a group's edge nodes.
+
+    >>> group_filter("cnc")
+    'spBv1.0/cnc/#'
+    """
+    return f"{NAMESPACE}/{group}/#"

@@ -10,18 +10,17 @@ from itertools import pairwise
 from typing import Any
 
 from cnctwin.api.live.trace import Sample
-from cnctwin.plant.view import TWIN_PREFIX
 from sparkplug.quality import Quality
+from twin.vocabulary import twin_signals
 
-PART_RECORD = f"{TWIN_PREFIX}part_record"
 TEXTS = {
     "exec_state": "execution",
     "program": "program",
     "alarm": "alarm",
-    f"{TWIN_PREFIX}stop_reason": "stop",
+    twin_signals.STOP_REASON: "stop",
 }
 FLAGS = {"tool_change_active": ("tool_change", "tool change")}
-ALARMS = ("anomaly_alarm", "gap_growing", "score_drift")
+ALARMS = (twin_signals.ANOMALY_ALARM, twin_signals.GAP_GROWING, twin_signals.SCORE_DRIFT)
 NOTHING = frozenset({"", "none", "NORMAL", "UNAVAILABLE"})
 EVENTS_MAX = 5000
 Event = dict[str, Any]
@@ -29,10 +28,9 @@ Event = dict[str, Any]
 
 def event_signals(known: Iterable[str]) -> tuple[str, ...]:
     """Those of a machine's signals that tell events."""
-    alarms = {f"{TWIN_PREFIX}{name}" for name in ALARMS}
-    rules = f"{TWIN_PREFIX}rule_"
-    fixed = {*TEXTS, *FLAGS, *alarms, PART_RECORD, "tool_number"}
-    return tuple(sorted(name for name in known if name in fixed or (name.startswith(rules) and name != f"{rules}detail")))
+    rules = twin_signals.RULE_PREFIX
+    fixed = {*TEXTS, *FLAGS, *ALARMS, twin_signals.PART_RECORD, "tool_number"}
+    return tuple(sorted(name for name in known if name in fixed or (name.startswith(rules) and name != twin_signals.RULE_DETAIL)))
 
 
 def events_of(samples: Mapping[str, Sequence[Sample]]) -> list[Event]:
@@ -49,13 +47,13 @@ def events_of(samples: Mapping[str, Sequence[Sample]]) -> list[Event]:
         elif signal in FLAGS:
             kind, text = FLAGS[signal]
             events += _stretches(kind, held, lambda value, text=text: text if value is True else "")
-        elif signal == PART_RECORD:
+        elif signal == twin_signals.PART_RECORD:
             events += _parts(held)
         elif signal == "tool_number":
             if "tool_change_active" not in samples:
                 events += [_event(one, "tool_change", f"tool {one.value}") for one in _changes(held) if one.value is not None]
         else:
-            name = signal.removeprefix(TWIN_PREFIX).removeprefix("rule_").replace("_", " ")
+            name = signal.removeprefix(twin_signals.TWIN_PREFIX).removeprefix("rule_").replace("_", " ")
             events += _stretches("alarm", held, lambda value, name=name: name if value is True else "")
     events += _holes(samples.get("exec_state", ()))
     return sorted(events, key=lambda one: (one["t"], one["kind"]))

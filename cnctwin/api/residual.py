@@ -10,6 +10,7 @@ from cnctwin.api.answers import Part
 from cnctwin.api.constants import OfMachine
 from cnctwin.api.prediction import CONSTANTS, Plan
 from twin.errors import TwinError
+from twin.vocabulary import twin_signals
 
 if TYPE_CHECKING:
     from twin.residual.model import ResidualModel
@@ -60,7 +61,7 @@ class Models:
         from twin.residual.prediction import predict_correction  # noqa: PLC0415  with the extra that it needs
 
         try:
-            found = predict_correction(model, {**plan.signals(), "twin/spindle_temp_c": physics_c}, plan.dt_s)
+            found = predict_correction(model, {**plan.signals(), twin_signals.SPINDLE_TEMP_C: physics_c}, plan.dt_s)
         except TwinError as error:
             return Correction(None, f"none: {error}")
         temp_c = [

@@ -27,6 +27,7 @@ from cnctwin.processes.given_broker import address, broker_or_own
 from cnctwin.processes.stopping import stopped_by_signals
 from edge.state_dir import state_dir
 from sparkplug.broker import BrokerAddress
+from twin.vocabulary.nodes import JOBS_NODE
 
 jobs_app = typer.Typer(
     no_args_is_help=True, help="Optimise, identify, diagnose as jobs: asked for over the broker, done in turn."
@@ -65,7 +66,7 @@ def run(
     logging.getLogger("cnctwin.jobs").setLevel(logging.INFO)
     kept = folder or state_dir() / "jobs"
     limits = Limits(queued_max=queued_max, kept_max=kept_max, kept_days=kept_days, seconds_max=3600.0 * hours_max)
-    setting = Setting(files, group, kept / "twin-jobs.json", workers, dask, limits)
+    setting = Setting(files, group, kept / f"{JOBS_NODE}.json", workers, dask, limits)
     with stopped_by_signals() as stop, broker_or_own(address(broker)) as at:
         consumer = Consumer(kept, at, setting)
         below = "no files" if files is None else f"files below {files}"

@@ -13,6 +13,7 @@ from cnctwin.errors import UsageError
 from cnctwin.processes.given_broker import address
 from cnctwin.terminal.console import standard_output
 from edge.state_dir import state_dir
+from twin.vocabulary.nodes import VALIDATION_NODE
 
 DAY_MS = 86_400_000
 TIME = "UTC, as 2026-11-21T06:00 or ms since 1970"
@@ -53,5 +54,5 @@ def validate(
         *(out or state_dir() / "validation", keep, group),
     )
     where = None if broker is None else address(broker)
-    session_file = None if where is None else state_dir() / "twin-validation.json"
+    session_file = None if where is None else state_dir() / f"{VALIDATION_NODE}.json"
     raise typer.Exit(command.validate(asked, where, session_file, as_json=as_json, console=standard_output()))

@@ -24,6 +24,8 @@ from cnctwin.plant.view import StageLedger, ledgers, machines, text
 from cnctwin.plant.watch import show, viewer
 from cnctwin.standins.simulated_machine import description
 from sparkplug.host import EventKind, HostApplication, HostEvent
+from sparkplug.topics import NAMESPACE
+from twin.vocabulary.topics import MIRROR
 
 GROUP = "cnc"
 QUIET_S = 1.5
@@ -130,8 +132,8 @@ def greeting(demo: Demo) -> str:
         f"{demo.machine}: {what}\n"
         f"page:      {demo.page_url or demo.page_trouble}\n"
         f"broker:    {demo.broker.address.url} (private, loopback only)\n"
-        f"read it:   mosquitto_sub{at} -t 'cnc/#' -v          plain JSON, any MQTT client\n"
-        f"           mosquitto_sub{at} -t 'spBv1.0/#' -F '%t'  the Sparkplug B messages behind it\n"
+        f"read it:   mosquitto_sub{at} -t '{MIRROR}#' -v          plain JSON, any MQTT client\n"
+        f"           mosquitto_sub{at} -t '{NAMESPACE}/#' -F '%t'  the Sparkplug B messages behind it\n"
         f"elsewhere: cnctwin watch --broker {demo.broker.address.url}   cnctwin doctor --broker {demo.broker.address.url}"
     )
 
@@ -167,7 +169,7 @@ def _note(demo: Demo, ends_s: float | None) -> str:
     left = "Ctrl-C ends the demo" if ends_s is None else f"{max(ends_s - time.monotonic(), 0):.0f} s left, Ctrl-C ends it earlier"
     ended = " · the recording has ended" if demo.recording_ended else ""
     notice = f" · {demo.notice}" if demo.notice else ""
-    return f"{left}{ended}{notice} · mosquitto_sub -p {demo.broker.port} -t 'cnc/#' -v"
+    return f"{left}{ended}{notice} · mosquitto_sub -p {demo.broker.port} -t '{MIRROR}#' -v"
 
 
 def _tell(summary: Summary, demo: Demo, console: Console, *, as_json: bool) -> None:

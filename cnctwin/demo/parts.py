@@ -17,6 +17,7 @@ from cnctwin.standins.simulated_machine import description
 from cnctwin.standins.simulated_machine.anomaly_model import place_model
 from sparkplug.errors import TopicError
 from sparkplug.topics import check_id
+from twin.vocabulary.nodes import HISTORIAN_NODE
 
 PROCESSORS = ("thermal", "cutting_force", "gap", "rules", "joint_anomaly", "alerts", "events", "mirror", "historian")
 START_S_MAX = 15.0
@@ -181,7 +182,7 @@ class Demo:
     def _await_historian(self) -> None:
         """Until its store is there, but not for ever: it is started again if it dies."""
         deadline_s = time.monotonic() + START_S_MAX
-        while time.monotonic() < deadline_s and not (self._folder / "twin-historian.json").exists():
+        while time.monotonic() < deadline_s and not (self._folder / f"{HISTORIAN_NODE}.json").exists():
             time.sleep(0.05)
 
     def _serve(self, arguments: list[str]) -> None:

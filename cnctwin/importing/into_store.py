@@ -16,11 +16,13 @@ from cnctwin.memory.store.contract import Message, Pinned, Store
 from cnctwin.standins.mtconnect_agent.errors import ReplayError
 from edge.running.birth import DATATYPES
 from edge.sample import EdgeSample
-from edge.signals import DERIVED, signal
+from edge.signals import signal
 from sparkplug.datatype import DataType
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId, Reading
 from sparkplug.quality import Quality
+from twin.vocabulary.nodes import edge_node
+from twin.vocabulary.signals import DERIVED
 
 BATCH = 2000
 NOT_YET = "not known yet"
@@ -70,7 +72,7 @@ def recorded_messages(rows: Sequence[Sequence[EdgeSample]], machine: str, group:
 
     The birth declares every signal that the recording has, with the values of its first row that has a time.
     """
-    node = NodeId(group, f"edge-{machine}")
+    node = NodeId(group, edge_node(machine))
     names = dict.fromkeys([sample.signal for row in rows for sample in row] + ["tool_number", *DERIVED])
     received_ms = 0
     for row in rows:

@@ -13,16 +13,19 @@ from typing import Any
 
 from cnctwin.jobs.job import Job, JobState
 from cnctwin.jobs.job_queue import JobQueue
-from cnctwin.jobs.topics import STATE, state_topic
-from processors.contract import JOBS_NODE, Provenance
+from processors.contract import Provenance
 from sparkplug.datatype import DataType
 from sparkplug.edge_node import EdgeNode
 from sparkplug.errors import SparkplugError
 from sparkplug.host import HostApplication
 from sparkplug.metric import Change, MetricSpec
 from sparkplug.quality import Quality
+from twin.vocabulary.nodes import JOBS_NODE
+from twin.vocabulary.topics import JOBS_STATE, state_of_job
 
 NODE = JOBS_NODE
+JOB_ID, JOB_KIND, JOB_STATE = "twin/job_id", "twin/job_kind", "twin/job_state"
+PROGRESS, RESULT = "twin/job_progress_pct", "twin/job_result"
 DEVICE = "jobs"
 REQUEST, CANCEL, ANSWER = "Job/Request", "Job/Cancel", "Job/Answer"
 STATE_S_MIN, STATE_S_MAX = 0.25, 10.0  # of progress only; how jobs stand is told at once
@@ -38,13 +41,11 @@ _COMMANDS = (
 )
 _INFERRED = {"provenance": Provenance.INFERRED.value}
 METRICS = (
-    MetricSpec("twin/job_id", DataType.STRING, properties={**_INFERRED, "meaning": "the job that changed last"}),
-    MetricSpec("twin/job_kind", DataType.STRING, properties={**_INFERRED, "meaning": "optimise, identify or diagnose"}),
-    MetricSpec(
-        "twin/job_state", DataType.STRING, properties={**_INFERRED, "meaning": "queued, running, done, failed, cancelled"}
-    ),
-    MetricSpec("twin/job_progress_pct", DataType.DOUBLE, "%", 0.0, 100.0, properties={**_INFERRED, "meaning": "how far it is"}),
-    MetricSpec("twin/job_result", DataType.STRING, properties={**_INFERRED, "meaning": "summary of the result, as JSON"}),
+    MetricSpec(JOB_ID, DataType.STRING, properties={**_INFERRED, "meaning": "the job that changed last"}),
+    MetricSpec(JOB_KIND, DataType.STRING, properties={**_INFERRED, "meaning": "optimise, identify or diagnose"}),
+    MetricSpec(JOB_STATE, DataType.STRING, properties={**_INFERRED, "meaning": "queued, running, done, failed, cancelled"}),
+    MetricSpec(PROGRESS, DataType.DOUBLE, "%", 0.0, 100.0, properties={**_INFERRED, "meaning": "how far it is"}),
+    MetricSpec(RESULT, DataType.STRING, properties={**_INFERRED, "meaning": "summary of the result, as JSON"}),
 )
 NODE_METRICS = (
     *_COMMANDS,
@@ -94,7 +95,7 @@ class Announcer:
 
     def clear(self, job_id: str) -> None:
         """Take away what the broker retains of a job that is not there any more."""
-        self._host.publish_plain(state_topic(job_id), b"", qos=1, retain=True)
+        self._host.publish_plain(state_of_job(job_id), b"", qos=1, retain=True)
 
     def tell(self) -> None:
         """Publish what is due."""
@@ -125,7 +126,7 @@ class Announcer:
         for job_id in sorted(self._due):
             if job_id in self._queue:
                 job, place = self._queue[job_id], self._queue.place(job_id)
-                if not self._host.publish_plain(state_topic(job_id), _payload(job.shown(place)), qos=1, retain=True):
+                if not self._host.publish_plain(state_of_job(job_id), _payload(job.shown(place)), qos=1, retain=True):
                     return
                 if job.state.is_over and not job.is_told:
                     if job.reply_topic:
@@ -138,17 +139,17 @@ class Announcer:
         age_s = now_s - self._state_s
         if states == self._states_told and age_s < (STATE_S_MIN if self._state_is_due else STATE_S_MAX):
             return
-        if self._host.publish_plain(STATE, _payload(state_of(self._queue)), qos=1, retain=True):
+        if self._host.publish_plain(JOBS_STATE, _payload(state_of(self._queue)), qos=1, retain=True):
             self._state_s, self._state_is_due, self._states_told = now_s, False, states
 
     def _tell_plant(self, job: Job) -> None:
         result = json.dumps(job.result, ensure_ascii=False) if job.result else None
         told: dict[str, str | float | None] = {
-            "twin/job_id": job.id,
-            "twin/job_kind": job.kind,
-            "twin/job_state": str(job.state),
-            "twin/job_progress_pct": job.progress_pct,
-            "twin/job_result": result,
+            JOB_ID: job.id,
+            JOB_KIND: job.kind,
+            JOB_STATE: str(job.state),
+            PROGRESS: job.progress_pct,
+            RESULT: result,
         }
         for device in dict.fromkeys((DEVICE, self._device_of(job.machine))):
             before = self._devices[device]

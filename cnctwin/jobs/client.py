@@ -15,10 +15,10 @@ from uuid import uuid4
 
 from cnctwin.errors import ApplicationError, UsageError
 from cnctwin.jobs.request import read_request
-from cnctwin.jobs.topics import CANCEL, REPLY, REQUEST, STATE, state_topic
 from sparkplug.broker import BrokerAddress
 from sparkplug.host import HostApplication
 from sparkplug.host_session import EventKind
+from twin.vocabulary.topics import JOB_CANCEL, JOB_REPLY, JOB_REQUEST, JOBS_STATE, state_of_job
 
 REPEAT_S = 2.0
 FRESH_S_MAX = 35.0  # the state comes every ten seconds
@@ -49,7 +49,7 @@ class JobsClient:
         document = {key: value for key, value in document.items() if key != "reply_to"}
         document.setdefault("id", f"{document.get('job')}-{uuid4().hex[:12]}")
         request = read_request(json.dumps(document).encode())
-        answer = self._ask(REQUEST, document, request.id, wait_s)
+        answer = self._ask(JOB_REQUEST, document, request.id, wait_s)
         if answer is None:
             said = f"nobody has accepted {request.id} within {wait_s:g} s{self._why()}; is `cnctwin jobs run` there?"
             raise NoAnswerError(f"{said} It is safe to send it again with the same id: it is done once")
@@ -57,15 +57,15 @@ class JobsClient:
 
     def cancel(self, job_id: str, wait_s: float = 15.0) -> dict[str, Any]:
         """Cancel a job: the consumer's answer. Raises NoAnswerError."""
-        answer = self._ask(CANCEL, {"id": job_id}, job_id, wait_s)
+        answer = self._ask(JOB_CANCEL, {"id": job_id}, job_id, wait_s)
         if answer is None:
             raise NoAnswerError(f"nobody has answered within {wait_s:g} s{self._why()}; is `cnctwin jobs run` there?")
         return answer
 
     def state(self, wait_s: float = 5.0) -> dict[str, Any]:
         """All jobs in short. Raises NoAnswerError where there is no consumer, or there is none any more."""
-        self._listen(STATE)
-        state = self.until(lambda: self._heard.get(STATE), wait_s)
+        self._listen(JOBS_STATE)
+        state = self.until(lambda: self._heard.get(JOBS_STATE), wait_s)
         if state is None:
             raise NoAnswerError(f"{self.broker.url} knows nothing of jobs{self._why()}; is `cnctwin jobs run` there?")
         age_s = _age_s(state)
@@ -75,8 +75,8 @@ class JobsClient:
 
     def job(self, job_id: str, wait_s: float = 5.0) -> dict[str, Any]:
         """One job in full. Raises UsageError where there is none of that id."""
-        self._listen(state_topic(job_id))
-        found = self.until(lambda: self._heard.get(state_topic(job_id)), wait_s)
+        self._listen(state_of_job(job_id))
+        found = self.until(lambda: self._heard.get(state_of_job(job_id)), wait_s)
         if found is None:
             raise UsageError(f"{self.broker.url} knows no job {job_id!r}{self._why()}; `cnctwin jobs list` shows them")
         return dict(found)
@@ -92,7 +92,7 @@ class JobsClient:
 
     def _ask(self, topic: str, document: dict[str, Any], job_id: str, wait_s: float) -> dict[str, Any] | None:
         """Send until there is an answer, to us alone: another one who asks for the same hears his own."""
-        reply = f"{REPLY}{job_id}/{uuid4().hex[:8]}"
+        reply = f"{JOB_REPLY}{job_id}/{uuid4().hex[:8]}"
         payload = json.dumps({**document, "reply_to": reply}, ensure_ascii=False).encode()
         self._listen(reply)
         self._heard.pop(reply, None)

@@ -15,7 +15,6 @@ from pathlib import Path
 from threading import Event
 from typing import Any
 
-from cnctwin.jobs import topics
 from cnctwin.jobs.announcer import CANCEL, NODE, NODE_METRICS, REQUEST, Announcer
 from cnctwin.jobs.attempt import Attempt, how_ended
 from cnctwin.jobs.durable import EXIT_DISK
@@ -31,6 +30,7 @@ from sparkplug.edge_session import Command
 from sparkplug.host import HostApplication
 from sparkplug.host_session import HostEvent
 from sparkplug.metric import NodeId
+from twin.vocabulary import topics
 
 CHILD = (sys.executable, "-m", "cnctwin.jobs.child")
 POLL_S = 0.05
@@ -88,7 +88,7 @@ class Consumer:
     def run(self, stop: Event) -> None:
         """Work until `stop` is set; the job that runs then goes on when a consumer is started again."""
         self._recover()
-        for topic in (topics.REQUEST, topics.CANCEL, topics.STATES):
+        for topic in (topics.JOB_REQUEST, topics.JOB_CANCEL, topics.state_of_job("+")):
             self._host.subscribe_plain(topic)
         self._host.start()
         self._edge.start()
@@ -126,15 +126,15 @@ class Consumer:
             self.announcer.counts["requests_refused"] += 1
 
     def _hear(self, event: HostEvent) -> None:
-        if event.topic == topics.REQUEST:
+        if event.topic == topics.JOB_REQUEST:
             answer, topic = self._take(event.payload)
             if topic:
                 self.announcer.reply(topic, answer.document())
-        elif event.topic == topics.CANCEL:
+        elif event.topic == topics.JOB_CANCEL:
             answer, topic = self._cancel_asked(event.payload)
             if topic:
                 self.announcer.reply(topic, answer.document())
-        elif event.payload and event.topic.startswith("cnc/jobs/"):
+        elif event.payload and event.topic.startswith(topics.JOBS):
             job_id = event.topic.split("/")[2]
             if job_id not in self.queue and is_id(job_id):
                 self.announcer.clear(job_id)  # of a life that was forgotten while the broker was away

@@ -15,7 +15,8 @@ from pydantic import ValidationError
 
 from cnctwin.errors import UsageError
 from cnctwin.jobs.kinds import KINDS, Kind, Parameters
-from cnctwin.jobs.topics import REPLY
+from sparkplug.topics import NAMESPACE
+from twin.vocabulary.topics import JOB_REPLY, MIRROR, OWN
 
 REQUEST_BYTES_MAX = 4_000_000
 SHOWN_MAX = 60
@@ -23,7 +24,7 @@ TOPIC_BYTES_MAX = 200
 _ID = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 _TAKEN = ("reply", "state", "request", "cancel")
 """Levels of topics of ours."""
-_RESERVED = ("spBv1.0/", "$", "cnctwin/", "cnc/")
+_RESERVED = (f"{NAMESPACE}/", "$", OWN, MIRROR)
 """Topics on which a reply would be taken for something else: by an edge for a command, by the mirror's readers for a value."""
 
 
@@ -37,7 +38,7 @@ class RequestError(UsageError):
     @property
     def reply_topic(self) -> str:
         """The topic for the refusal; empty where nobody can be told."""
-        return self.reply_to or (REPLY + self.job_id if self.job_id else "")
+        return self.reply_to or (JOB_REPLY + self.job_id if self.job_id else "")
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +65,7 @@ class Request:
     @property
     def reply_topic(self) -> str:
         """The topic for answers."""
-        return self.reply_to or REPLY + self.id
+        return self.reply_to or JOB_REPLY + self.id
 
 
 def read_request(payload: bytes) -> Request:
@@ -106,7 +107,7 @@ def read_cancel(payload: bytes) -> tuple[str, str]:
     known_id, known_topic = _head(document)
     if not known_id or document:
         raise RequestError("request: to cancel a job takes its id, and nothing but reply_to beside it", known_id, known_topic)
-    return known_id, known_topic or REPLY + known_id
+    return known_id, known_topic or JOB_REPLY + known_id
 
 
 def _object(payload: bytes) -> dict[str, Any]:
@@ -150,8 +151,8 @@ def _topic_fault(topic: str) -> str | None:
         return f"a topic of 1 to {TOPIC_BYTES_MAX} bytes is wanted"
     if any(sign in topic for sign in "+#\0"):
         return "'+', '#' and a zero byte cannot stand in it"
-    if topic.startswith(_RESERVED) and not topic.startswith(REPLY):
-        return f"is a topic of others; {REPLY}… is for answers, or take one of your own"
+    if topic.startswith(_RESERVED) and not topic.startswith(JOB_REPLY):
+        return f"is a topic of others; {JOB_REPLY}… is for answers, or take one of your own"
     return None
 
 

@@ -17,12 +17,13 @@ from cnctwin.memory.store.retention import Retention
 from edge.running.forwarder import SEQUENCE
 from edge.running.receipts import RECEIPT, REPEAT_S
 from edge.running.spans import Spans
-from processors.contract import TWIN_NODE_PREFIX
 from processors.effects import Pin
 from processors.historian import HistorianConfig
 from processors.running.ports import Receipt
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.topics import NodeId
+from twin.vocabulary.nodes import HISTORIAN_NODE, TWIN_NODE_PREFIX
+from twin.vocabulary.topics import SNAPSHOT
 
 QUEUE_MAX = 400_000  # samples
 BATCH_MAX = 20_000  # samples
@@ -31,7 +32,6 @@ TIDY_S, STATUS_S = 60.0, 5.0
 AGAIN_S = 5.0  # after a `tidy` that sealed something
 RETRY_S_MAX = 10.0
 BEHIND_S, BEHIND_S_MAX = 1.0, REPEAT_S - 1.0  # from when on nobody is told that we are here; nor anything else
-SNAPSHOTS = "cnctwin/snapshot/"
 HOUR_MS = 3_600_000
 MACHINES_MAX = 1_000  # that are given receipts
 UNITS_MAX = 20_000  # of processors, whose snapshots are kept
@@ -103,7 +103,7 @@ class StoreRecorder:
     A failure of the thread that is no StoreError is our own bug: the next `keep` raises it, and ends the processor.
     """
 
-    keeps_plain = SNAPSHOTS + "#"
+    keeps_plain = SNAPSHOT + "#"
 
     def __init__(self, store: Store, group: str = "cnc") -> None:
         self._store, self._group = store, group
@@ -181,7 +181,7 @@ class StoreRecorder:
         if status.newest_ms is not None:
             away_s = max(now_ms - status.newest_ms, 0) / 1000
             detail = f"the historian began; the newest sample before it is {away_s:.0f} s old"
-            node = NodeId(self._group, "twin-historian")
+            node = NodeId(self._group, HISTORIAN_NODE)
             for machine in self._store.machines():
                 self._queue.put(Message(now_ms, HostEvent(EventKind.HOLE, node, machine, now_ms, detail=detail)))
         self._thread.start()
@@ -199,7 +199,7 @@ class StoreRecorder:
 
     def _hear_snapshot(self, event: HostEvent, received_ms: int) -> None:
         """Keep the first of each hour of a processor's unit, and remember the last."""
-        processor, _, unit = event.topic.removeprefix(SNAPSHOTS).partition("/")
+        processor, _, unit = event.topic.removeprefix(SNAPSHOT).partition("/")
         key, hour = (processor, unit), received_ms // HOUR_MS
         if not event.payload or not unit or (key not in self._kept_hours and len(self._kept_hours) >= UNITS_MAX):
             return

@@ -17,9 +17,8 @@ from cnctwin.errors import UsageError
 from sparkplug.broker import BrokerAddress
 from sparkplug.host import HostApplication
 from sparkplug.host_session import EventKind
+from twin.vocabulary.topics import ALERT_COMMAND, ALERT_STATE
 
-STATE = "cnctwin/alerts/state"
-COMMAND = "cnctwin/alerts/command/"
 FRESH_S_MAX = 150.0  # the state comes once a minute
 
 
@@ -36,7 +35,7 @@ class Desk:
         deadline_s = time.monotonic() + seconds
         while True:
             for event in self.host.poll(0.05):
-                if event.kind is EventKind.PLAIN and event.topic == STATE and event.payload:
+                if event.kind is EventKind.PLAIN and event.topic == ALERT_STATE and event.payload:
                     self.state = _parsed(event.payload)
             if (value := true()) or time.monotonic() > deadline_s:
                 return value or None
@@ -45,7 +44,7 @@ class Desk:
         """Give a command and wait for what becomes of it. Raises UsageError where it is not done."""
         key = uuid4().hex[:16]
         payload = json.dumps({"id": key, **fields}, ensure_ascii=False).encode()
-        if not self.host.publish_plain(COMMAND + name, payload, qos=1):
+        if not self.host.publish_plain(ALERT_COMMAND + name, payload, qos=1):
             raise UsageError(f"the connection to {self.url} was lost; try again")
 
         def outcome() -> Any:
@@ -64,7 +63,7 @@ def alert_desk(given: BrokerAddress | None, wait_s: float) -> Iterator[Desk]:
     """Connect and wait for the state. Raises UsageError where there is none, or one that is not kept up."""
     where = given or BrokerAddress()
     host = HostApplication(where, f"alerts-{os.getpid()}", (), publish_state=False)
-    host.subscribe_plain(STATE)
+    host.subscribe_plain(ALERT_STATE)
     host.start()
     try:
         desk = Desk(host, where.url)

@@ -11,8 +11,9 @@ from sparkplug.broker import BrokerAddress
 from sparkplug.host import HostApplication
 from sparkplug.metric import Reading
 from sparkplug.quality import Quality
+from twin.vocabulary.nodes import VALIDATION_NODE
 
-COME_AND_GO = ("twin-validation",)  # nodes that tell what they have found, and end
+COME_AND_GO = (VALIDATION_NODE,)  # nodes that tell what they have found, and end
 
 
 @dataclass(frozen=True, slots=True)

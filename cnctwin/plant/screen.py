@@ -12,9 +12,10 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
-from cnctwin.plant.view import TWIN_PREFIX, MachineView, StageLedger, text
+from cnctwin.plant.view import MachineView, StageLedger, text
 from sparkplug.metric import Reading
 from sparkplug.quality import Quality
+from twin.vocabulary import twin_signals
 
 # Most telling first; what is not in the list follows by name.
 FIRST = (
@@ -52,7 +53,14 @@ def line(machines: Sequence[MachineView], ledgers: Sequence[StageLedger]) -> str
     parts = []
     for machine in machines:
         values = {**machine.measured, **machine.twin}
-        shown = ("exec_state", "tool_number", "spindle_rpm", "spindle_load_pct", "twin/spindle_temp_c", "twin/cutting_force_n")
+        shown = (
+            "exec_state",
+            "tool_number",
+            "spindle_rpm",
+            "spindle_load_pct",
+            twin_signals.SPINDLE_TEMP_C,
+            twin_signals.CUTTING_FORCE_N,
+        )
         told = ", ".join(f"{name} {text(values[name])}" for name in shown if name in values)
         change = values.get("tool_change_active")
         parts.append(f"{machine.name}: {told}{', TOOL CHANGE' if change is not None and change.value is True else ''}")
@@ -91,7 +99,7 @@ def _machine(machine: MachineView) -> Panel:
             Text(order[row] if reading else ""),
             _cell(reading),
             _clock(reading),
-            Text(beside.name.removeprefix(TWIN_PREFIX) if beside else ""),
+            Text(beside.name.removeprefix(twin_signals.TWIN_PREFIX) if beside else ""),
             _cell(beside),
         )
     state = "[green]online[/]" if machine.online else "[red]offline: values are stale[/]"

@@ -3,14 +3,12 @@
 from dataclasses import dataclass
 from typing import Protocol
 
-from cnctwin.jobs.announcer import NODE as JOBS_NODE
 from sparkplug.metric import NodeId, Reading
 from sparkplug.node_picture import NodePicture
 from sparkplug.quality import Quality
-
-TWIN_PREFIX = "twin/"
-_LEDGER = "ledger/"
-_REASON = "ledger/dropped/"
+from twin.vocabulary.node_ledger import BUFFERED, DROPPED, DROPPED_PREFIX, EMITTED, LEDGER_PREFIX, RECEIVED
+from twin.vocabulary.nodes import JOBS_NODE, is_twin_node
+from twin.vocabulary.twin_signals import TWIN_PREFIX
 
 
 class Pictures(Protocol):
@@ -78,22 +76,24 @@ def ledgers(pictures: Pictures) -> list[StageLedger]:
     """The ledger of each node that publishes one; edges first, then the processors."""
     found = []
     for picture in _pictures(pictures):
-        values = {name: reading.value for name, reading in picture.own.readings.items() if name.startswith(_LEDGER)}
-        if f"{_LEDGER}received" not in values:
+        values = {name: reading.value for name, reading in picture.own.readings.items() if name.startswith(LEDGER_PREFIX)}
+        if RECEIVED not in values:
             continue
         counts = {name: value if isinstance(value, int) else 0 for name, value in values.items()}
         found.append(
             StageLedger(
                 node=picture.node.node,
                 online=picture.online,
-                received=counts[f"{_LEDGER}received"],
-                emitted=counts.get(f"{_LEDGER}emitted", 0),
-                buffered=counts.get(f"{_LEDGER}buffered", 0),
-                dropped=counts.get(f"{_LEDGER}dropped", 0),
-                reasons={name.removeprefix(_REASON): n for name, n in counts.items() if name.startswith(_REASON) and n},
+                received=counts[RECEIVED],
+                emitted=counts.get(EMITTED, 0),
+                buffered=counts.get(BUFFERED, 0),
+                dropped=counts.get(DROPPED, 0),
+                reasons={
+                    name.removeprefix(DROPPED_PREFIX): n for name, n in counts.items() if name.startswith(DROPPED_PREFIX) and n
+                },
             )
         )
-    return sorted(found, key=lambda ledger: (ledger.node.startswith("twin-"), ledger.node))
+    return sorted(found, key=lambda ledger: (is_twin_node(ledger.node), ledger.node))
 
 
 def health(pictures: Pictures) -> dict[str, dict[str, Reading]]:

@@ -12,13 +12,14 @@ from cnctwin.plant.screen import line, screen
 from cnctwin.plant.view import MachineView, ledgers, machines
 from sparkplug.broker import BrokerAddress
 from sparkplug.host import HostApplication, HostEvent
+from sparkplug.topics import group_filter
 
 PLAIN_LINE_S = 5.0
 
 
 def viewer(broker: BrokerAddress, group: str) -> HostApplication:
     """A host application that only looks: it publishes no STATE, so nobody waits for it."""
-    return HostApplication(broker, f"view-{os.getpid()}", (f"spBv1.0/{group}/#",), publish_state=False)
+    return HostApplication(broker, f"view-{os.getpid()}", (group_filter(group),), publish_state=False)
 
 
 def show(

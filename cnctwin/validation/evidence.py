@@ -13,10 +13,11 @@ from cnctwin.validation.clock import Clock, Pair, placed
 from cnctwin.validation.track import Floats, Track
 from sparkplug.quality import Quality
 from twin.runlog import RunLog
+from twin.vocabulary import twin_signals
 
 TEMPERATURE, AMBIENT, SPEED, LOAD = "spindle_temp_c", "ambient_temp_c", "spindle_rpm", "spindle_load_pct"
 VIBRATION, COOLANT, TOOL = "vibration_rms_g", "coolant_on", "tool_number"
-MODELLED, FORCE, SHAKEN = "twin/spindle_temp_c", "twin/cutting_force_n", "twin/vibration_rms_g"
+MODELLED, FORCE, SHAKEN = twin_signals.SPINDLE_TEMP_C, twin_signals.CUTTING_FORCE_N, twin_signals.VIBRATION_RMS_G
 RESULTANT = "resultant_n"
 SLOW_MS, FAST_MS = 10_000, 1_000
 SLOW = (TEMPERATURE, AMBIENT, MODELLED)
@@ -59,7 +60,7 @@ def of_store(store: Store, machine: str, from_ms: int, to_ms: int, source: str) 
     for names, every_ms in ((SLOW, SLOW_MS), (FAST, FAST_MS)):
         for column in store.query(Query(machine, names, from_ms, to_ms, every_ms)):
             tracks[column.signal] = track_of(column, every_ms / 1000.0)
-    twin = {name: track for name, track in tracks.items() if name.startswith("twin/")}
+    twin = {name: track for name, track in tracks.items() if name.startswith(twin_signals.TWIN_PREFIX)}
     told = {name: track for name, track in tracks.items() if name not in twin}
     return Evidence(source, machine, from_ms / 1000.0, to_ms / 1000.0, source, told, twin)
 

@@ -16,11 +16,11 @@ from sparkplug.edge_node import EdgeNode
 from sparkplug.host import HostApplication
 from sparkplug.metric import Change, MetricSpec, NodeId
 from sparkplug.quality import Quality
+from twin.vocabulary.nodes import VALIDATION_NODE
+from twin.vocabulary.topics import VALIDATION, VALIDATION_BARRIER
+from twin.vocabulary.twin_signals import TWIN_PREFIX
 
-NODE = "twin-validation"
-PREFIX = "twin/validation/"
-PLAIN = "cnctwin/validation/"
-BARRIER = "cnctwin/validation-barrier"
+PREFIX = f"{TWIN_PREFIX}validation/"
 PLAIN_NIGHTS = 7
 WAIT_S_MAX = 10.0
 NAMES = (
@@ -64,7 +64,10 @@ def publish(told: Mapping[str, Any], broker: BrokerAddress, group: str, session_
     specs, changes = metrics(told)
     confirmed: list[int] = []
     node = EdgeNode(
-        *(broker, NodeId(group, NODE)), session_file=session_file, barrier_topic=BARRIER, on_confirmed=confirmed.append
+        *(broker, NodeId(group, VALIDATION_NODE)),
+        session_file=session_file,
+        barrier_topic=VALIDATION_BARRIER,
+        on_confirmed=confirmed.append,
     )
     machine = str(told["machine"])
     node.declare_device(machine, specs)
@@ -83,7 +86,7 @@ def publish(told: Mapping[str, Any], broker: BrokerAddress, group: str, session_
 
 def _publish_plain(told: Mapping[str, Any], broker: BrokerAddress) -> None:
     host = HostApplication(broker, "validation-plain", (), publish_state=False)
-    topic = PLAIN + str(told["machine"]).translate({ord(letter): "_" for letter in "/+#"})
+    topic = VALIDATION + str(told["machine"]).translate({ord(letter): "_" for letter in "/+#"})
     payload = json.dumps(told, ensure_ascii=False, allow_nan=False).encode()
     heard: list[bytes] = []
     host.subscribe_plain(topic)

@@ -18,9 +18,10 @@ from edge.sample import EdgeSample, Gap, SampleSet
 from sparkplug.datatype import DataType
 from sparkplug.metric import Change, MetricSpec
 from sparkplug.quality import Quality
+from twin.vocabulary.signals import VIBRATION_BLOCK_G, VIBRATION_SAMPLE_RATE_HZ
 
 RMS, VELOCITY = "vibration_rms_g", "vibration_velocity_mm_s"
-BLOCK, RATE = "vibration_block_g", "vibration_sample_rate_hz"
+BLOCK, RATE = VIBRATION_BLOCK_G, VIBRATION_SAMPLE_RATE_HZ
 BLOCK_METRICS = (
     MetricSpec(BLOCK, DataType.FLOAT_ARRAY, "g", is_transient=True),
     MetricSpec(RATE, DataType.DOUBLE, "Hz"),

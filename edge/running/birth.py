@@ -5,10 +5,11 @@ from dataclasses import replace
 
 from edge.clock import offset as clock
 from edge.sample import EdgeSample, Offer
-from edge.signals import DERIVED, Kind, signal
+from edge.signals import signal
 from edge.tool_change import CUE
 from sparkplug.datatype import DataType
 from sparkplug.metric import MetricSpec
+from twin.vocabulary.signals import DERIVED, Kind
 
 DATATYPES = {Kind.NUMBER: DataType.DOUBLE, Kind.INTEGER: DataType.INT64, Kind.TEXT: DataType.STRING, Kind.FLAG: DataType.BOOLEAN}
 

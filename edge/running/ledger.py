@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from edge.sample import Drop
 from sparkplug.datatype import DataType
 from sparkplug.metric import Change, MetricSpec
+from twin.vocabulary.node_ledger import BUFFERED, DROPPED, DROPPED_PREFIX, EMITTED, RECEIVED
 
 
 class Ledger:
@@ -50,17 +51,17 @@ class Ledger:
         """All counters by metric name."""
         with self._lock:
             counters = {
-                "ledger/received": self._received,
-                "ledger/emitted": self._emitted,
-                "ledger/buffered": self._queued + self._held + self._stored,
-                "ledger/dropped": sum(self._dropped.values()),
+                RECEIVED: self._received,
+                EMITTED: self._emitted,
+                BUFFERED: self._queued + self._held + self._stored,
+                DROPPED: sum(self._dropped.values()),
             }
-            return counters | {f"ledger/dropped/{reason}": number for reason, number in self._dropped.items()}
+            return counters | {f"{DROPPED_PREFIX}{reason}": number for reason, number in self._dropped.items()}
 
     @staticmethod
     def difference(counters: Mapping[str, int]) -> int:
         """What is missing in a snapshot; anything but 0 is a bug of ours."""
-        return counters["ledger/received"] - counters["ledger/emitted"] - counters["ledger/dropped"] - counters["ledger/buffered"]
+        return counters[RECEIVED] - counters[EMITTED] - counters[DROPPED] - counters[BUFFERED]
 
     def metrics(self) -> list[MetricSpec]:
         """For the birth certificate."""

@@ -21,7 +21,7 @@ from edge import tool_change
 from edge.config import EdgeConfig, SignalSection
 from edge.running import report_by_exception
 from edge.sample import Drop, EdgeSample, SampleSet
-from edge.signals import DERIVED
+from twin.vocabulary.signals import DERIVED
 
 _log = logging.getLogger(__name__)
 _DEFAULT = SignalSection()

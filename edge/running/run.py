@@ -22,9 +22,7 @@ from sparkplug.edge_node import EdgeNode
 from sparkplug.edge_session import Command
 from sparkplug.errors import SparkplugError
 from sparkplug.metric import NodeId
-
-BARRIER = "cnctwin/barrier"
-"""Below it each edge node publishes its barriers, QoS 1; nobody has to read them."""
+from twin.vocabulary.topics import edge_barrier
 
 
 def broker_address(section: BrokerSection, path: Path) -> BrokerAddress:
@@ -82,7 +80,7 @@ def edge_runtime(
         [*HEALTH, *clock.HEALTH, *(accelerometer.HEALTH if config.accelerometer.url else ()), *ledger.metrics()],
         session_file=Path(broker.session_file) if broker.session_file else None,
         primary_host=broker.primary_host or None,
-        barrier_topic=f"{BARRIER}/{broker.group}/{config.node}",
+        barrier_topic=edge_barrier(broker.group, config.node),
         on_confirmed=confirmed,
         on_command=commanded,
     )

@@ -10,13 +10,14 @@ from typing import Any
 
 from processors.alerts.config import AlertsConfig
 from processors.alerts.state import Alert, Item, Phase, Severity, labels_of
+from twin.vocabulary import topics
 
 ALERTS_A_BODY_MAX = 50
 TEXT_MAX = 2000
 TITLE_MAX = 200
 NOT_YET_S = -1e9  # of an item that was not emitted yet
 NEVER = "0001-01-01T00:00:00Z"  # how Go writes no time, and Alertmanager an alert that has no end yet
-OUTBOX = "cnctwin/alerts/outbox/"
+OUTBOX = topics.ALERT_OUTBOX
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,10 +10,11 @@ from processors.alerts.quiet import QuietHours
 from processors.alerts.receivers import AnyReceiver, Escalation, Heartbeat
 from processors.alerts.state import Severity
 from processors.config import CellConfig
+from twin.vocabulary import twin_signals
 
-RULES = ("twin/rule_load_over_limit", "twin/rule_thermal_runaway", "twin/rule_load_without_feed", "twin/rule_vibration")
-SCORE = "twin/anomaly_alarm"
-GAP, DRIFT = "twin/gap_growing", "twin/score_drift"
+RULES = twin_signals.RULES
+SCORE = twin_signals.ANOMALY_ALARM
+GAP, DRIFT = twin_signals.GAP_GROWING, twin_signals.SCORE_DRIFT
 ALARM_SIGNALS = (*RULES, SCORE, GAP, DRIFT)
 MACHINE_OFFLINE, SOURCE_LOST = "machine_offline", "alarm_source_lost"
 RECEIVERS_MAX = 20

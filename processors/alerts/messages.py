@@ -38,9 +38,10 @@ from processors.alerts.state import (
     Silence,
     fingerprint,
 )
+from twin.vocabulary import topics
 
-TOPIC = "cnctwin/alerts/"
-COMMAND, DELIVERY, OUTBOX = f"{TOPIC}command/", f"{TOPIC}delivery/", f"{TOPIC}outbox/"
+TOPIC = topics.ALERTS
+COMMAND, DELIVERY, OUTBOX = topics.ALERT_COMMAND, topics.ALERT_DELIVERY, topics.ALERT_OUTBOX
 MESSAGE_BYTES_MAX = 4096
 OUTBOX_BYTES_MAX = 200_000
 SILENCE_S_MAX = 30 * 86_400.0

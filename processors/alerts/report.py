@@ -8,15 +8,17 @@ from typing import Any
 
 from processors.alerts.body import as_alert, iso
 from processors.alerts.config import AlertsConfig
-from processors.alerts.messages import DELIVERY, FAILED, OUTBOX, TOPIC, settled
+from processors.alerts.messages import DELIVERY, FAILED, OUTBOX, settled
 from processors.alerts.notices import silenced_alerts
 from processors.alerts.phases import flaps
 from processors.alerts.state import Alert, AlertsState, Item, Phase, ReceiverState, Silence
 from processors.config import Configuration
-from processors.contract import TWIN_PREFIX, Output, PlainOutput
+from processors.contract import Output, PlainOutput
+from twin.vocabulary import topics
+from twin.vocabulary.twin_signals import ALERT_STATE, TWIN_PREFIX
 
-STATE, FIRING, SUMMARY = f"{TWIN_PREFIX}alert_state", f"{TWIN_PREFIX}alerts_firing", f"{TWIN_PREFIX}alert_summary"
-STATE_TOPIC = f"{TOPIC}state"
+STATE, FIRING, SUMMARY = ALERT_STATE, f"{TWIN_PREFIX}alerts_firing", f"{TWIN_PREFIX}alert_summary"
+STATE_TOPIC = topics.ALERT_STATE
 SHOWN_MAX = 1000
 SUMMARY_MAX = 500
 EMIT_AGAIN_S = 30.0  # an outbox item of unknown fate: the message may have been lost

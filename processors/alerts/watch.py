@@ -8,11 +8,10 @@ from processors.alerts.config import ALARM_SIGNALS, MACHINE_OFFLINE, RULES, SOUR
 from processors.alerts.phases import Beat, Condition, advanced, begun, condition_of, raised
 from processors.alerts.state import ALERTS_MAX, Alert, AlertsState, Phase, Severity, fingerprint, labels_of
 from processors.config import Configuration
-from processors.contract import TWIN_PREFIX
 from sparkplug.metric import Reading
 from sparkplug.quality import Quality
+from twin.vocabulary.twin_signals import SEVERITY, TWIN_PREFIX
 
-SEVERITY = f"{TWIN_PREFIX}severity"
 PROGRAM, TOOL = "program", "tool_number"
 INPUTS = frozenset({*ALARM_SIGNALS, SEVERITY, PROGRAM, TOOL})
 SEEN_S_MAX = 5.0  # of one beat: what lies between two that are further apart was not watched

@@ -14,7 +14,7 @@ from typing import NamedTuple
 from pydantic import Field
 
 from processors.config import ProcessorConfig
-from processors.contract import TWIN_PREFIX, Output, OutputSpec, Processor, Provenance, Sample, SampleKind
+from processors.contract import Output, OutputSpec, Processor, Provenance, Sample, SampleKind
 from processors.events.execution import (
     ACTIVE,
     ALARM,
@@ -40,12 +40,13 @@ from processors.events.record import record
 from processors.events.run import FLAGS, FORCE, VIBRATION, Run, begun, followed, lasted, why_standing
 from processors.events.share import Shares, share_pct, with_time
 from sparkplug.datatype import DataType
+from twin.vocabulary.twin_signals import PART_RECORD, STOP_REASON, TWIN_PREFIX
 
 STATE, SINCE, STATE_BASIS = f"{TWIN_PREFIX}execution_state", f"{TWIN_PREFIX}execution_since", f"{TWIN_PREFIX}execution_basis"
 CYCLE, NUMBER, CYCLE_PROGRAM = f"{TWIN_PREFIX}cycle_time_s", f"{TWIN_PREFIX}cycle_number", f"{TWIN_PREFIX}cycle_program"
 INTERRUPTED = f"{TWIN_PREFIX}interrupted_s"
 UTILISATION, TODAY = f"{TWIN_PREFIX}utilisation_pct", f"{TWIN_PREFIX}utilisation_today_pct"
-STOP, STOP_S, PART = f"{TWIN_PREFIX}stop_reason", f"{TWIN_PREFIX}stop_s", f"{TWIN_PREFIX}part_record"
+STOP, STOP_S, PART = STOP_REASON, f"{TWIN_PREFIX}stop_s", PART_RECORD
 WATCHED = frozenset({EXECUTION, PROGRAM, MODE, ALARM, CHANGING, FEED_OVERRIDE})
 AT_ONCE = frozenset({TOOL, FORCE, *VIBRATION, *FLAGS})
 TOLD_EVERY_S = 60.0

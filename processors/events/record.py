@@ -15,6 +15,7 @@ from processors.events.execution import OVERRIDES
 from processors.events.run import BASES, FIGURES, FORCE, GAPS, OTHER_TOOLS, SCORE, TEMPERATURE, VIBRATION, Figure, Run, ToolUse
 from processors.sample import Sample
 from sparkplug.quality import Quality
+from twin.vocabulary.twin_signals import TWIN_PREFIX
 
 VERSION = 1
 BYTES_MAX = 16_000
@@ -81,9 +82,9 @@ def _document(run: Run, sample: Sample, *, number: int, ended_by: str, is_end_se
         "vibration": None
         if vibration is None
         else {"signal": vibration, "unit": "mm/s", **(_figure(run.figures[vibration]) or {})},
-        "gap": {name.removeprefix("twin/"): _gap(run.figures[name]) for name in GAPS if name in run.figures},
+        "gap": {name.removeprefix(TWIN_PREFIX): _gap(run.figures[name]) for name in GAPS if name in run.figures},
         "score": _figure(run.figures.get(SCORE)),
-        "alarms": [{"flag": one.flag.removeprefix("twin/"), "at": _utc(one.at_ms)} for one in run.raised],
+        "alarms": [{"flag": one.flag.removeprefix(TWIN_PREFIX), "at": _utc(one.at_ms)} for one in run.raised],
         "alarms_not_listed": run.raised_more,
         "overrides": {name: _figure(run.figures[name]) for name in OVERRIDES if name in run.figures},
         "twin": _bases(sample),
@@ -148,12 +149,12 @@ def _bases(sample: Sample) -> dict[str, str]:
     for name in BASES:
         reading = sample.row.get(name)
         if reading is not None and reading.quality is Quality.GOOD and isinstance(reading.value, str):
-            found[name.removeprefix("twin/")] = reading.value[:BASIS_MAX]
+            found[name.removeprefix(TWIN_PREFIX)] = reading.value[:BASIS_MAX]
     return found
 
 
 def _whose(name: str) -> str:
-    return "inferred" if name.startswith("twin/") else "measured"
+    return "inferred" if name.startswith(TWIN_PREFIX) else "measured"
 
 
 def _rounded(value: float) -> float | None:

@@ -11,24 +11,28 @@ from processors.events.execution import ACTIVE, OVERRIDES, is_changing_tool, sto
 from processors.sample import Sample, SampleKind
 from sparkplug.metric import Reading
 from sparkplug.quality import Quality
+from twin.vocabulary import twin_signals
 
-TEMPERATURE, FORCE, SCORE = "spindle_temp_c", "twin/cutting_force_n", "twin/adjusted_score"
-VIBRATION = ("vibration_velocity_mm_s", "twin/vibration_velocity_mm_s")
+TEMPERATURE, FORCE, SCORE = "spindle_temp_c", twin_signals.CUTTING_FORCE_N, twin_signals.ADJUSTED_SCORE
+VIBRATION = ("vibration_velocity_mm_s", twin_signals.VIBRATION_VELOCITY_MM_S)
 GAPS = (
-    "twin/gap_spindle_temp_c",
-    "twin/gap_spindle_load_pct",
-    "twin/gap_spindle_rpm",
-    *(f"twin/gap_axis_{axis}_load_pct" for axis in "xyzabc"),
+    f"{twin_signals.GAP_PREFIX}spindle_temp_c",
+    f"{twin_signals.GAP_PREFIX}spindle_load_pct",
+    f"{twin_signals.GAP_PREFIX}spindle_rpm",
+    *(f"{twin_signals.GAP_PREFIX}axis_{axis}_load_pct" for axis in "xyzabc"),
 )
 FLAGS = (
-    "twin/anomaly_alarm",
-    "twin/gap_growing",
-    "twin/rule_load_over_limit",
-    "twin/rule_thermal_runaway",
-    "twin/rule_load_without_feed",
-    "twin/rule_vibration",
+    twin_signals.ANOMALY_ALARM,
+    twin_signals.GAP_GROWING,
+    *twin_signals.RULES,
 )
-BASES = ("twin/spindle_temp_basis", "twin/cutting_force_basis", "twin/gap_basis", "twin/anomaly_basis", "twin/residual_basis")
+BASES = (
+    twin_signals.SPINDLE_TEMP_BASIS,
+    twin_signals.CUTTING_FORCE_BASIS,
+    twin_signals.GAP_BASIS,
+    twin_signals.ANOMALY_BASIS,
+    twin_signals.RESIDUAL_BASIS,
+)
 FIGURES = (TEMPERATURE, SCORE, *VIBRATION, *OVERRIDES, *GAPS)
 TOOLS_MAX, REASONS_MAX, FLAGS_MAX, PROFILE_MAX = 24, 12, 40, 240
 OTHER_TOOLS = -1

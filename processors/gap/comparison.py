@@ -23,10 +23,11 @@ from processors.tool_change_detector.context import ACTIVE as CHANGE
 from processors.tool_change_detector.context import DETECTED, STALE, tool_change_context
 from processors.tool_change_detector.context import NONE as NOBODY
 from sparkplug.quality import Quality
+from twin.vocabulary import twin_signals
 
 SPEED, COMMAND, FEED = "spindle_rpm", "spindle_rpm_cmd", "feed_mm_min"
 LOAD, TEMPERATURE = "spindle_load_pct", "spindle_temp_c"
-RESIDUAL, RISE = "twin/spindle_temp_residual_k", "twin/spindle_temp_rise_k"
+RESIDUAL, RISE = twin_signals.SPINDLE_TEMP_RESIDUAL_K, twin_signals.SPINDLE_TEMP_RISE_K
 CHANGE_SOURCE = "tool_change_source"
 EXECUTION, PROGRAM = "exec_state", "program"
 AXIS_LOADS = tuple(f"axis_{letter}_load_pct" for letter in "xyzabc")

@@ -18,7 +18,7 @@ from typing import Self
 from pydantic import AwareDatetime, Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from processors.config import ProcessorConfig
-from processors.contract import TWIN_PREFIX, Output, OutputSpec, Processor, Provenance, Sample, SampleKind
+from processors.contract import Output, OutputSpec, Processor, Provenance, Sample, SampleKind
 from processors.gap.cell import Cell, Moments, Terms, closed, seen
 from processors.gap.comparison import (
     INPUTS,
@@ -38,10 +38,11 @@ from processors.gap.comparison import (
 from processors.gap.growth import BLOCKS_MIN
 from sparkplug.datatype import DataType
 from sparkplug.quality import Quality
+from twin.vocabulary import twin_signals
 
-GAP = f"{TWIN_PREFIX}gap_"
-GROWING, GROWING_SIGNAL, WINDOW = f"{GAP}growing", f"{GAP}growing_signal", f"{GAP}window"
-BASIS, LEFT_OUT = f"{GAP}basis", f"{GAP}left_out_pct"
+GAP, GROWING = twin_signals.GAP_PREFIX, twin_signals.GAP_GROWING
+GROWING_SIGNAL, WINDOW = twin_signals.GAP_GROWING_SIGNAL, twin_signals.GAP_WINDOW
+BASIS, LEFT_OUT = twin_signals.GAP_BASIS, twin_signals.GAP_LEFT_OUT_PCT
 NAMES = {
     signal: {f"{GAP}{signal}": ""} | {f"{GAP}{signal}/{regime}": regime for regime in regimes if len(regimes) > 1}
     for signal, regimes in REGIMES.items()

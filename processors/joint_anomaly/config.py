@@ -13,6 +13,7 @@ from processors.joint_anomaly.gate import GateRule
 from processors.joint_anomaly.member import Seat
 from twin.anomaly.common_mode import CommonModeRule, Method
 from twin.errors import TwinError
+from twin.vocabulary import twin_signals
 
 if TYPE_CHECKING:
     from twin.anomaly.model import AnomalyModel, Calibration
@@ -30,8 +31,9 @@ NUMBERS = frozenset(
         *("feed_override_pct", "rapid_override_pct", "spindle_override_pct", "spindle_temp_c", "ambient_temp_c"),
         *("vibration_rms_g", "vibration_velocity_mm_s"),
         *(f"axis_{axis}_load_pct" for axis in "xyzabc"),
-        *("twin/vibration_rms_g", "twin/vibration_velocity_mm_s", "twin/vibration_crest_factor", "twin/vibration_kurtosis"),
-        *("twin/spindle_temp_residual_k", "twin/cutting_force_n"),
+        *(twin_signals.VIBRATION_RMS_G, twin_signals.VIBRATION_VELOCITY_MM_S),
+        *(twin_signals.VIBRATION_CREST_FACTOR, twin_signals.VIBRATION_KURTOSIS),
+        *(twin_signals.SPINDLE_TEMP_RESIDUAL_K, twin_signals.CUTTING_FORCE_N),
     }
 )
 """What a model may have as features."""

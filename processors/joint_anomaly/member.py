@@ -11,13 +11,14 @@ from processors.joint_anomaly.score_drift import Drift, drifted
 from sparkplug.quality import Quality
 from twin.anomaly.alarm import AlarmRule, AlarmState, after_tick
 from twin.anomaly.preparation import Smoothed
+from twin.vocabulary import twin_signals
 
 if TYPE_CHECKING:
     from twin.anomaly.model import AnomalyModel, Calibration
 
-ADJUSTED, COMMON, GATE = "twin/adjusted_score", "twin/common_mode", "twin/tool_change_gate"
+ADJUSTED, COMMON, GATE = twin_signals.ADJUSTED_SCORE, twin_signals.COMMON_MODE, twin_signals.TOOL_CHANGE_GATE
 GATE_SOURCE, PEER, PEERS = "twin/tool_change_gate_source", "twin/common_mode_peer", "twin/common_mode_peers"
-ALARM, GATED_SHARE = "twin/anomaly_alarm", "twin/gated_share_pct"
+ALARM, GATED_SHARE = twin_signals.ANOMALY_ALARM, twin_signals.GATED_SHARE_PCT
 SHARE_S = 7 * 86_400.0
 NO_MODEL = "no model for this machine; cnctwin train anomaly makes one"
 NO_THRESHOLD = "the model has no threshold; cnctwin train anomaly fits one, or configure threshold"

@@ -49,8 +49,9 @@ from sparkplug.quality import Quality
 from twin.anomaly.alarm import AlarmRule
 from twin.anomaly.common_mode import Method, adjust_frame, standardised
 from twin.anomaly.preparation import CONTEXT, Preparation, standardised_row
+from twin.vocabulary import twin_signals
 
-RAW, THRESHOLD, BASIS = "twin/raw_score", "twin/anomaly_threshold", "twin/anomaly_basis"
+RAW, THRESHOLD, BASIS = twin_signals.RAW_SCORE, twin_signals.ANOMALY_THRESHOLD, twin_signals.ANOMALY_BASIS
 CLOCK_OFFSET, STAMP_CLOCK = "clock_offset_s", "stamp_clock"
 BY_EDGE = "edge"  # the control gives no stamps: its samples carry the edge's time, whatever its own clock shows
 _VALUE, _QUALITY = Reading._fields.index("value"), Reading._fields.index("quality")

@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from processors.contract import Output
 from processors.gap.growth import Baseline, Chart, charted, learned, rule_of
+from twin.vocabulary import twin_signals
 
 if TYPE_CHECKING:
     from twin.anomaly.calibration import Calibration
 
-DRIFT = "twin/score_drift"
+DRIFT = twin_signals.SCORE_DRIFT
 BLOCK_S = 3600.0
 JUDGED_S_MIN = 600.0  # of an hour, for its mean to count
 FALSE_ALARMS_A_YEAR = 0.5

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import NamedTuple
 
-from processors.contract import TWIN_PREFIX, Output, OutputSpec, Processor, Provenance, Sample, SampleKind
+from processors.contract import Output, OutputSpec, Processor, Provenance, Sample, SampleKind
 from processors.rules.alarm import IDLE, Judgement, Latch, Stand, Timing, latched, rested
 from processors.rules.spindle import (
     EXECUTION,
@@ -31,10 +31,10 @@ from processors.rules.temperature import followed as trend_followed
 from processors.rules.vibration import RAMPS, SOURCES, STANDS, VibrationLimits, Zone, velocity, vibration, zone_of
 from processors.sample import why_unknown
 from sparkplug.datatype import DataType
+from twin.vocabulary import twin_signals
 
-ANOMALY = f"{TWIN_PREFIX}anomaly_alarm"
-RULE = f"{TWIN_PREFIX}rule_"
-ZONE, SEVERITY, DETAIL = f"{TWIN_PREFIX}vibration_zone", f"{TWIN_PREFIX}severity", f"{RULE}detail"
+ANOMALY, RULE = twin_signals.ANOMALY_ALARM, twin_signals.RULE_PREFIX
+ZONE, SEVERITY, DETAIL = "twin/vibration_zone", twin_signals.SEVERITY, twin_signals.RULE_DETAIL
 NONE, MEDIUM, HIGH = "none", "medium", "high"
 
 

@@ -17,10 +17,9 @@ from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 from processors.config import ProcessorConfig
 from processors.rules.alarm import Judgement, Stand, over_under
 from processors.sample import Sample, why_unknown
+from twin.vocabulary.bounds import SPINDLE_LOAD_PCT_MAX, SPINDLE_RPM_MAX
 
 LOAD, SPEED, FEED, EXECUTION = "spindle_load_pct", "spindle_rpm", "feed_mm_min", "exec_state"
-LOAD_PCT_MAX = 1000.0
-RPM_MAX = 200_000.0
 REPORT_S_MIN, REPORT_S_MAX = 0.1, 1.0
 EXCUSED = Judgement(Stand.EXCUSED)
 
@@ -78,7 +77,7 @@ class Motion(NamedTuple):
 def followed(spindle: Spindle, limits: SpindleLimits, sample: Sample) -> Spindle:
     """The spindle as of this sample."""
     rpm, reason = sample.number(SPEED)
-    if rpm is None or abs(rpm) > RPM_MAX:
+    if rpm is None or abs(rpm) > SPINDLE_RPM_MAX:
         why_not = reason or f"{SPEED} is beyond any spindle"
         return spindle if spindle.rpm is None and spindle.why_not == why_not else Spindle(None, why_not, sample.at_s)
     if spindle.rpm is None:
@@ -137,7 +136,7 @@ def _load(sample: Sample) -> tuple[float | None, str]:
     load_pct, reason = sample.number(LOAD)
     if load_pct is None:
         return None, reason or ""
-    return (None, f"{LOAD} is beyond any spindle") if abs(load_pct) > LOAD_PCT_MAX else (abs(load_pct), "")
+    return (None, f"{LOAD} is beyond any spindle") if abs(load_pct) > SPINDLE_LOAD_PCT_MAX else (abs(load_pct), "")
 
 
 def _is_running(limits: SpindleLimits, sample: Sample) -> tuple[bool | None, str]:

@@ -20,9 +20,10 @@ from processors.config import ProcessorConfig
 from processors.rules.alarm import Judgement, Stand
 from processors.rules.spindle import EXCUSED, Motion
 from processors.sample import Sample
+from twin.vocabulary.twin_signals import VIBRATION_VELOCITY_MM_S
 
 VELOCITY = "vibration_velocity_mm_s"
-SOURCES = (VELOCITY, f"twin/{VELOCITY}")
+SOURCES = (VELOCITY, VIBRATION_VELOCITY_MM_S)
 """The edge's figure; else that of processor `vibration`."""
 VELOCITY_MM_S_MAX = 1000.0
 STANDS = "the spindle stands still"

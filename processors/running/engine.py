@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from operator import itemgetter
 
 from processors.config import ALL, CellConfig, Configuration, ProcessorConfig
-from processors.contract import TWIN_NODE_PREFIX, CellProcessor
+from processors.contract import CellProcessor
 from processors.discovery import AnyProcessor
 from processors.effects import Declare, Effect, PublishPlain, Remove
 from processors.errors import SnapshotError
@@ -22,6 +22,7 @@ from processors.running.snapshot import SnapshotCodec
 from processors.sample import Sample, SampleKind
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId, Reading
+from twin.vocabulary.nodes import is_twin_node
 
 MACHINES_MAX = 1000
 SIGNALS_MAX = 5000
@@ -56,11 +57,7 @@ class _Machine:
     @property
     def is_online(self) -> bool:
         """Whether an edge of it is."""
-        return any(not _is_twin(node) for node in self.online)
-
-
-def _is_twin(node: NodeId) -> bool:
-    return node.node.startswith(TWIN_NODE_PREFIX)
+        return any(not is_twin_node(node.node) for node in self.online)
 
 
 class Engine:
@@ -282,7 +279,7 @@ class Engine:
 
     def _is_of_twin(self, node: NodeId) -> bool:
         """Whether only what is an input tells this processor the time: another processor may stamp by the wall's clock."""
-        return self._processor.inputs is not None and _is_twin(node)
+        return self._processor.inputs is not None and is_twin_node(node.node)
 
     def _data(self, machine: _Machine, event: HostEvent, wall_s: float, effects: list[Effect]) -> None:
         readings: tuple[Reading, ...] | list[Reading] = event.readings

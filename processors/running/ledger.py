@@ -3,6 +3,8 @@
 from collections import Counter
 from enum import Enum
 
+from twin.vocabulary.node_ledger import BUFFERED, DROPPED, DROPPED_PREFIX, EMITTED, RECEIVED
+
 
 class DropReason(Enum):
     """Why a message of a device led to nothing."""
@@ -52,9 +54,9 @@ class Ledger:
     def metrics(self) -> dict[str, int]:
         """The ledger by metric name; every reason is there, also at 0."""
         counts = {
-            "ledger/received": self.received,
-            "ledger/emitted": self.emitted,
-            "ledger/buffered": self.buffered,
-            "ledger/dropped": self.dropped_total,
+            RECEIVED: self.received,
+            EMITTED: self.emitted,
+            BUFFERED: self.buffered,
+            DROPPED: self.dropped_total,
         }
-        return counts | {f"ledger/dropped/{reason.value}": self.dropped[reason] for reason in DropReason}
+        return counts | {f"{DROPPED_PREFIX}{reason.value}": self.dropped[reason] for reason in DropReason}

@@ -18,6 +18,7 @@ from sparkplug.broker import BrokerAddress
 from sparkplug.edge_node import EdgeNode
 from sparkplug.host import HostApplication
 from sparkplug.metric import NodeId
+from sparkplug.topics import group_filter
 
 JOIN_S_MAX = 15.0
 OTHERS = ("validation",)  # tables of the same file that are for no processor
@@ -105,7 +106,7 @@ def _worker(
     *,
     recorder: Recorder | None,
 ) -> Worker:
-    host = HostApplication(broker, processor.node, (f"spBv1.0/{group}/#",), wanted=lambda node: processor.listens_to(node.node))
+    host = HostApplication(broker, processor.node, (group_filter(group),), wanted=lambda node: processor.listens_to(node.node))
     session_file = None if session_dir is None else session_dir / f"{processor.node}.json"
     edge = EdgeNode(broker, NodeId(group, processor.node), node_metrics(records=processor.records), session_file=session_file)
     return Worker(processor, configuration, host, edge, recorder if processor.records else None)

@@ -27,6 +27,7 @@ from processors.running.ports import EdgePort, HostPort, Recorder
 from sparkplug.errors import SparkplugError
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import Change, MetricSpec
+from twin.vocabulary import topics
 
 POLL_S = 0.05
 RESTORE_S_MAX = 1.0  # to wait for the snapshots, once the broker answers
@@ -53,9 +54,9 @@ class Worker:
         self.engine = Engine(processor, configuration)
         self._processor, self._host, self._edge, self._recorder = processor, host, edge, recorder
         self._specs: tuple[MetricSpec, ...] = tuple(spec.metric() for spec in processor.outputs)
-        self._snapshot_prefix = f"cnctwin/snapshot/{processor.name}/"
-        self._letter_prefix = f"cnctwin/deadletter/{processor.name}/"
-        self._marker_topic = f"cnctwin/marker/{processor.name}"
+        self._snapshot_prefix = topics.snapshots_of(processor.name)
+        self._letter_prefix = topics.dead_letters_of(processor.name)
+        self._marker_topic = topics.marker_of(processor.name)
         self._listens = processor.listens if isinstance(processor, CellProcessor) else ()
         self._declared: set[str] = set()
         self._waiting: deque[HostEvent] = deque()

@@ -10,9 +10,10 @@ from typing import NamedTuple
 from processors.sample import why_unknown
 from sparkplug.metric import Reading
 from sparkplug.quality import Quality
+from twin.vocabulary import twin_signals
 
 ACTIVE = "tool_change_active"
-DETECTED = "twin/tool_change_active"
+DETECTED = twin_signals.TOOL_CHANGE_ACTIVE
 INPUTS = frozenset({ACTIVE, DETECTED})
 CONTROLLER, DETECTOR, NONE, STALE = "controller", "detector", "none", "stale"
 

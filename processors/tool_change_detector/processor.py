@@ -17,15 +17,16 @@ from typing import TYPE_CHECKING, Annotated, Any, Self
 from pydantic import Field, PlainSerializer, PlainValidator, model_validator
 
 from processors.config import ProcessorConfig
-from processors.contract import TWIN_PREFIX, Output, OutputSpec, Processor, Provenance, Sample, SampleKind
+from processors.contract import Output, OutputSpec, Processor, Provenance, Sample, SampleKind
 from sparkplug.datatype import DataType
 from sparkplug.quality import Quality
+from twin.vocabulary.twin_signals import TOOL_CHANGE_ACTIVE, TWIN_PREFIX
 
 if TYPE_CHECKING:
     from twin.transient.detector import Detector
     from twin.transient.detector import State as Search
 
-ACTIVE, SOURCE = f"{TWIN_PREFIX}tool_change_active", f"{TWIN_PREFIX}tool_change_source"
+ACTIVE, SOURCE = TOOL_CHANGE_ACTIVE, f"{TWIN_PREFIX}tool_change_source"
 CONFIDENCE, PHASE = f"{TWIN_PREFIX}tool_change_confidence", f"{TWIN_PREFIX}tool_change_phase"
 BASIS = f"{TWIN_PREFIX}tool_change_detector_basis"
 SIGNALS = ("spindle_rpm", "spindle_current_a", "spindle_load_pct")

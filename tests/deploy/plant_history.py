@@ -6,12 +6,13 @@ Signals are told when they change: the fast ones each two seconds, a tool number
 import math
 from collections.abc import Iterator
 
-from cnctwin.memory.store.contract import TWIN_PREFIX, Message
+from cnctwin.memory.store.contract import Message
 from processors.discovery import discover
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId, Reading
 from sparkplug.quality import Quality
 from sparkplug.values import Value
+from twin.vocabulary.twin_signals import TWIN_PREFIX
 
 MACHINES = ("okuma", "mazak.01")
 GOOD, BAD = (Quality.GOOD, None, None), (Quality.BAD, None, "the sensor is silent")

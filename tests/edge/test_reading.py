@@ -8,9 +8,10 @@ from hypothesis import strategies as st
 
 from edge.errors import ConfigError
 from edge.reading import TEXT_LENGTH_MAX, Target, Value, read, read_value
-from edge.signals import SIGNALS, signal
+from edge.signals import signal
 from edge.units import conversion
 from sparkplug.quality import Quality
+from twin.vocabulary.signals import SIGNALS
 
 GOOD, BAD = Quality.GOOD, Quality.BAD
 

@@ -9,13 +9,13 @@ from hypothesis import strategies as st
 from pydantic import TypeAdapter
 
 from processors.config import Configuration, read_tables
-from processors.contract import TWIN_PREFIX
 from processors.discovery import AnyProcessor, discover, sample_configuration
 from processors.effects import DeadLetter, Effect, Publish, PublishPlain, Remove
 from processors.running.snapshot import decode_state, encode_state
 from sparkplug.host_session import HostEvent
 from tests.depth import examples
 from tests.processors.streams import birth, data, death, engine_of, fed, wild_streams
+from twin.vocabulary.twin_signals import TWIN_PREFIX
 
 every_processor = pytest.mark.parametrize("processor", discover().values(), ids=discover().keys())
 quickly = settings(

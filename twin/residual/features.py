@@ -15,10 +15,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from twin.residual.errors import ResidualError
+from twin.vocabulary.twin_signals import SPINDLE_TEMP_C
 
 SPEED, LOAD, FEED = "spindle_rpm", "spindle_load_pct", "feed_mm_min"
 POSITIONS = ("axis_x_pos_mm", "axis_y_pos_mm", "axis_z_pos_mm")
-AMBIENT, PHYSICS, MEASURED = "ambient_temp_c", "twin/spindle_temp_c", "spindle_temp_c"
+AMBIENT, PHYSICS, MEASURED = "ambient_temp_c", SPINDLE_TEMP_C, "spindle_temp_c"
 RISE = "physics_rise_k"
 """Physics temperature less ambient."""
 SIGNALS = (SPEED, LOAD, FEED, *POSITIONS, AMBIENT, PHYSICS)

@@ -34,7 +34,7 @@ from twin.forest.regression import RegressionForest
 from twin.models.errors import PointerError
 from twin.models.pointer import LINK, POINTER, resolve
 from twin.residual.errors import ResidualError
-from twin.residual.features import Feature, feature
+from twin.residual.features import PHYSICS, Feature, feature
 from twin.residual.held_out import HeldOut
 from twin.residual.physics import Physics
 from twin.residual.region import Region, region_of_arrays
@@ -114,7 +114,7 @@ class ResidualModel:
             kind=KIND,
             version=VERSION,
             features=tuple(map(str, self.features)),
-            target="spindle_temp_c - twin/spindle_temp_c, K",
+            target=f"spindle_temp_c - {PHYSICS}, K",
             trained=self.trained,
             held_out=self.held_out,
             mean_residual_k=self.mean_residual_k,

@@ -6,19 +6,19 @@ import threading
 from typing import Any
 from uuid import uuid4
 
-from cnctwin.jobs.topics import REPLY, STATE, STATES
+from twin.vocabulary.topics import JOB_REPLY, JOBS_STATE, state_of_job
 
 JOBS_MAX = 1000
 WAITING_MAX = 100
 BYTES_MAX = 4_000_000
-_OWN = f"{REPLY}page-{uuid4().hex[:8]}/"
-_ONE = re.compile(r"cnc/jobs/([^/]+)/state")
+_OWN = f"{JOB_REPLY}page-{uuid4().hex[:8]}/"
+_ONE = re.compile(state_of_job("([^/]+)"))
 
 
 class LiveJobs:
     """Fed by the viewer's thread, asked by the server's. `filters`: the topics to listen to."""
 
-    filters = (STATE, STATES, f"{_OWN}+")
+    filters = (JOBS_STATE, state_of_job("+"), f"{_OWN}+")
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -30,7 +30,7 @@ class LiveJobs:
         """A message of those topics; of others, nothing happens."""
         document = _parsed(payload)
         with self._lock:
-            if topic == STATE:
+            if topic == JOBS_STATE:
                 self._all = document
             elif found := _ONE.fullmatch(topic):
                 self._take_one(found[1], document)

@@ -15,12 +15,12 @@ from cnctwin.api.fleet import fleet_item, is_key_signal
 from cnctwin.api.live.batches import Batch, Row, alerts_batch, fleet_rows, machine_rows, state_batch
 from cnctwin.api.live.trace import Sample, Trace
 from cnctwin.api.value_object import plain, value_object
-from cnctwin.jobs.announcer import NODE as JOBS_NODE
-from cnctwin.plant.view import TWIN_PREFIX
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId, Reading
 from sparkplug.quality import Quality
 from sparkplug.values import DataSet, PropertySet, Template
+from twin.vocabulary.nodes import JOBS_NODE
+from twin.vocabulary.twin_signals import TWIN_PREFIX
 
 MACHINES_MAX = 1000
 SIGNALS_MAX = 2000  # of one device; what is beyond is counted

@@ -11,13 +11,13 @@ from typing import Any
 from cnctwin.api.live.batches import Batch
 from cnctwin.api.live.jobs import LiveJobs
 from cnctwin.api.live.plant import LivePlant
-from cnctwin.plant.alert_desk import STATE as ALERTS_TOPIC
 from cnctwin.plant.watch import viewer
 from sparkplug.broker import BrokerAddress
 from sparkplug.connection import now_ms
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId
 from sparkplug.values import PropertySet
+from twin.vocabulary.topics import ALERT_STATE
 
 FLUSH_S = 0.1
 POLL_S = 0.05
@@ -36,7 +36,7 @@ class Viewer:
         self.jobs = LiveJobs()
         self._live = live
         self._host = viewer(broker, group)
-        for topic in (ALERTS_TOPIC, *LiveJobs.filters):
+        for topic in (ALERT_STATE, *LiveJobs.filters):
             self._host.subscribe_plain(topic)
         self._outbox: deque[tuple[str, bytes]] = deque(maxlen=OUTBOX_MAX)
         self._stop = threading.Event()
@@ -104,7 +104,7 @@ class Viewer:
             return
         self._live.take(events, now_ms(), self._describe)
         for event in (one for one in events if one.kind is EventKind.PLAIN):
-            if event.topic != ALERTS_TOPIC:
+            if event.topic != ALERT_STATE:
                 self.jobs.take(event.topic, event.payload)
             elif (state := _parsed(event.payload)) is not None:
                 self._live.take_alerts(state)

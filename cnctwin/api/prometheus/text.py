@@ -7,16 +7,16 @@ from prometheus_client import CollectorRegistry, generate_latest
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
 
-from cnctwin.api.fleet import GATE, GROWING, is_gap_figure
 from cnctwin.api.live.plant import NodeView
 from cnctwin.api.prometheus.validation import validation_metrics
 from cnctwin.api.sources import Sources
 from cnctwin.memory.store.contract import Status
-from cnctwin.plant.view import TWIN_PREFIX
 from sparkplug.metric import Reading
 from sparkplug.quality import Quality
+from twin.vocabulary import twin_signals
+from twin.vocabulary.node_ledger import DROPPED_PREFIX, LEDGER_PREFIX
+from twin.vocabulary.nodes import is_twin_node
 
-_LEDGER, _REASON = "ledger/", "ledger/dropped/"
 PHASES = ("pending", "firing", "acknowledged", "resolved")
 NODE_GAUGES = {
     "twin_processor_lag_seconds": ("health/lag_s", "age of the last message when it was taken"),
@@ -37,12 +37,12 @@ NODE_COUNTERS = {
 }
 MACHINE_GAUGES = {
     "twin_clock_offset_seconds": ("clock_offset_s", "controller clock minus edge clock"),
-    "twin_gate_active": (GATE, "1 while a tool change and its tail gate the score"),
-    "twin_raw_score": (f"{TWIN_PREFIX}raw_score", "anomaly score before gates"),
-    "twin_adjusted_score": (f"{TWIN_PREFIX}adjusted_score", "anomaly score that alarms are made of"),
-    "twin_spindle_temp_residual_kelvin": (f"{TWIN_PREFIX}spindle_temp_residual_k", "measured minus modelled"),
-    "twin_residual_rmse": (f"{TWIN_PREFIX}residual_rmse_k", "of the corrected temperature"),
-    "twin_gap_growing": (GROWING, "1 where the gap of some signal grows"),
+    "twin_gate_active": (twin_signals.TOOL_CHANGE_GATE, "1 while a tool change and its tail gate the score"),
+    "twin_raw_score": (twin_signals.RAW_SCORE, "anomaly score before gates"),
+    "twin_adjusted_score": (twin_signals.ADJUSTED_SCORE, "anomaly score that alarms are made of"),
+    "twin_spindle_temp_residual_kelvin": (twin_signals.SPINDLE_TEMP_RESIDUAL_K, "measured minus modelled"),
+    "twin_residual_rmse": ("twin/residual_rmse_k", "of the corrected temperature"),
+    "twin_gap_growing": (twin_signals.GAP_GROWING, "1 where the gap of some signal grows"),
 }
 
 
@@ -122,13 +122,15 @@ def _machines(machines: Mapping[str, tuple[bool, Mapping[str, Reading]]], now_ms
     online = GaugeMetricFamily("twin_source_online", "whether the machine's control is connected", labels=["machine"])
     gap = GaugeMetricFamily("twin_gap", "standing gap, rms over its floor", labels=["machine", "signal"])
     for machine, (is_online, readings) in machines.items():
-        newest_ms = max((r.timestamp_ms for name, r in readings.items() if not name.startswith(TWIN_PREFIX)), default=None)
+        newest_ms = max(
+            (r.timestamp_ms for name, r in readings.items() if not name.startswith(twin_signals.TWIN_PREFIX)), default=None
+        )
         online.add_metric([machine], float(is_online))
         if newest_ms is not None:
             age.add_metric([machine], max(now_ms - newest_ms, 0) / 1000.0)
         for name, reading in readings.items():
-            if is_gap_figure(name) and (value := _number(reading)) is not None:
-                gap.add_metric([machine, name.removeprefix(f"{TWIN_PREFIX}gap_")], value)
+            if twin_signals.is_gap(name) and (value := _number(reading)) is not None:
+                gap.add_metric([machine, name.removeprefix(twin_signals.GAP_PREFIX)], value)
     yield from (age, online, gap)
     for title, (name, meaning) in MACHINE_GAUGES.items():
         family = GaugeMetricFamily(title, meaning, labels=["machine"])
@@ -154,8 +156,8 @@ def _nodes(nodes: Iterable[NodeView]) -> Iterator[Metric]:
     for node, is_online, values in told:
         online.add_metric([node], float(is_online))
         if (gaps := _count(values.get("health/holes"))) is not None:
-            holes.add_metric(["sparkplug" if node.startswith("twin-") else "mtconnect", node], gaps)
-        sums = {name: _count(values.get(f"{_LEDGER}{name}")) for name in ("received", "emitted", "buffered", "dropped")}
+            holes.add_metric(["sparkplug" if is_twin_node(node) else "mtconnect", node], gaps)
+        sums = {name: _count(values.get(f"{LEDGER_PREFIX}{name}")) for name in ("received", "emitted", "buffered", "dropped")}
         if sums["received"] is None:
             continue
         for name, family in ledger.items():
@@ -163,8 +165,8 @@ def _nodes(nodes: Iterable[NodeView]) -> Iterator[Metric]:
         depth.add_metric([node], sums["buffered"] or 0.0)
         difference.add_metric([node], sums["received"] - sum(sums[name] or 0.0 for name in ("emitted", "buffered", "dropped")))
         for name, value in values.items():
-            if name.startswith(_REASON) and (count := _count(value)) is not None:
-                dropped.add_metric([node, name.removeprefix(_REASON)], count)
+            if name.startswith(DROPPED_PREFIX) and (count := _count(value)) is not None:
+                dropped.add_metric([node, name.removeprefix(DROPPED_PREFIX)], count)
     yield from (online, *ledger.values(), depth, difference, dropped, holes)
     yield from _by_table(told, NODE_GAUGES, GaugeMetricFamily)
     yield from _by_table(told, NODE_COUNTERS, CounterMetricFamily)

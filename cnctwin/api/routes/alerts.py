@@ -16,8 +16,9 @@ from cnctwin.api.errors import ApiError
 from cnctwin.api.live.plant import LivePlant
 from cnctwin.api.live.viewer import Viewer
 from cnctwin.api.routes.health import state_age_s
-from cnctwin.plant.alert_desk import COMMAND, FRESH_S_MAX
+from cnctwin.plant.alert_desk import FRESH_S_MAX
 from sparkplug.connection import now_ms
+from twin.vocabulary.topics import ALERT_COMMAND
 
 ANSWER_S_MAX = 5.0
 LOOK_S = 0.05
@@ -97,7 +98,7 @@ def alert_routes(live: LivePlant, viewer: Viewer | None) -> APIRouter:
 async def _command(live: LivePlant, viewer: Viewer, name: str, fields: Mapping[str, Any]) -> dict[str, Any]:
     """Give a command, and wait for what becomes of it."""
     key = uuid4().hex[:16]
-    if not viewer.publish(COMMAND + name, json.dumps({"id": key, **fields}).encode()):
+    if not viewer.publish(ALERT_COMMAND + name, json.dumps({"id": key, **fields}).encode()):
         raise ApiError(503, f"{viewer.trouble or 'too much waits for the broker'}; try again")
     deadline_s = time.monotonic() + ANSWER_S_MAX
     while time.monotonic() < deadline_s:

@@ -12,9 +12,17 @@ from pydantic import BaseModel, Field
 
 from cnctwin.api.answers import Answer, Problem, ValueObject
 from cnctwin.api.errors import ApiError
-from cnctwin.api.fleet import GAP, GROWING
 from cnctwin.api.routes.plant import UNKNOWN, Machine, known_state
 from cnctwin.api.sources import Sources
+from twin.vocabulary.twin_signals import (
+    GAP_BASIS,
+    GAP_GROWING,
+    GAP_GROWING_SIGNAL,
+    GAP_LEFT_OUT_PCT,
+    GAP_NOTES,
+    GAP_PREFIX,
+    GAP_WINDOW,
+)
 
 FILE_BYTES_MAX = 20_000_000
 REPORT_POLICY = (
@@ -90,23 +98,22 @@ def standing(state: dict[str, Any]) -> dict[str, Any]:
     ('spindle_load_pct', 'air')
     """
     twin = state["twin"]
-    others = {GROWING, f"{GAP}growing_signal", f"{GAP}window", f"{GAP}left_out_pct", f"{GAP}basis"}
     rows = []
     for name, value in twin.items():
-        if not name.startswith(GAP) or name in others or name.endswith("/mean") or _is_of_no_axis(value):
+        if not name.startswith(GAP_PREFIX) or name in GAP_NOTES or name.endswith("/mean") or _is_of_no_axis(value):
             continue
-        signal, _, regime = name.removeprefix(GAP).partition("/")
-        mean = twin.get(f"{GAP}{signal}/mean")
+        signal, _, regime = name.removeprefix(GAP_PREFIX).partition("/")
+        mean = twin.get(f"{GAP_PREFIX}{signal}/mean")
         rows.append({"signal": signal, "regime": regime or None, "gap": value, "mean": None if regime else mean})
-    basis = twin.get(f"{GAP}basis")
+    basis = twin.get(GAP_BASIS)
     return {
         "machine": state["machine"],
         "now": state["now"],
         "standing": rows,
-        "growing": twin.get(GROWING),
-        "growing_signal": twin.get(f"{GAP}growing_signal"),
-        "window": _window(twin.get(f"{GAP}window")),
-        "left_out_pct": twin.get(f"{GAP}left_out_pct"),
+        "growing": twin.get(GAP_GROWING),
+        "growing_signal": twin.get(GAP_GROWING_SIGNAL),
+        "window": _window(twin.get(GAP_WINDOW)),
+        "left_out_pct": twin.get(GAP_LEFT_OUT_PCT),
         "basis": None if basis is None else basis["value"],
     }
 

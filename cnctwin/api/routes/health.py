@@ -13,13 +13,12 @@ from cnctwin.api.live.plant import LivePlant
 from cnctwin.api.residual import models_part
 from cnctwin.api.sources import Sources
 from cnctwin.errors import ApplicationError
-from cnctwin.jobs.announcer import NODE as JOBS_NODE
 from cnctwin.jobs.client import FRESH_S_MAX as JOBS_FRESH_S_MAX
 from cnctwin.page import WEB
 from cnctwin.plant.alert_desk import FRESH_S_MAX
 from cnctwin.plant.doctor import COME_AND_GO
-from processors.contract import TWIN_NODE_PREFIX
 from sparkplug.connection import now_ms
+from twin.vocabulary.nodes import JOBS_NODE, TWIN_NODE_PREFIX, is_twin_node
 
 
 def health_routes(sources: Sources) -> APIRouter:
@@ -69,7 +68,7 @@ def _broker(sources: Sources) -> Part:
 def _processors(live: LivePlant) -> Part:
     """Those that were heard of since the server began; one that ends in its own time, as a nightly check, is not missed."""
     others = (*COME_AND_GO, JOBS_NODE)
-    known = [view for view in live.nodes() if view.node.startswith(TWIN_NODE_PREFIX) and view.node not in others]
+    known = [view for view in live.nodes() if is_twin_node(view.node) and view.node not in others]
     if not known:
         return Part(part="processors", state="missing", reason="no processor was heard of", do="cnctwin process NAME…")
     dead = [view.node.removeprefix(TWIN_NODE_PREFIX) for view in known if not view.online]

@@ -23,8 +23,8 @@ from cnctwin.api.routes.health import jobs_trouble
 from cnctwin.api.sources import Sources
 from cnctwin.jobs.kinds import KINDS
 from cnctwin.jobs.request import RequestError, is_id, read_request
-from cnctwin.jobs.topics import CANCEL, REQUEST
 from sparkplug.connection import now_ms
+from twin.vocabulary.topics import JOB_CANCEL, JOB_REQUEST
 
 ANSWER_S_MAX = 8.0
 REPEAT_S = 2.0  # nobody is told of a message that the consumer missed; the same id twice is the same job
@@ -134,13 +134,13 @@ def job_routes(sources: Sources) -> APIRouter:
             read_request(json.dumps(document).encode())
         except RequestError as error:
             raise ApiError(400, str(error)) from None
-        return await _answer(viewer, REQUEST, document)
+        return await _answer(viewer, JOB_REQUEST, document)
 
     @router.post("/jobs/{job_id}/cancel", response_model=JobAnswer, responses={**missing, **refusals})
     async def cancel(job_id: JobId) -> Any:
         """Cancel a job that waits or runs."""
         _known(viewer, job_id)
-        return await _answer(viewer, CANCEL, {"id": job_id})
+        return await _answer(viewer, JOB_CANCEL, {"id": job_id})
 
     return router
 

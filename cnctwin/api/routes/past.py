@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from cnctwin.api.answers import Events, Parts, Replayed, Validation
 from cnctwin.api.errors import ApiError
-from cnctwin.api.event_list import EVENTS_MAX, PART_RECORD, event_signals, events_of, part_records
+from cnctwin.api.event_list import EVENTS_MAX, event_signals, events_of, part_records
 from cnctwin.api.live.trace import Sample
 from cnctwin.api.replay_child import replayed
 from cnctwin.api.routes.history import MS_MAX, FromMs, ToMs
@@ -19,6 +19,7 @@ from cnctwin.api.value_object import plain
 from cnctwin.memory.store.contract import Query as StoreQuery
 from cnctwin.memory.store.contract import Store, StoreError
 from sparkplug.connection import now_ms
+from twin.vocabulary.twin_signals import PART_RECORD
 
 DAY_MS = 86_400_000
 STRETCH_MS_MAX = 31 * DAY_MS

@@ -5,8 +5,7 @@ from typing import Any, NamedTuple
 
 from cnctwin.memory.store.contract import Query, Store
 from sparkplug.quality import Quality
-
-SIGNAL = "twin/part_record"
+from twin.vocabulary.twin_signals import PART_RECORD
 
 
 class Part(NamedTuple):
@@ -20,7 +19,7 @@ class Part(NamedTuple):
 
 def parts(store: Store, machine: str, from_ms: int, to_ms: int) -> list[Part]:
     """The parts of a machine that were finished in [from_ms, to_ms), oldest first, each once. What is no record is left out."""
-    (column,) = store.query(Query(machine, (SIGNAL,), from_ms, to_ms))
+    (column,) = store.query(Query(machine, (PART_RECORD,), from_ms, to_ms))
     found: dict[str, Part] = {}
     for t_us, value, quality in zip(column.t_us, column.value, column.quality, strict=True):
         part = _part(t_us // 1000, value) if isinstance(value, str) and quality is not Quality.BAD else None

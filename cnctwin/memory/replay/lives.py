@@ -10,11 +10,12 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 
-from cnctwin.memory.replay.log import HISTORIAN, NODE_OFFLINE, Mark, birth_behind, is_twin
+from cnctwin.memory.replay.log import NODE_OFFLINE, Mark, birth_behind, is_twin
 from cnctwin.memory.store.contract import Series, Store
 from processors.discovery import AnyProcessor
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId
+from twin.vocabulary.nodes import HISTORIAN_NODE, is_twin_node
 
 SNAPSHOT_MS_MAX = 2 * 3_600_000
 """Older ones are no start: there is one an hour of a processor that works."""
@@ -142,7 +143,7 @@ def restarts(
     notes += [
         f"the memory has a hole until {_utc(mark.received_ms)}: {mark.event.detail}"
         for mark in found
-        if mark.event.kind is EventKind.HOLE and mark.event.node.node == HISTORIAN
+        if mark.event.kind is EventKind.HOLE and mark.event.node.node == HISTORIAN_NODE
     ][:3]
     return result
 
@@ -202,7 +203,7 @@ def offers(found: Sequence[Mark], series: Mapping[str, Sequence[Series]]) -> dic
     """Return the nodes that offer each signal of each machine, edges first."""
     nodes = {(mark.event.device or "", mark.event.node) for mark in found if mark.event.kind is not EventKind.HOLE}
     result: dict[str, dict[NodeId, list[str]]] = {}
-    for machine, node in sorted(nodes, key=lambda pair: (pair[0], pair[1].node.startswith("twin-"), pair[1])):
+    for machine, node in sorted(nodes, key=lambda pair: (pair[0], is_twin_node(pair[1].node), pair[1])):
         names = [one.signal for one in series.get(machine, ()) if one.node in (node.node, str(node))]
         result.setdefault(machine, {})[node] = names
     return result

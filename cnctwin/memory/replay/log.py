@@ -6,10 +6,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from cnctwin.memory.store.contract import Message, Store
-from processors.contract import TWIN_NODE_PREFIX
 from sparkplug.host_session import EventKind, HostEvent
+from twin.vocabulary.nodes import is_twin_node
 
-HISTORIAN = f"{TWIN_NODE_PREFIX}historian"
 NODE_OFFLINE = "edge node offline"
 """The detail of a device's death that came with its edge node's: of a processor that was killed, stopped or cut off."""
 NOTHING_YET = (
@@ -67,7 +66,7 @@ def marks(stretch: Stretch) -> tuple[list[Mark], int, int]:
 
 def is_twin(event: HostEvent) -> bool:
     """Return True if a processor says it."""
-    return event.node.node.startswith(TWIN_NODE_PREFIX)
+    return is_twin_node(event.node.node)
 
 
 def birth_behind(found: Sequence[Mark], of_twin: Mark) -> Mark | None:

@@ -8,7 +8,7 @@ from collections.abc import Collection, Mapping, Sequence
 
 from cnctwin.memory.replay.comparison import Comparison, as_sent
 from cnctwin.memory.replay.lives import Restart, Start, births_of
-from cnctwin.memory.replay.log import HISTORIAN, is_twin
+from cnctwin.memory.replay.log import is_twin
 from processors.config import Configuration, ProcessorConfig
 from processors.contract import CellProcessor
 from processors.discovery import AnyProcessor
@@ -18,6 +18,7 @@ from processors.running.engine import Engine
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import Change, NodeId, Reading
 from sparkplug.quality import Quality
+from twin.vocabulary.nodes import HISTORIAN_NODE
 
 POLL_S = 0.025  # a worker looks for silence every 50 ms
 SETTLED_MS = 1000
@@ -79,7 +80,7 @@ class Rerun:
         self._is_counted = is_counted
         if event.node.node == self.processor.node:
             self._own(place, received_ms, event)
-        elif event.node.node in self._fed or event.node.node == HISTORIAN:
+        elif event.node.node in self._fed or event.node.node == HISTORIAN_NODE:
             pass
         elif not self._births and place < self._hears_from.get(event.device or "", 0):
             self._missed(received_ms, event)

@@ -13,10 +13,10 @@ from cnctwin.memory.replay.rerun import Rerun
 from cnctwin.memory.replay.result import Difference, ProcessorReplayed, Replayed, ReplayRefusedError
 from cnctwin.memory.store.contract import Series, Store
 from processors.config import CellConfig, Configuration, ProcessorConfig
-from processors.contract import TWIN_NODE_PREFIX
 from processors.discovery import AnyProcessor, find
 from processors.errors import UnknownProcessorError
 from sparkplug.host_session import HostEvent
+from twin.vocabulary.nodes import TWIN_NODE_PREFIX, is_twin_node
 
 WARM_UP_MS = 1_800_000
 NOT_COMPARED = frozenset({"historian", "mirror"})  # what they give is no metric, or is of the store itself
@@ -70,7 +70,7 @@ def replay(  # noqa: PLR0917
 def published_of(series: Sequence[Series]) -> list[str]:
     """The processors that have published of a machine, by name."""
     nodes = {one.node.rpartition("/")[2] for one in series}
-    names = {node.removeprefix(TWIN_NODE_PREFIX) for node in nodes if node.startswith(TWIN_NODE_PREFIX)}
+    names = {node.removeprefix(TWIN_NODE_PREFIX) for node in nodes if is_twin_node(node)}
     return sorted(names - NOT_COMPARED)
 
 

@@ -17,9 +17,9 @@ from cnctwin.errors import ApplicationError
 from sparkplug.host_session import HostEvent
 from sparkplug.quality import Quality
 from sparkplug.values import Value
+from twin.vocabulary.twin_signals import TWIN_PREFIX
 
 RAW, DERIVED = "cnc_raw", "cnc_twin_state"
-TWIN_PREFIX = "twin/"
 
 
 class StoreError(ApplicationError):

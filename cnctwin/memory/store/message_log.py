@@ -18,9 +18,9 @@ from cnctwin.memory.store.series_table import HISTORY_BIT, RANK_MASK, RANKS, REA
 from cnctwin.memory.store.value_form import Kind, given
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId, Reading
+from twin.vocabulary.nodes import HISTORIAN_NODE
 
 PAGE_FIRST, PAGE_MESSAGES, PAGE_NUMBERS_MAX = 2_000, 4_000, 1_000_000
-RECORDER_NODE = "twin-historian"
 """Its holes say that nobody wrote down what came: they concern every machine."""
 Parts = dict[int, list[tuple[int, int, Reading]]]
 """The parts of each message, by number: time, series and reading of its samples."""
@@ -89,7 +89,7 @@ WHERE machine = ? AND number >= ? AND number < ?
 _HOLES = f"""
 SELECT number, received_ms, nodes.name, stamp_ms, detail
 FROM nodes JOIN events ON events.machine IS NULL AND events.node = nodes.id
-WHERE (nodes.id IN (SELECT node FROM signals WHERE machine = ?) OR nodes.name LIKE '%/{RECORDER_NODE}')
+WHERE (nodes.id IN (SELECT node FROM signals WHERE machine = ?) OR nodes.name LIKE '%/{HISTORIAN_NODE}')
     AND number >= ? AND number < ?
 """  # noqa: S608
 

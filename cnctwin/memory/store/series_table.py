@@ -9,10 +9,10 @@ from collections.abc import Iterable
 from enum import IntEnum
 from typing import Any
 
-from cnctwin.memory.store.contract import TWIN_PREFIX
 from cnctwin.memory.store.value_form import BLOCKS, Kind, given
 from sparkplug.quality import Quality
 from sparkplug.values import Value
+from twin.vocabulary.twin_signals import TWIN_PREFIX
 
 RANKS = (Quality.GOOD, Quality.STALE, Quality.BAD)
 RANK = {quality: rank for rank, quality in enumerate(RANKS)}

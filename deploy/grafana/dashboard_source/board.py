@@ -3,8 +3,9 @@
 from dataclasses import dataclass
 from enum import Enum
 
+from twin.vocabulary.twin_signals import TWIN_PREFIX
+
 RAW, DERIVED = "cnc_raw", "cnc_twin_state"
-TWIN_PREFIX = "twin/"
 MINUTE_S, HOUR_S, DAY_S = 60, 3600, 86_400
 HOLD_S = 10 * MINUTE_S
 """For so long a value that is not told again is drawn on: signals are told when they change."""

@@ -2,10 +2,11 @@
 
 from dashboard_source import words
 from dashboard_source.board import DAY_S, HOUR_S, Board, Draw, Limit, Mark, Panel, Reading, Shown, View
+from twin.vocabulary import twin_signals as twin
 
 STATE_S = DAY_S  # a state is what it is until it is told again
 GAP_S = 2 * HOUR_S  # told once a minute, where it has changed
-GAPS = "twin/gap_(spindle_temp_c|spindle_load_pct|spindle_rpm|axis_[a-z]_load_pct)"
+GAPS = f"{twin.GAP_PREFIX}(spindle_temp_c|spindle_load_pct|spindle_rpm|axis_[a-z]_load_pct)"
 TOOL_CHANGES = (
     Mark(name="Another tool", signal="tool_number", colour=words.PURPLE),
     Mark(name="Tool change in progress", signal="tool_change_active", colour=words.GREY, stretch=True),
@@ -39,22 +40,22 @@ FLEET = Board(
         ),
         Panel(
             title="Severity",
-            says="twin/severity: high where a rule alarms, medium where only the score does.",
-            series=(_state("twin/severity", "{}", fleet=True),),
+            says=f"{twin.SEVERITY}: high where a rule alarms, medium where only the score does.",
+            series=(_state(twin.SEVERITY, "{}", fleet=True),),
             view=View.STATES,
             words=words.SEVERITY,
         ),
         Panel(
             title="Gap growing",
-            says="twin/gap_growing: the standing gap has left what it was while the machine was healthy.",
-            series=(_state("twin/gap_growing", "{}", fleet=True),),
+            says=f"{twin.GAP_GROWING}: the standing gap has left what it was while the machine was healthy.",
+            series=(_state(twin.GAP_GROWING, "{}", fleet=True),),
             view=View.STATES,
             words=words.GROWTH,
         ),
         Panel(
             title="Adjusted anomaly score",
             says="Beside the peers, 0 while gated. The score as it was before is on the dashboard Anomaly.",
-            series=(Reading(signal="twin/adjusted_score", legend="{}", fleet=True, shown=Shown.PEAK),),
+            series=(Reading(signal=twin.ADJUSTED_SCORE, legend="{}", fleet=True, shown=Shown.PEAK),),
         ),
         Panel(
             title="Spindle load",
@@ -65,13 +66,13 @@ FLEET = Board(
         Panel(
             title="Gap of the spindle load",
             says="rms of twin minus measured, over the floor: 1 is as good as a healthy machine repeats itself.",
-            series=(Reading(signal="twin/gap_spindle_load_pct", legend="{}", fleet=True, hold_s=GAP_S),),
+            series=(Reading(signal=f"{twin.GAP_PREFIX}spindle_load_pct", legend="{}", fleet=True, hold_s=GAP_S),),
             limits=FLOOR,
         ),
         Panel(
             title="Time that was gated",
             says="Share of the last week in which no score was judged: a gate that hides much is a fault of its own.",
-            series=(Reading(signal="twin/gated_share_pct", legend="{}", fleet=True, hold_s=STATE_S),),
+            series=(Reading(signal=twin.GATED_SHARE_PCT, legend="{}", fleet=True, hold_s=STATE_S),),
             view=View.FIGURE,
             unit="percent",
             limits=(Limit(None, words.GREEN), Limit(20.0, words.YELLOW), Limit(50.0, words.RED)),
@@ -155,8 +156,8 @@ ANOMALY = Board(
             title="What was not judged",
             says="Grey: the score is suppressed, for a tool change, or since the peers show the same. It is drawn below.",
             series=(
-                _state("twin/tool_change_gate", "tool-change gate"),
-                _state("twin/common_mode", "peers explain it"),
+                _state(twin.TOOL_CHANGE_GATE, "tool-change gate"),
+                _state(twin.COMMON_MODE, "peers explain it"),
             ),
             view=View.STATES,
             words=words.GATE,
@@ -167,11 +168,11 @@ ANOMALY = Board(
             title="Alarms",
             says="Of the score and of each rule; what is not known has no colour.",
             series=(
-                _state("twin/anomaly_alarm", "score"),
-                _state("twin/rule_load_over_limit", "load over limit"),
-                _state("twin/rule_thermal_runaway", "thermal runaway"),
-                _state("twin/rule_load_without_feed", "load without feed"),
-                _state("twin/rule_vibration", "vibration"),
+                _state(twin.ANOMALY_ALARM, "score"),
+                _state(twin.RULE_LOAD_OVER_LIMIT, "load over limit"),
+                _state(twin.RULE_THERMAL_RUNAWAY, "thermal runaway"),
+                _state(twin.RULE_LOAD_WITHOUT_FEED, "load without feed"),
+                _state(twin.RULE_VIBRATION, "vibration"),
             ),
             view=View.STATES,
             words=words.ALARMS,
@@ -182,18 +183,18 @@ ANOMALY = Board(
             title="Scores",
             says="raw: of the model, in gates too. adjusted: beside the peers, 0 while gated. Grey area: gated.",
             series=(
-                Reading(signal="twin/raw_score", legend="raw", shown=Shown.PEAK),
-                Reading(signal="twin/adjusted_score", legend="adjusted", shown=Shown.PEAK),
-                Reading(signal="twin/anomaly_threshold", legend="threshold", draw=Draw.BROKEN, hold_s=STATE_S),
-                _shade("twin/tool_change_gate", "gate"),
+                Reading(signal=twin.RAW_SCORE, legend="raw", shown=Shown.PEAK),
+                Reading(signal=twin.ADJUSTED_SCORE, legend="adjusted", shown=Shown.PEAK),
+                Reading(signal=twin.ANOMALY_THRESHOLD, legend="threshold", draw=Draw.BROKEN, hold_s=STATE_S),
+                _shade(twin.TOOL_CHANGE_GATE, "gate"),
             ),
             width=24,
             height=10,
         ),
         Panel(
             title="Severity",
-            says="twin/severity of the machine.",
-            series=(_state("twin/severity", "severity"),),
+            says=f"{twin.SEVERITY} of the machine.",
+            series=(_state(twin.SEVERITY, "severity"),),
             view=View.STATES,
             words=words.SEVERITY,
             height=5,
@@ -201,7 +202,7 @@ ANOMALY = Board(
         Panel(
             title="Time that was gated",
             says="Share of the last week in which no score was judged.",
-            series=(Reading(signal="twin/gated_share_pct", legend="gated", hold_s=STATE_S),),
+            series=(Reading(signal=twin.GATED_SHARE_PCT, legend="gated", hold_s=STATE_S),),
             view=View.FIGURE,
             unit="percent",
             height=5,
@@ -220,9 +221,9 @@ TEMPERATURE = Board(
             says="Measured and estimated, left; measured minus estimated, right.",
             series=(
                 Reading(signal="spindle_temp_c", legend="measured", hold_s=HOUR_S),
-                Reading(signal="twin/spindle_temp_c", legend="estimated", hold_s=HOUR_S),
+                Reading(signal=twin.SPINDLE_TEMP_C, legend="estimated", hold_s=HOUR_S),
                 Reading(signal="ambient_temp_c", legend="ambient", draw=Draw.BROKEN, hold_s=STATE_S),
-                Reading(signal="twin/spindle_temp_residual_k", legend="residual", unit="kelvin", right=True, hold_s=HOUR_S),
+                Reading(signal=twin.SPINDLE_TEMP_RESIDUAL_K, legend="residual", unit="kelvin", right=True, hold_s=HOUR_S),
             ),
             unit="celsius",
             width=24,
@@ -230,8 +231,8 @@ TEMPERATURE = Board(
         ),
         Panel(
             title="Rise over ambient",
-            says="twin/spindle_temp_rise_k, of the thermal network.",
-            series=(Reading(signal="twin/spindle_temp_rise_k", legend="rise", hold_s=HOUR_S),),
+            says=f"{twin.SPINDLE_TEMP_RISE_K}, of the thermal network.",
+            series=(Reading(signal=twin.SPINDLE_TEMP_RISE_K, legend="rise", hold_s=HOUR_S),),
             unit="kelvin",
         ),
         Panel(
@@ -254,8 +255,8 @@ FORCE = Board(
     panels=(
         Panel(
             title="Cutting force",
-            says="twin/cutting_force_n, inferred from load and speed; null where that means nothing. Marks: tool changes.",
-            series=(Reading(signal="twin/cutting_force_n", legend="force", shown=Shown.PEAK),),
+            says=f"{twin.CUTTING_FORCE_N}, inferred from load and speed; null where that means nothing. Marks: tool changes.",
+            series=(Reading(signal=twin.CUTTING_FORCE_N, legend="force", shown=Shown.PEAK),),
             unit="forceN",
             width=24,
             height=12,
@@ -282,8 +283,8 @@ GAP = Board(
     panels=(
         Panel(
             title="Growing",
-            says="twin/gap_growing: red from when some signal and regime has left what it was while healthy.",
-            series=(_state("twin/gap_growing", "gap"),),
+            says=f"{twin.GAP_GROWING}: red from when some signal and regime has left what it was while healthy.",
+            series=(_state(twin.GAP_GROWING, "gap"),),
             view=View.STATES,
             words=words.GROWTH,
             width=24,
@@ -302,7 +303,7 @@ GAP = Board(
             says="The same in one regime.",
             series=(
                 Reading(
-                    signal="twin/gap_(spindle_temp_c|spindle_load_pct)/(warm_up|steady|cool_down|air|cutting)",
+                    signal=f"{twin.GAP_PREFIX}(spindle_temp_c|spindle_load_pct)/(warm_up|steady|cool_down|air|cutting)",
                     legend="{}",
                     many=True,
                     hold_s=GAP_S,
@@ -317,8 +318,8 @@ GAP = Board(
         ),
         Panel(
             title="Time in which nothing was compared",
-            says="twin/gap_left_out_pct: tool changes, settling, no regime, unknown inputs.",
-            series=(Reading(signal="twin/gap_left_out_pct", legend="left out", hold_s=GAP_S),),
+            says=f"{twin.GAP_LEFT_OUT_PCT}: tool changes, settling, no regime, unknown inputs.",
+            series=(Reading(signal=twin.GAP_LEFT_OUT_PCT, legend="left out", hold_s=GAP_S),),
             view=View.FIGURE,
             unit="percent",
             height=5,

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 
 from cnctwin.memory.store.influx.codes import CODES
+from twin.vocabulary import twin_signals as twin
 
 Words = tuple[tuple[float, str, str], ...]
 GREEN, YELLOW, ORANGE, RED, BLUE, PURPLE, GREY = "green", "yellow", "orange", "red", "blue", "purple", "#8e8e8e"
@@ -24,7 +25,7 @@ def _coloured(signal: str, colours: Mapping[str, str]) -> Words:
 
 
 EXECUTION = _coloured("exec_state", _EXECUTION)
-SEVERITY = _coloured("twin/severity", _SEVERITY)
+SEVERITY = _coloured(twin.SEVERITY, _SEVERITY)
 ALARMS = ((0.0, "no", "transparent"), (1.0, "yes", RED))
 GATE = ((0.0, "no", "transparent"), (1.0, "yes", GREY))
 GROWTH = ((0.0, "as while healthy", GREEN), (1.0, "growing", RED))

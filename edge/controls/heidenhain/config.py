@@ -11,7 +11,8 @@ from edge.config import EdgeConfig
 from edge.controls.heidenhain.plc import PlcAddress
 from edge.errors import ConfigError, EdgeError
 from edge.section import Section
-from edge.signals import DERIVED, signal
+from edge.signals import signal
+from twin.vocabulary.signals import DERIVED
 
 PORT = 19000
 TOOL_CHANGE = "tool_change"  # the key of [heidenhain.plc] that is no signal: a bit that is 1 during a change

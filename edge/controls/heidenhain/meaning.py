@@ -16,9 +16,10 @@ from edge.config import SignalSection
 from edge.controls.heidenhain.config import Config
 from edge.errors import ConfigError
 from edge.reading import Target
-from edge.signals import Kind, signal
+from edge.signals import signal
 from edge.sweep import Plain
 from edge.units import conversion
+from twin.vocabulary.signals import Kind
 
 EXEC_STATES = {0: "ACTIVE", 1: "INTERRUPTED", 2: "PROGRAM_COMPLETED", 3: "STOPPED", 4: "INTERRUPTED", 5: "STOPPED"}
 EXEC_STATES |= {6: "STOPPED", 7: "READY"}

@@ -19,12 +19,13 @@ from typing import Any, NamedTuple
 from processors.alerts.body import iso
 from processors.alerts.courier.outcome import Outcome, Verdict
 from processors.alerts.courier.service import Message
+from twin.vocabulary import topics
 
 JOBS_MAX = 2000
 DONE_MAX = 10_000
 SAY_AGAIN_S = 5.0
 BACKOFF_S_MIN, BACKOFF_S_MAX = 2.0, 60.0
-OUTBOX, CLAIM, DELIVERY = "cnctwin/alerts/outbox/", "cnctwin/alerts/claim/", "cnctwin/alerts/delivery/"
+OUTBOX, CLAIM, DELIVERY = topics.ALERT_OUTBOX, topics.ALERT_CLAIM, topics.ALERT_DELIVERY
 SENDING, WAITING = "sending", "waiting"
 INTERRUPTED = "interrupted while sending; it may have arrived"
 

@@ -10,9 +10,10 @@ from typing import Any, NamedTuple
 
 from processors.alerts.courier.desk import Publish
 from processors.alerts.courier.pushover import ReceiptState
+from twin.vocabulary import topics
 
-RECEIPT = "cnctwin/alerts/receipt/"
-ACK = "cnctwin/alerts/command/ack"
+RECEIPT = topics.ALERT_RECEIPT
+ACK = topics.ALERT_ACK
 RECEIPTS_MAX = 500
 KEPT_S_MAX = 86_400.0
 RINGING = frozenset({"firing", "raised", "repeat"})

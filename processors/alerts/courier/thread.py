@@ -22,9 +22,10 @@ from processors.alerts.courier.service import Message, Service, service_of
 from sparkplug.broker import BrokerAddress
 from sparkplug.host import HostApplication
 from sparkplug.host_session import EventKind, HostEvent
+from twin.vocabulary import topics
 
-STATE = "cnctwin/alerts/state"
-MARKER = "cnctwin/marker/courier"
+STATE = topics.ALERT_STATE
+MARKER = topics.marker_of("courier")
 POLL_S = 0.05
 POLLS_S_MIN = 5.0  # of Pushover
 SAY_MARKER_AGAIN_S = 2.0

@@ -8,9 +8,9 @@ import pytest
 from cnctwin.api.live.plant import LivePlant
 from cnctwin.api.live.viewer import Viewer
 from cnctwin.api.routes import jobs as job_routes
-from cnctwin.jobs.topics import STATE, state_topic
 from sparkplug.broker import BrokerAddress
 from tests.cnctwin.api.small_plant import client_of
+from twin.vocabulary.topics import JOBS_STATE, state_of_job
 
 DONE = {"id": "night-7", "kind": "optimise", "state": "done"}
 
@@ -26,8 +26,8 @@ DONE = {"id": "night-7", "kind": "optimise", "state": "done"}
 )
 def test_a_job_is_told_with_what_its_result_exceeds(result: dict[str, object], caution: str) -> None:
     viewer = Viewer(BrokerAddress(), "cnc", LivePlant())
-    viewer.jobs.take(STATE, json.dumps({"at": "2999-01-01T00:00:00Z", "jobs": [DONE]}).encode())
-    viewer.jobs.take(state_topic("night-7"), json.dumps({**DONE, "result": result}).encode())
+    viewer.jobs.take(JOBS_STATE, json.dumps({"at": "2999-01-01T00:00:00Z", "jobs": [DONE]}).encode())
+    viewer.jobs.take(state_of_job("night-7"), json.dumps({**DONE, "result": result}).encode())
     with client_of(viewer=viewer) as client:
         (short,) = client.get("/jobs").json()["jobs"]
         assert (short["caution"], client.get("/jobs/night-7").json()["caution"]) == (caution, caution)

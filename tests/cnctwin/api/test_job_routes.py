@@ -11,7 +11,6 @@ from cnctwin.api.access import Access
 from cnctwin.api.routes import jobs as job_routes
 from cnctwin.api.server import Server
 from cnctwin.jobs.consumer import Consumer
-from cnctwin.jobs.topics import STATE
 from sparkplug.broker import BrokerAddress
 from tests.cnctwin.api.served_plant import PATIENCE_S, get, post, served
 from tests.cnctwin.api.small_plant import client_of
@@ -20,6 +19,7 @@ from tests.cnctwin.jobs.counting import chain_to
 from tests.edge.host_watch import wait
 from tests.recordings import PROJECT
 from tests.wire.mosquitto import Mosquitto
+from twin.vocabulary.topics import JOBS_STATE
 
 PROXIED = Access(proxy_header="X-Remote-User", proxy="127.0.0.1")
 
@@ -106,9 +106,9 @@ def test_where_no_consumer_is_it_says_so(mosquitto: Mosquitto, monkeypatch: pyte
         unheard = post(f"{server.url}/jobs", json=asked)
         assert (unheard.status_code, "cnctwin jobs run" in unheard.json()["error"]) == (503, True)
         heard = server.sources.viewer.jobs.take
-        heard(STATE, b'{"at": "2020-01-01T00:00:00Z", "jobs": []}')
+        heard(JOBS_STATE, b'{"at": "2020-01-01T00:00:00Z", "jobs": []}')
         assert "does not run any more" in jobs(server)["reason"]
-        heard(STATE, b'{"at": "2999-01-01T00:00:00Z", "jobs": []}')
+        heard(JOBS_STATE, b'{"at": "2999-01-01T00:00:00Z", "jobs": []}')
         assert jobs(server)["available"]
         nobody = post(f"{server.url}/jobs", json=asked)
         assert (nobody.status_code, "no answer within 0.3 s" in nobody.json()["error"]) == (504, True)

@@ -11,7 +11,6 @@ from random import Random
 import pytest
 
 from cnctwin.errors import UsageError
-from cnctwin.jobs import topics
 from cnctwin.jobs.client import JobsClient
 from cnctwin.jobs.consumer import Consumer, Setting
 from cnctwin.jobs.job import Job, JobState
@@ -26,6 +25,7 @@ from tests.cnctwin.jobs.consumer_on_trial import COUNTING, setting
 from tests.cnctwin.jobs.counting import chain_to, checkpoint_of, written
 from tests.cnctwin.program import until
 from tests.wire.mosquitto import Mosquitto
+from twin.vocabulary import topics
 
 pytestmark = pytest.mark.broker
 NODE = NodeId("cnc", "twin-jobs")
@@ -56,7 +56,7 @@ class Plant:
 
     def is_heard(self) -> bool:
         """Whether a consumer listens: it says how jobs stand when it has subscribed, and on the same connection."""
-        return any(topic == topics.STATE for topic, _ in self.plain)
+        return any(topic == topics.JOBS_STATE for topic, _ in self.plain)
 
     def said(self, device: str, name: str) -> list[object]:
         """All values of a metric, in their order."""
@@ -68,7 +68,7 @@ def test_a_plain_request_is_accepted_done_and_answered(start: Start, address: Br
     plant = Plant(address, "cell/answers", "cnc/jobs/#")
     asked = {"job": "count", "to": 30, "id": "night-7", "reply_to": "cell/answers", "machine": "vmc", "hold_at": 15}
     plant.until(plant.is_heard)
-    plant.host.publish_plain(topics.REQUEST, json.dumps(asked).encode(), qos=1)
+    plant.host.publish_plain(topics.JOB_REQUEST, json.dumps(asked).encode(), qos=1)
     for device in ("vmc", "jobs"):
         plant.until(lambda device=device: any(plant.said(device, "twin/job_progress_pct")))  # more than none
     (jobs / "night-7/go").touch()
@@ -93,7 +93,7 @@ def test_a_plain_request_is_accepted_done_and_answered(start: Start, address: Br
         assert progress[-1] == 100.0
         assert progress == sorted(progress)
         assert len(progress) > 2
-    shown = [told for topic, told in plant.plain if topic == topics.state_topic("night-7")]
+    shown = [told for topic, told in plant.plain if topic == topics.state_of_job("night-7")]
     assert shown[-1]["state"] == "done"
     plant.host.stop()
 
@@ -246,10 +246,10 @@ def test_no_payload_ends_the_consumer(start: Start, client: JobsClient, address:
         b'"x"',
     ]
     nasty += [chance.randbytes(chance.randrange(300)) for _ in range(60)]
-    plant = Plant(address, topics.STATE)
+    plant = Plant(address, topics.JOBS_STATE)
     plant.until(plant.is_heard)
     for number, payload in enumerate(nasty, start=1):
-        for topic in (topics.REQUEST, topics.CANCEL, topics.state_topic("x"), topics.state_topic("%")):
+        for topic in (topics.JOB_REQUEST, topics.JOB_CANCEL, topics.state_of_job("x"), topics.state_of_job("%")):
             plant.host.publish_plain(topic, payload, qos=1)
         if number % 20 == 0:  # its inbox has room for 200 messages
             until(lambda number=number: consumer.announcer.counts["requests_refused"] == number, "it to have read them")

@@ -2,6 +2,8 @@
 
 from collections.abc import Mapping
 
+from twin.vocabulary.twin_signals import SEVERITY
+
 CODES: Mapping[str, tuple[str, ...]] = {
     "exec_state": (
         "ACTIVE",
@@ -15,7 +17,7 @@ CODES: Mapping[str, tuple[str, ...]] = {
     ),
     "controller_mode": ("AUTOMATIC", "MANUAL", "MANUAL_DATA_INPUT", "SEMI_AUTOMATIC", "EDIT"),
     "tool_change_source": ("controller", "detector", "none", "stale"),
-    "twin/severity": ("none", "low", "medium", "high"),
+    SEVERITY: ("none", "low", "medium", "high"),
 }
 """Signal -> its texts. Append only: the numbers are in people's databases."""
 

@@ -3,12 +3,13 @@
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
-from cnctwin.memory.store.contract import DERIVED, RAW, TWIN_PREFIX, Query, Sample, Series, StoreError
+from cnctwin.memory.store.contract import DERIVED, RAW, Query, Sample, Series, StoreError
 from cnctwin.memory.store.influx import influxql
 from cnctwin.memory.store.influx.address import PINNED, Address
 from cnctwin.memory.store.influx.columns import Answered, Window, newest_series
 from cnctwin.memory.store.influx.plain_http import PlainHttp
 from cnctwin.memory.store.influx.sample_row import QUALITY, SampleRow, SeriesKey
+from twin.vocabulary.twin_signals import TWIN_PREFIX
 
 _MISSING = "database not found"
 _SIGNALS_AT_ONCE = 50

@@ -4,11 +4,12 @@ import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from cnctwin.memory.store.contract import DERIVED, RAW, TWIN_PREFIX, Message
+from cnctwin.memory.store.contract import DERIVED, RAW, Message
 from sparkplug.host_session import EventKind
 from sparkplug.metric import Reading
 from sparkplug.quality import Quality
 from sparkplug.values import Value
+from twin.vocabulary.twin_signals import TWIN_PREFIX
 
 TEXT_BYTES_MAX = 32_000
 """The longest text or reason; InfluxDB takes 64 KiB."""

@@ -12,12 +12,13 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from cnctwin.memory.store.contract import DERIVED, RAW, TWIN_PREFIX, Query, Sample, Series, StoreError
+from cnctwin.memory.store.contract import DERIVED, RAW, Query, Sample, Series, StoreError
 from cnctwin.memory.store.influx.address import Address
 from cnctwin.memory.store.influx.columns import Answered, Window, folded, newest_series
 from cnctwin.memory.store.influx.line_protocol import EMPTY
 from cnctwin.memory.store.influx.plain_http import PlainHttp
 from cnctwin.memory.store.influx.sample_row import QUALITY, SampleRow, SeriesKey
+from twin.vocabulary.twin_signals import TWIN_PREFIX
 
 _FIELDS = ("value", "held", "flag", "text", "quality", "reason")
 _EVER = "1"

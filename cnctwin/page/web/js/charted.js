@@ -1,11 +1,24 @@
 // What can be charted of a machine, and which of its signals belong together: measured, its twin, and what is between the two.
 
 import { Ring, Steps } from "./ring.js";
-import { NAMING, TWIN } from "./plant.js";
+import { NAMING } from "./plant.js";
 import { title } from "./text.js";
+import {
+  ADJUSTED_SCORE,
+  ANOMALY_THRESHOLD,
+  CUTTING_FORCE_N,
+  RAW_SCORE,
+  SPINDLE_TEMP_C,
+  SPINDLE_TEMP_CORRECTED_C,
+  SPINDLE_TEMP_RESIDUAL_K,
+  TOOL_CHANGE_GATE,
+  TWIN_PREFIX,
+  VIBRATION_RMS_G,
+  VIBRATION_VELOCITY_MM_S,
+} from "./vocabulary.js";
 
-export const SCORES = { raw: "twin/raw_score", adjusted: "twin/adjusted_score", threshold: "twin/anomaly_threshold" };
-export const CONTEXT = ["exec_state", "tool_number", "twin/tool_change_gate", "program", "nc_block", "nc_line"];
+export const SCORES = { raw: RAW_SCORE, adjusted: ADJUSTED_SCORE, threshold: ANOMALY_THRESHOLD };
+export const CONTEXT = ["exec_state", "tool_number", TOOL_CHANGE_GATE, "program", "nc_block", "nc_line"];
 
 /** The tiles, in their order; the first signal that the machine has is the one that is shown. */
 export const TILES = [
@@ -13,17 +26,17 @@ export const TILES = [
     id: "spindle_temp_c",
     name: "Spindle temperature",
     own: ["spindle_temp_c"],
-    twin: "twin/spindle_temp_c",
-    residual: "twin/spindle_temp_residual_k",
-    learned: "twin/spindle_temp_corrected_c",
+    twin: SPINDLE_TEMP_C,
+    residual: SPINDLE_TEMP_RESIDUAL_K,
+    learned: SPINDLE_TEMP_CORRECTED_C,
   },
-  { id: "spindle_load_pct", name: "Spindle load", own: ["spindle_load_pct"], twin: "twin/spindle_load_pct" },
+  { id: "spindle_load_pct", name: "Spindle load", own: ["spindle_load_pct"], twin: TWIN_PREFIX + "spindle_load_pct" },
   { id: "spindle_rpm", name: "Spindle speed", own: ["spindle_rpm"], twin: "spindle_rpm_cmd", twinIs: "commanded" },
-  { id: "cutting_force", name: "Cutting force", own: ["cutting_force_n", "twin/cutting_force_n"], twin: null },
+  { id: "cutting_force", name: "Cutting force", own: ["cutting_force_n", CUTTING_FORCE_N], twin: null },
   {
     id: "vibration",
     name: "Vibration",
-    own: ["vibration_rms_g", "twin/vibration_rms_g", "vibration_velocity_mm_s", "twin/vibration_velocity_mm_s"],
+    own: ["vibration_rms_g", VIBRATION_RMS_G, "vibration_velocity_mm_s", VIBRATION_VELOCITY_MM_S],
     twin: null,
   },
 ];
@@ -48,7 +61,7 @@ export function chartOf(machine, id) {
   const tile = TILES.find((one) => one.id === id || one.own[0] === id);
   const known = tile && tileOf(machine, tile);
   if (known) return known;
-  const twin = id.startsWith(TWIN) ? null : TWIN + id;
+  const twin = id.startsWith(TWIN_PREFIX) ? null : TWIN_PREFIX + id;
   return {
     id,
     name: title(id),
@@ -66,7 +79,7 @@ export function numbers(machine) {
     .filter(([signal, held]) => !NAMING.has(signal) && (typeof held.value === "number" || (held.value === null && held.unit)))
     .map(([signal]) => signal)
     .sort();
-  return [names.filter((name) => !name.startsWith(TWIN)), names.filter((name) => name.startsWith(TWIN))];
+  return [names.filter((name) => !name.startsWith(TWIN_PREFIX)), names.filter((name) => name.startsWith(TWIN_PREFIX))];
 }
 
 /** [t, v] of a number from `from` to `to`, its first sample moved to `from`, its last value held until `to` where it still holds. */

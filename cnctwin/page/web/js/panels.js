@@ -5,6 +5,7 @@ import { SCORES, difference, line, stretches, toolMarks, unknown } from "./chart
 import { el, setHidden, setText } from "./dom.js";
 import { Strip, stateItems, toolItems } from "./strip.js";
 import { moment, number, title } from "./text.js";
+import { TOOL_CHANGE_GATE, TWIN_PREFIX } from "./vocabulary.js";
 
 let count = 0;
 
@@ -75,7 +76,7 @@ export class Panels {
     this.charted = charted;
     const { machine } = this,
       unit = machine.value(charted.own)?.unit ?? machine.value(charted.twin)?.unit ?? "",
-      isTwinOnly = charted.own.startsWith("twin/");
+      isTwinOnly = charted.own.startsWith(TWIN_PREFIX);
     const commanded = charted.twinIs === "commanded";
     this.unit = unit;
     const lines = [{ label: charted.name, colour: isTwinOnly ? "after" : "ink", width: 2 }];
@@ -127,11 +128,11 @@ export class Panels {
   draw(from, to, live, lanes = []) {
     const { machine, charted } = this,
       range = [from, to];
-    const gates = stretches(machine, "twin/tool_change_gate", from, to).filter(([, , on]) => on === true);
+    const gates = stretches(machine, TOOL_CHANGE_GATE, from, to).filter(([, , on]) => on === true);
     const tools = toolMarks(machine, from, to);
     const holds = live && machine.online;
     const own = line(machine, charted.own, from, to, holds),
-      stale = charted.own.startsWith("twin/") ? [] : unknown(own, to);
+      stale = charted.own.startsWith(TWIN_PREFIX) ? [] : unknown(own, to);
     if (!machine.online && machine.offlineSince !== null) stale.push([Math.max(from, machine.offlineSince), to]);
     const marks = { gates, tools, stale };
     const twin = charted.twin ? line(machine, charted.twin, from, to, holds) : null;
@@ -163,7 +164,7 @@ export class Panels {
             ...stateItems(stretches(machine, "exec_state", from, end)),
             ...(machine.online ? [] : [{ from: end, to, text: "Offline", kind: "offline" }]),
           ],
-          toolItems(stretches(machine, "tool_number", from, end), stretches(machine, "twin/tool_change_gate", from, end)),
+          toolItems(stretches(machine, "tool_number", from, end), stretches(machine, TOOL_CHANGE_GATE, from, end)),
           ...lanes,
         ],
         from,

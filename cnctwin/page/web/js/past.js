@@ -3,6 +3,7 @@
 import { get, part, query } from "./api.js";
 import { CONTEXT, SCORES, TILES } from "./charted.js";
 import { Machine } from "./plant.js";
+import { ALERT_STATE, ANOMALY_ALARM, TWIN_PREFIX } from "./vocabulary.js";
 
 const COLUMNS = 1200;
 const AT_ONCE_MAX = 60;
@@ -12,8 +13,8 @@ const MORE = [
   "spindle_rpm",
   "spindle_rpm_cmd",
   "alarm",
-  "twin/alert_state",
-  "twin/anomaly_alarm",
+  ALERT_STATE,
+  ANOMALY_ALARM,
   ...Object.values(SCORES),
 ];
 
@@ -71,7 +72,7 @@ export function livedThrough(known, columns) {
       unit: column.unit ?? held?.unit ?? null,
       quality: "good",
       reason: column.reason?.[last] ?? null,
-      provenance: held?.provenance ?? (column.signal.startsWith("twin/") ? "inferred" : "measured"),
+      provenance: held?.provenance ?? (column.signal.startsWith(TWIN_PREFIX) ? "inferred" : "measured"),
       meaning: held?.meaning ?? null,
     });
   }

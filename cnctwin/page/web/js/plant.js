@@ -2,9 +2,17 @@
 
 import { serverNow } from "./clock.js";
 import { Ring, Steps } from "./ring.js";
+import {
+  ADJUSTED_SCORE,
+  ALERT_STATE,
+  ANOMALY_THRESHOLD,
+  GAP_GROWING,
+  SPINDLE_TEMP_RESIDUAL_K,
+  TOOL_CHANGE_GATE,
+  TWIN_PREFIX,
+} from "./vocabulary.js";
 
-export const TWIN = "twin/";
-const FLEET_SERIES = new Set(["spindle_load_pct", "twin/tool_change_gate"]);
+const FLEET_SERIES = new Set(["spindle_load_pct", TOOL_CHANGE_GATE]);
 export const NAMING = new Set(["tool_number", "nc_line"]); // numbers that name something
 const OTHER_CLOCK_MS = 5000;
 const MACHINES_MAX = 1000;
@@ -54,7 +62,7 @@ export class Machine {
   know(signal, given, { series }) {
     if (!given || typeof given !== "object" || !("value" in given)) return;
     if (!this.values.has(signal) && this.values.size >= SIGNALS_MAX) return;
-    const provenance = given.provenance ?? (signal.startsWith(TWIN) ? "inferred" : "measured");
+    const provenance = given.provenance ?? (signal.startsWith(TWIN_PREFIX) ? "inferred" : "measured");
     this.values.set(signal, {
       value: given.value,
       t: given.t ?? NaN,
@@ -80,7 +88,7 @@ export class Machine {
         unit: null,
         quality: "good",
         reason: null,
-        provenance: signal.startsWith(TWIN) ? "inferred" : "measured",
+        provenance: signal.startsWith(TWIN_PREFIX) ? "inferred" : "measured",
         meaning: null,
       };
       this.values.set(signal, held);
@@ -172,15 +180,15 @@ export class Plant {
       exec_state: "exec_state",
       program: "program",
       tool_number: "tool_number",
-      alert_state: "twin/alert_state",
-      score: "twin/adjusted_score",
-      gated: "twin/tool_change_gate",
+      alert_state: ALERT_STATE,
+      score: ADJUSTED_SCORE,
+      gated: TOOL_CHANGE_GATE,
       spindle_load_pct: "spindle_load_pct",
       spindle_rpm: "spindle_rpm",
-      threshold: "twin/anomaly_threshold",
+      threshold: ANOMALY_THRESHOLD,
       alarm: "alarm",
-      growing: "twin/gap_growing",
-      residual_k: "twin/spindle_temp_residual_k",
+      growing: GAP_GROWING,
+      residual_k: SPINDLE_TEMP_RESIDUAL_K,
     };
     for (const item of items) {
       const isNew = !this.machines.has(item.machine),
@@ -221,7 +229,7 @@ export class Plant {
     const keep = { series: true };
     for (const [signal, given] of Object.entries(state.measured ?? {})) machine.know(signal, given, keep);
     for (const [signal, given] of Object.entries(state.twin ?? {}))
-      machine.know(signal.startsWith(TWIN) ? signal : TWIN + signal, given, keep);
+      machine.know(signal.startsWith(TWIN_PREFIX) ? signal : TWIN_PREFIX + signal, given, keep);
     machine.setOnline(Boolean(state.online), machine.lastT === -Infinity ? null : machine.lastT);
     return machine;
   }

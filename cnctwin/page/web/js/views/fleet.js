@@ -4,6 +4,7 @@ import { get, part, query } from "../api.js";
 import { el, setClass, setHidden, setText } from "../dom.js";
 import { atMost } from "../frame.js";
 import { SPARK_MS, Unit } from "./fleet_unit.js";
+import { ALERT_STATE, GAP_GROWING } from "../vocabulary.js";
 
 const CARDS_MAX = 12;
 
@@ -12,20 +13,20 @@ const FILTERS = [
   ["active", "Active", (m) => m.online && m.bare("exec_state") === "ACTIVE"],
   ["still", "Not active", (m) => m.online && m.bare("exec_state") !== "ACTIVE"],
   ["alert", "Alerts", (m) => hasAlert(m)],
-  ["growing", "Gap growing", (m) => m.bare("twin/gap_growing") === true],
+  ["growing", "Gap growing", (m) => m.bare(GAP_GROWING) === true],
   ["offline", "Offline", (m) => !m.online],
 ];
 
 const hasAlert = (m) =>
-  ["firing", "acknowledged"].includes(m.bare("twin/alert_state")) ||
+  ["firing", "acknowledged"].includes(m.bare(ALERT_STATE)) ||
   (m.value("alarm")?.quality === "good" && Boolean(m.bare("alarm")));
 
 function urgency(m) {
-  const alert = m.bare("twin/alert_state");
+  const alert = m.bare(ALERT_STATE);
   return (
     (alert === "firing" ? 8 : alert === "acknowledged" ? 4 : 0) +
     (m.online ? 0 : 3) +
-    (m.bare("twin/gap_growing") === true ? 2 : 0) +
+    (m.bare(GAP_GROWING) === true ? 2 : 0) +
     (["STOPPED", "INTERRUPTED", "FEED_HOLD", "PROGRAM_STOPPED"].includes(m.bare("exec_state")) ? 1 : 0)
   );
 }

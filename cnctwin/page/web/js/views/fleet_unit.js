@@ -4,16 +4,26 @@ import { sparkline } from "../chart.js";
 import { el, setClass, setData, setHidden, setSymbol, setText, setTitle, symbol } from "../dom.js";
 import { Ring, Steps } from "../ring.js";
 import { coarse, execution, moment, number, plain, signed } from "../text.js";
+import {
+  ADJUSTED_SCORE,
+  ALERT_STATE,
+  ANOMALY_THRESHOLD,
+  GAP_GROWING,
+  GAP_LEFT_OUT_PCT,
+  GAP_PREFIX,
+  SPINDLE_TEMP_RESIDUAL_K,
+  TOOL_CHANGE_GATE,
+} from "../vocabulary.js";
 
 export const SPARK_MS = 120000;
 const LOAD_TOP = 120;
-const NO_GAP = new Set(["twin/gap_left_out_pct"]); // a number about the comparison, not a gap
+const NO_GAP = new Set([GAP_LEFT_OUT_PCT]); // a number about the comparison, not a gap
 
 /** The largest standing gap: what `/machines` says, kept up by the stream's `twin/gap_<signal>`. */
 function gapOf(machine) {
   let worst = null;
   for (const [signal, held] of machine.values) {
-    if (!signal.startsWith("twin/gap_") || signal.includes("/", 5) || NO_GAP.has(signal)) continue;
+    if (!signal.startsWith(GAP_PREFIX) || signal.includes("/", 5) || NO_GAP.has(signal)) continue;
     if (typeof held.value !== "number") continue;
     if (worst === null || held.value > worst) worst = held.value;
   }
@@ -89,16 +99,16 @@ export class Unit {
     this.scale(this.loadBar, load === null ? 0 : Math.abs(load) / LOAD_TOP);
     setClass(this.loadBar, "over", load !== null && load > 100);
     this.figure(this.speed, "spindle_rpm", "rev/min");
-    const score = this.figure(this.score, "twin/adjusted_score");
+    const score = this.figure(this.score, ADJUSTED_SCORE);
     if (score !== null) setText(this.score, score.toFixed(2).replace("-", "−"));
-    const limit = m.bare("twin/anomaly_threshold"),
+    const limit = m.bare(ANOMALY_THRESHOLD),
       top = typeof limit === "number" && limit > 0 ? 2 * limit : 1;
     this.scale(this.scoreBar, score === null ? 0 : Math.max(0, score) / top);
     setClass(this.scoreBar, "over", score !== null && typeof limit === "number" && score >= limit);
     setHidden(this.scoreMark, typeof limit !== "number");
     const gap = gapOf(m),
-      growing = m.bare("twin/gap_growing") === true;
-    const rest = gap === null ? m.bare("twin/spindle_temp_residual_k") : null,
+      growing = m.bare(GAP_GROWING) === true;
+    const rest = gap === null ? m.bare(SPINDLE_TEMP_RESIDUAL_K) : null,
       hasRest = typeof rest === "number";
     setText(this.gap, gap !== null ? coarse(gap) : hasRest ? signed(rest, "K") : "–");
     setText(this.gapUnit, gap !== null || !hasRest ? "floors" : "K now");
@@ -112,7 +122,7 @@ export class Unit {
     );
     setClass(this.gap, "large", gap !== null && gap > 3);
     setClass(this.growing, "off", !growing);
-    const alert = m.bare("twin/alert_state"),
+    const alert = m.bare(ALERT_STATE),
       shown = alert && alert !== "none";
     setClass(this.alert, "off", !shown);
     if (shown) {
@@ -121,7 +131,7 @@ export class Unit {
       setData(this.alert, "state", alert);
     }
     setData(this.link, "alert", shown ? alert : null);
-    setClass(this.gate, "off", m.bare("twin/tool_change_gate") !== true);
+    setClass(this.gate, "off", m.bare(TOOL_CHANGE_GATE) !== true);
   }
 
   scale(bar, share) {
@@ -131,7 +141,7 @@ export class Unit {
 
   spark() {
     const load = this.machine.series.get("spindle_load_pct"),
-      gates = this.machine.series.get("twin/tool_change_gate");
+      gates = this.machine.series.get(TOOL_CHANGE_GATE);
     if (!(load instanceof Ring) || !this.canvas.clientWidth) return;
     const to = this.machine.now(),
       from = to - SPARK_MS;

@@ -3,6 +3,7 @@
 import { el, setClass, setHidden, setSymbol, setText, symbol } from "../dom.js";
 import { age, execution, moment } from "../text.js";
 import { serverNow } from "../clock.js";
+import { ALERT_STATE, TOOL_CHANGE_GATE } from "../vocabulary.js";
 
 export function machineHead(app, machine, viewName, ...after) {
   const select = el("select", {
@@ -71,8 +72,8 @@ export function machineHead(app, machine, viewName, ...after) {
     );
     setText(block, machine.bare("nc_block") === null ? "" : String(machine.bare("nc_block")));
     setHidden(block, !block.textContent);
-    setHidden(gate, machine.bare("twin/tool_change_gate") !== true);
-    const phase = machine.bare("twin/alert_state"),
+    setHidden(gate, machine.bare(TOOL_CHANGE_GATE) !== true);
+    const phase = machine.bare(ALERT_STATE),
       alarm = machine.value("alarm")?.quality === "good" ? machine.bare("alarm") : null;
     setHidden(alert, (!phase || phase === "none") && !alarm);
     setSymbol(alertSign, { acknowledged: "s-ack", pending: "s-pending" }[phase] ?? "s-alert");

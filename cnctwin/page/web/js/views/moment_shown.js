@@ -4,6 +4,7 @@ import { SCORES } from "../charted.js";
 import { el, setText } from "../dom.js";
 import { Ring, Steps } from "../ring.js";
 import { execution, number, plain } from "../text.js";
+import { ALERT_STATE, TOOL_CHANGE_GATE } from "../vocabulary.js";
 
 /** The value of a signal that held at t. */
 function valueAt(past, signal, t) {
@@ -51,11 +52,11 @@ export class MomentShown {
     put("tool_number", at("tool_number") === null ? null : `T${at("tool_number")}`);
     put("nc_line", at("nc_line") === null ? null : plain(at("nc_line")));
     put("nc_block", at("nc_block"));
-    put("gate", at("twin/tool_change_gate") === null ? null : at("twin/tool_change_gate") ? "closed" : "open");
+    put("gate", at(TOOL_CHANGE_GATE) === null ? null : at(TOOL_CHANGE_GATE) ? "closed" : "open");
     put("spindle_rpm", unit("spindle_rpm", "rev/min"));
     put("spindle_load_pct", unit("spindle_load_pct", "%"));
     put("feed_mm_min", unit("feed_mm_min", "mm/min"));
     put("score", at(SCORES.adjusted) === null ? null : number(at(SCORES.adjusted)));
-    put("alert", at("alarm") || (at("twin/alert_state") ?? null));
+    put("alert", at("alarm") || (at(ALERT_STATE) ?? null));
   }
 }

@@ -3,6 +3,7 @@
 import { el, setClass, setText } from "../dom.js";
 import { onFrame } from "../frame.js";
 import { age, moment, plain } from "../text.js";
+import { TWIN_PREFIX } from "../vocabulary.js";
 
 const LONG = 120;
 
@@ -52,7 +53,7 @@ export class SignalTable {
 
   #write() {
     for (const signal of [...this.machine.values.keys()].sort(
-      (a, b) => Number(a.startsWith("twin/")) - Number(b.startsWith("twin/")) || a.localeCompare(b),
+      (a, b) => Number(a.startsWith(TWIN_PREFIX)) - Number(b.startsWith(TWIN_PREFIX)) || a.localeCompare(b),
     )) {
       const held = this.machine.value(signal);
       let row = this.rows.get(signal);
@@ -87,7 +88,7 @@ export class SignalTable {
         row.from.dataset.from = held.provenance;
         row.from.textContent = held.provenance;
       }
-      const stale = held.quality === "stale" || (!this.machine.online && !signal.startsWith("twin/"));
+      const stale = held.quality === "stale" || (!this.machine.online && !signal.startsWith(TWIN_PREFIX));
       setText(row.age, stale ? `stale since ${moment(held.staleSince ?? held.t)}` : age(this.machine.now() - held.t));
       setText(row.quality, held.reason ? `${held.quality}: ${held.reason}` : held.quality);
       setClass(row.element, "stale", stale);

@@ -3,6 +3,7 @@
 import { tileOf, SCORES } from "../charted.js";
 import { el, setClass, setData, setHidden, setText, setTitle } from "../dom.js";
 import { age, moment, number, signed } from "../text.js";
+import { COMMON_MODE, TOOL_CHANGE_GATE } from "../vocabulary.js";
 
 const OLD_MS = 10000;
 
@@ -169,8 +170,8 @@ export class ScoreTile {
     const known = held && typeof held.value === "number";
     setText(this.figure, known ? three(held.value) : "–");
     this.from.write(held?.provenance ?? raw?.provenance);
-    const gated = machine.bare("twin/tool_change_gate") === true,
-      isCommon = machine.bare("twin/common_mode") === true;
+    const gated = machine.bare(TOOL_CHANGE_GATE) === true,
+      isCommon = machine.bare(COMMON_MODE) === true;
     setText(
       this.aged,
       !known

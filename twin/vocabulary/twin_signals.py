@@ -1,0 +1,75 @@
+"""The names of signals that the twin publishes and that more than one file reads, all below `twin/`.
+
+Datatype, unit, meaning and provenance of each are in the `OutputSpec` of the processor that publishes it, which takes the name
+from here. A name that only its own processor uses is spelled there.
+"""
+
+TWIN_PREFIX = "twin/"
+
+# thermal, cutting_force, residual, vibration
+SPINDLE_TEMP_C = f"{TWIN_PREFIX}spindle_temp_c"
+SPINDLE_TEMP_RESIDUAL_K = f"{TWIN_PREFIX}spindle_temp_residual_k"
+SPINDLE_TEMP_RISE_K = f"{TWIN_PREFIX}spindle_temp_rise_k"
+SPINDLE_TEMP_BASIS = f"{TWIN_PREFIX}spindle_temp_basis"
+CUTTING_FORCE_N = f"{TWIN_PREFIX}cutting_force_n"
+CUTTING_FORCE_BASIS = f"{TWIN_PREFIX}cutting_force_basis"
+SPINDLE_TEMP_CORRECTION_K = f"{TWIN_PREFIX}spindle_temp_correction_k"
+SPINDLE_TEMP_CORRECTED_C = f"{TWIN_PREFIX}spindle_temp_corrected_c"
+SPINDLE_TEMP_CORRECTED_RESIDUAL_K = f"{TWIN_PREFIX}spindle_temp_corrected_residual_k"
+RESIDUAL_BASIS = f"{TWIN_PREFIX}residual_basis"
+VIBRATION_RMS_G = f"{TWIN_PREFIX}vibration_rms_g"
+VIBRATION_VELOCITY_MM_S = f"{TWIN_PREFIX}vibration_velocity_mm_s"
+VIBRATION_CREST_FACTOR = f"{TWIN_PREFIX}vibration_crest_factor"
+VIBRATION_KURTOSIS = f"{TWIN_PREFIX}vibration_kurtosis"
+
+# tool_change_detector
+TOOL_CHANGE_ACTIVE = f"{TWIN_PREFIX}tool_change_active"
+
+# joint_anomaly
+RAW_SCORE = f"{TWIN_PREFIX}raw_score"
+ADJUSTED_SCORE = f"{TWIN_PREFIX}adjusted_score"
+ANOMALY_THRESHOLD = f"{TWIN_PREFIX}anomaly_threshold"
+ANOMALY_ALARM = f"{TWIN_PREFIX}anomaly_alarm"
+ANOMALY_BASIS = f"{TWIN_PREFIX}anomaly_basis"
+COMMON_MODE = f"{TWIN_PREFIX}common_mode"
+TOOL_CHANGE_GATE = f"{TWIN_PREFIX}tool_change_gate"
+GATED_SHARE_PCT = f"{TWIN_PREFIX}gated_share_pct"
+SCORE_DRIFT = f"{TWIN_PREFIX}score_drift"
+
+# gap
+GAP_PREFIX = f"{TWIN_PREFIX}gap_"
+"""Followed by a signal: its standing gap; by a signal, a slash and a regime: the gap in that regime."""
+GAP_GROWING = f"{GAP_PREFIX}growing"
+GAP_GROWING_SIGNAL = f"{GAP_PREFIX}growing_signal"
+GAP_WINDOW = f"{GAP_PREFIX}window"
+GAP_LEFT_OUT_PCT = f"{GAP_PREFIX}left_out_pct"
+GAP_BASIS = f"{GAP_PREFIX}basis"
+GAP_NOTES = frozenset({GAP_GROWING, GAP_GROWING_SIGNAL, GAP_WINDOW, GAP_LEFT_OUT_PCT, GAP_BASIS})
+"""What is published about the comparison, beside the gaps themselves."""
+
+# rules
+RULE_PREFIX = f"{TWIN_PREFIX}rule_"
+"""Followed by a rule: its alarm."""
+RULE_LOAD_OVER_LIMIT = f"{RULE_PREFIX}load_over_limit"
+RULE_THERMAL_RUNAWAY = f"{RULE_PREFIX}thermal_runaway"
+RULE_LOAD_WITHOUT_FEED = f"{RULE_PREFIX}load_without_feed"
+RULE_VIBRATION = f"{RULE_PREFIX}vibration"
+RULES = (RULE_LOAD_OVER_LIMIT, RULE_THERMAL_RUNAWAY, RULE_LOAD_WITHOUT_FEED, RULE_VIBRATION)
+RULE_DETAIL = f"{RULE_PREFIX}detail"
+SEVERITY = f"{TWIN_PREFIX}severity"
+
+# events
+STOP_REASON = f"{TWIN_PREFIX}stop_reason"
+PART_RECORD = f"{TWIN_PREFIX}part_record"
+
+# alerts
+ALERT_STATE = f"{TWIN_PREFIX}alert_state"
+
+
+def is_gap(name: str) -> bool:
+    """Return True if a metric is the standing gap of a signal over all its regimes.
+
+    >>> is_gap("twin/gap_spindle_rpm"), is_gap("twin/gap_spindle_load_pct/air"), is_gap("twin/gap_basis")
+    (True, False, False)
+    """
+    return name.startswith(GAP_PREFIX) and "/" not in name[len(GAP_PREFIX) :] and name not in GAP_NOTES
