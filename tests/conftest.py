@@ -7,15 +7,22 @@ from typing import Any
 
 import pytest
 from hypothesis import settings
+from hypothesis.internal.conjecture import providers
 from xdist.scheduler import LoadFileScheduling
 
-from tests.depth import EXAMPLES
+from tests.depth import EXAMPLES, IS_FULL
 from tests.wire.mosquitto import Mosquitto, find_mosquitto
 from tests.wire.proxy import Proxy
 
-# How long an example takes says more of the machine that it runs on than of the code.
-settings.register_profile("house", deadline=None, max_examples=EXAMPLES)
-settings.load_profile("house")
+# How long an example takes says more of the machine that it runs on than of the code. The examples of a law follow from its own
+# source, so that it fails in every clone or in none (tests/test_same_examples.py); CNCTWIN_FULL=1 draws new ones each time.
+settings.register_profile("house", deadline=None, max_examples=EXAMPLES, derandomize=True, database=None)
+settings.register_profile("random", deadline=None, max_examples=EXAMPLES, print_blob=True)
+settings.load_profile("random" if IS_FULL else "house")
+if not IS_FULL:
+    # Hypothesis also draws constants that it reads in our modules, in those that are imported by then: a law's examples would
+    # change with each edit anywhere, and with the tests that run before it. No setting turns that off.
+    providers.HypothesisProvider._local_constants = providers.Constants()
 
 # Our tests start hundreds of processes: each module is compiled once, whatever the caller's environment says of that.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
