@@ -52,7 +52,7 @@ LONG = (
     "processors/alerts/courier/test_processor_and_courier_killed.py",
     "processors/alerts/courier/test_simulated_crashes.py",
     "cnctwin/memory/test_historian_killed.py",
-    "cnctwin/memory/store_influx/test_outage.py",
+    "cnctwin/memory/store/influx/test_outage.py",
     "cnctwin/page/test_views.py",
     "cnctwin/page/test_connection.py",
     "cnctwin/models/test_compare.py",

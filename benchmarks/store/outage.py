@@ -27,8 +27,8 @@ from cnctwin.memory.store.influx.store import ServerStore  # noqa: E402
 from sparkplug.host_session import EventKind, HostEvent  # noqa: E402
 from sparkplug.metric import NodeId, Reading  # noqa: E402
 from sparkplug.quality import Quality  # noqa: E402
-from tests.cnctwin.memory.store_influx.gate import Gate  # noqa: E402
-from tests.cnctwin.memory.store_influx.servers import Influxd, ServerProcess, VictoriaMetrics  # noqa: E402
+from tests.cnctwin.memory.store.influx.gate import Gate  # noqa: E402
+from tests.cnctwin.memory.store.influx.servers import Influxd, ServerProcess, VictoriaMetrics  # noqa: E402
 
 SIGNALS, EVERY_MS = 20, 100
 NODE = NodeId("cnc", "hall")

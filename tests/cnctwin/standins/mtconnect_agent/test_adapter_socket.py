@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from cnctwin.standins.mtconnect_agent import ShdrAdapter
-from tests.cnctwin.small_machine import at, write_machine
+from tests.cnctwin.standins.mtconnect_agent.small_machine import at, write_machine
 from tests.recordings import recording
 
 LINES = [at(n, f"tool|{n}|Xload|{n}") for n in range(200)]

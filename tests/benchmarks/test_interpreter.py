@@ -3,7 +3,7 @@
 import importlib.util
 from pathlib import Path
 
-BENCHMARK = Path(__file__).parents[3] / "benchmarks" / "interpreter.py"
+BENCHMARK = Path(__file__).parents[2] / "benchmarks" / "interpreter.py"
 
 
 def test_the_benchmark_measures_us_and_its_yardsticks() -> None:
