@@ -257,7 +257,7 @@ def case(folder: Path) -> dict[str, Any]:
 
 def simulated_program() -> Question:
     """The program of the simulated machine, 50 lines that feed, pockets by macro, five tools."""
-    folder = HERE.parent / "cnctwin" / "simulated_machine"
+    folder = HERE.parent / "cnctwin" / "standins" / "simulated_machine"
     text, toml = (folder / "base_plate.nc").read_text(), (folder / "machine.toml").read_text()
     return Question(text, toml, name="base_plate", force_limit_n=400.0)
 

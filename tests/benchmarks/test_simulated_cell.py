@@ -1,20 +1,15 @@
 """The simulated cell: what it draws is what it says, and a slice of the benchmark that is judged on it."""
 
-import importlib.util
-import sys
-from pathlib import Path
-from types import ModuleType
-
 import numpy as np
 import pytest
 
+from benchmarks import scoring
 from benchmarks.simulated_cell.cell import Cell, draw_cell, machine_signals
 from benchmarks.simulated_cell.fault import SIZES, FaultKind, Overlap
 from benchmarks.simulated_cell.part_program import Work
 from benchmarks.simulated_cell.schedule import DAY_S
 from benchmarks.simulated_cell.signals import FEATURES
 
-SOURCE = Path(__file__).parent.parent.parent / "benchmarks" / "scoring.py"
 LOAD, RPM, FEED, TEMP, VIBRATION = range(5)
 
 
@@ -22,16 +17,6 @@ LOAD, RPM, FEED, TEMP, VIBRATION = range(5)
 def cell() -> Cell:
     """Four machines, a day without faults and a day with them."""
     return draw_cell(7, 4, 2, 1)
-
-
-@pytest.fixture(scope="module")
-def scoring() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("scoring_benchmark", SOURCE)
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["scoring_benchmark"] = module
-    spec.loader.exec_module(module)
-    return module
 
 
 def test_a_seed_is_a_cell(cell: Cell) -> None:
@@ -114,7 +99,7 @@ def test_a_disturbance_is_felt_by_all_each_with_its_own_strength(cell: Cell) -> 
         assert 1.0 < max(one.gains) / min(one.gains) < 30.0
 
 
-def test_a_slice_of_the_benchmark_finds_what_is_big_and_more_with_peers(scoring: ModuleType) -> None:
+def test_a_slice_of_the_benchmark_finds_what_is_big_and_more_with_peers() -> None:
     """Two days each to learn, to calibrate and to be judged, three machines, two alerts a day asked for."""
     frames = scoring.framed(draw_cell(2, 3, 6, 4), (2, 2, 2))
     found = {}
