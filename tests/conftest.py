@@ -34,22 +34,30 @@ os.environ.setdefault("PYTHONPYCACHEPREFIX", str(Path(__file__).parents[1] / ".c
 for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
     os.environ.setdefault(name, "1")
 
-# Files that take half a minute and more. They begin first, so that none of them is left for one worker when the others are done.
+# Files that take a quarter of a minute and more, the longest first. They begin first, so that none of them is left for one worker
+# when the others are done.
 LONG = (
     "cnctwin/test_kill_and_restart.py",
-    "processors/alerts/courier/test_courier_on_a_broker.py",
-    "cnctwin/demo/test_demo.py",
     "twin/identification/test_identify.py",
+    "cnctwin/demo/test_demo.py",
+    "twin/gap/test_diagnose.py",
+    "processors/alerts/courier/test_courier_on_a_broker.py",
     "twin/gap/programs/test_diagnose.py",
+    "cnctwin/demo/test_demo_by_peer.py",
     "hivemq/test_barrier.py",
     "processors/test_contract.py",
-    "twin/gap/test_diagnose.py",
+    "twin/optimisation/test_limits.py",
+    "cnctwin/jobs/test_dask_cluster.py",
+    "cnctwin/commands/test_optimise.py",
     "cnctwin/validation/test_axes_and_programs.py",
-    "cnctwin/standins/simulated_machine/test_machining.py",
-    "twin/anomaly/test_detector.py",
-    "cnctwin/demo/test_demo_by_peer.py",
-    "cnctwin/commands/train/test_anomaly.py",
     "processors/alerts/courier/test_processor_and_courier_killed.py",
+    "twin/process/test_peak.py",
+    "twin/process/test_milling.py",
+    "cnctwin/memory/replay/test_replay_of_a_live_plant.py",
+    "cnctwin/standins/simulated_machine/test_machining.py",
+    "benchmarks/test_benchmarks.py",
+    "twin/anomaly/test_detector.py",
+    "cnctwin/commands/train/test_anomaly.py",
     "processors/alerts/courier/test_simulated_crashes.py",
     "cnctwin/memory/test_historian_killed.py",
     "cnctwin/memory/store/influx/test_outage.py",
@@ -57,7 +65,8 @@ LONG = (
     "cnctwin/page/test_connection.py",
     "cnctwin/models/test_compare.py",
     "processors/alerts/test_laws.py",
-    "cnctwin/memory/replay/test_replay_of_a_live_plant.py",
+    "benchmarks/test_simulated_cell.py",
+    "benchmarks/test_tool_change_detector.py",
 )
 
 # Files that share what takes long to start: one worker does it once for all of them.
