@@ -52,7 +52,6 @@ LONG = (
     "cnctwin/validation/test_axes_and_programs.py",
     "processors/alerts/courier/test_processor_and_courier_killed.py",
     "twin/process/test_peak.py",
-    "twin/process/test_milling.py",
     "cnctwin/memory/replay/test_replay_of_a_live_plant.py",
     "cnctwin/standins/simulated_machine/test_machining.py",
     "benchmarks/test_benchmarks.py",
@@ -69,8 +68,8 @@ LONG = (
     "benchmarks/test_tool_change_detector.py",
 )
 
-# Files that share what takes long to start: one worker does it once for all of them.
-TOGETHER = ("tests/hivemq/",)
+# Files that share what takes long to start or to compile: one worker does it once for all of them.
+TOGETHER = ("tests/hivemq/", "tests/twin/process/")
 
 
 class InGroups(LoadFileScheduling):
