@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Stability lobes: how fast, and how near the zero-order limit is to where the vibration itself begins to grow.
 
-    PYTHONPATH=. .venv/bin/python benchmarks/chatter.py
+    .venv/bin/python benchmarks/chatter.py
 
 The vibration is integrated step by step by tests/twin/process/milling_vibration.py, which shares no code with the lobes: a tool
 with a mode of 500 Hz, 2 % in x and one of 610 Hz, 3 % in y, at 26 tooth frequencies from 150 to 1400 Hz. Of each cut: the

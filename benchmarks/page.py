@@ -19,16 +19,13 @@ from typing import Any
 
 from playwright.sync_api import Page, sync_playwright
 
-ROOT = Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(ROOT))  # the made-up shop is the tests'
-
-from cnctwin.processes.private_broker import PrivateBroker  # noqa: E402
-from sparkplug.broker import BrokerAddress  # noqa: E402
-from sparkplug.datatype import DataType  # noqa: E402
-from sparkplug.edge_node import EdgeNode  # noqa: E402
-from sparkplug.metric import Change, MetricSpec, NodeId  # noqa: E402
-from sparkplug.quality import Quality  # noqa: E402
-from tests.cnctwin.page.simulated_shop import Told, signals  # noqa: E402
+from cnctwin.processes.private_broker import PrivateBroker
+from sparkplug.broker import BrokerAddress
+from sparkplug.datatype import DataType
+from sparkplug.edge_node import EdgeNode
+from sparkplug.metric import Change, MetricSpec, NodeId
+from sparkplug.quality import Quality
+from tests.cnctwin.page.simulated_shop import Told, signals
 
 WATCH = """() => {
   window.seen = { long: 0, longest: 0, frames: 0 };

@@ -8,7 +8,7 @@ from twin.forest.errors import ForestError
 from twin.forest.forest import forest_of_arrays
 from twin.forest.regression import RegressionForest
 
-KIND, VERSION = "cnctwin regression forest", 1
+KIND, VERSION = "regression forest", 1
 
 
 def save_regression(model: RegressionForest, folder: Path, features: Sequence[str], target: str) -> None:

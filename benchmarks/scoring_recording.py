@@ -22,6 +22,7 @@ from cnctwin.training.anomaly.held_rows import held_rows
 from twin.anomaly.alarm import AlarmRule, dwell_score, is_alarm, onsets
 from twin.anomaly.detector import Detector, trained_model
 from twin.anomaly.gate import gate, held
+from twin.anomaly.model import AnomalyModel
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -78,17 +79,23 @@ def stretches(recording: Path, devices: Path) -> list[Stretch]:
     return found
 
 
-def seen(recorded: Sequence[Stretch], number: int, faulty: Stretch | None = None) -> Seen:
-    """One stretch, scored by what the others taught; or what became of it, by what all of them taught."""
-    others = [one for place, one in enumerate(recorded) if place != number or faulty is not None]
-    learned = np.concatenate([one.rows[~one.shut] for one in others])
-    model = trained_model(Detector(), learned, FEATURES)
+def taught(others: Sequence[Stretch]) -> tuple[AnomalyModel, AlarmRule]:
+    """The model that these stretches teach, and the rule by which none of them is an alert."""
+    model = trained_model(Detector(), np.concatenate([one.rows[~one.shut] for one in others]), FEATURES)
     threshold = max(float(dwell_score(model.scores(one.rows), one.shut, DWELL).max()) for one in others)
-    rule = AlarmRule(max(threshold, 1e-6) * 1.0001, DWELL)
-    stretch = faulty or recorded[number]
+    return model, AlarmRule(max(threshold, 1e-6) * 1.0001, DWELL)
+
+
+def seen(stretch: Stretch, model: AnomalyModel, rule: AlarmRule) -> Seen:
+    """One stretch, as the model scores it."""
     raw = model.scores(stretch.rows)
     alerts = [onsets(is_alarm(rule, raw, shut)).tolist() for shut in (stretch.shut, np.zeros(len(raw), dtype=np.bool_))]
     return Seen(stretch, raw, rule.threshold, *alerts)
+
+
+def each_by_the_others(recorded: Sequence[Stretch]) -> list[Seen]:
+    """Each stretch, scored by what the others taught."""
+    return [seen(one, *taught([*recorded[:number], *recorded[number + 1 :]])) for number, one in enumerate(recorded)]
 
 
 def with_fault(stretch: Stretch, from_tick: int, points: float = 100.0) -> Stretch:
@@ -110,8 +117,8 @@ def main() -> None:
     asked.add_argument("devices", type=Path)
     given = asked.parse_args()
     recorded = stretches(given.recording, given.devices)
-    for number, stretch in enumerate(recorded):
-        found = seen(recorded, number)
+    by_all = taught(recorded)
+    for number, (stretch, found) in enumerate(zip(recorded, each_by_the_others(recorded), strict=True)):
         quiet = found.raw[~stretch.shut]
         peaks = [float(found.raw[one.start : one.end + int(TAIL_S)].max()) for one in stretch.changes]
         gated, opened = found.gated_alerts, found.open_alerts
@@ -121,7 +128,7 @@ def main() -> None:
             f"{len(opened)} not; raw in changes {np.round(peaks, 2).tolist()}, median outside {np.median(quiet):.2f}"
         )
         for one in stretch.changes:
-            faulty = seen(recorded, number, with_fault(stretch, (one.start + one.end) // 2))
+            faulty = seen(with_fault(stretch, (one.start + one.end) // 2), *by_all)
             clean = first_clean(stretch, one)
             first = next((tick for tick in faulty.gated_alerts if tick >= one.start), None)
             print(f"  fault from the middle of the change at {one.start} s: first clean tick {clean}, alert at {first}")

@@ -73,8 +73,11 @@ def test_nothing_is_unpickled_evaluated_or_left_unbounded(path: Path) -> None:
 
 
 def test_tests_mirror_the_tree() -> None:
-    missing = [package for package in PACKAGES if not any((ROOT / "tests" / package).glob("test_*.py"))]
-    assert not missing
+    tests = ROOT / "tests"
+    folders = {path.parent.relative_to(tests) for room in (*PACKAGES, "benchmarks") for path in (tests / room).rglob("test_*.py")}
+    assert {Path(package) for package in PACKAGES} <= folders
+    conformance = Path("sparkplug/conformance")  # follows the chapters of the specification
+    assert {folder for folder in folders if not any((ROOT / folder).glob("*.py"))} == {conformance}
 
 
 def test_the_files_that_begin_first_are_there() -> None:

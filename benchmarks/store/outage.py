@@ -18,17 +18,14 @@ from random import Random
 
 import httpx
 
-ROOT = Path(__file__).parents[2]
-sys.path.insert(0, str(ROOT))
-
-from cnctwin.memory.store.contract import Message, Query  # noqa: E402
-from cnctwin.memory.store.influx.opening import open_influx  # noqa: E402
-from cnctwin.memory.store.influx.store import ServerStore  # noqa: E402
-from sparkplug.host_session import EventKind, HostEvent  # noqa: E402
-from sparkplug.metric import NodeId, Reading  # noqa: E402
-from sparkplug.quality import Quality  # noqa: E402
-from tests.cnctwin.memory.store_influx.gate import Gate  # noqa: E402
-from tests.cnctwin.memory.store_influx.servers import Influxd, ServerProcess, VictoriaMetrics  # noqa: E402
+from cnctwin.memory.store.contract import Message, Query
+from cnctwin.memory.store.influx.opening import open_influx
+from cnctwin.memory.store.influx.store import ServerStore
+from sparkplug.host_session import EventKind, HostEvent
+from sparkplug.metric import NodeId, Reading
+from sparkplug.quality import Quality
+from tests.cnctwin.memory.store.influx.gate import Gate
+from tests.cnctwin.memory.store.influx.servers import Influxd, ServerProcess, VictoriaMetrics
 
 SIGNALS, EVERY_MS = 20, 100
 NODE = NodeId("cnc", "hall")

@@ -1,8 +1,6 @@
 """The benchmarks run, and who cites them cites what is there; what they measure is not tested, since a machine is never quiet."""
 
 import ast
-import importlib.util
-import os
 import re
 import subprocess
 import sys
@@ -12,19 +10,19 @@ from pathlib import Path
 import pytest
 import typer.main
 
+from benchmarks import sample_path
 from cnctwin.cli import app
 
 ROOT = Path(__file__).parents[2]
-BENCHMARKS = ROOT / "benchmarks"
 SCRIPTS = {
-    ".".join(path.relative_to(BENCHMARKS).with_suffix("").parts): path.read_text(encoding="utf-8")
-    for path in sorted(BENCHMARKS.rglob("*.py"))
+    path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8")
+    for path in sorted((ROOT / "benchmarks").rglob("*.py"))
     if path.name != "__init__.py"
 }
 PAPERS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 WENT_AWAY = ("attr-defined", "call-arg", "import-not-found", "name-defined")
 """What mypy calls the use of a name, a module or a parameter that is not there. The rest of strictness is not asked of them."""
-SCRIPT = re.compile(r"(?:python\s+|`)(?:benchmarks/([\w/]+)\.py|-m benchmarks\.([\w.]*\w))\b(.*?)(?:`|#| {3}|$)", re.M)
+SCRIPT = re.compile(r"(?:python\s+|`)(?:(benchmarks/[\w/]+)\.py|-m (benchmarks[\w.]+))\b(.*?)(?:`|#| {3}|$)", re.M)
 PROGRAM = re.compile(r"\bcnctwin ([a-z].*?)(?:`|#| {3}|$)", re.M)
 OPTION = re.compile(r"(?<![\w-])--[a-z][\w-]*")
 CNCTWIN = typer.main.get_command(app)
@@ -32,10 +30,6 @@ PLACE = re.compile(r"\b(?:tests|benchmarks|scripts)/[\w./-]*\w")
 
 
 def test_every_message_of_the_sample_path_brings_a_result() -> None:
-    spec = importlib.util.spec_from_file_location("sample_path", BENCHMARKS / "sample_path.py")
-    assert spec is not None and spec.loader is not None
-    sample_path = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(sample_path)
     stages = sample_path.stages(200)
     assert set(stages) == {"floor", "decode", "fold", "encode"}
     assert all(figure >= 0.0 for figure in stages.values())
@@ -43,10 +37,9 @@ def test_every_message_of_the_sample_path_brings_a_result() -> None:
 
 def test_the_benchmarks_use_what_is_there() -> None:
     """Some seconds where mypy has looked at the packages before, as in `scripts/test`: asked the same way, it uses its cache."""
-    modules = [part for name in SCRIPTS for part in ("-m", f"benchmarks.{name}")]
-    environment = os.environ | {"MYPYPATH": "."}
+    modules = [part for name in SCRIPTS for part in ("-m", name.removesuffix(".py").replace("/", "."))]
     mypy = [Path(sys.executable).with_name("mypy"), "--no-error-summary", *modules]
-    done = subprocess.run(mypy, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
+    done = subprocess.run(mypy, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode in (0, 1), done.stdout + done.stderr
     codes = tuple(f"[{code}]" for code in WENT_AWAY)
     wrong = [line for line in done.stdout.splitlines() if line.startswith("benchmarks") and line.endswith(codes)]
@@ -66,12 +59,12 @@ def untaken(script: str, told: str) -> Iterator[str]:
     yield from (word for word in (*first, *OPTION.findall(told)) if word not in own)
 
 
-@pytest.mark.parametrize("path", [*PAPERS, *sorted(BENCHMARKS.rglob("*.py"))], ids=lambda path: str(path.relative_to(ROOT)))
+@pytest.mark.parametrize("path", [*PAPERS, *(ROOT / script for script in SCRIPTS)], ids=lambda path: str(path.relative_to(ROOT)))
 def test_a_cited_command_is_there_with_its_options(path: Path) -> None:
     text = path.read_text(encoding="utf-8")
     assert [place for place in PLACE.findall(text) if not (ROOT / place).exists()] == []
     for one in SCRIPT.finditer(text):
-        assert list(untaken((one[1] or one[2]).replace("/", "."), one[3])) == [], one[0]
+        assert list(untaken(f"{(one[1] or one[2]).replace('.', '/')}.py", one[3])) == [], one[0]
     for one in PROGRAM.finditer(text):
         command, words = CNCTWIN, one[1].split()
         while words and (inner := getattr(command, "commands", {}).get(words[0])):

@@ -1,20 +1,20 @@
 """The simulated cell: what it draws is what it says, and a slice of the benchmark that is judged on it."""
 
-import importlib.util
-import sys
-from pathlib import Path
-from types import ModuleType
+from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
+from benchmarks import scoring
 from benchmarks.simulated_cell.cell import Cell, draw_cell, machine_signals
 from benchmarks.simulated_cell.fault import SIZES, FaultKind, Overlap
 from benchmarks.simulated_cell.part_program import Work
 from benchmarks.simulated_cell.schedule import DAY_S
 from benchmarks.simulated_cell.signals import FEATURES
 
-SOURCE = Path(__file__).parent.parent.parent / "benchmarks" / "scoring.py"
+Floats = NDArray[np.float64]
 LOAD, RPM, FEED, TEMP, VIBRATION = range(5)
 
 
@@ -22,16 +22,6 @@ LOAD, RPM, FEED, TEMP, VIBRATION = range(5)
 def cell() -> Cell:
     """Four machines, a day without faults and a day with them."""
     return draw_cell(7, 4, 2, 1)
-
-
-@pytest.fixture(scope="module")
-def scoring() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("scoring_benchmark", SOURCE)
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["scoring_benchmark"] = module
-    spec.loader.exec_module(module)
-    return module
 
 
 def test_a_seed_is_a_cell(cell: Cell) -> None:
@@ -71,25 +61,33 @@ def test_before_the_faults_all_is_the_same_without_them(cell: Cell) -> None:
     assert len(differs) > 0
 
 
-def test_faults_are_of_all_kinds_sizes_and_overlaps() -> None:
-    faults = draw_cell(9, 4, 14, 7).faults
+@pytest.fixture(scope="module")
+def faulty() -> Cell:
+    return draw_cell(9, 4, 14, 7)
+
+
+@pytest.fixture(scope="module")
+def of_a_machine(faulty: Cell) -> Callable[[int, bool], Floats]:
+    """Its signals with and without its faults, made once."""
+    return cache(lambda machine, with_faults: machine_signals(faulty, machine, with_faults=with_faults))
+
+
+def test_faults_are_of_all_kinds_sizes_and_overlaps(faulty: Cell) -> None:
+    faults = faulty.faults
     assert len(faults) == 54
     assert {fault.kind for fault in faults} == set(FaultKind)
     assert {fault.size for fault in faults} == set(SIZES)
     assert {fault.overlap for fault in faults} == set(Overlap)
 
 
-@pytest.fixture(scope="module")
-def faulty() -> Cell:
-    return draw_cell(9, 4, 14, 7)
-
-
 @pytest.mark.parametrize("kind", list(FaultKind))
-def test_a_fault_is_as_big_as_it_is_said_to_be(kind: FaultKind, faulty: Cell) -> None:
+def test_a_fault_is_as_big_as_it_is_said_to_be(
+    kind: FaultKind, faulty: Cell, of_a_machine: Callable[[int, bool], Floats]
+) -> None:
     fault = next(fault for fault in faulty.faults if fault.kind is kind and fault.size >= 1.0 and fault.overlap is Overlap.NONE)
     quarter = 0.25 * (fault.end_s - fault.start_s)
     middle = slice(int(fault.start_s + quarter), int(fault.end_s - quarter))
-    rows, healthy = (machine_signals(faulty, fault.machine, with_faults=one)[middle] for one in (True, False))
+    rows, healthy = (of_a_machine(fault.machine, with_faults)[middle] for with_faults in (True, False))
     cut = faulty.schedules[fault.machine].work[middle] == Work.CUTTING
     assert cut.any()
     factors = {
@@ -114,7 +112,7 @@ def test_a_disturbance_is_felt_by_all_each_with_its_own_strength(cell: Cell) -> 
         assert 1.0 < max(one.gains) / min(one.gains) < 30.0
 
 
-def test_a_slice_of_the_benchmark_finds_what_is_big_and_more_with_peers(scoring: ModuleType) -> None:
+def test_a_slice_of_the_benchmark_finds_what_is_big_and_more_with_peers() -> None:
     """Two days each to learn, to calibrate and to be judged, three machines, two alerts a day asked for."""
     frames = scoring.framed(draw_cell(2, 3, 6, 4), (2, 2, 2))
     found = {}

@@ -1,27 +1,17 @@
 """The benchmark of the simulator runs, and what it compares computes the same; its times are not tested."""
 
-import importlib
 import shutil
-import sys
 from pathlib import Path
-from types import ModuleType
 
 import pytest
 
-BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
+from benchmarks import simulator
 
 pytestmark = pytest.mark.skipif(not shutil.which("gcc"), reason="no gcc, and the yardstick is a C loop")
 
 
-@pytest.fixture(scope="module")
-def simulator() -> ModuleType:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("sys.path", [*sys.path, str(BENCHMARKS)])  # last: a benchmark is called edge.py
-        return importlib.import_module("simulator")
-
-
 @pytest.mark.parametrize("name", ["contour", "axis by axis"])
-def test_the_c_loop_and_the_simulator_move_alike(simulator: ModuleType, tmp_path: Path, name: str) -> None:
+def test_the_c_loop_and_the_simulator_move_alike(tmp_path: Path, name: str) -> None:
     machine = simulator.machine_from_toml(simulator.MACHINE)
     motion = simulator.motion_of(machine, simulator.MOTIONS[name], 1000)
     row = simulator.servo_rows(machine, motion, {"C": simulator.PlainLoop(tmp_path, simulator.PLAIN)}, 1)
@@ -30,7 +20,7 @@ def test_the_c_loop_and_the_simulator_move_alike(simulator: ModuleType, tmp_path
     assert motion.reference_mm["x"].max() > 0.1
 
 
-def test_every_group_is_printed(simulator: ModuleType) -> None:
+def test_every_group_is_printed() -> None:
     servo = dict.fromkeys(("C, traces", "C, sums", "limit, traces", "single", "batch, traces", "batch, sums"), 1.0)
     effects = {f"{some}, {kept}": 2.0 for some in ("bare", "all") for kept in ("traces", "sums")}
     groups = {

@@ -16,7 +16,7 @@ import yaml
 
 from cnctwin.memory.store.influx.opening import open_influx
 from cnctwin.memory.store.influx.store import ServerStore
-from tests.cnctwin.memory.store_influx.servers import Influxd, ServerProcess, VictoriaMetrics
+from tests.cnctwin.memory.store.influx.servers import Influxd, ServerProcess, VictoriaMetrics
 from tests.deploy.grafana_schema import complaints
 from tests.deploy.plant import DEPLOY
 from tests.deploy.plant_history import MACHINES, SECONDS, TOOL_CHANGE_S, exposition, fast, messages, published

@@ -1,24 +1,21 @@
 """Pieces on a real Dask cluster: killed workers cost time and no answer, and nothing is waited for without end."""
 
-import importlib.util
 import json
 import shutil
 import signal
 import subprocess
-import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 
+from benchmarks import spread as spreading
 from cnctwin.errors import SpreadError, UsageError
 from cnctwin.jobs.dask_cluster import DaskCluster
 from cnctwin.jobs.spread import spread_over
 from tests.cnctwin.jobs import pieces
 from tests.cnctwin.jobs.dask_processes import DaskProcesses, dask_processes
-from tests.recordings import PROJECT
 from twin.errors import TwinError
 from twin.optimisation.optimise import NO_HOOKS, Hooks, search
 
@@ -32,19 +29,7 @@ def dask(tmp_path: Path) -> Iterator[DaskProcesses]:
         yield processes
 
 
-def benchmark() -> Any:
-    """benchmarks/spread.py, which tells the same at length."""
-    spec = importlib.util.spec_from_file_location("spread_benchmark", PROJECT / "benchmarks" / "spread.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
-
-
 def test_an_optimisation_on_two_workers_one_of_which_is_killed_gives_the_same_answer(dask: DaskProcesses) -> None:
-    spreading = benchmark()
     asked = spreading.question(levels=1, islands=4, evolutions=10, population=16)
     here = search(asked, NO_HOOKS, None)
     cluster = DaskCluster.from_text(dask.start_scheduler())
@@ -64,7 +49,7 @@ def test_without_a_worker_or_a_scheduler_nobody_waits_for_ever(dask: DaskProcess
     texts = [json.dumps([number, str(marks), 0.1]) for number in range(10)]
     cluster = replace(DaskCluster.from_text(dask.start_scheduler()), patience_s=1.5)
     worker = dask.start_worker(cluster.address)
-    benchmark().wait_for_workers(dask, 1)
+    spreading.wait_for_workers(dask, 1)
     with spread_over(dask=cluster, packages=TESTS) as spread:
         with pytest.raises(TwinError, match="line 7: G2: a bow without I and J"):
             list(spread(pieces.refused, ['"I and J"', '"K"']))

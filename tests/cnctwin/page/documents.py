@@ -1,6 +1,7 @@
 """What the interface tells beside live values: alerts, a gap with its diagnosis, events, parts, validation, a replay."""
 
 import time
+import zlib
 from datetime import UTC, datetime
 from typing import Any
 
@@ -21,7 +22,7 @@ def alert(machine: str, name: str, severity: str, phase: str, ago_s: float, **mo
         "annotations": {"summary": f"{name} on {machine}", "description": more.pop("description", "")},
         "startsAt": iso(began),
         "endsAt": iso(began + 90_000) if phase == "resolved" else "0001-01-01T00:00:00Z",
-        "fingerprint": f"{abs(hash((machine, name))):016x}"[:16],
+        "fingerprint": f"{zlib.crc32(f'{machine} {name}'.encode()):016x}",
         "phase": phase,
         "severity": severity,
         "severities": [severity],

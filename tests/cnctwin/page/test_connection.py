@@ -1,18 +1,14 @@
 """The connection: what is not live never looks live, and the page comes back by itself; fifty machines at 10 Hz."""
 
-import os
 import re
-from typing import Any
+import time
 
-import pytest
 from playwright.sync_api import Browser, expect
 
-from tests.cnctwin.page.conftest import SIZES, Visit
+from tests.cnctwin.page.conftest import SIZES, WAIT_MS_MAX, Visit
 from tests.cnctwin.page.fake_server import FakeServer, Shop, now_ms
 
-LAG_MS_MAX = 250.0
-BUSY = 2.0  # processes that want to run, for each core
-WINDOWS_MAX = 6  # the tests run beside others: the best of some windows is the page's own
+MACHINES, BATCHES = 50, 15
 
 
 def test_the_page_comes_back_by_itself_after_the_server_was_restarted(visit: Visit, server: FakeServer) -> None:
@@ -91,28 +87,32 @@ def test_figures_read_as_a_person_writes_them(visit: Visit) -> None:
     ]  # fmt: skip
 
 
-def skip_where_busy() -> None:
-    """A page that waits for a processor says nothing of itself."""
-    if os.getloadavg()[0] > BUSY * (os.cpu_count() or 1):
-        pytest.skip(f"the machine is too busy to measure on: load average {os.getloadavg()[0]:.0f}")
+def test_fifty_machines_at_ten_hertz_are_painted_before_the_next_values_come(browser: Browser) -> None:
+    """A slice; `benchmarks/page.py` does it with the real server, a real broker and simulated edges, and measures the lag.
 
-
-def test_fifty_machines_at_ten_hertz_are_painted_within_a_quarter_of_a_second(browser: Browser) -> None:
-    """A slice; `benchmarks/page.py` does it with the real server, a real broker and simulated edges."""
-    shop = Shop([f"mill-{number:02d}" for number in range(50)])
+    Counted is the processor time of the page's thread, which is the same however long it waits for a processor. A page that has
+    painted one batch before the next one comes shows a value within two periods and a frame: less than a quarter of a second.
+    """
+    shop = Shop([f"mill-{number:02d}" for number in range(MACHINES)])
     with FakeServer(shop) as server:
         visit = Visit(browser, server.url, SIZES["wall"])
         page = visit.open("#/fleet")
-        expect(page.locator(".unit")).to_have_count(50)
-        skip_where_busy()
-        found: list[Any] = []
-        while len(found) < WINDOWS_MAX and not (found and found[-1]["median"] <= LAG_MS_MAX):
-            visit.evaluate("(await module('lag')).forget();")
-            page.wait_for_timeout(1500)
-            found.append(visit.evaluate("return (await module('lag')).lag();"))
+        expect(page.locator(".unit")).to_have_count(MACHINES)
+        thread = visit.context.new_cdp_session(page)
+        thread.send("Performance.enable", {"timeDomain": "threadTicks"})
+
+        def page_thread_ms() -> float:
+            metrics = {one["name"]: one["value"] for one in thread.send("Performance.getMetrics")["metrics"]}
+            return 1000.0 * metrics["TaskDuration"]
+
+        visit.evaluate("(await module('lag')).forget();")
+        began_ms = page_thread_ms()
+        end_s, painted = time.monotonic() + WAIT_MS_MAX / 1000.0, 0
+        while painted < BATCHES * MACHINES and time.monotonic() < end_s:
+            page.wait_for_timeout(200)
+            painted = visit.evaluate("return (await module('lag')).lag()?.count ?? 0;")  # type: ignore[assignment]
+        took_ms = page_thread_ms() - began_ms
         visit.context.close()
     assert visit.errors == []
-    if found[-1]["median"] > LAG_MS_MAX:
-        skip_where_busy()
-    assert found[-1]["count"] > 300
-    assert found[-1]["median"] <= LAG_MS_MAX, found
+    assert painted >= BATCHES * MACHINES
+    assert 0.0 < took_ms / painted * MACHINES <= 1000.0 * shop.period_s

@@ -10,7 +10,7 @@ from cnctwin.plant.screen import ledger_table, line, screen
 from cnctwin.plant.view import StageLedger, health, ledgers, machines, text
 from sparkplug.metric import Reading
 from sparkplug.quality import Quality
-from tests.cnctwin.pictures import Pictures, balance, owner
+from tests.cnctwin.plant.pictures import Pictures, balance, owner
 
 
 def plant() -> Pictures:

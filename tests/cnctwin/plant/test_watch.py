@@ -11,7 +11,7 @@ from rich.console import Console
 from cnctwin.plant import watch as watch_module
 from cnctwin.plant.watch import show
 from sparkplug.host import HostEvent
-from tests.cnctwin.pictures import Pictures, balance, owner
+from tests.cnctwin.plant.pictures import Pictures, balance, owner
 from tests.cnctwin.program import Program, until
 from tests.wire.mosquitto import Mosquitto
 

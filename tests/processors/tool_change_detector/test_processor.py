@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter
 
+from benchmarks import synthetic_changes as drive
+from benchmarks import tool_change_detector as bench
 from processors.config import Configuration
 from processors.effects import DeadLetter, Effect
 from processors.errors import ConfigurationError
@@ -18,7 +20,7 @@ from sparkplug.metric import Change
 from sparkplug.quality import Quality
 from tests.processors.streams import birth, data, death, engine_of, event, fed, hole, published, reading
 from tests.recordings import recording
-from tests.twin.transient.synthetic import benchmark, drive, small
+from tests.twin.transient.synthetic import small
 from twin.transient.artefact import save_detector
 from twin.transient.replay import replayed
 
@@ -52,7 +54,7 @@ def stream_of(values: Any, begin_s: float = 0.0) -> list[HostEvent]:
 
 def change(quiet_s: float = 40.0) -> Any:
     quiet = np.ones(round(quiet_s / 0.1))
-    return np.concatenate([quiet, drive().changed(1.1, 1.5, 3.5), quiet])
+    return np.concatenate([quiet, drive.changed(1.1, 1.5, 3.5), quiet])
 
 
 def values_of(effects: list[Effect], name: str) -> list[Any]:
@@ -95,7 +97,7 @@ def test_a_lower_score_finds_what_is_less_alike(model: str) -> None:
 
 
 def test_a_stop_for_good_is_retracted(model: str) -> None:
-    stop = drive().changed(1.0, 0.0, 3.0)[:22]
+    stop = drive.changed(1.0, 0.0, 3.0)[:22]
     engine = engine_of(PROCESSOR, model=model)
     effects = fed(engine, *stream_of(np.concatenate([np.ones(400), stop, np.full(10, stop[-1])])), data(120.0, tool_number=3))
     assert values_of(effects, PHASE) == ["none", "provisional", "retracted", "none"]
@@ -154,7 +156,7 @@ def test_where_the_control_reports_itself_that_is_said(model: str) -> None:
 @pytest.mark.parametrize("cut", [3, 90, 320, 360, 400, 440, 520])
 def test_a_restart_in_the_middle_changes_nothing(model: str, cut: int) -> None:
     rng = np.random.default_rng(cut)
-    stream = stream_of(change() + drive().noise(len(change()), 15.0, rng))
+    stream = stream_of(change() + drive.noise(len(change()), 15.0, rng))
     whole, restarted = engine_of(PROCESSOR, model=model), engine_of(PROCESSOR, model=model)
     assert fed(whole, *stream[:cut]) == fed(restarted, *stream[:cut])
     adapter: TypeAdapter[Any] = TypeAdapter(PROCESSOR.state)
@@ -199,7 +201,6 @@ def test_a_model_that_does_not_fit_is_refused_before_it_runs(model: str, table: 
 
 def test_a_recorded_part_gives_what_the_replay_gives(tmp_path: Path) -> None:
     """Plate 15, which was not learned from, through the engine, report by report."""
-    bench = benchmark()
     path = recording("nist/plate/Plate-Hurco04-15of20.txt")
     done = bench.trained(bench.training_streams(), bench.TrainingSettings("spindle_rpm"), np.random.default_rng(0))
     save_detector(tmp_path, done, (), {}, 1.0)

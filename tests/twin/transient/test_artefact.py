@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.twin.transient.synthetic import drive, small
+from benchmarks import synthetic_changes as drive
+from tests.twin.transient.synthetic import small
 from twin.transient.artefact import ARRAYS, MANIFEST, load_detector, save_detector
 from twin.transient.errors import TransientError
 from twin.transient.replay import replayed
@@ -19,7 +20,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def test_what_is_loaded_finds_the_same(folder: Path) -> None:
-    stream = drive().stream_of_changes(4, 10.0, np.random.default_rng(1), stretched=True, stalled=True)
+    stream = drive.stream_of_changes(4, 10.0, np.random.default_rng(1), stretched=True, stalled=True)
     loaded, _ = load_detector(folder)
     assert replayed(loaded, stream).confirmed == replayed(small().detector, stream).confirmed != ()
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from twin.transient.evidence import longest, probability, weighing_of
+from twin.transient.evidence import longest, probability, run_length, weighing_of
 
 NAMES = ("correlation", "rest")
 
@@ -46,3 +46,12 @@ def test_the_longest_rest_in_a_window_is_no_longer_than_the_window() -> None:
 def test_odds_become_a_probability() -> None:
     assert probability(0.0) == 0.5
     assert probability(1000.0) == pytest.approx(1.0) and probability(-1000.0) == pytest.approx(0.0)
+
+
+def test_run_lengths_say_when_they_are_not_known() -> None:
+    length = -1.0
+    seen = []
+    for holds in (True, True, False, True, None, True):
+        length = run_length(length, holds)
+        seen.append(length)
+    assert seen == [1.0, 2.0, 0.0, 1.0, -1.0, 1.0]

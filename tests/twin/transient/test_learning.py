@@ -3,23 +3,22 @@
 import numpy as np
 import pytest
 
-from tests.twin.transient.synthetic import drive, small
+from benchmarks import synthetic_changes as drive
+from tests.twin.transient.synthetic import small
 from twin.transient.capture import parts_of
 from twin.transient.errors import TransientError
 from twin.transient.learning import learned
 from twin.transient.template import resampled
 
-B = drive()
-
 
 def captures(count: int, snr_db: float, seed: int, **how: bool) -> list[np.ndarray]:  # type: ignore[type-arg]
     rng = np.random.default_rng(seed)
-    stream = B.stream_of_changes(count, snr_db, rng, **{"stretched": False, "stalled": False} | how)
+    stream = drive.stream_of_changes(count, snr_db, rng, **{"stretched": False, "stalled": False} | how)
     return [stream.window(at_s, 10.0, 10.0) for at_s in stream.changes_s]
 
 
 def test_the_parts_of_a_capture_are_where_it_moves() -> None:
-    window = np.concatenate([np.ones(40), B.changed(1.0, 0.0, 3.0), np.ones(40)])
+    window = np.concatenate([np.ones(40), drive.changed(1.0, 0.0, 3.0), np.ones(40)])
     parts = parts_of(window, 0.1)
     assert 32 <= parts.first <= 43 and 55 <= parts.begun <= 75 and 95 <= parts.ending <= 110 and 120 <= parts.last <= 145
 
@@ -28,7 +27,7 @@ def test_the_parts_of_a_capture_are_where_it_moves() -> None:
 def test_the_average_is_near_to_the_truth(how: dict[str, bool]) -> None:
     found = learned(captures(6, 10.0, 1, **how), 0.1, 4.0)
     template = found.template
-    truth = np.concatenate([np.ones(400), B.synthetic_change(np.arange(0.0, 10.0, 0.01)), np.ones(400)])
+    truth = np.concatenate([np.ones(400), drive.synthetic_change(np.arange(0.0, 10.0, 0.01)), np.ones(400)])
     whole, best = template.whole, 0.0
     for begin_s in np.arange(0.0, 6.0, 0.1):
         for seconds in np.arange(7.0, 14.0, 0.1):

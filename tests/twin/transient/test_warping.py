@@ -3,10 +3,8 @@
 import numpy as np
 import pytest
 
-from tests.twin.transient.synthetic import drive
+from benchmarks import synthetic_changes as drive
 from twin.transient.warping import BAND, shape_of, warped_distance
-
-B = drive()
 
 
 def brute(left: np.ndarray, right: np.ndarray) -> float:  # type: ignore[type-arg]
@@ -30,14 +28,14 @@ def test_the_path_is_the_cheapest_there_is() -> None:
 
 
 def test_a_stall_costs_little_and_another_shape_much() -> None:
-    shape = shape_of(B.changed(1.0, 0.0, 3.0))
-    stalled = warped_distance(shape_of(B.changed(1.0, 4.0, 3.5)), shape, BAND)
+    shape = shape_of(drive.changed(1.0, 0.0, 3.0))
+    stalled = warped_distance(shape_of(drive.changed(1.0, 4.0, 3.5)), shape, BAND)
     other = warped_distance(shape_of(np.sin(np.linspace(0.0, 9.0, 120))), shape, BAND)
     assert stalled < 0.15 < 0.4 < other
     assert warped_distance(shape, shape, BAND) == 0.0
 
 
 def test_size_offset_and_length_do_not_matter() -> None:
-    change = B.changed(1.0, 0.0, 3.0)
+    change = drive.changed(1.0, 0.0, 3.0)
     np.testing.assert_allclose(shape_of(3.0 * change + 5.0), shape_of(change), atol=1e-9)
     assert shape_of(np.ones(50)).tolist() == [0.0] * 96

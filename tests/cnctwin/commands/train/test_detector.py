@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from benchmarks import synthetic_changes as drive
 from cnctwin.errors import UsageError
 from cnctwin.training.detector.recorded_streams import known_changes, streams_of
 from cnctwin.training.detector.train import train_detector
-from tests.twin.transient.synthetic import drive
 from twin.runlog import run_log, write_run
 from twin.transient.artefact import load_detector
 from twin.transient.replay import replayed
@@ -25,7 +25,7 @@ ASKED = TrainingSettings("spindle_load_pct", before_s=9.0, after_s=9.0)
 def recorded(path: Path, seed: int, *, labelled: bool) -> Stream:
     """Five changes among other things at 20 dB, written as a run log."""
     rng = np.random.default_rng(seed)
-    stream: Stream = drive().stream_of_changes(5, 20.0, rng, stretched=False, stalled=False)
+    stream: Stream = drive.stream_of_changes(5, 20.0, rng, stretched=False, stalled=False)
     t_s = np.arange(len(stream.values)) * 0.1
     columns = {"t_s": t_s, "spindle_load_pct": stream.values}
     if labelled:

@@ -1,4 +1,4 @@
-"""What every store answers (`tests/cnctwin/memory/store_influx/suite.py`), answered by the embedded one: hot, and sealed."""
+"""What every store answers (`tests/cnctwin/memory/store/influx/suite.py`), answered by the embedded one: hot, and sealed."""
 
 from pathlib import Path
 
@@ -6,7 +6,7 @@ import pytest
 
 from cnctwin.memory.store.contract import Store
 from cnctwin.memory.store.embedded import EmbeddedStore
-from tests.cnctwin.memory.store_influx.suite import T0_MS, Opened, StoreSuite
+from tests.cnctwin.memory.store.influx.suite import T0_MS, Opened, StoreSuite
 
 
 class TestHot(StoreSuite):

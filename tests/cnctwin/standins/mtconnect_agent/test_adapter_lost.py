@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from cnctwin.standins.mtconnect_agent import ReplayAgent
-from tests.cnctwin.small_machine import at, fetch, observations, played, values, write_machine
+from tests.cnctwin.standins.mtconnect_agent.small_machine import at, fetch, observations, played, values, write_machine
 
 START_S = 1_800_000_000.0
 

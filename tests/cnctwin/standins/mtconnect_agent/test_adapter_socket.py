@@ -6,8 +6,8 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from tests.cnctwin.small_machine import at, write_machine
 from tests.cnctwin.standins.mtconnect_agent.adapter_socket import ShdrAdapter
+from tests.cnctwin.standins.mtconnect_agent.small_machine import at, write_machine
 from tests.recordings import recording
 
 LINES = [at(n, f"tool|{n}|Xload|{n}") for n in range(200)]

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from cnctwin.standins.mtconnect_agent.assets import AssetStore, read_asset
-from tests.cnctwin.small_machine import at, elements, fetch, header, observations, played, values
+from tests.cnctwin.standins.mtconnect_agent.small_machine import at, elements, fetch, header, observations, played, values
 
 
 def tool(second: int, asset_id: str, life: int) -> str:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from cnctwin.standins.mtconnect_agent.buffer import ObservationBuffer
 from cnctwin.standins.mtconnect_agent.device_model import Component, DataItem
 from cnctwin.standins.mtconnect_agent.observation import Observation, observe
-from tests.cnctwin.small_machine import at, played
+from tests.cnctwin.standins.mtconnect_agent.small_machine import at, played
 
 _DEVICE = Component("Device", "d", "d")
 EXECUTION = DataItem("exec", None, "EVENT", "EXECUTION", _DEVICE, "d")

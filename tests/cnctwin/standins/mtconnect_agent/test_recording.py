@@ -10,8 +10,17 @@ from cnctwin.standins.mtconnect_agent import DeviceModelError, RecordingError, R
 from cnctwin.standins.mtconnect_agent.recording import Recording
 from cnctwin.standins.mtconnect_agent.replay import Pace
 from tests.cnctwin.program import until
-from tests.cnctwin.small_machine import DEVICES, at, elements, fetch, observations, played, values, write_machine
 from tests.cnctwin.standins.mtconnect_agent.adapter_socket import ShdrAdapter
+from tests.cnctwin.standins.mtconnect_agent.small_machine import (
+    DEVICES,
+    at,
+    elements,
+    fetch,
+    observations,
+    played,
+    values,
+    write_machine,
+)
 from tests.recordings import recording
 
 FILES = {

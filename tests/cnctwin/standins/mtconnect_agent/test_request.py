@@ -7,7 +7,17 @@ import pytest
 
 from cnctwin.standins.mtconnect_agent import ReplayAgent
 from cnctwin.standins.mtconnect_agent.request import Answer, answer
-from tests.cnctwin.small_machine import ask, at, elements, error, fetch, header, observations, played, values
+from tests.cnctwin.standins.mtconnect_agent.small_machine import (
+    ask,
+    at,
+    elements,
+    error,
+    fetch,
+    header,
+    observations,
+    played,
+    values,
+)
 
 STYLES = ("2.3", "1.4")
 

@@ -10,7 +10,7 @@ from cnctwin.standins.mtconnect_agent.data_set import changes, merged, parse_dat
 from cnctwin.standins.mtconnect_agent.shdr import LINE_CHARS_MAX, Command, Entry, Line, Unusable, entries, parse_line, parse_lines
 from cnctwin.standins.mtconnect_agent.stamp import microsecond_text, read_stamp, stamp_text
 from cnctwin.standins.mtconnect_agent.units import conversion
-from tests.cnctwin.small_machine import at, fetch, observations, played, values
+from tests.cnctwin.standins.mtconnect_agent.small_machine import at, fetch, observations, played, values
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,16 @@ from urllib.parse import urlsplit
 import pytest
 
 from cnctwin.standins.mtconnect_agent import ReplayAgent
-from tests.cnctwin.small_machine import at, error, fetch, header, observations, played, values, write_machine
+from tests.cnctwin.standins.mtconnect_agent.small_machine import (
+    at,
+    error,
+    fetch,
+    header,
+    observations,
+    played,
+    values,
+    write_machine,
+)
 
 STYLES = ("2.3", "1.4")
 

@@ -14,7 +14,7 @@ from cnctwin.standins.simulated_machine.agent import COMPILING, SimulatedMachine
 from cnctwin.standins.simulated_machine.moment import Moment
 from cnctwin.standins.simulated_machine.part import Part, spare_part
 from tests.cnctwin.program import until
-from tests.cnctwin.small_machine import header, observations, values
+from tests.cnctwin.standins.mtconnect_agent.small_machine import header, observations, values
 
 SPEED = 200.0
 

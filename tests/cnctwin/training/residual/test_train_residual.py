@@ -1,9 +1,7 @@
 """`cnctwin train residual`: from run logs and from a store to a model that the processor takes, or to why there is none."""
 
-import importlib.util
 import json
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -21,17 +19,14 @@ from processors.residual import PROCESSOR
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId, Reading
 from sparkplug.quality import Quality
-from tests.recordings import recording
 from tests.twin.residual.days import PHYSICS_TOLD, recorded, wandering
 from twin.residual.features import MEASURED, PHYSICS
 from twin.residual.table import Recorded
-from twin.residual.training import TrainingSettings
 from twin.runlog import run_log, write_run
 
 app = typer.Typer()
 app.command()(train_residual)
 SMALL = ("--trees", "8", "--depth", "10", "--row-s", "60")
-ROOT = Path(__file__).parents[4]
 
 
 def _run_log(path: Path, of: Recorded) -> Path:
@@ -142,18 +137,3 @@ def test_the_store_gives_what_the_run_log_gives(folder: Path, tmp_path: Path) ->
     for name in (PHYSICS, MEASURED):
         apart = np.abs(found.signals[name][ours] - expected.signals[name][theirs])
         assert np.nanquantile(apart, 0.9) < 0.05
-
-
-def _benchmark() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("benchmark_residual", ROOT / "benchmarks" / "residual.py")
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-def test_of_the_real_mazak_no_model_is_made() -> None:
-    """Its spindle temperature is not explained by speed and load: facts of the recording, not of the model."""
-    found = _benchmark().mazak(recording("nist/raw/Mazak01-20180718-20180719.txt"), TrainingSettings(trees=8, row_s=60.0))
-    assert found["cutting_hours"] < 40.0  # so the command refuses it before it is judged
-    assert found["refused"]

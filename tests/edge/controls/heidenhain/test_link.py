@@ -149,12 +149,12 @@ def test_t_ok_goes_out_only_as_the_call_for_the_next_part_of_a_file() -> None:
         silent.link.telegram("T_OK")
 
 
-def answered(answer: bytes, *, then_close: bool = False, pause_s: float = 0.0) -> bytearray:
+def answered(answer: bytes, *, then_close: bool = False, pause_s: float = 0.0, patience_s: float = 60.0) -> bytearray:
     """What the link makes of these bytes in answer to R_RI."""
     near, far = socket.socketpair()
-    link = ReadOnlyLink("", 0, logins=LOGINS, patience_s=0.2, clock=time.monotonic, pylsv2=library())
+    link = ReadOnlyLink("", 0, logins=LOGINS, patience_s=patience_s, clock=time.monotonic, pylsv2=library())
     link._socket = near
-    link.begin(0.3)
+    link.begin(patience_s)
 
     def reply() -> None:
         with suppress(OSError):
@@ -187,10 +187,8 @@ def answered(answer: bytes, *, then_close: bool = False, pause_s: float = 0.0) -
     ],
 )
 def test_an_answer_that_is_none_ends_the_connection_in_time(answer: bytes, why: str) -> None:
-    began_s = time.monotonic()
     with pytest.raises(ConnectionLostError, match=why):
-        answered(answer)
-    assert time.monotonic() - began_s < 2.0
+        answered(answer, patience_s=0.3 if "no answer" in why else 60.0)
 
 
 def test_a_control_that_closes_in_the_middle_or_drips_byte_by_byte_for_ever_ends_it_too() -> None:
@@ -198,8 +196,8 @@ def test_a_control_that_closes_in_the_middle_or_drips_byte_by_byte_for_ever_ends
         answered(b"\x00\x00\x00\x02S_RI\x00", then_close=True)
     began_s = time.monotonic()
     with pytest.raises(ConnectionLostError, match="no answer"):
-        answered(b"\x00\x00\x01\x00S_RI" + b"x" * 200, pause_s=0.05)
-    assert time.monotonic() - began_s < 2.0
+        answered(b"\x00\x00\x04\x00S_RI" + b"x" * 1000, pause_s=0.05, patience_s=0.3)
+    assert time.monotonic() - began_s < 20.0, "it drips for 50 s"
     assert bytes(answered(b"\x00\x00\x00\x02S_RI\x00\x07", pause_s=0.005)) == b"\x00\x07"
 
 

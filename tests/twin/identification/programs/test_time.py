@@ -1,12 +1,8 @@
 """The time model: found again where it is known, and on recorded plates."""
 
-import doctest
-
 import numpy as np
 import pytest
 
-import benchmarks.program_spindle
-from benchmarks.program_spindle import RunUp, run_ups, spindle_ramp
 from tests.recordings import recording
 from twin.errors import RunLogError
 from twin.gcode import Settings, interpret
@@ -16,7 +12,7 @@ from twin.motion.limits import Limits
 from twin.motion.path import path_from_moves
 from twin.motion.plan import plan
 from twin.motion.sampling import sampled
-from twin.recording.observations import Observation, Observations, read_observations
+from twin.recording.observations import Observation, Observations
 from twin.recording.program_run import program_runs
 
 TRUE = Limits(
@@ -96,26 +92,6 @@ def test_the_rapid_rate_is_read_off_the_long_rapids(made: list[RecordedProgram])
 def test_what_no_run_tells_is_said_to_be_undetermined(made: list[RecordedProgram]) -> None:
     model = identify_program_times(made[:1], ("tool_change_s", "spindle_deceleration_rpm_s"), ideal_limits(made))
     assert {e.path for e in model.estimates if not e.identifiable} == {"spindle_deceleration_rpm_s"}
-
-
-def test_the_base_speed_of_a_spindle_is_read_off_its_run_ups_to_several_speeds() -> None:
-    alpha, base = 4000.0, 2500.0
-    seen = [RunUp(rpm, base / (2 * alpha) + rpm**2 / (2 * alpha * base)) for rpm in (4000.0, 8000.0, 12000.0, 12000.0)]
-    ramp = spindle_ramp(seen)
-    assert (ramp.acceleration_rpm_s, ramp.base_rpm) == pytest.approx((alpha, base))
-    with pytest.raises(RunLogError, match="two speeds"):
-        spindle_ramp(seen[2:])
-    assert doctest.testmod(benchmarks.program_spindle).failed == 0
-
-
-def test_the_cover_shows_run_ups_that_the_plates_share() -> None:
-    cover, plate = (
-        [one for run in program_runs(read_observations(recording(f"nist/{name}").read_text())) for one in run_ups(run)]
-        for name in ("cover/Cover-Hurco04-01of20.txt", "plate/Plate-Hurco04-13of20.txt")
-    )
-    at_nine, at_twelve = ([one.seconds for one in seen if one.rpm == rpm] for seen, rpm in ((plate, 9000.0), (cover, 12000.0)))
-    assert np.median(at_nine) == pytest.approx(4.05, abs=0.15)
-    assert np.median(at_twelve) == pytest.approx(7.05, abs=0.15)  # 1.74 times as long for 1.33 times the speed: power, not torque
 
 
 def test_windows_are_apart(made: list[RecordedProgram]) -> None:

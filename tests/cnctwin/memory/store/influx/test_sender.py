@@ -15,7 +15,7 @@ from cnctwin.memory.store.contract import StoreError
 from cnctwin.memory.store.influx.sender import Patience, Sender
 from cnctwin.memory.store.influx.server import RefusedError, ServerAwayError, TooLargeError
 from cnctwin.memory.store.influx.spool import Batch, RingLimits, Spool
-from tests.cnctwin.memory.store_influx.stand_in import MemoryServer, refuses
+from tests.cnctwin.memory.store.influx.stand_in import MemoryServer, refuses
 
 QUICK = Patience(delay_s_min=0.001, delay_s_max=0.01, samples_at_once=100)
 ROOM = RingLimits(free_bytes_min=0)

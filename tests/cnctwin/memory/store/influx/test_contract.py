@@ -8,8 +8,8 @@ import pytest
 from cnctwin.memory.store.contract import Store
 from cnctwin.memory.store.influx.opening import open_influx
 from cnctwin.memory.store.influx.store import ServerStore
-from tests.cnctwin.memory.store_influx.servers import Influxd, ServerProcess, VictoriaMetrics, given_influx2
-from tests.cnctwin.memory.store_influx.suite import Opened, StoreSuite
+from tests.cnctwin.memory.store.influx.servers import Influxd, ServerProcess, VictoriaMetrics, given_influx2
+from tests.cnctwin.memory.store.influx.suite import Opened, StoreSuite
 
 
 def _running(kind: type[ServerProcess], folder: Path) -> Iterator[ServerProcess]:

@@ -23,12 +23,12 @@ from cnctwin.memory.store.influx.spool import RingLimits
 from cnctwin.memory.store.influx.store import Reader, ServerStore
 from cnctwin.memory.store.influx.victoria import Victoria
 from cnctwin.memory.store.influx.victoria_reader import VictoriaReader
-from tests.cnctwin.memory.store_influx.gate import Gate
-from tests.cnctwin.memory.store_influx.servers import Influxd, ServerProcess, VictoriaMetrics
-from tests.cnctwin.memory.store_influx.suite import T0_MS, reading, told
+from tests.cnctwin.memory.store.influx.gate import Gate
+from tests.cnctwin.memory.store.influx.servers import Influxd, ServerProcess, VictoriaMetrics
+from tests.cnctwin.memory.store.influx.suite import T0_MS, reading, told
 
 EVERY_MS = 10
-ROOT = Path(__file__).parents[4]
+ROOT = Path(__file__).parents[5]
 
 
 class DeduplicatingVictoria(VictoriaMetrics):
@@ -127,7 +127,7 @@ def test_a_writer_that_is_killed_loses_nothing_of_what_it_acknowledged(server: S
         command = [
             sys.executable,
             "-m",
-            "tests.cnctwin.memory.store_influx.writer",
+            "tests.cnctwin.memory.store.influx.writer",
             server.url(),
             str(tmp_path / "ring"),
             machine,

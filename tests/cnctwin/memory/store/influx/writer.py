@@ -1,6 +1,6 @@
 """A process that appends numbered samples to a store until it is killed, and says after each append how far it is.
 
-python -m tests.cnctwin.memory.store_influx.writer URL RING MACHINE FIRST LAST T0_MS
+python -m tests.cnctwin.memory.store.influx.writer URL RING MACHINE FIRST LAST T0_MS
 """
 
 import sys

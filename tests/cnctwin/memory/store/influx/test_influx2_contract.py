@@ -18,8 +18,8 @@ from cnctwin.memory.store.influx.influx_reader import InfluxReader
 from cnctwin.memory.store.influx.sender import Patience
 from cnctwin.memory.store.influx.store import ServerStore
 from sparkplug.host_session import EventKind
-from tests.cnctwin.memory.store_influx.stand_in import Answer, HttpServer, error
-from tests.cnctwin.memory.store_influx.suite import BAD, STALE, T0_MS, reading, told
+from tests.cnctwin.memory.store.influx.stand_in import Answer, HttpServer, error
+from tests.cnctwin.memory.store.influx.suite import BAD, STALE, T0_MS, reading, told
 
 
 @pytest.fixture

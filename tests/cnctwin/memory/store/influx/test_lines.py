@@ -18,7 +18,7 @@ from cnctwin.memory.store.influx.spool import RingLimits, Spool
 from cnctwin.memory.store.influx.stamps import AGE_MS, Stamps, digest
 from cnctwin.memory.store.influx.vocabulary import TEXTS_MAX, Vocabulary
 from sparkplug.host_session import EventKind
-from tests.cnctwin.memory.store_influx.suite import BAD, GOOD, STALE, reading, told
+from tests.cnctwin.memory.store.influx.suite import BAD, GOOD, STALE, reading, told
 
 KEY = SeriesKey("m", "cnc/hall", "exec_state")
 

@@ -14,8 +14,8 @@ from cnctwin.memory.store.influx.opening import open_influx
 from cnctwin.memory.store.influx.store import ServerStore, steady_wall_ms
 from cnctwin.memory.store.opening import open_store
 from sparkplug.host_session import EventKind
-from tests.cnctwin.memory.store_influx.servers import Influxd
-from tests.cnctwin.memory.store_influx.suite import BAD, T0_MS, points, reading, told
+from tests.cnctwin.memory.store.influx.servers import Influxd
+from tests.cnctwin.memory.store.influx.suite import BAD, T0_MS, points, reading, told
 
 
 @pytest.fixture(scope="module")

@@ -1,30 +1,18 @@
 """What may be claimed on recorded plates: a slice of benchmarks/optimise_plates.py."""
 
-import importlib
-import sys
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 import pytest
 
-from tests.recordings import PROJECT, recording
+from benchmarks import proven_choices as choices
+from tests.recordings import recording
 from twin.identification.programs.recording import RecordedProgram, recorded_programs
 from twin.identification.programs.time import ProgramTimes, identify_program_times
 from twin.motion.limits import Limits
 from twin.motion.plan import plan
 
 NAMES = ("03", "04", "10", "13")
-
-
-@pytest.fixture(scope="module")
-def choices() -> ModuleType:
-    """benchmarks/proven_choices.py, as the benchmark has it."""
-    sys.path.insert(0, str(PROJECT / "benchmarks"))
-    try:
-        return importlib.import_module("proven_choices")
-    finally:
-        sys.path.pop(0)
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +35,7 @@ def model(runs: dict[str, RecordedProgram]) -> ProgramTimes:
 
 
 @pytest.fixture(scope="module")
-def rows(choices: ModuleType, runs: dict[str, RecordedProgram], model: ProgramTimes) -> list[Any]:
+def rows(runs: dict[str, RecordedProgram], model: ProgramTimes) -> list[Any]:
     host = runs["plate 13"]
     whole_mm = {tool: choices.cut_mm(host.path, span) for tool, span in choices.spans(host.path)}
     ideal = Limits(rapid_mm_min=model.limits.rapid_mm_min, acceleration_mm_s2=np.inf)
@@ -59,9 +47,7 @@ def of(rows: list[Any], run: str, tool: int) -> Any:
     return row
 
 
-def test_savings_between_plates_are_predicted_within_three_percent_and_in_the_right_order(
-    choices: ModuleType, rows: list[Any]
-) -> None:
+def test_savings_between_plates_are_predicted_within_three_percent_and_in_the_right_order(rows: list[Any]) -> None:
     of_runs = choices.wholes(rows)
     assert list(of_runs) == ["plate 03", "plate 10", "plate 13"], "the second attempt of 04 made the rest of a part"
     said = choices.savings("whole", [choices.figures(each) for each in of_runs.values()])
@@ -86,7 +72,7 @@ def test_what_was_not_run_as_programmed_proves_nothing(rows: list[Any]) -> None:
 
 
 def test_a_plate_with_its_own_choices_is_itself_and_with_those_of_another_takes_their_feeds_and_speeds(
-    choices: ModuleType, runs: dict[str, RecordedProgram]
+    runs: dict[str, RecordedProgram],
 ) -> None:
     host, other = runs["plate 13"], runs["plate 03"]
     own = choices.composed(host.path, {tool: (host.path, span) for tool, span in choices.spans(host.path)})
@@ -99,7 +85,7 @@ def test_a_plate_with_its_own_choices_is_itself_and_with_those_of_another_takes_
 
 
 def test_only_proven_choices_are_offered_and_the_fastest_comes_first(
-    choices: ModuleType, runs: dict[str, RecordedProgram], rows: list[Any], model: ProgramTimes
+    runs: dict[str, RecordedProgram], rows: list[Any], model: ProgramTimes
 ) -> None:
     offered = choices.proven(runs["plate 03"], [runs["plate 10"], runs["plate 13"]], rows, model)
     assert {tool: str(options[0].choice) for tool, options in offered.items() if tool in {4, 5, 7}} == {
@@ -111,9 +97,7 @@ def test_only_proven_choices_are_offered_and_the_fastest_comes_first(
     assert all(options[0].predicted_s <= options[-1].predicted_s for options in offered.values())
 
 
-def test_the_batch_of_the_optimiser_takes_as_long_as_the_plan(
-    choices: ModuleType, runs: dict[str, RecordedProgram], model: ProgramTimes
-) -> None:
+def test_the_batch_of_the_optimiser_takes_as_long_as_the_plan(runs: dict[str, RecordedProgram], model: ProgramTimes) -> None:
     several = [runs["plate 13"], runs["plate 03"], runs["plate 10"]]
     assert choices.batch_gap_s(several[0], several, model) < 1e-9
     slow, fast = (plan(run.with_set_up(model.set_up), model.limits).total_s for run in several[1:])

@@ -13,8 +13,8 @@ from cnctwin.memory.store.influx.store import ServerStore
 from cnctwin.memory.store.opening import open_store
 from sparkplug.host_session import EventKind
 from sparkplug.metric import NodeId, Reading
-from tests.cnctwin.memory.store_influx.servers import Influxd, ServerProcess, VictoriaMetrics
-from tests.cnctwin.memory.store_influx.suite import BAD, EDGE, GOOD, OTHER, STALE, T0_MS, reading, told
+from tests.cnctwin.memory.store.influx.servers import Influxd, ServerProcess, VictoriaMetrics
+from tests.cnctwin.memory.store.influx.suite import BAD, EDGE, GOOD, OTHER, STALE, T0_MS, reading, told
 
 SPAN_MS = 40_000
 SIGNALS = ("spindle_rpm", "exec_state", "coolant_on", "twin/raw_score", "tool_number")

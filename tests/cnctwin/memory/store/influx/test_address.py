@@ -17,7 +17,7 @@ from cnctwin.memory.store.influx.influx_reader import InfluxReader
 from cnctwin.memory.store.influx.opening import open_influx
 from cnctwin.memory.store.influx.server import Server, ServerAwayError
 from cnctwin.memory.store.influx.victoria import Victoria
-from tests.cnctwin.memory.store_influx.stand_in import Answer, HttpServer
+from tests.cnctwin.memory.store.influx.stand_in import Answer, HttpServer
 
 SECRET = "s3cret-token-of-the-plant"
 
