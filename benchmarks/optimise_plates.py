@@ -23,7 +23,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import asdict
 
-from benchmarks.program_time import cover_ramp, data_folder, is_fitted, plates
+from benchmarks.programs.time import cover_ramp, data_folder, is_fitted, plates
 from benchmarks.proven_choices import REFERENCE, Savings, Study, study, wholes
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import spearmanr, t
 
-from benchmarks.program_time import fitted, is_fitted
+from benchmarks.programs.time import fitted, is_fitted
 from twin.identification.programs.recording import RecordedProgram, line_starts
 from twin.identification.programs.time import PARAMETERS, ProgramTimes, compare
 from twin.motion.candidates import Candidates

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Each effect of the catalogue: is a machine that is made with it diagnosed as it, or as a class that holds it?
 
-    .venv/bin/python benchmarks/gap/effects_found.py [EFFECT …] [--floors 2 10] [--json]
+    .venv/bin/python benchmarks/gap/effects_found.py [--only EFFECT …] [--floors 2 10] [--json]
 
 A small machine is simulated with each effect at twice and ten times its floor (`tests/twin/effects/made_with.py`) and diagnosed.
 For each it prints the size, what came of it (named; in the class of what was named; unknown; missed, which is right where the
@@ -27,12 +27,12 @@ from twin.effects.catalogue import catalogue, effect_named
 def main() -> None:
     """Print a line for each effect and size, and how many of each outcome there were."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("effects", nargs="*", metavar="EFFECT", help="effects of the catalogue; none = all")
+    parser.add_argument("--only", nargs="+", default=[], metavar="EFFECT", help="effects of the catalogue; else all of them")
     parser.add_argument("--floors", type=float, nargs="+", default=[2.0, 10.0], help="sizes to make each effect at")
     parser.add_argument("--json", action="store_true")
     arguments = parser.parse_args()
     rows: list[dict[str, object]] = []
-    for effect in [effect_named(name) for name in arguments.effects] or catalogue().values():
+    for effect in [effect_named(name) for name in arguments.only] or catalogue().values():
         for floors in arguments.floors:
             begun = perf_counter()
             found, size = diagnosed(effect, floors)

@@ -22,7 +22,7 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.program_columns import program_columns
+from benchmarks.programs.columns import program_columns
 from twin.case import Case, read_case
 from twin.gap.diagnosis import Diagnosed
 from twin.gap.programs.diagnose import diagnose_programs

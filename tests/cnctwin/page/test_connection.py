@@ -88,7 +88,7 @@ def test_figures_read_as_a_person_writes_them(visit: Visit) -> None:
 
 
 def test_fifty_machines_at_ten_hertz_are_painted_before_the_next_values_come(browser: Browser) -> None:
-    """A slice; `benchmarks/page.py` does it with the real server, a real broker and simulated edges, and measures the lag.
+    """A slice; `benchmarks/page/page.py` does it with the real server, a real broker and simulated edges, and measures the lag.
 
     Counted is the processor time of the page's thread, which is the same however long it waits for a processor. A page that has
     painted one batch before the next one comes shows a value within two periods and a frame: less than a quarter of a second.

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.program_columns import program_columns
+from benchmarks.programs.columns import program_columns
 from cnctwin.errors import UsageError
 from cnctwin.validation.budgets import Budgets
 from cnctwin.validation.cycle_time import Cycle, Cycles, judged_cycle_time, texts_of

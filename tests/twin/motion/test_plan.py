@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import twin.motion.path
 import twin.motion.plan
-from benchmarks.program_columns import program_columns
+from benchmarks.programs.columns import program_columns
 from twin.errors import MachineError, PartProgramError
 from twin.gcode import canonical
 from twin.machine import Program

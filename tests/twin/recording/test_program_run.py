@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.program_time import overrides_moved
+from benchmarks.programs.time import overrides_moved
 from tests.recordings import recording
 from twin.errors import RunLogError
 from twin.recording.observations import Observation, Observations, last_values, read_observations

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.program_columns import program_columns
+from benchmarks.programs.columns import program_columns
 from tests.recordings import recording
 from twin.case import Case, read_case
 from twin.gcode import interpret

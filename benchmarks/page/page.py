@@ -1,6 +1,6 @@
 """How far the page is behind: fifty machines at 10 Hz on a real broker, `cnctwin serve`, and Debian's Chromium.
 
-    .venv/bin/python benchmarks/page.py [--machines 50] [--hz 10] [--seconds 20] [--restarts]
+    .venv/bin/python benchmarks/page/page.py [--machines 50] [--hz 10] [--seconds 20] [--restarts]
 
 From the stamp of a value to the moment after the frame that shows it was painted: median, 95 %, worst; frames a second; tasks of
 the browser's main thread beyond 50 ms; its heap. `--restarts` kills server and broker, and says how long until live again.

@@ -1,8 +1,8 @@
 """What the page's server costs: machines on a real broker, `cnctwin serve`, and readers of its streams.
 
-    .venv/bin/python benchmarks/page_load.py [--machines 50] [--hz 10] [--signals 20] [--readers 4] [--seconds 20]
+    .venv/bin/python benchmarks/page/load.py [--machines 50] [--hz 10] [--signals 20] [--readers 4] [--seconds 20]
 
-    .venv/bin/python benchmarks/page_load.py --fill      (no broker: memory when all traces are full, and what a value costs)
+    .venv/bin/python benchmarks/page/load.py --fill      (no broker: memory when all traces are full, and what a value costs)
 
 Prints processor time and memory of the server, how late rows reach a reader, and how long /machines and /state take.
 """

@@ -5,8 +5,8 @@ import doctest
 import numpy as np
 import pytest
 
-from benchmarks import program_spindle
-from benchmarks.program_spindle import RunUp, run_ups, spindle_ramp
+from benchmarks.programs import spindle as program_spindle
+from benchmarks.programs.spindle import RunUp, run_ups, spindle_ramp
 from tests.recordings import recording
 from twin.errors import RunLogError
 from twin.recording.observations import read_observations

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """How well a model of the control predicts what ten recorded parts took, from length over feed upwards.
 
-    .venv/bin/python benchmarks/program_time.py [--json]
+    .venv/bin/python benchmarks/programs/time.py [--json]
 
 Recordings: the plates of the NIST Smart Manufacturing Systems Test Bed (CNCTWIN_DATA or ../shared/data). Each model is fitted to
 plates 13, 14 and 15 and judged on the others, which have other feeds and other spindle speeds and were not looked at by the fit.
@@ -30,7 +30,7 @@ from time import perf_counter
 
 import numpy as np
 
-from benchmarks.program_spindle import SpindleRamp, run_ups, spindle_ramp
+from benchmarks.programs.spindle import SpindleRamp, run_ups, spindle_ramp
 from twin.identification.programs.recording import RecordedProgram, recorded_programs
 from twin.identification.programs.time import PARAMETERS, Comparison, ProgramTimes, compare, ideal_limits, identify_program_times
 from twin.recording.observations import read_observations
@@ -67,7 +67,7 @@ MODELS: tuple[tuple[str, tuple[str, ...], bool], ...] = (
 
 def data_folder() -> Path:
     """Where the recordings are."""
-    return Path(os.environ.get("CNCTWIN_DATA") or Path(__file__).resolve().parent.parent.parent / "shared" / "data")
+    return Path(os.environ.get("CNCTWIN_DATA") or Path(__file__).resolve().parents[3] / "shared" / "data")
 
 
 def plates(folder: Path, names: tuple[str, ...] = PLATES) -> list[RecordedProgram]:
