@@ -15,7 +15,7 @@ from twin.runlog import RunLog, read_run
 
 
 class RunKind(StrEnum):
-    """What the machine did in a run."""
+    """The kind of run: what the machine did."""
 
     AIR = "air"
     CUT = "cut"

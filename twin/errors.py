@@ -1,4 +1,4 @@
-"""What can go wrong in the twin, in one tree. Each message names the culprit, its value and the way out.
+"""The errors of the twin, in one tree. Each message names the culprit, its value and the way out.
 
 TwinError
 ├── PartProgramError  a part program that the control would refuse: line, word, reason

@@ -21,7 +21,7 @@ Objective = Callable[[Floats], Floats]
 
 @dataclass(frozen=True, slots=True)
 class GeneticSettings:
-    """How it searches.
+    """The settings of a search.
 
     evolutions_max, fitness_limit: it ends after so many evolutions, or when the best objective is not above the limit
     population: candidates; generation_gap: part of them that is replaced at each evolution
@@ -58,7 +58,7 @@ class GeneticSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Population:
-    """Where a search stands: candidates with their objectives, and the state of its chance. `step` takes it on.
+    """The state of a search: candidates with their objectives, and the random generator's. `step` takes it on.
 
     genes: (population, p); fitness: (population,); history: best objective after each evolution, that of the start first
     """
@@ -94,7 +94,7 @@ class Population:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Evolved:
-    """Where it ended: genes (p,) and objective of the best; history: (evolutions + 1,) best objective after each evolution."""
+    """The result: genes (p,) and objective of the best; history: (evolutions + 1,) best objective after each evolution."""
 
     genes: Floats
     objective: float

@@ -245,7 +245,7 @@ class MachineFile(Section):
 
     @property
     def settings(self) -> Settings:
-        """What the control makes of a program: [control]."""
+        """The settings with which the control reads a program: [control]."""
         return self.control.settings()
 
 

@@ -68,7 +68,7 @@ class ControlSection(BaseModel):
         return self
 
     def settings(self) -> Settings:
-        """What the interpreter is to be told.
+        """The settings of the interpreter.
 
         >>> section = ControlSection(tool_offsets={"1": OffsetRow(length_mm=100.0)}, builder_m_codes=(13,))
         >>> section.settings().tool_offsets[1].length_mm

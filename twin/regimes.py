@@ -18,7 +18,7 @@ ACCELERATION_MM_S2_MIN = 5.0
 
 
 class Regime(IntEnum):
-    """What the reference tells an axis to do."""
+    """The regime of an axis: what its reference makes it do."""
 
     REST = 0
     REVERSAL = 1

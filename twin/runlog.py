@@ -57,7 +57,7 @@ class RunLog:
             raise RunLogError(f"{self.source}: there is no column {name}; there are {', '.join(self.columns)}") from None
 
     def has(self, *names: str) -> bool:
-        """Whether each of the columns is there with at least one sample."""
+        """Return True where each of the columns is there with at least one sample."""
         return all(name in self.columns and bool(np.isfinite(self.columns[name]).any()) for name in names)
 
     def axes(self) -> tuple[str, ...]:

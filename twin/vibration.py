@@ -66,7 +66,7 @@ def band(rate_hz: float, low_hz: float = 10.0, high_hz: float = 1000.0) -> Band:
 
 
 class Moments(NamedTuple):
-    """Of so many values: mean, sums of the 2nd, 3rd and 4th powers about it, least and greatest."""
+    """The moments of so many values: mean, sums of the 2nd, 3rd and 4th powers about it, least and greatest."""
 
     samples: int = 0
     mean: float = 0.0
@@ -78,7 +78,7 @@ class Moments(NamedTuple):
 
 
 class Tally(NamedTuple):
-    """What a stretch of samples adds up to: moments of the whole signal in g, sums of squares of its band in g² and (mm/s)²."""
+    """The sums of a stretch of samples: moments of the whole signal in g, sums of squares of its band in g² and (mm/s)²."""
 
     moments: Moments = Moments()
     acceleration: float = 0.0
@@ -93,7 +93,7 @@ class Carried(NamedTuple):
 
 
 class Figures(NamedTuple):
-    """What is said of a window. Rms are of the band; peak, crest factor and kurtosis of the whole signal, about its mean.
+    """The figures of a window. Rms are of the band; peak, crest factor and kurtosis of the whole signal, about its mean.
 
     crest_factor, kurtosis: None where nothing shakes
     """
@@ -157,7 +157,7 @@ def together(left: Tally, right: Tally) -> Tally:
 
 
 def figures(tally: Tally) -> Figures:
-    """What a tally says; it has to hold a sample.
+    """Return the figures of a tally; it has to hold a sample.
 
     >>> figures(Tally(Moments(4, 1.0, 4.0, 0.0, 4.0, 0.0, 2.0), 4.0, 36.0))
     Figures(rms_g=1.0, velocity_mm_s=3.0, peak_g=1.0, crest_factor=1.0, kurtosis=1.0)

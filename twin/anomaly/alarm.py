@@ -60,7 +60,7 @@ def after_tick(rule: AlarmRule, state: AlarmState, score: float | None, is_gated
 
 
 def is_alarm(rule: AlarmRule, scores: "NDArray[np.float64]", gated: "NDArray[np.bool_]") -> "NDArray[np.bool_]":
-    """Whether the alarm is on at each tick, of scores (T,) or (T, N), NaN = not known; the same as folding `after_tick`."""
+    """Return the ticks at which the alarm is on, of scores (T,) or (T, N), NaN = not known; as folding `after_tick` does."""
     import numpy as np  # noqa: PLC0415  the stream needs none
 
     high = dwell_score(scores, gated, rule.dwell_ticks) >= rule.threshold

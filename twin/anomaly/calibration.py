@@ -1,4 +1,4 @@
-"""What a threshold means: so many alerts a machine-week, on scores that came about with these settings."""
+"""The meaning of a threshold: so many alerts a machine-week, on scores that came about with these settings."""
 
 from typing import Annotated
 
@@ -50,6 +50,6 @@ class Calibration(Record):
 
     @property
     def in_words(self) -> str:
-        """What the threshold rests on, in one line."""
+        """Describe in one line what the threshold rests on."""
         found = f"{self.estimate:.2g} alerts a machine-week ({self.low:.2g} to {self.high:.2g}) in {self.hours:.0f} h"
         return f"{self.threshold:.4g}, {found}{', beyond what was seen' if self.is_extrapolated else ''}"

@@ -1,4 +1,4 @@
-"""What is left of a machine's features beside those of its peers, feature by feature.
+"""The remainder of a machine's features beside those of its peers, feature by feature.
 
     left_f = sign(s_f) · max(0, |s_f| − 2 · c_f)     c_f: the ⌈n/5⌉-th largest of the peers' s_f in the direction of s_f, or 0
     adjusted = sqrt(Σ (left_f / tail_f)²)
@@ -30,7 +30,7 @@ TAIL_LEAST = 0.3
 
 
 def left_over(own: Smoothed, peers: Sequence[Smoothed], tick: int, tick_s: float) -> tuple[float, ...]:
-    """What the peers do not explain, by feature, as of a tick that all have come to.
+    """Return the part of each feature that the peers do not explain, as of a tick that all have come to.
 
     >>> own, peer = Smoothed((5.0, -4.0), (9, 9)), Smoothed((1.0, 3.0), (9, 9))
     >>> left_over(own, [peer], 9, 1.0)
@@ -52,7 +52,7 @@ def _left(own: float, peers: list[float]) -> float:
 
 
 def length(preparation: Preparation, left: Sequence[float]) -> float:
-    """How far that is, in tails of the training data."""
+    """Return the length of that remainder, in tails of the training data."""
     total = 0.0
     for value, up, down in zip(left, preparation.up, preparation.down, strict=True):
         share = value / up if value > 0.0 else value / down

@@ -30,7 +30,7 @@ MEDIAN_PEERS_MIN = 3
 
 
 class Method(StrEnum):
-    """How a score is judged beside those of the peers."""
+    """The method of judging a score beside those of the peers."""
 
     SOURCE = "source"
     RESIDUAL = "residual"
@@ -56,12 +56,12 @@ class CommonModeRule:
 
     @property
     def leaves_gated_peers_out(self) -> bool:
-        """Whether a peer in a tool change is no peer."""
+        """Return True where peers that change their tool are ignored."""
         return self.exclude_gated_peers or self.method is Method.RESIDUAL
 
 
 class Adjusted(NamedTuple):
-    """What is left of a score.
+    """The remainder of a score beside the peers.
 
     score: None where the own score is not known; in units of the score given in
     is_common: the peers explain the score (the residual subtracts them in any case)
@@ -85,7 +85,7 @@ def standardised(raw: float, center: float, spread: float) -> float:
 
 
 def _left(rule: CommonModeRule, own: float | None, is_gated: bool, centre: float, peer: int | None, peers: int) -> Adjusted:
-    """What is left of a score; centre: of the peers' for the residual, the largest of them for `source`."""
+    """Return the remainder of a score; centre: of the peers' for the residual, the largest of them for `source`."""
     if own is None:
         return Adjusted(None, False, peer, peers)
     is_common = own > 0 and peers > 0 and centre >= rule.factor * own

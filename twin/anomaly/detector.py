@@ -28,7 +28,7 @@ FOREST_DEFAULTS: Mapping[str, Any] = {"n_estimators": 200, "contamination": 0.01
 
 @dataclass(frozen=True, slots=True)
 class Detector:
-    """What is trained.
+    """The kind of detector that is trained.
 
     name: `isolation_forest` (scikit-learn's), or a detector of PyOD; parameters: as the library names them; a forest without
     any has 200 trees, and its 0 is what 1 % of the training rows exceed; seed: of all chance

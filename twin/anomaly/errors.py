@@ -1,4 +1,4 @@
-"""What can go wrong with an anomaly model."""
+"""Errors of an anomaly model."""
 
 from twin.errors import TwinError
 

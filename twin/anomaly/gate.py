@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 
 def gate(active: NDArray[np.generic], tick_s: float, tail_s: float, look_back_s: float = 0.0) -> NDArray[np.bool_]:
-    """Where scores are gated, of `active` (T,) or (T, N), one row a tick; bool, or float with NaN for not known.
+    """Return the gated ticks of `active` (T,) or (T, N), one row a tick; bool, or float with NaN for not known.
 
     What is not known is as it was last said (values are reported when they change); before anything was said, there is no change.
     A tail of two ticks and a look-back of one, of a change in ticks 2 and 3:

@@ -40,7 +40,7 @@ class GoldenWeek:
         return float((~self.gated & np.isfinite(self.scores)).sum()) * self.tick_s / WEEK_S
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """What `golden_of_arrays` takes."""
+        """Return the arrays that `golden_of_arrays` takes."""
         told = np.array([self.alerts, self.tick_s])
         return {"rows": self.rows, "scores": self.scores, "gated": self.gated, "peers": self.peers, "alerts_tick_s": told}
 

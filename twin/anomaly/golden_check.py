@@ -41,7 +41,7 @@ class GoldenCheck:
 
     @property
     def passes(self) -> bool:
-        """Whether nothing is wrong."""
+        """Return True where nothing is wrong."""
         return not self.faults
 
 
@@ -93,13 +93,13 @@ def adjusted_by_peers(found: Calibration, scores: Floats, gated: Flags, peers: F
 
 
 def alerts_of(found: Calibration, scores: Floats, gated: Flags, peers: Floats) -> int:
-    """How many alarms come on."""
+    """Return the number of alarms that come on."""
     rule = AlarmRule(found.threshold, found.dwell_ticks, found.clear_fraction)
     return len(onsets(is_alarm(rule, adjusted_by_peers(found, scores, gated, peers), gated)))
 
 
 def checked(model: AnomalyModel, golden: GoldenWeek, is_challenger: bool = False) -> GoldenCheck:
-    """Whether a model gives the frozen scores and alerts; of a challenger, whether its alerts are what its threshold stands for.
+    """Check that a model gives the frozen scores and alerts; of a challenger, that its alerts are what its threshold stands for.
 
     Raises ModelError where the model looks at signals that were not frozen, or has no calibration.
     """

@@ -11,7 +11,7 @@ KIND, VERSION = "cnctwin anomaly model", 1
 
 
 class Trained(Record):
-    """What a model was trained on.
+    """The data and time that a model was trained on.
 
     at: UTC, as ISO 8601; source: files or database; from_s, to_s: window on the clock of the source; versions: of the libraries
     """

@@ -49,7 +49,7 @@ class AnomalyModel:
     preparation: Preparation | None = None
 
     def score_one(self, values: Sequence[float]) -> float:
-        """How unusual one row is: 0 = at the contamination share of training, larger = worse.
+        """Return how unusual one row is: 0 = at the contamination share of training, larger = worse.
 
         Raises TwinError where it has not one finite number for each feature.
         """
@@ -65,7 +65,7 @@ class AnomalyModel:
 
     @property
     def in_words(self) -> str:
-        """What it is, in one line."""
+        """Describe the model in one line."""
         scorer = self.scorer
         name = f"isolation forest of {scorer.forest.trees} trees" if isinstance(scorer, IsolationScorer) else scorer.about.name
         when = f", trained {self.trained.at}" if self.trained.at else ", trained"
@@ -73,7 +73,7 @@ class AnomalyModel:
 
 
 def files_of(model: AnomalyModel, golden: GoldenWeek | None = None) -> dict[str, bytes]:
-    """What stands in the folder of a model; the same model gives the same bytes."""
+    """Return the files of a model's folder; the same model gives the same bytes."""
     scorer = model.scorer
     if isinstance(scorer, IsolationScorer):
         detector: Flat | Refit = Flat(denominator=scorer.denominator, offset=scorer.offset)

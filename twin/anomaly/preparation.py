@@ -41,7 +41,7 @@ NEVER = -(10**12)
 
 
 class Regime(Record):
-    """What is usual in it, by signal: median, and robust standard deviation."""
+    """The usual values of a regime, by signal: median, and robust standard deviation."""
 
     center: tuple[Finite, ...]
     spread: tuple[Positive, ...]

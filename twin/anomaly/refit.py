@@ -89,7 +89,7 @@ class RefitScorer:
         return np.concatenate(found) - self.about.center
 
     def arrays(self) -> dict[str, Floats]:
-        """What `again` takes."""
+        """Return the arrays that `again` takes."""
         return {"training_rows": self.rows, "probe_rows": self.probes, "probe_scores": self.scores(self.probes)}
 
 
@@ -134,7 +134,7 @@ def thinned(rows: Floats, most: int) -> Floats:
 
 
 def versions() -> dict[str, str]:
-    """Of the libraries that a model depends on, as far as they are there."""
+    """Return the versions of the libraries that a model depends on, as far as they are installed."""
     found = {}
     for name in ("numpy", "scikit-learn", "pyod", "numba"):
         try:

@@ -1,4 +1,4 @@
-"""Where models stand: <models>/<machine>/<first 12 digits of its SHA-256>/, and `current`, a link to the one that scores.
+"""The folders of models: <models>/<machine>/<first 12 digits of its SHA-256>/, and `current`, a link to the one that scores.
 
 A model never changes; to promote another, or to go back, is to turn the link, which is done in one move.
 """

@@ -62,7 +62,7 @@ def cut(
     resolution_mm: float = 0.1,
     cutting: ArrayLike | None = None,
 ) -> tuple[Workpiece, Engagement]:
-    """What is left of the workpiece, and the engagement along the path. The workpiece that was given is as it was.
+    """Return the workpiece after the cut, and the engagement along the path. The workpiece that was given stays as it was.
 
     Parameters and errors as of `engagement`. Where the path begins, the tool is taken to have cut already.
     """

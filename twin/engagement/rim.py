@@ -1,4 +1,4 @@
-"""Where the front rim of the tool meets material: the angles, the depth, the section of the chip.
+"""The contact of the tool's front rim with the material: the angles, the depth, the section of the chip.
 
 The rim point at φ is p + R (sin φ u + cos φ l) with the heading u and l to its left. The front half, 0 ≤ φ ≤ π, is looked at in
 steps of 1°; where the depth jumps between two steps, the place is found by bisection. So an angle is as exact as the heights are
@@ -29,7 +29,7 @@ WIDTH_MIN_MM = 1e-3
 
 
 class Contact(NamedTuple):
-    """What the front rim meets. depth_mm, entry_rad, exit_rad: the rectangle that stands for it; section_mm2: of the chip, across
+    """The contact of the rim. depth_mm, entry_rad, exit_rad: the rectangle that stands for it; section_mm2: of the chip, across
     the feed (R ∫ a sin φ dφ); deepest_mm: largest depth; arcs: separate arcs, 0 = no contact; uniform: one arc of one depth."""
 
     depth_mm: float
@@ -88,7 +88,7 @@ def _add(moments: Floats, depth: float, start: float, end: float, radius: float)
 
 @kernel
 def contact(cells: Cells, x: float, y: float, heading_x: float, heading_y: float, radius: float, tip: float) -> Contact:
-    """What the front rim of a tool at (x, y), its end face at the z `tip`, meets on the way along a unit vector."""
+    """Return the contact of the front rim of a tool at (x, y), its end face at the z `tip`, on the way along a unit vector."""
     place = np.array([x, y, heading_x, heading_y, radius, max(tip, cells.low_z)])
     total, arc = np.zeros(5), np.zeros(5)
     total[3] = arc[3] = math.inf

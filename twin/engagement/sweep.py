@@ -1,4 +1,4 @@
-"""What one straight move of a flat end mill removes: the points within its radius of the move, down to the end face.
+"""The sweep of one straight move of a flat end mill: the points within its radius of the move, down to the end face.
 
 A sweep begins at (x₀, y₀, z₀) and goes the horizontal length L in the direction u, its end face at z(s) = z₀ + k s. A point q
 with t = (q − p₀)·u along the move and d across it is reached at the positions s with |s − t| ≤ √(R² − d²) and 0 ≤ s ≤ L, and left

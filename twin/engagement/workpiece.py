@@ -17,7 +17,7 @@ CELLS_MAX = 8_000_000
 
 @dataclass(frozen=True, slots=True)
 class Workpiece:
-    """What is left of a stock, in machine coordinates.
+    """The rest of a stock, in machine coordinates.
 
     cells: where tools have been, the stock as cells and sweeps (cells.py); the rest of the stock is whole
     cells_max: limit of the number of cells; 12 bytes each
@@ -53,7 +53,7 @@ class Workpiece:
         return _heights(self.cells, np.ascontiguousarray(points_mm, dtype=np.float64))
 
     def volume_mm3(self, samples: int = 16) -> float:
-        """What is left. A cell that a wall goes through is sampled at `samples`² points; the others are exact. 0: no stock."""
+        """Return the volume. A cell with a wall in it is sampled at `samples`² points; the others are exact. 0: no stock."""
         cells = self.cells
         if not math.isfinite(cells.high_z):
             return 0.0

@@ -1,4 +1,4 @@
-"""What can go wrong with a forest."""
+"""Errors of a forest."""
 
 from twin.errors import TwinError
 

@@ -103,7 +103,7 @@ def _average_path(rows: NDArray[Any]) -> Floats:
 
 
 def _places(left: list[int], right: list[int], rows: list[float]) -> NDArray[np.int64]:
-    """Where each node goes: children side by side, and right after a node the children of that child which more rows come to."""
+    """Return the places of nodes: children side by side, and right after a node the children of the child that gets more rows."""
     place, free, open_nodes = [0] * len(left), 1, [0]
     while open_nodes:
         node = open_nodes.pop()

@@ -46,12 +46,12 @@ class Forest:
 
     @property
     def features(self) -> int:
-        """How many features a row has."""
+        """The number of features in a row."""
         return int(self.scaling.shape[1])
 
     @property
     def trees(self) -> int:
-        """How many trees there are."""
+        """The number of trees."""
         return len(self.tree_nodes)
 
     def total_one(self, row: Sequence[float]) -> float:
@@ -89,7 +89,7 @@ class Forest:
         raise AssertionError("a finite row has a finite total")
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """What `forest_of_arrays` takes, see there."""
+        """Return the arrays that `forest_of_arrays` takes, see there."""
         nodes = self.nodes[:-1]
         child, low = (nodes >> 40).astype(np.int32), nodes.astype(np.int32)  # the lower half
         is_leaf = child == 0

@@ -15,7 +15,7 @@ REPEATABLE: Final = frozenset("IJK")
 
 
 class Kind(Enum):
-    """What a block is."""
+    """The kind of a block."""
 
     WORDS = auto()
     ASSIGN = auto()

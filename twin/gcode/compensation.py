@@ -95,7 +95,7 @@ def note(state: State, move: Motion) -> None:
 
 
 def in_force(state: State) -> bool:
-    """Whether the tool is beside its path. A section whose G40 has been read ends here, also without a move that leaves it."""
+    """Return True while the tool is beside its path. A section whose G40 was read ends here, even with no move that leaves it."""
     if state.compensation is not None and state.compensation.leaving:
         finish(state)
     return state.compensation is not None

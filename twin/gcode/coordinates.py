@@ -97,14 +97,14 @@ class Coordinates:
         return tuple(moved)
 
     def mirrors(self, plane: int) -> bool:
-        """Whether S turns clockwise into counter-clockwise in that plane."""
+        """Return True where S turns clockwise into counter-clockwise in that plane."""
         if self.scaling is None:
             return False
         first, second, _ = PLANES[plane]
         return self.scaling.factors[first] * self.scaling.factors[second] < 0
 
     def arc_scale(self, plane: int) -> float:
-        """How much longer a radius in that plane is. RefusedError where a circle would not stay one."""
+        """Return the factor by which a radius in that plane is longer. RefusedError where a circle would not stay one."""
         if self.rotation is not None and self.rotation.plane != plane:
             raise RefusedError("", f"an arc in G{plane} cannot be rotated by G68 of G{self.rotation.plane}; cancel with G69")
         if self.scaling is None:

@@ -15,7 +15,7 @@ EXACT_INTEGER_MAX = 2**53
 
 
 class Store(Protocol):
-    """What an expression reads from."""
+    """The store that an expression reads from."""
 
     def read(self, number: float) -> float | None:
         """Value of #number; None = null."""

@@ -82,7 +82,7 @@ class Interpreter:
         return False
 
     def is_plain(self) -> bool:
-        """Whether the modes allow the short way."""
+        """Return True where the modes allow the short way."""
         state = self.state
         modal = state.modal
         return (
@@ -157,7 +157,7 @@ class Interpreter:
 
     @property
     def increment(self) -> float:
-        """What a length without a point counts, in programmed units."""
+        """Return what a length without a point counts, in programmed units."""
         return self.state.increment if self.settings.integer_words is IntegerWords.INCREMENTS else 1.0
 
     def count(self, blocks: int) -> None:

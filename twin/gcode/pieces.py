@@ -23,7 +23,7 @@ def placed(position: Position, point: Point, plane: int) -> Position:
 
 
 def piece(start: Position, move: Motion, plane: int) -> Piece:
-    """What a motion is in the plane. RefusedError for an arc of another plane."""
+    """Return the line or arc that a motion is in the plane. RefusedError for an arc of another plane."""
     a, b = in_plane(start, plane), in_plane(move.end_mm, plane)
     if isinstance(move, Arc):
         if move.plane != plane:

@@ -54,7 +54,7 @@ def parallel(piece: Piece, distance: float) -> Piece | None:
 
 
 def along(piece: Piece, point: Point, at_end: bool = False) -> float:
-    """How far along the piece a point of its curve is, mm; negative just before the start.
+    """Return the distance of a point of the curve along the piece, mm; negative just before the start.
 
     at_end: where start and end of a circle are one point, it is meant as the end
     """
@@ -82,7 +82,7 @@ def extent(piece: Piece) -> float:
 
 
 def crossings(first: Piece, second: Piece) -> list[Point]:
-    """Where the whole lines or circles of two pieces meet: no, one or two points."""
+    """Return the points where the whole lines or circles of two pieces meet: none, one or two."""
     if first.centre is None and second.centre is None:
         return line_with_line(first, second)
     if first.centre is None:
@@ -150,7 +150,7 @@ def trimmed(piece: Piece, start: Point | None = None, end: Point | None = None) 
 
 
 def shared(first: Piece, second: Piece, reach_mm: float, begin_mm: float = 0.0) -> Point | None:
-    """Where one piece, shortened at its end, meets the other, shortened at its start; None where they do not.
+    """Return the point where one piece, shortened at its end, meets the other, shortened at its start; None where they do not.
 
     begin_mm: what of the first is gone already, at its start
     reach_mm: by how much a piece may be passed, for the rounding of the program's figures

@@ -1,4 +1,4 @@
-"""What a control knows before it reads the first block: axes, offsets, switches, and the parameters that change a meaning."""
+"""The settings of a control before the first block: axes, offsets, switches, and the parameters that change a meaning."""
 
 import math
 import re
@@ -14,7 +14,7 @@ WORK_NAME: Final = re.compile(r"external|G5[4-9]|G54\.1 P([1-9]|[1-3][0-9]|4[0-8
 
 
 class IntegerWords(StrEnum):
-    """What a length without a decimal point means (FANUC parameter 3401#0, DPI)."""
+    """The meaning of a length without a decimal point (FANUC parameter 3401#0, DPI)."""
 
     UNITS = "units"
     """`X100` is 100 mm (DPI = 1, "calculator type")."""
@@ -23,7 +23,7 @@ class IntegerWords(StrEnum):
 
 
 class DwellUnit(StrEnum):
-    """What P counts in G4 and in cycles."""
+    """The unit of P in G4 and in cycles."""
 
     MILLISECONDS = "ms"
     SECONDS = "s"
@@ -31,7 +31,7 @@ class DwellUnit(StrEnum):
 
 
 class OutsideCorner(StrEnum):
-    """How a compensated path goes round an outside corner (FANUC parameter 19607#2, CCC)."""
+    """The way of a compensated path round an outside corner (FANUC parameter 19607#2, CCC)."""
 
     LINE = "line"
     """Up to the crossing of the tangents; round a corner sharper than 90° in a straight line between two points (CCC = 0)."""
@@ -40,7 +40,7 @@ class OutsideCorner(StrEnum):
 
 
 class LeadIn(StrEnum):
-    """Where the first compensated block ends (FANUC parameter 5003#0, SUP)."""
+    """The end of the first compensated block (FANUC parameter 5003#0, SUP)."""
 
     NEXT = "next"
     """Beside the start of the next block, square to it (type A)."""
@@ -49,7 +49,7 @@ class LeadIn(StrEnum):
 
 
 class OffsetLookup(StrEnum):
-    """Which offset G43, G41 and G42 take where their block has no H or D."""
+    """The offset that G43, G41 and G42 take where their block has no H or D."""
 
     WORD = "word"
     """That of the last H or D; none = offset 0 (FANUC)."""

@@ -1,4 +1,4 @@
-"""Where the interpreter stands between two blocks: modes, feed and speed, offsets, position, and what was put out so far.
+"""The state of the interpreter between two blocks: modes, feed and speed, offsets, position, and what was put out so far.
 
 It is the one thing that changes while a program runs; functions of the other files take it and change it, block by block.
 """
@@ -50,7 +50,7 @@ class PolarPole:
 
 @dataclass(slots=True)
 class CycleData:
-    """What a canned cycle remembers until it is cancelled: words in program units of mm, pauses in s."""
+    """The data that a canned cycle keeps until it is cancelled: words in program units of mm, pauses in s."""
 
     initial_mm: float
     r_mm: float | None = None
@@ -154,7 +154,7 @@ class State:
 
     @property
     def unit_mm(self) -> float:
-        """What one unit of a programmed length is, mm."""
+        """One unit of a programmed length, mm."""
         return MM_PER_INCH if self.modal.units == 200 else 1.0
 
     @property

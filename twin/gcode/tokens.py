@@ -47,7 +47,7 @@ def number(text: str, word: str) -> float:
 
 
 def _around(written: str, place: int) -> str:
-    """What stands around a place, from space to space, as far as it helps."""
+    """Return the text around a place, from space to space, as far as it helps."""
     before = written[:place].rpartition(" ")[2][-16:]
     return before + written[place:].partition(" ")[0][:16]
 

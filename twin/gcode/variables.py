@@ -9,7 +9,7 @@ LOCAL_MAX = 33
 
 
 class Variables:
-    """What `#` reads and writes. None is the null variable.
+    """The variables that `#` reads and writes. None is the null variable.
 
     read_system, write_system: what to do from #1000 on; given the number
     """

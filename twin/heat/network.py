@@ -13,7 +13,7 @@ from twin.sites import Site, at
 
 
 class Heat(NamedTuple):
-    """What goes in, W, and what goes off by kelvin of rise, W/K."""
+    """The heat that goes in, W, and that goes off by kelvin of rise, W/K."""
 
     heat_w: float
     cooling_w_per_k: float
@@ -41,7 +41,7 @@ def heat(
 
 
 class Temperature(NamedTuple):
-    """Where it would settle, and where it is after the step."""
+    """The temperature where it would settle, and after the step."""
 
     final_c: float
     temperature_next_c: float

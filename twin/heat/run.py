@@ -23,7 +23,6 @@ INPUTS = ("spindle_load_pct", "spindle_rpm", "ambient_c", "coolant_on")
 FED = (*INPUTS, "temperature_c", "duration_s", "time_s")
 
 
-@cache
 def thermal_quantities() -> dict[str, str]:
     """The quantities of the spindle's heat that an effect can change, with their sites."""
     return HEAT.quantities()
@@ -46,7 +45,7 @@ def thermal_constants(thermal: Thermal) -> dict[str, float]:
 
 @dataclass(frozen=True, slots=True)
 class Warming:
-    """What the temperature depends on, each (samples,); NaN = no sample, the last one holds.
+    """The signals that the temperature depends on, each (samples,); NaN = no sample, the last one holds.
 
     t_s: increasing; spindle_load_pct and spindle_rpm; ambient_c: the surroundings; coolant_on: 0 or 1, None = it never is
     """

@@ -166,7 +166,7 @@ def _path(letter: str, parameter: AxisParameter, by_force: bool) -> str:
 
 
 def _unknown(letter: str, found: AxisFit, forced: bool) -> list[str]:
-    """What the runs of an axis cannot say."""
+    """Return notes on what the runs of an axis cannot tell."""
     said = [
         f"{_path(letter, p, False)}: these runs do not excite it; the stated value and its uncertainty stand"
         for p, known in zip(found.model.parameters, found.found.known, strict=True)

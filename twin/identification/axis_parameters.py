@@ -1,4 +1,4 @@
-"""What is identified of an axis, as factors on what the machine states.
+"""The parameters that are identified of an axis, as factors on what the machine states.
 
 A factor is exp(θ), so that a constant stays positive and its stated relative uncertainty is the standard deviation of θ. How far
 friction differs by direction is a plain number a, with (1 − a) moving in − and (1 + a) moving in +. Static friction differs as

@@ -23,7 +23,7 @@ OUTLIER = 3.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fit:
-    """Where the fit ended.
+    """The result of the fit.
 
     theta: (p,); covariance: (p, p); known: (p,) part of the information that comes from the recordings, 0 to 1
     rms: of the residuals, in units of their noise; evaluations: simulated candidates

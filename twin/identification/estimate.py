@@ -29,7 +29,7 @@ class Estimate:
 
     @property
     def identifiable(self) -> bool:
-        """Whether the recordings say more about it than was known before."""
+        """Return True where the recordings say more about it than was known before."""
         return self.known_by > 0.5
 
     def sentence(self) -> str:

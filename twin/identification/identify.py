@@ -27,7 +27,7 @@ Progress = Callable[[str], None]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Identification:
-    """What came out.
+    """The result of an identification.
 
     machine: with the identified constants and their uncertainty; estimates: of each constant that was fitted
     misfits: signals that the machine does not follow even so, a sentence each
@@ -81,7 +81,7 @@ def identify(case: Case, *, free_gains: bool = False, progress: Progress = lambd
 
 
 def _misfits(runs: tuple[Run, ...], gaps: tuple[GapRow, ...]) -> tuple[str, ...]:
-    """What the twin does not follow. A position is measured by its following error, anything else by itself."""
+    """Return the misfits of the twin. A position is measured by its following error, anything else by itself."""
     said = []
     for run in runs:
         for signal in dict.fromkeys(row.signal for row in gaps if row.run == run.name):
@@ -209,7 +209,7 @@ def _heat(machine: MachineFile, runs: tuple[Run, ...], known: list[Estimate], un
 
 
 def _say_thermal(found: Fit, free: list[str], unknown: list[str], constant_s: float) -> None:
-    """What temperatures cannot say."""
+    """Add a note on what temperatures cannot tell."""
     unknown.append(
         "thermal: of the four constants, temperatures know three combinations (alpha/C, beta/C and R·C); capacity_j_per_k stays "
         "as stated, the other three hold with it"

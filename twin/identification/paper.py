@@ -51,7 +51,7 @@ GENETIC_ALL = "genetic algorithm, all evolutions"
 
 
 class FrictionObjective(Enum):
-    """What the friction limit of 100 is a limit of."""
+    """The figure that the friction limit of 100 is a limit of."""
 
     SQUARES = "N²"
     RMS = "N"

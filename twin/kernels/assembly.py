@@ -7,7 +7,7 @@ which would stay the same where the class of a tuple changes or moves.
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from typing import Any, TypeVar
 
 import numpy as np
@@ -37,7 +37,7 @@ class Assembly:
 
     def quantities(self) -> dict[str, str]:
         """Return the quantities that an effect can change or a recording replace, with the site of each."""
-        return quantities(self.physics)
+        return _quantities(self.physics)
 
     def effects(self, names: Iterable[str]) -> tuple[Effect, ...]:
         """Return the effects of these names. Raises EffectError where one does not exist or does not act in this stage."""
@@ -56,6 +56,11 @@ class Assembly:
                 raise EffectError(f"the constant {name} of {self.owner} is missing")
             taken.append(constants[name])
         return taken
+
+
+@cache
+def _quantities(physics: tuple[Physics, ...]) -> dict[str, str]:
+    return quantities(physics)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""Where compiled kernels are kept, so that each is compiled once on a machine.
+"""The folder of compiled kernels, so that each is compiled once on a machine.
 
 `$CNCTWIN_KERNELS`, else `$XDG_CACHE_HOME/cnctwin/kernels`, else `~/.cache/cnctwin/kernels`; where that cannot be written, a
 folder of this process. The folder is its owner's alone: numba trusts what it has kept there. It holds the newest few hundred

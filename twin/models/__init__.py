@@ -1,1 +1,1 @@
-"""Which model of several counts: the champion, and the one before it while it is kept warm."""
+"""The model of several that counts: the champion, and the one before it while it is kept warm."""

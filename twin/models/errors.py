@@ -1,4 +1,4 @@
-"""What can go wrong with the pointer to a model."""
+"""Errors of the pointer to a model."""
 
 from twin.errors import TwinError
 

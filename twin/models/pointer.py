@@ -34,7 +34,7 @@ class Pointer:
         return json.dumps(asdict(self), indent=2, ensure_ascii=False) + "\n"
 
     def is_warm(self, now_s: float) -> bool:
-        """Whether the previous champion is kept beside the present one at a moment, s since 1970.
+        """Return True where the previous champion is kept beside the present one at a moment, s since 1970.
 
         >>> Pointer("b", "a", "1970-01-01T00:00:00Z", "1970-01-03T00:00:00Z").is_warm(172_799.0)
         True

@@ -25,7 +25,7 @@ SPINDLE = 2
 
 
 class Wear(NamedTuple):
-    """How the tool wears: `factor` |n|^exponent a second at n rev/min.
+    """The wear of the tool: `factor` |n|^exponent a second at n rev/min.
 
     factor: (segments,) on a segment, 0 = nothing is cut there
     share: (segments,) part of all the time that nothing is cut which wears the tool as this segment does; 0 = that time does not

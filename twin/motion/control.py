@@ -76,7 +76,7 @@ def control_of(machine: MachineFile, unstated: Program) -> Control:
 
 
 def effects_tell(machine: MachineFile) -> bool:
-    """Whether an effect of the machine says anything of its control."""
+    """Return True where an effect of the machine changes its control."""
     return any(not effect_named(name).is_null(values) for name, values in program_effects(machine).items())
 
 
@@ -146,7 +146,7 @@ def _change(effect: Effect, quantity: str, value: PerAxis, given: Mapping[str, f
 
 @cache
 def _arguments(function: Change) -> tuple[str, ...]:
-    """What a change takes besides the quantity."""
+    """Return the arguments that a change takes besides the quantity."""
     return tuple(inspect.signature(function).parameters)[1:]
 
 
@@ -158,5 +158,5 @@ def _number(value: object) -> float:
 def _unless_same(
     values: Mapping[str, PerAxis], stated: Mapping[str, PerAxis], quantity: str, otherwise: float | None
 ) -> PerAxis | None:
-    """What an effect made of a quantity; untouched, it is left as the planner resolves it."""
+    """Return a quantity as an effect left it; untouched, it stays as the planner resolves it."""
     return otherwise if values[quantity] == stated[quantity] else values[quantity]

@@ -1,4 +1,4 @@
-"""What a control states about its motion, and what that allows on each segment and at each corner of a path.
+"""The limits that a control states for its motion, and what they allow on each segment and at each corner of a path.
 
 The corner rule is that of FANUC's AI contour control (A-63512EN; permissible speed difference, parameter 1783): with unit
 tangents t⁻, t⁺ before and after a corner, the speed there is v ≤ min over axes of D_i / |t⁺_i − t⁻_i|. The other rule that
@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.errors import MachineError
-from twin.gcode.planes import PLANES
 from twin.machine import Program
 from twin.motion.path import Event, EventKind, Kind, Path
 
@@ -89,7 +88,7 @@ class Limits:
 
 
 class Bounds(NamedTuple):
-    """What the limits allow on one path, whatever its feed. mm and s.
+    """The bounds that the limits set on one path, whatever its feed. mm and s.
 
     speed_mm_s, acceleration_mm_s2, jerk_mm_s3: (n,) along each segment
     junction_mm_s: (n + 1,) at the start of each segment and at the end of the last
@@ -104,7 +103,8 @@ class Bounds(NamedTuple):
 def bounds(path: Path, limits: Limits) -> Bounds:
     """The bounds of `path` under `limits`. Raises MachineError where the limits have another number of axes."""
     rapid = path.kind == Kind.RAPID
-    reach = _axis_share(path)
+    starting = path.tangents(np.arange(len(path)), np.zeros(len(path)))
+    reach = _axis_share(path, starting)
     in_rapid = limits.rapid_acceleration_mm_s2 if limits.rapid_acceleration_mm_s2 is not None else limits.acceleration_mm_s2
     rapid_jerk = limits.rapid_jerk_mm_s3 if limits.rapid_jerk_mm_s3 is not None else limits.jerk_mm_s3
 
@@ -120,7 +120,7 @@ def bounds(path: Path, limits: Limits) -> Bounds:
     speed[curved] = np.minimum(speed[curved], np.sqrt(_centripetal(path, limits)[curved] / curvature[curved]))
     if limits.block_time_s > 0.0:
         speed = np.where(rapid, speed, np.minimum(speed, path.length_mm / limits.block_time_s))
-    return Bounds(speed, acceleration, slowest(limits.jerk_mm_s3, rapid_jerk), _junctions(path, limits, acceleration))
+    return Bounds(speed, acceleration, slowest(limits.jerk_mm_s3, rapid_jerk), _junctions(path, limits, acceleration, starting))
 
 
 def _each_axis(value: PerAxis, path: Path) -> Floats:
@@ -131,13 +131,12 @@ def _each_axis(value: PerAxis, path: Path) -> Floats:
     return np.full(len(path.axes), float(value))
 
 
-def _axis_share(path: Path) -> Floats:
-    """The largest |dp_i/ds| of each axis on each segment (n, axes)."""
-    zero, every = np.zeros(len(path)), np.arange(len(path))
-    share = np.abs(path.tangents(every, zero))
-    for plane, (u, v, _) in PLANES.items():
-        arcs = (path.kind == Kind.ARC) & (path.plane == plane)
-        share[arcs, u] = share[arcs, v] = np.hypot(share[arcs, u], share[arcs, v])
+def _axis_share(path: Path, starting: Floats) -> Floats:
+    """The largest |dp_i/ds| of each axis on each segment (n, axes), of the tangents where they start."""
+    share = np.abs(starting)
+    arcs = np.flatnonzero(path.kind == Kind.ARC)
+    u, v = path.plane_axes[arcs].T
+    share[arcs, u] = share[arcs, v] = np.hypot(share[arcs, u], share[arcs, v])
     return share
 
 
@@ -147,26 +146,23 @@ def _centripetal(path: Path, limits: Limits) -> Floats:
         return np.full(len(path), limits.centripetal_mm_s2)
     each = _each_axis(limits.acceleration_mm_s2, path)
     allowed = np.full(len(path), np.inf)
-    for plane, (u, v, _) in PLANES.items():
-        arcs = (path.kind == Kind.ARC) & (path.plane == plane)
-        if np.any(arcs):
-            allowed[arcs] = np.min(each[[u, v]])
+    arcs = np.flatnonzero(path.kind == Kind.ARC)
+    allowed[arcs] = np.min(each[path.plane_axes[arcs]], axis=1)
     return allowed
 
 
 def stops(event: Event) -> bool:
-    """Whether the axes stand still for this event. Coolant is switched in passing."""
+    """Return True where the axes stand still for this event. Coolant is switched in passing."""
     return event.kind != EventKind.COOLANT
 
 
-def _junctions(path: Path, limits: Limits, acceleration: Floats) -> Floats:
+def _junctions(path: Path, limits: Limits, acceleration: Floats, starting: Floats) -> Floats:
     n = len(path)
     junction = np.zeros(n + 1)
     if n == 0:
         return junction
-    every, rapid = np.arange(n), path.kind == Kind.RAPID
-    before = path.tangents(every, path.length_mm)[:-1]
-    after = path.tangents(every, np.zeros(n))[1:]
+    rapid = path.kind == Kind.RAPID
+    before, after = path.tangents(np.arange(n), path.length_mm)[:-1], starting[1:]
     jump = np.abs(after - before)
     allowed = _each_axis(limits.corner_speed_difference_mm_min, path) / 60.0
     junction[1:-1] = np.min(np.where(jump > 1e-9, allowed / np.maximum(jump, 1e-9), np.inf), axis=1)

@@ -30,7 +30,7 @@ SHORTEST_MM = 1e-9
 
 
 class Kind(IntEnum):
-    """How a segment is travelled."""
+    """The kind of motion along a segment."""
 
     RAPID = 0
     LINE = 1
@@ -38,7 +38,7 @@ class Kind(IntEnum):
 
 
 class EventKind(IntEnum):
-    """What happens between segments."""
+    """The kind of an event between segments."""
 
     DWELL = 0
     TOOL_CHANGE = 1
@@ -67,7 +67,7 @@ class Path:
     """Segments (rows of arrays, all of one length n) and the events between them. Lengths in mm, feeds in mm/min.
 
     start_mm, end_mm: (n, axes); centre_mm: (n, axes), of use for arcs only
-    plane: 17, 18, 19; sweep_rad: 0 for what is no arc
+    plane_axes: (n, 2) first and second axis of the plane; sweep_rad: 0 for what is no arc
     exact_stop: (n,) the segment ends at rest (G61, G9)
     tool_mm: (n, 2) length of the tool in z, as the control counts it, at the start and at the end of each segment; they differ
         where the segment takes up another one
@@ -80,7 +80,7 @@ class Path:
     start_mm: Floats
     end_mm: Floats
     centre_mm: Floats
-    plane: Ints
+    plane_axes: Ints
     sweep_rad: Floats
     length_mm: Floats
     feed_mm_min: Floats
@@ -93,8 +93,8 @@ class Path:
 
     def segments(self) -> Segments:
         """Return the segments as the kernels take them."""
-        axes = PLANE_AXES[self.plane - 17]
-        return Segments(self.line, self.kind, self.start_mm, self.end_mm, self.centre_mm, axes, self.sweep_rad, self.length_mm)
+        ends = self.start_mm, self.end_mm, self.centre_mm
+        return Segments(self.line, self.kind, *ends, self.plane_axes, self.sweep_rad, self.length_mm)
 
     def at(self, segment: Ints, s_mm: Floats) -> Floats:
         """Points (n, axes) at the distances `s_mm` (n,) from the start of the segments `segment` (n,)."""
@@ -168,7 +168,7 @@ class _Builder:
 def _length(
     start: tuple[float, ...], end: tuple[float, ...], centre: tuple[float, ...] | None, plane: int, sweep: float
 ) -> float:
-    """What the feed counts: the way of the linear axes, or that of the rotary ones where nothing else moves."""
+    """Return the length that the feed counts: that of the linear axes, or of the rotary ones where nothing else moves."""
     moved = [b - a for a, b in zip(start, end, strict=True)]
     if centre is not None:
         u, v, normal = PLANES[plane]
@@ -208,7 +208,7 @@ def path_from_moves(
         start_mm=np.ascontiguousarray(points[:, 0]),
         end_mm=np.ascontiguousarray(points[:, 1]),
         centre_mm=np.ascontiguousarray(points[:, 2]),
-        plane=rows[:, 2].astype(np.int64),
+        plane_axes=PLANE_AXES[rows[:, 2].astype(np.int64) - 17],
         sweep_rad=rows[:, 3].copy(),
         length_mm=rows[:, 4].copy(),
         feed_mm_min=rows[:, 5].copy(),

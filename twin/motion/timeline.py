@@ -36,7 +36,7 @@ class EventRows(NamedTuple):
 
 
 class ControlTimes(NamedTuple):
-    """How long the control and its spindle take. Ramps of the spindle in rev/min a second."""
+    """The times that the control and its spindle take. Ramps of the spindle in rev/min a second."""
 
     tool_change_s: float
     spindle_rpm_s: float

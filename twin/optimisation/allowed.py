@@ -1,4 +1,4 @@
-"""What the limits leave each line: the speeds it may have, and the highest feed at each of them.
+"""The room that the limits leave each line: the speeds it may have, and the highest feed at each of them.
 
     f_max(n) = min(f_high, c_max N n, c_P(n) N n),      V = π D n in its range,      n in the stable lobes
 
@@ -44,7 +44,7 @@ class Impossible(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Allowed:
-    """Of each feed line that may be changed, (lines,); arrays of speeds and feeds are (…, lines). mm/min, rev/min.
+    """The feed lines that may be changed, (lines,); arrays of speeds and feeds are (…, lines). mm/min, rev/min.
 
     index: of the line in `Programmed.lines`; cutting: it meets material, so it has a speed of its own
     teeth: of its tool, 1 where it has none; advance_max_mm with its reason; feed_low, feed_high: range of the feed word
@@ -114,7 +114,7 @@ class Allowed:
 def allowed(
     program: Programmed, forces: CutForces, limits: Limits, feed_ratio: float = 1.0
 ) -> tuple[Allowed, tuple[Impossible, ...]]:
-    """What the limits leave each line that may be changed, and the lines for which they leave nothing (those are not in it)."""
+    """Return what the limits leave each line that may be changed, and the lines for which they leave nothing (not in it)."""
     free = [k for k, line in enumerate(program.lines) if not line.left_alone]
     advance, reasons = _advances(program, forces, limits)
     spindle = SpindlePower.of(program.machine)

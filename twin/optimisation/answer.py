@@ -1,4 +1,4 @@
-"""What the optimiser answers: the program rewritten, each line before and after, what binds, how far the optimum is."""
+"""The answer of the optimiser: the program rewritten, each line before and after, what binds, how far the optimum is."""
 
 from dataclasses import asdict, dataclass
 from enum import StrEnum
@@ -6,7 +6,7 @@ from typing import Any
 
 
 class Objective(StrEnum):
-    """What is made small."""
+    """The figure that is made small."""
 
     TIME = "time"
     COST = "cost"
@@ -14,7 +14,7 @@ class Objective(StrEnum):
 
 
 class SpeedChanges(StrEnum):
-    """Where the spindle may change its speed between two lines (`twin.optimisation.speeds.groups`)."""
+    """The places between two lines where the spindle may change its speed (`twin.optimisation.speeds.groups`)."""
 
     ANYWHERE = "anywhere"
     IN_AIR = "in_air"
@@ -24,7 +24,7 @@ class SpeedChanges(StrEnum):
 
 
 class Binds(StrEnum):
-    """What keeps a line from being better."""
+    """The limit that keeps a line from being better."""
 
     FEED = "feed range"
     SPEED = "spindle speed range"
@@ -91,7 +91,7 @@ class LineAnswer:
 
 @dataclass(frozen=True, slots=True)
 class Totals:
-    """Of the whole program. cost: None without [cost]; over: lines above a limit, 0 = none."""
+    """The figures of the whole program. cost: None without [cost]; over: lines above a limit, 0 = none."""
 
     seconds: float
     cost: float | None
@@ -130,7 +130,7 @@ class FrontPoint:
 
 @dataclass(frozen=True, slots=True)
 class Parted:
-    """How much one uncertain constant says of the force: path as in [uncertainty], relative standard deviation, and by how many
+    """The share of one uncertain constant in the force: path as in [uncertainty], relative standard deviation, and by how many
     per cent the greatest force changes for one standard deviation."""
 
     path: str
@@ -140,7 +140,7 @@ class Parted:
 
 @dataclass(frozen=True, slots=True)
 class Sensitivity:
-    """What the twin's uncertainty makes of the force limit.
+    """The effect of the twin's uncertainty on the force limit.
 
     kept: probability that no line exceeds the limit, 0 to 1; asked: that which was asked for, None = planned by the mean twin
     draws: on how many draws of the constants `kept` stands, other ones than those that the plan was made with
@@ -162,7 +162,7 @@ class Sensitivity:
 
 @dataclass(frozen=True, slots=True)
 class Search:
-    """How it was found. history: best objective (or hypervolume of the front) after each evolution."""
+    """The course of the search. history: best objective (or hypervolume of the front) after each evolution."""
 
     method: str
     seed: int

@@ -66,7 +66,7 @@ def answered(
 
 
 def _bound_of_front(made: Problem, front: tuple[FrontPoint, ...]) -> Bound:
-    """Of its two ends: the least cost, and in words the least time."""
+    """Return the bound of the front's two ends: the least cost, and in words the least time."""
     cheapest = bound_of(made, Objective.COST, min(point.cost for point in front))
     fastest = bound_of(made, Objective.TIME, min(point.seconds for point in front))
     how = f"of the cheapest program; the fastest is {_part(fastest.distance)} above the least time of {fastest.value:.2f} s"

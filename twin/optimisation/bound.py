@@ -1,4 +1,4 @@
-"""What no program within the limits can be better than, so that an answer states its distance to it and not only its gain.
+"""The bound that no program within the limits can beat, so that an answer states its distance to it and not only its gain.
 
 Time: every line at the highest feed of any speed it may have, on axes with their limits, while speeds change for nothing; but
 lines that share a speed have one, and a spindle that starts from rest has to ramp up to that of the line it starts for. Cost:
@@ -118,7 +118,7 @@ class Cells:
 
     @classmethod
     def of(cls, problem: Problem, group: int) -> Self:
-        """Of one group."""
+        """Return the cells of one group."""
         edges = [np.geomspace(a, b, CELLS + 1) if b > a else np.array([a, a]) for a, b in problem.spans[group]]
         return cls(problem.allowed, np.concatenate([e[:-1] for e in edges]), np.concatenate([e[1:] for e in edges]))
 

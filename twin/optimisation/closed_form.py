@@ -38,7 +38,7 @@ BLOCK = 1_000_000
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Worth:
-    """What g weighs, (lines,): length_mm and fixed_s of each; wear, wear_fixed: w and v; per_second: R; exponent: m."""
+    """The weights in g, (lines,): length_mm and fixed_s of each; wear, wear_fixed: w and v; per_second: R; exponent: m."""
 
     length_mm: Floats
     fixed_s: Floats
@@ -54,7 +54,7 @@ class Worth:
         return np.asarray(first + self.fixed_s * (self.per_second + self.wear_fixed * power))
 
     def of(self, rows: Ints, feed: Floats, rpm: Floats) -> Floats:
-        """Of some lines that share their speed: feeds (…, rows), speeds (…)."""
+        """Return g of some lines that share their speed: feeds (…, rows), speeds (…)."""
         return np.asarray(self.lines(rows).each(feed, np.asarray(rpm)[..., None]).sum(axis=-1))
 
     def lines(self, rows: Ints) -> "Worth":
@@ -97,11 +97,11 @@ class _Pieces:
         )
 
     def sums(self, values: Floats) -> Floats:
-        """Of the elements of each piece, (…, pieces)."""
+        """Return the sums over the elements of each piece, (…, pieces)."""
         return np.asarray(np.add.reduceat(values, self.first, axis=-1))
 
     def corner_rpm(self) -> Floats:
-        """Where the feed range takes over from the chip, (elements,)."""
+        """The speed at which the feed range takes over from the chip, (elements,)."""
         one = self.lines
         return np.asarray(one.feed_high * one.feed_ratio / (one.advance_max_mm * one.teeth))
 
@@ -164,7 +164,7 @@ def _chosen(made: _Pieces, value: Floats, second: Floats, groups: int) -> list[t
 
 
 def _stationary(made: _Pieces, worth: Worth) -> list[Floats]:
-    """Of each piece the speed at which n² G' comes to zero, or the end that is nearer, and the corner that is nearest to it."""
+    """Return, for each piece, the speed where n² G' comes to zero, or the nearer end, and the corner that is nearest to it."""
     corner, m = made.corner_rpm(), worth.exponent
     before_s = 60.0 * worth.length_mm * corner / (made.lines.feed_high * made.lines.feed_ratio)  # 60 L / k
     beyond_s = 60.0 * worth.length_mm / (made.lines.feed_high * made.lines.feed_ratio)
@@ -219,7 +219,7 @@ def _with_power(made: _Pieces, candidates: Floats) -> tuple[Floats, NDArray[np.b
 
 
 def _power_binds(made: _Pieces, rpm: Floats) -> NDArray[np.bool_]:
-    """Whether the power allows less feed than chip and range do, (…, elements)."""
+    """Return True where the power allows less feed than chip and range do, (…, elements)."""
     one = made.lines
     per_chip = one.teeth * rpm / one.feed_ratio
     return np.asarray(one.advance_by_power_mm(rpm) * per_chip < np.minimum(one.feed_high, one.advance_max_mm * per_chip))

@@ -1,4 +1,4 @@
-"""What a second costs: labour and depreciation, and the life of the tool (reference paper, Eq. 19 to 22).
+"""The cost of a second: labour and depreciation, and the life of the tool (reference paper, Eq. 19 to 22).
 
     C_p = C_m + C_t,   C_m = T_p (E_p + C_d),   C_t = (T_p / T_l) (P_t + T_c (E_p + C_d)),   V T_l^n = C,   V = π D n_s
 
@@ -33,7 +33,7 @@ class Economy:
 
     @classmethod
     def of(cls, cost: Cost) -> Self:
-        """Of [cost].
+        """Return the economy of [cost].
 
         The reference paper's machine: 3.001 KRW a second, and a tool costs 28,000 + 60 · 3.001 = 28,180 KRW:
 

@@ -1,4 +1,4 @@
-"""What a cut does at an advance c in a tooth period: peak force, mean tangential force, chip. All of them grow with c.
+"""The forces of a cut at an advance c in a tooth period: peak force, mean tangential force, chip. All of them grow with c.
 
 Nothing else of feed and speed goes into the force (formats, section 4), so a limit of force is a limit of c: c_max, from which
 the feed at any speed n is c_max · N · n. Nominally the force is c times a figure, and c_max is exact; with an edge force or a
@@ -50,12 +50,12 @@ class CutForces:
 
     @property
     def teeth(self) -> Ints:
-        """Of the tool of each cut."""
+        """The teeth of the tool of each cut."""
         return np.array([tool.teeth for tool in self.tools], dtype=np.int64)[self.tool_of_cut]
 
     @property
     def diameter_mm(self) -> Floats:
-        """Of the tool of each cut."""
+        """The diameter of the tool of each cut."""
         return np.array([tool.diameter_mm for tool in self.tools], dtype=np.float64)[self.tool_of_cut]
 
     def peak_n(self, advance_mm: ArrayLike) -> Floats:

@@ -52,7 +52,7 @@ def evolve_piece(text: str) -> str:
 
 
 def fitness_of(made: Problem, objective: Objective) -> Fitness:
-    """What is made small: cost; or seconds, of those that are equally fast the cheapest."""
+    """Return the fitness that is made small: cost; or seconds, of those that are equally fast the cheapest."""
     at_first = made.as_programmed()
 
     def fitness(genes: Floats) -> Floats:

@@ -43,7 +43,7 @@ class Stopped(Exception):  # noqa: N818 - no error: the caller asked for it
 
 @dataclass(frozen=True, slots=True)
 class Hooks:
-    """What surrounds a search.
+    """The hooks of a search.
 
     spread: as `map`, in order; progress: part done, and what is being done; clock: seconds
     save: is given a checkpoint, a text, after every epoch; stop: whether it was asked to stop

@@ -28,7 +28,7 @@ PENALTY_PER_N = 1.0
 
 @dataclass(frozen=True, slots=True)
 class PaperSearch:
-    """Where it ended: seconds, cost, greatest force; distance: of the objective above the exact bound, relative."""
+    """The result of a search: seconds, cost, greatest force; distance: of the objective above the exact bound, relative."""
 
     objective: Objective
     seconds: float

@@ -1,4 +1,4 @@
-"""What each line cuts, from a run log of the program: where the stock is not known.
+"""The cuts of each line from a run log of the program, for use where the stock is not known.
 
 A run log counts lines by index from 0, or by N words (formats, section 3), and does not say which. It is read both ways: where it
 cuts, there has to be a feed line of the program, and where it is at all, a line that does something.

@@ -33,7 +33,7 @@ SNAP = 0.03
 
 
 class Evaluated(NamedTuple):
-    """Of each candidate, (candidates,): seconds, and cost (zeros without [cost])."""
+    """The figures of each candidate, (candidates,): seconds, and cost (zeros without [cost])."""
 
     seconds: Floats
     cost: Floats
@@ -41,7 +41,7 @@ class Evaluated(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Speeds:
-    """Where speeds come from. owner: (events,) row of `Allowed` whose speed the event takes, NOBODY = the event's own value."""
+    """The source of speeds. owner: (events,) row of `Allowed` whose speed the event takes, NOBODY = the event's own value."""
 
     candidates: Candidates
     owner: Ints
@@ -79,7 +79,7 @@ class Problem:
 
     @property
     def genes(self) -> int:
-        """How many genes a candidate has."""
+        """The number of genes of a candidate."""
         return len(self.allowed) + len(self.groups)
 
     @cached_property
@@ -118,7 +118,7 @@ class Problem:
         return _speeds(self)
 
     def limits(self) -> Limits:
-        """Of the control, effects of the machine included."""
+        """The limits of the control, effects of the machine included."""
         return self.control.limits
 
     def ideal_control(self) -> Control:
@@ -142,7 +142,7 @@ class Problem:
 
     @cached_property
     def changes_cost(self) -> bool:
-        """Whether a change of speed takes time: a spindle that ramps, or axes that stop for it."""
+        """Return True where a change of speed takes time: a spindle that ramps, or axes that stop for it."""
         limits = self.limits()
         ideal = np.min(np.asarray(limits.acceleration_mm_s2)) >= ACCELERATION_MAX_MM_S2
         return bool(np.isfinite(limits.spindle_acceleration_rpm_s) or limits.in_position_s > 0.0 or not ideal)
@@ -185,7 +185,7 @@ class Problem:
         return Evaluated(seconds, self._cost(seconds, worn))
 
     def as_programmed(self) -> Evaluated:
-        """Of the program as it is."""
+        """Evaluate the program as it is."""
         seconds, cost = self.evaluate_path(self.program.path)
         return Evaluated(np.array([seconds]), np.array([cost]))
 
@@ -199,7 +199,7 @@ class Problem:
 
     @cached_property
     def wear(self) -> Wear | None:
-        """How the tools wear. In cut only; or all the time (Eq. 20), which lines share by the way that they cut."""
+        """The wear of the tools. In cut only; or all the time (Eq. 20), which lines share by the way that they cut."""
         if self.economy is None:
             return None
         path, economy = self.program.path, self.economy
@@ -218,7 +218,7 @@ class Problem:
         return Wear(factor, share, economy.exponent)
 
     def worth(self, per_second: float, of_wear: float) -> Worth:
-        """What a second and a tool are worth, for the closed form: (1, 0) is time, (per_second, per_tool) cost."""
+        """Return what a second and a tool are worth, for the closed form: (1, 0) is time, (per_second, per_tool) cost."""
         lines = [self.program.lines[int(k)] for k in self.allowed.index]
         length = np.array([line.length_mm for line in lines], dtype=np.float64)
         fixed_s = self.fixed_time.by_line_s

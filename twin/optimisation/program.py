@@ -68,7 +68,7 @@ class FeedLine:
 
     @property
     def cutting(self) -> bool:
-        """Whether it meets material."""
+        """Return True where it meets material."""
         return self.cuts[1] > self.cuts[0]
 
 
@@ -225,7 +225,7 @@ def _tool_notes(machine: MachineFile, path: Path) -> list[str]:
 
 
 def _collision_notes(path: Path, rows: PathRows) -> list[str]:
-    """Where rapids go into material, the first three."""
+    """Return notes on rapids that go into material, the first three."""
     said = []
     for hit in rows.collisions[:3]:
         place = ", ".join(f"{v:.1f}" for v in hit.position_mm)
@@ -234,7 +234,7 @@ def _collision_notes(path: Path, rows: PathRows) -> list[str]:
 
 
 def _unknown_start(path: Path) -> int:
-    """How many rapids come before the first motion of Z: where they go from is not known, so they meet nothing."""
+    """Return the number of rapids before the first motion of Z: where they go from is not known, so they meet nothing."""
     level = (path.kind == Kind.RAPID) & (path.start_mm[:, 2] == path.end_mm[:, 2])
     count = int(np.argmin(level)) if not level.all() else len(path)
     leaves_z = count < len(path) and path.kind[count] == Kind.RAPID
@@ -322,7 +322,7 @@ def _why_not(line: FeedLine, path: Path, tied: set[int], tools: Ints, found: _Li
 
 
 def path_is_cycle(path: Path, executions: Sequence[tuple[int, int]]) -> bool:
-    """Whether one block makes rapids and feeds: only a cycle does."""
+    """Return True where one block makes rapids and feeds: only a cycle does."""
     return any((path.kind[a:b] == Kind.RAPID).any() for a, b in executions)
 
 
@@ -335,7 +335,7 @@ def _no_plain_words(text: str) -> str:
 
 
 def _is_plain_feed(text: str, feed_mm_min: float, inch: bool, tied: bool) -> bool:
-    """Whether the feed of a line is what an F word says, in mm or inch a minute: not so in G93 and G95, nor by an expression."""
+    """Return True where the feed is what an F word says, in mm or inch a minute: not so in G93 and G95, nor by an expression."""
     place = find_word(text, "F")
     if tied or (place is not None and not place.plain):
         return False
@@ -359,7 +359,7 @@ def _check_branches(source: list[str], run: set[int]) -> None:
 
 
 def _is_clear(machine: MachineFile, path: Path, segments: Ints, tools: Sequence[tuple[int, Tool]], tool: int) -> bool:
-    """Whether a feed in air stays clear of the stock as it was: above it, or beside it by more than the tool and a clearance.
+    """Return True where a feed in air stays clear of the stock as it was: above it, or beside it by more than tool and clearance.
 
     What is left of the stock would be more exact, and a spring pass along a finished wall is air to it.
     """

@@ -84,7 +84,7 @@ class Question:
         return cls(**values | known)
 
     def digest(self) -> str:
-        """What tells one question from another."""
+        """Return a digest that tells one question from another."""
         return hashlib.sha256(self.to_json().encode()).hexdigest()[:32]
 
     def with_(self, **changes: Any) -> "Question":
@@ -110,7 +110,7 @@ def problem(question: Question) -> Problem:
 
 
 def _leaves(made: Problem, question: Question) -> str:
-    """What keeping the force limit with a probability leaves of it: the figure that a refusal compares with."""
+    """Return what keeping the force limit with a probability leaves of it: the figure that a refusal compares with."""
     asked = limits_of(made.program.machine, question.force_limit_n).force_n
     if question.margin == 1.0 or asked is None:
         return ""
@@ -147,5 +147,5 @@ def _read(text: str) -> Programmed:
 
 
 def single(objective: Objective) -> Objective:
-    """What a line by itself is best by: of a front, the cost."""
+    """Return the objective that a line by itself is best by: of a front, the cost."""
     return Objective.COST if objective is Objective.PARETO else objective

@@ -1,4 +1,4 @@
-"""What keeps a line from being better, in words."""
+"""The words for what keeps a line from being better."""
 
 import numpy as np
 

@@ -50,7 +50,7 @@ class Rewritten:
 
 @dataclass(frozen=True, slots=True)
 class _Wanted:
-    """What a feed line is to have: figures as text, None = as it is; feed in mm/min and speed to check by, None = as before"""
+    """The words wanted in a line: figures as text, None = as it is; feed in mm/min and speed to check by, None = as before"""
 
     feed: str | None
     feed_mm_min: float | None

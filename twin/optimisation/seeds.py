@@ -1,4 +1,4 @@
-"""Where a search begins: the closed form of each group, the program as it is, common speeds, and the best sequence of speeds;
+"""The seeds of a search: the closed form of each group, the program as it is, common speeds, and the best sequence of speeds;
 and the first and the last of these with fewer changes of speed than may be.
 
 The sequence is found by dynamic programming (Viterbi): groups in the order of their first lines, a few speeds for each, a
@@ -26,7 +26,7 @@ SWEEP = 24
 
 
 def worth_of(problem: Problem, objective: Objective, per_second_more: float = 0.0) -> Worth:
-    """What the closed form is to weigh: seconds, or cost; `per_second_more` on top, for the points of a front."""
+    """Return the weights of the closed form: seconds, or cost; `per_second_more` on top, for the points of a front."""
     if objective is Objective.TIME or problem.economy is None:
         return problem.worth(1.0, 0.0)
     return problem.worth(problem.economy.per_second + per_second_more, problem.economy.per_tool)
@@ -134,7 +134,7 @@ def _some_speeds(problem: Problem, alone: Floats) -> Floats:
 
 
 def _change(problem: Problem, worth: Worth, speeds: Floats) -> Floats:
-    """What a change from one speed to another is worth, (speeds, speeds): the ramp, and a stop of the axes."""
+    """Return what a change from one speed to another costs, (speeds, speeds): the ramp, and a stop of the axes."""
     limits = problem.limits()
     base = limits.spindle_base_rpm
     tau = np.array([effort(float(n), base) for n in speeds])

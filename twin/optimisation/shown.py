@@ -17,7 +17,7 @@ HAIR = 1e-6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ShownLines:
-    """Of each feed line of the program, (lines,); the worst of its cuts, zeros in air."""
+    """The figures of each feed line of the program, (lines,); the worst of its cuts, zeros in air."""
 
     feed_mm_min: Floats
     rpm: Floats
@@ -105,7 +105,7 @@ def _cut(problem: Problem, forces: CutForces, feed: Floats, rpm: Floats) -> tupl
 
 
 def totals(shown: ShownLines, seconds: float, cost: float | None, limits: Limits, problem: Problem) -> Totals:
-    """Of the whole program; `over` counts lines above a limit."""
+    """Return the figures of the whole program; `over` counts lines above a limit."""
     over = np.zeros(len(shown.rpm), dtype=np.bool_)
     cutting = shown.force_n > 0.0
     kept = np.array([line.needs_speed for line in problem.program.lines], dtype=np.bool_)

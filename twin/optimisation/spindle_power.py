@@ -31,7 +31,7 @@ class SpindlePower:
 
     @classmethod
     def of(cls, machine: MachineFile) -> Self | None:
-        """Of a machine; None where it has no [spindle]."""
+        """Return the power of a machine's spindle; None where it has no [spindle]."""
         if machine.spindle is None:
             return None
         known = set(spindle_quantities())
@@ -48,7 +48,7 @@ class SpindlePower:
         return cls(constants, tuple(added), limit, base or 0.0)
 
     def electrical_kw(self, cutting_w: Floats, rpm: Floats) -> Floats:
-        """What the drive draws; arrays of one shape."""
+        """Return the power that the drive draws; arrays of one shape."""
         power, speed = np.broadcast_arrays(np.asarray(cutting_w, dtype=np.float64), np.asarray(rpm, dtype=np.float64))
         drawn = spindle_load_pct(self.constants, power.ravel(), speed.ravel(), period_s=1.0, effects=self.effects)[0]
         return np.asarray(drawn.reshape(power.shape))

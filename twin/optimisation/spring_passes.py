@@ -21,7 +21,7 @@ PART = 0.5
 
 
 def touching(path: Path, stock: Stock, sections: Sequence[Section], segments: Sequence[Ints]) -> list[bool]:
-    """Of each line, by its segments: whether it touches the work along half of its way or more."""
+    """Return True for each line, by its segments, that touches the work along half of its way or more."""
     if not segments:
         return []
     suspected = np.zeros(len(path), dtype=np.bool_)

@@ -1,4 +1,4 @@
-"""What the twin's uncertainty makes of the force limit: how likely it is kept, and by how much to stay below it so that it is.
+"""The force limit under the twin's uncertainty: how likely it is kept, and by how much to stay below it so that it is.
 
 Each uncertain constant x is drawn as x exp(σ z) with σ its relative standard deviation from [uncertainty], as identification and
 diagnosis wrote it, and z standard normal, one draw for the whole program: a harder material is harder in every line.
@@ -72,7 +72,7 @@ def greatest_forces_n(forces: CutForces, advance_mm: Floats, factors: Mapping[st
 
 
 def margin_for(forces: CutForces, advance_mm: Floats, machine: MachineFile, probability: float, seed: int) -> float:
-    """What the limit is to be divided by: the quantile of the greatest force over that of the mean twin, at least 1."""
+    """Return the divisor of the limit: the quantile of the greatest force over that of the mean twin, at least 1."""
     constants = uncertain_constants(machine, forces.numbers)
     if not constants or not len(forces.cuts):
         return 1.0

@@ -22,7 +22,7 @@ LINE_END = re.compile(r"\r\n|\r|\n")
 
 
 class WordPlace(NamedTuple):
-    """Where a word stands in the text of a block: begin, end; plain: its value is a number, no expression."""
+    """The place of a word in the text of a block: begin, end; plain: its value is a number, no expression."""
 
     begin: int
     end: int
@@ -68,7 +68,7 @@ def with_word(text: str, letter: str, figure: str) -> str:
 
 
 def last_word_end(text: str) -> int:
-    """Where the last word of a block ends: before comments and spaces behind it."""
+    """Return the end of the last word of a block: before comments and spaces behind it."""
     end = 0
     for match in TOKEN.finditer(text.translate(CAPITALS)):
         if match.lastindex is not None and match.lastindex < 6:
@@ -96,7 +96,7 @@ def joined(text: str, changed: Mapping[int, str]) -> str:
 
 
 def branches(lines: list[str]) -> list[bool]:
-    """Of each line, whether the control may come to it, or go on from it, another way than from line to line.
+    """Return True for each line that the control may come to, or go on from, another way than from line to line.
 
     Block skips, jumps and the N words that they may aim at, loops, calls, and the O words of what is called.
 
@@ -138,7 +138,7 @@ def codes(text: str) -> Codes:
 
 
 def inch_lines(lines: list[str], inch: bool = False) -> list[bool]:
-    """Of each line, whether G20 stands in it or in the last line before it that has G20 or G21; `inch`: at the start.
+    """Return True for each line with G20 in it, or in the last line before it that has G20 or G21; `inch`: at the start.
 
     >>> inch_lines(["G1 F3", "G20", "G1 F3 (G21)", "G21 G1 F3"])
     [False, True, True, False]

@@ -1,4 +1,4 @@
-"""Where the force at a tick hangs by a hair: a tooth that enters or leaves the cut as closely as the angle is known.
+"""Ticks at which the force hangs by a hair: a tooth that enters or leaves the cut as closely as the angle is known.
 
 A log has the spindle's angle to so many digits. Where the force jumps (at exit off the middle of a slot, with edge forces, with
 runout) a rounded angle does not say on which side of the jump a tooth was, so such a sample of a dynamometer cannot be predicted.
@@ -14,7 +14,7 @@ from twin.process.milling import Milling
 
 
 def at_a_jump(motion: Milling, teeth: int, resolution_rad: float = 1e-4) -> NDArray[np.bool_]:
-    """Whether a tooth is as near as `resolution_rad` to entry or exit, (motions, ticks).
+    """Return True where a tooth is as near as `resolution_rad` to entry or exit, (motions, ticks).
 
     Two teeth in a slot along x change places at the angle 0:
 

@@ -26,7 +26,6 @@ AT_TICK = ("spindle_rpm", "speed_mm_s", "axial_depth_mm")
 CUT = Assembly((tooth.radius, tooth.lag, tooth.tooth_force), acts_on="the cut", owner="the cut")
 
 
-@cache
 def process_quantities() -> dict[str, str]:
     """The quantities of the cut that an effect can change, with their sites."""
     return CUT.quantities()

@@ -23,7 +23,7 @@ LANES = (1, 8, 32)
 
 @dataclass(frozen=True, slots=True)
 class Milling:
-    """What the force depends on, tick by tick: each (ticks,), or (motions, ticks).
+    """The signals that the force depends on, tick by tick: each (ticks,), or (motions, ticks).
 
     spindle_angle_rad: phase of tooth 0; spindle_rpm: 0 or less = the spindle does not cut
     velocity_x_mm_s, velocity_y_mm_s: of the reference, at the tick
@@ -181,7 +181,7 @@ def _lane_count(constants: Mapping[str, ArrayLike], motions: int) -> int:
 
 
 def _blocks(lanes: int, effects: tuple[Effect, ...], *, shared: bool) -> list[tuple[slice, int]]:
-    """Which lanes go side by side, and in how wide a kernel: one by one where their angles differ."""
+    """Return the lanes that go side by side, and the width of their kernel: one by one where their angles differ."""
     apart = not shared or any("lag_rad" in effect.changes for effect in effects)
     size = 1 if apart else LANES[-1]
     chosen = [slice(first, min(first + size, lanes)) for first in range(0, lanes, size)]

@@ -39,7 +39,7 @@ SMALLEST_PART = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class ChatterCut:
-    """What is cut, and how the tool stands in it.
+    """The cut, and how the tool stands in it.
 
     entry_angle_rad, exit_angle_rad: of the engaged arc, as in twin/engagement, from the left of the heading in the sense in which
     the tool turns (M3); a slot is 0 to π, entry = exit cuts nothing, an exit before the entry goes through 2π
@@ -95,7 +95,7 @@ def tip_response(modes: Sequence[Mode], frequency_rad_s: Floats) -> Complexes:
 
 
 def eigenvalues(matrix: Floats, response: Complexes) -> Complexes:
-    """Of A0 G, (2, frequencies), in no order; exactly 0 where one direction does not give way."""
+    """Return the eigenvalues of A0 G, (2, frequencies), in no order; exactly 0 where one direction does not give way."""
     half = 0.5 * (matrix[0, 0] * response[0] + matrix[1, 1] * response[1])
     product = (matrix[0, 0] * matrix[1, 1] - matrix[0, 1] * matrix[1, 0]) * response[0] * response[1]
     root = np.sqrt(half * half - product)

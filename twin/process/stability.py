@@ -167,7 +167,7 @@ def _ranges(oriented: Oriented, branch: int, level: float) -> Iterator[Floats]:
 
 
 def _crossings(oriented: Oriented, branch: int, level: float, below: Floats, above: Floats) -> Floats:
-    """Where Re λ = level between each pair of frequencies, by regula falsi in the Illinois form; `above` where both are above."""
+    """Return where Re λ = level between each pair of frequencies, by regula falsi (Illinois); `above` where both are above."""
     under, over = (oriented.exact(branch, ends).real - level for ends in (below, above))
     place, was_high = above, np.zeros(len(above), dtype=np.int8)
     between = (under < 0.0) & (over > 0.0)
@@ -202,7 +202,7 @@ def _unstable_periods(frequency: Floats, phase: Floats, longest_s: float) -> Ite
 
 
 def _left_over(unstable: list[tuple[float, float]], low: float, high: float) -> tuple[tuple[float, float], ...]:
-    """What the unstable intervals leave of the range from low to high."""
+    """Return what the unstable intervals leave of the range from low to high."""
     stable: list[tuple[float, float]] = []
     for begin, end in sorted(unstable):
         if end <= low:

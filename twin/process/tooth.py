@@ -32,7 +32,7 @@ def lag(axial_depth_mm: float, tool_diameter_mm: float) -> float:
 
 
 class ToothForce(NamedTuple):
-    """What a tooth bears, N by mm of axial depth."""
+    """The force on a tooth, N by mm of axial depth."""
 
     chip_mm: float
     tangential_n_per_mm: float

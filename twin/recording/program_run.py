@@ -32,7 +32,7 @@ OVERRIDES = {
 
 
 class Ending(StrEnum):
-    """How a run ended."""
+    """The end of a run."""
 
     COMPLETED = "completed"
     ABORTED = "aborted"
@@ -116,7 +116,7 @@ def program_runs(recording: Observations, before: Mapping[str, str] | None = Non
 
 
 def _starts(rows: Sequence[Observation]) -> list[int]:
-    """Where runs begin: at ACTIVE after the end of another, or after a stop if the runtime counter starts anew."""
+    """Return the begin of each run: at ACTIVE after the end of another, or after a stop if the runtime counter starts again."""
     starts: list[int] = []
     status, runtime = None, 0.0
     for k, row in enumerate(rows):
@@ -183,7 +183,7 @@ def _row(state: Mapping[str, str], t_s: float) -> dict[str, float | str | bool]:
 
 
 def _pauses(rows: Sequence[Observation]) -> tuple[Pause, ...]:
-    """Where the runtime counter stands. It counts whole seconds, so that a pause is known to half a second."""
+    """Return the pauses: the runtime counter stands. It counts whole seconds, so that a pause is known to half a second."""
     begin = rows[0].t_s
     counted = [(row.t_s - begin, float(row.value)) for row in rows if row.key == "Program_Runtime_Seconds"]
     good = [
@@ -206,6 +206,6 @@ def _is_wrong(value: float, before: Sequence[tuple[float, float]], after: Sequen
 
 
 def _reason(rows: Sequence[Observation], start: float, end: float) -> str:
-    """What the control said of a pause; nothing = it waited at an optional stop, or the recorder did not see why."""
+    """Return the control's reason for a pause; nothing = it waited at an optional stop, or the recorder did not see why."""
     said = [row.value for row in rows if row.key == "Program_Status" and start <= row.t_s <= end and row.value != "ACTIVE"]
     return said[0] if said else "counter stands"

@@ -1,4 +1,4 @@
-"""What the physics of the spindle's temperature gets wrong, learned: measured minus physics, by a random forest.
+"""The residual of the spindle's temperature, learned: measured minus physics, by a random forest.
 
     correction = forest(speed, load, feed, positions, ambient, physics temperature …)
 

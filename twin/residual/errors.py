@@ -1,4 +1,4 @@
-"""What can go wrong with a residual model."""
+"""Errors of a residual model."""
 
 from twin.errors import TwinError
 

@@ -1,4 +1,4 @@
-"""What a residual model did on time that was held out, and whether that is enough to be used."""
+"""The result of a residual model on time that was held out, and the judgement whether that is enough to be used."""
 
 from collections.abc import Mapping
 
@@ -19,7 +19,7 @@ class Interval(Record):
 
 
 class HeldOut(Record):
-    """What a model did on held-out time, of the rows that are in its region.
+    """The result of a model on held-out time, of the rows that are in its region.
 
     hours: held out, in_region: share of it; blocks: of `gap_s` each; over_constant: gain over the physics with a constant added
     by_regime: RMSE of physics, RMSE corrected, share of the rows; importance: K of RMSE that a feature is worth, by name

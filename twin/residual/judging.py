@@ -1,4 +1,4 @@
-"""How much a correction gains on time that was held out.
+"""The gain of a correction on time that was held out.
 
     gain = 1 − RMSE_corrected / RMSE_physics,    with the interval of a bootstrap over blocks of time (90 %)
 

@@ -47,7 +47,7 @@ REGION = "region_"
 
 
 class Trained(Record):
-    """What a model was trained on.
+    """The data and time that a model was trained on.
 
     at: UTC, ISO 8601; source: files or store; from_s, to_s: of the training rows, since 1970 (of run logs: since their start)
     hours: recorded; cutting_hours: of them; rows: trained on; physics: that is corrected; data_sha256: of the table of all rows
@@ -92,7 +92,7 @@ class ResidualModel:
     seed: int = 0
 
     def correction_one(self, row: Sequence[float]) -> float | str:
-        """What is to be added to the physics, K; where the row is outside the region, why.
+        """Return what is to be added to the physics, K; where the row is outside the region, why.
 
         Raises ForestError where it has not one finite number for each feature.
         """
@@ -108,7 +108,7 @@ class ResidualModel:
 
     @cached_property
     def files(self) -> Mapping[str, bytes]:
-        """What stands in its folder; the same model gives the same bytes."""
+        """Return the files of its folder; the same model gives the same bytes."""
         arrays = packed({**self.forest.forest.arrays(), **{REGION + name: a for name, a in self.region.arrays().items()}})
         manifest = _Manifest(
             kind=KIND,
@@ -130,7 +130,7 @@ class ResidualModel:
 
     @property
     def in_words(self) -> str:
-        """What it is, in one line."""
+        """Describe the model in one line."""
         trained, held = self.trained, self.held_out
         return (
             f"model {self.version}: random forest of {self.forest.forest.trees} trees on {', '.join(map(str, self.features))}; "

@@ -9,7 +9,7 @@ from twin.residual.model import ResidualModel
 
 
 class Correction(NamedTuple):
-    """What is to be added to the physics, K; None, and why."""
+    """The correction to be added to the physics, K; None, and why."""
 
     correction_k: float | None
     reason: str | None = None

@@ -25,7 +25,7 @@ TICKS_MAX = 20_000_000
 
 
 class Samples(NamedTuple):
-    """Of one signal, oldest first: t_s (n,); value (n,), NaN = it was said to be unknown."""
+    """The samples of one signal, oldest first: t_s (n,); value (n,), NaN = reported as unknown."""
 
     t_s: Floats
     value: Floats

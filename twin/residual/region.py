@@ -53,7 +53,7 @@ class Region:
         return Outside(at, float(row[at]), None, None)
 
     def has(self, rows: Floats) -> NDArray[np.bool_]:
-        """Which of the rows (n, f) are inside, (n,); as one by one."""
+        """Return True for each of the rows (n, f) that is inside, (n,); as one by one."""
         inside = ((rows >= self.low) & (rows <= self.high)).all(axis=1)
         found = [bool(ranged) and self._is_near(row) for ranged, row in zip(np.asarray(inside), rows, strict=True)]
         return np.array(found, dtype=np.bool_)
@@ -62,7 +62,7 @@ class Region:
         return bool(nearest_of(row * self.scale, self.prototypes)[1] <= self.limit[0] ** 2)
 
     def arrays(self) -> dict[str, Floats]:
-        """What `region_of_arrays` takes."""
+        """Return the arrays that `region_of_arrays` takes."""
         return {name: getattr(self, name) for name in ARRAYS}
 
 

@@ -33,12 +33,12 @@ class Split:
 
     @property
     def blocks(self) -> int:
-        """How many blocks of held-out time there are."""
+        """The number of blocks of held-out time."""
         return len(np.unique(self.block))
 
 
 def remembers_s(t_s: Floats, residual: Floats, stretch: NDArray[np.int64], most_s: float) -> float:
-    """How long the residual (n,) remembers, s: the first lag at which its autocorrelation is below 0.1; at most `most_s`.
+    """Return the memory of the residual (n,), s: the first lag at which its autocorrelation is below 0.1; at most `most_s`.
 
     stretch: (n,) numbers; pairs of different ones do not count
     """

@@ -141,7 +141,7 @@ def _chosen(table: Table, split: Split, settings: TrainingSettings, say: Say) ->
 def judged(
     forest: RegressionForest, region: Region, features: tuple[Feature, ...], table: Table, split: Split, seed: int
 ) -> HeldOut:
-    """What the forest does on the held-out rows that are in its region."""
+    """Judge the forest on the held-out rows that are in its region."""
     x, y, train, test = table.of(features), table.residual_k, split.train, split.test
     inside = region.has(x[test])
     rows = test[inside]
@@ -175,7 +175,7 @@ def judged(
 
 
 def importance(forest: RegressionForest, features: tuple[Feature, ...], x: Floats, y: Floats, seed: int) -> dict[str, float]:
-    """How much the RMSE grows, K, where a feature of the rows (n, f) is shuffled among them."""
+    """Return the growth of the RMSE, K, where a feature of the rows (n, f) is shuffled among them."""
     rng = np.random.default_rng(seed)
     chosen = rng.permutation(len(x))[:IMPORTANCE_ROWS_MAX]
     x, y = x[chosen], y[chosen]
@@ -198,6 +198,6 @@ def ridge(x: Floats, y: Floats, rows: Floats) -> Floats:
 
 
 def versions() -> dict[str, str]:
-    """Of what trained it."""
+    """Return the versions of what trained it."""
     names = ("numpy", "scikit-learn")
     return {"python": ".".join(map(str, sys.version_info[:3])), **{name: version(name) for name in names}}

@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 
 
 class Reading(NamedTuple):
-    """What the sensor reads."""
+    """The reading of the sensor."""
 
     reading: float
 
@@ -52,7 +52,7 @@ def readings(
     temperature_rise_k: Floats | None = None,
     reference_run: bool = False,
 ) -> Floats:
-    """What the sensor reads of `values`, (n,), NaN where there is no sample.
+    """Return the sensor's readings of `values`, (n,), NaN where there is no sample.
 
     since_s: (n,) s since the sample before, 0 for the first; effects: name → parameters, as put on this signal
     temperature_rise_k: (n,) of the machine since the start; needed by what grows with it

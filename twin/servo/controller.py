@@ -11,7 +11,7 @@ from twin.sites import Site, at
 
 
 class ReferenceMotion(NamedTuple):
-    """How the reference moves, by backward differences, as a control that feeds it forward sees it."""
+    """The motion of the reference, by backward differences, as a control that feeds it forward sees it."""
 
     reference_velocity_mm_s: float
     reference_acceleration_mm_s2: float
@@ -31,7 +31,7 @@ def reference_motion(
 
 
 class ControllerState(NamedTuple):
-    """What the control says and remembers."""
+    """The output and the memory of the control."""
 
     following_error_mm: float
     integral_a: float
@@ -78,7 +78,7 @@ def control(
 
 
 class Remembered(NamedTuple):
-    """What the next tick takes differences against."""
+    """The values that the next tick takes differences against."""
 
     previous_reference_mm: float
     previous_reference_velocity_mm_s: float

@@ -13,7 +13,7 @@ from twin.sites import Site, at
 
 
 class Breakaway(NamedTuple):
-    """What it takes to move from rest: the direction in which it is pushed (+1, −1), and the force, N."""
+    """The breakaway from rest: the direction in which the axis is pushed (+1, −1), and the force that it takes, N."""
 
     push: float
     breakaway_n: float

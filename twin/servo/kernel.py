@@ -30,7 +30,7 @@ STATES = frozenset(
 
 
 def control_stage(measured: bool) -> tuple[Physics, ...]:
-    """What happens at a tick."""
+    """Return the physics of a tick."""
     return (
         table.table,
         controller.reference_motion,
@@ -41,7 +41,7 @@ def control_stage(measured: bool) -> tuple[Physics, ...]:
 
 
 def move_stage(effects: Iterable[Effect]) -> tuple[Physics, ...]:
-    """What happens between two ticks, in one or more steps."""
+    """Return the physics between two ticks, in one or more steps."""
     bent = any("bristle_compliance_mm_per_n" in effect.changes for effect in effects)
     return (mechanics.forces, friction.breakaway, friction.sliding, mechanics.slide, mechanics.bend if bent else mechanics.arrive)
 
@@ -60,7 +60,6 @@ AXES = Assembly(
 )
 
 
-@cache
 def axis_quantities() -> dict[str, str]:
     """The quantities of an axis that an effect can change or a recording replace, with their sites."""
     return AXES.quantities()

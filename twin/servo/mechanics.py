@@ -20,7 +20,7 @@ from twin.sites import Site, at
 
 
 class Forces(NamedTuple):
-    """What acts on the mass before friction, and the mass."""
+    """The forces on the mass before friction, and the mass."""
 
     moving_mass_kg: float
     midpoint_mm: float
@@ -53,7 +53,7 @@ def forces(
 
 
 class Motion(NamedTuple):
-    """Where the mass is at the end of a step, and how fast."""
+    """The position and speed of the mass at the end of a step."""
 
     position_next_mm: float
     velocity_next_mm_s: float
@@ -103,7 +103,7 @@ def slide(
 
 
 class Arrival(NamedTuple):
-    """Where a step on a rigid contact ends."""
+    """The end of a step on a rigid contact."""
 
     position_mm: float
     velocity_mm_s: float

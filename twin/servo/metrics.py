@@ -1,4 +1,4 @@
-"""What an axis did, without keeping how: sums and peaks over the ticks, for searches that need no traces."""
+"""The measures of an axis: sums and peaks over the ticks, for searches that need no traces."""
 
 from typing import NamedTuple
 

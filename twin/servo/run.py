@@ -21,7 +21,7 @@ LANES = (4, 8, 32)
 
 @dataclass(frozen=True, slots=True)
 class AxisRun:
-    """What the lanes did.
+    """The result of the lanes.
 
     outputs: name → (lanes, ticks); state: name → (lanes,), to go on from; ticks: how many have been run since the start, so that
     effects that age go on ageing
@@ -42,7 +42,7 @@ class AxisRun:
 
 @dataclass(frozen=True, slots=True)
 class AxisInput:
-    """What goes into the lanes, by tick.
+    """The inputs of the lanes, by tick.
 
     reference_mm: (columns, ticks); disturbance_n: the same shape, or None; recorded: quantity → (columns, ticks), taken from a
     recording in place of what the model makes; column: (lanes,) which column a lane follows

@@ -1,4 +1,4 @@
-"""What a recorded run tells the twin: the inputs of the response, the states it starts from, the noise of its sensors."""
+"""The twin's inputs from a recorded run: those of the response, the states it starts from, the noise of its sensors."""
 
 from collections.abc import Mapping
 
@@ -19,7 +19,7 @@ SETTLED = 50
 
 
 def told_of(log: RunLog, machine: MachineFile) -> RunInput:
-    """What the machine was told in a recorded run.
+    """Return what the machine was commanded in a recorded run.
 
     Raises RunLogError where an axis of the machine is recorded at another period than the one its loops tick with.
     """
@@ -105,7 +105,7 @@ def _filled(values: Floats, instead: Floats) -> Floats:
 
 
 def _standing_mm(position_mm: Floats) -> float:
-    """Where an axis stands whose reference stands: the mean, or that of the first samples where it gave way later on."""
+    """Return the position of an axis whose reference stands: the mean, or that of the first samples where it gave way later."""
     first, whole = float(np.mean(position_mm[:SETTLED])), float(np.mean(position_mm))
     certain = white_noise(position_mm) / np.sqrt(min(SETTLED, len(position_mm)))
     return first if abs(first - whole) > 5.0 * certain > 0.0 else whole

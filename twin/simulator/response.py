@@ -49,7 +49,7 @@ SENSOR_NOISE = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RunInput:
-    """What a machine is told, and its surroundings; arrays (n,) over `t_s`.
+    """The commands to a machine, and its surroundings; arrays (n,) over `t_s`.
 
     reference_mm: axis letter → (n,), evenly sampled at the servo period; none where the run is of slow signals only
     spindle_rpm, spindle_angle_rad, axial_depth_mm, entry_angle_rad, exit_angle_rad: of the cut; None = nothing is cut
@@ -72,7 +72,7 @@ class RunInput:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Response:
-    """What the machine does: columns of a run log → (n,), and by how much its courses spread, standard deviation → (n,)."""
+    """The response of the machine: columns of a run log → (n,), and the spread of its courses, standard deviation → (n,)."""
 
     columns: dict[str, Floats]
     spread: dict[str, Floats]

@@ -24,7 +24,6 @@ SPINDLE = Assembly((meter.reading,), acts_on="the spindle", owner="the spindle")
 FED = ("cutting_power_kw", "spindle_rpm", "period_s")
 
 
-@cache
 def spindle_quantities() -> dict[str, str]:
     """The quantities of the spindle that an effect can change, with their sites."""
     return SPINDLE.quantities()
@@ -52,7 +51,7 @@ def spindle_load_pct(
     effects: Sequence[str] = (),
     reference_run: bool = False,
 ) -> Array:
-    """What the meter shows at each tick, (lanes, ticks), % of rated power.
+    """Return the meter's reading at each tick, (lanes, ticks), % of rated power.
 
     constants: name → a number or (lanes,), of the spindle (`spindle_constants`) and of the effects (`effect__parameter`)
     cutting_power_w: mean over each tick, and spindle_rpm: each (ticks,) or (lanes, ticks)

@@ -66,7 +66,7 @@ class FalseGates(Record):
 
 
 class Training(Record):
-    """What it was learned from. asked_score: the threshold for the rate that was asked for; None = too little null to say."""
+    """The training of a detector. asked_score: the threshold for the rate that was asked for; None = too little null to say."""
 
     runs: tuple[str, ...] = ()
     versions: dict[str, str] = {}

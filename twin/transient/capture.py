@@ -1,4 +1,4 @@
-"""Where in a captured window the transient lies, and where it has its beginning and its end.
+"""The place of the transient in a captured window, with its beginning and its end.
 
 Activity is how far the level moves within half a second, less what it moves in the quieter half of the window: noise. The
 transient lies where nearly all activity does; its beginning and its end are parted by the time in which least happens for how
@@ -37,7 +37,7 @@ class Parts:
 
 
 def activity(values: Floats, period_s: float) -> Floats:
-    """Of a window of levels, (n,)."""
+    """Return the activity in a window of levels, (n,)."""
     width = max(1, round(SMOOTHED_S / period_s))
     padded = np.pad(values, width, mode="edge")
     smooth = np.convolve(padded, np.ones(width) / width, mode="same")

@@ -38,7 +38,7 @@ DISTANCE_ANY = 2.0
 
 
 class Phase(StrEnum):
-    """What is known of a tool change now."""
+    """The phase of a tool change, as known now."""
 
     NONE = "none"
     PROVISIONAL = "provisional"
@@ -100,7 +100,7 @@ class Gate(NamedTuple):
 
 
 class State(NamedTuple):
-    """What the future depends on."""
+    """The state that the future depends on."""
 
     history: History
     gate: Gate
@@ -144,7 +144,7 @@ class Detector:
 
     @cached_property
     def limits_in_quanta(self) -> tuple[float, float]:
-        """Of the deviation."""
+        """The limits of the deviation, in quanta."""
         return self.limits.deviation_min * QUANTA, self.limits.deviation_max * QUANTA
 
     def begun(self) -> State:
@@ -175,7 +175,7 @@ class Detector:
         return self._confirmed(state, found), found if is_new else None
 
     def confirms(self, found: PatternMatch) -> bool:
-        """Whether this is one."""
+        """Return True where this is a tool change."""
         if found.logit is not None:
             return found.logit >= 0.0
         return found.score >= self.limits.pattern_score and found.distance <= self.limits.distance_max
@@ -206,7 +206,7 @@ class Detector:
 
     @cached_property
     def _running(self) -> tuple[Floats, Floats, float, float, float, int, Floats]:
-        """What each sample needs. The last is scratch: nothing in it outlives a sample."""
+        """Return what each sample needs. The last is scratch: nothing in it outlives a sample."""
         bank = self.template.bank
         out = np.zeros((4, bank.terms.shape[1]))
         hop = max(1, int(MATCHED_S / self.template.period_s + 1e-9))

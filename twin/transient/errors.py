@@ -1,4 +1,4 @@
-"""What can go wrong with a transient.
+"""Errors of a transient.
 
 TwinError
 └── TransientError    captures that no template can be learned from, or a model that cannot be used

@@ -1,4 +1,4 @@
-"""What other signals say of a pattern, and how likely it makes a tool change: logistic regression on few robust features.
+"""The evidence of other signals for a pattern, and how likely it makes a tool change: logistic regression on few robust features.
 
 While a tool is exchanged the axes stand and the program does not advance. Both are told as run lengths, in samples: for how long
 the path feed has been nil, for how long the same block has been executed. A feature is the longest such stretch between the
@@ -69,7 +69,7 @@ def _counted(value: float, typical: float | None) -> float:
 
 
 def probability(logit: float) -> float:
-    """Of log odds.
+    """Return the probability of log odds.
 
     >>> probability(0.0)
     0.5

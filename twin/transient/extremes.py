@@ -1,4 +1,4 @@
-"""How often chance does it: peaks over threshold of a null stream, and the threshold for a stated rate.
+"""The rate of chance: peaks over threshold of a null stream, and the threshold for a stated rate.
 
     z = −log(1 − score),  rate of peaks above z = n / T · (1 + ξ (z − z0) / σ)^(−1/ξ)      (Pickands 1975; Coles 2001, 4.3)
 
@@ -31,7 +31,7 @@ class Tail:
     per_hour: float
 
     def rate_per_hour(self, u: float) -> float:
-        """Of peaks above u ≥ u0."""
+        """Return the rate of peaks above u ≥ u0."""
         base = 1.0 + self.shape * (u - self.u0) / self.scale
         if base <= 0.0:
             return 0.0
@@ -90,7 +90,7 @@ def threshold_for(peaks: Floats, hours: float, per_day: float) -> float | None:
 
 
 def false_rate(peaks: Floats, hours: float, threshold: float, rng: np.random.Generator) -> FalseRate:
-    """How many false gates a day to expect above a threshold."""
+    """Return the false gates a day to expect above a threshold."""
     seen = int((peaks > threshold).sum())
     rates = []
     for _ in range(DRAWS):

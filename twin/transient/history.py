@@ -47,7 +47,7 @@ class History(NamedTuple):
 
     @property
     def length(self) -> int:
-        """How many samples it keeps at least."""
+        """The least number of samples that it keeps."""
         return int((self.rows.shape[1] - 1) // 2)
 
     def kept(self) -> Floats:

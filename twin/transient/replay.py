@@ -37,7 +37,7 @@ class Confirmed(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """Of one stream. opened_s: each time that the provisional gate opened; active: (n,), whether any gate was open."""
+    """The outcome of a stream. opened_s: each time that the provisional gate opened; active: (n,), whether any gate was open."""
 
     confirmed: tuple[Confirmed, ...]
     opened_s: tuple[float, ...]
@@ -45,7 +45,7 @@ class Outcome:
 
 
 def replayed(detector: Detector, stream: Stream) -> Outcome:
-    """What the gate does over a stream."""
+    """Run the gate over a stream."""
     state, before = detector.begun(), Gate()
     confirmed: list[Confirmed] = []
     opened: list[float] = []

@@ -30,7 +30,7 @@ class Stream:
 
     @property
     def hours(self) -> float:
-        """How long it is."""
+        """The duration of the stream."""
         return len(self.values) * self.period_s / 3600.0
 
     def index(self, at_s: float) -> int:

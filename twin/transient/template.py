@@ -51,7 +51,7 @@ class Template:
 
     @property
     def seconds(self) -> float:
-        """How long it takes, without stretch or stall."""
+        """The duration of the transient, without stretch or stall."""
         return len(self.whole) * self.period_s
 
     @cached_property

@@ -178,7 +178,7 @@ def _distance_max(own: Sequence[PatternMatch], copied: Sequence[PatternMatch]) -
 
 
 def _is_near(stream: Stream, at_s: float, settings: TrainingSettings) -> bool:
-    """Whether a known change may have caused what happened then."""
+    """Return True where a known change may have caused what happened then."""
     after_s = settings.after_s + settings.stall_s
     return any(change_s - settings.before_s <= at_s <= change_s + after_s for change_s in stream.changes_s)
 
@@ -195,7 +195,7 @@ def _features(found: PatternMatch) -> tuple[float, ...] | None:
 
 
 def _weighing(seen: Sequence[tuple[Stream, Sequence[Candidate]]], settings: TrainingSettings) -> Weighing | None:
-    """Of changes against all else; None where feed or block is not known, or there is too little of either.
+    """Return the weighing of changes against all else; None where feed or block is not known, or there is too little of either.
 
     What ends before the given time of a change is not the change, but what looks like its beginning and end: as good an example
     of what is none as there is.

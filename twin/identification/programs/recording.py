@@ -24,7 +24,7 @@ OVERRIDE_LEAST = 0.01
 
 
 class SetUp(NamedTuple):
-    """Where the machine's own positions are, seen from the zero of the work: what neither program nor recording tells. mm.
+    """The machine's own positions, seen from the zero of the work, which neither program nor recording tells. mm.
 
     reference_z: upper reference position (G28); tool_change_x, tool_change_y: where a tool change takes the table
     """

@@ -1,4 +1,4 @@
-"""How long programs take on a machine: the control's parameters, fitted to recorded runs by least squares, with intervals.
+"""The time of programs on a machine: the control's parameters, fitted to recorded runs by least squares, with intervals.
 
 What is compared: the active seconds between two lines, a second or more apart, as the plan has them and as the recording has
 them (active = without the pauses that the recording itself shows). The recorder asks the control every 0.16 s or so; a robust

@@ -1,4 +1,4 @@
-"""Which lines share one speed, and the speeds that suit all of them.
+"""The groups of lines that share one speed, and the speeds that suit all of them.
 
 A group is what has to have one speed: a line with all its executions, and beside it every line that a stretch
 (`twin.optimisation.speeds.stretches`) joins to one of these. A line of a subprogram is in the stretches of all its callers, and
@@ -151,7 +151,7 @@ def _joined(found: tuple[Stretch, ...], which: "frozenset[int] | set[int]") -> d
 
 
 def _left_alone(program: Programmed, found: tuple[Stretch, ...], root: Mapping[int, int]) -> dict[int, dict[float, Kept]]:
-    """Of each group, by its root: the speeds that lines left alone in its stretches need, with the first line of each."""
+    """Return, by the root of each group, the speeds that lines left alone in its stretches need, with the first line of each."""
     programmed = np.abs(program.path.commanded_rpm())
     needed: dict[int, dict[float, Kept]] = {}
     for stretch in found:

@@ -1,4 +1,4 @@
-"""What is said of the changes of speed: how often in the material, what it would take without, which lines hold a speed.
+"""Notes on the changes of speed: how often in the material, what it would take without, which lines hold a speed.
 
 All of it is counted on the rewritten program, read again.
 """
@@ -47,7 +47,7 @@ def speed_notes(made: Problem, question: Question, path: Path, value: float) -> 
 
 
 def _shared(made: Problem, path: Path) -> str:
-    """What was kept, in figures."""
+    """Return a note on what was kept, in figures."""
     if made.groups.changes is SpeedChanges.IN_AIR:
         lines, groups = len(made.cutting), len(made.groups)
         many = "one speed" if groups == 1 else f"{groups} groups of one speed each"

@@ -37,7 +37,7 @@ class Stretch(NamedTuple):
 
 
 def executions(program: Programmed) -> list[Execution]:
-    """Of all feed lines, in their order."""
+    """Return the executions of all feed lines, in their order."""
     return sorted(Execution(a, b, k) for k, line in enumerate(program.lines) for a, b in line.executions)
 
 
@@ -88,7 +88,7 @@ def changes_in_material(program: Programmed, path: Path) -> tuple[int, ...]:
 
 
 def _clear(program: Programmed) -> Flags:
-    """Whether the tool is clear of the material where each segment begins, (segments,)."""
+    """Return True where the tool is clear of the material at the begin of a segment, (segments,)."""
     path, stock = program.path, program.machine.stock
     if stock is None:
         clear = np.append(False, path.kind[:-1] == Kind.RAPID)[: len(path)]
@@ -110,7 +110,7 @@ def _alone(program: Programmed) -> tuple[Stretch, ...]:
 
 
 def _of_tools(program: Programmed) -> tuple[Stretch, ...]:
-    """Of each tool number all of the program, however often it comes into the spindle."""
+    """Return, for each tool number, all of the program, however often it comes into the spindle."""
     numbers = tool_numbers(program.path)
     edges = [0, *(np.flatnonzero(np.diff(numbers)) + 1).tolist(), len(numbers)] if len(numbers) else [0]
     every = executions(program)
