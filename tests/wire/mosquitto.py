@@ -30,7 +30,7 @@ def free_port() -> int:
     another connection's when it is wanted again.
     """
     for _ in range(PORT_ATTEMPTS_MAX):
-        port = random.randrange(10_000, 32_768)
+        port = random.SystemRandom().randrange(10_000, 32_768)  # hypothesis seeds the ordinary one alike in all workers
         with socket.socket() as probe, suppress(OSError):
             probe.bind(("127.0.0.1", port))
             return port

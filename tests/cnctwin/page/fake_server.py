@@ -15,6 +15,7 @@ from urllib.parse import parse_qs, unquote, urlsplit
 
 from cnctwin.page import WEB
 from tests.cnctwin.page.simulated_shop import FLEET, Told, fleet_item, row, signals, value_object
+from tests.wire.mosquitto import free_port
 
 POLICY = (
     "default-src 'self'; img-src 'self' data:; object-src 'none'; base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
@@ -95,7 +96,7 @@ class FakeServer:
 
     def __init__(self, shop: Shop) -> None:
         self.shop = shop
-        self.port = 0
+        self.port = free_port()  # of its own, also while it is stopped
         self._stop = threading.Event()
         self._server: ThreadingHTTPServer | None = None
         self._thread: threading.Thread | None = None

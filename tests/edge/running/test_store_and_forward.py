@@ -133,10 +133,11 @@ def uninterrupted(recorded: Path, mosquitto: Mosquitto, folder: Path) -> list[To
 
 
 def caught_up(runtime: EdgeRuntime, agent: ReplayAgent) -> bool:
-    """Whether nothing has come for a while."""
+    """All that the agent has was read, and nothing has come for a while."""
     before = runtime.ledger.snapshot()["ledger/received"]
     time.sleep(0.3)
-    return agent.finished and runtime.ledger.snapshot()["ledger/received"] == before
+    all_read = runtime._connection._cursor.next_sequence == agent.agent.buffer.next_sequence
+    return agent.finished and all_read and runtime.ledger.snapshot()["ledger/received"] == before
 
 
 @contextmanager

@@ -28,6 +28,7 @@ from edge.controls.focas.policy import Policy, policy_of
 from edge.running.ledger import Ledger
 from edge.running.pipeline import Pipeline
 from edge.sample import EdgeSample, Gap
+from tests.wire.mosquitto import free_port
 
 SWITCHED_ON_S = 1_767_225_600.0
 CLOCK_OFFSET_S = 2.5
@@ -228,7 +229,7 @@ def run(seconds: float, seed: int, *, pause_s: float = 25.0, is_well: bool = Fal
     time, hour, chance = MachineTime(), Hour(states), random.Random(seed)
     control = SimulatedControl(states, machine_s=lambda: time.now_s, switched_on_s=SWITCHED_ON_S, clock_offset_s=CLOCK_OFFSET_S)
     lines = tuple(PROGRAM.read_text(encoding="utf-8").splitlines())
-    with FocasServer(control, ControlDescription(program_lines=lines)) as server:
+    with FocasServer(control, ControlDescription(program_lines=lines), port=free_port()) as server:
         source = FocasConfig.model_validate({"port": server.port, "timeout_s": SOCKET_TIMEOUT_S, **options})
         config = EdgeConfig(source=source)
         backend = TimedBackend(EthernetBackend(source), time, chance)

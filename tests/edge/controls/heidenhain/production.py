@@ -20,6 +20,7 @@ from edge.running.ledger import Ledger
 from edge.running.pipeline import Pipeline
 from edge.sample import EdgeSample, SampleSet
 from tests.edge.controls.heidenhain.machine_time import SWITCHED_ON_S, MachineTime
+from tests.wire.mosquitto import free_port
 
 FAULTS = tuple(fault for fault in Fault if fault is not Fault.NONE)
 PATIENCE_S = 0.15
@@ -134,7 +135,7 @@ def produce(seconds: float, model: Model, *, seed: int = 6, interval_ms: int = 2
     time, states = MachineTime(), list(production(seconds))
     run = Run(states, interval_s=interval_ms / 1000)
     control = SimulatedControl(states, machine_s=time.now_s, switched_on_s=SWITCHED_ON_S)
-    with Lsv2Server(control, model=model, pause=time.pass_by) as server:
+    with Lsv2Server(control, model=model, port=free_port(), pause=time.pass_by) as server:
         run.blocks = read_program(server.answers.program_text).blocks
         _planned(server, time, run, seconds, seed)
         config = EdgeConfig(source=HeidenhainConfig(url=server.url, interval_ms=interval_ms, **source))

@@ -30,6 +30,7 @@ from edge.running.pipeline import Pipeline
 from edge.sample import Drop, EdgeSample, Gap
 from tests.edge.controls.mtconnect.faulty_link import FaultyLink
 from tests.edge.controls.mtconnect.mischief import Episode, episodes
+from tests.wire.mosquitto import free_port
 
 SWITCHED_ON_S = 1_767_225_600.0
 BUFFER_SIZE = 1024  # of the agent: about half a minute of this machine
@@ -143,8 +144,8 @@ class Shop:
         spoken = dialect("1.4" if seed % 2 else "2.3")
         model = read_device_model(DEVICES.read_text(encoding="utf-8"), spoken.schema)
         self.agent = Agent(model, model.devices[0], spoken, buffer_size=BUFFER_SIZE, assets_max=4, now=self._wall_s)
-        self._server: AgentServer | None = AgentServer(self.agent, port=0, clients_max=8)
-        self._port = int(self._server.url.rpartition(":")[2])
+        self._port = free_port()
+        self._server: AgentServer | None = AgentServer(self.agent, port=self._port, clients_max=8)
         self._server.start()
         self.link = FaultyLink(self._port, is_polled=is_polled)
         source = {"url": self.link.url, "interval_ms": 1, "heartbeat_ms": 100, "timeout_s": 0.3, "poll_ms": 50}

@@ -7,13 +7,14 @@ told to, so that an hour of it takes as long as its values need, and is the same
 import json
 import os
 import signal
-import socket
 import subprocess
 import sys
 import time
 from pathlib import Path
 from types import TracebackType
 from typing import Any
+
+from tests.wire.mosquitto import free_port
 
 ROOT = Path(__file__).parents[4]
 LOOK_S = 0.05  # machine time from look to look
@@ -26,9 +27,7 @@ class ControlProcess:
 
     def __init__(self, folder: Path, *, seconds: float) -> None:
         self._folder, self._seconds = folder, seconds
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            self.port: int = probe.getsockname()[1]
+        self.port = free_port()
         self.url = f"opc.tcp://127.0.0.1:{self.port}"
         self.machine_s = 0.0
         self.fingerprint = ""
