@@ -10,12 +10,14 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
-from processors.alerts.body import Notice, item
+from processors.alerts.body import Notice
 from processors.alerts.config import AlertsConfig
+from processors.alerts.outbox import made
 from processors.alerts.receivers import AnyReceiver
-from processors.alerts.routing import FIRING, OVER, PASSED, RAISED, REPEAT, RESOLVED, Change, changes_for, has_passed
+from processors.alerts.routing import Change, changes_for, has_passed
 from processors.alerts.silence import silenced_by
 from processors.alerts.state import OUTBOX_MAX, Alert, AlertsState, Group, ReceiverState, Severity, Told
+from processors.alerts.statement import FIRING, OVER, PASSED, RAISED, REPEAT, RESOLVED
 from processors.config import Configuration
 
 HOUR_S = 3600.0
@@ -59,9 +61,9 @@ def notified(configuration: Configuration[AlertsConfig], state: AlertsState) -> 
         known, notices = _due(desk, known, changes)
         for notice in notices:
             if len(outbox) < OUTBOX_MAX:
-                made = item(notice, config, state.wall_s, state.clock_s)
-                if made.id not in state.settled and made.id not in outbox:
-                    outbox[made.id] = made
+                item = made(notice, config, state.wall_s, state.clock_s)
+                if item.id not in state.settled and item.id not in outbox:
+                    outbox[item.id] = item
         receivers[name] = known
     return replace(state, receivers=receivers, outbox=outbox)
 

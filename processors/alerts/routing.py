@@ -4,11 +4,9 @@ from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 from processors.alerts.config import AlertsConfig, Route
-from processors.alerts.state import Alert, AlertsState, Phase, ReceiverState, Severity, Told
+from processors.alerts.state import Alert, AlertsState, Phase, ReceiverState, Told
+from processors.alerts.statement import FIRING, PASSED, RAISED, REPEAT, RESOLVED, Statement
 
-FIRING, RAISED, REPEAT, RESOLVED = "firing", "raised", "repeat", "resolved"
-PASSED = "passed"  # it fired and was over before anybody was told
-OVER = (RESOLVED, PASSED)
 PASSED_S_MAX = 3600.0
 
 
@@ -21,27 +19,9 @@ class Change(NamedTuple):
 
     @property
     def says(self) -> str:
-        """What the notification says, to be recognized after a crash."""
+        """The line of the notification."""
         alert = self.alert
-        return f"{alert.fingerprint}.{alert.episode}.{self.what}.{self.told_before}.{alert.severity.value}"
-
-
-class Said(NamedTuple):
-    """What a notification said of one alert."""
-
-    fingerprint: str
-    episode: int
-    what: str
-    told_before: int
-    severity: Severity
-
-    @classmethod
-    def of(cls, text: str) -> "Said | None":
-        """The parts of `Change.says`; None for what says something else. Raises ValueError where a number is none."""
-        parts = text.split(".")
-        if len(parts) != 5 or parts[4] not in {severity.value for severity in Severity}:
-            return None
-        return cls(parts[0], int(parts[1]), parts[2], int(parts[3]), Severity(parts[4]))
+        return Statement(alert.fingerprint, alert.episode, self.what, self.told_before, alert.severity).text
 
 
 def receivers_of(alert: Alert, config: AlertsConfig, clock_s: float, told_by: Iterable[str]) -> set[str]:

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 from processors.alerts.body import iso
 from processors.alerts.courier.outcome import Outcome, Verdict
-from processors.alerts.courier.service import Message
+from processors.alerts.notification import Notification
 
 JOBS_MAX = 2000
 DONE_MAX = 10_000
@@ -39,7 +39,7 @@ class Publish(NamedTuple):
 class Send(NamedTuple):
     """Send this notification."""
 
-    message: Message
+    message: Notification
 
 
 Action = Publish | Send
@@ -57,7 +57,7 @@ class Stage(Enum):
 
 @dataclass(slots=True)
 class _Job:
-    message: Message
+    message: Notification
     stage: Stage = Stage.WAITING
     attempts: int = 0
     first_s: float | None = None  # of the first attempt
@@ -115,10 +115,10 @@ class Desk:
                 job.is_seen, job.said_s = False, 0.0  # it asks again: what we said was lost
             return
         if self._done.get(key):  # the alerts processor does not know its fate, which we do
-            if (message := Message.of(payload)) is not None:
+            if (message := _notification(payload)) is not None:
                 self._jobs[key] = _Job(message, Stage.SETTLED, said=self._done[key])
             return
-        message = Message.of(payload)
+        message = _notification(payload)
         if message is None or message.id != key:
             self.malformed += 1
             return
@@ -274,6 +274,14 @@ class Desk:
             "reason": outcome.reason,
         }
         return json.dumps(said, separators=(",", ":"), ensure_ascii=False).encode("utf-8", "replace")
+
+
+def _notification(payload: bytes) -> Notification | None:
+    """The notification in the outbox; None where it cannot be read."""
+    try:
+        return Notification.of(payload)
+    except (ValueError, RecursionError):
+        return None
 
 
 def _claimed(payload: bytes) -> dict[str, Any]:

@@ -10,12 +10,12 @@ from typing import Any, NamedTuple
 
 from processors.alerts.courier.desk import Publish
 from processors.alerts.courier.pushover import ReceiptState
+from processors.alerts.statement import RINGING, Statement
 
 RECEIPT = "cnctwin/alerts/receipt/"
 ACK = "cnctwin/alerts/command/ack"
 RECEIPTS_MAX = 500
 KEPT_S_MAX = 86_400.0
-RINGING = frozenset({"firing", "raised", "repeat"})
 Episode = tuple[str, int]
 
 
@@ -72,10 +72,9 @@ class Receipts:
         except (ValueError, TypeError, KeyError, RecursionError):
             return
 
-    def opened(self, key: str, receiver: str, receipt: str, says: Iterable[str], wall_s: float) -> Publish:
+    def opened(self, key: str, receiver: str, receipt: str, statements: Iterable[Statement], wall_s: float) -> Publish:
         """An emergency has been sent."""
-        parts = [said.split(".") for said in says]
-        episodes = [(part[0], int(part[1])) for part in parts if len(part) == 5 and part[2] in RINGING]
+        episodes = [(statement.fingerprint, statement.episode) for statement in statements if statement.what in RINGING]
         document = {"receiver": receiver, "receipt": receipt, "episodes": episodes, "until_s": wall_s + KEPT_S_MAX}
         payload = json.dumps(document, separators=(",", ":")).encode()
         self.found(key, payload)
