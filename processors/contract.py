@@ -10,9 +10,9 @@ Where machines are compared with each other, a `CellProcessor` folds the samples
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, is_dataclass
 from enum import Enum
-from typing import Generic, NamedTuple, TypeVar
+from typing import ClassVar, Generic, NamedTuple, TypeVar
 
-from processors.config import CellConfig, Configuration, ProcessorConfig
+from processors.config import ALL, CellConfig, Configuration, ProcessorConfig
 from processors.effects import Pin
 from processors.errors import DeclarationError
 from processors.sample import Sample, SampleKind
@@ -187,9 +187,33 @@ class _Declaration(Generic[C, S]):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Processor(_Declaration[C, S]):
-    """A fold over what one machine says: a state for each machine."""
+    """A fold over what one machine says: a state for each machine, which is its own unit."""
 
     step: Callable[[C, S, Sample], tuple[S, Outputs]]
+    listens: ClassVar[tuple[str, ...]] = ()
+    wakes: ClassVar[frozenset[str] | None] = None
+    beats: ClassVar[bool] = False
+
+    @property
+    def is_of_cells(self) -> bool:
+        """Whether machines share a state."""
+        return False
+
+    def unit_of(self, configuration: Configuration[C], machine: str) -> str:
+        """The unit that a machine is in: what has a state."""
+        return machine
+
+    def units_at_start(self, configuration: Configuration[C]) -> tuple[str, ...]:
+        """The units that there are before any machine is born."""
+        return ()
+
+    def config_of(self, configuration: Configuration[C], machine: str) -> C:
+        """The values that hold for the stream of a machine, or the first state of a unit."""
+        return configuration.of(machine)
+
+    def given(self, configuration: Configuration[C], unit: str) -> C:
+        """The configuration that the step of a unit is given."""
+        return configuration.of(unit)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -208,3 +232,24 @@ class CellProcessor(_Declaration[D, S]):
     listens: tuple[str, ...] = ()
     wakes: frozenset[str] | None = None
     beats: bool = False
+
+    @property
+    def is_of_cells(self) -> bool:
+        """Whether machines share a state."""
+        return True
+
+    def unit_of(self, configuration: Configuration[D], machine: str) -> str:
+        """The cell that a machine is in."""
+        return configuration.default.cell_of(machine)
+
+    def units_at_start(self, configuration: Configuration[D]) -> tuple[str, ...]:
+        """All cells, where the processor works without any machine."""
+        return (*configuration.default.cells, ALL) if self.beats or self.listens else ()
+
+    def config_of(self, configuration: Configuration[D], machine: str) -> D:
+        """The values that hold for all: the machines of a cell share ticks and times."""
+        return configuration.default
+
+    def given(self, configuration: Configuration[D], unit: str) -> Configuration[D]:
+        """The whole configuration, that of each machine at hand."""
+        return configuration
