@@ -7,10 +7,10 @@ suite: same stream, same answer; a restart in the middle changes nothing; nothin
 Where machines are compared with each other, a `CellProcessor` folds the samples of all machines of a cell into one state.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, is_dataclass
 from enum import Enum
-from typing import ClassVar, Generic, NamedTuple, TypeVar
+from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 
 from processors.config import ALL, CellConfig, Configuration, ProcessorConfig
 from processors.effects import Pin
@@ -150,6 +150,7 @@ class _Declaration(Generic[C, S]):
     version: of the state's form; a snapshot of another version is not restored
     inputs: names of the metrics that are read; None = all, those of other processors too
     state: a frozen dataclass of JSON-able fields; `initial` makes the first one
+    reads: makes what the step needs of the files that a configuration names, by machine; raises ValueError where it cannot
     records: whether the runtime hands all that it hears to a recorder, as it comes, before the fold sees it
     """
 
@@ -161,6 +162,7 @@ class _Declaration(Generic[C, S]):
     state: type[S]
     initial: Callable[[C], S]
     plain: tuple[PlainSpec, ...] = ()
+    reads: Callable[[Configuration[C]], Mapping[str, Any]] | None = None
     records: bool = False
 
     def __post_init__(self) -> None:
@@ -174,6 +176,10 @@ class _Declaration(Generic[C, S]):
     def node(self) -> str:
         """The id of its edge node and of its host application."""
         return TWIN_NODE_PREFIX + self.name
+
+    def configured(self, table: Mapping[str, Any] | None = None) -> Configuration[C]:
+        """The configuration out of a table, checked, with what it names on the disk. Raises ConfigurationError."""
+        return Configuration(self.config, table, name=self.name, reads=self.reads)
 
     def listens_to(self, node: str) -> bool:
         """Whether it reads what the node `node` says: never itself or jobs, other processors only where an input is theirs."""
