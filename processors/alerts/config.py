@@ -6,6 +6,7 @@ from typing import Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
 
+from processors.alerts.alarms import alarm_signals
 from processors.alerts.quiet import QuietHours
 from processors.alerts.receivers import AnyReceiver, Escalation, Heartbeat
 from processors.alerts.state import Severity
@@ -14,7 +15,6 @@ from processors.config import CellConfig
 RULES = ("twin/rule_load_over_limit", "twin/rule_thermal_runaway", "twin/rule_load_without_feed", "twin/rule_vibration")
 SCORE = "twin/anomaly_alarm"
 GAP, DRIFT = "twin/gap_growing", "twin/score_drift"
-ALARM_SIGNALS = (*RULES, SCORE, GAP, DRIFT)
 MACHINE_OFFLINE, SOURCE_LOST = "machine_offline", "alarm_source_lost"
 RECEIVERS_MAX = 20
 ROUTES_MAX = 100
@@ -41,9 +41,11 @@ class Rule(BaseModel):
 
 
 def _signals() -> dict[str, Rule]:
+    """Every declared alarm; one that is not named here is of medium severity."""
     rules = dict.fromkeys(RULES, Rule(severity=Severity.HIGH))
     score = Rule(severity=Severity.MEDIUM, raised_by_rule=True)
-    return {**rules, SCORE: score, GAP: Rule(severity=Severity.MEDIUM), DRIFT: Rule(severity=Severity.LOW)}
+    named = {**rules, SCORE: score, GAP: Rule(severity=Severity.MEDIUM), DRIFT: Rule(severity=Severity.LOW)}
+    return named | {name: Rule(severity=Severity.MEDIUM) for name in alarm_signals() if name not in named}
 
 
 class Route(BaseModel):
@@ -98,8 +100,8 @@ class AlertsConfig(CellConfig):
         if self.cells:
             raise ValueError("cells: alerts watch all machines together; leave it out")
         for signal in self.signals:
-            if signal not in ALARM_SIGNALS:
-                raise ValueError(f"signals: {signal!r} is no alarm signal; there are: {', '.join(ALARM_SIGNALS)}")
+            if signal not in alarm_signals():
+                raise ValueError(f"signals: {signal!r} is no alarm signal; there are: {', '.join(_signals())}")
         for name in self.labels:
             if not _LABEL.fullmatch(name) or name in _OWN_LABELS:
                 raise ValueError(

@@ -4,7 +4,8 @@ from collections.abc import Iterator, Mapping, Set
 from dataclasses import replace
 from typing import NamedTuple
 
-from processors.alerts.config import ALARM_SIGNALS, MACHINE_OFFLINE, RULES, SOURCE_LOST, AlertsConfig, Rule
+from processors.alerts.alarms import alarm_signals
+from processors.alerts.config import MACHINE_OFFLINE, RULES, SOURCE_LOST, AlertsConfig, Rule
 from processors.alerts.phases import Beat, Condition, advanced, begun, condition_of, raised
 from processors.alerts.state import ALERTS_MAX, Alert, AlertsState, Phase, Severity, fingerprint, labels_of
 from processors.config import Configuration
@@ -14,7 +15,7 @@ from sparkplug.quality import Quality
 
 SEVERITY = f"{TWIN_PREFIX}severity"
 PROGRAM, TOOL = "program", "tool_number"
-INPUTS = frozenset({*ALARM_SIGNALS, SEVERITY, PROGRAM, TOOL})
+INPUTS = frozenset({*alarm_signals(), SEVERITY, PROGRAM, TOOL})
 SEEN_S_MAX = 5.0  # of one beat: what lies between two that are further apart was not watched
 RESOLVED_SHOWN_S = 3600.0
 MACHINES_MAX = 2000
