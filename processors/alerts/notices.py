@@ -16,7 +16,7 @@ from processors.alerts.outbox import made
 from processors.alerts.receivers import AnyReceiver
 from processors.alerts.routing import Change, changes_for, has_passed
 from processors.alerts.silence import silenced_by
-from processors.alerts.state import OUTBOX_MAX, Alert, AlertsState, Group, ReceiverState, Severity, Told
+from processors.alerts.state import OUTBOX_MAX, Alert, AlertsState, Group, LastNotice, ReceiverState, Severity
 from processors.alerts.statement import FIRING, OVER, PASSED, RAISED, REPEAT, RESOLVED
 from processors.config import Configuration
 
@@ -202,7 +202,7 @@ def _alerts_in(desk: _Desk, known: ReceiverState, key: str, news: list[Change], 
 
 def _told(known: ReceiverState, news: list[Change], clock_s: float) -> ReceiverState:
     told = {
-        change.alert.fingerprint: Told(
+        change.alert.fingerprint: LastNotice(
             change.alert.episode, change.alert.severity, change.what not in OVER, clock_s, change.told_before + 1
         )
         for change in news

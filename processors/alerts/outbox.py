@@ -28,10 +28,10 @@ from processors.alerts.state import (
     AlertsState,
     Failure,
     Item,
+    LastNotice,
     ReceiverState,
     Settled,
     Severity,
-    Told,
     fingerprint,
 )
 from processors.alerts.statement import OVER, statements_in
@@ -130,7 +130,7 @@ def _caught_up(state: AlertsState, found: Notification, known: ReceiverState, sh
         if before is not None and (before.episode, before.count) >= (said.episode, count):
             continue
         is_over = said.what in OVER
-        told[said.fingerprint] = Told(said.episode, said.severity, not is_over, state.clock_s, count)
+        told[said.fingerprint] = LastNotice(said.episode, said.severity, not is_over, state.clock_s, count)
         written_alert = shown.get(said.fingerprint)
         alert = alerts.get(said.fingerprint, written_alert)
         if written_alert is None or alert is None or (alert is written_alert and len(alerts) >= ALERTS_MAX):

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 from processors.alerts.config import AlertsConfig, Route
-from processors.alerts.state import Alert, AlertsState, Phase, ReceiverState, Told
+from processors.alerts.state import Alert, AlertsState, LastNotice, Phase, ReceiverState
 from processors.alerts.statement import FIRING, PASSED, RAISED, REPEAT, RESOLVED, Statement
 
 PASSED_S_MAX = 3600.0
@@ -48,7 +48,7 @@ def _matches(route: Route, alert: Alert) -> bool:
     return named and alert.severity.rank >= route.severity_min.rank
 
 
-def change_of(alert: Alert, told: Told | None, config: AlertsConfig, clock_s: float) -> Change | None:
+def change_of(alert: Alert, told: LastNotice | None, config: AlertsConfig, clock_s: float) -> Change | None:
     """What is news to a receiver that was last told `told`."""
     if not alert.is_on:
         # One that pends again is waited for: it fires, or is over after all.
@@ -67,7 +67,7 @@ def change_of(alert: Alert, told: Told | None, config: AlertsConfig, clock_s: fl
     return None
 
 
-def has_passed(alert: Alert, told: Told | None, clock_s: float) -> bool:
+def has_passed(alert: Alert, told: LastNotice | None, clock_s: float) -> bool:
     """Whether an episode is over of which a receiver knows nothing, and not long ago."""
     if alert.phase is not Phase.RESOLVED or not alert.rises_s or (told is not None and told.episode >= alert.episode):
         return False

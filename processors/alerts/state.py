@@ -84,7 +84,7 @@ class Alert:
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class LastNotice:
     """What a receiver was last told of an alert; `count`: how often in this episode."""
 
     episode: int
@@ -107,7 +107,7 @@ class Group:
 class ReceiverState:
     """What one receiver knows, and how it fares. `recent_s` and `recent_high_s`: notifications of the last hour, by clock_s."""
 
-    told: dict[str, Told] = field(default_factory=dict)
+    told: dict[str, LastNotice] = field(default_factory=dict)
     groups: dict[str, Group] = field(default_factory=dict)
     recent_s: tuple[float, ...] = ()
     recent_high_s: tuple[float, ...] = ()

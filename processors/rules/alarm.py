@@ -9,7 +9,7 @@ from enum import Enum
 from typing import NamedTuple
 
 
-class Stand(Enum):
+class LimitState(Enum):
     """How the value of a rule stands to its limits."""
 
     OVER = "over"
@@ -22,7 +22,7 @@ class Stand(Enum):
 class Judgement(NamedTuple):
     """What a rule finds at one moment. `reason`: why it is unknown; `finding`: what is over which limit, as a person reads it."""
 
-    stand: Stand
+    limit_state: LimitState
     reason: str = ""
     finding: str = ""
 
@@ -55,26 +55,26 @@ class Latch(NamedTuple):
 IDLE = Latch()
 
 
-def over_under(value: float, limit: float, clear_limit: float) -> Stand:
+def over_under(value: float, limit: float, clear_limit: float) -> LimitState:
     """How `value` stands to a limit and the lower one at which an alarm ends.
 
     >>> [over_under(value, 110.0, 100.0).value for value in (111.0, 110.0, 99.0)]
     ['over', 'between', 'under']
     """
     if value > limit:
-        return Stand.OVER
-    return Stand.BETWEEN if value >= clear_limit else Stand.UNDER
+        return LimitState.OVER
+    return LimitState.BETWEEN if value >= clear_limit else LimitState.UNDER
 
 
 def latched(latch: Latch, judgement: Judgement, timing: Timing, at_s: float) -> Latch:
     """The alarm after one more judgement."""
-    stand, alarm_s = judgement.stand, latch.alarm_s
-    if stand is Stand.OVER:
+    limit_state, alarm_s = judgement.limit_state, latch.alarm_s
+    if limit_state is LimitState.OVER:
         over_s = at_s if latch.over_s is None else latch.over_s
         if alarm_s is None and at_s - over_s >= timing.dwell_s:
             return Latch(over_s, judgement.finding, over_s)
         return latch if latch.over_s is not None and latch.under_s is None else Latch(alarm_s, latch.finding, over_s)
-    if stand is Stand.UNDER and alarm_s is not None:
+    if limit_state is LimitState.UNDER and alarm_s is not None:
         under_s = at_s if latch.under_s is None else latch.under_s
         if at_s - under_s >= timing.clear_s:
             return IDLE
