@@ -23,7 +23,7 @@ TICKS_MAX = 100_000  # that one jump of event time may bring
 
 
 class ProcessorConfig(BaseModel):
-    """What the engine needs of every processor's configuration. Durations are event time."""
+    """The settings that the engine needs of every processor. Durations are event time."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
     of_one_machine: ClassVar[frozenset[str] | None] = None
@@ -44,7 +44,7 @@ ALL = "all"
 
 
 class CellConfig(ProcessorConfig):
-    """What the engine needs of the configuration of a processor that compares machines.
+    """The settings that the engine needs of a processor that compares machines.
 
     cells: the machines of each cell by name; those that stand in none are together in the cell "all"
     """
@@ -108,7 +108,7 @@ class Configuration(Generic[C_co]):
 
 
 def _check_own(model: type[ProcessorConfig], own: Mapping[str, Any], where: str) -> None:
-    """What holds for all machines together is not to be set for one, and then not heeded."""
+    """Refuse a value for one machine that holds for all of them, and would not be heeded."""
     allowed = model.of_one_machine
     if allowed is not None and (common := [key for key in own if key in model.model_fields and key not in allowed]):
         raise ConfigurationError(

@@ -1,4 +1,4 @@
-"""What a processor is: a pure fold over the samples of a machine, with everything it reads and emits declared.
+"""A processor: a pure fold over the samples of a machine, with everything it reads and emits declared.
 
     step(config, state, sample) -> (state, outputs)
 
@@ -43,7 +43,7 @@ JOBS_NODE = "twin-jobs"  # of the jobs consumer: what it says is of jobs, and no
 
 
 class Provenance(Enum):
-    """Where a figure comes from."""
+    """The origin of a figure."""
 
     MEASURED = "measured"
     MODELLED = "modelled"
@@ -145,7 +145,7 @@ Outputs = Sequence[Output | PlainOutput | Pin]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Declaration(Generic[C, S]):
-    """What both kinds of processor declare.
+    """The part of a declaration that both kinds of processor share.
 
     version: of the state's form; a snapshot of another version is not restored
     inputs: names of the metrics that are read; None = all, those of other processors too
@@ -182,7 +182,7 @@ class _Declaration(Generic[C, S]):
         return Configuration(self.config, table, name=self.name, reads=self.reads)
 
     def listens_to(self, node: str) -> bool:
-        """Whether it reads what the node `node` says: never itself or jobs, other processors only where an input is theirs."""
+        """Return True if it reads the node `node`: never itself or jobs, other processors only where an input is theirs."""
         if not node.startswith(TWIN_NODE_PREFIX):
             return True
         if node == JOBS_NODE:
@@ -202,7 +202,7 @@ class Processor(_Declaration[C, S]):
 
     @property
     def is_of_cells(self) -> bool:
-        """Whether machines share a state."""
+        """True if machines share a state."""
         return False
 
     def unit_of(self, configuration: Configuration[C], machine: str) -> str:
@@ -241,7 +241,7 @@ class CellProcessor(_Declaration[D, S]):
 
     @property
     def is_of_cells(self) -> bool:
-        """Whether machines share a state."""
+        """True if machines share a state."""
         return True
 
     def unit_of(self, configuration: Configuration[D], machine: str) -> str:

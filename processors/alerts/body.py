@@ -1,4 +1,4 @@
-"""What a notification says: the JSON of Alertmanager's webhook, version 4, and a title and a text for people."""
+"""The content of a notification: the JSON of Alertmanager's webhook, version 4, and a title and a text for people."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass

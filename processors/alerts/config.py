@@ -49,7 +49,7 @@ def _signals() -> dict[str, Rule]:
 
 
 class Route(BaseModel):
-    """Which alerts go to which receivers; what is left empty matches all. An alert goes to the receivers of every route that
+    """A route of alerts to receivers; what is left empty matches all. An alert goes to the receivers of every route that
     matches it."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)

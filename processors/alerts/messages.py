@@ -1,4 +1,4 @@
-"""What comes on cnctwin/alerts/…: commands of people, the fate of notifications, and our own outbox after a crash.
+"""Messages on cnctwin/alerts/…: commands of people, the fate of notifications, and our own outbox after a crash.
 
     cnctwin/alerts/command/ack        {"id", "by", "fingerprint", "comment"}
     cnctwin/alerts/command/silence    {"id", "by", "matchers": {label: pattern}, "for_s", "starts_s", "comment"}
@@ -46,7 +46,7 @@ class _Message(BaseModel):
 
 
 class Command(_Message):
-    """What every command has."""
+    """The fields that every command has."""
 
     id: Name
     by: Name
@@ -81,7 +81,7 @@ class Trial(Command):
 
 
 class Delivery(_Message):
-    """What became of a notification."""
+    """The fate of a notification."""
 
     id: Name
     receiver: Name

@@ -35,7 +35,7 @@ class _Bundle(NamedTuple):
 
 
 class _Desk(NamedTuple):
-    """What deciding for one receiver needs."""
+    """The context of deciding for one receiver."""
 
     name: str
     receiver: AnyReceiver
@@ -88,7 +88,7 @@ def _tidied(known: ReceiverState, state: AlertsState) -> ReceiverState:
 
 
 def _passed_in_silence(known: ReceiverState, state: AlertsState, silenced: Mapping[str, str]) -> ReceiverState:
-    """What came and went while it was silenced is not told afterwards."""
+    """Mark alerts that came and went while silenced as known: they are not told afterwards."""
     alerts = [state.alerts[key] for key in silenced]
     over = [alert for alert in alerts if has_passed(alert, known.told.get(alert.fingerprint), state.clock_s)]
     firing = [alert for alert in over if (told := known.told.get(alert.fingerprint)) is not None and told.is_firing]
@@ -181,7 +181,7 @@ def _send(desk: _Desk, known: ReceiverState, bundle: _Bundle, *, is_held: bool) 
 
 
 def _alerts_in(desk: _Desk, known: ReceiverState, key: str, news: list[Change], kind: str) -> tuple[Alert, ...]:
-    """What is new, then what else of the group this receiver believes to be firing, so that it sees the whole."""
+    """Return the new alerts, then what else of the group this receiver believes to be firing, so that it sees the whole."""
     new = tuple(change.alert for change in news)
     if kind == DIGEST:
         return new

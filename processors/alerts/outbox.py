@@ -141,7 +141,7 @@ def _caught_up(state: AlertsState, found: Notification, known: ReceiverState, sh
 
 
 def _is_ours(one: WrittenAlert) -> bool:
-    """Whether its labels are those of its fingerprint."""
+    """Return True if its labels are those of its fingerprint."""
     labels = {name: value for name, value in one.labels.items() if name != "severity"}
     return {"machine", "alertname", "severity"} <= one.labels.keys() and fingerprint(labels) == one.fingerprint
 

@@ -1,4 +1,4 @@
-"""What the alerts processor publishes: its state as one JSON, three metrics for each machine."""
+"""The publications of the alerts processor: its state as one JSON, three metrics for each machine."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -30,7 +30,7 @@ _ORDER = {Phase.FIRING: 3, Phase.ACKNOWLEDGED: 2, Phase.PENDING: 1, Phase.RESOLV
 def machine_outputs(
     configuration: Configuration[AlertsConfig], state: AlertsState, online: Sequence[str], at_s: float
 ) -> tuple[AlertsState, list[Output]]:
-    """What changed of the machines that are online."""
+    """Return the metrics that changed, of the machines that are online."""
     alerts: dict[str, list[Alert]] = {}
     for alert in state.alerts.values():
         alerts.setdefault(alert.machine, []).append(alert)

@@ -1,4 +1,4 @@
-"""Which receivers an alert goes to, and what is news to each of them."""
+"""Routing: the receivers that an alert goes to, and what is news to each of them."""
 
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
@@ -49,7 +49,7 @@ def _matches(route: Route, alert: Alert) -> bool:
 
 
 def change_of(alert: Alert, told: LastNotice | None, config: AlertsConfig, clock_s: float) -> Change | None:
-    """What is news to a receiver that was last told `told`."""
+    """Return what is news to a receiver that was last told `told`."""
     if not alert.is_on:
         # One that pends again is waited for: it fires, or is over after all.
         if told is not None and told.is_firing:
@@ -68,7 +68,7 @@ def change_of(alert: Alert, told: LastNotice | None, config: AlertsConfig, clock
 
 
 def has_passed(alert: Alert, told: LastNotice | None, clock_s: float) -> bool:
-    """Whether an episode is over of which a receiver knows nothing, and not long ago."""
+    """Return True if an episode that a receiver knows nothing of is over, and not long ago."""
     if alert.phase is not Phase.RESOLVED or not alert.rises_s or (told is not None and told.episode >= alert.episode):
         return False
     return clock_s - alert.resolved_s <= PASSED_S_MAX

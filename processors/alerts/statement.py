@@ -18,7 +18,7 @@ _SEVERITIES = frozenset(severity.value for severity in Severity)
 
 
 class Statement(NamedTuple):
-    """What a notification says of one alert; told_before: how often the receiver had been told of this episode."""
+    """One statement about one alert; told_before: how often the receiver had been told of this episode."""
 
     fingerprint: str
     episode: int

@@ -97,7 +97,7 @@ def _all(
     cell: Mapping[str, Row],
     known: Set[tuple[str, str]],
 ) -> Iterator[Watched]:
-    """What stands, and what is an alert already: of a shop in order that is next to nothing."""
+    """Yield what stands, and what is an alert already: of a shop in order that is next to nothing."""
     for machine, last_s in machines.items():
         config, row = configuration.of(machine), cell.get(machine)
         for signal, rule in config.signals.items():
@@ -121,8 +121,8 @@ def _all(
 
 
 def _source(config: AlertsConfig, row: Row | None) -> Condition:
-    """Whether a processor that gave alarm signals has gone while the machine is there: then nobody watches, and no alarm is no
-    good news."""
+    """Return whether a processor that gave alarm signals has gone while the machine is there: nobody watches then, and no alarm
+    is no good news."""
     if row is None:
         return Condition(None, OFFLINE, 0)
     lost = [row[signal].timestamp_ms for signal in config.signals if signal in row and row[signal].quality is Quality.STALE]
@@ -132,7 +132,7 @@ def _source(config: AlertsConfig, row: Row | None) -> Condition:
 def _raised(
     configuration: Configuration[AlertsConfig], alerts: dict[str, Alert], cell: Mapping[str, Row], beat: Beat
 ) -> dict[str, Alert]:
-    """Where a rule fires on the same machine, what the score says is confirmed."""
+    """Raise the alerts that a rule confirms by firing on the same machine."""
     by_rule = {alert.machine for alert in alerts.values() if alert.is_on and alert.signal in RULES}
     said_high = {machine for machine, row in cell.items() if _says_high(row.get(SEVERITY))}
     worse = by_rule | said_high
@@ -156,7 +156,7 @@ def _says_high(reading: Reading | None) -> bool:
 
 
 def _context(row: Row) -> str:
-    """What the machine was doing, for the person who is woken up."""
+    """Return what the machine was doing, for the person who is woken up."""
     parts = []
     for signal, word in ((PROGRAM, "program"), (TOOL, "tool")):
         reading = row.get(signal)

@@ -1,4 +1,4 @@
-"""What `joint_anomaly` is told: which models score, what is common mode, when the gate is shut, when a score is an alarm."""
+"""Configuration of `joint_anomaly`: which models score, what is common mode, when the gate is shut, when a score is an alarm."""
 
 import math
 from functools import cached_property
@@ -27,11 +27,11 @@ NUMBERS = frozenset(
         *("twin/spindle_temp_residual_k", "twin/cutting_force_n"),
     }
 )
-"""What a model may have as features."""
+"""The features that a model may have."""
 
 
 class Config(CellConfig):
-    """Which models score, what is common mode, when the gate is shut, when a score is an alarm.
+    """The models, the rule of common mode, the gate and the alarm.
 
     models: folder with one model for each machine, by name; "" = none: every score is null then, and says so
     threshold: in units of the adjusted score; absent = that of the model
@@ -61,7 +61,7 @@ class Config(CellConfig):
 
     @cached_property
     def common_mode_rule(self) -> CommonModeRule:
-        """What is common mode."""
+        """The rule of common mode."""
         return CommonModeRule(self.common_mode, self.common_mode_factor, self.exclude_gated_peers)
 
     @cached_property

@@ -28,7 +28,7 @@ class _One(NamedTuple):
 
 
 def adjusted_by_features(scorings: Mapping[str, Scoring], frame: Frame, members: Mapping[str, Member]) -> dict[str, Adjustment]:
-    """What is left of each machine of a frame, of one tick."""
+    """Return the score of each machine of a frame, of one tick."""
     known = {name: one for name, scoring in scorings.items() if (one := _of(scoring, frame, members[name])) is not None}
     found: dict[str, Adjustment] = {}
     for name, scoring in scorings.items():

@@ -22,7 +22,7 @@ NO_PEER = "none"
 
 
 class Adjustment(NamedTuple):
-    """What is left of a score beside those of the peers, and who of them makes it common mode.
+    """The score of a machine after those of its peers, and the peer that makes it common mode.
 
     score: None where it is not known, for the reason `why`; is_idle: nothing was judged, as in a gate
     smoothed: the features of the machine after this tick, where they are judged
@@ -38,7 +38,7 @@ class Adjustment(NamedTuple):
 
 
 class Published(NamedTuple):
-    """What readers were told last, beside the scores: it seldom changes, and is told again when it does.
+    """The figures that were published last, beside the scores: they seldom change, and are published again when they do.
 
     unknown: why there is no adjusted score, and no common mode; alarm None: why there is no alarm
     """
@@ -54,7 +54,7 @@ class Published(NamedTuple):
 
 
 class Member(NamedTuple):
-    """What is known of one machine.
+    """The state of one machine.
 
     tick: the last one that it has come to; None while it is offline
     offset_ticks: its clock is ahead of that of its peers by so many

@@ -1,4 +1,4 @@
-"""How unusual each machine of a cell is, beside its peers, and not while it changes its tool.
+"""Anomaly scores of the machines of a cell, each beside its peers, and not while it changes its tool.
 
 At each tick the features of a machine, as last reported, are scored by its model (`twin/anomaly/model.py`): the raw score, 0 = as
 unusual as the model's contamination share of the training data, larger = worse. It is always published. Once all machines that
@@ -163,7 +163,7 @@ def _scored(scoring: Scoring, sample: Sample, tick: int) -> Scored:
 
 
 def _context(preparation: Preparation, row: Mapping[str, Reading]) -> list[object]:
-    """What names the regime; None where it is not known."""
+    """Return the values that name the regime; None where it is not known."""
     readings = [row.get(name) for name in preparation.context]
     return [None if one is None or one.quality is not Quality.GOOD else one.value for one in readings]
 
@@ -206,7 +206,7 @@ def _on_the_scale(shared: Config, scoring: Scoring, raw: float | None) -> float 
 
 
 def _introduced(config: Configuration[Config], machine: str) -> list[Output]:
-    """What a reader of a machine has to know of its scores, once."""
+    """Return the outputs that explain a machine's scores, once."""
     shared, scoring = config.default, scoring_of(config, machine)
     model, rule = scoring.model, scoring.rule
     if model is None:

@@ -1,5 +1,5 @@
-"""How each machine is scored: by which model, and when that is an alarm. Put together once, from the configuration and the models
-that it names."""
+"""The scoring of each machine: by which model, and when that is an alarm. Put together once, from the configuration and the
+models that it names."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Scoring:
-    """How one machine is scored; rule: None where it has no threshold."""
+    """The model and the alarm of one machine; rule: None where it has no threshold."""
 
     machine: str
     model: "AnomalyModel | None"
@@ -28,7 +28,7 @@ class Scoring:
 
     @cached_property
     def calibration(self) -> "Calibration | None":
-        """Of the model."""
+        """The calibration of the model."""
         return None if self.model is None else self.model.calibration
 
     @cached_property

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 
 class LimitState(Enum):
-    """How the value of a rule stands to its limits."""
+    """The position of a rule's value against its limits."""
 
     OVER = "over"
     BETWEEN = "between"
@@ -20,7 +20,7 @@ class LimitState(Enum):
 
 
 class Judgement(NamedTuple):
-    """What a rule finds at one moment. `reason`: why it is unknown; `finding`: what is over which limit, as a person reads it."""
+    """The finding of a rule at one moment. `reason`: why it is unknown; `finding`: what is over which limit, to be read."""
 
     limit_state: LimitState
     reason: str = ""
@@ -28,7 +28,7 @@ class Judgement(NamedTuple):
 
 
 class Timing(NamedTuple):
-    """How long over the limit until it alarms, how long under the lower one until it ends."""
+    """The time over the limit until it alarms, and under the lower one until it ends."""
 
     dwell_s: float
     clear_s: float
@@ -48,7 +48,7 @@ class Latch(NamedTuple):
 
     @property
     def is_alarm(self) -> bool:
-        """Whether it alarms."""
+        """True while it alarms."""
         return self.alarm_s is not None
 
 
@@ -56,7 +56,7 @@ IDLE = Latch()
 
 
 def over_under(value: float, limit: float, clear_limit: float) -> LimitState:
-    """How `value` stands to a limit and the lower one at which an alarm ends.
+    """Return how `value` stands to a limit and the lower one at which an alarm ends.
 
     >>> [over_under(value, 110.0, 100.0).value for value in (111.0, 110.0, 99.0)]
     ['over', 'between', 'under']

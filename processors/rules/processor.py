@@ -44,7 +44,7 @@ class Config(SpindleLimits, TemperatureLimits, VibrationLimits):
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """What the rules remember: the spindle's speed, the temperature's trend, the zone, and the alarm of each rule by its name."""
+    """The state of the rules: the spindle's speed, the temperature's trend, the zone, and the alarm of each rule by its name."""
 
     spindle: Spindle = field(default_factory=Spindle)
     trend: Trend = field(default_factory=Trend)
@@ -53,7 +53,7 @@ class State:
 
 
 class Given(NamedTuple):
-    """What a rule may look at."""
+    """The inputs that a rule may look at."""
 
     config: Config
     state: State
@@ -176,7 +176,7 @@ def _outputs(state: State, judged: Mapping[str, Judgement], no_zone: Judgement, 
 
 
 def _anomaly(sample: Sample) -> tuple[bool | None, str]:
-    """Whether the anomaly score alarms; None with the reason."""
+    """Return True if the anomaly score alarms; None with the reason."""
     reading = sample.row.get(ANOMALY)
     reason = f"{ANOMALY} is not offered" if reading is None else why_unknown(reading)
     if reading is None or reason is not None:

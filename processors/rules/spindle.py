@@ -67,7 +67,7 @@ class Spindle(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """What the spindle does now. `rpm` None: unknown, with the reason."""
+    """The motion of the spindle now. `rpm` None: unknown, with the reason."""
 
     rpm: float | None
     why_not: str
@@ -93,7 +93,7 @@ def followed(spindle: Spindle, limits: SpindleLimits, sample: Sample) -> Spindle
 
 
 def motion(spindle: Spindle, limits: SpindleLimits, at_s: float) -> Motion:
-    """What the spindle does at `at_s`."""
+    """Return the motion of the spindle at `at_s`."""
     if spindle.rpm is None:
         return Motion(None, spindle.why_not, False, False)
     ramping = False
@@ -141,7 +141,7 @@ def _load(sample: Sample) -> tuple[float | None, str]:
 
 
 def _is_running(limits: SpindleLimits, sample: Sample) -> tuple[bool | None, str]:
-    """Whether the program runs; None with the reason. Without any state to ask for, it is taken to run."""
+    """Return True if the program runs; None with the reason. Without any state to ask for, it is taken to run."""
     if not limits.exec_states:
         return True, ""
     reading = sample.row.get(EXECUTION)

@@ -26,14 +26,14 @@ TEMPERATURE = "spindle_temp_c"
 POINTS = 24
 """Points a window: 276 pairs."""
 KNOWN_PART = 0.75
-"""Of a window, which has to be known."""
+"""The part of a window that has to be known."""
 STRAY_S = 10.0
 TEMPERATURES_C = (-60.0, 400.0)
 """Beyond them nothing is a spindle's temperature."""
 
 
 class TemperatureLimits(ProcessorConfig):
-    """What runaway is."""
+    """The limits of runaway."""
 
     runaway_k_per_min: PositiveFloat = 5.0
     runaway_clear_k_per_min: PositiveFloat = 3.0

@@ -65,7 +65,7 @@ BOUNDARIES_MM_S: dict[VibrationClass, tuple[float, float, float]] = {
 
 
 class VibrationLimits(ProcessorConfig):
-    """Which boundaries hold, and from which zone on it is an alarm.
+    """The boundaries that hold, and the zone from which on it is an alarm.
 
     vibration_boundaries_mm_s: A/B, B/C, C/D of your own; None = those of the class
     vibration_hysteresis_pct: a zone is left downwards so far below its boundary

@@ -66,7 +66,7 @@ class Engine:
     # Events.
 
     def is_message(self, event: HostEvent) -> bool:
-        """Whether the ledger counts it: of a device, from a node that this processor reads."""
+        """Return True if the ledger counts it: it is of a device, from a node that this processor reads."""
         return event.device is not None and event.kind is not EventKind.HOLE and self._processor.listens_to(event.node.node)
 
     def received(self, event: HostEvent, *, has_room: bool) -> None:
@@ -105,7 +105,7 @@ class Engine:
         self.ledger.overflowed(count)
 
     def unsent(self) -> None:
-        """What the last event brought could not be sent."""
+        """Note that the outcome of the last event could not be sent."""
         if self.ledger.emitted > self._emitted_before:
             self.ledger.unsent()
 

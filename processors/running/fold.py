@@ -21,7 +21,7 @@ from sparkplug.metric import Reading
 
 Row = Mapping[str, Reading]
 Folded = tuple[list[Effect], Fates]
-"""What is to be sent, and what became of the message that brought it: of that one, and of those that were held back before it."""
+"""The effects to be sent, and the fates of the message that brought them and of those that were held back before it."""
 DEAD: Fates = (DropReason.DEAD_LETTER,)
 
 

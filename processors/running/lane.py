@@ -177,7 +177,7 @@ class Lane:
             self.fold.show(self._machine, self._view)
 
     def drop_held(self) -> Fates:
-        """What was held back was a straggler."""
+        """Drop the messages that were held back: they were stragglers."""
         late = (DropReason.LATE,) * len(self._held)
         self._held.clear()
         return late

@@ -1,4 +1,4 @@
-"""Where each message went: received = emitted + dropped(reason) + buffered, at every moment."""
+"""The fate of each message: received = emitted + dropped(reason) + buffered, at every moment."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ class DropReason(Enum):
 
 
 Fates = tuple[DropReason | None, ...]
-"""What became of messages, one for each; None = it was folded."""
+"""The fates of messages; None = it was folded."""
 FOLDED: Fates = (None,)
 
 

@@ -1,4 +1,4 @@
-"""What has a state and is saved as one: a unit, which is a machine or a cell of them; and the machines that the engine knows."""
+"""Units, each with a state that is saved as one: a machine or a cell of them; and the machines that the engine knows."""
 
 from dataclasses import dataclass, field
 
@@ -10,7 +10,7 @@ from sparkplug.metric import NodeId
 
 @dataclass(slots=True)
 class Unit:
-    """What has a state: a machine, or a cell with all its machines."""
+    """The holder of a state: a machine, or a cell with all its machines."""
 
     name: str
     live: Fold
@@ -35,10 +35,10 @@ class Machine:
 
     @property
     def is_online(self) -> bool:
-        """Whether an edge of it is."""
+        """True while an edge of it is online."""
         return any(not is_twin(node) for node in self.online)
 
 
 def is_twin(node: NodeId) -> bool:
-    """Whether a processor publishes it."""
+    """Return True for the node of a processor."""
     return node.node.startswith(TWIN_NODE_PREFIX)

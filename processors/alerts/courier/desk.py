@@ -1,4 +1,4 @@
-"""What the courier does with each notification, without I/O. The clock is an argument.
+"""The course of each notification through the courier, without I/O. The clock is an argument.
 
     waiting -> claiming -> sending -> settled
        ^                      |
@@ -46,7 +46,7 @@ Action = Publish | Send
 
 
 class Stage(Enum):
-    """Where a notification stands."""
+    """The stage of a notification."""
 
     WAITING = "waiting"
     CLAIMING = "claiming"
@@ -94,11 +94,11 @@ class Desk:
 
     @property
     def unseen(self) -> bool:
-        """Whether the fate of a notification is still to be seen on the broker."""
+        """True while the fate of a notification is still to be seen on the broker."""
         return any(job.stage is Stage.SETTLED and not job.is_seen for job in self._jobs.values())
 
     def take(self) -> list[Action]:
-        """What is to be done, in this order."""
+        """Return the actions that are due, in this order."""
         actions, self._actions = self._actions, []
         return actions
 
@@ -233,7 +233,7 @@ class Desk:
             self._done.popitem(last=False)
 
     def _recall(self, key: str, job: _Job) -> None:
-        """What an earlier life of the courier has left on the broker of this notification."""
+        """Take over what an earlier life of the courier has left on the broker of this notification."""
         claim, delivery = self._claims.pop(key, None), self._deliveries.get(key)
         if delivery is not None:
             job.stage, job.said, job.is_seen = Stage.SETTLED, delivery, True

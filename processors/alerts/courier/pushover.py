@@ -21,7 +21,7 @@ HEADERS = {"User-Agent": "cnctwin"}
 
 
 class ReceiptState(NamedTuple):
-    """What Pushover says of an emergency."""
+    """The state of an emergency at Pushover."""
 
     acknowledged_by: str  # empty: by nobody yet
     is_over: bool  # expired, cancelled, or not known any more
@@ -53,7 +53,7 @@ class Pushover:
         return outcome
 
     def ask(self, receipt: str) -> ReceiptState | None:
-        """What became of an emergency; None where Pushover does not say."""
+        """Return the state of an emergency; None where Pushover does not say."""
         request = self._request("GET", f"/1/receipts/{quote(receipt, safe='')}.json", query={"token": self._token})
         answer = exchanged(request, self._receiver.timeout_s)
         if isinstance(answer, Outcome):

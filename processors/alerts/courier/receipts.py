@@ -87,7 +87,7 @@ class Receipts:
             self._firing = frozenset((a["fingerprint"], a["episode"]) for a in alerts if a.get("phase") == "firing")
 
     def due(self, now_s: float, wall_s: float, free: frozenset[str]) -> list[Ask | Cancel | Publish | Acknowledge]:
-        """What is to be done now, at most one question for each receiver that is free."""
+        """Return what is to be done now, at most one question for each receiver that is free."""
         actions: list[Ask | Cancel | Publish | Acknowledge] = []
         asked: set[str] = set()
         for key, one in sorted(self._open.items(), key=lambda entry: entry[1].asked_s):
@@ -110,7 +110,7 @@ class Receipts:
         return actions
 
     def answered(self, key: str, state: ReceiptState | None) -> list[Publish | Acknowledge]:
-        """What Pushover said."""
+        """Take Pushover's answer."""
         one = self._open.get(key)
         if one is None or state is None:
             return []
@@ -120,7 +120,7 @@ class Receipts:
         return [self._closed(key)] if state.is_over else []
 
     def cancelled(self, key: str, is_done: bool) -> list[Publish]:
-        """Whether Pushover has stopped it."""
+        """Close a receipt that Pushover has stopped."""
         return [self._closed(key)] if is_done and key in self._open else []
 
     def _closed(self, key: str) -> Publish:

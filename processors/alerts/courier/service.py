@@ -1,4 +1,4 @@
-"""What the courier needs of a receiver, and which file speaks to which."""
+"""The service that speaks to a receiver, and the choice of the file that does."""
 
 import os
 from collections.abc import Mapping
@@ -29,7 +29,7 @@ class Service(Protocol):
 
 
 def service_of(name: str, receiver: AnyReceiver, environment: Mapping[str, str] = os.environ) -> Service:
-    """What speaks to this receiver, its secrets read. Raises ConfigurationError."""
+    """Return what speaks to this receiver, its secrets read. Raises ConfigurationError."""
     try:
         if isinstance(receiver, AppriseReceiver):
             return AppriseService(read_secret(receiver.url, environment), receiver.timeout_s)

@@ -35,7 +35,7 @@ _log = logging.getLogger(__name__)
 
 
 class _Work(NamedTuple):
-    """What a receiver's thread is to do, and what to do with its result in the courier's thread."""
+    """A task of a receiver's thread, and the use of its result in the courier's thread."""
 
     do: Callable[[], Any]
     then: Callable[[Any], None]
@@ -83,7 +83,7 @@ class Courier:
 
     @property
     def is_alive(self) -> bool:
-        """Whether the courier's thread runs."""
+        """True while the courier's thread runs."""
         return self._thread.is_alive()
 
     # The courier's thread.
