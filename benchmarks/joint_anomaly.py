@@ -27,6 +27,7 @@ from processors.contract import Output
 from processors.effects import Effect, Publish
 from processors.joint_anomaly.config import Config
 from processors.joint_anomaly.processor import PROCESSOR, RAW, State
+from processors.joint_anomaly.scoring import scorings
 from processors.running.engine import Engine
 from processors.sample import Sample
 from sparkplug.host_session import EventKind, HostEvent
@@ -75,8 +76,8 @@ def stream(machines: list[str], seconds: float) -> list[HostEvent]:
 def engine(step: Step, names: list[str], cell: int, models: list[AnomalyModel]) -> Engine:
     """The processor's own fold, or another, over cells of so many machines."""
     cells = {f"c{i}": names[i : i + cell] for i in range(0, len(names), cell)}
-    configuration = Configuration(Config, {"cells": cells, "tick_s": TICK_MS / 1000, "threshold": 1.0}, name="joint_anomaly")
-    configuration.default.__dict__["loaded"] = dict(zip(names, models, strict=True))
+    table, by_name = {"cells": cells, "tick_s": TICK_MS / 1000, "threshold": 1.0}, dict(zip(names, models, strict=True))
+    configuration = Configuration(Config, table, name="joint_anomaly", reads=lambda config: scorings(config, by_name))
     return Engine(replace(PROCESSOR, step=step), configuration, machines_max=len(names))
 
 

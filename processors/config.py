@@ -10,7 +10,7 @@ A file holds a table for each processor, so that one file can serve several:
 """
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, ClassVar, Generic, Self, TypeVar
 
@@ -23,7 +23,7 @@ TICKS_MAX = 100_000  # that one jump of event time may bring
 
 
 class ProcessorConfig(BaseModel):
-    """What the engine needs of every processor's configuration. Durations are event time."""
+    """The settings that the engine needs of every processor. Durations are event time."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
     of_one_machine: ClassVar[frozenset[str] | None] = None
@@ -44,7 +44,7 @@ ALL = "all"
 
 
 class CellConfig(ProcessorConfig):
-    """What the engine needs of the configuration of a processor that compares machines.
+    """The settings that the engine needs of a processor that compares machines.
 
     cells: the machines of each cell by name; those that stand in none are together in the cell "all"
     """
@@ -67,10 +67,21 @@ C_co = TypeVar("C_co", bound=ProcessorConfig, covariant=True)
 
 
 class Configuration(Generic[C_co]):
-    """The configuration of one processor: the values for all machines, and for those that have their own."""
+    """The configuration of one processor: the values for all machines, and for those that have their own.
 
-    def __init__(self, model: type[C_co], table: Mapping[str, Any] | None = None, *, name: str = "") -> None:
-        """Check `table` at once, every machine of it. Raises ConfigurationError naming key, value and model."""
+    read: by machine, what the processor has made of the files that the values name (its models): read once, here
+    """
+
+    def __init__(
+        self,
+        model: type[C_co],
+        table: Mapping[str, Any] | None = None,
+        *,
+        name: str = "",
+        reads: "Callable[[Configuration[C_co]], Mapping[str, Any]] | None" = None,
+    ) -> None:
+        """Check `table` at once, every machine of it, and read what it names. Raises ConfigurationError naming key, value and
+        model."""
         shared = dict(table or {})
         machines = shared.pop(MACHINES, {})
         if not isinstance(machines, dict) or not all(isinstance(own, dict) for own in machines.values()):
@@ -81,6 +92,10 @@ class Configuration(Generic[C_co]):
         self._of_machine: dict[str, C_co] = {
             machine: _validated(model, {**shared, **own}, f"{name}.{MACHINES}.{machine}") for machine, own in machines.items()
         }
+        try:
+            self.read: Mapping[str, Any] = {} if reads is None else reads(self)
+        except ValueError as error:
+            raise ConfigurationError(f"[{name}] {error}") from error
 
     def of(self, machine: str) -> C_co:
         """The values that hold for `machine`."""
@@ -93,7 +108,7 @@ class Configuration(Generic[C_co]):
 
 
 def _check_own(model: type[ProcessorConfig], own: Mapping[str, Any], where: str) -> None:
-    """What holds for all machines together is not to be set for one, and then not heeded."""
+    """Refuse a value for one machine that holds for all of them, and would not be heeded."""
     allowed = model.of_one_machine
     if allowed is not None and (common := [key for key in own if key in model.model_fields and key not in allowed]):
         raise ConfigurationError(

@@ -1,4 +1,4 @@
-"""What a processor is: a pure fold over the samples of a machine, with everything it reads and emits declared.
+"""A processor: a pure fold over the samples of a machine, with everything it reads and emits declared.
 
     step(config, state, sample) -> (state, outputs)
 
@@ -7,12 +7,12 @@ suite: same stream, same answer; a restart in the middle changes nothing; nothin
 Where machines are compared with each other, a `CellProcessor` folds the samples of all machines of a cell into one state.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, is_dataclass
 from enum import Enum
-from typing import Generic, NamedTuple, TypeVar
+from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 
-from processors.config import CellConfig, Configuration, ProcessorConfig
+from processors.config import ALL, CellConfig, Configuration, ProcessorConfig
 from processors.effects import Pin
 from processors.errors import DeclarationError
 from processors.sample import Sample, SampleKind
@@ -41,7 +41,7 @@ __all__ = [
 
 
 class Provenance(Enum):
-    """Where a figure comes from."""
+    """The origin of a figure."""
 
     MEASURED = "measured"
     MODELLED = "modelled"
@@ -143,11 +143,12 @@ Outputs = Sequence[Output | PlainOutput | Pin]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Declaration(Generic[C, S]):
-    """What both kinds of processor declare.
+    """The part of a declaration that both kinds of processor share.
 
     version: of the state's form; a snapshot of another version is not restored
     inputs: names of the metrics that are read; None = all, those of other processors too
     state: a frozen dataclass of JSON-able fields; `initial` makes the first one
+    reads: makes what the step needs of the files that a configuration names, by machine; raises ValueError where it cannot
     records: whether the runtime hands all that it hears to a recorder, as it comes, before the fold sees it
     """
 
@@ -159,6 +160,7 @@ class _Declaration(Generic[C, S]):
     state: type[S]
     initial: Callable[[C], S]
     plain: tuple[PlainSpec, ...] = ()
+    reads: Callable[[Configuration[C]], Mapping[str, Any]] | None = None
     records: bool = False
 
     def __post_init__(self) -> None:
@@ -173,8 +175,12 @@ class _Declaration(Generic[C, S]):
         """The id of its edge node and of its host application."""
         return twin_node(self.name)
 
+    def configured(self, table: Mapping[str, Any] | None = None) -> Configuration[C]:
+        """The configuration out of a table, checked, with what it names on the disk. Raises ConfigurationError."""
+        return Configuration(self.config, table, name=self.name, reads=self.reads)
+
     def listens_to(self, node: str) -> bool:
-        """Whether it reads what the node `node` says: never itself or jobs, other processors only where an input is theirs."""
+        """Return True if it reads the node `node`: never itself or jobs, other processors only where an input is theirs."""
         if not is_twin_node(node):
             return True
         if node == JOBS_NODE:
@@ -185,9 +191,33 @@ class _Declaration(Generic[C, S]):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Processor(_Declaration[C, S]):
-    """A fold over what one machine says: a state for each machine."""
+    """A fold over what one machine says: a state for each machine, which is its own unit."""
 
     step: Callable[[C, S, Sample], tuple[S, Outputs]]
+    listens: ClassVar[tuple[str, ...]] = ()
+    wakes: ClassVar[frozenset[str] | None] = None
+    beats: ClassVar[bool] = False
+
+    @property
+    def is_of_cells(self) -> bool:
+        """True if machines share a state."""
+        return False
+
+    def unit_of(self, configuration: Configuration[C], machine: str) -> str:
+        """The unit that a machine is in: what has a state."""
+        return machine
+
+    def units_at_start(self, configuration: Configuration[C]) -> tuple[str, ...]:
+        """The units that there are before any machine is born."""
+        return ()
+
+    def config_of(self, configuration: Configuration[C], machine: str) -> C:
+        """The values that hold for the stream of a machine, or the first state of a unit."""
+        return configuration.of(machine)
+
+    def given(self, configuration: Configuration[C], unit: str) -> C:
+        """The configuration that the step of a unit is given."""
+        return configuration.of(unit)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -206,3 +236,24 @@ class CellProcessor(_Declaration[D, S]):
     listens: tuple[str, ...] = ()
     wakes: frozenset[str] | None = None
     beats: bool = False
+
+    @property
+    def is_of_cells(self) -> bool:
+        """True if machines share a state."""
+        return True
+
+    def unit_of(self, configuration: Configuration[D], machine: str) -> str:
+        """The cell that a machine is in."""
+        return configuration.default.cell_of(machine)
+
+    def units_at_start(self, configuration: Configuration[D]) -> tuple[str, ...]:
+        """All cells, where the processor works without any machine."""
+        return (*configuration.default.cells, ALL) if self.beats or self.listens else ()
+
+    def config_of(self, configuration: Configuration[D], machine: str) -> D:
+        """The values that hold for all: the machines of a cell share ticks and times."""
+        return configuration.default
+
+    def given(self, configuration: Configuration[D], unit: str) -> Configuration[D]:
+        """The whole configuration, that of each machine at hand."""
+        return configuration

@@ -1,4 +1,4 @@
-"""What the engine asks of the runtime, in order."""
+"""The requests of the engine to the runtime, in order."""
 
 from typing import NamedTuple
 

@@ -1,4 +1,4 @@
-"""What can go wrong in this package.
+"""The exceptions of this package.
 
 ProcessorError
 ├── DeclarationError      a processor is declared in a way that the contract does not allow

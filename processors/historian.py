@@ -23,7 +23,7 @@ DAY_MS = 86_400_000
 
 
 class HistorianConfig(ProcessorConfig):
-    """Where things are kept and for how long (docs/store.md), and what is pinned."""
+    """The store, how long it keeps what (docs/store.md), and what is pinned."""
 
     store: str = ""
     pin_before_s: float = Field(default=600.0, ge=0.0, le=86_400.0)

@@ -1,4 +1,4 @@
-"""What the physics of the spindle's temperature gets wrong, beside it: a correction learned from recordings of the machine.
+"""The error of the physics of the spindle's temperature: a correction learned from recordings of the machine.
 
     corrected = twin/spindle_temp_c + forest(speed, load, …)          (twin.residual)
 
@@ -159,7 +159,7 @@ def _gained(config: Config, gain: Gain, physics_k: float, corrected_k: float) ->
 
 
 def _gain(config: Config, gain: Gain) -> Output:
-    """How much less the error is than that of the physics alone, in the region, of late."""
+    """Return how much smaller the error is than that of the physics alone, in the region, of late."""
     if gain.seconds < min(config.gain_min_s, 0.9 * config.gain_over_s):
         return Output.null(GAIN, f"less than {config.gain_min_s:g} s seen in the region yet")
     if gain.physics_k2_s <= 0.0:

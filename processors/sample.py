@@ -1,4 +1,4 @@
-"""What a fold is given: one message of one machine, or a moment at which none came."""
+"""The input of a fold: one message of one machine, or a moment at which none came."""
 
 import math
 from collections.abc import Mapping

@@ -34,7 +34,7 @@ BLOCK_MS_MIN = 10.0
 SAMPLES_MAX = 1_000_000
 RATE_TOLERANCE = 0.01
 LATE_KEPT = 0.9
-"""Of the sum of latenesses, from block to block: stamps that are 5 % off their rate, block by block, are seen."""
+"""The share of the sum of latenesses kept from block to block: stamps that are 5 % off their rate, block by block, are seen."""
 AT_FULL_SCALE = 0.999
 NUMBERS = frozenset({float, int})
 G_MAX = 100_000.0

@@ -1,23 +1,18 @@
-"""What a notification says: the JSON of Alertmanager's webhook, version 4, and a title and a text for people."""
+"""The content of a notification: the JSON of Alertmanager's webhook, version 4, and a title and a text for people."""
 
-import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import lru_cache
-from hashlib import sha256
 from typing import Any
 
 from processors.alerts.config import AlertsConfig
-from processors.alerts.state import Alert, Item, Phase, Severity, labels_of
-from twin.vocabulary import topics
+from processors.alerts.state import Alert, Phase, Severity, labels_of
 
 ALERTS_A_BODY_MAX = 50
 TEXT_MAX = 2000
 TITLE_MAX = 200
-NOT_YET_S = -1e9  # of an item that was not emitted yet
 NEVER = "0001-01-01T00:00:00Z"  # how Go writes no time, and Alertmanager an alert that has no end yet
-OUTBOX = topics.ALERT_OUTBOX
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,12 +41,6 @@ def iso(at_ms: int) -> str:
     except (OverflowError, ValueError, OSError):
         return NEVER
     return f"{stamp.removesuffix('+00:00')}Z"
-
-
-def notification_id(receiver: str, kind: str, says: Iterable[str]) -> str:
-    """The same for the same news to the same receiver, also after a crash."""
-    text = "\n".join((receiver, kind, *sorted(says)))
-    return sha256(text.encode("utf-8", "surrogatepass")).hexdigest()[:16]
 
 
 def as_alert(alert: Alert, config: AlertsConfig) -> dict[str, Any]:
@@ -136,23 +125,3 @@ def _line(alert: Alert) -> str:
 def worst_of(alerts: Iterable[Alert]) -> Severity | None:
     """The highest severity among them."""
     return max((alert.severity for alert in alerts), key=lambda severity: severity.rank, default=None)
-
-
-def item(notice: Notice, config: AlertsConfig, wall_s: float, clock_s: float) -> Item:
-    """The notification as it stands in the outbox."""
-    key = notification_id(notice.receiver, notice.kind, notice.says)
-    worst = worst_of(alert for alert in notice.alerts if alert.is_on)
-    document = {
-        "id": key,
-        "receiver": notice.receiver,
-        "kind": notice.kind,
-        "severity": worst.value if worst is not None else "none",
-        "title": title(notice),
-        "text": text(notice),
-        "says": list(notice.says),
-        "created": iso(round(wall_s * 1000)),
-        "expires_s": wall_s + notice.expires_s,
-        "body": body(notice, config),
-    }
-    payload = json.dumps(document, separators=(",", ":"), ensure_ascii=False)
-    return Item(key, notice.receiver, notice.kind, notice.says, payload, clock_s, NOT_YET_S, clock_s + notice.expires_s)

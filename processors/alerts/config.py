@@ -6,6 +6,7 @@ from typing import Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
 
+from processors.alerts.alarms import alarm_signals
 from processors.alerts.quiet import QuietHours
 from processors.alerts.receivers import AnyReceiver, Escalation, Heartbeat
 from processors.alerts.state import Severity
@@ -15,7 +16,6 @@ from twin.vocabulary import twin_signals
 RULES = twin_signals.RULES
 SCORE = twin_signals.ANOMALY_ALARM
 GAP, DRIFT = twin_signals.GAP_GROWING, twin_signals.SCORE_DRIFT
-ALARM_SIGNALS = (*RULES, SCORE, GAP, DRIFT)
 MACHINE_OFFLINE, SOURCE_LOST = "machine_offline", "alarm_source_lost"
 RECEIVERS_MAX = 20
 ROUTES_MAX = 100
@@ -42,13 +42,15 @@ class Rule(BaseModel):
 
 
 def _signals() -> dict[str, Rule]:
+    """Every declared alarm; one that is not named here is of medium severity."""
     rules = dict.fromkeys(RULES, Rule(severity=Severity.HIGH))
     score = Rule(severity=Severity.MEDIUM, raised_by_rule=True)
-    return {**rules, SCORE: score, GAP: Rule(severity=Severity.MEDIUM), DRIFT: Rule(severity=Severity.LOW)}
+    named = {**rules, SCORE: score, GAP: Rule(severity=Severity.MEDIUM), DRIFT: Rule(severity=Severity.LOW)}
+    return named | {name: Rule(severity=Severity.MEDIUM) for name in alarm_signals() if name not in named}
 
 
 class Route(BaseModel):
-    """Which alerts go to which receivers; what is left empty matches all. An alert goes to the receivers of every route that
+    """A route of alerts to receivers; what is left empty matches all. An alert goes to the receivers of every route that
     matches it."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -99,8 +101,8 @@ class AlertsConfig(CellConfig):
         if self.cells:
             raise ValueError("cells: alerts watch all machines together; leave it out")
         for signal in self.signals:
-            if signal not in ALARM_SIGNALS:
-                raise ValueError(f"signals: {signal!r} is no alarm signal; there are: {', '.join(ALARM_SIGNALS)}")
+            if signal not in alarm_signals():
+                raise ValueError(f"signals: {signal!r} is no alarm signal; there are: {', '.join(_signals())}")
         for name in self.labels:
             if not _LABEL.fullmatch(name) or name in _OWN_LABELS:
                 raise ValueError(

@@ -1,4 +1,4 @@
-"""What comes on cnctwin/alerts/…: commands of people, the fate of notifications, and our own outbox after a crash.
+"""Messages on cnctwin/alerts/…: commands of people, the fate of notifications, and our own outbox after a crash.
 
     cnctwin/alerts/command/ack        {"id", "by", "fingerprint", "comment"}
     cnctwin/alerts/command/silence    {"id", "by", "matchers": {label: pattern}, "for_s", "starts_s", "comment"}
@@ -12,31 +12,22 @@ done again. What cannot be read is counted and shown, and changes nothing.
 import json
 from collections.abc import Callable
 from dataclasses import replace
-from datetime import UTC, datetime
 from hashlib import sha256
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from processors.alerts.body import ALERTS_A_BODY_MAX, Notice, iso, item
+from processors.alerts.body import Notice
 from processors.alerts.config import AlertsConfig
-from processors.alerts.recall import recalled
+from processors.alerts.notification import Notification
+from processors.alerts.outbox import made, recalled, settled
 from processors.alerts.state import (
-    FAILURES_MAX,
     OUTCOMES_MAX,
-    SETTLED_MAX,
     SILENCES_MAX,
-    Alert,
     AlertsState,
     CommandOutcome,
-    Failure,
-    Item,
     Phase,
-    ReceiverState,
-    Settled,
-    Severity,
     Silence,
-    fingerprint,
 )
 from twin.vocabulary import topics
 
@@ -46,7 +37,6 @@ MESSAGE_BYTES_MAX = 4096
 OUTBOX_BYTES_MAX = 200_000
 SILENCE_S_MAX = 30 * 86_400.0
 TEST_EXPIRES_S = 600.0
-DELIVERED, FAILED = "delivered", "failed"
 
 Name = Annotated[str, Field(min_length=1, max_length=64)]
 Comment = Annotated[str, Field(max_length=500)]
@@ -57,7 +47,7 @@ class _Message(BaseModel):
 
 
 class Command(_Message):
-    """What every command has."""
+    """The fields that every command has."""
 
     id: Name
     by: Name
@@ -92,38 +82,12 @@ class Trial(Command):
 
 
 class Delivery(_Message):
-    """What became of a notification."""
+    """The fate of a notification."""
 
     id: Name
     receiver: Name
     outcome: Literal["delivered", "failed"]
     reason: Comment = ""
-
-
-class OutboxAlert(_Message):
-    """What is read of an alert in our own outbox."""
-
-    fingerprint: Name
-    labels: dict[str, str]
-    annotations: dict[str, str] = {}
-    ended: str = Field(alias="endsAt")
-
-
-class OutboxBody(_Message):
-    """The alerts of a notification in our own outbox."""
-
-    alerts: list[OutboxAlert] = Field(default=[], max_length=ALERTS_A_BODY_MAX)
-
-
-class OutboxItem(_Message):
-    """What is read of our own outbox."""
-
-    id: Name
-    receiver: Name
-    kind: Name
-    created: str = ""
-    body: OutboxBody = OutboxBody()
-    says: list[Annotated[str, Field(max_length=200)]] = Field(max_length=5000)
 
 
 def taken(config: AlertsConfig, state: AlertsState, topic: str, text: str) -> AlertsState:
@@ -132,13 +96,13 @@ def taken(config: AlertsConfig, state: AlertsState, topic: str, text: str) -> Al
     try:
         if len(text) > size_max:
             raise ValueError(f"more than {size_max} characters")
+        if topic.startswith(OUTBOX):
+            return recalled(state, Notification.of(text), text)
         document = json.loads(text)
         if topic.startswith(COMMAND):
             return _command(config, state, topic.removeprefix(COMMAND), document)
         if topic.startswith(DELIVERY):
             return _delivered(state, Delivery.model_validate(document))
-        if topic.startswith(OUTBOX):
-            return _own(state, OutboxItem.model_validate(document), text)
     except ValidationError as error:
         first = error.errors()[0]
         return _malformed(state, topic, f"{'.'.join(map(str, first['loc']))}: {first['msg']}")
@@ -215,8 +179,8 @@ def _test(config: AlertsConfig, state: AlertsState, command: Trial) -> Done:
     key = sha256(command.id.encode("utf-8", "surrogatepass")).hexdigest()[:16]
     notes = (f"asked for by {command.by}",)
     notice = Notice(command.receiver, "test", "test", {}, (), (f"test.{key}",), notes, TEST_EXPIRES_S)
-    made = item(notice, config, state.wall_s, state.clock_s)
-    return replace(state, outbox=state.outbox | {made.id: made}), True, made.id
+    item = made(notice, config, state.wall_s, state.clock_s)
+    return replace(state, outbox=state.outbox | {item.id: item}), True, item.id
 
 
 _COMMANDS: dict[str, tuple[type[Command], Callable[..., Done]]] = {
@@ -232,65 +196,3 @@ _COMMANDS: dict[str, tuple[type[Command], Callable[..., Done]]] = {
 
 def _delivered(state: AlertsState, delivery: Delivery) -> AlertsState:
     return settled(state, delivery.id, delivery.receiver, delivery.outcome, delivery.reason)
-
-
-def settled(state: AlertsState, key: str, receiver: str, outcome: str, reason: str) -> AlertsState:
-    """The fate of a notification is known: counted once. A failure is kept to be seen, and escalates what it said."""
-    if key in state.settled or len(state.settled) >= SETTLED_MAX:
-        return state
-    made = state.outbox.get(key)
-    known = state.receivers.get(receiver, ReceiverState())
-    if outcome == DELIVERED:
-        known = replace(known, delivered=known.delivered + 1, last_delivered_wall_s=state.wall_s)
-    else:
-        known = replace(known, failed=known.failed + 1, last_error=reason)
-        says = made.says if made is not None else ()
-        failure = Failure(key, receiver, reason, state.wall_s, says)
-        told = {said.split(".")[0] for said in says}
-        failed = {name: replace(alert, undelivered=True) for name, alert in state.alerts.items() if name in told and alert.is_on}
-        state = replace(state, failures=(*state.failures, failure)[-FAILURES_MAX:], alerts=state.alerts | failed)
-    outbox = {name: one for name, one in state.outbox.items() if name != key}
-    return replace(
-        state,
-        outbox=outbox,
-        settled=state.settled | {key: Settled(receiver, outcome, reason, state.clock_s)},
-        receivers=state.receivers | {receiver: known},
-    )
-
-
-def _own(state: AlertsState, found: OutboxItem, text: str) -> AlertsState:
-    if found.id in state.outbox:
-        return state
-    made = Item(
-        found.id,
-        found.receiver,
-        found.kind,
-        tuple(found.says),
-        text,
-        state.clock_s,
-        state.clock_s,
-        state.clock_s + TEST_EXPIRES_S,
-    )
-    written = {one.fingerprint: _written(one) for one in found.body.alerts if _is_ours(one)}
-    return recalled(state, made, written, is_later=found.created > iso(round(state.wall_s * 1000)))
-
-
-def _is_ours(found: OutboxAlert) -> bool:
-    """Whether its labels are those of its fingerprint."""
-    labels = {name: value for name, value in found.labels.items() if name != "severity"}
-    return {"machine", "alertname", "severity"} <= found.labels.keys() and fingerprint(labels) == found.fingerprint
-
-
-def _written(found: OutboxAlert) -> Alert:
-    """The alert of no episode yet. Raises ValueError where its severity or its end is none."""
-    labels = found.labels
-    return Alert(
-        labels["machine"],
-        labels["alertname"],
-        labels.get("signal", ""),
-        found.fingerprint,
-        Severity(labels["severity"]),
-        0,
-        ended_ms=round(datetime.fromisoformat(found.ended).replace(tzinfo=UTC).timestamp() * 1000),
-        context=found.annotations.get("description", ""),
-    )

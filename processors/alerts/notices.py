@@ -10,12 +10,14 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
-from processors.alerts.body import Notice, item
+from processors.alerts.body import Notice
 from processors.alerts.config import AlertsConfig
+from processors.alerts.outbox import made
 from processors.alerts.receivers import AnyReceiver
-from processors.alerts.routing import FIRING, OVER, PASSED, RAISED, REPEAT, RESOLVED, Change, changes_for, has_passed
+from processors.alerts.routing import Change, changes_for, has_passed
 from processors.alerts.silence import silenced_by
-from processors.alerts.state import OUTBOX_MAX, Alert, AlertsState, Group, ReceiverState, Severity, Told
+from processors.alerts.state import OUTBOX_MAX, Alert, AlertsState, Group, LastNotice, ReceiverState, Severity
+from processors.alerts.statement import FIRING, OVER, PASSED, RAISED, REPEAT, RESOLVED
 from processors.config import Configuration
 
 HOUR_S = 3600.0
@@ -33,7 +35,7 @@ class _Bundle(NamedTuple):
 
 
 class _Desk(NamedTuple):
-    """What deciding for one receiver needs."""
+    """The context of deciding for one receiver."""
 
     name: str
     receiver: AnyReceiver
@@ -59,9 +61,9 @@ def notified(configuration: Configuration[AlertsConfig], state: AlertsState) -> 
         known, notices = _due(desk, known, changes)
         for notice in notices:
             if len(outbox) < OUTBOX_MAX:
-                made = item(notice, config, state.wall_s, state.clock_s)
-                if made.id not in state.settled and made.id not in outbox:
-                    outbox[made.id] = made
+                item = made(notice, config, state.wall_s, state.clock_s)
+                if item.id not in state.settled and item.id not in outbox:
+                    outbox[item.id] = item
         receivers[name] = known
     return replace(state, receivers=receivers, outbox=outbox)
 
@@ -86,7 +88,7 @@ def _tidied(known: ReceiverState, state: AlertsState) -> ReceiverState:
 
 
 def _passed_in_silence(known: ReceiverState, state: AlertsState, silenced: Mapping[str, str]) -> ReceiverState:
-    """What came and went while it was silenced is not told afterwards."""
+    """Mark alerts that came and went while silenced as known: they are not told afterwards."""
     alerts = [state.alerts[key] for key in silenced]
     over = [alert for alert in alerts if has_passed(alert, known.told.get(alert.fingerprint), state.clock_s)]
     firing = [alert for alert in over if (told := known.told.get(alert.fingerprint)) is not None and told.is_firing]
@@ -179,7 +181,7 @@ def _send(desk: _Desk, known: ReceiverState, bundle: _Bundle, *, is_held: bool) 
 
 
 def _alerts_in(desk: _Desk, known: ReceiverState, key: str, news: list[Change], kind: str) -> tuple[Alert, ...]:
-    """What is new, then what else of the group this receiver believes to be firing, so that it sees the whole."""
+    """Return the new alerts, then what else of the group this receiver believes to be firing, so that it sees the whole."""
     new = tuple(change.alert for change in news)
     if kind == DIGEST:
         return new
@@ -200,7 +202,7 @@ def _alerts_in(desk: _Desk, known: ReceiverState, key: str, news: list[Change], 
 
 def _told(known: ReceiverState, news: list[Change], clock_s: float) -> ReceiverState:
     told = {
-        change.alert.fingerprint: Told(
+        change.alert.fingerprint: LastNotice(
             change.alert.episode, change.alert.severity, change.what not in OVER, clock_s, change.told_before + 1
         )
         for change in news

@@ -20,7 +20,7 @@ NOT_OFFERED = "not offered"
 
 
 class Condition(NamedTuple):
-    """Whether the alarm stands: yes, no, or None with the reason; since when in event time (ms)."""
+    """The alarm as it stands: yes, no, or None with the reason; since when in event time (ms)."""
 
     stands: bool | None
     reason: str
@@ -36,7 +36,7 @@ class Beat(NamedTuple):
 
 
 def condition_of(reading: Reading | None) -> Condition:
-    """What an alarm signal says."""
+    """Return the condition that an alarm signal reports."""
     if reading is None:
         return Condition(None, NOT_OFFERED, 0)
     if (reason := why_unknown(reading)) is not None:
@@ -123,13 +123,13 @@ def caught_up(alert: Alert, severity: Severity, episode: int, ended_ms: int | No
 
 
 def flaps(alert: Alert, clock_s: float, config: AlertsConfig) -> bool:
-    """Whether it has fired so often lately that each firing is no news."""
+    """Return True if it has fired so often lately that each firing is no news."""
     lately = sum(clock_s - rise_s <= config.flap_window_s for rise_s in alert.rises_s)
     return lately >= config.flap_episodes
 
 
 def keep_firing_for_s(alert: Alert, rule: Rule, clock_s: float, config: AlertsConfig) -> float:
-    """How long the alarm has to be gone."""
+    """Return how long the alarm has to be gone."""
     if flaps(alert, clock_s, config):
         return max(rule.keep_firing_for_s, config.flap_keep_firing_for_s)
     return rule.keep_firing_for_s

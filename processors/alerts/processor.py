@@ -1,18 +1,19 @@
 """Alerts: from alarm signals of all machines to notifications, once each, for people who are to keep them switched on.
 
 A pure fold over all machines. Once a second (a beat of the wall clock) each alarm is looked at, each alert goes a step
-(`alerts_phases`), and what each receiver has to be told goes into the outbox (`alerts_notices`), a retained message for each
-notification, which the courier (`processors/alerts/courier`) sends. What became of it comes back; only then is it cleared.
+(`phases.py`), and what each receiver has to be told (`notices.py`) goes into the outbox (`outbox.py`), a retained message for
+each notification, which the courier (`courier/`) sends. What became of it comes back; only then is it cleared.
 """
 
 from collections.abc import Sequence
 from dataclasses import replace
 
-from processors.alerts.body import Notice, item
+from processors.alerts.body import Notice
 from processors.alerts.config import AlertsConfig
 from processors.alerts.messages import COMMAND, DELIVERY, OUTBOX, TOPIC, taken
 from processors.alerts.notices import notified
-from processors.alerts.report import FIRING, STATE, SUMMARY, machine_outputs, outbox_outputs, state_output
+from processors.alerts.outbox import emitted, made
+from processors.alerts.report import FIRING, STATE, SUMMARY, machine_outputs, state_output
 from processors.alerts.state import AlertsState
 from processors.alerts.watch import INPUTS, next_beat, watched
 from processors.config import Configuration
@@ -59,7 +60,7 @@ def _beat(
 ) -> tuple[AlertsState, Sequence[Output | PlainOutput]]:
     state = watched(configuration, before, sample.cell, next_beat(before, sample.at_s))
     state = _beaten(configuration.default, notified(configuration, state))
-    state, outbox = outbox_outputs(state)
+    state, outbox = emitted(state)
     state, metrics = machine_outputs(configuration, state, tuple(sample.cell), sample.at_s)
     state, told = state_output(configuration, state)
     return state, (*outbox, *metrics, *told)
@@ -69,11 +70,11 @@ def _beaten(config: AlertsConfig, state: AlertsState) -> AlertsState:
     """The heartbeat of this slot of time, where the last one is gone."""
     name, every_s = config.heartbeat.receiver, config.heartbeat.every_s
     slot = int(state.wall_s // every_s)
-    if not name or slot == state.heartbeat_slot or any(made.kind == HEARTBEAT for made in state.outbox.values()):
+    if not name or slot == state.heartbeat_slot or any(item.kind == HEARTBEAT for item in state.outbox.values()):
         return state
     notice = Notice(name, HEARTBEAT, HEARTBEAT, {"alertname": "cnctwin_heartbeat"}, (), (f"{HEARTBEAT}.{slot}",), (), every_s)
-    made = item(notice, config, state.wall_s, state.clock_s)
-    outbox = state.outbox if made.id in state.settled else state.outbox | {made.id: made}
+    item = made(notice, config, state.wall_s, state.clock_s)
+    outbox = state.outbox if item.id in state.settled else state.outbox | {item.id: item}
     return replace(state, heartbeat_slot=slot, outbox=outbox)
 
 

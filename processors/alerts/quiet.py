@@ -48,7 +48,7 @@ class QuietHours(BaseModel):
         return self
 
     def holds(self, receiver: str, wall_s: float) -> bool:
-        """Whether it is quiet for this receiver.
+        """Return True if it is quiet for this receiver.
 
         >>> night = QuietHours(time_zone="Europe/Berlin", start="22:00", end="06:00", days=("fri",))
         >>> friday = datetime(2026, 11, 20, tzinfo=UTC).timestamp()

@@ -16,7 +16,7 @@ _FILE = re.compile(r"file:.+")
 
 
 def names_secret(text: str) -> bool:
-    """Whether this is the name of a secret: `$NAME` or `file:/path`.
+    """Return True if this is the name of a secret: `$NAME` or `file:/path`.
 
     >>> names_secret("$PUSHOVER_TOKEN"), names_secret("file:/etc/cnctwin/token"), names_secret("azGDORePK8gMaC0QOYAMyEEuzJnyUi")
     (True, True, False)
@@ -25,7 +25,7 @@ def names_secret(text: str) -> bool:
 
 
 def url_fault(url: str) -> str | None:
-    """What is wrong with an address that notifications go to; its path and query are never part of the answer.
+    """Return the fault of an address that notifications go to; its path and query are never part of the answer.
 
     >>> url_fault("http://hooks.plant.example/x")
     "http://hooks.plant.example is not encrypted: use https:// (http:// is for this computer's loopback only)"
@@ -66,7 +66,7 @@ Address = Annotated[str, AfterValidator(_address)]
 
 
 class Receiver(BaseModel):
-    """What all receivers have.
+    """The settings that all receivers have.
 
     rate_per_hour: notifications that hold no high alert; more are held back, counted, and said with the next one
     rate_high_per_hour: notifications that hold a high alert

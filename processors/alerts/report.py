@@ -1,4 +1,4 @@
-"""What the alerts processor publishes: its state as one JSON, three metrics for each machine, the outbox."""
+"""The publications of the alerts processor: its state as one JSON, three metrics for each machine."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -8,10 +8,9 @@ from typing import Any
 
 from processors.alerts.body import as_alert, iso
 from processors.alerts.config import AlertsConfig
-from processors.alerts.messages import DELIVERY, FAILED, OUTBOX, settled
 from processors.alerts.notices import silenced_alerts
 from processors.alerts.phases import flaps
-from processors.alerts.state import Alert, AlertsState, Item, Phase, ReceiverState, Silence
+from processors.alerts.state import Alert, AlertsState, Phase, ReceiverState, Silence
 from processors.config import Configuration
 from processors.contract import Output, PlainOutput
 from twin.vocabulary import topics
@@ -21,35 +20,9 @@ STATE, FIRING, SUMMARY = ALERT_STATE, f"{TWIN_PREFIX}alerts_firing", f"{TWIN_PRE
 STATE_TOPIC = topics.ALERT_STATE
 SHOWN_MAX = 1000
 SUMMARY_MAX = 500
-EMIT_AGAIN_S = 30.0  # an outbox item of unknown fate: the message may have been lost
-CLEAR_AFTER_S = 60.0  # a settled item: long after the snapshot that knows of it
 REPUBLISH_S = 60.0
 NONE = "none"
 _ORDER = {Phase.FIRING: 3, Phase.ACKNOWLEDGED: 2, Phase.PENDING: 1, Phase.RESOLVED: 0}
-
-
-# The outbox.
-
-
-def outbox_outputs(state: AlertsState) -> tuple[AlertsState, list[PlainOutput]]:
-    """New notifications, those of unknown fate again, and the removal of what is settled."""
-    clock_s = state.clock_s
-    for key, made in state.outbox.items():
-        if clock_s > made.expires_s + CLEAR_AFTER_S:
-            state = settled(state, key, made.receiver, FAILED, "no courier said what became of it; it may have arrived")
-    outputs = []
-    outbox: dict[str, Item] = {}
-    for key, made in state.outbox.items():
-        is_due = clock_s - made.emitted_s >= EMIT_AGAIN_S
-        outbox[key] = replace(made, emitted_s=clock_s) if is_due else made
-        if is_due:
-            outputs.append(PlainOutput(f"{OUTBOX}{key}", made.payload.encode("utf-8", "replace")))
-    kept = dict(state.settled)
-    for key, fate in state.settled.items():
-        if clock_s - fate.at_s >= CLEAR_AFTER_S:
-            outputs += [PlainOutput(f"{OUTBOX}{key}", b""), PlainOutput(f"{DELIVERY}{key}", b"")]
-            del kept[key]
-    return replace(state, outbox=outbox, settled=kept), outputs
 
 
 # The metrics.
@@ -58,7 +31,7 @@ def outbox_outputs(state: AlertsState) -> tuple[AlertsState, list[PlainOutput]]:
 def machine_outputs(
     configuration: Configuration[AlertsConfig], state: AlertsState, online: Sequence[str], at_s: float
 ) -> tuple[AlertsState, list[Output]]:
-    """What changed of the machines that are online."""
+    """Return the metrics that changed, of the machines that are online."""
     alerts: dict[str, list[Alert]] = {}
     for alert in state.alerts.values():
         alerts.setdefault(alert.machine, []).append(alert)
@@ -186,4 +159,4 @@ def _wall(wall_s: float) -> str:
     return iso(round(wall_s * 1000))
 
 
-__all__ = ["FIRING", "STATE", "STATE_TOPIC", "SUMMARY", "machine_outputs", "outbox_outputs", "state_output"]
+__all__ = ["FIRING", "STATE", "STATE_TOPIC", "SUMMARY", "machine_outputs", "state_output"]

@@ -1,14 +1,12 @@
-"""Which receivers an alert goes to, and what is news to each of them."""
+"""Routing: the receivers that an alert goes to, and what is news to each of them."""
 
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 from processors.alerts.config import AlertsConfig, Route
-from processors.alerts.state import Alert, AlertsState, Phase, ReceiverState, Severity, Told
+from processors.alerts.state import Alert, AlertsState, LastNotice, Phase, ReceiverState
+from processors.alerts.statement import FIRING, PASSED, RAISED, REPEAT, RESOLVED, Statement
 
-FIRING, RAISED, REPEAT, RESOLVED = "firing", "raised", "repeat", "resolved"
-PASSED = "passed"  # it fired and was over before anybody was told
-OVER = (RESOLVED, PASSED)
 PASSED_S_MAX = 3600.0
 
 
@@ -21,27 +19,9 @@ class Change(NamedTuple):
 
     @property
     def says(self) -> str:
-        """What the notification says, to be recognized after a crash."""
+        """The line of the notification."""
         alert = self.alert
-        return f"{alert.fingerprint}.{alert.episode}.{self.what}.{self.told_before}.{alert.severity.value}"
-
-
-class Said(NamedTuple):
-    """What a notification said of one alert."""
-
-    fingerprint: str
-    episode: int
-    what: str
-    told_before: int
-    severity: Severity
-
-    @classmethod
-    def of(cls, text: str) -> "Said | None":
-        """The parts of `Change.says`; None for what says something else. Raises ValueError where a number is none."""
-        parts = text.split(".")
-        if len(parts) != 5 or parts[4] not in {severity.value for severity in Severity}:
-            return None
-        return cls(parts[0], int(parts[1]), parts[2], int(parts[3]), Severity(parts[4]))
+        return Statement(alert.fingerprint, alert.episode, self.what, self.told_before, alert.severity).text
 
 
 def receivers_of(alert: Alert, config: AlertsConfig, clock_s: float, told_by: Iterable[str]) -> set[str]:
@@ -68,8 +48,8 @@ def _matches(route: Route, alert: Alert) -> bool:
     return named and alert.severity.rank >= route.severity_min.rank
 
 
-def change_of(alert: Alert, told: Told | None, config: AlertsConfig, clock_s: float) -> Change | None:
-    """What is news to a receiver that was last told `told`."""
+def change_of(alert: Alert, told: LastNotice | None, config: AlertsConfig, clock_s: float) -> Change | None:
+    """Return what is news to a receiver that was last told `told`."""
     if not alert.is_on:
         # One that pends again is waited for: it fires, or is over after all.
         if told is not None and told.is_firing:
@@ -87,8 +67,8 @@ def change_of(alert: Alert, told: Told | None, config: AlertsConfig, clock_s: fl
     return None
 
 
-def has_passed(alert: Alert, told: Told | None, clock_s: float) -> bool:
-    """Whether an episode is over of which a receiver knows nothing, and not long ago."""
+def has_passed(alert: Alert, told: LastNotice | None, clock_s: float) -> bool:
+    """Return True if an episode that a receiver knows nothing of is over, and not long ago."""
     if alert.phase is not Phase.RESOLVED or not alert.rises_s or (told is not None and told.episode >= alert.episode):
         return False
     return clock_s - alert.resolved_s <= PASSED_S_MAX

@@ -8,7 +8,7 @@ from processors.alerts.state import Alert, Silence, labels_of
 
 
 def matches(silence: Silence, alert: Alert, config: AlertsConfig, wall_s: float) -> bool:
-    """Whether a silence holds for this alert now; `*` and `?` in a value stand for any characters."""
+    """Return True if a silence holds for this alert now; `*` and `?` in a value stand for any characters."""
     if not silence.starts_s <= wall_s < silence.ends_s:
         return False
     labels = labels_of(alert.machine, alert.name, alert.signal, config.labels) | {"severity": alert.severity.value}

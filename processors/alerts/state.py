@@ -1,4 +1,4 @@
-"""What the alerts processor remembers: alerts, who was told what, what waits in the outbox, silences, commands.
+"""The state of the alerts processor: alerts, who was told what, what waits in the outbox, silences, commands.
 
 Two clocks: `wall_s` is UTC as the last beat told it, for what people read and for silences and quiet hours; `clock_s` counts the
 same seconds but never goes back, for every interval, so that a clock that is set changes no dwell and no repeat.
@@ -17,7 +17,7 @@ FAILURES_MAX = 50
 
 
 class Phase(StrEnum):
-    """Where an alert stands. One that never fired and does not pend has no record."""
+    """The phase of an alert. One that never fired and does not pend has no record."""
 
     PENDING = "pending"
     FIRING = "firing"
@@ -26,7 +26,7 @@ class Phase(StrEnum):
 
 
 class Severity(StrEnum):
-    """How bad it is, from the least."""
+    """The severity of an alert, from the least."""
 
     LOW = "low"
     MEDIUM = "medium"
@@ -79,13 +79,13 @@ class Alert:
 
     @property
     def is_on(self) -> bool:
-        """Whether it fires, acknowledged or not."""
+        """True while it fires, acknowledged or not."""
         return self.phase in (Phase.FIRING, Phase.ACKNOWLEDGED)
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
-    """What a receiver was last told of an alert; `count`: how often in this episode."""
+class LastNotice:
+    """The last notice that a receiver got of an alert; `count`: how often in this episode."""
 
     episode: int
     severity: Severity
@@ -105,9 +105,9 @@ class Group:
 
 @dataclass(frozen=True, slots=True)
 class ReceiverState:
-    """What one receiver knows, and how it fares. `recent_s` and `recent_high_s`: notifications of the last hour, by clock_s."""
+    """One receiver and how it fares. `recent_s` and `recent_high_s`: notifications of the last hour, by clock_s."""
 
-    told: dict[str, Told] = field(default_factory=dict)
+    told: dict[str, LastNotice] = field(default_factory=dict)
     groups: dict[str, Group] = field(default_factory=dict)
     recent_s: tuple[float, ...] = ()
     recent_high_s: tuple[float, ...] = ()
@@ -169,7 +169,7 @@ class Silence:
 
 @dataclass(frozen=True, slots=True)
 class CommandOutcome:
-    """What became of a command."""
+    """The outcome of a command."""
 
     id: str
     command: str
@@ -204,7 +204,7 @@ class AlertsState:
 
 
 def fingerprint(labels: dict[str, str]) -> str:
-    """What makes two alerts the same: its labels, severity left out, since that may rise.
+    """Return the identity of an alert: its labels, severity left out, since that may rise.
 
     >>> fingerprint({"alertname": "rule_vibration", "machine": "okuma"})
     'ea33a6c7165f5dfa'

@@ -4,7 +4,8 @@ from collections.abc import Iterator, Mapping, Set
 from dataclasses import replace
 from typing import NamedTuple
 
-from processors.alerts.config import ALARM_SIGNALS, MACHINE_OFFLINE, RULES, SOURCE_LOST, AlertsConfig, Rule
+from processors.alerts.alarms import alarm_signals
+from processors.alerts.config import MACHINE_OFFLINE, RULES, SOURCE_LOST, AlertsConfig, Rule
 from processors.alerts.phases import Beat, Condition, advanced, begun, condition_of, raised
 from processors.alerts.state import ALERTS_MAX, Alert, AlertsState, Phase, Severity, fingerprint, labels_of
 from processors.config import Configuration
@@ -13,7 +14,7 @@ from sparkplug.quality import Quality
 from twin.vocabulary.twin_signals import SEVERITY, TWIN_PREFIX
 
 PROGRAM, TOOL = "program", "tool_number"
-INPUTS = frozenset({*ALARM_SIGNALS, SEVERITY, PROGRAM, TOOL})
+INPUTS = frozenset({*alarm_signals(), SEVERITY, PROGRAM, TOOL})
 SEEN_S_MAX = 5.0  # of one beat: what lies between two that are further apart was not watched
 RESOLVED_SHOWN_S = 3600.0
 MACHINES_MAX = 2000
@@ -95,7 +96,7 @@ def _all(
     cell: Mapping[str, Row],
     known: Set[tuple[str, str]],
 ) -> Iterator[Watched]:
-    """What stands, and what is an alert already: of a shop in order that is next to nothing."""
+    """Yield what stands, and what is an alert already: of a shop in order that is next to nothing."""
     for machine, last_s in machines.items():
         config, row = configuration.of(machine), cell.get(machine)
         for signal, rule in config.signals.items():
@@ -119,8 +120,8 @@ def _all(
 
 
 def _source(config: AlertsConfig, row: Row | None) -> Condition:
-    """Whether a processor that gave alarm signals has gone while the machine is there: then nobody watches, and no alarm is no
-    good news."""
+    """Return whether a processor that gave alarm signals has gone while the machine is there: nobody watches then, and no alarm
+    is no good news."""
     if row is None:
         return Condition(None, OFFLINE, 0)
     lost = [row[signal].timestamp_ms for signal in config.signals if signal in row and row[signal].quality is Quality.STALE]
@@ -130,7 +131,7 @@ def _source(config: AlertsConfig, row: Row | None) -> Condition:
 def _raised(
     configuration: Configuration[AlertsConfig], alerts: dict[str, Alert], cell: Mapping[str, Row], beat: Beat
 ) -> dict[str, Alert]:
-    """Where a rule fires on the same machine, what the score says is confirmed."""
+    """Raise the alerts that a rule confirms by firing on the same machine."""
     by_rule = {alert.machine for alert in alerts.values() if alert.is_on and alert.signal in RULES}
     said_high = {machine for machine, row in cell.items() if _says_high(row.get(SEVERITY))}
     worse = by_rule | said_high
@@ -154,7 +155,7 @@ def _says_high(reading: Reading | None) -> bool:
 
 
 def _context(row: Row) -> str:
-    """What the machine was doing, for the person who is woken up."""
+    """Return what the machine was doing, for the person who is woken up."""
     parts = []
     for signal, word in ((PROGRAM, "program"), (TOOL, "tool")):
         reading = row.get(signal)

@@ -1,4 +1,4 @@
-"""What a machine is doing, in MTConnect's words, and why it stands where it does: only what is known.
+"""The execution of a machine in MTConnect's words, and why it stands where it does: only what is known.
 
 `exec_state` of the control is believed. Where a control has none, feed is taken for it: ACTIVE while it feeds, READY else. A
 machine whose edge is offline is OFFLINE; a state that is null is unknown, which is not a state: what comes back after it as it
@@ -40,7 +40,7 @@ class Execution(NamedTuple):
 
 
 def execution(sample: Sample, feed_mm_min_min: float) -> Execution:
-    """What the row says the machine does.
+    """Return what the machine does, by its row.
 
     >>> from processors.sample import SampleKind
     >>> execution(Sample("vmc", SampleKind.TICK, 0.0, {}), 1.0)
@@ -83,13 +83,13 @@ def tool(row: Mapping[str, Reading]) -> int | None:
 
 
 def is_changing_tool(row: Mapping[str, Reading]) -> bool:
-    """Whether a tool change is told."""
+    """Return True if a tool change is reported."""
     reading = row.get(CHANGING)
     return reading is not None and reading.quality is Quality.GOOD and reading.value is True
 
 
 def is_held_by_override(sample: Sample) -> bool:
-    """Whether the feed override stands at nought."""
+    """Return True if the feed override stands at zero."""
     percent, _ = sample.number(FEED_OVERRIDE)
     return percent is not None and percent <= 0.0
 

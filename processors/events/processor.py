@@ -54,7 +54,7 @@ STAMP_MAX_S = 253_402_300_000.0
 
 
 class Config(ProcessorConfig):
-    """What counts as a run, and the window that the share is of."""
+    """The definition of a run, and the window of the share."""
 
     window_h: float = Field(default=24.0, ge=0.1, le=168.0, description="the rolling window of the utilisation")
     day_begins_h_utc: float = Field(default=0.0, ge=0.0, lt=24.0, description="when a day begins")

@@ -109,7 +109,7 @@ def _missing(run: Run, *, is_end_seen: bool) -> list[str]:
 
 
 def _absent(run: Run) -> list[str]:
-    """Which figures there are none of."""
+    """Return the figures that are missing."""
     wanted = {"spindle temperature": TEMPERATURE, "anomaly score": SCORE}
     absent = [f"no {what}" for what, name in wanted.items() if name not in run.figures]
     absent += [] if any(use.force is not None for use in run.tools) else ["no cutting force"]

@@ -132,7 +132,7 @@ def lasted(run: Run, sample: Sample, state: str | None, reason: str, dt_s: float
 
 
 def followed(run: Run, sample: Sample) -> Run:
-    """What a message tells at once: another tool, a peak, a flag that rises."""
+    """Take what a message tells at once: another tool, a peak, a flag that rises."""
     changed = sample.changed
     if "tool_number" in changed:
         number = tool(sample.row)

@@ -24,7 +24,7 @@ SPREAD_WORTH = math.log(1.5)
 
 
 class Moments(NamedTuple):
-    """Of a value held for so long; `m2` is the integral of the square about the mean."""
+    """The mean of a value held for so long; `m2` is the integral of the square about the mean."""
 
     seconds: float = 0.0
     mean: float = 0.0
@@ -93,7 +93,7 @@ class Cell(NamedTuple):
 
     @property
     def is_judged(self) -> bool:
-        """Whether there is a baseline to judge growth by."""
+        """True if there is a baseline to judge growth by."""
         return is_enough(self.level)
 
     @property
@@ -108,17 +108,17 @@ class Cell(NamedTuple):
 
     @property
     def rise(self) -> float:
-        """How far the charts are towards an alarm, 1 = there."""
+        """The charts' distance towards an alarm, 1 = there."""
         return max(self.level_chart.level, self.spread_chart.level)
 
     @property
     def grows(self) -> bool:
-        """Whether one of its charts says so."""
+        """True if one of its charts says so."""
         return bool(self.level_chart.grows or self.spread_chart.grows)
 
 
 class Terms(NamedTuple):
-    """How a cell is kept.
+    """The rules by which a cell is kept.
 
     floor: of d, None while it is not known; resolution: to which controls show the signal; growth_floors: worth an alarm
     blocks_between_alarms: false ones, of one side of a chart; blocks_of_window: that make a stretch to diagnose
@@ -188,7 +188,7 @@ def _judged(cell: Cell, terms: Terms, level: float, spread: float, span_s: tuple
 
 
 def rules_of(cell: Cell, terms: Terms) -> tuple[Rule, Rule] | None:
-    """How its level and its scatter are judged; None while there is no baseline or no floor."""
+    """Return the rules for its level and its scatter; None while there is no baseline or no floor."""
     if terms.floor is None:
         return None
     level = rule_of(cell.level, terms.growth_floors * terms.floor, terms.blocks_between_alarms)

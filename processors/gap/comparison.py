@@ -1,4 +1,4 @@
-"""What the live twin says of a signal, beside what was measured, and in which regime: twin minus measured at one moment.
+"""The live twin beside the measurement, signal by signal, and the regime: twin minus measured at one moment.
 
 | signal | regime | the twin |
 |---|---|---|
@@ -47,7 +47,7 @@ PROGRAM_CHARACTERS_MAX = 40
 
 
 class Feeding(StrEnum):
-    """What the feed says of the cut."""
+    """The cut as the feed shows it."""
 
     UNKNOWN = "unknown"
     REST = "rest"
@@ -56,7 +56,7 @@ class Feeding(StrEnum):
 
 
 class ToolChange(StrEnum):
-    """What the control says of the tool change."""
+    """The tool change as the control reports it."""
 
     ABSENT = "absent"  # it says nothing, ever
     UNKNOWN = "unknown"  # it says nothing now
@@ -66,7 +66,7 @@ class ToolChange(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Watch:
-    """What has to have been so for a while. A new one only where something changed.
+    """The conditions that have to hold for a while. A new one only where something changed.
 
     rise_mean_k: of the modelled rise, over HEATING_S
     """
@@ -81,7 +81,7 @@ class Watch:
 
 
 class Given(NamedTuple):
-    """What the comparison has to be told. idle_load_pct: of the drive, None = not known."""
+    """The settings of the comparison. idle_load_pct: of the drive, None = not known."""
 
     settle_s: float
     rapid_feed_mm_min: float
@@ -98,7 +98,7 @@ class Compared(NamedTuple):
 
 
 class Comparison(NamedTuple):
-    """What could be compared at a moment, and by signal why it could not, where an input was missing."""
+    """The comparisons of one moment, and by signal why there is none, where an input was missing."""
 
     compared: tuple[Compared, ...]
     missing: dict[str, str]
@@ -134,7 +134,7 @@ def heated(watch: Watch, sample: Sample, seconds: float) -> Watch:
 
 
 def comparison(watch: Watch, given: Given, sample: Sample) -> Comparison:
-    """What can be compared at this moment."""
+    """Return the comparisons of this moment."""
     if watch.change is ToolChange.UNKNOWN:
         return Comparison((), dict.fromkeys(SIGNALS, f"{CHANGE} is not known: the samples cannot be gated"), True)
     found = [_temperature(watch, sample), _load(watch, given, sample), _speed(watch, given, sample)]
@@ -203,7 +203,7 @@ def _at_rest(watch: Watch, given: Given, sample: Sample, signal: str) -> Compare
 
 
 def _runs(sample: Sample) -> bool:
-    """Whether a program runs, so that the drives are on; where nobody tells, it is taken to be so."""
+    """Return True if a program runs, so that the drives are on; where nobody tells, it is taken to be so."""
     state = sample.row.get(EXECUTION)
     return state is None or (state.quality is Quality.GOOD and state.value == "ACTIVE")
 
@@ -218,7 +218,7 @@ def _feeding(given: Given, sample: Sample) -> Feeding:
 
 
 def _change(sample: Sample) -> ToolChange:
-    """What the control says, else the detector; ABSENT where neither does."""
+    """Return the report of the control, else of the detector; ABSENT where neither does."""
     said = tool_change_context(sample.row)
     if said.active is not None and said.source != STALE:
         return ToolChange.ACTIVE if said.active else ToolChange.NONE

@@ -1,4 +1,4 @@
-"""Whether a gap grows: a chart of the figures of its blocks (hours), against what they were while the machine was healthy.
+"""A chart of growth: the figures of its blocks (hours), against what they were while the machine was healthy.
 
 Neighbouring hours are alike, so the mean of n of them is not √n times better known than one. The sum over n figures of an AR(1)
 process with correlation φ varies like that of independent ones which scatter ω times as much, so each figure x is taken as
@@ -27,7 +27,7 @@ BLOCKS_MIN = 40
 INDEPENDENT_MIN = 8.0
 """So many healthy blocks make a baseline, and so many that are independent of each other."""
 BASELINES_MAX = 10_000
-"""Of so many, which are fixed once they are learned, the rules are kept at hand."""
+"""Baselines whose rules are cached; they are fixed once they are learned."""
 CORRELATION_MAX = 0.98
 PAIRS_MIN = 10
 DOUBT = 3.0
@@ -35,11 +35,11 @@ STRAY = 3.0
 ALLOWANCE_MIN, ALLOWANCE_MAX = 0.1, 2.0
 THRESHOLD_MIN = 4.0
 CAP = 1.25
-"""Of the threshold: S goes no higher, so that a gap that has gone is seen to be gone in time."""
+"""The cap of S, in thresholds: it goes no higher, so that a gap that has gone is seen to be gone in time."""
 
 
 class Baseline(NamedTuple):
-    """What is known of the figures of healthy blocks, one added after the other.
+    """Statistics of the figures of healthy blocks, one added after the other.
 
     m2: sum of squares about the mean; pairs: neighbours, with the sum of their products and their sum, both from `origin` on
     """
@@ -93,7 +93,8 @@ def learned(baseline: Baseline, figure: float, before: float | None) -> Baseline
 
 
 def correlation(baseline: Baseline) -> float:
-    """Of neighbouring blocks, 0 to CORRELATION_MAX; corrected for being estimated from few, and one standard error higher.
+    """Return the correlation of neighbouring blocks, 0 to CORRELATION_MAX; corrected for being estimated from few, and one
+    standard error higher.
 
     A figure that goes up and down by turns is not correlated in a way that hides a growth:
 
@@ -116,14 +117,14 @@ def correlation(baseline: Baseline) -> float:
 
 @lru_cache(maxsize=BASELINES_MAX)
 def is_enough(baseline: Baseline) -> bool:
-    """Whether so much is known of the healthy machine that a growth can be judged."""
+    """True once enough is known of the healthy machine to judge growth."""
     phi = correlation(baseline)
     return baseline.blocks >= BLOCKS_MIN and baseline.blocks * (1.0 - phi) / (1.0 + phi) >= INDEPENDENT_MIN
 
 
 @lru_cache(maxsize=BASELINES_MAX)
 def rule_of(baseline: Baseline, worth: float, blocks_between_alarms: float) -> Rule | None:
-    """How the chart of this baseline judges; None while it knows too little.
+    """Return the rule by which the chart of this baseline judges; None while it knows too little.
 
     worth: the smallest growth that is worth an alarm, in the unit of the figure
     blocks_between_alarms: between two false alarms of one side of one chart, on average

@@ -52,13 +52,13 @@ NONE = "none"
 PUBLISH_S = 60.0
 YEAR_S = 365.25 * 86_400.0
 SIDES = 3
-"""Of a cell: its mean rises, its mean falls, its scatter grows."""
+"""The ways in which a cell grows: its mean rises, its mean falls, its scatter grows."""
 REGIMES_OF_SIGNAL_MAX = 8
 GROWING_SHOWN_MAX = 3
 
 
 class Config(ProcessorConfig):
-    """What the twin knows of the drive, what healthy is, and how soon to cry out.
+    """The drive as the twin knows it, the healthy period, and how soon to raise an alarm.
 
     healthy_from: with its time zone; without it, the first hours that are seen are taken to be healthy, and the basis says so
     """
@@ -80,7 +80,7 @@ class Config(ProcessorConfig):
 
     @cached_property
     def given(self) -> Given:
-        """What the comparison has to be told."""
+        """The settings of the comparison."""
         idle_kw, rated_kw = self.idle_power_kw, self.rated_power_kw
         idle_pct = None if idle_kw is None or rated_kw is None else 100.0 * idle_kw / rated_kw
         return Given(self.settle_s, self.rapid_feed_mm_min, idle_pct)
@@ -283,7 +283,7 @@ def _window(config: Config, state: State, growing: Sequence[str]) -> str:
 
 
 def _basis(config: Config, state: State) -> str:
-    """What the figures rest on, and who said that the machine was healthy."""
+    """Return the basis of the figures, and who said that the machine was healthy."""
     from_s, until_s = _healthy_s(config, state)
     idle = "learned" if config.given.idle_load_pct is None else f"idle power, {config.given.idle_load_pct:.3g} % of rated"
     stated = "stated" if config.healthy_from is not None else "assumed, nobody stated it"

@@ -1,22 +1,15 @@
-"""What `joint_anomaly` is told: which models score, what is common mode, when the gate is shut, when a score is an alarm."""
+"""Configuration of `joint_anomaly`: which models score, what is common mode, when the gate is shut, when a score is an alarm."""
 
 import math
-from collections.abc import Mapping
-from functools import cached_property, lru_cache
-from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar, Self
+from functools import cached_property
+from typing import ClassVar, Self
 
 from pydantic import Field, PositiveFloat, model_validator
 
 from processors.config import CellConfig
 from processors.joint_anomaly.gate import GateRule
-from processors.joint_anomaly.member import Seat
 from twin.anomaly.common_mode import CommonModeRule, Method
-from twin.errors import TwinError
 from twin.vocabulary import twin_signals
-
-if TYPE_CHECKING:
-    from twin.anomaly.model import AnomalyModel, Calibration
 
 FITTED_WITH = (
     *("tick_s", "dwell_ticks", "clear_fraction", "common_mode", "common_mode_factor", "exclude_gated_peers", "tail_s"),
@@ -36,17 +29,16 @@ NUMBERS = frozenset(
         *(twin_signals.SPINDLE_TEMP_RESIDUAL_K, twin_signals.CUTTING_FORCE_N),
     }
 )
-"""What a model may have as features."""
+"""The features that a model may have."""
 
 
 class Config(CellConfig):
-    """Which models score, what is common mode, when the gate is shut, when a score is an alarm.
+    """The models, the rule of common mode, the gate and the alarm.
 
     models: folder with one model for each machine, by name; "" = none: every score is null then, and says so
     threshold: in units of the adjusted score; absent = that of the model
     peer_wait_s: machines whose ticks are no further apart wait for each other (`processors/joint_anomaly/frames.py`); one that
-    says
-        nothing is at least 2 s and a tick behind, since its messages might still be on their way
+        says nothing is at least 2 s and a tick behind, since its messages might still be on their way
     """
 
     of_one_machine: ClassVar[frozenset[str] | None] = frozenset({"threshold"})
@@ -64,11 +56,6 @@ class Config(CellConfig):
     peer_wait_s: float = Field(default=5.0, ge=0.0, le=600.0)
 
     @cached_property
-    def loaded(self) -> "Mapping[str, AnomalyModel]":
-        """The models by machine."""
-        return _models_in(Path(self.models)) if self.models else {}
-
-    @cached_property
     def gate_rule(self) -> GateRule:
         """When scores are gated."""
         tail_ticks = math.ceil(self.tail_s / self.tick_s - TICK_ROUNDING)
@@ -76,13 +63,8 @@ class Config(CellConfig):
 
     @cached_property
     def common_mode_rule(self) -> CommonModeRule:
-        """What is common mode."""
+        """The rule of common mode."""
         return CommonModeRule(self.common_mode, self.common_mode_factor, self.exclude_gated_peers)
-
-    @cached_property
-    def seats(self) -> dict[str, Seat]:
-        """By machine; filled as they are needed."""
-        return {}
 
     @cached_property
     def tick_ms(self) -> int:
@@ -100,38 +82,7 @@ class Config(CellConfig):
         return math.ceil(self.look_back_s / self.tick_s - TICK_ROUNDING)
 
     @model_validator(mode="after")
-    def _fits_the_models(self) -> Self:
+    def _waiting_is_bounded(self) -> Self:
         if (self.look_back_s + self.peer_wait_s) / self.tick_s > WAITING_MAX:
             raise ValueError(f"look_back_s and peer_wait_s hold more than {WAITING_MAX} ticks; make tick_s longer")
-        for machine, model in self.loaded.items():
-            if unknown := [name for name in model.features if name not in NUMBERS]:
-                raise ValueError(f"the model of {machine} has the feature {unknown[0]!r}, which is no signal that is scored live")
-            if self.common_mode is Method.FEATURES and model.preparation is None:
-                raise ValueError(f"common_mode = features, but the model of {machine} was not trained for it: train it anew so")
-            if model.calibration is not None and self.threshold is None:
-                _check_settings(self, machine, model.calibration)
         return self
-
-
-@lru_cache(maxsize=4)
-def _models_in(folder: Path) -> "dict[str, AnomalyModel]":
-    """Raises ValueError where the folder or a model cannot be read."""
-    try:
-        from twin.anomaly.model import load_models  # noqa: PLC0415  numpy comes with it
-    except ImportError as error:
-        raise ValueError(f"scoring needs {error.name}: pip install 'cnctwin[twin]'") from error
-    try:
-        return load_models(folder)
-    except TwinError as error:
-        raise ValueError(str(error)) from error
-
-
-def _check_settings(config: Config, machine: str, calibration: "Calibration") -> None:
-    """A threshold means so many alerts a week for the settings that it was fitted with, and nothing for others."""
-    for key in FITTED_WITH:
-        fitted, configured = getattr(calibration, key), getattr(config, key)
-        if fitted != configured:
-            raise ValueError(
-                f"{key} = {configured}, but the threshold of {machine} was fitted with {fitted}: configure that, fit anew, "
-                "or set threshold"
-            )

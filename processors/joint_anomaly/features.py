@@ -9,7 +9,8 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from processors.joint_anomaly.frames import Frame
-from processors.joint_anomaly.member import NO_PEER, Beside, Member, Seat
+from processors.joint_anomaly.member import NO_PEER, Adjustment, Member
+from processors.joint_anomaly.scoring import Scoring
 from twin.anomaly.common_features import MEMORY_S, left_over, length
 from twin.anomaly.preparation import STANDS, Preparation, Smoothed, smoothed_after, unsmoothed
 
@@ -19,49 +20,51 @@ NO_PREPARATION = "the model was not trained for common_mode = features"
 class _One(NamedTuple):
     """A machine of the frame that has features."""
 
-    seat: Seat
+    scoring: Scoring
     preparation: Preparation
     smoothed: Smoothed
     is_gated: bool
     why: str | None
 
 
-def beside_by_features(seats: Mapping[str, Seat], frame: Frame, members: Mapping[str, Member]) -> dict[str, Beside]:
-    """What is left of each machine of a frame, of one tick."""
-    known = {name: one for name, seat in seats.items() if (one := _of(seat, frame, members[name])) is not None}
-    found: dict[str, Beside] = {}
-    for name, seat in seats.items():
+def adjusted_by_features(scorings: Mapping[str, Scoring], frame: Frame, members: Mapping[str, Member]) -> dict[str, Adjustment]:
+    """Return the score of each machine of a frame, of one tick."""
+    known = {name: one for name, scoring in scorings.items() if (one := _of(scoring, frame, members[name])) is not None}
+    found: dict[str, Adjustment] = {}
+    for name, scoring in scorings.items():
         scored, _ = frame[name]
         one = known.get(name)
         if one is None:
-            found[name] = Beside(None, False, NO_PEER, 0, smoothed=members[name].smoothed, why=scored.reason or NO_PREPARATION)
+            found[name] = Adjustment(
+                None, False, NO_PEER, 0, smoothed=members[name].smoothed, why=scored.reason or NO_PREPARATION
+            )
         else:
             peers = {other: peer.smoothed for other, peer in known.items() if other != name}
-            found[name] = _judged(one, peers, scored.tick, seat.tick_s)
+            found[name] = _judged(one, peers, scored.tick, scoring.tick_s)
     return found
 
 
-def _of(seat: Seat, frame: Frame, member: Member) -> _One | None:
-    scored, label = frame[seat.machine]
-    preparation = None if seat.model is None else seat.model.preparation
+def _of(scoring: Scoring, frame: Frame, member: Member) -> _One | None:
+    scored, label = frame[scoring.machine]
+    preparation = None if scoring.model is None else scoring.model.preparation
     if preparation is None or scored.now is None:
         return None
     before = member.smoothed or unsmoothed(preparation)
     is_gated = label.is_on is True
-    smoothed = smoothed_after(preparation, before, scored.now, is_gated, scored.tick, seat.tick_s)
-    return _One(seat, preparation, smoothed, is_gated, scored.now.unknown)
+    smoothed = smoothed_after(preparation, before, scored.now, is_gated, scored.tick, scoring.tick_s)
+    return _One(scoring, preparation, smoothed, is_gated, scored.now.unknown)
 
 
-def _judged(one: _One, peers: Mapping[str, Smoothed], tick: int, tick_s: float) -> Beside:
+def _judged(one: _One, peers: Mapping[str, Smoothed], tick: int, tick_s: float) -> Adjustment:
     oldest = tick - round(MEMORY_S / tick_s)
     fresh = {name: peer for name, peer in peers.items() if max(peer.ticks) >= oldest}
     if one.is_gated or one.why is not None:
         is_known = one.is_gated or one.why == STANDS
-        return Beside(0.0 if is_known else None, False, NO_PEER, len(fresh), smoothed=one.smoothed, why=one.why, is_idle=True)
+        return Adjustment(0.0 if is_known else None, False, NO_PEER, len(fresh), smoothed=one.smoothed, why=one.why, is_idle=True)
     left = length(one.preparation, left_over(one.smoothed, list(fresh.values()), tick, tick_s))
-    threshold = None if one.seat.rule is None else one.seat.rule.threshold
+    threshold = None if one.scoring.rule is None else one.scoring.rule.threshold
     is_common = threshold is not None and left < threshold <= length(one.preparation, one.smoothed.values)
-    return Beside(left, is_common, _loudest(one, fresh) if is_common else NO_PEER, len(fresh), smoothed=one.smoothed)
+    return Adjustment(left, is_common, _loudest(one, fresh) if is_common else NO_PEER, len(fresh), smoothed=one.smoothed)
 
 
 def _loudest(one: _One, peers: Mapping[str, Smoothed]) -> str:

@@ -54,7 +54,7 @@ class InStep(NamedTuple):
         return InStep(self.first, self.last, self.behind - 1) if self.behind > 1 else None
 
     def has(self, tick: int | None) -> bool:
-        """Whether a machine that has come to `tick` is in step."""
+        """Return True if a machine that has come to `tick` is in step."""
         return tick is not None and self.first <= tick <= self.last
 
 
@@ -76,8 +76,8 @@ def in_step(ticks: Collection[int], wait_ticks: int) -> InStep:
 
 
 def frames(ready: Mapping[str, tuple[Ready, ...]], step: InStep, look_back_ticks: int) -> list[Frame]:
-    """What is to be judged of the scores that wait, side by side by tick, oldest first: what all who are in step have come to,
-    and all scores of a machine whose clock is ahead of theirs."""
+    """Return the frames of waiting scores that can be judged, side by side by tick, oldest first: what all who are in step have
+    come to, and all scores of a machine whose clock is ahead of theirs."""
     found: dict[int, Frame] = {}
     up_to, last = step.first - look_back_ticks, step.last - look_back_ticks
     for machine, waiting in ready.items():

@@ -39,7 +39,7 @@ class Gate(NamedTuple):
 
 
 class Gated(NamedTuple):
-    """Whether a score is not to be judged: `is_on` None = nobody can tell, with the reason; the source says who did."""
+    """The gate at a score: `is_on` None = nobody can tell, with the reason; the source says who did."""
 
     is_on: bool | None
     source: str
@@ -66,7 +66,7 @@ def restarted(gate: Gate, at_s: float) -> Gate:
 
 
 def gated(gate: Gate, rule: GateRule, at_s: float) -> Gated:
-    """Whether a score as of `at_s` is gated, as far as is known by now.
+    """Return whether a score as of `at_s` is gated, as far as is known by now.
 
     >>> rule = GateRule(tail_s=8.0, look_back_s=10.0, gate_s_max=180.0)
     >>> gate = followed(Gate(), rule, ToolChangeContext(True, "controller", 100.0), 100.0)
@@ -87,7 +87,7 @@ def gated(gate: Gate, rule: GateRule, at_s: float) -> Gated:
 
 
 def _matters(change: Change, rule: GateRule, at_s: float) -> bool:
-    """Whether a score that still waits may be gated by it."""
+    """Return True if a score that still waits may be gated by it."""
     if change.fall_s is None:
         return True
     return change.fall_s + rule.tail_s > at_s - 2.0 * (rule.look_back_s + rule.gate_s_max)

@@ -1,20 +1,16 @@
 """One machine of a cell: what of it is known, and what becomes of it when one of its scores has been judged beside its peers."""
 
-from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from processors.contract import Output
 from processors.joint_anomaly.frames import NEVER, Ready, Scored
 from processors.joint_anomaly.gate import Gate, Gated, GateRule, gated, restarted
 from processors.joint_anomaly.score_drift import Drift, drifted
+from processors.joint_anomaly.scoring import Scoring
 from sparkplug.quality import Quality
-from twin.anomaly.alarm import AlarmRule, AlarmState, after_tick
+from twin.anomaly.alarm import AlarmState, after_tick
 from twin.anomaly.preparation import Smoothed
 from twin.vocabulary import twin_signals
-
-if TYPE_CHECKING:
-    from twin.anomaly.model import AnomalyModel, Calibration
 
 ADJUSTED, COMMON, GATE = twin_signals.ADJUSTED_SCORE, twin_signals.COMMON_MODE, twin_signals.TOOL_CHANGE_GATE
 GATE_SOURCE, PEER, PEERS = "twin/tool_change_gate_source", "twin/common_mode_peer", "twin/common_mode_peers"
@@ -26,28 +22,8 @@ NO_CALIBRATION = "no centre and spread: the model is not calibrated"
 NO_PEER = "none"
 
 
-@dataclass(frozen=True)
-class Seat:
-    """What the configuration says of one machine; rule: None where it has no threshold."""
-
-    machine: str
-    model: "AnomalyModel | None"
-    rule: AlarmRule | None
-    tick_s: float
-
-    @cached_property
-    def calibration(self) -> "Calibration | None":
-        """Of the model."""
-        return None if self.model is None else self.model.calibration
-
-    @cached_property
-    def calm_below(self) -> float:
-        """Scores below it count towards the end of an alarm."""
-        return 0.0 if self.rule is None else self.rule.clear_fraction * self.rule.threshold
-
-
-class Beside(NamedTuple):
-    """What is left of a score beside those of the peers, and who of them makes it common mode.
+class Adjustment(NamedTuple):
+    """The score of a machine after those of its peers, and the peer that makes it common mode.
 
     score: None where it is not known, for the reason `why`; is_idle: nothing was judged, as in a gate
     smoothed: the features of the machine after this tick, where they are judged
@@ -62,8 +38,8 @@ class Beside(NamedTuple):
     smoothed: Smoothed | None = None
 
 
-class Told(NamedTuple):
-    """What readers were told last, beside the scores: it seldom changes, and is told again when it does.
+class Published(NamedTuple):
+    """The figures that were published last, beside the scores: they seldom change, and are published again when they do.
 
     unknown: why there is no adjusted score, and no common mode; alarm None: why there is no alarm
     """
@@ -79,7 +55,7 @@ class Told(NamedTuple):
 
 
 class Member(NamedTuple):
-    """What is known of one machine.
+    """The state of one machine.
 
     tick: the last one that it has come to; None while it is offline
     offset_ticks: its clock is ahead of that of its peers by so many
@@ -98,7 +74,7 @@ class Member(NamedTuple):
     total_s: float = 0.0
     gated_s: float = 0.0
     drift: Drift = Drift()
-    told: Told = Told()
+    told: Published = Published()
     smoothed: Smoothed | None = None
 
     def waiting_with(self, scored: Scored, rule: GateRule, look_back_ticks: int) -> "Member":
@@ -121,39 +97,41 @@ class Member(NamedTuple):
         )
 
 
-def after(seat: Seat, member: Member, beside: Beside, outputs: list[Output]) -> Member:
+def after(scoring: Scoring, member: Member, adjustment: Adjustment, outputs: list[Output]) -> Member:
     """The machine after the oldest of its ready scores was judged; what is new is added to the outputs.
 
     The dwell counts ticks in a row: one that is missing interrupts it like one that is gated.
     """
     tick, offset_ticks, young, ready, gate, judged, alarm, total_s, gated_s, drift, told, _ = member
     scored, label = ready[0]
-    name, tick_s, at_s, adjusted, is_gated = seat.machine, seat.tick_s, scored.at_s, beside.score, label.is_on is True
-    unknown, is_on, why = None, None, NO_MODEL if seat.model is None else NO_THRESHOLD
+    name, tick_s, at_s, adjusted, is_gated = scoring.machine, scoring.tick_s, scored.at_s, adjustment.score, label.is_on is True
+    unknown, is_on, why = None, None, NO_MODEL if scoring.model is None else NO_THRESHOLD
     if adjusted is None:
-        unknown = scored.reason or beside.why or NO_CALIBRATION
+        unknown = scored.reason or adjustment.why or NO_CALIBRATION
         outputs.append(Output.null(ADJUSTED, unknown, name, at_s))
     else:
         outputs.append(Output(ADJUSTED, adjusted, Quality.GOOD, None, name, at_s))
-    if seat.rule is not None:
+    if scoring.rule is not None:
         if scored.tick != judged + 1:
             alarm = AlarmState(alarm.is_on)
-        is_idle = is_gated or beside.is_idle
-        if adjusted is None or is_idle or adjusted >= seat.calm_below or alarm.calm_ticks < seat.rule.dwell_ticks:
-            alarm = after_tick(seat.rule, alarm, adjusted, is_idle)  # else it is calm, and stays so
+        is_idle = is_gated or adjustment.is_idle
+        if adjusted is None or is_idle or adjusted >= scoring.calm_below or alarm.calm_ticks < scoring.rule.dwell_ticks:
+            alarm = after_tick(scoring.rule, alarm, adjusted, is_idle)  # else it is calm, and stays so
         is_on, why = (alarm.is_on, "") if alarm.is_on or unknown is None else (None, unknown)
     total_s = min(total_s + tick_s, SHARE_S)
     gated_s = gated_s * (1.0 - tick_s / SHARE_S) + (tick_s if is_gated else 0.0)
     share_pct = min(round(200.0 * gated_s / total_s) / 2.0, 100.0)
-    now = Told(label, beside.is_common, unknown, beside.peer, beside.peers, is_on, why, share_pct)
+    now = Published(label, adjustment.is_common, unknown, adjustment.peer, adjustment.peers, is_on, why, share_pct)
     if now != told:
         outputs += _news(name, at_s, now)
-    drift, news = drifted(drift, seat.calibration, None if is_gated else scored.raw, at_s)
+    drift, news = drifted(drift, scoring.calibration, None if is_gated else scored.raw, at_s)
     outputs += [one._replace(machine=name) for one in news]
-    return Member(tick, offset_ticks, young, ready[1:], gate, scored.tick, alarm, total_s, gated_s, drift, now, beside.smoothed)
+    return Member(
+        tick, offset_ticks, young, ready[1:], gate, scored.tick, alarm, total_s, gated_s, drift, now, adjustment.smoothed
+    )
 
 
-def _news(name: str, at_s: float, told: Told) -> list[Output]:
+def _news(name: str, at_s: float, told: Published) -> list[Output]:
     """All of it; what readers know already is not sent again."""
     gate = told.gate
     assert gate is not None

@@ -1,4 +1,4 @@
-"""How unusual each machine of a cell is, beside its peers, and not while it changes its tool.
+"""Anomaly scores of the machines of a cell, each beside its peers, and not while it changes its tool.
 
 At each tick the features of a machine, as last reported, are scored by its model (`twin/anomaly/model.py`): the raw score, 0 = as
 unusual as the model's contamination share of the training data, larger = worse. It is always published. Once all machines that
@@ -20,7 +20,7 @@ from dataclasses import dataclass, field
 from processors.config import Configuration
 from processors.contract import CellProcessor, Output, OutputSpec, Provenance, Sample, SampleKind
 from processors.joint_anomaly.config import NUMBERS, Config
-from processors.joint_anomaly.features import beside_by_features
+from processors.joint_anomaly.features import adjusted_by_features
 from processors.joint_anomaly.frames import Frame, InStep, Scored, frames, in_step
 from processors.joint_anomaly.gate import followed
 from processors.joint_anomaly.member import (
@@ -35,18 +35,17 @@ from processors.joint_anomaly.member import (
     NO_THRESHOLD,
     PEER,
     PEERS,
-    Beside,
+    Adjustment,
     Member,
-    Seat,
     after,
 )
 from processors.joint_anomaly.score_drift import DRIFT, NO_GOLDEN_WEEK
+from processors.joint_anomaly.scoring import Scoring, read_scorings, scoring_of
 from processors.tool_change_detector.context import INPUTS as CONTEXT_INPUTS
 from processors.tool_change_detector.context import tool_change_context
 from sparkplug.datatype import DataType
 from sparkplug.metric import Reading
 from sparkplug.quality import Quality
-from twin.anomaly.alarm import AlarmRule
 from twin.anomaly.common_mode import Method, adjust_frame, standardised
 from twin.anomaly.preparation import CONTEXT, Preparation, standardised_row
 from twin.vocabulary import twin_signals
@@ -55,7 +54,6 @@ RAW, THRESHOLD, BASIS = twin_signals.RAW_SCORE, twin_signals.ANOMALY_THRESHOLD, 
 CLOCK_OFFSET, STAMP_CLOCK = "clock_offset_s", "stamp_clock"
 BY_EDGE = "edge"  # the control gives no stamps: its samples carry the edge's time, whatever its own clock shows
 _VALUE, _QUALITY = Reading._fields.index("value"), Reading._fields.index("quality")
-SEATS_MAX = 10_000
 MEMBERS_MAX = 2000  # of a cell; those that are offline are forgotten when there are more
 OFFSET_TICKS_MAX = 0.75  # that a clock's offset may change before it is a step of the clock
 NOT_FINITE = "the model has no finite answer"
@@ -98,10 +96,10 @@ def step(config: Configuration[Config], state: State, sample: Sample) -> tuple[S
 def _ticked(config: Configuration[Config], state: State, sample: Sample) -> tuple[State, Sequence[Output]]:
     """Score a machine; judge what its coming to this tick makes complete."""
     shared, machine = config.default, sample.machine
-    seat, step_before = _seat(config, machine), state.in_step
+    scoring, step_before = scoring_of(config, machine), state.in_step
     member = _placed(shared, state.members.get(machine) or Member(), sample)
     before, tick = member.tick, _tick(shared, member, sample.at_s)
-    scored = _scored(seat, sample, tick)
+    scored = _scored(scoring, sample, tick)
     members = {**state.members, machine: member.waiting_with(scored, shared.gate_rule, shared.look_back_ticks)}
     outputs = [Output.null(RAW, scored.reason or "") if scored.raw is None else Output(RAW, scored.raw)]
     step_now = step_before.moved(before, tick)
@@ -143,9 +141,9 @@ def _tick(shared: Config, member: Member, at_s: float) -> int:
     return round(at_s * 1000.0) // shared.tick_ms - member.offset_ticks
 
 
-def _scored(seat: Seat, sample: Sample, tick: int) -> Scored:
+def _scored(scoring: Scoring, sample: Sample, tick: int) -> Scored:
     """The raw score of a machine as of a tick. A model that fails concerns its own machine only."""
-    model = seat.model
+    model = scoring.model
     if model is None:
         return Scored(tick, sample.at_s, None, NO_MODEL)
     row, values = sample.row, []
@@ -166,7 +164,7 @@ def _scored(seat: Seat, sample: Sample, tick: int) -> Scored:
 
 
 def _context(preparation: Preparation, row: Mapping[str, Reading]) -> list[object]:
-    """What names the regime; None where it is not known."""
+    """Return the values that name the regime; None where it is not known."""
     readings = [row.get(name) for name in preparation.context]
     return [None if one is None or one.quality is not Quality.GOOD else one.value for one in readings]
 
@@ -178,54 +176,40 @@ def _judge(
     shared = config.default
     ready = {name: members[name].ready for name in names if members[name].ready}
     for frame in frames(ready, step_now, shared.look_back_ticks):
-        seats = {name: _seat(config, name) for name in frame}
+        scorings = {name: scoring_of(config, name) for name in frame}
         if shared.common_mode is Method.FEATURES:
-            found = beside_by_features(seats, frame, members)
+            found = adjusted_by_features(scorings, frame, members)
         else:
-            found = _beside_by_scores(shared, seats, frame)
-        for name, seat in seats.items():
-            members[name] = after(seat, members[name], found[name], outputs)
+            found = _adjusted_by_scores(shared, scorings, frame)
+        for name, scoring in scorings.items():
+            members[name] = after(scoring, members[name], found[name], outputs)
 
 
-def _beside_by_scores(shared: Config, seats: Mapping[str, Seat], frame: Frame) -> dict[str, Beside]:
+def _adjusted_by_scores(shared: Config, scorings: Mapping[str, Scoring], frame: Frame) -> dict[str, Adjustment]:
     """By the published rule, or the residual of the scores."""
-    names = list(seats)
-    scores = [_on_the_scale(shared, seat, frame[name][0].raw) for name, seat in seats.items()]
+    names = list(scorings)
+    scores = [_on_the_scale(shared, scoring, frame[name][0].raw) for name, scoring in scorings.items()]
     judged = adjust_frame(shared.common_mode_rule, scores, [frame[name][1].is_on is True for name in names])
     return {
-        name: Beside(one.score, one.is_common, names[one.peer] if one.is_common and one.peer is not None else NO_PEER, one.peers)
+        name: Adjustment(
+            one.score, one.is_common, names[one.peer] if one.is_common and one.peer is not None else NO_PEER, one.peers
+        )
         for name, one in zip(names, judged, strict=True)
     }
 
 
-def _on_the_scale(shared: Config, seat: Seat, raw: float | None) -> float | None:
+def _on_the_scale(shared: Config, scoring: Scoring, raw: float | None) -> float | None:
     """The raw score for the published rule; for the residual, how many spreads it lies above its centre."""
     if raw is None or shared.common_mode is Method.SOURCE:
         return raw
-    calibration = seat.calibration
+    calibration = scoring.calibration
     return None if calibration is None else standardised(raw, calibration.raw_center, calibration.raw_spread)
 
 
-def _seat(config: Configuration[Config], machine: str) -> Seat:
-    """What the configuration says of one machine, put together once."""
-    shared = config.default
-    seat = shared.seats.get(machine)
-    if seat is None:
-        model = shared.loaded.get(machine)
-        threshold = config.of(machine).threshold
-        if threshold is None and model is not None and model.calibration is not None:
-            threshold = model.calibration.threshold
-        rule = None if threshold is None or model is None else AlarmRule(threshold, shared.dwell_ticks, shared.clear_fraction)
-        if len(shared.seats) >= SEATS_MAX:
-            shared.seats.clear()
-        seat = shared.seats[machine] = Seat(machine, model, rule, shared.tick_s)
-    return seat
-
-
 def _introduced(config: Configuration[Config], machine: str) -> list[Output]:
-    """What a reader of a machine has to know of its scores, once."""
-    shared, seat = config.default, _seat(config, machine)
-    model, rule = seat.model, seat.rule
+    """Return the outputs that explain a machine's scores, once."""
+    shared, scoring = config.default, scoring_of(config, machine)
+    model, rule = scoring.model, scoring.rule
     if model is None:
         return [Output.null(THRESHOLD, NO_MODEL), Output(BASIS, NO_MODEL)]
     fitted = "configured" if config.of(machine).threshold is not None else "not fitted"
@@ -280,4 +264,5 @@ PROCESSOR = CellProcessor(
     initial=lambda _: State(),
     step=step,
     wakes=CONTEXT_INPUTS,
+    reads=read_scorings,
 )

@@ -1,4 +1,4 @@
-"""Whether the raw scores of a machine have drifted from its golden week: hourly means on the chart of `processors/gap/growth.py`.
+"""Drift of a machine's raw scores from its golden week: hourly means on the chart of `processors/gap/growth.py`.
 
 A threshold holds for machines that score as they did when it was fitted. Means over an hour of scores that were not gated are
 charted against those of the golden week, with the correlation of neighbouring hours in it; what goes up or down for good is

@@ -9,8 +9,8 @@ from enum import Enum
 from typing import NamedTuple
 
 
-class Stand(Enum):
-    """How the value of a rule stands to its limits."""
+class LimitState(Enum):
+    """The position of a rule's value against its limits."""
 
     OVER = "over"
     BETWEEN = "between"
@@ -20,15 +20,15 @@ class Stand(Enum):
 
 
 class Judgement(NamedTuple):
-    """What a rule finds at one moment. `reason`: why it is unknown; `finding`: what is over which limit, as a person reads it."""
+    """The finding of a rule at one moment. `reason`: why it is unknown; `finding`: what is over which limit, to be read."""
 
-    stand: Stand
+    limit_state: LimitState
     reason: str = ""
     finding: str = ""
 
 
 class Timing(NamedTuple):
-    """How long over the limit until it alarms, how long under the lower one until it ends."""
+    """The time over the limit until it alarms, and under the lower one until it ends."""
 
     dwell_s: float
     clear_s: float
@@ -48,33 +48,33 @@ class Latch(NamedTuple):
 
     @property
     def is_alarm(self) -> bool:
-        """Whether it alarms."""
+        """True while it alarms."""
         return self.alarm_s is not None
 
 
 IDLE = Latch()
 
 
-def over_under(value: float, limit: float, clear_limit: float) -> Stand:
-    """How `value` stands to a limit and the lower one at which an alarm ends.
+def over_under(value: float, limit: float, clear_limit: float) -> LimitState:
+    """Return how `value` stands to a limit and the lower one at which an alarm ends.
 
     >>> [over_under(value, 110.0, 100.0).value for value in (111.0, 110.0, 99.0)]
     ['over', 'between', 'under']
     """
     if value > limit:
-        return Stand.OVER
-    return Stand.BETWEEN if value >= clear_limit else Stand.UNDER
+        return LimitState.OVER
+    return LimitState.BETWEEN if value >= clear_limit else LimitState.UNDER
 
 
 def latched(latch: Latch, judgement: Judgement, timing: Timing, at_s: float) -> Latch:
     """The alarm after one more judgement."""
-    stand, alarm_s = judgement.stand, latch.alarm_s
-    if stand is Stand.OVER:
+    limit_state, alarm_s = judgement.limit_state, latch.alarm_s
+    if limit_state is LimitState.OVER:
         over_s = at_s if latch.over_s is None else latch.over_s
         if alarm_s is None and at_s - over_s >= timing.dwell_s:
             return Latch(over_s, judgement.finding, over_s)
         return latch if latch.over_s is not None and latch.under_s is None else Latch(alarm_s, latch.finding, over_s)
-    if stand is Stand.UNDER and alarm_s is not None:
+    if limit_state is LimitState.UNDER and alarm_s is not None:
         under_s = at_s if latch.under_s is None else latch.under_s
         if at_s - under_s >= timing.clear_s:
             return IDLE

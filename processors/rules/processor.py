@@ -12,7 +12,7 @@ from datetime import UTC, datetime
 from typing import NamedTuple
 
 from processors.contract import Output, OutputSpec, Processor, Provenance, Sample, SampleKind
-from processors.rules.alarm import IDLE, Judgement, Latch, Stand, Timing, latched, rested
+from processors.rules.alarm import IDLE, Judgement, Latch, LimitState, Timing, latched, rested
 from processors.rules.spindle import (
     EXECUTION,
     FEED,
@@ -44,7 +44,7 @@ class Config(SpindleLimits, TemperatureLimits, VibrationLimits):
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """What the rules remember: the spindle's speed, the temperature's trend, the zone, and the alarm of each rule by its name."""
+    """The state of the rules: the spindle's speed, the temperature's trend, the zone, and the alarm of each rule by its name."""
 
     spindle: Spindle = field(default_factory=Spindle)
     trend: Trend = field(default_factory=Trend)
@@ -53,7 +53,7 @@ class State:
 
 
 class Given(NamedTuple):
-    """What a rule may look at."""
+    """The inputs that a rule may look at."""
 
     config: Config
     state: State
@@ -113,7 +113,7 @@ def step(config: Config, state: State, sample: Sample) -> tuple[State, Sequence[
     """Judge every sample: what is held counts as long as it is held."""
     if sample.kind is SampleKind.HOLE:
         if sample.gap_s >= config.gap_s_max:
-            return State(), _outputs(State(), {}, Judgement(Stand.UNKNOWN, sample.detail), sample)
+            return State(), _outputs(State(), {}, Judgement(LimitState.UNKNOWN, sample.detail), sample)
         state = _over_hole(state, sample)
     spindle = spindle_followed(state.spindle, config, sample)
     moves = motion(spindle, config, sample.at_s)
@@ -128,7 +128,7 @@ def step(config: Config, state: State, sample: Sample) -> tuple[State, Sequence[
         is_moved = is_moved or latch is not before
     if is_moved:
         state = State(spindle, state.trend, zone, latches)
-    return state, _outputs(state, judged, Judgement(Stand.UNKNOWN, no_zone), sample)
+    return state, _outputs(state, judged, Judgement(LimitState.UNKNOWN, no_zone), sample)
 
 
 def _over_hole(state: State, sample: Sample) -> State:
@@ -155,7 +155,7 @@ def _outputs(state: State, judged: Mapping[str, Judgement], no_zone: Judgement, 
     for rule in RULES:
         judgement = judged.get(rule.name, no_zone)
         latch = state.latches.get(rule.name, IDLE)
-        if judgement.stand is Stand.UNKNOWN:
+        if judgement.limit_state is LimitState.UNKNOWN:
             unknown.append(rule.name)
             outputs.append(Output.null(rule.metric, judgement.reason))
             continue
@@ -176,7 +176,7 @@ def _outputs(state: State, judged: Mapping[str, Judgement], no_zone: Judgement, 
 
 
 def _anomaly(sample: Sample) -> tuple[bool | None, str]:
-    """Whether the anomaly score alarms; None with the reason."""
+    """Return True if the anomaly score alarms; None with the reason."""
     reading = sample.row.get(ANOMALY)
     reason = f"{ANOMALY} is not offered" if reading is None else why_unknown(reading)
     if reading is None or reason is not None:

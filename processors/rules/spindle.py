@@ -15,13 +15,13 @@ from typing import NamedTuple, Self
 from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
 from processors.config import ProcessorConfig
-from processors.rules.alarm import Judgement, Stand, over_under
+from processors.rules.alarm import Judgement, LimitState, over_under
 from processors.sample import Sample, why_unknown
 from twin.vocabulary.bounds import SPINDLE_LOAD_PCT_MAX, SPINDLE_RPM_MAX
 
 LOAD, SPEED, FEED, EXECUTION = "spindle_load_pct", "spindle_rpm", "feed_mm_min", "exec_state"
 REPORT_S_MIN, REPORT_S_MAX = 0.1, 1.0
-EXCUSED = Judgement(Stand.EXCUSED)
+EXCUSED = Judgement(LimitState.EXCUSED)
 
 
 class SpindleLimits(ProcessorConfig):
@@ -66,7 +66,7 @@ class Spindle(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """What the spindle does now. `rpm` None: unknown, with the reason."""
+    """The motion of the spindle now. `rpm` None: unknown, with the reason."""
 
     rpm: float | None
     why_not: str
@@ -92,7 +92,7 @@ def followed(spindle: Spindle, limits: SpindleLimits, sample: Sample) -> Spindle
 
 
 def motion(spindle: Spindle, limits: SpindleLimits, at_s: float) -> Motion:
-    """What the spindle does at `at_s`."""
+    """Return the motion of the spindle at `at_s`."""
     if spindle.rpm is None:
         return Motion(None, spindle.why_not, False, False)
     ramping = False
@@ -105,13 +105,13 @@ def load_over_limit(limits: SpindleLimits, moves: Motion, sample: Sample) -> Jud
     """Load over its limit, whatever the direction of the torque."""
     load_pct, why_not = _load(sample)
     if load_pct is None or moves.rpm is None:
-        return Judgement(Stand.UNKNOWN, why_not or moves.why_not)
+        return Judgement(LimitState.UNKNOWN, why_not or moves.why_not)
     if moves.is_ramping:
         return EXCUSED
-    stand = over_under(load_pct, limits.load_limit_pct, limits.load_clear_pct)
-    if stand is not Stand.OVER:
-        return Judgement(stand)
-    return Judgement(stand, finding=f"{LOAD} {load_pct:.0f} % over {limits.load_limit_pct:g} %")
+    limit_state = over_under(load_pct, limits.load_limit_pct, limits.load_clear_pct)
+    if limit_state is not LimitState.OVER:
+        return Judgement(limit_state)
+    return Judgement(limit_state, finding=f"{LOAD} {load_pct:.0f} % over {limits.load_limit_pct:g} %")
 
 
 def load_without_feed(limits: SpindleLimits, moves: Motion, sample: Sample) -> Judgement:
@@ -120,16 +120,16 @@ def load_without_feed(limits: SpindleLimits, moves: Motion, sample: Sample) -> J
     feed, no_feed = sample.number(FEED)
     running, not_known = _is_running(limits, sample)
     if load_pct is None or feed is None or running is None or moves.rpm is None:
-        return Judgement(Stand.UNKNOWN, why_not or no_feed or not_known or moves.why_not)
+        return Judgement(LimitState.UNKNOWN, why_not or no_feed or not_known or moves.why_not)
     if moves.is_ramping:
         return EXCUSED
     if not running or not moves.is_turning or abs(feed) >= limits.no_feed_mm_min:
-        return Judgement(Stand.UNDER)
-    stand = over_under(load_pct, limits.no_feed_load_pct, limits.no_feed_clear_pct)
-    if stand is not Stand.OVER:
-        return Judgement(stand)
+        return Judgement(LimitState.UNDER)
+    limit_state = over_under(load_pct, limits.no_feed_load_pct, limits.no_feed_clear_pct)
+    if limit_state is not LimitState.OVER:
+        return Judgement(limit_state)
     over = f"{load_pct:.0f} % over {limits.no_feed_load_pct:g} %"
-    return Judgement(stand, finding=f"{LOAD} {over} with {FEED} below {limits.no_feed_mm_min:g} mm/min")
+    return Judgement(limit_state, finding=f"{LOAD} {over} with {FEED} below {limits.no_feed_mm_min:g} mm/min")
 
 
 def _load(sample: Sample) -> tuple[float | None, str]:
@@ -140,7 +140,7 @@ def _load(sample: Sample) -> tuple[float | None, str]:
 
 
 def _is_running(limits: SpindleLimits, sample: Sample) -> tuple[bool | None, str]:
-    """Whether the program runs; None with the reason. Without any state to ask for, it is taken to run."""
+    """Return True if the program runs; None with the reason. Without any state to ask for, it is taken to run."""
     if not limits.exec_states:
         return True, ""
     reading = sample.row.get(EXECUTION)

@@ -19,21 +19,21 @@ from typing import NamedTuple, Self
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from processors.config import ProcessorConfig
-from processors.rules.alarm import Judgement, Stand, over_under
+from processors.rules.alarm import Judgement, LimitState, over_under
 from processors.sample import Sample
 
 TEMPERATURE = "spindle_temp_c"
 POINTS = 24
 """Points a window: 276 pairs."""
 KNOWN_PART = 0.75
-"""Of a window, which has to be known."""
+"""The part of a window that has to be known."""
 STRAY_S = 10.0
 TEMPERATURES_C = (-60.0, 400.0)
 """Beyond them nothing is a spindle's temperature."""
 
 
 class TemperatureLimits(ProcessorConfig):
-    """What runaway is."""
+    """The limits of runaway."""
 
     runaway_k_per_min: PositiveFloat = 5.0
     runaway_clear_k_per_min: PositiveFloat = 3.0
@@ -99,13 +99,13 @@ def thermal_runaway(limits: TemperatureLimits, trend: Trend, sample: Sample) -> 
     """Temperature rises faster than it may."""
     temperature_c, reason = sample.number(TEMPERATURE)
     if temperature_c is None:
-        return Judgement(Stand.UNKNOWN, reason or "")
+        return Judgement(LimitState.UNKNOWN, reason or "")
     if not TEMPERATURES_C[0] <= temperature_c <= TEMPERATURES_C[1]:
-        return Judgement(Stand.UNKNOWN, f"{TEMPERATURE} is beyond any spindle")
+        return Judgement(LimitState.UNKNOWN, f"{TEMPERATURE} is beyond any spindle")
     slope = trend.slope_k_per_min
     if slope is None:
-        return Judgement(Stand.UNKNOWN, f"{TEMPERATURE} is known for less than {KNOWN_PART * limits.runaway_window_s:g} s")
-    stand = over_under(slope, limits.runaway_k_per_min, limits.runaway_clear_k_per_min)
-    if stand is not Stand.OVER:
-        return Judgement(stand)
-    return Judgement(stand, finding=f"{TEMPERATURE} rises by {slope:.1f} K/min, over {limits.runaway_k_per_min:g} K/min")
+        return Judgement(LimitState.UNKNOWN, f"{TEMPERATURE} is known for less than {KNOWN_PART * limits.runaway_window_s:g} s")
+    limit_state = over_under(slope, limits.runaway_k_per_min, limits.runaway_clear_k_per_min)
+    if limit_state is not LimitState.OVER:
+        return Judgement(limit_state)
+    return Judgement(limit_state, finding=f"{TEMPERATURE} rises by {slope:.1f} K/min, over {limits.runaway_k_per_min:g} K/min")

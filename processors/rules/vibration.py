@@ -17,7 +17,7 @@ from typing import Self
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from processors.config import ProcessorConfig
-from processors.rules.alarm import Judgement, Stand
+from processors.rules.alarm import Judgement, LimitState
 from processors.rules.spindle import EXCUSED, Motion
 from processors.sample import Sample
 from twin.vocabulary.twin_signals import VIBRATION_VELOCITY_MM_S
@@ -66,7 +66,7 @@ BOUNDARIES_MM_S: dict[VibrationClass, tuple[float, float, float]] = {
 
 
 class VibrationLimits(ProcessorConfig):
-    """Which boundaries hold, and from which zone on it is an alarm.
+    """The boundaries that hold, and the zone from which on it is an alarm.
 
     vibration_boundaries_mm_s: A/B, B/C, C/D of your own; None = those of the class
     vibration_hysteresis_pct: a zone is left downwards so far below its boundary
@@ -125,13 +125,15 @@ def zone_of(limits: VibrationLimits, velocity_mm_s: float, before: Zone | None =
 def vibration(limits: VibrationLimits, moves: Motion, zone: Zone | None, sample: Sample) -> Judgement:
     """The zone is one of those that alarm. A spindle that stands or changes its speed is not judged."""
     if moves.rpm is None:
-        return Judgement(Stand.UNKNOWN, moves.why_not)
+        return Judgement(LimitState.UNKNOWN, moves.why_not)
     velocity_mm_s, why_not = velocity(sample)
     if velocity_mm_s is None:
-        return Judgement(Stand.UNKNOWN, why_not)
+        return Judgement(LimitState.UNKNOWN, why_not)
     if moves.is_ramping or zone is None:
         return EXCUSED
     if ZONES.index(zone) < ZONES.index(limits.vibration_alarm_zone):
-        return Judgement(Stand.UNDER)
+        return Judgement(LimitState.UNDER)
     boundary = limits.boundaries_mm_s[ZONES.index(limits.vibration_alarm_zone) - 1]
-    return Judgement(Stand.OVER, finding=f"vibration {velocity_mm_s:.1f} mm/s rms in zone {zone.value}, over {boundary:g} mm/s")
+    return Judgement(
+        LimitState.OVER, finding=f"vibration {velocity_mm_s:.1f} mm/s rms in zone {zone.value}, over {boundary:g} mm/s"
+    )

@@ -1,4 +1,4 @@
-"""What a processor counts beside the ledger."""
+"""The counts of a processor beside the ledger."""
 
 from dataclasses import dataclass
 

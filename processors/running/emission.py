@@ -25,7 +25,7 @@ class Emission:
         self._rules = _rules(processor.outputs)
 
     def news(self, outputs: Iterable[Output], at_ms: int) -> list[Change]:
-        """What of `outputs` has to be published, each beside the one before it. Changes nothing: `published` does.
+        """Return the changes that have to be published, each beside the one before it. Changes nothing: `published` does.
 
         Raises OutputError where an output is not declared or is of another type: our own bug.
         """
@@ -51,7 +51,7 @@ class Emission:
         return changes
 
     def known(self, at_ms: int) -> tuple[Change, ...]:
-        """What a reader of a new twin device is told at once: the last values, and nulls that say why there is none yet."""
+        """Return the values of a new twin device: the last ones, and nulls that say why there is none yet."""
         nothing = "nothing computed yet"
         return tuple(self.latest.get(name) or Change(name, None, at_ms, Quality.BAD, nothing) for name in self._rules)
 
@@ -89,7 +89,7 @@ def _checked(spec: OutputSpec, output: Output) -> tuple[Value, Quality, str | No
 
 
 def _is_near(old: Value, new: Value, deadband: float) -> bool:
-    """Whether readers need not be told."""
+    """Return True if the change is too small to be published."""
     if deadband and isinstance(old, (int, float)) and isinstance(new, (int, float)):
         return abs(new - old) < deadband
     return old == new

@@ -6,19 +6,18 @@ where two offer it; and keeps the ledger. What has a state, and is saved as one,
 
 import itertools
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, field
 from operator import itemgetter
 
-from processors.config import ALL, CellConfig, Configuration, ProcessorConfig
-from processors.contract import CellProcessor
+from processors.config import Configuration, ProcessorConfig
 from processors.discovery import AnyProcessor
 from processors.effects import Declare, Effect, PublishPlain, Remove
 from processors.errors import SnapshotError
 from processors.running.counts import Counts
-from processors.running.fold import Fold
+from processors.running.fold import Fold, Folded
 from processors.running.lane import Lane
-from processors.running.ledger import DropReason, Ledger
+from processors.running.ledger import FOLDED, DropReason, Ledger
 from processors.running.snapshot import SnapshotCodec
+from processors.running.unit import Machine, Unit
 from processors.sample import Sample, SampleKind
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId, Reading
@@ -29,39 +28,11 @@ SIGNALS_MAX = 5000
 _IS_HISTORICAL: Callable[[Reading], bool] = itemgetter(Reading._fields.index("is_historical"))
 
 
-@dataclass(slots=True)
-class _Unit:
-    """What has a state: a machine, or a cell with all its machines."""
-
-    name: str
-    live: Fold
-    machines: dict[str, "_Machine"] = field(default_factory=dict)
-    history: Fold | None = None
-
-
-@dataclass(slots=True)
-class _Machine:
-    """A machine, the sources that are online, and which source each signal is taken from.
-
-    It is online while an edge of it is: what other processors say of it, they would go on saying of a machine that is off.
-    """
-
-    name: str
-    unit: _Unit
-    live: Lane
-    history: Lane | None = None
-    online: set[NodeId] = field(default_factory=set)
-    owner: dict[str, NodeId] = field(default_factory=dict)
-    excluded: dict[NodeId, frozenset[str]] = field(default_factory=dict)
-
-    @property
-    def is_online(self) -> bool:
-        """Whether an edge of it is."""
-        return any(not is_twin_node(node.node) for node in self.online)
-
-
 class Engine:
-    """See the module. Every method that returns effects has already counted what it did."""
+    """See the module. Every method that returns effects has already counted what it did; nobody else counts.
+
+    Only what is an input of another processor tells this one the time (`is_of_twin`): it may stamp by the wall's clock.
+    """
 
     def __init__(
         self,
@@ -75,14 +46,13 @@ class Engine:
         self.counts = Counts()
         self._processor, self._configuration = processor, configuration
         self._margin_s, self._machines_max = lateness_margin_s, machines_max
-        self._cell_config: CellConfig | None = configuration.default if isinstance(configuration.default, CellConfig) else None
-        self._machines: dict[str, _Machine] = {}
-        self._units: dict[str, _Unit] = {}
+        self._machines: dict[str, Machine] = {}
+        self._units: dict[str, Unit] = {}
         self._changed: dict[str, None] = {}
         self._codec = SnapshotCodec(processor)
-        if self._cell_config is not None and isinstance(processor, CellProcessor) and (processor.beats or processor.listens):
-            for cell in [*self._cell_config.cells, ALL]:  # they work without any machine
-                self._unit(cell)
+        self._emitted_before = 0
+        for unit in processor.units_at_start(configuration):
+            self._unit(unit)
 
     @property
     def machines(self) -> tuple[str, ...]:
@@ -96,36 +66,49 @@ class Engine:
 
     # Events.
 
-    def feed(self, event: HostEvent, wall_s: float) -> list[Effect]:
-        """Take one event; `wall_s` is any clock that only goes forward."""
+    def is_message(self, event: HostEvent) -> bool:
+        """Return True if the ledger counts it: it is of a device, from a node that this processor reads."""
+        return event.device is not None and event.kind is not EventKind.HOLE and self._processor.listens_to(event.node.node)
+
+    def received(self, event: HostEvent, *, has_room: bool) -> None:
+        """An event has come that cannot be fed yet: it waits outside, or is lost where there is no room."""
+        if self.is_message(event):
+            self.ledger.count(() if has_room else (DropReason.QUEUE_FULL,))
+
+    def feed(self, event: HostEvent, wall_s: float, *, has_waited: bool = False) -> list[Effect]:
+        """Take one event; `wall_s` is any clock that only goes forward. `has_waited`: `received` has counted it."""
         kind, node, device = event.kind, event.node, event.device
+        self._emitted_before = self.ledger.emitted
         if not self._processor.listens_to(node.node):
             self.counts.ignored += 1
             return []
-        effects: list[Effect] = []
         if device is None:
-            self._node_event(event, effects)
-            return effects
-        self.ledger.received += 1
+            return self._node_event(event)
         machine = self._machines.get(device)
-        if kind is EventKind.DATA:
-            if machine is None or node not in machine.online:
-                self.ledger.drop(DropReason.BEFORE_BIRTH)
-            else:
-                self._data(machine, event, wall_s, effects)
-        elif kind is EventKind.BIRTH:
-            self._birth(machine, event, wall_s, effects)
-        elif kind is EventKind.DEATH:
-            self._death(machine, event, effects)
+        if kind is EventKind.HOLE:  # no message
+            effects = [] if machine is None else machine.live.lost(event.detail)
         else:
-            self.ledger.received -= 1  # a hole is no message
-            if machine is not None:
-                machine.live.lost(event.detail, effects)
+            if kind is EventKind.DATA:
+                effects, fates = self._data(machine, event, wall_s)
+            elif kind is EventKind.BIRTH:
+                effects, fates = self._birth(machine, event, wall_s)
+            else:
+                effects, fates = self._death(machine, event)
+            self.ledger.count(fates, 0 if has_waited else 1)
         if machine is None:
             machine = self._machines.get(device)
         if machine is not None:
             self._changed[machine.unit.name] = None
         return effects
+
+    def overflowed(self, count: int) -> None:
+        """A full queue in front of us has lost so many messages."""
+        self.ledger.overflowed(count)
+
+    def unsent(self) -> None:
+        """Note that the outcome of the last event could not be sent."""
+        if self.ledger.emitted > self._emitted_before:
+            self.ledger.unsent()
 
     def plain(self, topic: str, payload: bytes, at_ms: int) -> list[Effect]:
         """A plain message that the processor listens to; every cell is given it."""
@@ -134,15 +117,13 @@ class Engine:
 
     def beat(self, at_ms: int) -> list[Effect]:
         """A second has passed on the wall, where the processor wants to know."""
-        if not isinstance(self._processor, CellProcessor) or not self._processor.beats:
-            return []
-        return self._of_no_machine(Sample("", SampleKind.BEAT, at_ms / 1000, {}), at_ms)
+        return self._of_no_machine(Sample("", SampleKind.BEAT, at_ms / 1000, {}), at_ms) if self._processor.beats else []
 
     def _of_no_machine(self, sample: Sample, at_ms: int) -> list[Effect]:
         effects: list[Effect] = []
         for unit in self._units.values():
             before = unit.live.state
-            unit.live.take(sample._replace(cell=unit.live.cell), at_ms, effects)
+            effects += unit.live.take(sample._replace(cell=unit.live.cell), at_ms)[0]
             if unit.live.state is not before:
                 self._changed[unit.name] = None
         return effects
@@ -152,7 +133,7 @@ class Engine:
         effects: list[Effect] = []
         for machine in self._machines.values():
             clock_ms = machine.live.clock_ms
-            machine.live.silence(wall_s, self._margin_s, effects)
+            effects += machine.live.silence(wall_s, self._margin_s)
             if machine.live.clock_ms != clock_ms:
                 self._changed[machine.unit.name] = None
         return effects
@@ -223,7 +204,8 @@ class Engine:
             if machine.live.is_restored and not machine.is_online:
                 machine.live.is_restored = False
                 reason = "not seen since the processor was started"
-                self._die(machine, list(machine.live.row), at_ms, reason, effects, is_last=True)
+                self.ledger.count(machine.live.drop_held(), 0)
+                effects += self._die(machine, list(machine.live.row), at_ms, reason, is_last=True)[0]
         return effects
 
     def farewell(self, at_ms: int) -> list[PublishPlain]:
@@ -234,7 +216,8 @@ class Engine:
             return []
         for machine in self._machines.values():
             if machine.is_online:
-                machine.live.death(list(machine.live.row), at_ms, "the processor was stopped", effects, is_last=True)
+                self.ledger.count(machine.live.drop_held(), 0)
+                effects += machine.live.death(list(machine.live.row), at_ms, "the processor was stopped", is_last=True)[0]
         return [effect for effect in effects if isinstance(effect, PublishPlain)]
 
     # How it is done.
@@ -242,34 +225,34 @@ class Engine:
     def _fold(self, name: str, *, is_history: bool) -> Fold:
         return Fold(self._processor, self._configuration, name, self.counts, is_history=is_history)
 
-    def _fresh_unit(self, name: str) -> _Unit:
-        return _Unit(name, self._fold(name, is_history=False))
+    def _fresh_unit(self, name: str) -> Unit:
+        return Unit(name, self._fold(name, is_history=False))
 
-    def _unit(self, name: str) -> _Unit:
+    def _unit(self, name: str) -> Unit:
         """The unit of that name, made where there is none."""
         if name not in self._units:
             self._units[name] = self._fresh_unit(name)
         return self._units[name]
 
     def _lane(self, fold: Fold, machine: str) -> Lane:
-        config = self._configuration.of(machine) if self._cell_config is None else self._cell_config
-        return Lane(fold, self._processor.inputs, config, machine, self.ledger, self.counts)
+        config = self._processor.config_of(self._configuration, machine)
+        return Lane(fold, self._processor.inputs, config, machine, self.counts)
 
     def _unit_name(self, machine: str) -> str:
-        return machine if self._cell_config is None else self._cell_config.cell_of(machine)
+        return self._processor.unit_of(self._configuration, machine)
 
-    def _joined(self, name: str) -> _Machine:
+    def _joined(self, name: str) -> Machine:
         """A machine that is new here, in the unit that it belongs to."""
         machine = self._machines[name] = self._restored(self._unit(self._unit_name(name)), name)
         return machine
 
-    def _restored(self, unit: _Unit, name: str) -> _Machine:
+    def _restored(self, unit: Unit, name: str) -> Machine:
         """The machine of a unit, made where there is none; only the unit knows of it."""
         if name not in unit.machines:
-            unit.machines[name] = _Machine(name, unit, self._lane(unit.live, name))
+            unit.machines[name] = Machine(name, unit, self._lane(unit.live, name))
         return unit.machines[name]
 
-    def _history_of(self, unit: _Unit, name: str) -> Lane:
+    def _history_of(self, unit: Unit, name: str) -> Lane:
         machine = self._restored(unit, name)
         if unit.history is None:
             unit.history = self._fold(unit.name, is_history=True)
@@ -277,59 +260,58 @@ class Engine:
             machine.history = self._lane(unit.history, name)
         return machine.history
 
-    def _is_of_twin(self, node: NodeId) -> bool:
-        """Whether only what is an input tells this processor the time: another processor may stamp by the wall's clock."""
-        return self._processor.inputs is not None and is_twin_node(node.node)
-
-    def _data(self, machine: _Machine, event: HostEvent, wall_s: float, effects: list[Effect]) -> None:
+    def _data(self, machine: Machine | None, event: HostEvent, wall_s: float) -> Folded:
+        if machine is None or event.node not in machine.online:
+            return [], (DropReason.BEFORE_BIRTH,)
         readings: tuple[Reading, ...] | list[Reading] = event.readings
-        is_of_twin = self._is_of_twin(event.node)
+        inputs = self._processor.inputs
+        is_of_twin = inputs is not None and is_twin_node(event.node.node)
         excluded = machine.excluded.get(event.node)
         if excluded:
             readings = [reading for reading in readings if reading.name not in excluded]
             if not readings and event.readings:
-                self.ledger.drop(DropReason.NAME_CLASH)
-                return
+                return [], (DropReason.NAME_CLASH,)
         if is_of_twin:
-            readings = [reading for reading in readings if reading.name in (self._processor.inputs or ())]
+            readings = [reading for reading in readings if reading.name in (inputs or ())]
             if not readings:
-                self.ledger.emitted += 1  # nothing of it is for this processor
-                return
+                return [], FOLDED  # nothing of it is for this processor
             if not machine.is_online:
                 machine.live.note(readings)
-                return
+                return [], FOLDED
         if True not in map(_IS_HISTORICAL, readings):
-            machine.live.data(readings, wall_s, effects, is_of_twin=is_of_twin)
-            return
+            return machine.live.data(readings, wall_s, is_of_twin=is_of_twin)
+        effects: list[Effect] = []
         live = [reading for reading in readings if not reading.is_historical]
         if live:  # a message with both goes through both lanes, and counts as two
-            machine.live.data(live, wall_s, effects, is_of_twin=is_of_twin)
-            self.ledger.received += 1
+            effects, fates = machine.live.data(live, wall_s, is_of_twin=is_of_twin)
+            self.ledger.count(fates)
         history = self._history_of(machine.unit, machine.name)
-        history.data([reading for reading in readings if reading.is_historical], wall_s, effects)
+        late, fates = history.data([reading for reading in readings if reading.is_historical], wall_s)
+        return effects + late, fates
 
-    def _birth(self, machine: _Machine | None, event: HostEvent, wall_s: float, effects: list[Effect]) -> None:
+    def _birth(self, machine: Machine | None, event: HostEvent, wall_s: float) -> Folded:
         if len(event.readings) > SIGNALS_MAX:
-            self.ledger.drop(DropReason.SIGNALS_MAX)
-            return
+            return [], (DropReason.SIGNALS_MAX,)
         if machine is None:
             if len(self._machines) >= self._machines_max and not self._forget_one():
-                self.ledger.drop(DropReason.MACHINES_MAX)
-                return
+                return [], (DropReason.MACHINES_MAX,)
             machine = self._joined(event.device or "")
-        is_of_twin = self._is_of_twin(event.node)
+        is_of_twin = self._processor.inputs is not None and is_twin_node(event.node.node)
         was_online = machine.is_online
         machine.online.add(event.node)
         machine.live.born(str(event.node), event.timestamp_ms)
         taken = self._taken(machine, event)
         if not machine.is_online and self._processor.inputs is not None:  # another processor is quicker than the edge
             machine.live.note(taken)
-            return
+            return [], FOLDED
+        declared: list[Effect] = []
         if not was_online and self._processor.outputs:
-            effects.append(Declare(machine.name, machine.live.emission.known(event.timestamp_ms)))
-        machine.live.birth(taken if is_of_twin else event.readings, taken, wall_s, effects, is_of_twin=is_of_twin)
+            declared.append(Declare(machine.name, machine.live.emission.known(event.timestamp_ms)))
+        offered = taken if is_of_twin else event.readings
+        effects, fates = machine.live.birth(offered, taken, wall_s, is_of_twin=is_of_twin)
+        return declared + effects, fates
 
-    def _taken(self, machine: _Machine, event: HostEvent) -> list[Reading]:
+    def _taken(self, machine: Machine, event: HostEvent) -> list[Reading]:
         """The readings of a birth that this processor takes from this source. A signal belongs to the first source that is
         online with it; what a source offered before and does not offer any more is withdrawn."""
         inputs, node, owner = self._processor.inputs, event.node, machine.owner
@@ -348,35 +330,31 @@ class Engine:
                 del machine.live.row[name]
         return taken
 
-    def _death(self, machine: _Machine | None, event: HostEvent, effects: list[Effect]) -> None:
+    def _death(self, machine: Machine | None, event: HostEvent) -> Folded:
         if machine is None or event.node not in machine.online:
-            self.ledger.drop(DropReason.ALREADY_DEAD)
-        elif self._source_dies(machine, event, effects):
-            self.ledger.emitted += 1
-        else:
-            self.ledger.drop(DropReason.DEAD_LETTER)
-
-    def _node_event(self, event: HostEvent, effects: list[Effect]) -> None:
-        """A hole of an edge node concerns each machine that it stands for. Its death comes as one death for each device."""
-        if event.kind is not EventKind.HOLE:
-            return
-        for machine in self._machines.values():
-            if event.node in machine.online:
-                machine.live.lost(event.detail, effects)
-                self._changed[machine.unit.name] = None
-
-    def _source_dies(self, machine: _Machine, event: HostEvent, effects: list[Effect]) -> bool:
+            return [], (DropReason.ALREADY_DEAD,)
         was_online = machine.is_online
         machine.online.discard(event.node)
         names = [name for name, source in machine.owner.items() if source == event.node and name in machine.live.row]
         is_last = was_online and not machine.is_online
-        return self._die(machine, names, event.timestamp_ms, event.detail or "offline", effects, is_last=is_last)
+        late = machine.live.drop_held()
+        effects, fates = self._die(machine, names, event.timestamp_ms, event.detail or "offline", is_last=is_last)
+        return effects, late + fates
 
-    def _die(self, machine: _Machine, names: list[str], at_ms: int, reason: str, effects: list[Effect], *, is_last: bool) -> bool:
-        folded = machine.live.death(names, at_ms, reason, effects, is_last=is_last)
-        if is_last and self._processor.outputs:
-            effects.append(Remove(machine.name))
-        return folded
+    def _node_event(self, event: HostEvent) -> list[Effect]:
+        """A hole of an edge node concerns each machine that it stands for. Its death comes as one death for each device."""
+        effects: list[Effect] = []
+        if event.kind is not EventKind.HOLE:
+            return effects
+        for machine in self._machines.values():
+            if event.node in machine.online:
+                effects += machine.live.lost(event.detail)
+                self._changed[machine.unit.name] = None
+        return effects
+
+    def _die(self, machine: Machine, names: list[str], at_ms: int, reason: str, *, is_last: bool) -> Folded:
+        effects, fates = machine.live.death(names, at_ms, reason, is_last=is_last)
+        return ([*effects, Remove(machine.name)] if is_last and self._processor.outputs else effects), fates
 
     def _forget_one(self) -> bool:
         """Make room: the machine that has been offline longest by order of arrival goes."""
@@ -390,8 +368,8 @@ class Engine:
         lost = self._machines.pop(name)
         for lane in (lost.live, lost.history):
             if lane is not None:
-                lane.drop_held()
+                self.ledger.count(lane.drop_held(), 0)
                 lane.fold.leave(name)
         del lost.unit.machines[name]
-        if self._cell_config is None:
+        if not self._processor.is_of_cells:
             del self._units[name]

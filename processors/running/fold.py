@@ -8,17 +8,21 @@ from types import MappingProxyType
 from typing import Any
 
 from processors.config import Configuration, ProcessorConfig
-from processors.contract import CellProcessor, Output, Outputs, PlainOutput
+from processors.contract import Output, Outputs, PlainOutput
 from processors.discovery import AnyProcessor
 from processors.effects import DeadLetter, Effect, Pin, Publish
 from processors.errors import OutputError
 from processors.running.counts import Counts
 from processors.running.dead_letter import dead_letter
 from processors.running.emission import Emission, plain_message
+from processors.running.ledger import FOLDED, DropReason, Fates
 from processors.sample import Sample
 from sparkplug.metric import Reading
 
 Row = Mapping[str, Reading]
+Folded = tuple[list[Effect], Fates]
+"""The effects to be sent, and the fates of the message that brought them and of those that were held back before it."""
+DEAD: Fates = (DropReason.DEAD_LETTER,)
 
 
 class Fold:
@@ -47,16 +51,14 @@ class Fold:
         *,
         is_history: bool,
     ) -> None:
-        is_cell = isinstance(processor, CellProcessor)
-        config = configuration.default if is_cell else configuration.of(name)
         self.name, self.is_history = name, is_history
-        self.state: Any = processor.initial(config)
+        self.state: Any = processor.initial(processor.config_of(configuration, name))
         self.emissions: dict[str, Emission] = {}
         self._processor, self._step, self._counts = processor, processor.step, counts
-        self.wakes = processor.wakes if isinstance(processor, CellProcessor) else None
-        self._config: Any = configuration if is_cell else config
+        self.wakes = processor.wakes
+        self._config: Any = processor.given(configuration, name)
         self._rows: dict[str, Row] = {}
-        self.cell: Mapping[str, Row] = MappingProxyType(self._rows if is_cell else {})
+        self.cell: Mapping[str, Row] = MappingProxyType(self._rows if processor.is_of_cells else {})
 
     def join(self, machine: str) -> Emission:
         """A machine is known from now on; what it is told."""
@@ -75,20 +77,19 @@ class Fold:
         self.hide(machine)
         self.emissions.pop(machine, None)
 
-    def take(self, sample: Sample, at_ms: int, effects: list[Effect]) -> bool:
-        """Fold a sample; whether its step came to an end."""
+    def take(self, sample: Sample, at_ms: int) -> Folded:
+        """Fold a sample."""
         try:
             state, outputs = self._step(self._config, self.state, sample)
-            if outputs:
-                self._emit(outputs, sample.machine, at_ms, effects)
+            effects = self._emitted(outputs, sample.machine, at_ms) if outputs else []
         except Exception as error:  # whatever a step does, the stream goes on with the state before
             self._counts.dead_letters += 1
-            effects.append(DeadLetter(sample.machine or self.name, dead_letter(self._processor.name, sample, error)))
-            return False
+            letter = DeadLetter(sample.machine or self.name, dead_letter(self._processor.name, sample, error))
+            return [letter], DEAD
         self.state = state
-        return True
+        return effects, FOLDED
 
-    def _emit(self, outputs: Outputs, machine: str, at_ms: int, effects: list[Effect]) -> None:
+    def _emitted(self, outputs: Outputs, machine: str, at_ms: int) -> list[Effect]:
         """All outputs of a step, or none: what is not declared raises before anything is remembered."""
         by_machine: dict[str, list[Output]] = {}
         beside: list[Effect] = []
@@ -107,8 +108,9 @@ class Fold:
             if emission is None:
                 raise OutputError(f"{self._processor.name} emits {own[0].name!r} of {whose!r}, no machine of {self.name!r}")
             news.append((whose, emission, emission.news(own, at_ms)))
+        effects: list[Effect] = []
         for whose, emission, changes in news:
             if changes:
                 emission.published(changes)
                 effects.append(Publish(whose, tuple(changes)))
-        effects += beside
+        return effects + beside if beside else effects

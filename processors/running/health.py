@@ -1,4 +1,4 @@
-"""What a processor says of itself: the node metrics of its edge node."""
+"""The health of a processor: the node metrics of its edge node."""
 
 from processors.running.ledger import Ledger
 from sparkplug.datatype import DataType

@@ -20,13 +20,15 @@ from typing import Any
 from processors.config import ProcessorConfig
 from processors.effects import Effect
 from processors.running.counts import Counts
-from processors.running.fold import Fold
-from processors.running.ledger import DropReason, Ledger
+from processors.running.fold import Fold, Folded
+from processors.running.ledger import FOLDED, DropReason, Fates
 from processors.sample import Sample, SampleKind
 from sparkplug.metric import Reading
 from sparkplug.quality import Quality
 
 REWIND_MESSAGES = 3  # so many messages in a row, far behind, mean that the clock was set back
+SUPERSEDED: Fates = (DropReason.SUPERSEDED,)
+HELD: Fates = ()
 _name: Callable[[Reading], str] = itemgetter(Reading._fields.index("name"))
 _timestamp_ms: Callable[[Reading], int] = itemgetter(Reading._fields.index("timestamp_ms"))
 
@@ -40,14 +42,12 @@ class Lane:
     """
 
     __slots__ = (
-        "_anchor_ms", "_anchor_wall_s", "_counts", "_fold_in", "_gap_ms", "_held", "_inputs", "_late_ms", "_ledger", "_machine",
+        "_anchor_ms", "_anchor_wall_s", "_counts", "_fold_in", "_gap_ms", "_held", "_inputs", "_late_ms", "_machine",
         "_tick_ms", "_view",
         "births", "births_are_old", "clock_ms", "emission", "fold", "is_restored", "is_silent", "last_ms", "row", "ticking",
     )  # fmt: skip
 
-    def __init__(  # noqa: PLR0917
-        self, fold: Fold, inputs: frozenset[str] | None, config: ProcessorConfig, machine: str, ledger: Ledger, counts: Counts
-    ) -> None:
+    def __init__(self, fold: Fold, inputs: frozenset[str] | None, config: ProcessorConfig, machine: str, counts: Counts) -> None:
         self.row: dict[str, Reading] = {}
         self.fold = fold
         self.emission = fold.join(machine)
@@ -60,7 +60,7 @@ class Lane:
         self.births_are_old = False
         self._view: Mapping[str, Reading] = MappingProxyType(self.row)
         self._fold_in, self._inputs, self._machine = fold.take, inputs, machine
-        self._ledger, self._counts = ledger, counts
+        self._counts = counts
         self._tick_ms = max(1, round(config.tick_s * 1000))
         self._gap_ms = round(config.gap_s_max * 1000)
         self._late_ms = round(config.late_s_max * 1000)
@@ -74,64 +74,60 @@ class Lane:
 
     # Messages.
 
-    def data(self, readings: Sequence[Reading], wall_s: float, effects: list[Effect], *, is_of_twin: bool = False) -> None:
-        """A message with changes has come; the ledger says what became of it. What another processor says never sets the clock
-        back: its figures may be of a while ago, or as old as their last change."""
+    def data(self, readings: Sequence[Reading], wall_s: float, *, is_of_twin: bool = False) -> Folded:
+        """A message with changes has come. What another processor says never sets the clock back: its figures may be of a while
+        ago, or as old as their last change."""
         if not readings:
-            self._ledger.emitted += 1
-            return
+            return [], FOLDED
         if self._inputs is None:
-            self._show(SampleKind.DATA, readings, effects)
-            return
+            return self._show(SampleKind.DATA, readings)
         at_ms = self._time_of(readings)
         if is_of_twin:
-            self._accept(readings, self._if_news(at_ms), wall_s, effects)
-            return
+            return self._accept(readings, self._if_news(at_ms), wall_s)
         if at_ms is not None and self.clock_ms is not None and at_ms < self.last_ms - self._late_ms:
             self._held.append(readings)
-            self._ledger.buffered += 1
-            if len(self._held) == REWIND_MESSAGES:
-                self._follow_the_clock_back(wall_s, effects)
-            return
-        if self._held:
-            self.drop_held()
-        self._accept(readings, at_ms, wall_s, effects)
+            return self._follow_the_clock_back(wall_s) if len(self._held) == REWIND_MESSAGES else ([], HELD)
+        if not self._held:
+            return self._accept(readings, at_ms, wall_s)
+        late = self.drop_held()
+        effects, fates = self._accept(readings, at_ms, wall_s)
+        return effects, late + fates
 
     def birth(
         self,
         readings: Sequence[Reading],
         taken: Sequence[Reading],
         wall_s: float,
-        effects: list[Effect],
         *,
         is_of_twin: bool = False,
-    ) -> None:
+    ) -> Folded:
         """A birth has come: the values `taken` of it hold, whatever was known before."""
         self.fold.show(self._machine, self._view)
         if self._inputs is None:
             self.is_restored = False
-            self._show(SampleKind.BIRTH, taken, effects)
-            return
-        self.drop_held()
+            return self._show(SampleKind.BIRTH, taken)
+        late = self.drop_held()
+        effects: list[Effect] = []
         at_ms = self._time_of(readings)
         if is_of_twin:
             at_ms = self._if_news(at_ms)
         before_ms = self.last_ms if self.clock_ms is not None else None
         if at_ms is not None:
             if before_ms is not None and max(map(_timestamp_ms, readings)) < before_ms - self._late_ms:
-                self._jump_back(at_ms, effects)
+                effects += self._jump_back(at_ms)
             if self.is_restored and before_ms is not None and at_ms > before_ms:
                 # Nobody heard what held meanwhile: no ticks, and so no figures, of that time.
                 self.ticking = False
-                self._reach(at_ms, wall_s, effects)
-                self._hole((at_ms - before_ms) / 1000, "restarted: what came in between was not seen", effects)
+                effects += self._reach(at_ms, wall_s)
+                effects += self._hole((at_ms - before_ms) / 1000, "restarted: what came in between was not seen")
             else:
-                self._reach(at_ms, wall_s, effects)
+                effects += self._reach(at_ms, wall_s)
         self.is_restored = False
         self.row.update((reading.name, reading) for reading in taken)
         self.ticking = True
         names = tuple(reading.name for reading in taken)
-        self._settle(self._fold(SampleKind.BIRTH, self._now_ms(readings), names, effects))
+        folded, fates = self._fold(SampleKind.BIRTH, self._now_ms(readings), names)
+        return effects + folded, late + fates
 
     def born(self, node: str, stamp_ms: int) -> None:
         """A birth of this node is heard."""
@@ -142,32 +138,32 @@ class Lane:
     def note(self, readings: Sequence[Reading]) -> None:
         """Keep what another processor says of a machine whose edge is offline: nothing is made of it until the edge is back."""
         self.row.update((reading.name, reading) for reading in readings)
-        self._ledger.emitted += 1
 
-    def _show(self, kind: SampleKind, readings: Sequence[Reading], effects: list[Effect]) -> None:
+    def _show(self, kind: SampleKind, readings: Sequence[Reading]) -> Folded:
         """For a processor that reads everything, from several sources, each with a clock of its own: there is no common time.
 
         What comes last of a source is what it said last: the session has put its messages in order.
         """
         self.row.update((reading.name, reading) for reading in readings)
-        self._settle(self._fold(kind, self._now_ms(readings), tuple(reading.name for reading in readings), effects))
+        return self._fold(kind, self._now_ms(readings), tuple(reading.name for reading in readings))
 
-    def death(self, names: Sequence[str], at_ms: int, reason: str, effects: list[Effect], *, is_last: bool) -> bool:
-        """An edge of the machine went offline, and `names` with it. Whether the fold took it."""
-        self.drop_held()
+    def death(self, names: Sequence[str], at_ms: int, reason: str, *, is_last: bool) -> Folded:
+        """An edge of the machine went offline, and `names` with it. What was held back is to be dropped before."""
+        effects: list[Effect] = []
         if self.clock_ms is not None and self.clock_ms < at_ms <= self.last_ms + self._gap_ms:
-            self._pass_silence(at_ms, effects)  # and no further than its last tick: each host stamps a death by its own clock
+            effects = self._pass_silence(at_ms)  # and no further than its last tick: each host stamps a death by its own clock
         self.ticking = self.ticking and not is_last
         for name in names:
             self.row[name] = self.row[name]._replace(quality=Quality.STALE, reason=reason)
         if is_last:
             self.fold.hide(self._machine)
         now_ms = at_ms if self.clock_ms is None else self.clock_ms
-        return self._fold(SampleKind.DEATH, now_ms, tuple(names), effects, detail=reason)
+        folded, fates = self._fold(SampleKind.DEATH, now_ms, tuple(names), detail=reason)
+        return effects + folded, fates
 
-    def lost(self, detail: str, effects: list[Effect]) -> None:
+    def lost(self, detail: str) -> list[Effect]:
         """Messages were lost on the way."""
-        self._hole(0.0, detail, effects)
+        return self._hole(0.0, detail)
 
     def withdraw(self, names: Sequence[str]) -> None:
         """Signals that a new birth does not offer any more."""
@@ -180,20 +176,21 @@ class Lane:
         if self.ticking:
             self.fold.show(self._machine, self._view)
 
-    def drop_held(self) -> None:
-        """What was held back was a straggler."""
-        self._ledger.buffered -= len(self._held)
-        self._ledger.dropped[DropReason.LATE] += len(self._held)
+    def drop_held(self) -> Fates:
+        """Drop the messages that were held back: they were stragglers."""
+        late = (DropReason.LATE,) * len(self._held)
         self._held.clear()
+        return late
 
     # Time.
 
-    def silence(self, wall_s: float, margin_s: float, effects: list[Effect]) -> None:
+    def silence(self, wall_s: float, margin_s: float) -> list[Effect]:
         """No message waits: give the ticks up to the present, held back by a margin for what is still on its way."""
         if self.ticking and self._anchor_ms and self.clock_ms is not None and not self.is_silent:
             now_ms = self._anchor_ms + int((wall_s - self._anchor_wall_s - margin_s) * 1000)
             if now_ms - self.clock_ms >= self._tick_ms or now_ms > self.last_ms + self._gap_ms:
-                self._pass_silence(now_ms, effects)
+                return self._pass_silence(now_ms)
+        return []
 
     def _time_of(self, readings: Sequence[Reading]) -> int | None:
         """Event time of a message: its newest reading; None where it has none to believe. When time leaps, only a good value is
@@ -212,69 +209,72 @@ class Lane:
         """The time of the fold, also before any time was believed."""
         return max(map(_timestamp_ms, readings), default=0) if self.clock_ms is None else self.clock_ms
 
-    def _accept(self, readings: Sequence[Reading], at_ms: int | None, wall_s: float, effects: list[Effect]) -> None:
+    def _accept(self, readings: Sequence[Reading], at_ms: int | None, wall_s: float) -> Folded:
         before_ms = self.last_ms
-        if at_ms is not None:
-            if self.clock_ms is not None and at_ms < before_ms:
-                self._counts.late += 1
-            self._reach(at_ms, wall_s, effects)
+        if at_ms is not None and self.clock_ms is not None and at_ms < before_ms:
+            self._counts.late += 1
+        effects = [] if at_ms is None else self._reach(at_ms, wall_s)
         inputs = self._inputs
         if inputs is not None and not inputs.issuperset(map(_name, readings)):
             readings = [reading for reading in readings if reading[0] in inputs]
         if not readings:
-            self._ledger.emitted += 1  # nothing in it for this processor, but the time
-        elif not (changed := self._update(readings, before_ms)):
-            self._ledger.drop(DropReason.SUPERSEDED)
-        elif self.fold.wakes is not None and self.fold.wakes.isdisjoint(changed):
-            self._ledger.emitted += 1  # the next tick sees it
-        else:
-            self._settle(self._fold(SampleKind.DATA, self._now_ms(readings), changed, effects))
+            return effects, FOLDED  # nothing in it for this processor, but the time
+        if not (changed := self._update(readings, before_ms)):
+            return effects, SUPERSEDED
+        if self.fold.wakes is not None and self.fold.wakes.isdisjoint(changed):
+            return effects, FOLDED  # the next tick sees it
+        folded, fates = self._fold(SampleKind.DATA, self._now_ms(readings), changed)
+        return (effects + folded if effects else folded), fates
 
-    def _reach(self, at_ms: int, wall_s: float, effects: list[Effect]) -> None:
-        if self.clock_ms is None:
-            self.clock_ms = self.last_ms = at_ms
-        elif at_ms > self.clock_ms:
-            self._pass_silence(at_ms, effects)
+    def _reach(self, at_ms: int, wall_s: float) -> list[Effect]:
+        is_forward = self.clock_ms is not None and at_ms > self.clock_ms
+        effects = self._pass_silence(at_ms) if is_forward else []
+        if is_forward or self.clock_ms is None:
             self.clock_ms = self.last_ms = at_ms
         else:
             self.last_ms = max(self.last_ms, at_ms)
         self.is_silent = False
         self._anchor_ms, self._anchor_wall_s = self.clock_ms, wall_s
+        return effects
 
-    def _pass_silence(self, to_ms: int, effects: list[Effect]) -> None:
+    def _pass_silence(self, to_ms: int) -> list[Effect]:
         """Give what silence up to `to_ms` brings: ticks, then a hole if it is long. Bounded by gap_s_max / tick_s."""
         clock_ms = self.clock_ms
+        effects: list[Effect] = []
         if clock_ms is None or self.is_silent:
-            return
+            return effects
         end_ms = self.last_ms + self._gap_ms
         if self.ticking:
             tick_ms = self._tick_ms
             for at_ms in range((clock_ms // tick_ms + 1) * tick_ms, min(to_ms, end_ms) + 1, tick_ms):
                 self.clock_ms = at_ms
                 self._counts.ticks += 1
-                self._fold(SampleKind.TICK, at_ms, (), effects)
+                effects += self._fold(SampleKind.TICK, at_ms, ())[0]
         if to_ms > end_ms:
             self.clock_ms, self.is_silent = end_ms, True
-            self._hole(self._gap_ms / 1000, f"no message for {self._gap_ms / 1000:g} s", effects)
+            effects += self._hole(self._gap_ms / 1000, f"no message for {self._gap_ms / 1000:g} s")
+        return effects
 
-    def _follow_the_clock_back(self, wall_s: float, effects: list[Effect]) -> None:
+    def _follow_the_clock_back(self, wall_s: float) -> Folded:
         held = list(self._held)
         self._held.clear()
-        self._ledger.buffered -= len(held)
-        self._jump_back(min(max(map(_timestamp_ms, readings)) for readings in held), effects)
+        effects = self._jump_back(min(max(map(_timestamp_ms, readings)) for readings in held))
+        fates: Fates = ()
         for readings in held:
-            self._accept(readings, self._time_of(readings), wall_s, effects)
+            accepted, fate = self._accept(readings, self._time_of(readings), wall_s)
+            effects += accepted
+            fates += fate
+        return effects, fates
 
-    def _jump_back(self, at_ms: int, effects: list[Effect]) -> None:
+    def _jump_back(self, at_ms: int) -> list[Effect]:
         gap_s = (self.last_ms - at_ms) / 1000
         self.clock_ms = self.last_ms = at_ms
         self.is_silent = False
-        self._hole(gap_s, "the machine's clock was set back", effects)
+        return self._hole(gap_s, "the machine's clock was set back")
 
-    def _hole(self, gap_s: float, detail: str, effects: list[Effect]) -> None:
+    def _hole(self, gap_s: float, detail: str) -> list[Effect]:
         self._counts.holes += 1
-        if self.clock_ms is not None:
-            self._fold(SampleKind.HOLE, self.clock_ms, (), effects, gap_s=gap_s, detail=detail)
+        return [] if self.clock_ms is None else self._fold(SampleKind.HOLE, self.clock_ms, (), gap_s=gap_s, detail=detail)[0]
 
     # The fold.
 
@@ -294,22 +294,15 @@ class Lane:
                 changed.append(name)
         return tuple(changed)
 
-    def _settle(self, folded: bool) -> None:
-        if folded:
-            self._ledger.emitted += 1
-        else:
-            self._ledger.drop(DropReason.DEAD_LETTER)
-
     def _fold(
         self,
         kind: SampleKind,
         at_ms: int,
         changed: tuple[str, ...],
-        effects: list[Effect],
         *,
         gap_s: float = 0.0,
         detail: str = "",
-    ) -> bool:
+    ) -> Folded:
         fold = self.fold
         sample = Sample(self._machine, kind, at_ms / 1000, self._view, changed, gap_s, detail, fold.is_history, fold.cell)
-        return self._fold_in(sample, at_ms, effects)
+        return self._fold_in(sample, at_ms)

@@ -1,6 +1,7 @@
-"""Where each message went: received = emitted + dropped(reason) + buffered, at every moment."""
+"""The fate of each message: received = emitted + dropped(reason) + buffered, at every moment."""
 
 from collections import Counter
+from collections.abc import Sequence
 from enum import Enum
 
 from twin.vocabulary.node_ledger import BUFFERED, DROPPED, DROPPED_PREFIX, EMITTED, RECEIVED
@@ -21,8 +22,13 @@ class DropReason(Enum):
     BROKER_OFFLINE = "broker_offline"  # folded, but its results could not be sent
 
 
+Fates = tuple[DropReason | None, ...]
+"""The fates of messages; None = it was folded."""
+FOLDED: Fates = (None,)
+
+
 class Ledger:
-    """Counts of one processor. Unit: messages of devices (births, data, deaths)."""
+    """Counts of one processor, made by its engine. Unit: messages of devices (births, data, deaths)."""
 
     __slots__ = ("buffered", "dropped", "emitted", "received")
 
@@ -42,9 +48,30 @@ class Ledger:
         """0, or we have a bug."""
         return self.received - self.emitted - self.buffered - self.dropped_total
 
-    def drop(self, reason: DropReason, count: int = 1) -> None:
-        """Count messages that led to nothing."""
-        self.dropped[reason] += count
+    def count(self, fates: Sequence[DropReason | None], received: int = 1) -> None:
+        """Count `received` new messages, and the fates of as many as have one by now, of those that waited too; the others wait.
+
+        >>> ledger = Ledger()
+        >>> ledger.count(())  # it is held back
+        >>> ledger.count((DropReason.LATE, None))  # the next one says that it was late
+        >>> ledger.received, ledger.emitted, ledger.dropped_total, ledger.buffered
+        (2, 1, 1, 0)
+        """
+        self.received += received
+        if fates is FOLDED and received == 1:  # what nearly every message is
+            self.emitted += 1
+            return
+        self.buffered += received - len(fates)
+        for fate in fates:
+            if fate is None:
+                self.emitted += 1
+            else:
+                self.dropped[fate] += 1
+
+    def overflowed(self, count: int) -> None:
+        """Count messages that a full queue has lost."""
+        self.received += count
+        self.dropped[DropReason.QUEUE_FULL] += count
 
     def unsent(self) -> None:
         """The message just emitted could not be sent after all."""

@@ -1,4 +1,4 @@
-"""What the runtime needs of the outside: a host application to read from, an edge node to write to, memory to keep things in."""
+"""The outside as the runtime needs it: a host application to read from, an edge node to write to, memory to keep things in."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple, Protocol
@@ -62,7 +62,7 @@ class Recorder(Protocol):
         """The filter of the plain messages that it wants."""
 
     def receipts(self) -> Iterable[Receipt]:
-        """What has been kept since this was last asked, for those who wait for it."""
+        """Return what has been kept since the last call, for those who wait for it."""
 
     def health(self) -> Mapping[str, int | float | str]:
-        """How it is, by name: published as `health/<name>` of the processor's node."""
+        """Return the recorder's state by name: published as `health/<name>` of the processor's node."""

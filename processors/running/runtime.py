@@ -81,10 +81,7 @@ def configured(names: Sequence[str], config_path: Path | None = None) -> "list[C
             _table_owner(table, config_path)
     processors = [find(name) for name in dict.fromkeys(names)]
     try:
-        return [
-            (processor, Configuration(processor.config, tables.get(processor.name), name=processor.name))
-            for processor in processors
-        ]
+        return [(processor, processor.configured(tables.get(processor.name))) for processor in processors]
     except ConfigurationError as error:
         raise ConfigurationError(f"{config_path}: {error}") from error
 

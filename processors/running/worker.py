@@ -16,13 +16,11 @@ from threading import Event
 from paho.mqtt.client import topic_matches_sub
 
 from processors.config import Configuration, ProcessorConfig
-from processors.contract import CellProcessor
 from processors.discovery import AnyProcessor
 from processors.effects import Declare, Effect, Pin, Publish, PublishPlain, Remove
 from processors.errors import SnapshotError
 from processors.plain_topic import topic_level
 from processors.running.engine import Engine
-from processors.running.ledger import DropReason
 from processors.running.ports import EdgePort, HostPort, Recorder
 from sparkplug.errors import SparkplugError
 from sparkplug.host_session import EventKind, HostEvent
@@ -57,7 +55,7 @@ class Worker:
         self._snapshot_prefix = topics.snapshots_of(processor.name)
         self._letter_prefix = topics.dead_letters_of(processor.name)
         self._marker_topic = topics.marker_of(processor.name)
-        self._listens = processor.listens if isinstance(processor, CellProcessor) else ()
+        self._listens = processor.listens
         self._declared: set[str] = set()
         self._waiting: deque[HostEvent] = deque()
         self._unsaved: dict[str, float] = {}  # unit: since when
@@ -148,11 +146,7 @@ class Worker:
         self._reconnects = self._host.reconnects
         now_s = time.monotonic()
         while self._waiting:
-            event = self._waiting.popleft()
-            if self._is_message(event):
-                self.engine.ledger.received -= 1
-                self.engine.ledger.buffered -= 1
-            self._take(event, now_s)
+            self._take(self._waiting.popleft(), now_s, has_waited=True)
 
     def _await_edge(self, stop: Event) -> None:
         """Results can go out once our own node is born; a moment's patience saves the first ones."""
@@ -161,18 +155,11 @@ class Worker:
             for event in self._host.poll(POLL_S):
                 self._wait_with(event)
 
-    def _is_message(self, event: HostEvent) -> bool:
-        return event.device is not None and event.kind is not EventKind.HOLE and self._processor.listens_to(event.node.node)
-
     def _wait_with(self, event: HostEvent) -> None:
-        ledger = self.engine.ledger
-        counted = self._is_message(event)
-        ledger.received += counted
-        if len(self._waiting) >= WAITING_MAX:
-            ledger.dropped[DropReason.QUEUE_FULL] += counted
-            return
-        ledger.buffered += counted
-        self._waiting.append(event)
+        has_room = len(self._waiting) < WAITING_MAX
+        self.engine.received(event, has_room=has_room)
+        if has_room:
+            self._waiting.append(event)
 
     def _take_snapshot(self, event: HostEvent) -> None:
         if not event.payload:
@@ -198,23 +185,18 @@ class Worker:
 
     # Events and effects.
 
-    def _take(self, event: HostEvent, now_s: float) -> None:
+    def _take(self, event: HostEvent, now_s: float, *, has_waited: bool = False) -> None:
         if event.kind is not EventKind.PLAIN:
             if self._recorder is not None and self._processor.listens_to(event.node.node):
                 self._recorder.keep(event, time.time_ns() // 1_000_000)
-            self._feed(event, now_s)
+            if not self._apply(self.engine.feed(event, now_s, has_waited=has_waited)):
+                self.engine.unsent()
+            if event.device is not None:
+                self._lag_s = time.time() - event.timestamp_ms / 1000
         elif self._recorder is not None and topic_matches_sub(self._recorder.keeps_plain, event.topic):
             self._recorder.keep(event, event.timestamp_ms)
         elif event.payload and any(topic_matches_sub(wanted, event.topic) for wanted in self._listens):
             self._apply(self.engine.plain(event.topic, event.payload, event.timestamp_ms))
-
-    def _feed(self, event: HostEvent, now_s: float) -> None:
-        emitted = self.engine.ledger.emitted
-        sent = self._apply(self.engine.feed(event, now_s))
-        if not sent and self.engine.ledger.emitted > emitted:
-            self.engine.ledger.unsent()
-        if event.device is not None:
-            self._lag_s = time.time() - event.timestamp_ms / 1000
 
     def _apply(self, effects: Sequence[Effect]) -> bool:
         """Carry out what the engine asks; whether everything could be sent."""
@@ -275,8 +257,7 @@ class Worker:
         ledger, counts, host = self.engine.ledger, self.engine.counts, self._host
         overflowed = host.dropped - self._queue_dropped
         self._queue_dropped += overflowed
-        ledger.received += overflowed
-        ledger.dropped[DropReason.QUEUE_FULL] += overflowed
+        self.engine.overflowed(overflowed)
         at_ms = time.time_ns() // 1_000_000
         self._edge.publish(None, [Change(name, count, at_ms) for name, count in ledger.metrics().items()])
         health: dict[str, int | float | str] = {

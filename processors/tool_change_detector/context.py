@@ -1,4 +1,4 @@
-"""What is known of a tool change on a machine, and who says so: its control, the detector, or nobody.
+"""Tool changes of a machine as far as they are known, and who reports them: its control, the detector, or nobody.
 
 The control is believed first; the detector where the control tells nothing. A value holds until it is said otherwise, since
 values are reported when they change; one whose source has died is stale, which is not "no".
@@ -28,7 +28,7 @@ class ToolChangeContext(NamedTuple):
 
 
 def tool_change_context(row: Mapping[str, Reading]) -> ToolChangeContext:
-    """What a machine's row says of a tool change.
+    """Return the tool change in a machine's row.
 
     >>> tool_change_context({}).reason
     'tool_change_active is not offered'

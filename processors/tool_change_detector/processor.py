@@ -39,7 +39,7 @@ BLOCK_CHARACTERS_MAX = 200
 
 
 class Config(ProcessorConfig):
-    """Which model. tick_s has to go into its sample period a whole number of times."""
+    """The model and its thresholds. tick_s has to go into its sample period a whole number of times."""
 
     tick_s: float = Field(default=0.1, ge=0.001, le=3600.0, description="the model's sample period, or a whole part of it")
     model: Path | None = None
@@ -157,7 +157,7 @@ def _fields(state: State) -> tuple[Any, str, float, int, float, float, str | Non
 
 
 def _block(sample: Sample) -> str | None:
-    """What is executed now: the line, else the text of the block; None where neither is known."""
+    """Return what is executed now: the line, else the text of the block; None where neither is known."""
     for name in (LINE, BLOCK):
         reading = sample.row.get(name)
         if reading is not None and reading.quality is Quality.GOOD and isinstance(reading.value, int | float | str):
@@ -200,7 +200,7 @@ def _outputs(config: Config, detector: "Detector", search: "Search | None", stat
 
 
 def _basis(detector: "Detector", sample: Sample) -> str:
-    """What the answer rests on."""
+    """Return the basis of the answer."""
     limits = detector.limits
     parts = [f"{detector.signal}: two-part matched filter, pattern from a score of {limits.pattern_score:.2f}"]
     if detector.weighing is not None:

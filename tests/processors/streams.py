@@ -6,7 +6,6 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from processors.config import Configuration
 from processors.discovery import AnyProcessor
 from processors.effects import Effect, Publish, PublishPlain
 from processors.running.engine import Engine
@@ -54,7 +53,7 @@ def hole(at_s: float, node: NodeId = EDGE) -> HostEvent:
 
 def engine_of(processor: AnyProcessor, **table: Any) -> Engine:
     """An engine with a configuration of its own."""
-    return Engine(processor, Configuration(processor.config, table, name=processor.name))
+    return Engine(processor, processor.configured(table))
 
 
 def fed(engine: Engine, *events: HostEvent, wall_s: float = 0.0) -> list[Effect]:

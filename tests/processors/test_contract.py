@@ -1,6 +1,9 @@
 """The contract suite: every processor that discovery finds, the ones of tomorrow included."""
 
 import json
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -9,7 +12,7 @@ from hypothesis import strategies as st
 from pydantic import TypeAdapter
 
 from processors.config import Configuration, read_tables
-from processors.discovery import AnyProcessor, discover, sample_configuration
+from processors.discovery import AnyProcessor, discover, modules, sample_configuration
 from processors.effects import DeadLetter, Effect, Publish, PublishPlain, Remove
 from processors.running.snapshot import decode_state, encode_state
 from sparkplug.host_session import HostEvent
@@ -17,6 +20,7 @@ from tests.depth import examples
 from tests.processors.streams import birth, data, death, engine_of, fed, wild_streams
 from twin.vocabulary.twin_signals import TWIN_PREFIX
 
+ROOT = Path(__file__).parents[2]
 every_processor = pytest.mark.parametrize("processor", discover().values(), ids=discover().keys())
 quickly = settings(
     max_examples=examples(40, 25), deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large]
@@ -45,9 +49,36 @@ def test_the_sample_configuration_loads_and_equals_the_defaults(processor: AnyPr
 
 
 @every_processor
-def test_the_sample_configuration_names_every_field(processor: AnyProcessor) -> None:
-    text = sample_configuration(processor).read_text(encoding="utf-8")
-    assert [field for field in processor.config.model_fields if field not in text] == []
+def test_every_section_of_the_sample_configuration_holds_every_key_at_its_default(processor: AnyProcessor) -> None:
+    """What TOML cannot say (no value at all) stands there as a comment, and so may a whole section."""
+    path = sample_configuration(processor)
+    given = read_tables(path)[processor.name]
+    defaults = processor.config().model_dump(mode="json")
+    assert list(_drifted(given, defaults, path.read_text(encoding="utf-8"))) == []
+
+
+def _drifted(given: Mapping[str, Any], defaults: Mapping[str, Any], text: str, where: str = "") -> Iterator[str]:
+    for key in defaults.keys() | given.keys():
+        place = f"{where}{key}"
+        if key not in defaults:
+            yield f"{place} is in the sample only"
+        elif key not in given:
+            if not re.search(rf"^#.*\b{re.escape(key)}\b", text, re.MULTILINE):
+                yield f"{place} is not in the sample"
+        elif isinstance(given[key], dict) and isinstance(defaults[key], dict):
+            yield from _drifted(given[key], defaults[key], text, f"{place}.")
+        elif json.loads(json.dumps(given[key], default=str)) != defaults[key]:
+            yield f"{place} is {given[key]!r} in the sample, {defaults[key]!r} by default"
+
+
+@every_processor
+def test_sample_page_and_code_lead_to_each_other(processor: AnyProcessor) -> None:
+    path = sample_configuration(processor)
+    opening = "\n".join(path.read_text(encoding="utf-8").splitlines()[:3])
+    (page,) = re.findall(r"^# Page: (docs/[\w-]+\.md)$", opening, re.MULTILINE)
+    links = re.findall(r"\]\(([^)]+)\)", (ROOT / page).read_text(encoding="utf-8"))
+    code = f"../{modules()[processor.name].replace('.', '/')}.py"
+    assert {code, f"../{path.relative_to(ROOT)}"} <= set(links)
 
 
 @every_processor
@@ -108,14 +139,13 @@ def _same(left: list[Effect], right: list[Effect]) -> bool:
 @every_processor
 def test_a_snapshot_carries_a_machine_over_to_a_new_process(processor: AnyProcessor) -> None:
     """The edge lives on: the new process is given its birth, with the values that it has by then, and goes on."""
-    first = engine_of(processor, ambient_temp_c=20.0) if processor.name == "thermal" else engine_of(processor)
-    whole = engine_of(processor, ambient_temp_c=20.0) if processor.name == "thermal" else engine_of(processor)
-    values = {"spindle_rpm": 5000.0, "spindle_load_pct": 40.0, "tool_number": 3}
+    first, whole, second = engine_of(processor), engine_of(processor), engine_of(processor)
+    values = {"spindle_rpm": 5000.0, "spindle_load_pct": 40.0, "tool_number": 3, "ambient_temp_c": 20.0}
     opening = [birth(0.0, **values), data(10.4, spindle_load_pct=50.0)]
-    rest = [data(20.2, spindle_rpm=5100.0), data(45.0, spindle_rpm=0.0, spindle_load_pct=0.0), data(90.0, tool_number=4)]
+    cut_short = data(45.0, spindle_rpm=0.0, spindle_load_pct=0.0)
+    rest = [data(20.2, spindle_rpm=5100.0), cut_short, data(90.0, tool_number=4, ambient_temp_c=20.5)]
     fed(first, *opening)
     fed(whole, *opening, *rest)
-    second = engine_of(processor, ambient_temp_c=20.0) if processor.name == "thermal" else engine_of(processor)
     (unit,) = first.units
     assert second.restore(first.snapshot(unit)) == unit
     fed(second, birth(10.4, **values | {"spindle_load_pct": 50.0}), *rest)

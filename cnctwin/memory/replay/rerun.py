@@ -10,7 +10,6 @@ from cnctwin.memory.replay.comparison import Comparison, as_sent
 from cnctwin.memory.replay.lives import Restart, Start, births_of
 from cnctwin.memory.replay.log import is_twin
 from processors.config import Configuration, ProcessorConfig
-from processors.contract import CellProcessor
 from processors.discovery import AnyProcessor
 from processors.effects import DeadLetter, Declare, Effect, Publish, Remove
 from processors.errors import SnapshotError
@@ -66,7 +65,7 @@ class Rerun:
         self._births, self._saved_ms = start.births, start.saved_ms
         self._early: list[tuple[int, HostEvent]] = []
         self._wall_s = 0.0
-        self._beats = isinstance(processor, CellProcessor) and processor.beats
+        self._beats = processor.beats
         self._beat_ms: int | None = None
         self._is_counted = False
         self._produced: list[HostEvent] = []

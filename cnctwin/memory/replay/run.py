@@ -48,7 +48,7 @@ def replay(  # noqa: PLR0917
     chosen = [_found(name) for name in (published_of(series[machine]) if processors is None else dict.fromkeys(processors))]
     if not chosen:
         raise ReplayRefusedError(f"no processor has ever published of {machine!r}; name those to run with --processors")
-    pairs = [(one, Configuration(one.config, (tables or {}).get(one.name), name=one.name)) for one in chosen]
+    pairs = [(one, one.configured((tables or {}).get(one.name))) for one in chosen]
     units = [_units(configuration, machine, known) for _, configuration in pairs]
     starts = [kept_start(store, one, tuple(unit), from_ms, warm_up_ms) for (one, _), unit in zip(pairs, units, strict=True)]
     machines = tuple(sorted({name for unit in units for members in unit.values() for name in members}))

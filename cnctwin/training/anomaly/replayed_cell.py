@@ -21,6 +21,7 @@ from processors.effects import DeadLetter
 from processors.joint_anomaly.config import Config
 from processors.joint_anomaly.member import ADJUSTED, GATE
 from processors.joint_anomaly.processor import PROCESSOR, RAW
+from processors.joint_anomaly.scoring import scorings
 from processors.running.engine import Engine
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId, Reading
@@ -65,8 +66,7 @@ class _MachineScores:
 def replayed(stretch: Stretch, models: Mapping[str, AnomalyModel], settings: Mapping[str, Any]) -> dict[str, Track]:
     """The scores of each machine. `settings` are the processor's. Raises UsageError where a sample cannot be folded."""
     told = {name: _MachineScores() for name in stretch}
-    configuration = Configuration(Config, dict(settings), name=PROCESSOR.name)
-    configuration.default.__dict__["loaded"] = dict(models)
+    configuration = Configuration(Config, settings, name=PROCESSOR.name, reads=lambda config: scorings(config, models))
 
     def step(config: Configuration[Config], state: Any, sample: Sample) -> tuple[Any, Outputs]:
         state, outputs = PROCESSOR.step(config, state, sample)

@@ -12,9 +12,10 @@ from typing import Any
 from processors.alerts.body import iso
 from processors.alerts.courier.exchange import Request, exchanged, judged
 from processors.alerts.courier.outcome import Outcome, Verdict
-from processors.alerts.courier.service import Message
 from processors.alerts.courier.webhook import headers
+from processors.alerts.notification import Notification
 from processors.alerts.receivers import AlertmanagerReceiver
+from processors.alerts.statement import RAISED
 
 PATH = "/api/v2/alerts"
 RESENDS_TO_END = 4
@@ -28,9 +29,9 @@ class Alertmanager:
         self._url, self._bearer = url.rstrip("/") + PATH, bearer
         self._timeout_s, self._lasts_s = receiver.timeout_s, RESENDS_TO_END * receiver.resend_s
 
-    def send(self, message: Message) -> Outcome:
+    def send(self, message: Notification) -> Outcome:
         """Send the alerts of one notification."""
-        raised = {said.split(".")[0] for said in message.says if said.split(".")[2:3] == ["raised"]}
+        raised = {statement.fingerprint for statement in message.statements if statement.what == RAISED}
         alerts = message.body.get("alerts") or [_bare(message)]
         return self._post(alerts_for(alerts, time.time(), self._lasts_s, raised), message.id)
 
@@ -80,7 +81,7 @@ def _seconds(text: str, otherwise_s: float) -> float:
         return otherwise_s
 
 
-def _bare(message: Message) -> dict[str, Any]:
+def _bare(message: Notification) -> dict[str, Any]:
     """A test or a heartbeat: an alert of its own, which ends by itself."""
     labels = {"alertname": f"cnctwin_{message.kind}"}
     annotations = {"summary": message.title}

@@ -6,7 +6,7 @@ import warnings
 from typing import Any
 
 from processors.alerts.courier.outcome import Outcome, Verdict
-from processors.alerts.courier.service import Message
+from processors.alerts.notification import Notification
 from processors.errors import ConfigurationError
 
 
@@ -33,7 +33,7 @@ class AppriseService:
             raise ConfigurationError("Apprise does not know what to do with this address; `apprise --details` lists services")
         return opened
 
-    def send(self, message: Message) -> Outcome:
+    def send(self, message: Notification) -> Outcome:
         """Send one notification."""
         kind = self._types.get(message.severity, "info")
         try:

@@ -1,4 +1,4 @@
-"""What the courier does with each notification, without I/O. The clock is an argument.
+"""The course of each notification through the courier, without I/O. The clock is an argument.
 
     waiting -> claiming -> sending -> settled
        ^                      |
@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 from processors.alerts.body import iso
 from processors.alerts.courier.outcome import Outcome, Verdict
-from processors.alerts.courier.service import Message
+from processors.alerts.notification import Notification
 from twin.vocabulary import topics
 
 JOBS_MAX = 2000
@@ -40,14 +40,14 @@ class Publish(NamedTuple):
 class Send(NamedTuple):
     """Send this notification."""
 
-    message: Message
+    message: Notification
 
 
 Action = Publish | Send
 
 
 class Stage(Enum):
-    """Where a notification stands."""
+    """The stage of a notification."""
 
     WAITING = "waiting"
     CLAIMING = "claiming"
@@ -58,7 +58,7 @@ class Stage(Enum):
 
 @dataclass(slots=True)
 class _Job:
-    message: Message
+    message: Notification
     stage: Stage = Stage.WAITING
     attempts: int = 0
     first_s: float | None = None  # of the first attempt
@@ -95,11 +95,11 @@ class Desk:
 
     @property
     def unseen(self) -> bool:
-        """Whether the fate of a notification is still to be seen on the broker."""
+        """True while the fate of a notification is still to be seen on the broker."""
         return any(job.stage is Stage.SETTLED and not job.is_seen for job in self._jobs.values())
 
     def take(self) -> list[Action]:
-        """What is to be done, in this order."""
+        """Return the actions that are due, in this order."""
         actions, self._actions = self._actions, []
         return actions
 
@@ -116,10 +116,10 @@ class Desk:
                 job.is_seen, job.said_s = False, 0.0  # it asks again: what we said was lost
             return
         if self._done.get(key):  # the alerts processor does not know its fate, which we do
-            if (message := Message.of(payload)) is not None:
+            if (message := _notification(payload)) is not None:
                 self._jobs[key] = _Job(message, Stage.SETTLED, said=self._done[key])
             return
-        message = Message.of(payload)
+        message = _notification(payload)
         if message is None or message.id != key:
             self.malformed += 1
             return
@@ -234,7 +234,7 @@ class Desk:
             self._done.popitem(last=False)
 
     def _recall(self, key: str, job: _Job) -> None:
-        """What an earlier life of the courier has left on the broker of this notification."""
+        """Take over what an earlier life of the courier has left on the broker of this notification."""
         claim, delivery = self._claims.pop(key, None), self._deliveries.get(key)
         if delivery is not None:
             job.stage, job.said, job.is_seen = Stage.SETTLED, delivery, True
@@ -275,6 +275,14 @@ class Desk:
             "reason": outcome.reason,
         }
         return json.dumps(said, separators=(",", ":"), ensure_ascii=False).encode("utf-8", "replace")
+
+
+def _notification(payload: bytes) -> Notification | None:
+    """The notification in the outbox; None where it cannot be read."""
+    try:
+        return Notification.of(payload)
+    except (ValueError, RecursionError):
+        return None
 
 
 def _claimed(payload: bytes) -> dict[str, Any]:

@@ -29,7 +29,7 @@ for _chatty in ("httpx", "httpcore"):  # they log whole addresses, and a token m
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """What is to be sent; `secrets` are kept out of every reason."""
+    """A request to be sent; `secrets` are kept out of every reason."""
 
     method: str
     url: str
@@ -42,7 +42,7 @@ class Request:
 
     @property
     def host(self) -> str:
-        """Where it goes, for people to read."""
+        """The host it goes to, for people to read."""
         return urlsplit(self.url).hostname or "?"
 
 
@@ -61,7 +61,7 @@ def exchanged(request: Request, timeout_s: float) -> Answer | Outcome:
 
 
 def judged(answer: Answer, request: Request) -> Outcome:
-    """What a status says: 2xx taken; 429 and 5xx surely not taken, but for 504, where a gateway has passed it on."""
+    """Return the outcome of a status: 2xx taken; 429 and 5xx surely not taken, but for 504, where a gateway has passed it on."""
     status = answer.status
     if 200 <= status < 300:
         return Outcome(Verdict.DELIVERED)

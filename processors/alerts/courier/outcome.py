@@ -1,11 +1,11 @@
-"""What became of an attempt to send."""
+"""The outcome of an attempt to send."""
 
 from enum import Enum
 from typing import NamedTuple
 
 
 class Verdict(Enum):
-    """What is known about it."""
+    """The knowledge about an attempt."""
 
     DELIVERED = "delivered"  # the receiver has it
     REFUSED = "refused"  # the receiver has it not, and trying again would not help

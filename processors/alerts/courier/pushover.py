@@ -12,7 +12,7 @@ from urllib.parse import quote
 from processors.alerts.courier.exchange import Answer, Request, exchanged, judged
 from processors.alerts.courier.outcome import Outcome, Verdict
 from processors.alerts.courier.secret import redacted
-from processors.alerts.courier.service import Message
+from processors.alerts.notification import Notification
 from processors.alerts.receivers import PushoverReceiver
 
 MESSAGE_MAX, TITLE_MAX = 1024, 250
@@ -21,7 +21,7 @@ HEADERS = {"User-Agent": "cnctwin"}
 
 
 class ReceiptState(NamedTuple):
-    """What Pushover says of an emergency."""
+    """The state of an emergency at Pushover."""
 
     acknowledged_by: str  # empty: by nobody yet
     is_over: bool  # expired, cancelled, or not known any more
@@ -33,7 +33,7 @@ class Pushover:
     def __init__(self, receiver: PushoverReceiver, url: str, token: str, user: str) -> None:
         self._receiver, self._url, self._token, self._user = receiver, url.rstrip("/"), token, user
 
-    def send(self, message: Message) -> Outcome:
+    def send(self, message: Notification) -> Outcome:
         """Send one notification; the outcome of an emergency has a receipt."""
         request = self._request("POST", "/1/messages.json", form=self.form(message))
         answer = exchanged(request, self._receiver.timeout_s)
@@ -53,7 +53,7 @@ class Pushover:
         return outcome
 
     def ask(self, receipt: str) -> ReceiptState | None:
-        """What became of an emergency; None where Pushover does not say."""
+        """Return the state of an emergency; None where Pushover does not say."""
         request = self._request("GET", f"/1/receipts/{quote(receipt, safe='')}.json", query={"token": self._token})
         answer = exchanged(request, self._receiver.timeout_s)
         if isinstance(answer, Outcome):
@@ -75,7 +75,7 @@ class Pushover:
         answer = exchanged(request, self._receiver.timeout_s)
         return not isinstance(answer, Outcome) and answer.status < 500 and answer.status != 429
 
-    def form(self, message: Message) -> dict[str, str]:
+    def form(self, message: Notification) -> dict[str, str]:
         """The fields of a message."""
         receiver = self._receiver
         priorities = {"low": receiver.priority_low, "medium": receiver.priority_medium, "high": receiver.priority_high}

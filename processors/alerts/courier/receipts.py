@@ -10,13 +10,13 @@ from typing import Any, NamedTuple
 
 from processors.alerts.courier.desk import Publish
 from processors.alerts.courier.pushover import ReceiptState
+from processors.alerts.statement import RINGING, Statement
 from twin.vocabulary import topics
 
 RECEIPT = topics.ALERT_RECEIPT
 ACK = topics.ALERT_ACK
 RECEIPTS_MAX = 500
 KEPT_S_MAX = 86_400.0
-RINGING = frozenset({"firing", "raised", "repeat"})
 Episode = tuple[str, int]
 
 
@@ -73,10 +73,9 @@ class Receipts:
         except (ValueError, TypeError, KeyError, RecursionError):
             return
 
-    def opened(self, key: str, receiver: str, receipt: str, says: Iterable[str], wall_s: float) -> Publish:
+    def opened(self, key: str, receiver: str, receipt: str, statements: Iterable[Statement], wall_s: float) -> Publish:
         """An emergency has been sent."""
-        parts = [said.split(".") for said in says]
-        episodes = [(part[0], int(part[1])) for part in parts if len(part) == 5 and part[2] in RINGING]
+        episodes = [(statement.fingerprint, statement.episode) for statement in statements if statement.what in RINGING]
         document = {"receiver": receiver, "receipt": receipt, "episodes": episodes, "until_s": wall_s + KEPT_S_MAX}
         payload = json.dumps(document, separators=(",", ":")).encode()
         self.found(key, payload)
@@ -89,7 +88,7 @@ class Receipts:
             self._firing = frozenset((a["fingerprint"], a["episode"]) for a in alerts if a.get("phase") == "firing")
 
     def due(self, now_s: float, wall_s: float, free: frozenset[str]) -> list[Ask | Cancel | Publish | Acknowledge]:
-        """What is to be done now, at most one question for each receiver that is free."""
+        """Return what is to be done now, at most one question for each receiver that is free."""
         actions: list[Ask | Cancel | Publish | Acknowledge] = []
         asked: set[str] = set()
         for key, one in sorted(self._open.items(), key=lambda entry: entry[1].asked_s):
@@ -112,7 +111,7 @@ class Receipts:
         return actions
 
     def answered(self, key: str, state: ReceiptState | None) -> list[Publish | Acknowledge]:
-        """What Pushover said."""
+        """Take Pushover's answer."""
         one = self._open.get(key)
         if one is None or state is None:
             return []
@@ -122,7 +121,7 @@ class Receipts:
         return [self._closed(key)] if state.is_over else []
 
     def cancelled(self, key: str, is_done: bool) -> list[Publish]:
-        """Whether Pushover has stopped it."""
+        """Close a receipt that Pushover has stopped."""
         return [self._closed(key)] if is_done and key in self._open else []
 
     def _closed(self, key: str) -> Publish:

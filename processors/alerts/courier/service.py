@@ -1,13 +1,16 @@
-"""What the courier needs of a receiver, and which file speaks to which."""
+"""The service that speaks to a receiver, and the choice of the file that does."""
 
-import json
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
+from processors.alerts.courier.alertmanager import Alertmanager
+from processors.alerts.courier.apprise_service import AppriseService
 from processors.alerts.courier.outcome import Outcome
+from processors.alerts.courier.pushover import Pushover
 from processors.alerts.courier.secret import read_secret
+from processors.alerts.courier.webhook import Webhook
+from processors.alerts.notification import Notification
 from processors.alerts.receivers import (
     AlertmanagerReceiver,
     AnyReceiver,
@@ -19,50 +22,14 @@ from processors.alerts.receivers import (
 from processors.errors import ConfigurationError
 
 
-@dataclass(frozen=True, slots=True)
-class Message:
-    """A notification out of the outbox. Raises nothing: `of` gives None for what is none."""
-
-    id: str
-    receiver: str
-    kind: str
-    severity: str
-    title: str
-    text: str
-    says: tuple[str, ...]
-    expires_s: float
-    body: Mapping[str, Any]
-
-    @classmethod
-    def of(cls, payload: bytes) -> "Message | None":
-        """The notification that this payload holds."""
-        try:
-            document = json.loads(payload)
-            key, receiver, kind = document["id"], document["receiver"], document["kind"]
-            severity, title, text = document["severity"], document["title"], document["text"]
-            says, body, expires_s = list(document["says"]), document["body"], float(document["expires_s"])
-        except (ValueError, TypeError, KeyError, OverflowError, RecursionError):
-            return None
-        texts = [key, receiver, kind, severity, title, text, *says]
-        if not all(isinstance(one, str) for one in texts) or not isinstance(body, dict):
-            return None
-        return cls(key, receiver, kind, severity, title, text, tuple(says), expires_s, body)
-
-
 class Service(Protocol):
     """One receiver. Whatever happens is an outcome."""
 
-    def send(self, message: Message) -> Outcome: ...
+    def send(self, message: Notification) -> Outcome: ...
 
 
 def service_of(name: str, receiver: AnyReceiver, environment: Mapping[str, str] = os.environ) -> Service:
-    """What speaks to this receiver, its secrets read. Raises ConfigurationError."""
-    # One that is not used is not loaded.
-    from processors.alerts.courier.alertmanager import Alertmanager  # noqa: PLC0415
-    from processors.alerts.courier.apprise_service import AppriseService  # noqa: PLC0415
-    from processors.alerts.courier.pushover import Pushover  # noqa: PLC0415
-    from processors.alerts.courier.webhook import Webhook  # noqa: PLC0415
-
+    """Return what speaks to this receiver, its secrets read. Raises ConfigurationError."""
     try:
         if isinstance(receiver, AppriseReceiver):
             return AppriseService(read_secret(receiver.url, environment), receiver.timeout_s)

@@ -18,7 +18,8 @@ from processors.alerts.courier.desk import CLAIM, DELIVERY, OUTBOX, Desk, Publis
 from processors.alerts.courier.outcome import Outcome, Verdict
 from processors.alerts.courier.pushover import Pushover
 from processors.alerts.courier.receipts import ACK, RECEIPT, Acknowledge, Ask, Cancel, Receipts
-from processors.alerts.courier.service import Message, Service, service_of
+from processors.alerts.courier.service import Service, service_of
+from processors.alerts.notification import Notification
 from sparkplug.broker import BrokerAddress
 from sparkplug.host import HostApplication
 from sparkplug.host_session import EventKind, HostEvent
@@ -35,7 +36,7 @@ _log = logging.getLogger(__name__)
 
 
 class _Work(NamedTuple):
-    """What a receiver's thread is to do, and what to do with its result in the courier's thread."""
+    """A task of a receiver's thread, and the use of its result in the courier's thread."""
 
     do: Callable[[], Any]
     then: Callable[[Any], None]
@@ -83,7 +84,7 @@ class Courier:
 
     @property
     def is_alive(self) -> bool:
-        """Whether the courier's thread runs."""
+        """True while the courier's thread runs."""
         return self._thread.is_alive()
 
     # The courier's thread.
@@ -167,14 +168,15 @@ class Courier:
     def _publish(self, action: Publish) -> None:
         self._host.publish_plain(action.topic, action.payload, qos=1, retain=True)
 
-    def _send(self, message: Message) -> None:
+    def _send(self, message: Notification) -> None:
         service = self._services[message.receiver]
 
         def then(outcome: Outcome) -> None:
             if outcome.verdict is not Verdict.DELIVERED:
                 _log.warning("notification %s to %s: %s: %s", message.id, message.receiver, outcome.verdict.value, outcome.reason)
             if outcome.receipt:
-                self._publish(self._receipts.opened(message.id, message.receiver, outcome.receipt, message.says, time.time()))
+                receipt, statements = outcome.receipt, message.statements
+                self._publish(self._receipts.opened(message.id, message.receiver, receipt, statements, time.time()))
             self._desk.result(message.id, outcome, time.monotonic())
             self._act()
 

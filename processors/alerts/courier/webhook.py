@@ -2,7 +2,7 @@
 
 from processors.alerts.courier.exchange import Request, exchanged, judged
 from processors.alerts.courier.outcome import Outcome
-from processors.alerts.courier.service import Message
+from processors.alerts.notification import Notification
 
 ID_HEADER = "X-Cnctwin-Notification"
 
@@ -19,7 +19,7 @@ class Webhook:
     def __init__(self, url: str, bearer: str | None, timeout_s: float) -> None:
         self._url, self._bearer, self._timeout_s = url, bearer, timeout_s
 
-    def send(self, message: Message) -> Outcome:
+    def send(self, message: Notification) -> Outcome:
         """Send one notification."""
         request = Request(
             "POST", self._url, headers(self._bearer, message.id), json=message.body, secrets=(self._url, self._bearer or "")

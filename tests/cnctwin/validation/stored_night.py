@@ -6,7 +6,6 @@ from typing import Any
 
 from cnctwin.memory.store.contract import Message
 from cnctwin.memory.store.opening import open_store
-from processors.config import Configuration
 from processors.discovery import find
 from processors.effects import Declare, Publish
 from processors.running.engine import Engine
@@ -43,7 +42,7 @@ def told(log: RunLog, at_s: float, machine: str = "vmc") -> Iterator[HostEvent]:
 def twin_told(events: Sequence[HostEvent], names: Sequence[str], tables: Mapping[str, Mapping[str, Any]]) -> Iterator[HostEvent]:
     """Each event, and behind it what the processors say of it."""
     folds = [find(name) for name in names]
-    engines = [(fold.node, Engine(fold, Configuration(fold.config, tables.get(fold.name), name=fold.name))) for fold in folds]
+    engines = [(fold.node, Engine(fold, fold.configured(tables.get(fold.name)))) for fold in folds]
     for event in events:
         yield event
         for name, engine in engines:

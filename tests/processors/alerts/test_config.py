@@ -1,11 +1,15 @@
 """A wrong configuration of the alerts is refused, and no secret is repeated."""
 
+import tomllib
 from typing import Any
 
 import pytest
 
 from processors.alerts.config import AlertsConfig
+from processors.alerts.processor import PROCESSOR
+from processors.alerts.state import Severity
 from processors.config import Configuration
+from processors.discovery import sample_configuration
 from processors.errors import ConfigurationError
 from tests.processors.alerts.courier.alert_shop import DESK
 
@@ -48,3 +52,15 @@ def test_a_secret_in_the_configuration_is_refused_and_not_repeated(receiver: dic
     assert said in str(error.value)
     if receiver["type"] != "hunter2":
         assert "hunter2" not in str(error.value)
+
+
+def test_the_alerts_that_the_sample_shows_are_the_defaults() -> None:
+    """They stand there as comments, so that an alarm that a processor adds is an alert without a line there."""
+    lines = sample_configuration(PROCESSOR).read_text(encoding="utf-8").splitlines()
+    shown = [line.removeprefix("# ") for line in lines if line.startswith(('# "twin/', "# [alerts.signals]"))]
+    table = tomllib.loads("\n".join(shown))["alerts"]
+    defaults = AlertsConfig()
+    assert len(table["signals"]) >= 7
+    assert AlertsConfig.model_validate(table).signals.items() <= defaults.signals.items()
+    others = [rule.severity for name, rule in defaults.signals.items() if name not in table["signals"]]
+    assert set(others) <= {Severity.MEDIUM}

@@ -4,7 +4,8 @@ from typing import Any
 
 import pytest
 
-from processors.alerts.config import ALARM_SIGNALS
+from processors.alerts.alarms import alarm_signals
+from processors.alerts.config import AlertsConfig
 from processors.alerts.processor import PROCESSOR
 from processors.discovery import discover
 from sparkplug.quality import Quality
@@ -28,7 +29,8 @@ def phases(shop: Shop, seconds: int, name: str = "rule_vibration") -> list[str]:
 def test_every_alarm_of_every_processor_is_an_alert() -> None:
     """The rules of the others are declared alarms; what is declared and not watched would be an alarm that nobody is told of."""
     alarms = {spec.name for processor in discover().values() for spec in processor.outputs if spec.is_alarm}
-    assert alarms <= set(ALARM_SIGNALS)
+    assert alarms == set(alarm_signals())
+    assert set(AlertsConfig().signals) == alarms
     assert PROCESSOR.inputs is not None
     assert alarms <= PROCESSOR.inputs
 

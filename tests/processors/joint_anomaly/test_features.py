@@ -4,16 +4,14 @@ from typing import Any
 
 import pytest
 
-from processors.config import Configuration
 from processors.effects import Effect, Publish
 from processors.errors import ConfigurationError
-from processors.joint_anomaly.config import Config
 from processors.joint_anomaly.member import ADJUSTED, ALARM, COMMON, GATE, PEER
 from processors.joint_anomaly.processor import PROCESSOR, RAW
 from processors.running.engine import Engine
 from sparkplug.host_session import HostEvent
 from sparkplug.metric import NodeId
-from tests.processors.joint_anomaly.test_processor import PlainModel, metric, together
+from tests.processors.joint_anomaly.test_processor import PlainModel, engine_with, metric, together
 from tests.processors.streams import birth, data, fed
 from twin.anomaly.preparation import Preparation, Regime
 
@@ -41,9 +39,7 @@ class PreparedModel(PlainModel):
 
 
 def cell(*machines: str, **table: Any) -> Engine:
-    configuration = Configuration(Config, {"threshold": 2.0, "common_mode": "features"} | table, name="joint_anomaly")
-    configuration.default.__dict__["loaded"] = dict.fromkeys(machines, PreparedModel())
-    return Engine(PROCESSOR, configuration)
+    return engine_with(dict.fromkeys(machines, PreparedModel()), {"threshold": 2.0, "common_mode": "features"} | table)
 
 
 def work(machine: str, until_s: int, changes: dict[float, dict[str, Any]]) -> list[HostEvent]:
@@ -126,6 +122,6 @@ def test_a_restart_in_the_middle_changes_nothing() -> None:
 
 
 def test_a_model_without_baselines_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("processors.joint_anomaly.config._models_in", lambda _: {"a": PlainModel()})
+    monkeypatch.setattr("processors.joint_anomaly.scoring._models_in", lambda _: {"a": PlainModel()})
     with pytest.raises(ConfigurationError, match="the model of a was not trained for it"):
-        Configuration(Config, {"models": "somewhere", "common_mode": "features"}, name="joint_anomaly")
+        PROCESSOR.configured({"models": "somewhere", "common_mode": "features"})

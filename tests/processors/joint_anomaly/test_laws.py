@@ -19,7 +19,7 @@ from processors.running.engine import Engine
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId
 from tests.depth import examples
-from tests.processors.joint_anomaly.test_processor import PlainModel, born, cell, fed, metric, says
+from tests.processors.joint_anomaly.test_processor import A_TENTH, PlainModel, born, cell, engine_with, fed, metric, says
 from tests.processors.streams import T0_MS, birth, death, event, reading
 from twin.anomaly.alarm import AlarmRule, is_alarm
 from twin.anomaly.common_mode import CommonModeRule, Method, adjust_frames
@@ -66,10 +66,7 @@ def drawn(seed: int) -> Shift:
 
 def engine_for(shift: Shift) -> Engine:
     """All machines have the plain model; for the residual a spread of 0.1 about −0.2."""
-    engine = cell(*shift.says, **shift.table)
-    for model in engine._configuration.default.loaded.values():
-        model.calibration = Centred()
-    return engine
+    return cell(*shift.says, calibration=Centred(), **shift.table)
 
 
 @dataclass(frozen=True)
@@ -310,11 +307,8 @@ class HalfBroken(PlainModel):
 @pytest.mark.parametrize(("load", "why"), [(85.0, "the model has no finite answer"), (95.0, "the model fails: ValueError")])
 @pytest.mark.parametrize("common_mode", ["source", "residual"])
 def test_a_model_that_fails_concerns_its_own_machine_only_and_is_said(load: float, why: str, common_mode: str) -> None:
-    engine = cell("a", "b", common_mode=common_mode)
-    loaded = engine._configuration.default.loaded
-    for machine, model in (("a", HalfBroken()), ("b", PlainModel())):
-        model.calibration = Centred()
-        loaded[machine] = model
+    models = {"a": HalfBroken(Centred()), "b": PlainModel(Centred())}
+    engine = engine_with(models, {"threshold": A_TENTH, "common_mode": common_mode})
     stream = [
         one
         for s in range(1, 12)

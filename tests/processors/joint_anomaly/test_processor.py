@@ -1,7 +1,7 @@
 """The joint anomaly score: gate, common mode and alarm on a cell whose model is so plain that every figure is checked by hand."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any
 
@@ -13,6 +13,7 @@ from processors.errors import ConfigurationError
 from processors.joint_anomaly.config import Config
 from processors.joint_anomaly.member import ADJUSTED, ALARM, COMMON, GATE, GATE_SOURCE, NO_MODEL, PEERS
 from processors.joint_anomaly.processor import PROCESSOR, RAW
+from processors.joint_anomaly.scoring import scorings
 from processors.running.engine import Engine
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId
@@ -26,18 +27,24 @@ class PlainModel:
 
     features = ("spindle_load_pct",)
     in_words = "a model for tests"
-    calibration: Any = None
     preparation: Any = None
+
+    def __init__(self, calibration: Any = None) -> None:
+        self.calibration = calibration
 
     def score_one(self, values: Sequence[float]) -> float:
         return (values[0] - 50.0) / 100.0
 
 
-def cell(*machines: str, **table: Any) -> Engine:
-    """An engine whose machines all have the plain model and a threshold of 0.1."""
-    configuration = Configuration(Config, {"threshold": A_TENTH} | table, name="joint_anomaly")
-    configuration.default.__dict__["loaded"] = dict.fromkeys(machines, PlainModel())
+def engine_with(models: Mapping[str, Any], table: dict[str, Any]) -> Engine:
+    """An engine whose machines have these models."""
+    configuration = Configuration(Config, table, name="joint_anomaly", reads=lambda config: scorings(config, models))
     return Engine(PROCESSOR, configuration)
+
+
+def cell(*machines: str, calibration: Any = None, **table: Any) -> Engine:
+    """An engine whose machines all have the plain model and a threshold of 0.1."""
+    return engine_with(dict.fromkeys(machines, PlainModel(calibration)), {"threshold": A_TENTH} | table)
 
 
 def metric(effects: list[Effect], name: str, machine: str = "a") -> list[tuple[float, Any]]:
@@ -240,10 +247,8 @@ def test_taken_literally_a_peers_tool_change_hides_a_fault_and_without_gated_pee
 
 
 def test_the_residual_keeps_a_fault_that_comes_with_a_common_disturbance() -> None:
-    engine = cell("a", "b", "c", "d", common_mode="residual", threshold=1.0)
     calibrated = SimpleNamespace(raw_center=-0.2, raw_spread=0.1, threshold=1.0, in_words="", hourly_means=())
-    for model in engine._configuration.default.loaded.values():
-        model.calibration = calibrated
+    engine = cell("a", "b", "c", "d", common_mode="residual", threshold=1.0, calibration=calibrated)
     loads = {"a": 90.0, "b": 60.0, "c": 60.0, "d": 62.0}  # z: 6.0, and 3.0, 3.0, 3.2 of the peers
     effects = fed(engine, *born(*loads), *together(*(course(name, 10, {1.5: {"load": load}}) for name, load in loads.items())))
     assert metric(effects, ADJUSTED)[-1] == (2.0, pytest.approx(3.0))
@@ -340,10 +345,10 @@ def test_history_that_comes_late_wakes_nobody() -> None:
 def test_a_threshold_is_refused_for_settings_that_it_was_not_fitted_with(monkeypatch: pytest.MonkeyPatch) -> None:
     fitted = Config().model_dump() | {"tick_s": 0.1}
     model = SimpleNamespace(features=("spindle_load_pct",), calibration=SimpleNamespace(**fitted), preparation=None)
-    monkeypatch.setattr("processors.joint_anomaly.config._models_in", lambda _: {"a": model})
+    monkeypatch.setattr("processors.joint_anomaly.scoring._models_in", lambda _: {"a": model})
     with pytest.raises(ConfigurationError, match=r"tick_s = 1.0, but the threshold of a was fitted with 0.1"):
-        Configuration(Config, {"models": "somewhere"}, name="joint_anomaly")
-    assert Configuration(Config, {"models": "somewhere", "threshold": 0.3}, name="joint_anomaly").default.threshold == 0.3
+        PROCESSOR.configured({"models": "somewhere"})
+    assert PROCESSOR.configured({"models": "somewhere", "threshold": 0.3}).default.threshold == 0.3
 
 
 def test_the_snapshot_of_a_cell_stays_small() -> None:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from processors.contract import OutputSpec
 from processors.effects import DeadLetter, Effect, Publish
 from processors.errors import ConfigurationError
-from processors.rules.alarm import IDLE, Judgement, Stand, Timing, latched
+from processors.rules.alarm import IDLE, Judgement, LimitState, Timing, latched
 from processors.rules.processor import DETAIL, PROCESSOR, RULES, SEVERITY, ZONE
 from processors.rules.vibration import BOUNDARIES_MM_S
 from processors.running.engine import Engine
@@ -337,13 +337,13 @@ def test_what_lasts_is_published_once() -> None:
     assert len(changes) <= 8
 
 
-stands = st.lists(st.tuples(st.sampled_from(list(Stand)), st.floats(0.0, 4.0)), max_size=30)
+stands = st.lists(st.tuples(st.sampled_from(list(LimitState)), st.floats(0.0, 4.0)), max_size=30)
 
 
 @given(steps=stands, dwell_s=st.floats(0.0, 6.0), clear_s=st.floats(0.0, 6.0))
 @settings(max_examples=300, deadline=None)
 def test_an_alarm_needs_its_dwell_without_a_break_and_its_end_too(
-    steps: list[tuple[Stand, float]], dwell_s: float, clear_s: float
+    steps: list[tuple[LimitState, float]], dwell_s: float, clear_s: float
 ) -> None:
     """The latch against the sentence that it implements."""
     latch, at_s, history = IDLE, 0.0, []
@@ -352,7 +352,7 @@ def test_an_alarm_needs_its_dwell_without_a_break_and_its_end_too(
         was = latch.is_alarm
         latch = latched(latch, Judgement(stand, finding="x"), Timing(dwell_s, clear_s), at_s)
         history.append((stand, at_s))
-        wanted = Stand.OVER if not was else Stand.UNDER
+        wanted = LimitState.OVER if not was else LimitState.UNDER
         run = []
         for past in reversed(history):
             if past[0] is not wanted:

@@ -15,9 +15,8 @@ from cnctwin.training.anomaly.calibrated_cell import Calibrated, TrainingSetting
 from cnctwin.training.anomaly.recorded_cell import part, recorded_cell
 from cnctwin.training.anomaly.replayed_cell import replayed
 from cnctwin.training.anomaly.time_split import split
-from processors.config import Configuration
 from processors.errors import ConfigurationError
-from processors.joint_anomaly.config import Config
+from processors.joint_anomaly.processor import PROCESSOR
 from tests.cnctwin.training.anomaly.cells import FEATURES, machine_log
 from twin.anomaly.common_mode import Method
 from twin.anomaly.detector import Detector
@@ -60,9 +59,9 @@ def test_what_it_writes_is_what_the_processor_takes(folder: Path, tmp_path: Path
     assert done.exit_code == 0, done.output
     assert sorted(load_models(tmp_path / "models")) == ["a", "b", "c"]
     table = tomllib.loads(done.output[done.output.index("[joint_anomaly]") :])["joint_anomaly"]
-    assert len(Configuration(Config, table, name="joint_anomaly").default.loaded) == 3
+    assert len(PROCESSOR.configured(table).read) == 3
     with pytest.raises(ConfigurationError, match="dwell_ticks"):
-        Configuration(Config, {**table, "dwell_ticks": 5}, name="joint_anomaly")
+        PROCESSOR.configured({**table, "dwell_ticks": 5})
 
 
 def test_what_is_usual_in_each_operation_goes_with_the_model(folder: Path, tmp_path: Path) -> None:
@@ -73,7 +72,7 @@ def test_what_is_usual_in_each_operation_goes_with_the_model(folder: Path, tmp_p
         assert model.preparation.signals == model.features
         assert set(model.preparation.regimes) == {"?|?|?"}  # nothing tells of programs or tools here
     table = tomllib.loads(done.output[done.output.index("[joint_anomaly]") :])["joint_anomaly"]
-    assert Configuration(Config, table, name="joint_anomaly").default.common_mode is Method.FEATURES
+    assert PROCESSOR.configured(table).default.common_mode is Method.FEATURES
     assert run("check", tmp_path / "models").exit_code == 0
     other = run("check", tmp_path / "models" / "a", "--against", tmp_path / "models" / "b")
     assert "check another on recordings" in str(other.exception)

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from random import Random
 
 from cnctwin.memory.store.contract import Message, Snapshot
-from processors.config import Configuration
 from processors.discovery import AnyProcessor
 from processors.effects import Declare, Effect, Publish, Remove
 from processors.running.engine import Engine
@@ -37,7 +36,7 @@ class Living:
 
     def start(self) -> None:
         """As a new process."""
-        self.engine = Engine(self.processor, Configuration(self.processor.config, self._table, name=self.processor.name))
+        self.engine = Engine(self.processor, self.processor.configured(self._table))
         self._heard, self._declared, self.waiting = set(), {}, []
         for payload in self.snapshots.values():
             self.engine.restore(payload)

@@ -12,6 +12,7 @@ from processors.config import Configuration
 from processors.effects import Publish
 from processors.joint_anomaly.config import Config
 from processors.joint_anomaly.processor import PROCESSOR
+from processors.joint_anomaly.scoring import scorings
 from processors.running.engine import Engine
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId, Reading
@@ -39,8 +40,8 @@ def message_by_message(
     runs: dict[str, RunLog], model: Any, settings: dict[str, Any]
 ) -> dict[tuple[str, str], list[tuple[float, Any]]]:
     """What the processor publishes where each row of the logs is a message of its own: by machine and metric."""
-    configuration = Configuration(Config, settings, name="joint_anomaly")
-    configuration.default.__dict__["loaded"] = dict.fromkeys(runs, model)
+    models = dict.fromkeys(runs, model)
+    configuration = Configuration(Config, settings, name="joint_anomaly", reads=lambda config: scorings(config, models))
     engine, events = Engine(PROCESSOR, configuration), []
     for machine, run in runs.items():
         names = [*FEATURES, "tool_change_active"]

@@ -15,8 +15,9 @@ from processors.alerts.courier.alertmanager import alerts_for
 from processors.alerts.courier.outcome import Verdict
 from processors.alerts.courier.pushover import Pushover, ReceiptState
 from processors.alerts.courier.secret import read_secret
-from processors.alerts.courier.service import Message, Service, service_of
+from processors.alerts.courier.service import Service, service_of
 from processors.alerts.messages import OUTBOX
+from processors.alerts.notification import Notification
 from processors.alerts.receivers import AnyReceiver
 from processors.errors import ConfigurationError
 from tests.processors.alerts.courier.alert_shop import Shop
@@ -40,7 +41,7 @@ def service(server: ReceivingServer, kind: str = "webhook", **fields: Any) -> Se
     return service_of("x", RECEIVER.validate_python({"type": kind, "timeout_s": 60.0} | secrets | url | fields), ENVIRONMENT)
 
 
-def message(severity: str = "high", **values: Any) -> Message:
+def message(severity: str = "high", **values: Any) -> Notification:
     """A notification as the fold makes it."""
     shop = Shop()
     if severity == "resolved":
@@ -53,9 +54,7 @@ def message(severity: str = "high", **values: Any) -> Message:
         shop.set(**({"vibration": True} if severity == "high" else {"score": True} if severity == "medium" else {"drift": True}))
         shop.wait(20)
     payload = shop.retained[OUTBOX + shop.told[-1].id]
-    made = Message.of(json.dumps(json.loads(payload) | values).encode())
-    assert made is not None
-    return made
+    return Notification.of(json.dumps(json.loads(payload) | values).encode())
 
 
 # What an answer means.

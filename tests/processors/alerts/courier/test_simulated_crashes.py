@@ -17,8 +17,8 @@ from pydantic import TypeAdapter
 from processors.alerts.config import AlertsConfig
 from processors.alerts.courier.desk import CLAIM, Desk, Publish, Send
 from processors.alerts.courier.outcome import Outcome, Verdict
-from processors.alerts.courier.service import Message
 from processors.alerts.messages import DELIVERY, OUTBOX
+from processors.alerts.notification import Notification
 from processors.alerts.processor import step
 from processors.alerts.state import AlertsState
 from processors.config import Configuration
@@ -80,8 +80,7 @@ class Plant:
             self.to_courier.append((topic, payload))
 
     def note(self, payload: bytes) -> None:
-        message = Message.of(payload)
-        assert message is not None
+        message = Notification.of(payload)
         if message.id not in self.known:
             self.known.add(message.id)
             for said in message.says:
@@ -139,7 +138,7 @@ class Plant:
         self.lives += 1
         self.desk = Desk(f"life{self.lives}", dict.fromkeys(TABLE["receivers"], 60.0))  # type: ignore[attr-defined]
         self.to_courier: deque[tuple[str, bytes]] = deque(self.shuffled(OUTBOX, CLAIM, DELIVERY))
-        self.in_flight: dict[str, tuple[Message, Outcome | None]] = {}
+        self.in_flight: dict[str, tuple[Notification, Outcome | None]] = {}
         while self.to_courier:
             self.courier_message()
         self.desk.complete()

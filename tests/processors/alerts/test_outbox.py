@@ -2,7 +2,9 @@
 
 import json
 
+from processors.alerts.courier.desk import Desk
 from processors.alerts.messages import OUTBOX
+from processors.alerts.notification import Notification
 from processors.alerts.phases import Beat, caught_up
 from processors.alerts.state import Alert, AlertsState, Phase, Severity
 from tests.processors.alerts.courier.alert_shop import VIBRATION, Shop
@@ -113,3 +115,29 @@ def test_one_that_pends_fires_where_that_was_told() -> None:
 def outbox(shop: Shop) -> list[dict[str, list[str]]]:
     found = [json.loads(payload) for topic, payload in shop.retained.items() if topic.startswith(OUTBOX)]
     return sorted(found, key=lambda one: str(one["created"]))
+
+
+def test_what_is_written_is_read_again_by_the_one_parser() -> None:
+    shop = Shop(delivers=False, **BRIEF)
+    shop.set(vibration=True)
+    shop.wait(11)
+    (payload,) = outbox(shop)
+    read = Notification.of(json.dumps(payload))
+    names = ("id", "receiver", "kind", "severity", "title", "text", "created", "expires_s", "body")
+    assert {name: getattr(read, name) for name in names} == {name: payload[name] for name in names}
+    assert [statement.text for statement in read.statements] == list(read.says) == payload["says"]
+
+
+def test_what_is_no_notification_is_refused_by_the_processor_and_by_the_courier() -> None:
+    shop = Shop(delivers=False, **BRIEF)
+    shop.set(vibration=True)
+    shop.wait(11)
+    (payload,) = outbox(shop)
+    broken = [{**payload, "says": ["fp.now.firing.0.high"]}, {**payload, "body": {"alerts": [{}]}}]
+    broken += [{key: value for key, value in payload.items() if key != name} for name in ("title", "expires_s", "body")]
+    for number, document in enumerate(broken):
+        text = json.dumps({**document, "id": f"{number}"})
+        desk = Desk("here", {})
+        desk.outbox(f"{number}", text.encode())
+        shop.plain(f"{OUTBOX}{number}", text)
+        assert (desk.malformed, shop.state.malformed) == (1, number + 1)
