@@ -20,7 +20,7 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import Any, NamedTuple, TypeVar
 
-from edge.clock.bounds import Bound, OneWay, above, agreed, largest_gap, of_reading
+from edge.clock.bounds import Bound, OneWay, above, agreed, of_reading
 from edge.clock.drift import Drift, Series, drift
 from edge.sample import ClockReading, EdgeSample, SampleSet
 from sparkplug.datatype import DataType
@@ -38,7 +38,9 @@ HEALTH = (
 NEVER_S = -1e300
 BUCKET_S = 10.0
 BUCKET_READINGS_MAX = 128
+BUCKET_PHASES_MAX = 32  # of documents
 WINDOW_BUCKETS_MAX = 60
+WAY_BUCKETS_MAX = 30  # of what came one way, whose upper bound grows with its age
 WINDOW_S = 3600.0  # evidence that is older is forgotten
 STEP_BUCKETS = 3  # of readings that agree on another offset
 STEP_WAY_BUCKETS = 6  # of what came one way
@@ -88,8 +90,7 @@ class Told(NamedTuple):
 class State(NamedTuple):
     """What is known of one control's clock.
 
-    bucket, document, phases, stamp: of the bucket that is open until `until_s`: readings; the largest lower bound of documents,
-        and when they arrived, modulo the clock's resolution; the largest lower bound of stamps
+    bucket, document, stamp: of the bucket that is open until `until_s`: readings, documents, stamps
     readings, documents, stamps: one for each bucket that is closed; peaks: of the signals
     stamps_samples: as the last reading says; None while there was none
     wall_ahead_s: the edge's wall clock minus its monotonic one
@@ -98,8 +99,6 @@ class State(NamedTuple):
     until_s: float = NEVER_S
     bucket: tuple[Bound, ...] = ()
     document: OneWay | None = None
-    phases: tuple[float, ...] = ()
-    resolution_s: float = 1.0
     stamp: OneWay | None = None
     readings: tuple[Bound, ...] = ()
     documents: tuple[OneWay, ...] = ()
@@ -169,11 +168,7 @@ def _gathered(state: State, heard: Heard) -> dict[str, Any]:
     if reading is not None:
         changes["stamps_samples"] = reading.stamps_samples
         if not reading.edge_ms:
-            way = OneWay(heard.at_s, (reading.control_ms - heard.arrival_ms) / 1000.0, reading.round_trip_ms / 1000.0)
-            resolution_s = max(reading.resolution_ms, 1) / 1000.0
-            phase = heard.arrival_ms / 1000.0 / resolution_s % 1.0
-            changes |= {"document": _larger(state.document, way), "resolution_s": resolution_s}
-            changes["phases"] = (*state.phases[1 - BUCKET_READINGS_MAX :], phase)
+            changes["document"] = _document(state.document, reading, heard)
         elif len(state.bucket) < BUCKET_READINGS_MAX:
             changes["bucket"] = (*state.bucket, of_reading(reading, heard.at_s))
     if heard.newest_ms is not None:
@@ -186,21 +181,34 @@ def _gathered(state: State, heard: Heard) -> dict[str, Any]:
     return changes
 
 
+def _document(before: OneWay | None, reading: ClockReading, heard: Heard) -> OneWay:
+    """The documents of the open bucket with one more."""
+    resolution_s, low_s = max(reading.resolution_ms, 1) / 1000.0, (reading.control_ms - heard.arrival_ms) / 1000.0
+    phase = heard.arrival_ms / 1000.0 / resolution_s % 1.0
+    way = OneWay(heard.at_s, low_s, reading.round_trip_ms / 1000.0, resolution_s, (phase,))
+    if before is None:
+        return way
+    if resolution_s > before.resolution_s:  # a clock of milliseconds that shows a full second by chance
+        way = way._replace(resolution_s=before.resolution_s, phases=before.phases)
+    elif resolution_s == before.resolution_s:
+        way = way._replace(phases=(*before.phases, phase)[:BUCKET_PHASES_MAX])
+    return _larger(before, way)._replace(resolution_s=way.resolution_s, phases=way.phases)
+
+
 def _larger(before: OneWay | None, way: OneWay) -> OneWay:
     return before if before is not None and before.low_s > way.low_s else way
 
 
 def _closed(state: State, at_s: float) -> State:
     """The bucket goes into the windows, and may be the one that shows a step."""
-    readings, documents, stamps = _kept(state.readings, at_s), _kept(state.documents, at_s), _kept(state.stamps, at_s)
+    readings = _kept(state.readings, at_s)
+    documents, stamps = _kept(state.documents, at_s, WAY_BUCKETS_MAX), _kept(state.stamps, at_s, WAY_BUCKETS_MAX)
     found: list[float | None] = []  # steps, as the evidence has them that is read now, best first
     if state.bucket:
         readings, by_s = _stepped((*readings, agreed(state.bucket, at_s).bound), at_s)
         found.append(by_s)
     if state.document is not None:
-        hidden_s = largest_gap(state.phases) * state.resolution_s
-        document = state.document._replace(doubt_s=state.document.doubt_s + hidden_s)
-        documents, by_s = _way_stepped((*documents, document), at_s)
+        documents, by_s = _way_stepped((*documents, state.document), at_s)
         found.append(by_s)
     if state.stamp is not None and state.stamps_samples:
         stamps, by_s = _way_stepped((*stamps, state.stamp), at_s)
@@ -209,7 +217,6 @@ def _closed(state: State, at_s: float) -> State:
         until_s=at_s + BUCKET_S,
         bucket=(),
         document=None,
-        phases=(),
         stamp=None,
         readings=readings,
         documents=documents,
@@ -228,8 +235,8 @@ def _closed(state: State, at_s: float) -> State:
 WayT = TypeVar("WayT", Bound, OneWay)
 
 
-def _kept(window: tuple[WayT, ...], at_s: float) -> tuple[WayT, ...]:
-    return tuple(one for one in window[1 - WINDOW_BUCKETS_MAX :] if at_s - one.at_s <= WINDOW_S)
+def _kept(window: tuple[WayT, ...], at_s: float, buckets_max: int = WINDOW_BUCKETS_MAX) -> tuple[WayT, ...]:
+    return tuple(one for one in window[1 - buckets_max :] if at_s - one.at_s <= WINDOW_S)
 
 
 def _stepped(window: tuple[Bound, ...], at_s: float) -> tuple[tuple[Bound, ...], float | None]:
