@@ -52,7 +52,8 @@ BEGINNING_S = 300.0  # after which the offset is known well enough for what it b
 ALARM_S = 1.0  # of drift
 ALARM_STANDS_S = 3600.0  # after a step
 ROOM_S, ROOM_SHARE = 0.025, 0.2  # that an offset may move before it is published again, and of its spread
-NARROWER = 0.6
+NARROWER = 0.6  # of the spread that was published, to be published again
+NARROWER_WAY = 0.8  # of what came one way, whose first spread is wide
 READINGS, DOCUMENTS, STAMPS = "readings of the clock", "times of documents", "stamps of samples"
 UNSTEADY = "the clock does not keep to the rate of the edge's"
 OUTDATED = "the control's clock was not read for an hour"
@@ -337,7 +338,8 @@ def _is_news(told: Told | None, judged: Told) -> bool:
     if told is None or told[1:] != judged[1:] or told.bound is None or judged.bound is None:
         return told is None or told[1:] != judged[1:]
     before, now = told.bound, judged.bound.aged(judged.bound.at_s + 2.0 * BUCKET_S)  # when it is looked at again
-    return now.low_s < before.low_s or now.high_s > before.high_s or _room_s(now) + now.spread_s < NARROWER * before.spread_s
+    narrower = NARROWER if judged.method.startswith(READINGS) else NARROWER_WAY
+    return now.low_s < before.low_s or now.high_s > before.high_s or _room_s(now) + now.spread_s < narrower * before.spread_s
 
 
 def _padded(judged: Told) -> Told:
