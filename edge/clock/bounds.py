@@ -9,11 +9,11 @@ With readings at different phases of the second such intervals overlap by little
 
 What comes one way only (a stamp, a document with the time of its making) was made before it arrived, so its time minus its
 arrival is a lower bound. It is below the offset by its latency, and by what the clock's resolution hid. How large a latency is
-cannot be known from one way, so one thing is assumed: one of the documents at hand, and one of any `QUICK_AMONG` of them that are
-chosen by their phase, took no more than a stated latency L. Such a document that arrives L to L + h after a full second of the
-clock is below the offset by L + h at most. So h is the shortest arc of the second that holds `QUICK_AMONG` arrivals wherever it
-lies (`arc_holding`), and the whole second where there are fewer (`above`). An arc with a single arrival would not do: that
-document may have been a slow one.
+cannot be known from one way, so this is assumed: of `QUICK_AMONG` documents one took no more than a stated latency L, and so did
+one of any `QUICK_IN_ARC` that arrived in one arc of the clock's second; of fewer documents, one took no more than 2 L. A document
+that took L at most and arrives L to L + h after a full second is below the offset by L + h at most. So h is the shortest arc that
+holds `QUICK_IN_ARC` arrivals wherever it lies (`arc_holding`), and the whole second where there are fewer (`above`). An arc with
+a single arrival would not do: that document may have been a slow one.
 
 A bound ages: a clock may have drifted since, by as much as `DRIFT_PPM_MAX`.
 
@@ -29,7 +29,7 @@ DRIFT_PPM_MAX = 500.0
 """Of a clock against another: a quartz is within 100, and NTP turns a clock by 500 at most."""
 ROUNDING_MS = 1.0
 """Of times that are whole milliseconds."""
-QUICK_AMONG = 8
+QUICK_AMONG, QUICK_IN_ARC = 12, 8
 """Documents of which one at least took no more than the stated latency."""
 NEWEST_WEIGHT = 1.5
 """Against 1 of each other bound: where two disagree, the newer one is believed."""
@@ -162,17 +162,20 @@ def above(ways: Sequence[OneWay], at_s: float) -> Bound:
     >>> above([OneWay(0.0, low_s, 1.0) for low_s in (0.5, 0.8, 0.9, 77.0)], 0.0)
     Bound(at_s=0.0, low_s=0.9, high_s=1.9)
 
-    Upwards, the clock may have drifted since the oldest of them came, and with it the phase at which they arrived:
+    Upwards, the clock may have drifted since the oldest of them came, and with it the phase at which they arrived; and two
+    documents are few:
 
-    >>> above([OneWay(0.0, 0.5, 1.0, 1.0, (0.0, 0.5))], 200.0)
+    >>> above([OneWay(0.0, 0.5, 0.5, 1.0, (0.0, 0.5))], 200.0)
     Bound(at_s=200.0, low_s=0.4, high_s=2.6)
     """
     drift = DRIFT_PPM_MAX * 1e-6
     *others, largest = sorted(ways, key=lambda way: way.low_s - abs(at_s - way.at_s) * drift)
     kept = others or [largest]
     resolution_s = min(way.resolution_s for way in kept)
-    phases = [phase for way in others if way.resolution_s == resolution_s for phase in way.phases]
-    doubt_s = max(way.latency_s for way in kept) + resolution_s * arc_holding(phases, QUICK_AMONG)
+    phases = [phase for way in kept if way.resolution_s == resolution_s for phase in way.phases]
+    is_few = 0 < sum(len(way.phases) for way in kept) < QUICK_AMONG
+    latency_s = max(way.latency_s for way in kept) * (2.0 if is_few else 1.0)
+    hidden_s = resolution_s * arc_holding(phases, QUICK_IN_ARC)
     aged_s = max(abs(at_s - way.at_s) for way in kept) * drift
     low_s = kept[-1].low_s - abs(at_s - kept[-1].at_s) * drift
-    return Bound(at_s, low_s, max(way.low_s for way in kept) + doubt_s + aged_s)
+    return Bound(at_s, low_s, max(way.low_s for way in kept) + latency_s + hidden_s + aged_s)

@@ -134,6 +134,7 @@ def test_documents_that_come_one_way_are_enough_where_one_of_them_is_quick(offse
     stamps_samples=st.booleans(),
     seed=st.integers(0, 10**6),
 )
+@example(every_s=2.0, longest_s=0.85, ppm=32.5, resolution_ms=10, stamps_samples=True, seed=4059)
 @settings(max_examples=15, deadline=None)
 def test_documents_cover_at_any_pace_and_drift_where_half_of_them_are_quick(
     every_s: float, longest_s: float, ppm: float, resolution_ms: int, stamps_samples: bool, seed: int
