@@ -79,8 +79,8 @@ def heard(frame: SampleSet, at_s: float, arrival_ms: float, peak: Bound | None =
     return Heard(at_s, arrival_ms, frame.clock, frame.newest_ms if is_news else None, peak)
 
 
-class Told(NamedTuple):
-    """What was published last. `bound` None: a null, for this reason."""
+class OffsetEstimate(NamedTuple):
+    """The offset as all the evidence has it, or as it was published. `bound` None: a null, for this reason."""
 
     bound: Bound | None
     reason: str
@@ -114,7 +114,7 @@ class State(NamedTuple):
     steps: int = 0
     step_s: float = NEVER_S
     step: str = ""
-    told: Told | None = None
+    published: OffsetEstimate | None = None
 
 
 class Done(NamedTuple):
@@ -131,7 +131,7 @@ def step(state: State, heard: Heard) -> Done:
     if state.wall_ahead_s is not None and abs(ahead_s - state.wall_ahead_s) > EDGE_STEP_S:
         state = _edge_clock_set(state, state.wall_ahead_s - ahead_s, heard.at_s)
     state = state._replace(wall_ahead_s=ahead_s, **_gathered(state, heard))
-    if heard.at_s < state.until_s and not (state.told is None and state.bucket):
+    if heard.at_s < state.until_s and not (state.published is None and state.bucket):
         return Done(state)
     if heard.at_s >= state.until_s:
         state = _closed(state, heard.at_s)
@@ -139,10 +139,10 @@ def step(state: State, heard: Heard) -> Done:
     if judged is None:
         return Done(state)
     state = _followed(state, judged)
-    is_news, told = _is_news(state.told, judged), _padded(judged)
+    is_news, padded = _is_news(state.published, judged), _padded(judged)
     stamp_ms = state.newest_ms if state.stamps_samples and state.newest_ms is not None else round(heard.arrival_ms)
-    after = state._replace(told=told) if is_news else state
-    return Done(after, _samples(told, stamp_ms) if is_news else (), _health(after, judged, heard.at_s))
+    after = state._replace(published=padded) if is_news else state
+    return Done(after, _samples(padded, stamp_ms) if is_news else (), _health(after, judged, heard.at_s))
 
 
 def _edge_clock_set(state: State, by_s: float, at_s: float) -> State:
@@ -213,7 +213,7 @@ def _closed(state: State, at_s: float) -> State:
         found.append(by_s)
     if state.stamp is not None and state.stamps_samples:
         stamps, by_s = _way_stepped((*stamps, state.stamp), at_s)
-        found = [by_s] if _is_by_stamps(state.told) else [*found, by_s]
+        found = [by_s] if _is_by_stamps(state.published) else [*found, by_s]
     after = state._replace(
         until_s=at_s + BUCKET_S,
         bucket=(),
@@ -229,7 +229,7 @@ def _closed(state: State, at_s: float) -> State:
         return after
     words = f"the control's clock was set by {by_s:+.3f} s"
     after = after._replace(steps=state.steps + 1, step_s=at_s, step=words, series=Series(), drift=None, began=None, peaks=())
-    is_read = not _is_by_stamps(state.told) and bool(state.bucket or state.document)
+    is_read = not _is_by_stamps(state.published) and bool(state.bucket or state.document)
     return after._replace(documents=() if is_read and state.bucket else documents, stamps=() if is_read else stamps)
 
 
@@ -273,7 +273,7 @@ def _is_running_away(ways: tuple[OneWay, ...]) -> bool:
     return len(last) == STEADY_BUCKETS and (min(moves) > 1.0 or max(moves) < -1.0)
 
 
-def _judged(state: State, at_s: float) -> Told | None:
+def _judged(state: State, at_s: float) -> OffsetEstimate | None:
     """The offset as all the evidence has it; None while there never was any."""
     stamped_by = "control" if state.stamps_samples else "edge"
     stamps = state.stamps if state.stamps_samples and len(state.stamps) >= STEADY_BUCKETS else ()
@@ -282,18 +282,18 @@ def _judged(state: State, at_s: float) -> Told | None:
     if window:
         found = agreed(window, at_s)
         if 2 * found.number < len(window):
-            return Told(None, UNSTEADY, READINGS, stamped_by)
+            return OffsetEstimate(None, UNSTEADY, READINGS, stamped_by)
         return _beside_stamps(state, found.bound, READINGS, stamps)
     if state.documents:
         if _is_running_away(state.documents):
-            return Told(None, UNSTEADY, DOCUMENTS, stamped_by)
+            return OffsetEstimate(None, UNSTEADY, DOCUMENTS, stamped_by)
         return _beside_stamps(state, above(state.documents, at_s), DOCUMENTS, stamps)
     if stamps:
         return _by_stamps(state, above(stamps, at_s))
-    return None if state.told is None else Told(None, OUTDATED, state.told.method, stamped_by)
+    return None if state.published is None else OffsetEstimate(None, OUTDATED, state.published.method, stamped_by)
 
 
-def _beside_stamps(state: State, read: Bound, method: str, stamps: tuple[OneWay, ...]) -> Told:
+def _beside_stamps(state: State, read: Bound, method: str, stamps: tuple[OneWay, ...]) -> OffsetEstimate:
     """The clock that was read, unless the stamps show that theirs is another; else they may show that it is further ahead."""
     stamped_by = "control" if state.stamps_samples else "edge"
     last = stamps[-STEP_WAY_BUCKETS:]
@@ -302,30 +302,30 @@ def _beside_stamps(state: State, read: Bound, method: str, stamps: tuple[OneWay,
         if is_ahead or all(way.low_s + STAMP_BEHIND_S_MAX < read.low_s for way in last):
             return _by_stamps(state, above(last, read.at_s), "; the clock that is read is another")
     if last and read.low_s < (low_s := above(stamps, read.at_s).low_s) <= read.high_s:
-        return Told(read._replace(low_s=low_s), "", f"{method}, {STAMPS}", stamped_by)
-    return Told(read, "", method, stamped_by)
+        return OffsetEstimate(read._replace(low_s=low_s), "", f"{method}, {STAMPS}", stamped_by)
+    return OffsetEstimate(read, "", method, stamped_by)
 
 
-def _by_stamps(state: State, stamps: Bound, but: str = "") -> Told:
+def _by_stamps(state: State, stamps: Bound, but: str = "") -> OffsetEstimate:
     """Where there are no readings of the clock that stamps: the signals may know better what a sample takes."""
     if state.peaks:
         peak = agreed(state.peaks, stamps.at_s).bound
         if peak.high_s >= stamps.low_s:
             both = stamps.both(peak) if peak.meets(stamps) else peak
-            return Told(both, "", f"{STAMPS}, signals{but}", "control")
-    return Told(stamps, "", f"{STAMPS}{but}", "control")
+            return OffsetEstimate(both, "", f"{STAMPS}, signals{but}", "control")
+    return OffsetEstimate(stamps, "", f"{STAMPS}{but}", "control")
 
 
-def _is_by_stamps(told: Told | None) -> bool:
-    return told is not None and told.method.startswith(STAMPS)
+def _is_by_stamps(published: OffsetEstimate | None) -> bool:
+    return published is not None and published.method.startswith(STAMPS)
 
 
-def _followed(state: State, judged: Told) -> State:
+def _followed(state: State, judged: OffsetEstimate) -> State:
     """The series for the drift, and where it began; of another clock than before both begin anew."""
     bound = judged.bound
     if bound is None:
         return state
-    if _is_by_stamps(state.told) != _is_by_stamps(judged):
+    if _is_by_stamps(state.published) != _is_by_stamps(judged):
         state = state._replace(series=Series(), drift=None, began=None)
     series = state.series.taken(bound)
     found = state.drift if series is state.series else drift(series)
@@ -333,16 +333,16 @@ def _followed(state: State, judged: Told) -> State:
     return state._replace(series=series, drift=found, began=bound if is_beginning or state.began is None else state.began)
 
 
-def _is_news(told: Told | None, judged: Told) -> bool:
+def _is_news(published: OffsetEstimate | None, judged: OffsetEstimate) -> bool:
     """Whether what was published is no longer true, or much less than what is known."""
-    if told is None or told[1:] != judged[1:] or told.bound is None or judged.bound is None:
-        return told is None or told[1:] != judged[1:]
-    before, now = told.bound, judged.bound.aged(judged.bound.at_s + 2.0 * BUCKET_S)  # when it is looked at again
+    if published is None or published[1:] != judged[1:] or published.bound is None or judged.bound is None:
+        return published is None or published[1:] != judged[1:]
+    before, now = published.bound, judged.bound.aged(judged.bound.at_s + 2.0 * BUCKET_S)  # when it is looked at again
     narrower = NARROWER if judged.method.startswith(READINGS) else NARROWER_WAY
     return now.low_s < before.low_s or now.high_s > before.high_s or _room_s(now) + now.spread_s < narrower * before.spread_s
 
 
-def _padded(judged: Told) -> Told:
+def _padded(judged: OffsetEstimate) -> OffsetEstimate:
     """As it is published: with room for what it may move before it is published again."""
     bound = judged.bound
     if bound is None:
@@ -355,7 +355,7 @@ def _room_s(bound: Bound) -> float:
     return ROOM_S + ROOM_SHARE * bound.spread_s
 
 
-def _samples(judged: Told, stamp_ms: int) -> tuple[EdgeSample, ...]:
+def _samples(judged: OffsetEstimate, stamp_ms: int) -> tuple[EdgeSample, ...]:
     """Derived values: they account for no observation."""
     by = EdgeSample(STAMPED_BY, judged.stamped_by, stamp_ms, observations=0)
     if judged.bound is None:
@@ -366,7 +366,7 @@ def _samples(judged: Told, stamp_ms: int) -> tuple[EdgeSample, ...]:
     return offset, EdgeSample(SPREAD, spread_s, stamp_ms, observations=0), by
 
 
-def _health(state: State, judged: Told, at_s: float) -> dict[str, str | int | float | None]:
+def _health(state: State, judged: OffsetEstimate, at_s: float) -> dict[str, str | int | float | None]:
     return {
         "health/clock_step": state.steps,
         "health/clock_drift_ppm": None if state.drift is None else state.drift.ppm,
@@ -375,7 +375,7 @@ def _health(state: State, judged: Told, at_s: float) -> dict[str, str | int | fl
     }
 
 
-def _alarm(state: State, judged: Told, at_s: float) -> str:
+def _alarm(state: State, judged: OffsetEstimate, at_s: float) -> str:
     """What a person has to look at; "" where there is nothing."""
     bound = judged.bound
     if state.step and at_s - state.step_s <= ALARM_STANDS_S:

@@ -226,7 +226,7 @@ class EdgeRuntime:
 
     def _compare_clocks(self, arrival: Arrival) -> None:
         """What the frame says of the control's clock."""
-        known = None if self._clocks.told is None else self._clocks.told.bound
+        known = None if self._clocks.published is None else self._clocks.published.bound
         peak = self._sensor.peak(arrival.frame.samples, arrival.at_s, 0.0 if known is None else known.offset_s)
         done = clock.step(self._clocks, clock.heard(arrival.frame, arrival.at_s, arrival.wall_ms, peak))
         self._clocks = done.state

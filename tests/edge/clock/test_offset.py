@@ -164,9 +164,9 @@ def test_a_clock_that_is_set_is_one_step_and_its_size_is_told(
     assert state.steps == 0
     *_, (look, done) = folded(replace(before, offset_s=3.0 + by_s, seed=1).looks(300.0, 500.0), state)
     assert done.state.steps == 1
-    assert done.state.told is not None
-    assert done.state.told.bound is not None
-    assert abs(done.state.told.bound.offset_s - 3.0 - by_s - 20e-6 * look.at_s) <= done.state.told.bound.spread_s
+    assert done.state.published is not None
+    assert done.state.published.bound is not None
+    assert abs(done.state.published.bound.offset_s - 3.0 - by_s - 20e-6 * look.at_s) <= done.state.published.bound.spread_s
     found_s = float(done.state.step.removeprefix("the control's clock was set by ").removesuffix(" s"))
     assert found_s == pytest.approx(by_s, abs=1.1)
 
@@ -225,8 +225,8 @@ def test_samples_that_carry_the_edges_time_say_so_and_their_stamps_prove_nothing
     told = [values(one.samples) for one in done if one.samples]
     assert {str(look[STAMPED_BY]) for look in told} == {"edge"}
     assert told[-1][OFFSET] == pytest.approx(-77.0, abs=0.05)
-    assert done[-1].state.told is not None
-    assert done[-1].state.told.method == "readings of the clock"
+    assert done[-1].state.published is not None
+    assert done[-1].state.published.method == "readings of the clock"
 
 
 @pytest.mark.parametrize("stamps_ahead_s", [40.0, -40.0])
@@ -240,10 +240,10 @@ def test_stamps_of_another_clock_than_the_one_that_is_read_are_found_out(stamps_
     )
     health, state = last_health(looks)
     assert health["health/clock_alarm"] == ""
-    assert state.told is not None
-    assert state.told.bound is not None
-    assert abs(state.told.bound.offset_s - 1.0 - stamps_ahead_s) <= state.told.bound.spread_s
-    assert state.told.method == "stamps of samples; the clock that is read is another"
+    assert state.published is not None
+    assert state.published.bound is not None
+    assert abs(state.published.bound.offset_s - 1.0 - stamps_ahead_s) <= state.published.bound.spread_s
+    assert state.published.method == "stamps of samples; the clock that is read is another"
 
 
 def test_a_step_of_the_clock_that_stamps_is_found_where_another_one_is_read() -> None:
@@ -264,9 +264,9 @@ def test_one_stamp_from_the_future_moves_nothing() -> None:
     looks[100] = looks[100]._replace(newest_ms=round((T0_S + 10**9) * 1000))
     plain, odd = after(one.looks(0.0, 200.0)), after(iter(looks))
     assert odd.steps == 0
-    assert odd.told is not None
-    assert plain.told is not None
-    assert odd.told.bound == plain.told.bound
+    assert odd.published is not None
+    assert plain.published is not None
+    assert odd.published.bound == plain.published.bound
 
 
 def test_a_stall_of_the_network_is_no_step() -> None:
@@ -278,8 +278,8 @@ def test_a_stall_of_the_network_is_no_step() -> None:
     )
     for _, done in folded(late, state):
         assert done.state.steps == 0
-        assert done.state.told is not None
-        assert done.state.told.bound is not None
+        assert done.state.published is not None
+        assert done.state.published.bound is not None
 
 
 def test_stamps_of_a_backlog_or_of_a_state_as_found_say_nothing_of_latency() -> None:
