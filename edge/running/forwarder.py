@@ -26,7 +26,8 @@ from edge.config import StoreSection
 from edge.errors import StoreError
 from edge.place import Place
 from edge.running.receipts import RECEIPT, Receipts
-from edge.running.ring import Eviction, Ring, StoredRow
+from edge.running.ring import Ring, StoredRow
+from edge.running.ring_file import Eviction
 from edge.running.spans import Spans
 from edge.sample import Drop, EdgeSample
 from sparkplug.datatype import DataType
