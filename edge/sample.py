@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+from sparkplug.metric import Change
 from sparkplug.quality import Quality
 
 UNAVAILABLE = "unavailable"  # the reason of a null that the control does not report
@@ -47,6 +48,11 @@ class EdgeSample:
     sequence: int = 0
     observations: int = 1
     is_baseline: bool = False
+
+    @property
+    def change(self) -> Change:
+        """The value as it is published."""
+        return Change(self.signal, self.value, self.timestamp_ms, self.quality, self.reason)
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ states itself, with the most that they can have held.
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from edge.errors import DocumentError
@@ -139,8 +139,8 @@ def _whole(value: Any) -> int:
 
 
 @dataclass(frozen=True, slots=True)
-class Stand:
-    """Where a parser of sweeps stands: the life and the number of the next frame, and the time up to which all is taken."""
+class SweepPosition:
+    """The place of a parser in the sweeps: the life and the number of the next frame, and the time up to which all is taken."""
 
     life: str = ""
     next_number: int = 0
@@ -151,7 +151,7 @@ class Stand:
         return Place(self.life, self.taken_ms) if self.life else None
 
     @classmethod
-    def resumed(cls, kept: Place) -> "Stand":
+    def resumed(cls, kept: Place) -> "SweepPosition":
         """Where an edge stands that was here before: the time is known, the life is over."""
         return cls("", 0, kept.next_sequence)
 
@@ -163,30 +163,30 @@ class Taken(NamedTuple):
     are the state as found, not events.
     """
 
-    stand: Stand
+    position: SweepPosition
     sweep: Sweep | None
     about: SampleSet
     is_baseline: bool = False
 
 
-def take(stand: Stand, raw: bytes) -> Taken:
+def take(position: SweepPosition, raw: bytes) -> Taken:
     """Take a frame, once, and find the holes before it."""
     try:
         sweep = Sweep.decode(raw)
     except DocumentError as error:
-        return Taken(stand, None, SampleSet(error=str(error)))
+        return Taken(position, None, SampleSet(error=str(error)))
     received = len(sweep.facts)
-    is_new_life = sweep.life != stand.life
-    if not is_new_life and sweep.number < stand.next_number:
+    is_new_life = sweep.life != position.life
+    if not is_new_life and sweep.number < position.next_number:
         dropped: dict[str, int] = {Drop.DUPLICATE: received} if received else {}
-        return Taken(stand, None, SampleSet(received=received, dropped=dropped, instance=sweep.life))
+        return Taken(position, None, SampleSet(received=received, dropped=dropped, instance=sweep.life))
     gaps = [Gap(hole.reason, hole.from_ms, hole.to_ms, hole.lost) for hole in sweep.holes]
-    if is_new_life and stand.taken_ms:
-        gaps.insert(0, _away(stand, sweep))
-    elif not is_new_life and sweep.number > stand.next_number:
-        missing = sweep.number - stand.next_number
-        gaps.insert(0, Gap("frames missing", stand.taken_ms, sweep.t_ms, missing * max(received, 1)))
-    after = Stand(sweep.life, sweep.number + 1, max(sweep.t_ms, stand.taken_ms))
+    if is_new_life and position.taken_ms:
+        gaps.insert(0, _away(position, sweep))
+    elif not is_new_life and sweep.number > position.next_number:
+        missing = sweep.number - position.next_number
+        gaps.insert(0, Gap("frames missing", position.taken_ms, sweep.t_ms, missing * max(received, 1)))
+    after = SweepPosition(sweep.life, sweep.number + 1, max(sweep.t_ms, position.taken_ms))
     newest = max((fact.t_ms for fact in sweep.facts if fact.t_ms is not None), default=sweep.t_ms if sweep.facts else None)
     about = SampleSet(
         gaps=tuple(gaps),
@@ -200,15 +200,6 @@ def take(stand: Stand, raw: bytes) -> Taken:
     return Taken(after, sweep, about, is_baseline=is_new_life or bool(gaps))
 
 
-def _away(stand: Stand, sweep: Sweep) -> Gap:
-    looks = (sweep.t_ms - stand.taken_ms) // sweep.interval_ms if sweep.interval_ms else 1
-    return Gap(EDGE_RESTARTED, stand.taken_ms, sweep.t_ms, max(looks, 0) * len(sweep.facts))
-
-
-def told(about: SampleSet, **more: Any) -> SampleSet:
-    """What is said of the frame, and the samples made of it.
-
-    >>> told(SampleSet(received=2), dropped={"unmapped": 2}).accounted()
-    True
-    """
-    return replace(about, **more)
+def _away(position: SweepPosition, sweep: Sweep) -> Gap:
+    looks = (sweep.t_ms - position.taken_ms) // sweep.interval_ms if sweep.interval_ms else 1
+    return Gap(EDGE_RESTARTED, position.taken_ms, sweep.t_ms, max(looks, 0) * len(sweep.facts))

@@ -107,7 +107,7 @@ def judged(case: Case, truth: Truth, seconds: float, chance: random.Random) -> t
     for one in heard(case, truth, seconds, chance):
         done = clock.step(state, one)
         state = done.state
-        told = state.told
+        told = state.published
         if done.health and told is not None and told.bound is not None:
             found.append(Estimate(one.at_s, told.bound.offset_s, told.bound.spread_s, truth.at(one.at_s)))
     return found, state

@@ -8,8 +8,12 @@ read somewhere between question and answer, and shows the start of the step of i
 With readings at different phases of the second such intervals overlap by little, and the offset lies in what is left (`agreed`).
 
 What comes one way only (a stamp, a document with the time of its making) was made before it arrived, so its time minus its
-arrival is a lower bound, and the largest of many is below the offset by the least latency, and by what the clock's resolution
-hid (`above`). How large that latency is cannot be known from one way; it is taken to be no more than a stated one.
+arrival is a lower bound. It is below the offset by its latency, and by what the clock's resolution hid. How large a latency is
+cannot be known from one way, so this is assumed: of `QUICK_AMONG` documents one took no more than a stated latency L, and so did
+one of any `QUICK_IN_ARC` that arrived in one arc of the clock's second; of fewer documents, one took no more than 2 L. A document
+that took L at most and arrives L to L + h after a full second is below the offset by L + h at most. So h is the shortest arc that
+holds `QUICK_IN_ARC` arrivals wherever it lies (`arc_holding`), and the whole second where there are fewer (`above`). An arc with
+a single arrival would not do: that document may have been a slow one.
 
 A bound ages: a clock may have drifted since, by as much as `DRIFT_PPM_MAX`.
 
@@ -17,7 +21,6 @@ Marzullo, K.: Maintaining the time in a distributed system, Stanford, 1984 (as i
 """
 
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import NamedTuple
 
 from edge.sample import ClockReading
@@ -26,6 +29,8 @@ DRIFT_PPM_MAX = 500.0
 """Of a clock against another: a quartz is within 100, and NTP turns a clock by 500 at most."""
 ROUNDING_MS = 1.0
 """Of times that are whole milliseconds."""
+QUICK_AMONG, QUICK_IN_ARC = 12, 8
+"""Documents of which one at least took no more than the stated latency."""
 NEWEST_WEIGHT = 1.5
 """Against 1 of each other bound: where two disagree, the newer one is believed."""
 
@@ -70,15 +75,28 @@ class Bound(NamedTuple):
 
 
 class OneWay(NamedTuple):
-    """The offset was above `low_s`, by no more than `doubt_s` if one of those that came was as quick as is taken for granted."""
+    """What came one way within a bucket: the offset is above `low_s`, the largest lower bound of them.
+
+    latency_s: what the quick ones took at most
+    resolution_s: the step of the clock, the finest that they show
+    phases: when they arrived, in steps of the clock modulo 1
+    """
 
     at_s: float
     low_s: float
-    doubt_s: float
+    latency_s: float
+    resolution_s: float = 0.0
+    phases: tuple[float, ...] = ()
+
+    @property
+    def doubt_s(self) -> float:
+        """How far below the offset the bound of a quick one is at most."""
+        return self.latency_s + self.resolution_s
 
     def moved(self, by_s: float) -> "OneWay":
         """After the edge's own clock was set."""
-        return OneWay(self.at_s, self.low_s + by_s, self.doubt_s)
+        phases = tuple((phase - by_s / self.resolution_s) % 1.0 for phase in self.phases)
+        return self._replace(low_s=self.low_s + by_s, phases=phases)
 
 
 class Agreement(NamedTuple):
@@ -101,14 +119,17 @@ def of_reading(reading: ClockReading, at_s: float) -> Bound:
     return Bound(at_s, low_ms / 1000.0, (high_ms + ROUNDING_MS) / 1000.0)
 
 
-def largest_gap(phases: Sequence[float]) -> float:
-    """The largest stretch of a circle of length 1 that holds none of these phases.
+def arc_holding(phases: Sequence[float], number: int) -> float:
+    """Return the shortest arc of a circle of length 1 that holds `number` of these phases wherever it lies; 1 at most.
 
-    >>> largest_gap([0.25, 0.5, 0.875]), largest_gap([0.5])
-    (0.375, 1.0)
+    >>> arc_holding([0.25, 0.5, 0.875], 1), arc_holding([0.25, 0.5, 0.875], 2), arc_holding([0.25, 0.5, 0.875], 4)
+    (0.375, 0.75, 1.0)
     """
+    if len(phases) < number:
+        return 1.0
     ordered = sorted(phases)
-    return max(ordered[0] + 1.0 - ordered[-1], *(right - left for left, right in pairwise(ordered)), 0.0)
+    following = [*ordered[number:], *(phase + 1.0 for phase in ordered[:number])]
+    return max(right - left for left, right in zip(ordered, following, strict=True))
 
 
 def agreed(bounds: Sequence[Bound], at_s: float) -> Agreement:
@@ -133,13 +154,28 @@ def agreed(bounds: Sequence[Bound], at_s: float) -> Agreement:
 
 
 def above(ways: Sequence[OneWay], at_s: float) -> Bound:
-    """The offset, from what came one way.
+    """Return the offset, from what came one way.
 
-    The largest of four or more is left out: one stamp from the future is an error of the control's, and no offset.
+    The largest of several is left out, and its phases with it: one stamp from the future is an error of the control's, and no
+    offset.
 
     >>> above([OneWay(0.0, low_s, 1.0) for low_s in (0.5, 0.8, 0.9, 77.0)], 0.0)
     Bound(at_s=0.0, low_s=0.9, high_s=1.9)
+
+    Upwards, the clock may have drifted since the oldest of them came, and with it the phase at which they arrived; and two
+    documents are few:
+
+    >>> above([OneWay(0.0, 0.5, 0.5, 1.0, (0.0, 0.5))], 200.0)
+    Bound(at_s=200.0, low_s=0.4, high_s=2.6)
     """
-    ordered = sorted(way.low_s - abs(at_s - way.at_s) * DRIFT_PPM_MAX * 1e-6 for way in ways)
-    low_s = ordered[-2] if len(ordered) >= 4 else ordered[-1]
-    return Bound(at_s, low_s, low_s + min(way.doubt_s for way in ways))
+    drift = DRIFT_PPM_MAX * 1e-6
+    *others, largest = sorted(ways, key=lambda way: way.low_s - abs(at_s - way.at_s) * drift)
+    kept = others or [largest]
+    resolution_s = min(way.resolution_s for way in kept)
+    phases = [phase for way in kept if way.resolution_s == resolution_s for phase in way.phases]
+    is_few = 0 < sum(len(way.phases) for way in kept) < QUICK_AMONG
+    latency_s = max(way.latency_s for way in kept) * (2.0 if is_few else 1.0)
+    hidden_s = resolution_s * arc_holding(phases, QUICK_IN_ARC)
+    aged_s = max(abs(at_s - way.at_s) for way in kept) * drift
+    low_s = kept[-1].low_s - abs(at_s - kept[-1].at_s) * drift
+    return Bound(at_s, low_s, max(way.low_s for way in kept) + latency_s + hidden_s + aged_s)

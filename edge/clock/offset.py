@@ -20,7 +20,7 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import Any, NamedTuple, TypeVar
 
-from edge.clock.bounds import Bound, OneWay, above, agreed, largest_gap, of_reading
+from edge.clock.bounds import Bound, OneWay, above, agreed, of_reading
 from edge.clock.drift import Drift, Series, drift
 from edge.sample import ClockReading, EdgeSample, SampleSet
 from sparkplug.datatype import DataType
@@ -38,7 +38,9 @@ HEALTH = (
 NEVER_S = -1e300
 BUCKET_S = 10.0
 BUCKET_READINGS_MAX = 128
+BUCKET_PHASES_MAX = 32  # of documents
 WINDOW_BUCKETS_MAX = 60
+WAY_BUCKETS_MAX = 30  # of what came one way, whose upper bound grows with its age
 WINDOW_S = 3600.0  # evidence that is older is forgotten
 STEP_BUCKETS = 3  # of readings that agree on another offset
 STEP_WAY_BUCKETS = 6  # of what came one way
@@ -50,7 +52,8 @@ BEGINNING_S = 300.0  # after which the offset is known well enough for what it b
 ALARM_S = 1.0  # of drift
 ALARM_STANDS_S = 3600.0  # after a step
 ROOM_S, ROOM_SHARE = 0.025, 0.2  # that an offset may move before it is published again, and of its spread
-NARROWER = 0.6
+NARROWER = 0.6  # of the spread that was published, to be published again
+NARROWER_WAY = 0.8  # of what came one way, whose first spread is wide
 READINGS, DOCUMENTS, STAMPS = "readings of the clock", "times of documents", "stamps of samples"
 UNSTEADY = "the clock does not keep to the rate of the edge's"
 OUTDATED = "the control's clock was not read for an hour"
@@ -76,8 +79,8 @@ def heard(frame: SampleSet, at_s: float, arrival_ms: float, peak: Bound | None =
     return Heard(at_s, arrival_ms, frame.clock, frame.newest_ms if is_news else None, peak)
 
 
-class Told(NamedTuple):
-    """What was published last. `bound` None: a null, for this reason."""
+class OffsetEstimate(NamedTuple):
+    """The offset as all the evidence has it, or as it was published. `bound` None: a null, for this reason."""
 
     bound: Bound | None
     reason: str
@@ -88,8 +91,7 @@ class Told(NamedTuple):
 class State(NamedTuple):
     """What is known of one control's clock.
 
-    bucket, document, phases, stamp: of the bucket that is open until `until_s`: readings; the largest lower bound of documents,
-        and when they arrived, modulo the clock's resolution; the largest lower bound of stamps
+    bucket, document, stamp: of the bucket that is open until `until_s`: readings, documents, stamps
     readings, documents, stamps: one for each bucket that is closed; peaks: of the signals
     stamps_samples: as the last reading says; None while there was none
     wall_ahead_s: the edge's wall clock minus its monotonic one
@@ -98,8 +100,6 @@ class State(NamedTuple):
     until_s: float = NEVER_S
     bucket: tuple[Bound, ...] = ()
     document: OneWay | None = None
-    phases: tuple[float, ...] = ()
-    resolution_s: float = 1.0
     stamp: OneWay | None = None
     readings: tuple[Bound, ...] = ()
     documents: tuple[OneWay, ...] = ()
@@ -114,7 +114,7 @@ class State(NamedTuple):
     steps: int = 0
     step_s: float = NEVER_S
     step: str = ""
-    told: Told | None = None
+    published: OffsetEstimate | None = None
 
 
 class Done(NamedTuple):
@@ -131,7 +131,7 @@ def step(state: State, heard: Heard) -> Done:
     if state.wall_ahead_s is not None and abs(ahead_s - state.wall_ahead_s) > EDGE_STEP_S:
         state = _edge_clock_set(state, state.wall_ahead_s - ahead_s, heard.at_s)
     state = state._replace(wall_ahead_s=ahead_s, **_gathered(state, heard))
-    if heard.at_s < state.until_s and not (state.told is None and state.bucket):
+    if heard.at_s < state.until_s and not (state.published is None and state.bucket):
         return Done(state)
     if heard.at_s >= state.until_s:
         state = _closed(state, heard.at_s)
@@ -139,10 +139,10 @@ def step(state: State, heard: Heard) -> Done:
     if judged is None:
         return Done(state)
     state = _followed(state, judged)
-    is_news, told = _is_news(state.told, judged), _padded(judged)
+    is_news, padded = _is_news(state.published, judged), _padded(judged)
     stamp_ms = state.newest_ms if state.stamps_samples and state.newest_ms is not None else round(heard.arrival_ms)
-    after = state._replace(told=told) if is_news else state
-    return Done(after, _samples(told, stamp_ms) if is_news else (), _health(after, judged, heard.at_s))
+    after = state._replace(published=padded) if is_news else state
+    return Done(after, _samples(padded, stamp_ms) if is_news else (), _health(after, judged, heard.at_s))
 
 
 def _edge_clock_set(state: State, by_s: float, at_s: float) -> State:
@@ -169,11 +169,7 @@ def _gathered(state: State, heard: Heard) -> dict[str, Any]:
     if reading is not None:
         changes["stamps_samples"] = reading.stamps_samples
         if not reading.edge_ms:
-            way = OneWay(heard.at_s, (reading.control_ms - heard.arrival_ms) / 1000.0, reading.round_trip_ms / 1000.0)
-            resolution_s = max(reading.resolution_ms, 1) / 1000.0
-            phase = heard.arrival_ms / 1000.0 / resolution_s % 1.0
-            changes |= {"document": _larger(state.document, way), "resolution_s": resolution_s}
-            changes["phases"] = (*state.phases[1 - BUCKET_READINGS_MAX :], phase)
+            changes["document"] = _document(state.document, reading, heard)
         elif len(state.bucket) < BUCKET_READINGS_MAX:
             changes["bucket"] = (*state.bucket, of_reading(reading, heard.at_s))
     if heard.newest_ms is not None:
@@ -186,30 +182,42 @@ def _gathered(state: State, heard: Heard) -> dict[str, Any]:
     return changes
 
 
+def _document(before: OneWay | None, reading: ClockReading, heard: Heard) -> OneWay:
+    """The documents of the open bucket with one more."""
+    resolution_s, low_s = max(reading.resolution_ms, 1) / 1000.0, (reading.control_ms - heard.arrival_ms) / 1000.0
+    phase = heard.arrival_ms / 1000.0 / resolution_s % 1.0
+    way = OneWay(heard.at_s, low_s, reading.round_trip_ms / 1000.0, resolution_s, (phase,))
+    if before is None:
+        return way
+    if resolution_s > before.resolution_s:  # a clock of milliseconds that shows a full second by chance
+        way = way._replace(resolution_s=before.resolution_s, phases=before.phases)
+    elif resolution_s == before.resolution_s:
+        way = way._replace(phases=(*before.phases, phase)[:BUCKET_PHASES_MAX])
+    return _larger(before, way)._replace(resolution_s=way.resolution_s, phases=way.phases)
+
+
 def _larger(before: OneWay | None, way: OneWay) -> OneWay:
     return before if before is not None and before.low_s > way.low_s else way
 
 
 def _closed(state: State, at_s: float) -> State:
     """The bucket goes into the windows, and may be the one that shows a step."""
-    readings, documents, stamps = _kept(state.readings, at_s), _kept(state.documents, at_s), _kept(state.stamps, at_s)
+    readings = _kept(state.readings, at_s)
+    documents, stamps = _kept(state.documents, at_s, WAY_BUCKETS_MAX), _kept(state.stamps, at_s, WAY_BUCKETS_MAX)
     found: list[float | None] = []  # steps, as the evidence has them that is read now, best first
     if state.bucket:
         readings, by_s = _stepped((*readings, agreed(state.bucket, at_s).bound), at_s)
         found.append(by_s)
     if state.document is not None:
-        hidden_s = largest_gap(state.phases) * state.resolution_s
-        document = state.document._replace(doubt_s=state.document.doubt_s + hidden_s)
-        documents, by_s = _way_stepped((*documents, document), at_s)
+        documents, by_s = _way_stepped((*documents, state.document), at_s)
         found.append(by_s)
     if state.stamp is not None and state.stamps_samples:
         stamps, by_s = _way_stepped((*stamps, state.stamp), at_s)
-        found = [by_s] if _is_by_stamps(state.told) else [*found, by_s]
+        found = [by_s] if _is_by_stamps(state.published) else [*found, by_s]
     after = state._replace(
         until_s=at_s + BUCKET_S,
         bucket=(),
         document=None,
-        phases=(),
         stamp=None,
         readings=readings,
         documents=documents,
@@ -221,15 +229,15 @@ def _closed(state: State, at_s: float) -> State:
         return after
     words = f"the control's clock was set by {by_s:+.3f} s"
     after = after._replace(steps=state.steps + 1, step_s=at_s, step=words, series=Series(), drift=None, began=None, peaks=())
-    is_read = not _is_by_stamps(state.told) and bool(state.bucket or state.document)
+    is_read = not _is_by_stamps(state.published) and bool(state.bucket or state.document)
     return after._replace(documents=() if is_read and state.bucket else documents, stamps=() if is_read else stamps)
 
 
 WayT = TypeVar("WayT", Bound, OneWay)
 
 
-def _kept(window: tuple[WayT, ...], at_s: float) -> tuple[WayT, ...]:
-    return tuple(one for one in window[1 - WINDOW_BUCKETS_MAX :] if at_s - one.at_s <= WINDOW_S)
+def _kept(window: tuple[WayT, ...], at_s: float, buckets_max: int = WINDOW_BUCKETS_MAX) -> tuple[WayT, ...]:
+    return tuple(one for one in window[1 - buckets_max :] if at_s - one.at_s <= WINDOW_S)
 
 
 def _stepped(window: tuple[Bound, ...], at_s: float) -> tuple[tuple[Bound, ...], float | None]:
@@ -265,7 +273,7 @@ def _is_running_away(ways: tuple[OneWay, ...]) -> bool:
     return len(last) == STEADY_BUCKETS and (min(moves) > 1.0 or max(moves) < -1.0)
 
 
-def _judged(state: State, at_s: float) -> Told | None:
+def _judged(state: State, at_s: float) -> OffsetEstimate | None:
     """The offset as all the evidence has it; None while there never was any."""
     stamped_by = "control" if state.stamps_samples else "edge"
     stamps = state.stamps if state.stamps_samples and len(state.stamps) >= STEADY_BUCKETS else ()
@@ -274,18 +282,18 @@ def _judged(state: State, at_s: float) -> Told | None:
     if window:
         found = agreed(window, at_s)
         if 2 * found.number < len(window):
-            return Told(None, UNSTEADY, READINGS, stamped_by)
+            return OffsetEstimate(None, UNSTEADY, READINGS, stamped_by)
         return _beside_stamps(state, found.bound, READINGS, stamps)
     if state.documents:
         if _is_running_away(state.documents):
-            return Told(None, UNSTEADY, DOCUMENTS, stamped_by)
+            return OffsetEstimate(None, UNSTEADY, DOCUMENTS, stamped_by)
         return _beside_stamps(state, above(state.documents, at_s), DOCUMENTS, stamps)
     if stamps:
         return _by_stamps(state, above(stamps, at_s))
-    return None if state.told is None else Told(None, OUTDATED, state.told.method, stamped_by)
+    return None if state.published is None else OffsetEstimate(None, OUTDATED, state.published.method, stamped_by)
 
 
-def _beside_stamps(state: State, read: Bound, method: str, stamps: tuple[OneWay, ...]) -> Told:
+def _beside_stamps(state: State, read: Bound, method: str, stamps: tuple[OneWay, ...]) -> OffsetEstimate:
     """The clock that was read, unless the stamps show that theirs is another; else they may show that it is further ahead."""
     stamped_by = "control" if state.stamps_samples else "edge"
     last = stamps[-STEP_WAY_BUCKETS:]
@@ -294,30 +302,30 @@ def _beside_stamps(state: State, read: Bound, method: str, stamps: tuple[OneWay,
         if is_ahead or all(way.low_s + STAMP_BEHIND_S_MAX < read.low_s for way in last):
             return _by_stamps(state, above(last, read.at_s), "; the clock that is read is another")
     if last and read.low_s < (low_s := above(stamps, read.at_s).low_s) <= read.high_s:
-        return Told(read._replace(low_s=low_s), "", f"{method}, {STAMPS}", stamped_by)
-    return Told(read, "", method, stamped_by)
+        return OffsetEstimate(read._replace(low_s=low_s), "", f"{method}, {STAMPS}", stamped_by)
+    return OffsetEstimate(read, "", method, stamped_by)
 
 
-def _by_stamps(state: State, stamps: Bound, but: str = "") -> Told:
+def _by_stamps(state: State, stamps: Bound, but: str = "") -> OffsetEstimate:
     """Where there are no readings of the clock that stamps: the signals may know better what a sample takes."""
     if state.peaks:
         peak = agreed(state.peaks, stamps.at_s).bound
         if peak.high_s >= stamps.low_s:
             both = stamps.both(peak) if peak.meets(stamps) else peak
-            return Told(both, "", f"{STAMPS}, signals{but}", "control")
-    return Told(stamps, "", f"{STAMPS}{but}", "control")
+            return OffsetEstimate(both, "", f"{STAMPS}, signals{but}", "control")
+    return OffsetEstimate(stamps, "", f"{STAMPS}{but}", "control")
 
 
-def _is_by_stamps(told: Told | None) -> bool:
-    return told is not None and told.method.startswith(STAMPS)
+def _is_by_stamps(published: OffsetEstimate | None) -> bool:
+    return published is not None and published.method.startswith(STAMPS)
 
 
-def _followed(state: State, judged: Told) -> State:
+def _followed(state: State, judged: OffsetEstimate) -> State:
     """The series for the drift, and where it began; of another clock than before both begin anew."""
     bound = judged.bound
     if bound is None:
         return state
-    if _is_by_stamps(state.told) != _is_by_stamps(judged):
+    if _is_by_stamps(state.published) != _is_by_stamps(judged):
         state = state._replace(series=Series(), drift=None, began=None)
     series = state.series.taken(bound)
     found = state.drift if series is state.series else drift(series)
@@ -325,15 +333,16 @@ def _followed(state: State, judged: Told) -> State:
     return state._replace(series=series, drift=found, began=bound if is_beginning or state.began is None else state.began)
 
 
-def _is_news(told: Told | None, judged: Told) -> bool:
+def _is_news(published: OffsetEstimate | None, judged: OffsetEstimate) -> bool:
     """Whether what was published is no longer true, or much less than what is known."""
-    if told is None or told[1:] != judged[1:] or told.bound is None or judged.bound is None:
-        return told is None or told[1:] != judged[1:]
-    before, now = told.bound, judged.bound.aged(judged.bound.at_s + 2.0 * BUCKET_S)  # when it is looked at again
-    return now.low_s < before.low_s or now.high_s > before.high_s or _room_s(now) + now.spread_s < NARROWER * before.spread_s
+    if published is None or published[1:] != judged[1:] or published.bound is None or judged.bound is None:
+        return published is None or published[1:] != judged[1:]
+    before, now = published.bound, judged.bound.aged(judged.bound.at_s + 2.0 * BUCKET_S)  # when it is looked at again
+    narrower = NARROWER if judged.method.startswith(READINGS) else NARROWER_WAY
+    return now.low_s < before.low_s or now.high_s > before.high_s or _room_s(now) + now.spread_s < narrower * before.spread_s
 
 
-def _padded(judged: Told) -> Told:
+def _padded(judged: OffsetEstimate) -> OffsetEstimate:
     """As it is published: with room for what it may move before it is published again."""
     bound = judged.bound
     if bound is None:
@@ -346,7 +355,7 @@ def _room_s(bound: Bound) -> float:
     return ROOM_S + ROOM_SHARE * bound.spread_s
 
 
-def _samples(judged: Told, stamp_ms: int) -> tuple[EdgeSample, ...]:
+def _samples(judged: OffsetEstimate, stamp_ms: int) -> tuple[EdgeSample, ...]:
     """Derived values: they account for no observation."""
     by = EdgeSample(STAMPED_BY, judged.stamped_by, stamp_ms, observations=0)
     if judged.bound is None:
@@ -357,7 +366,7 @@ def _samples(judged: Told, stamp_ms: int) -> tuple[EdgeSample, ...]:
     return offset, EdgeSample(SPREAD, spread_s, stamp_ms, observations=0), by
 
 
-def _health(state: State, judged: Told, at_s: float) -> dict[str, str | int | float | None]:
+def _health(state: State, judged: OffsetEstimate, at_s: float) -> dict[str, str | int | float | None]:
     return {
         "health/clock_step": state.steps,
         "health/clock_drift_ppm": None if state.drift is None else state.drift.ppm,
@@ -366,7 +375,7 @@ def _health(state: State, judged: Told, at_s: float) -> dict[str, str | int | fl
     }
 
 
-def _alarm(state: State, judged: Told, at_s: float) -> str:
+def _alarm(state: State, judged: OffsetEstimate, at_s: float) -> str:
     """What a person has to look at; "" where there is nothing."""
     bound = judged.bound
     if state.step and at_s - state.step_s <= ALARM_STANDS_S:

@@ -25,12 +25,14 @@ from typing import NamedTuple, Protocol
 from edge.config import StoreSection
 from edge.errors import StoreError
 from edge.place import Place
-from edge.running.receipts import Receipts
-from edge.running.ring import Eviction, Ring, StoredRow
+from edge.running.receipts import RECEIPT, Receipts
+from edge.running.ring import Ring, StoredRow
+from edge.running.ring_file import Eviction
 from edge.running.spans import Spans
 from edge.sample import Drop, EdgeSample
+from sparkplug.datatype import DataType
 from sparkplug.errors import SparkplugError
-from sparkplug.metric import Change
+from sparkplug.metric import Change, MetricSpec
 from sparkplug.quality import Quality
 
 SEQUENCE = "edge_sequence"
@@ -105,20 +107,28 @@ class Forwarder:
         """Of the pipeline, as stored."""
         return self._ring.memory()
 
+    def metrics(self) -> Sequence[MetricSpec]:
+        """The metrics of its own that a birth has to declare."""
+        sequence = MetricSpec(SEQUENCE, DataType.INT64)
+        return (sequence, MetricSpec(RECEIPT, DataType.STRING)) if self._limits.await_receipt else (sequence,)
+
     def declare(self, names: Iterable[str]) -> None:
         """What the present birth declares: history of anything else can't be told any more. Empty: the device is dead."""
         self._declared = frozenset(names)
 
-    def put(self, rows: Sequence[Sequence[EdgeSample]], place: Place | None, memory: str | None = None) -> None:
-        """Store the rows of a frame with the place and the memory after it, then send them.
+    def put(self, rows: Sequence[Sequence[EdgeSample]], place: Place | None, memory: str | None = None) -> Settled:
+        """Store the rows of a frame with the place and the memory after it, then send them. Nothing of it has settled then.
 
         What a frame without rows has moved is written with the next one, or within a second: a killed edge takes it again.
         """
         self._place, self._memory = place or self._place, memory or self._memory
-        if not rows:
-            return
+        if rows:
+            self._store(rows)
+        return Settled(0, Counter())
+
+    def _store(self, rows: Sequence[Sequence[EdgeSample]]) -> None:
         try:
-            first = self._ring.append([(_observations(row), _body(row)) for row in rows], self._place, self._memory)
+            first = self._ring.append([(observations_of(row), _body(row)) for row in rows], self._place, self._memory)
             self._place = self._memory = None
         except StoreError as error:
             self._fail(error)
@@ -126,8 +136,8 @@ class Forwarder:
                 self._send_unstored(row)
             return
         for sequence, row in enumerate(rows, start=first):
-            changes = [Change(s.signal, s.value, s.timestamp_ms, s.quality, s.reason) for s in row]
-            self._fly(sequence, _observations(row), [*changes, Change(SEQUENCE, sequence, changes[-1].timestamp_ms)])
+            changes = [sample.change for sample in row]
+            self._fly(sequence, observations_of(row), [*changes, Change(SEQUENCE, sequence, changes[-1].timestamp_ms)])
 
     def confirmed(self, token: int) -> None:
         """The broker has acknowledged a barrier. From any thread."""
@@ -322,11 +332,10 @@ class Forwarder:
 
     def _send_unstored(self, row: Sequence[EdgeSample]) -> None:
         """Where the disk takes nothing the edge goes on without: what is not sent now is lost, and counted."""
-        changes = [Change(s.signal, s.value, s.timestamp_ms, s.quality, s.reason) for s in row]
-        if self._node.publish(self._device, changes):
-            self._emitted += _observations(row)
+        if self._node.publish(self._device, [sample.change for sample in row]):
+            self._emitted += observations_of(row)
         else:
-            self._dropped[Drop.BROKER_OFFLINE] += _observations(row)
+            self._dropped[Drop.BROKER_OFFLINE] += observations_of(row)
 
     def _fail(self, error: StoreError) -> None:
         if str(error) != self.error:
@@ -334,7 +343,8 @@ class Forwarder:
         self.error = str(error)
 
 
-def _observations(row: Iterable[EdgeSample]) -> int:
+def observations_of(row: Iterable[EdgeSample]) -> int:
+    """Return how many observations a row accounts for."""
     return sum(sample.observations for sample in row)
 
 

@@ -67,15 +67,22 @@ class Pipeline:
         return self._change.held + (0 if self._before is None else self._before.change.held)
 
     def memory(self) -> str | None:
-        """To be stored with the rows of the frame that was taken last; None where nothing of it has changed."""
+        """Return what to store with the rows of the frame that was taken last; None where it is what `keep_memory` noted."""
+        lasting = self._lasting()
+        if self._before is not None or lasting == self._kept:
+            return None
+        return _MEMORY.dump_json(lasting._replace(change=replace(lasting.change, clock_ms=self._change.clock_ms))).decode()
+
+    def keep_memory(self) -> None:
+        """Note that the present memory is stored."""
+        self._kept = self._lasting()
+
+    def _lasting(self) -> Memory:
+        """The memory without its clock, which goes on with each frame."""
         last = tuple(self._report.last[name] for name in _REMEMBERED if name in self._report.last)
         change = self._change
         # A block that commands nothing changes nothing, and a program shows ten of them a second.
-        now = Memory(replace(change, clock_ms=None, block=change.block if change.shows_change else None), last)
-        if self._before is not None or now == self._kept:
-            return None
-        self._kept = now
-        return _MEMORY.dump_json(now._replace(change=replace(now.change, clock_ms=change.clock_ms))).decode()
+        return Memory(replace(change, clock_ms=None, block=change.block if change.shows_change else None), last)
 
     @property
     def last(self) -> tuple[EdgeSample, ...]:

@@ -4,8 +4,7 @@ A row is one message to be. Its number (`sequence`) is given once and never agai
 reader who has a row twice can tell, and one who misses a row too. Rows and the place in the control's stream from which the
 control has to be asked next are written in one transaction: a kill -9 loses neither, and takes none twice.
 
-WAL with synchronous=NORMAL (https://sqlite.org/wal.html): a commit survives the death of the process; with "full" that of the
-power too, at the price of an fsync each. What is too much goes oldest first: past the age, the bytes, or where the disk is full.
+What is too much goes oldest first: past the age, the bytes, or where the disk is full (`edge.running.ring_file`).
 """
 
 import json
@@ -14,16 +13,14 @@ import shutil
 import sqlite3
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
-from enum import StrEnum
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from edge.config import StoreSection
 from edge.errors import StoreError
 from edge.place import Place
+from edge.running.ring_file import EVICTED_AT_ONCE, Eviction, open_ring, passed_limit, transaction
 
-EVICTED_AT_ONCE = 200
-"""Rows; more would hold up what is live."""
 SPARE_PAGES, RETURNED_AT_ONCE = 1_000, 1_000
 """Pages that the file keeps for what comes; of more, so many are given back to the disk with each look."""
 _log = logging.getLogger(__name__)
@@ -49,14 +46,6 @@ _LOOK = """
 SELECT (SELECT stored_ms FROM rows ORDER BY sequence LIMIT 1),
     (SELECT page_count FROM pragma_page_count), (SELECT freelist_count FROM pragma_freelist_count)
 """
-
-
-class Eviction(StrEnum):
-    """Why a row had to go before anybody had it."""
-
-    AGE = "age"
-    BYTES = "bytes"
-    DISK = "disk"
 
 
 class StoredRow(NamedTuple):
@@ -121,13 +110,8 @@ class Ring:
             return db
 
     def _connect(self) -> sqlite3.Connection:
-        db = sqlite3.connect(self.file, isolation_level=None, timeout=1.0, check_same_thread=False)
+        db = open_ring(self.file, _SCHEMA, synchronous=self._limits.synchronous, timeout_s=1.0)
         try:
-            db.execute("PRAGMA auto_vacuum = INCREMENTAL")
-            db.execute("PRAGMA journal_mode = WAL")
-            db.execute(f"PRAGMA synchronous = {self._limits.synchronous}")
-            db.execute("PRAGMA journal_size_limit = 4194304")
-            db.executescript(_SCHEMA)
             found = db.execute("SELECT seq FROM sqlite_sequence WHERE name = 'rows'").fetchone()
             self.last = 0 if found is None else int(found[0])
             count, observations, newest = db.execute("SELECT count(*), sum(observations), max(stored_ms) FROM rows").fetchone()
@@ -178,14 +162,8 @@ class Ring:
                     _INSERT + ", (?, ?, ?, ?, ?, ?)" * (len(numbered) - 1), [value for row in numbered for value in row]
                 )
                 return
-            self._db.execute("BEGIN IMMEDIATE")
-            try:
+            with transaction(self._db):
                 self._db.executemany(_INSERT, numbered)
-                self._db.execute("COMMIT")
-            except BaseException:
-                with suppress(sqlite3.Error):
-                    self._db.execute("ROLLBACK")
-                raise
         except sqlite3.Error as error:
             raise StoreError(f"{self.file}: cannot be written: {error}") from error
 
@@ -269,15 +247,13 @@ class Ring:
     def _passed(self) -> Eviction | None:
         if not self.rows:
             return None
-        if self.age_s > self._limits.age_s_max:
-            return Eviction.AGE
-        if self.bytes > self._limits.bytes_max:
-            return Eviction.BYTES
+        return passed_limit(self._limits, age_s=self.age_s, size_bytes=self.bytes, free_bytes=self._free)
+
+    def _free(self) -> int:
         try:
-            free_bytes = self._free_bytes(self.file.parent) + self._spare_bytes
+            return self._free_bytes(self.file.parent) + self._spare_bytes
         except OSError as error:
             raise StoreError(f"{self.file}: nobody knows how much the disk has left: {error}") from error
-        return Eviction.DISK if free_bytes < self._limits.free_bytes_min else None
 
     def _ask(self, text: str, values: Iterable[int] = ()) -> list[tuple[Any, ...]]:
         try:

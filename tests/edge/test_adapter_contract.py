@@ -7,7 +7,9 @@ read it before you keep it.
 
 import json
 import os
+import tomllib
 from collections.abc import Sequence
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,15 +19,18 @@ from hypothesis import strategies as st
 from pydantic import TypeAdapter
 
 from edge.adapter import Adapter, adapters, modules
-from edge.config import EdgeConfig
+from edge.config import EdgeConfig, MachineSection
 from edge.config_file import load
 from edge.running.pipeline import Pipeline
 from edge.sample import EdgeSample, SampleSet
+from edge.section import Section
 from edge.signals import signal
 from edge.tool_change import not_observable
 from sparkplug.quality import Quality
 
 FRAMES = Path(__file__).with_name("frames")
+ROOT = Path(__file__).parents[2]
+SHARED = ROOT / "edge" / "edge.toml"
 every_adapter = pytest.mark.parametrize("adapter", adapters().values(), ids=lambda adapter: adapter.name)
 
 
@@ -62,10 +67,38 @@ def test_it_is_found_by_the_name_of_its_file(adapter: Adapter) -> None:
 
 
 @every_adapter
-def test_its_sample_configuration_loads_and_holds_the_defaults(adapter: Adapter) -> None:
+def test_its_sample_configuration_loads_and_every_section_holds_the_defaults(adapter: Adapter) -> None:
+    machine, default = MachineSection(adapter=adapter.name), EdgeConfig(source=adapter.config_model())
+    assert load(adapter.sample_config) == replace(default, machine=machine, path=adapter.sample_config)
+    assert load(SHARED) == replace(default, source=adapters()[MachineSection().adapter].config_model(), path=SHARED)
+
+
+@every_adapter
+def test_its_sample_and_the_shared_one_name_every_key_once(adapter: Adapter) -> None:
+    own = adapter.sample_config.read_text(encoding="utf-8")
     config = load(adapter.sample_config)
-    assert config.machine.adapter == adapter.name
-    assert config.source == adapter.config_model()
+    keys = {"machine": config.machine, adapter.name: config.source}
+    assert tomllib.loads(own).keys() == keys.keys(), "what all edges share is in edge/edge.toml"
+    shared = {one.name: getattr(config, one.name) for one in fields(config) if isinstance(getattr(config, one.name), Section)}
+    shared = {name: section for name, section in shared.items() if name not in {"machine", "source"}}
+    tables = tomllib.loads(own) | tomllib.loads(SHARED.read_text(encoding="utf-8"))
+    for name, section in (keys | shared).items():
+        assert tables[name].keys() == type(section).model_fields.keys()
+
+
+@every_adapter
+def test_its_sample_its_page_and_its_code_lead_to_each_other(adapter: Adapter) -> None:
+    declaration = f"{modules()[adapter.name].replace('.', '/')}.py"
+    sample, shared = adapter.sample_config.relative_to(ROOT).as_posix(), SHARED.relative_to(ROOT).as_posix()
+    page = f"docs/edge-{adapter.name.replace('_', '-')}.md"
+    for file, others in (
+        (sample, (page, declaration, shared)),
+        (declaration, (page, adapter.sample_config.name, shared)),
+        (page, (f"(../{sample})", f"(../{declaration})", f"(../{shared})")),
+        ("docs/edges.md", (f"({page.removeprefix('docs/')})", f"(../{sample})", f"(../{shared})")),
+    ):
+        text = (ROOT / file).read_text(encoding="utf-8")
+        assert [other for other in others if other not in text] == [], file
 
 
 @every_adapter

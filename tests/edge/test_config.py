@@ -27,14 +27,6 @@ def test_the_values_of_the_sample_are_the_defaults() -> None:
     assert sample.tool_change.block_pattern == BLOCK_PATTERN
 
 
-def test_the_sample_names_every_key() -> None:
-    text = ADAPTER.sample_config.read_text(encoding="utf-8")
-    config = load(ADAPTER.sample_config)
-    for section in (config.machine, config.broker, config.source, config.report, config.store, config.tool_change):
-        for key in type(section).model_fields:
-            assert f"\n{key} = " in text
-
-
 def test_the_example_of_a_signal_in_the_sample_is_valid() -> None:
     text = ADAPTER.sample_config.read_text(encoding="utf-8")
     example = text[text.index("# [signals") :].replace("\n# ", "\n").removeprefix("# ")

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from edge.errors import DocumentError
 from edge.sample import ClockReading, Gap
-from edge.sweep import Fact, Hole, Stand, Sweep, take
+from edge.sweep import Fact, Hole, Sweep, SweepPosition, take
 
 SWEEP = Sweep("life", 0, 1_000, (Fact("acts", 3500.5), Fact("prog", "O1", "", 990)), interval_ms=100)
 _PLAIN = st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text()
@@ -42,23 +42,23 @@ def test_bytes_that_are_no_frame_are_refused_in_one_line(raw: bytes) -> None:
 
 
 def test_a_frame_that_comes_twice_is_taken_once() -> None:
-    stand, sweep, about, is_baseline = take(Stand(), SWEEP.encode())
+    position, sweep, about, is_baseline = take(SweepPosition(), SWEEP.encode())
     assert (sweep, about.received, is_baseline) == (SWEEP, 2, True)
-    again = take(stand, SWEEP.encode())
+    again = take(position, SWEEP.encode())
     assert (again.sweep, dict(again.about.dropped), again.about.accounted()) == (None, {"duplicate": 2}, True)
 
 
 def test_numbers_that_are_left_out_are_a_hole_and_so_is_the_time_before_a_new_life() -> None:
-    stand = take(Stand(), SWEEP.encode()).stand
-    later = take(stand, replace(SWEEP, number=3, t_ms=1_300).encode())
+    position = take(SweepPosition(), SWEEP.encode()).position
+    later = take(position, replace(SWEEP, number=3, t_ms=1_300).encode())
     assert later.about.gaps == (Gap("frames missing", 1_000, 1_300, 4),)
-    place = stand.place()
+    place = position.place()
     assert place is not None
-    restarted = take(Stand.resumed(place), replace(SWEEP, life="other", t_ms=6_000).encode())
+    restarted = take(SweepPosition.resumed(place), replace(SWEEP, life="other", t_ms=6_000).encode())
     assert restarted.about.gaps == (Gap("edge restarted", 1_000, 6_000, 100),)
     assert restarted.is_baseline
 
 
 def test_a_hole_that_the_connection_states_is_passed_on() -> None:
     stated = replace(SWEEP, holes=(Hole("the control did not answer", 100, 900, 16),))
-    assert take(Stand(), stated.encode()).about.gaps == (Gap("the control did not answer", 100, 900, 16),)
+    assert take(SweepPosition(), stated.encode()).about.gaps == (Gap("the control did not answer", 100, 900, 16),)

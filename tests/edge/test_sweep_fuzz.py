@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from edge.errors import DocumentError
 from edge.sample import ClockReading
-from edge.sweep import FACTS_MAX, FRAME_BYTES_MAX, Fact, Hole, Stand, Sweep, take
+from edge.sweep import FACTS_MAX, FRAME_BYTES_MAX, Fact, Hole, Sweep, SweepPosition, take
 from tests.fuzz_depth import FUZZ, within
 
 PLAIN = st.one_of(st.none(), st.booleans(), st.integers(-(2**62), 2**62), st.floats(allow_nan=False), st.text(max_size=20))
@@ -61,9 +61,9 @@ def test_a_frame_with_something_else_in_a_field_is_read_or_refused(sweep: Sweep,
 @FUZZ
 @given(st.binary(max_size=200))
 def test_any_bytes_are_refused_and_change_nothing(raw: bytes) -> None:
-    stand = Stand("life", 7, 1000)
-    taken = take(stand, raw)
-    assert (taken.stand, taken.sweep) == (stand, None)
+    position = SweepPosition("life", 7, 1000)
+    taken = take(position, raw)
+    assert (taken.position, taken.sweep) == (position, None)
     assert taken.about.error
 
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from edge.controls.focas import wire
-from edge.controls.focas.calls import CLOCK_WORDS, STATUS_WORDS, Answer, Call, Found, Identity, Request, alarm_text
+from edge.controls.focas.calls import CLOCK_WORDS, STATUS_WORDS, Answer, Call, FocasValue, Identity, Request, alarm_text
 from edge.controls.focas.pmc import AREAS, pmc_address
 from edge.controls.focas.policy import DATA, FUNC, OK, told
 from edge.controls.focas.wire import PMC, Block, Reply
@@ -30,7 +30,7 @@ class Exchange(NamedTuple):
 
     blocks: tuple[Block, ...]
     answer_bytes: int
-    read: Callable[[Sequence[Reply], Identity], tuple[Found, ...]]
+    read: Callable[[Sequence[Reply], Identity], tuple[FocasValue, ...]]
 
 
 def identity(found: Sequence[Reply]) -> Identity:
@@ -95,34 +95,34 @@ def unknown() -> Answer:
     return Answer(FUNC)
 
 
-def _whole(key: str, reply: Reply) -> Found:
+def _whole(key: str, reply: Reply) -> FocasValue:
     if reply.status != OK:
-        return Found(key, None, reply.status)
+        return FocasValue(key, None, reply.status)
     if len(reply.data) < 4:
-        return Found(key, None, DATA)
-    return Found(key, int.from_bytes(reply.data[:4], "big", signed=True))
+        return FocasValue(key, None, DATA)
+    return FocasValue(key, int.from_bytes(reply.data[:4], "big", signed=True))
 
 
-def _row(keys: Sequence[str], reply: Reply) -> tuple[Found, ...]:
+def _row(keys: Sequence[str], reply: Reply) -> tuple[FocasValue, ...]:
     if reply.status != OK:
-        return tuple(Found(key, None, reply.status) for key in keys)
+        return tuple(FocasValue(key, None, reply.status) for key in keys)
     return tuple(_figure(key, reply.data[at * 8 : at * 8 + 8]) for at, key in enumerate(keys))
 
 
-def _figure(key: str, data: bytes) -> Found:
+def _figure(key: str, data: bytes) -> FocasValue:
     try:
         figure = wire.value(data)
     except DocumentError:
-        return Found(key, None, DATA)
-    return Found(key, figure, OK if figure is not None else DATA)
+        return FocasValue(key, None, DATA)
+    return FocasValue(key, figure, OK if figure is not None else DATA)
 
 
-def _status(found: Sequence[Reply], who: Identity) -> tuple[Found, ...]:
+def _status(found: Sequence[Reply], who: Identity) -> tuple[FocasValue, ...]:
     words = struct.unpack(">7h", found[0].data[:14])
-    return tuple(Found(f"status.{name}", word) for name, word in zip(STATUS_WORDS, words, strict=True))
+    return tuple(FocasValue(f"status.{name}", word) for name, word in zip(STATUS_WORDS, words, strict=True))
 
 
-def _dynamic(found: Sequence[Reply], who: Identity) -> tuple[Found, ...]:
+def _dynamic(found: Sequence[Reply], who: Identity) -> tuple[FocasValue, ...]:
     programs, sequence, feed, spindle, positions = found
     main = Reply(programs.status, programs.data[4:8])
     return (
@@ -135,71 +135,71 @@ def _dynamic(found: Sequence[Reply], who: Identity) -> tuple[Found, ...]:
     )
 
 
-def _servo_load(found: Sequence[Reply], who: Identity) -> tuple[Found, ...]:
+def _servo_load(found: Sequence[Reply], who: Identity) -> tuple[FocasValue, ...]:
     return _row([f"servo_load.{axis}" for axis in who.axes], found[0])
 
 
-def _spindle_load(found: Sequence[Reply], who: Identity) -> tuple[Found, ...]:
+def _spindle_load(found: Sequence[Reply], who: Identity) -> tuple[FocasValue, ...]:
     return _row(("spindle_load",), found[0])
 
 
-def _block(found: Sequence[Reply], who: Identity) -> tuple[Found, ...]:
+def _block(found: Sequence[Reply], who: Identity) -> tuple[FocasValue, ...]:
     if len(found[0].data) < 4:
         raise DocumentError("no block")
-    return (Found("block", wire.text(found[0].data[4:])),)
+    return (FocasValue("block", wire.text(found[0].data[4:])),)
 
 
-def _modal(found: Sequence[Reply], who: Identity) -> tuple[Found, ...]:
+def _modal(found: Sequence[Reply], who: Identity) -> tuple[FocasValue, ...]:
     row = wire.values(found[0].data, _MODAL_LAST - _MODAL_FIRST + 1)
     figures = ((word, row[number - _MODAL_FIRST]) for word, number in _MODAL_NUMBERS.items())
-    return tuple(Found(f"modal.{word}", figure) for word, figure in figures)  # None: none commanded since the control is on
+    return tuple(FocasValue(f"modal.{word}", figure) for word, figure in figures)  # None: none commanded since the control is on
 
 
 def _pmc(address: str) -> Exchange:
     area, byte, _, width = pmc_address(address)
 
-    def read(found: Sequence[Reply], who: Identity) -> tuple[Found, ...]:
+    def read(found: Sequence[Reply], who: Identity) -> tuple[FocasValue, ...]:
         data = found[0].data
         if len(data) != width:
             raise DocumentError(f"{len(data)} bytes of the PMC in place of {width}")
-        return (Found(f"pmc.{address}", int.from_bytes(data, "little")),)
+        return (FocasValue(f"pmc.{address}", int.from_bytes(data, "little")),)
 
     return Exchange((Block(0x8001, (byte, byte + width - 1, AREAS[area], 0), PMC),), 16 + width, read)
 
 
-def _program(found: Sequence[Reply], who: Identity) -> tuple[Found, ...]:
+def _program(found: Sequence[Reply], who: Identity) -> tuple[FocasValue, ...]:
     """The full name, or that of older controls."""
     full, short = found
     if full.status == OK:
-        return (Found("program.name", wire.text(full.data)),)
-    return (Found("program.name", wire.text(short.data[4:])),)
+        return (FocasValue("program.name", wire.text(full.data)),)
+    return (FocasValue("program.name", wire.text(short.data[4:])),)
 
 
-def _alarms(found: Sequence[Reply], who: Identity) -> tuple[Found, ...]:
+def _alarms(found: Sequence[Reply], who: Identity) -> tuple[FocasValue, ...]:
     data, texts = found[0].data, list[str]()
     record = 16 + ALARM_CHARS
     for at in range(0, len(data) - record + 1, record):
         number, kind, _, length = struct.unpack_from(">4i", data, at)
         message = wire.text(data[at + 16 : at + 16 + max(0, min(length, ALARM_CHARS))])
         texts.append(alarm_text(kind, number, message))
-    return (Found("alarms", "; ".join(texts)),)
+    return (FocasValue("alarms", "; ".join(texts)),)
 
 
-def _g_code(group: str) -> Callable[[Sequence[Reply], Identity], tuple[Found, ...]]:
-    def read(found: Sequence[Reply], who: Identity) -> tuple[Found, ...]:
+def _g_code(group: str) -> Callable[[Sequence[Reply], Identity], tuple[FocasValue, ...]]:
+    def read(found: Sequence[Reply], who: Identity) -> tuple[FocasValue, ...]:
         code, tenths = struct.unpack_from(">6xHxxH", found[0].data)
-        return (Found(f"modal.G{group}", f"G{code / 10:g}" if tenths else f"G{code}"),)
+        return (FocasValue(f"modal.G{group}", f"G{code / 10:g}" if tenths else f"G{code}"),)
 
     return read
 
 
-def _offset(found: Sequence[Reply], who: Identity) -> tuple[Found, ...]:
+def _offset(found: Sequence[Reply], who: Identity) -> tuple[FocasValue, ...]:
     return _row(("tool_offset",), found[0])
 
 
-def _clock(found: Sequence[Reply], who: Identity) -> tuple[Found, ...]:
+def _clock(found: Sequence[Reply], who: Identity) -> tuple[FocasValue, ...]:
     if any(reply.status != OK for reply in found):
         raise DocumentError("half a clock")
     date, time = found
     figures = (*struct.unpack(">3H", date.data[:6]), *struct.unpack(">3H", time.data[-6:]))
-    return tuple(Found(f"clock.{word}", figure) for word, figure in zip(CLOCK_WORDS, figures, strict=True))
+    return tuple(FocasValue(f"clock.{word}", figure) for word, figure in zip(CLOCK_WORDS, figures, strict=True))

@@ -1,7 +1,7 @@
 """What a FANUC control is asked, by the names of its functions, and the shape of what it answers: the interface of both backends.
 
-A call answers with facts (`Found`), one for each value, each with a return code of its own: a control that has not got the option
-for spindle loads still tells its servo loads.
+A call answers with values (`FocasValue`), each with a return code of its own: a control without the option for spindle loads
+still gives its servo loads.
 """
 
 from collections.abc import Sequence
@@ -46,7 +46,7 @@ class Request(NamedTuple):
         return f"{self.call} {self.argument}".rstrip()
 
 
-class Found(NamedTuple):
+class FocasValue(NamedTuple):
     """One value, or the code that came in its place."""
 
     key: str
@@ -76,7 +76,7 @@ class Answer(NamedTuple):
     """What became of one request. `code` other than 0: nothing was found."""
 
     code: int
-    found: tuple[Found, ...] = ()
+    found: tuple[FocasValue, ...] = ()
 
 
 class FocasBackend(Protocol):

@@ -14,7 +14,7 @@ from typing import Any
 from uuid import uuid4
 
 from edge.controls.focas.backend import backend_of
-from edge.controls.focas.calls import Answer, Call, FocasBackend, Found, Identity, Request
+from edge.controls.focas.calls import Answer, Call, FocasBackend, FocasValue, Identity, Request
 from edge.controls.focas.config import Config, Group
 from edge.controls.focas.plan import Refusals, quick, slow
 from edge.controls.focas.policy import OK, PROTOCOL, Policy, policy_of, told
@@ -223,5 +223,5 @@ def _identified(identity: Identity) -> tuple[Fact, ...]:
     return tuple(Fact(f"control.{name}", text) for name, text in told_of.items())
 
 
-def _fact(one: Found) -> Fact:
+def _fact(one: FocasValue) -> Fact:
     return Fact(one.key, one.value, "" if one.code == OK else told(one.code))

@@ -15,7 +15,7 @@ from edge.controls.focas.states import cue_of, execution_of, feed_override_pct, 
 from edge.place import Place
 from edge.reading import Outcome, Target, bad, read_value
 from edge.sample import UNAVAILABLE, Drop, EdgeSample, Offer, SampleSet
-from edge.sweep import Fact, Plain, Stand, Sweep, take, told
+from edge.sweep import Fact, Plain, Sweep, SweepPosition, take
 from edge.tool_change import CUE
 from sparkplug.quality import Quality
 
@@ -33,7 +33,7 @@ class Cursor:
     tool, called: by T codes alone, the tool in the spindle (None: not known) and the one that the present change brings
     """
 
-    stand: Stand = field(default_factory=Stand)
+    position: SweepPosition = field(default_factory=SweepPosition)
     mt_type: str = ""
     has_toolnum: bool = False
     has_name: bool = False
@@ -49,29 +49,29 @@ def start(config: Config) -> Cursor:
 
 def place(cursor: Cursor) -> Place | None:
     """Up to where everything is taken."""
-    return cursor.stand.place()
+    return cursor.position.place()
 
 
 def resume(config: Config, kept: Place) -> Cursor:
     """An edge that was here before."""
-    return Cursor(stand=Stand.resumed(kept))
+    return Cursor(position=SweepPosition.resumed(kept))
 
 
 def parse(config: Config, cursor: Cursor, raw: bytes) -> tuple[Cursor, SampleSet]:
     """The samples of one sweep."""
-    taken = take(cursor.stand, raw)
+    taken = take(cursor.position, raw)
     if taken.sweep is None:
-        return replace(cursor, stand=taken.stand), taken.about
+        return replace(cursor, position=taken.position), taken.about
     facts = {fact.key: fact for fact in taken.sweep.facts}
-    after = _known(replace(cursor, stand=taken.stand), facts)
-    is_away = taken.sweep.t_ms - cursor.stand.taken_ms >= CHANGE_MS_MIN or taken.sweep.life != cursor.stand.life
+    after = _known(replace(cursor, position=taken.position), facts)
+    is_away = taken.sweep.t_ms - cursor.position.taken_ms >= CHANGE_MS_MIN or taken.sweep.life != cursor.position.life
     look = _Look(config, after, taken.sweep, is_baseline=taken.is_baseline, is_away=is_away)
     samples = tuple(look.samples())
     dropped: Counter[str] = Counter()
     if more := len(taken.sweep.facts) - sum(sample.observations for sample in samples):
         dropped[Drop.UNMAPPED] = more
     offers = look.offers() if "control.series" in facts else None
-    return look.cursor, told(taken.about, samples=samples, dropped=dict(dropped), offers=offers)
+    return look.cursor, replace(taken.about, samples=samples, dropped=dict(dropped), offers=offers)
 
 
 def _known(cursor: Cursor, facts: Mapping[str, Fact]) -> Cursor:

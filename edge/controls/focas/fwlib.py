@@ -17,7 +17,7 @@ from edge.controls.focas.calls import (
     STATUS_WORDS,
     Answer,
     Call,
-    Found,
+    FocasValue,
     Identity,
     Request,
     alarm_text,
@@ -69,7 +69,7 @@ class Fwlib:
         self._has_process = False
         self._decimals: tuple[int, ...] = ()
         self.identity = Identity()
-        self._readers: dict[Call, Callable[[Request], tuple[Found, ...] | int]] = {
+        self._readers: dict[Call, Callable[[Request], tuple[FocasValue, ...] | int]] = {
             Call.STATUS: self._status,
             Call.DYNAMIC: self._dynamic,
             Call.SERVO_LOAD: self._servo_load,
@@ -141,15 +141,15 @@ class Fwlib:
         self._decimals = tuple(figures if 0 <= figures <= 9 else DECIMALS_USUAL for figures in known)
         return code if policy_of(code) is Policy.RECONNECT else OK
 
-    def _status(self, request: Request) -> tuple[Found, ...] | int:
+    def _status(self, request: Request) -> tuple[FocasValue, ...] | int:
         status = st.OdbSt()
         code = self._call("cnc_statinfo", byref(status))
-        return code or tuple(Found(f"status.{word}", getattr(status, word)) for word in STATUS_WORDS)
+        return code or tuple(FocasValue(f"status.{word}", getattr(status, word)) for word in STATUS_WORDS)
 
-    def _dynamic(self, request: Request) -> tuple[Found, ...] | int:
+    def _dynamic(self, request: Request) -> tuple[FocasValue, ...] | int:
         """Machine positions axis by axis; programs and speeds come with the first."""
         axes = self.identity.axes
-        found, positions = list[Found](), list[Found]()
+        found, positions = list[FocasValue](), list[FocasValue]()
         for number, axis in enumerate(axes or ("",), 1):
             dynamic = st.OdbDy2()
             code = self._call("cnc_rddynamic2", c_int16(number), c_int16(sizeof(dynamic)), byref(dynamic))
@@ -157,25 +157,25 @@ class Fwlib:
                 return code
             if number == 1:
                 found += [
-                    Found("program.number", dynamic.prgnum),
-                    Found("program.main", dynamic.prgmnum),
-                    Found("sequence", dynamic.seqnum),
+                    FocasValue("program.number", dynamic.prgnum),
+                    FocasValue("program.main", dynamic.prgmnum),
+                    FocasValue("sequence", dynamic.seqnum),
                     *self._speeds(dynamic),
                 ]
             decimals = self._decimals[number - 1] if number <= len(self._decimals) else DECIMALS_USUAL
             value = _scaled(dynamic.machine, decimals) if code == OK else None
-            positions += [Found(f"position.{axis}", value, code)] if axis else []
+            positions += [FocasValue(f"position.{axis}", value, code)] if axis else []
         return (*found, *positions)
 
-    def _speeds(self, dynamic: st.OdbDy2) -> tuple[Found, Found]:
+    def _speeds(self, dynamic: st.OdbDy2) -> tuple[FocasValue, FocasValue]:
         """Feed and speed with their decimals, which rddynamic2 leaves out; where rdspeed is missing, those whole figures."""
         speed = st.OdbSpeed()
         code = self._call("cnc_rdspeed", c_int16(-1), byref(speed))
         if code != OK:
-            return Found("feed", dynamic.actf), Found("spindle_rpm", self._spindle_rpm(dynamic.acts))
+            return FocasValue("feed", dynamic.actf), FocasValue("spindle_rpm", self._spindle_rpm(dynamic.acts))
         return (
-            Found("feed", _scaled(speed.actf.data, speed.actf.dec)),
-            Found("spindle_rpm", _scaled(speed.acts.data, speed.acts.dec)),
+            FocasValue("feed", _scaled(speed.actf.data, speed.actf.dec)),
+            FocasValue("spindle_rpm", _scaled(speed.acts.data, speed.acts.dec)),
         )
 
     def _spindle_rpm(self, rough: int) -> int:
@@ -184,71 +184,71 @@ class Fwlib:
             return int(several.data[0])
         return int(one.data) if self._call("cnc_acts", byref(one)) == OK else rough
 
-    def _servo_load(self, request: Request) -> tuple[Found, ...] | int:
+    def _servo_load(self, request: Request) -> tuple[FocasValue, ...] | int:
         count, loads = c_int16(st.MAX_AXIS), (st.LoadElm * st.MAX_AXIS)()
         code = self._call("cnc_rdsvmeter", byref(count), loads)
         pairs = zip(keys_of(request, self.identity.axes), loads[: max(0, count.value)], strict=False)
-        return code or tuple(Found(key, _scaled(load.data, load.dec)) for key, load in pairs)
+        return code or tuple(FocasValue(key, _scaled(load.data, load.dec)) for key, load in pairs)
 
-    def _spindle_load(self, request: Request) -> tuple[Found, ...] | int:
+    def _spindle_load(self, request: Request) -> tuple[FocasValue, ...] | int:
         count, loads = c_int16(1), (st.OdbSpLoad * 8)()
         code = self._call("cnc_rdspmeter", c_int16(-1), byref(count), loads)
-        return code or (Found("spindle_load", _scaled(loads[0].spload.data, loads[0].spload.dec)),)
+        return code or (FocasValue("spindle_load", _scaled(loads[0].spload.data, loads[0].spload.dec)),)
 
-    def _block(self, request: Request) -> tuple[Found, ...] | int:
+    def _block(self, request: Request) -> tuple[FocasValue, ...] | int:
         length, block, text = c_uint16(BLOCK_CHARS), c_int16(0), (c_char * (BLOCK_CHARS + 1))()
         code = self._call("cnc_rdexecprog", byref(length), byref(block), text)
-        return code or (Found("block", _word(text.raw[: min(length.value, BLOCK_CHARS)])),)
+        return code or (FocasValue("block", _word(text.raw[: min(length.value, BLOCK_CHARS)])),)
 
-    def _modal(self, request: Request) -> tuple[Found, ...] | int:
-        found = list[Found]()
+    def _modal(self, request: Request) -> tuple[FocasValue, ...] | int:
+        found = list[FocasValue]()
         for word, number in MODAL_WORDS.items():
             modal = st.OdbMdl()
             code = self._call("cnc_modal", c_int16(number), c_int16(0), byref(modal))
             if policy_of(code) is Policy.RECONNECT:
                 return code
-            found.append(Found(f"modal.{word}", int(modal.aux_data) if code == OK else None, code))
+            found.append(FocasValue(f"modal.{word}", int(modal.aux_data) if code == OK else None, code))
         return tuple(found)
 
-    def _tool(self, request: Request) -> tuple[Found, ...] | int:
+    def _tool(self, request: Request) -> tuple[FocasValue, ...] | int:
         tool = st.OdbTLife4()
         code = self._call("cnc_toolnum", c_int16(0), c_int16(0), byref(tool))
-        return code or (Found("tool", tool.data),)
+        return code or (FocasValue("tool", tool.data),)
 
-    def _pmc(self, request: Request) -> tuple[Found, ...] | int:
+    def _pmc(self, request: Request) -> tuple[FocasValue, ...] | int:
         area, byte, _, width = pmc_address(request.argument)
         data = st.IodbPmc()
         last = c_uint16(byte + width - 1)
         length = c_uint16(8 + width)
         code = self._call("pmc_rdpmcrng", c_int16(AREAS[area]), c_int16(0), c_uint16(byte), last, length, byref(data))
         raw = bytes(data)[st.IodbPmc.cdata.offset : st.IodbPmc.cdata.offset + width]
-        return code or (Found(f"pmc.{request.argument}", int.from_bytes(raw, "little")),)
+        return code or (FocasValue(f"pmc.{request.argument}", int.from_bytes(raw, "little")),)
 
-    def _program(self, request: Request) -> tuple[Found, ...] | int:
+    def _program(self, request: Request) -> tuple[FocasValue, ...] | int:
         program = st.OdbExePrg()
         code = self._call("cnc_exeprgname", byref(program))
-        return code or (Found("program.name", _word(program.name)),)
+        return code or (FocasValue("program.name", _word(program.name)),)
 
-    def _alarms(self, request: Request) -> tuple[Found, ...] | int:
+    def _alarms(self, request: Request) -> tuple[FocasValue, ...] | int:
         count, alarms = c_int16(ALARMS_MAX), (st.OdbAlmMsg2 * ALARMS_MAX)()
         code = self._call("cnc_rdalmmsg2", c_int16(-1), byref(count), alarms)
         told = alarms[: max(0, count.value)]
         texts = (alarm_text(one.type, one.alm_no, _word(one.alm_msg[: max(0, one.msg_len)])) for one in told)
-        return code or (Found("alarms", "; ".join(texts)),)
+        return code or (FocasValue("alarms", "; ".join(texts)),)
 
-    def _g_code(self, request: Request) -> tuple[Found, ...] | int:
+    def _g_code(self, request: Request) -> tuple[FocasValue, ...] | int:
         count, codes = c_int16(1), (st.OdbGcd * 4)()
         code = self._call("cnc_rdgcode", c_int16(int(request.argument)), c_int16(0), byref(count), codes)
-        return code or (Found(f"modal.G{request.argument}", _word(codes[0].code)),)
+        return code or (FocasValue(f"modal.G{request.argument}", _word(codes[0].code)),)
 
-    def _offset(self, request: Request) -> tuple[Found, ...] | int:
+    def _offset(self, request: Request) -> tuple[FocasValue, ...] | int:
         offset = st.OdbTOfs()
         number = c_int16(int(request.argument))
         code = self._call("cnc_rdtofs", number, c_int16(LENGTH_GEOMETRY), c_int16(sizeof(offset)), byref(offset))
         decimals = self._decimals[0] if self._decimals else DECIMALS_USUAL
-        return code or (Found("tool_offset", _scaled(offset.data, decimals)),)
+        return code or (FocasValue("tool_offset", _scaled(offset.data, decimals)),)
 
-    def _clock(self, request: Request) -> tuple[Found, ...] | int:
+    def _clock(self, request: Request) -> tuple[FocasValue, ...] | int:
         words = list[int]()
         for kind in (0, 1):
             timer = st.IodbTimer(type=kind)
@@ -256,7 +256,7 @@ class Fwlib:
             if code != OK:
                 return code
             words += timer.words
-        return tuple(Found(f"clock.{name}", int(word)) for name, word in zip(CLOCK_WORDS, words, strict=True))
+        return tuple(FocasValue(f"clock.{name}", int(word)) for name, word in zip(CLOCK_WORDS, words, strict=True))
 
 
 def _scaled(data: int, decimals: int) -> float | int:

@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Any
 
-from edge.controls.focas.calls import Answer, Found, Identity, Opened, Request
+from edge.controls.focas.calls import Answer, FocasValue, Identity, Opened, Request
 from edge.controls.focas.config import FocasConfig
 from edge.controls.focas.policy import PROTOCOL, SOCKET
 
@@ -136,7 +136,7 @@ def packed(message: Any) -> bytes:
     return _LENGTH.pack(len(body)) + body
 
 
-def _found(key: Any, value: Any, code: Any) -> Found:
+def _found(key: Any, value: Any, code: Any) -> FocasValue:
     if not isinstance(key, str) or not isinstance(value, str | int | float | bool | None):
         raise TypeError(f"no fact: {key!r}")
-    return Found(key, value, int(code))
+    return FocasValue(key, value, int(code))

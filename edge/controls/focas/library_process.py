@@ -9,7 +9,7 @@ import struct
 import sys
 from typing import Any, BinaryIO
 
-from edge.controls.focas.calls import Call, Found, Request
+from edge.controls.focas.calls import Call, FocasValue, Request
 from edge.controls.focas.fwlib import Fwlib
 from edge.controls.focas.library import FRAME_BYTES_MAX, packed
 from edge.controls.focas.policy import NODLL
@@ -40,7 +40,7 @@ def _opened(library: Fwlib, wanted: dict[str, Any]) -> dict[str, Any]:
     return {"code": code, "identity": library.identity}
 
 
-def _answer(library: Fwlib, request: Request) -> tuple[int, tuple[Found, ...]]:
+def _answer(library: Fwlib, request: Request) -> tuple[int, tuple[FocasValue, ...]]:
     answer = library.call(request)
     return answer.code, answer.found
 

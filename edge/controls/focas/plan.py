@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
-from edge.controls.focas.calls import Answer, Call, Found, Request, keys_of
+from edge.controls.focas.calls import Answer, Call, FocasValue, Request, keys_of
 from edge.controls.focas.config import Backend, FocasConfig, Group, ToolSource
 from edge.controls.focas.pmc import PmcAddress, pmc_address
 from edge.controls.focas.policy import Policy, policy_of
@@ -90,17 +90,17 @@ class Refusals:
             if request.name not in self.given_up and not all(key in self.given_up for key in keys_of(request, axes))
         )
 
-    def judge(self, request: Request, answer: Answer, axes: Sequence[str]) -> tuple[Found, ...]:
+    def judge(self, request: Request, answer: Answer, axes: Sequence[str]) -> tuple[FocasValue, ...]:
         """The facts of an answer that are to be told: values, and refusals the first time."""
         if answer.code == 0:
             found = answer.found
         else:
-            found = tuple(Found(key, None, answer.code) for key in keys_of(request, axes))
+            found = tuple(FocasValue(key, None, answer.code) for key in keys_of(request, axes))
             if policy_of(answer.code) is Policy.GIVE_UP:
                 self.given_up[request.name] = answer.code
         return tuple(one for one in found if self._is_told(one))
 
-    def _is_told(self, one: Found) -> bool:
+    def _is_told(self, one: FocasValue) -> bool:
         policy = policy_of(one.code)
         if policy is Policy.RETRY:
             self.busy[one.key] = self.busy.get(one.key, 0) + 1

@@ -3,6 +3,8 @@
 `connection` looks at the control at a steady pace through `control` (pyLSV2) and `link`, which lets no telegram out that
 writes; `cursor` makes samples of a look, with the tool from the program's text (`klartext`, `tool_flow`) where the control does
 not tell it.
+
+Documentation: docs/edge-heidenhain.md. Every key of the configuration: heidenhain.toml beside this file, edge/edge.toml.
 """
 
 from pathlib import Path

@@ -25,7 +25,7 @@ from edge.controls.heidenhain.tool_flow import BEFORE, PROGRAM_CALLED, Token, To
 from edge.place import Place
 from edge.reading import Target, bad, read_value
 from edge.sample import UNAVAILABLE, Drop, EdgeSample, Offer, SampleSet
-from edge.sweep import Fact, Plain, Stand, Sweep, take, told
+from edge.sweep import Fact, Plain, Sweep, SweepPosition, take
 from edge.tool_change import CUE
 from sparkplug.quality import Quality
 
@@ -44,7 +44,7 @@ class Cursor:
     CALL; `offers`: what was declared.
     """
 
-    stand: Stand = field(default_factory=Stand)
+    position: SweepPosition = field(default_factory=SweepPosition)
     texts: tuple[tuple[str, str, str], ...] = ()
     tool: int | str | None = None
     speed: float | None = None
@@ -80,19 +80,19 @@ def start(_config: Config) -> Cursor:
 
 def place(cursor: Cursor) -> Place | None:
     """Up to where everything is taken."""
-    return cursor.stand.place()
+    return cursor.position.place()
 
 
 def resume(_config: Config, kept: Place) -> Cursor:
     """The cursor of an edge that was here before."""
-    return Cursor(Stand.resumed(kept))
+    return Cursor(SweepPosition.resumed(kept))
 
 
 def parse(config: Config, cursor: Cursor, raw: bytes) -> tuple[Cursor, SampleSet]:
     """One look."""
-    taken = take(cursor.stand, raw)
+    taken = take(cursor.position, raw)
     if taken.sweep is None:
-        return replace(cursor, stand=taken.stand), taken.about
+        return replace(cursor, position=taken.position), taken.about
     sweep, is_baseline = taken.sweep, taken.is_baseline
     look = Look(config, sweep, {fact.key: fact for fact in sweep.facts}, is_baseline)
     if is_baseline:  # we have looked away
@@ -115,13 +115,13 @@ def parse(config: Config, cursor: Cursor, raw: bytes) -> tuple[Cursor, SampleSet
         dropped[Drop.UNMAPPED] = unmapped
     after = replace(
         after,
-        stand=taken.stand,
+        position=taken.position,
         offers=offers,
         state=where.state if isinstance(where.state, int) else None,
         at_call=_called(where) is not None and where.state in GOES_ON,
     )
     news = offers if offers != cursor.offers or is_baseline else None
-    return after, told(taken.about, samples=tuple(samples), dropped=dropped, offers=news)
+    return after, replace(taken.about, samples=tuple(samples), dropped=dropped, offers=news)
 
 
 def _is_wanted(config: Config, name: str) -> bool:

@@ -1,7 +1,9 @@
 """The edge for MTConnect agents, 1.2 to 2.x.
 
-`mtconnect_cursor` parses the documents and decides what to ask for next, `mtconnect_connection` asks, `mapping` and
-`names.toml` say which data item is which signal.
+`cursor` parses the documents and decides what to ask for next, `connection` asks, `mapping` and `names.toml` say which data item
+is which signal.
+
+Documentation: docs/edge-mtconnect.md. Every key of the configuration: mtconnect.toml beside this file, edge/edge.toml.
 """
 
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The documents of an agent, parsed: streams and errors here, the device description in `mtconnect_model`.
+"""The documents of an agent, parsed: streams and errors here, the device description in `model`.
 
 Source: MTConnect part 1 (protocol) and part 3 (streams). What real agents do and this file allows for: errors come with HTTP 200
 or 4xx and are told by the root element alone; an element without text is an empty value, not a missing one; the name of a

@@ -2,6 +2,8 @@
 
 `maps/*.toml` say which node is which signal, `resolve` finds the nodes, `session` holds the line, `delivery` finds what is
 missing, `cursor` parses. The library asyncua is an extra: only a connection imports it.
+
+Documentation: docs/edge-opcua.md. Every key of the configuration: opcua.toml beside this file, edge/edge.toml.
 """
 
 from pathlib import Path

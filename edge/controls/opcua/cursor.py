@@ -19,7 +19,7 @@ from edge.place import Place
 from edge.reading import Target, bad, read_value
 from edge.sample import EMPTY, Drop, EdgeSample, Offer, SampleSet
 from edge.signals import signal
-from edge.sweep import Fact, Stand, Sweep, take, told
+from edge.sweep import Fact, Sweep, SweepPosition, take
 from edge.units import conversion
 from sparkplug.quality import Quality
 
@@ -41,7 +41,7 @@ class Meaning:
 class Cursor:
     """Where the parser stands; what the keys of this life mean; the tools, and which of them was told last ("?" = none yet)."""
 
-    stand: Stand = field(default_factory=Stand)
+    position: SweepPosition = field(default_factory=SweepPosition)
     meanings: tuple[Meaning, ...] = ()
     unmapped: tuple[str, ...] = ()
     tools: Tools = ()
@@ -55,26 +55,26 @@ def start(_config: Config) -> Cursor:
 
 def place(cursor: Cursor) -> Place | None:
     """Up to when everything is taken; None while nothing is."""
-    return cursor.stand.place()
+    return cursor.position.place()
 
 
 def resume(_config: Config, kept: Place) -> Cursor:
     """The cursor of an edge that was here before."""
-    return Cursor(stand=Stand.resumed(kept))
+    return Cursor(position=SweepPosition.resumed(kept))
 
 
 def parse(config: Config, cursor: Cursor, raw: bytes) -> tuple[Cursor, SampleSet]:
     """One frame."""
-    taken = take(cursor.stand, raw)
+    taken = take(cursor.position, raw)
     sweep = taken.sweep
     if sweep is None:
-        return replace(cursor, stand=taken.stand), taken.about
-    is_new = sweep.life != cursor.stand.life
+        return replace(cursor, position=taken.position), taken.about
+    is_new = sweep.life != cursor.position.life
     before = Cursor() if is_new else cursor
-    after = _learned(config, replace(before, stand=taken.stand), sweep.facts)
+    after = _learned(config, replace(before, position=taken.position), sweep.facts)
     after, samples, dropped = _samples(config, after, sweep, taken.is_baseline)
     offers = _offers(after) if is_new or after.meanings != before.meanings or bool(after.tools) != bool(before.tools) else None
-    return after, told(taken.about, samples=samples, dropped=dropped, offers=offers)
+    return after, replace(taken.about, samples=samples, dropped=dropped, offers=offers)
 
 
 def _learned(config: Config, cursor: Cursor, facts: Iterable[Fact]) -> Cursor:

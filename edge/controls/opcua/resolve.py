@@ -38,7 +38,7 @@ class Resolved(NamedTuple):
     fault: str = ""
 
 
-class Found(NamedTuple):
+class BrowsedNode(NamedTuple):
     """An object or variable that browsing met: the type's name is "" where it is of no interest."""
 
     node: ua.NodeId
@@ -130,7 +130,7 @@ def _first_of_each(resolved: Iterable[Resolved]) -> list[Resolved]:
     return list(kept.values())
 
 
-def _chosen(config: Config, kind: str, objects: list[Found]) -> list[Found]:
+def _chosen(config: Config, kind: str, objects: list[BrowsedNode]) -> list[BrowsedNode]:
     """The objects of this type, once each, in the order of their browse paths; of channels and spindles the one that is named."""
     wanted = {"CncChannelType": config.source.channel, "ChannelMonitoringType": config.source.channel}
     wanted |= {"CncSpindleType": config.source.spindle, "SpindleMonitoringType": config.source.spindle}
@@ -141,7 +141,7 @@ def _chosen(config: Config, kind: str, objects: list[Found]) -> list[Found]:
 
 
 async def _flags(
-    client: Client, asked: Sequence[tuple[Point, Found, int]], namespaces: Sequence[str], model: str
+    client: Client, asked: Sequence[tuple[Point, BrowsedNode, int]], namespaces: Sequence[str], model: str
 ) -> dict[tuple[str, str], object]:
     """The values of the flags that decide whether a point is read at all."""
     wanted = {(str(found.node), flag): found.node for point, found, _ in asked if (flag := point.only_if or point.only_if_not)}
@@ -182,9 +182,9 @@ def _browse_path(start: ua.NodeId, path: str, index: int) -> ua.BrowsePath:
     return ua.BrowsePath(StartingNode=start, RelativePath=ua.RelativePath(Elements=elements))
 
 
-async def browse(client: Client, namespaces: Sequence[str], model: str, stop_at: Iterable[str] = ()) -> list[Found]:
+async def browse(client: Client, namespaces: Sequence[str], model: str, stop_at: Iterable[str] = ()) -> list[BrowsedNode]:
     """What is below Objects, breadth first, bounded in number, depth and time; with the model's type of each object."""
-    begun_s, found, seen = time.monotonic(), list[Found](), set[str]()
+    begun_s, found, seen = time.monotonic(), list[BrowsedNode](), set[str]()
     names: dict[str, str] = {}
     stops = set(stop_at) - {"CncChannelType"}  # a channel has spindles and axes below it, on some servers there alone
     root = ua.NodeId(ua.Int32(ObjectIds.ObjectsFolder))
@@ -205,12 +205,14 @@ async def browse(client: Client, namespaces: Sequence[str], model: str, stop_at:
     return found
 
 
-def _found(reference: ua.ReferenceDescription, path: tuple[str, ...], namespaces: Sequence[str], names: dict[str, str]) -> Found:
+def _found(
+    reference: ua.ReferenceDescription, path: tuple[str, ...], namespaces: Sequence[str], names: dict[str, str]
+) -> BrowsedNode:
     name, index = str(reference.BrowseName.Name or ""), int(reference.NodeId.NamespaceIndex)
     is_variable = reference.NodeClass == ua.NodeClass.Variable
     node = ua.NodeId(reference.NodeId.Identifier, reference.NodeId.NamespaceIndex)
     namespace = namespaces[index] if index < len(namespaces) else ""
-    return Found(node, namespace, name, names.get(str(reference.TypeDefinition), ""), is_variable, (*path, name))
+    return BrowsedNode(node, namespace, name, names.get(str(reference.TypeDefinition), ""), is_variable, (*path, name))
 
 
 async def _children(client: Client, nodes: Sequence[ua.NodeId]) -> list[list[ua.ReferenceDescription]]:

@@ -42,10 +42,10 @@ def test_heartbeats_alone_give_the_offset_within_its_spread(offset_s: int) -> No
         text = f"{_day(minute)}T{minute // 60 % 24:02d}:{minute % 60:02d}:{second:02d}Z"
         cursor, frame = fed(streams(10).replace(b"2026-01-01T00:00:00Z", text.encode()), cursor=cursor)
         state = clock.step(state, clock.heard(frame, 5.0 + 1.9 * number, made_ms + 30.0)).state
-    assert state.told is not None
-    assert state.told.bound is not None
-    assert abs(state.told.bound.offset_s - offset_s) <= state.told.bound.spread_s < 0.6
-    assert state.told.method == "times of documents"
+    assert state.published is not None
+    assert state.published.bound is not None
+    assert abs(state.published.bound.offset_s - offset_s) <= state.published.bound.spread_s < 0.6
+    assert state.published.method == "times of documents"
 
 
 def _day(minute: int) -> str:

@@ -82,11 +82,11 @@ def test_where_stamps_alone_are_known_the_signals_say_how_long_a_sample_takes() 
         peak = Bound(float(number), -0.6, 0.6) if number == 100 else None
         stamp_ms = (1000 + number) * 1000 - 900
         state = clock.step(state, clock.Heard(float(number), (1000 + number) * 1000.0, reading, stamp_ms, peak)).state
-    assert state.told is not None
-    assert state.told.bound is not None
-    assert state.told.method == "stamps of samples, signals; the clock that is read is another"
-    assert state.told.bound.low_s <= 0.0 <= state.told.bound.high_s
-    assert state.told.bound.spread_s < 0.8
+    assert state.published is not None
+    assert state.published.bound is not None
+    assert state.published.method == "stamps of samples, signals; the clock that is read is another"
+    assert state.published.bound.low_s <= 0.0 <= state.published.bound.high_s
+    assert state.published.bound.spread_s < 0.8
 
 
 def recorded_speed() -> Points:

@@ -71,3 +71,13 @@ def test_a_cue_is_never_published_and_counts_as_evidence() -> None:
     assert "tool_change_cue" not in {s.signal for s in (*published, *one.last)}
     assert [(s.value, s.timestamp_ms) for s in published if s.signal == "tool_change_active"] == [(False, 0), (True, 200)]
     assert outcome.dropped == {Drop.EVIDENCE: 4}
+
+
+def test_asking_for_the_memory_changes_nothing_and_what_is_noted_is_not_given_again() -> None:
+    pipeline = Pipeline(EdgeConfig(source=MtconnectConfig()))
+    pipeline.take(SampleSet((EdgeSample("tool_number", 7, 1_000),), received=1), arrival_s=0.0)
+    first = pipeline.memory()
+    assert first is not None
+    assert pipeline.memory() == first
+    pipeline.keep_memory()
+    assert pipeline.memory() is None

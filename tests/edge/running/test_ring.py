@@ -14,7 +14,8 @@ import pytest
 from edge.config import StoreSection
 from edge.errors import StoreError
 from edge.place import Place
-from edge.running.ring import Eviction, Ring
+from edge.running.ring import Ring
+from edge.running.ring_file import Eviction
 
 PLENTY = 10**12
 

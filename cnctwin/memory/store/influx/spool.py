@@ -1,8 +1,8 @@
 """The ring on the disk before the server: batches of lines that it has not taken yet, and what has to be remembered of them.
 
-One SQLite file (WAL, synchronous=NORMAL: a commit outlives a kill -9). In one transaction go: the batches, the stamps that tell a
-sample that comes again, and the account `taken = sent + refused + evicted + held`, of samples. What is too old or too much goes
-oldest first and is counted by reason. Two writers cannot share a folder: a lock file sees to that.
+One SQLite file (`edge.running.ring_file`; a commit outlives a kill -9). In one transaction go: the batches, the stamps by which a
+sample is known that comes again, and the account `taken = sent + refused + evicted + held`, of samples. What is too old or too
+much goes oldest first and is counted by reason. Two writers cannot share a folder: a lock file sees to that.
 """
 
 import fcntl
@@ -12,15 +12,15 @@ import zlib
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from threading import RLock
 from typing import Any, NamedTuple
 
 from cnctwin.memory.store.contract import Pinned, StoreError
+from edge.running.ring_file import EVICTED_AT_ONCE, Eviction, open_ring, passed_limit, transaction
 
 FILE, LOCK = "ring.sqlite", "writer.lock"
-EVICTED_AT_ONCE = 200
 _SCHEMA = """
 CREATE TABLE IF NOT EXISTS rows(sequence INTEGER PRIMARY KEY AUTOINCREMENT, stored_ms INTEGER NOT NULL,
     oldest_ms INTEGER NOT NULL, bucket TEXT NOT NULL, samples INTEGER NOT NULL, bytes INTEGER NOT NULL, body BLOB NOT NULL);
@@ -41,14 +41,6 @@ class RingLimits:
     bytes_max: int = 4_000_000_000
     age_s_max: float = 7 * 86_400.0
     free_bytes_min: int = 500_000_000
-
-
-class Eviction(StrEnum):
-    """Why a batch had to go before the server had it."""
-
-    AGE = "age"
-    BYTES = "bytes"
-    DISK = "disk"
 
 
 class Batch(NamedTuple):
@@ -98,12 +90,7 @@ class Spool:
             except OSError as error:
                 self._owner.close()
                 raise StoreError(f"{folder}: another process writes to this ring; stop it or name another folder") from error
-            self._db = sqlite3.connect(folder / FILE, isolation_level=None, timeout=5.0, check_same_thread=False)
-            self._db.execute("PRAGMA auto_vacuum = INCREMENTAL")
-            self._db.execute("PRAGMA journal_mode = WAL")
-            self._db.execute("PRAGMA synchronous = NORMAL")
-            self._db.execute("PRAGMA journal_size_limit = 4194304")
-            self._db.executescript(_SCHEMA)
+            self._db = open_ring(folder / FILE, _SCHEMA, synchronous="normal", timeout_s=5.0)
             sums = "SELECT coalesce(sum(samples), 0), coalesce(sum(bytes), 0) FROM rows"
             held, size = self._db.execute(sums).fetchone()
             self.held, self.bytes = int(held), int(size)
@@ -143,20 +130,14 @@ class Spool:
         now_ms = self._wall_ms()
         packed = [(now_ms, b.oldest_ms, b.bucket, b.samples, zlib.compress(b.lines, 1)) for b in batches]
         with self._lock:
-            self._db.execute("BEGIN IMMEDIATE")
-            try:
+            samples = sum(b.samples for b in batches)
+            with transaction(self._db):
                 self._db.executemany(
                     "INSERT INTO rows(stored_ms, oldest_ms, bucket, samples, bytes, body) VALUES (?, ?, ?, ?, ?, ?)",
                     [(*row[:4], len(row[4]), row[4]) for row in packed],
                 )
                 self._db.executemany("INSERT OR REPLACE INTO stamps VALUES (?, ?, ?, ?)", stamps)
-                samples = sum(b.samples for b in batches)
                 self._count([("taken", samples), *counted])
-                self._db.execute("COMMIT")
-            except BaseException:
-                with suppress(sqlite3.Error):
-                    self._db.execute("ROLLBACK")
-                raise
             self.held += samples
             self.bytes += sum(len(row[4]) for row in packed)
             self.last += len(packed)
@@ -183,16 +164,13 @@ class Spool:
         """All batches up to a number are with the server, but for so many samples that it refused."""
         with self._lock:
             try:
-                self._db.execute("BEGIN IMMEDIATE")
-                samples, size = self._db.execute(
-                    "SELECT coalesce(sum(samples), 0), coalesce(sum(bytes), 0) FROM rows WHERE sequence <= ?", (upto,)
-                ).fetchone()
-                self._db.execute("DELETE FROM rows WHERE sequence <= ?", (upto,))
-                self._count([("sent", samples - refused), ("refused by the server", refused)])
-                self._db.execute("COMMIT")
+                with transaction(self._db):
+                    samples, size = self._db.execute(
+                        "SELECT coalesce(sum(samples), 0), coalesce(sum(bytes), 0) FROM rows WHERE sequence <= ?", (upto,)
+                    ).fetchone()
+                    self._db.execute("DELETE FROM rows WHERE sequence <= ?", (upto,))
+                    self._count([("sent", samples - refused), ("refused by the server", refused)])
             except sqlite3.Error as error:
-                with suppress(sqlite3.Error):
-                    self._db.execute("ROLLBACK")
                 raise self._unwritable(error) from error
             self.held -= samples
             self.bytes -= size
@@ -213,11 +191,9 @@ class Spool:
         oldest = self._ask("SELECT stored_ms FROM rows ORDER BY sequence LIMIT 1")
         if not oldest:
             return None
-        if self._wall_ms() - oldest[0][0] > self._limits.age_s_max * 1000:
-            return Eviction.AGE
-        if self.bytes > self._limits.bytes_max:
-            return Eviction.BYTES
-        return Eviction.DISK if self._free_bytes(self.folder) < self._limits.free_bytes_min else None
+        age_s = (self._wall_ms() - oldest[0][0]) / 1000
+        free_bytes = partial(self._free_bytes, self.folder)
+        return passed_limit(self._limits, age_s=age_s, size_bytes=self.bytes, free_bytes=free_bytes)
 
     def _evict(self, reason: Eviction) -> int:
         with self._lock:
@@ -236,13 +212,10 @@ class Spool:
                 return 0
             samples: int = sum(row[1] for row in chosen)
             try:
-                self._db.execute("BEGIN IMMEDIATE")
-                self._db.executemany("DELETE FROM rows WHERE sequence = ?", [(row[0],) for row in chosen])
-                self._count([(f"evicted: {reason}", samples)])
-                self._db.execute("COMMIT")
+                with transaction(self._db):
+                    self._db.executemany("DELETE FROM rows WHERE sequence = ?", [(row[0],) for row in chosen])
+                    self._count([(f"evicted: {reason}", samples)])
             except sqlite3.Error as error:
-                with suppress(sqlite3.Error):
-                    self._db.execute("ROLLBACK")
                 raise self._unwritable(error) from error
             self.held -= samples
             self.bytes -= sum(row[2] for row in chosen)

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from itertools import islice
 
 from edge.config import EdgeConfig
-from edge.controls.focas.calls import CLOCK_WORDS, STATUS_WORDS, Answer, Call, Found, Identity, Opened, Request, keys_of
+from edge.controls.focas.calls import CLOCK_WORDS, STATUS_WORDS, Answer, Call, FocasValue, Identity, Opened, Request, keys_of
 from edge.controls.focas.config import FocasConfig
 from edge.controls.focas.connection import FocasConnection
 from edge.sweep import Sweep
@@ -13,7 +13,7 @@ WHO = Identity("31", "M", "G421", "40.1", ("X", "B"))
 T0_S = 1_700_000_000.0
 
 
-def shown(request: Request) -> tuple[Found, ...]:
+def shown(request: Request) -> tuple[FocasValue, ...]:
     """What a control shows that cuts."""
     values: dict[str, str | int | float | None] = dict(
         zip((f"status.{word}" for word in STATUS_WORDS), (1, 3, 1, 0, 0, 0, 0), strict=True)
@@ -28,7 +28,7 @@ def shown(request: Request) -> tuple[Found, ...]:
     }
     values |= {"pmc.G12": 155, "pmc.F10:4": 3, "modal.M": 3, "modal.T": 7}
     values |= dict(zip((f"clock.{word}" for word in CLOCK_WORDS), (2023, 11, 14, 22, 13, 21), strict=True))
-    return tuple(Found(key, values.get(key, 0)) for key in keys_of(request, WHO.axes))
+    return tuple(FocasValue(key, values.get(key, 0)) for key in keys_of(request, WHO.axes))
 
 
 class ImaginedControl:

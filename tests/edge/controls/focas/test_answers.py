@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from edge.controls.focas import answers
-from edge.controls.focas.calls import Answer, Call, Found, Identity, Request, keys_of
+from edge.controls.focas.calls import Answer, Call, FocasValue, Identity, Request, keys_of
 from edge.controls.focas.policy import DATA
 from edge.controls.focas.wire import Reply
 
@@ -118,5 +118,5 @@ def test_whatever_a_control_answers_gives_the_known_facts_or_a_code(request: Req
     good, bad = st.builds(Reply, st.just(0), st.binary(max_size=300)), st.builds(Reply, st.integers(1, 17), st.just(b""))
     found = data.draw(st.lists(good | bad, min_size=len(plan.blocks), max_size=len(plan.blocks)))
     answer = answers.answer(request, plan, found, WHO)
-    assert all(isinstance(one, Found) and one.key in keys_of(request, WHO.axes) for one in answer.found)
+    assert all(isinstance(one, FocasValue) and one.key in keys_of(request, WHO.axes) for one in answer.found)
     assert bool(answer.found) is (answer.code == 0)

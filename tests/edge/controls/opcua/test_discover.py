@@ -77,7 +77,7 @@ def test_an_address_may_say_how_to_get_in_and_what_it_says_is_checked(bench: Ben
 
 
 def test_browsing_is_bounded_and_names_can_be_written_into_a_configuration(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    async def seen() -> tuple[list[resolve.Found], list[str]]:
+    async def seen() -> tuple[list[resolve.BrowsedNode], list[str]]:
         async with session.opened(bench.config(security="none")) as client:
             namespaces = await client.get_namespace_array()
             return await resolve.browse(client, namespaces, ""), namespaces
