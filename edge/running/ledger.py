@@ -59,7 +59,7 @@ class Ledger:
 
     @staticmethod
     def difference(counters: Mapping[str, int]) -> int:
-        """What is missing in a snapshot; anything but 0 is a bug of ours."""
+        """Return what is missing in a snapshot; anything but 0 is a bug of ours."""
         return counters["ledger/received"] - counters["ledger/emitted"] - counters["ledger/dropped"] - counters["ledger/buffered"]
 
     def metrics(self) -> list[MetricSpec]:
