@@ -1,4 +1,4 @@
-"""What an edge adapter is, and how adapters are found.
+"""The declaration of an edge adapter, and how adapters are found.
 
 An adapter is a file `edge/controls/<name>.py` that ends in `ADAPTER = Adapter(...)`, with its sample configuration `<name>.toml`
 beside it, or a folder `edge/controls/<name>/` with both, the declaration in `adapter.py`. `parse` is a pure function from a

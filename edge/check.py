@@ -1,4 +1,4 @@
-"""What an edge would publish, and a first configuration for a control; neither needs a broker."""
+"""A preview of what an edge would publish, and a first configuration for a control; neither needs a broker."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ from edge.errors import ConfigError
 
 
 def check(config_path: Path) -> list[Row]:
-    """What the edge of this file would publish; ConfigError or ConnectionLostError where it cannot work."""
+    """Return what the edge of this file would publish; ConfigError or ConnectionLostError where it cannot work."""
     config = load(config_path)
     return find(config.machine.adapter).describe(config)
 

@@ -38,7 +38,7 @@ class MachineSection(Section):
 
 
 class BrokerSection(Section):
-    """Where to publish. Empty `node` means `edge-<machine>`; `session_file` keeps bdSeq and,
+    """The broker to publish to. Empty `node` means `edge-<machine>`; `session_file` keeps bdSeq and,
     beside it, the place in the control's stream; empty, the program keeps them in its state folder."""
 
     url: str = "mqtt://127.0.0.1:1883"
@@ -52,7 +52,7 @@ class BrokerSection(Section):
 
 
 class SignalSection(Section):
-    """How one canonical signal is fed. `native_unit` is what the values really are, whatever the control declares."""
+    """The source of one canonical signal. `native_unit` is what the values really are, whatever the control declares."""
 
     data_item: str = ""
     native_unit: str = ""

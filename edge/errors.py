@@ -1,4 +1,4 @@
-"""What can go wrong at an edge.
+"""Errors of an edge.
 
 EdgeError
 ├── ConfigError            a configuration that cannot be used: it names file, key, value and the way out

@@ -15,7 +15,7 @@ _log = logging.getLogger(__name__)
 
 
 class Place(NamedTuple):
-    """Which life of the control's server, and the number of the first observation that was not taken yet."""
+    """The life of the control's server, and the number of the first observation that was not taken yet."""
 
     instance: str
     next_sequence: int

@@ -1,4 +1,4 @@
-"""What an adapter hands on: changes of canonical signals, holes, and how each observation fared.
+"""The samples that an adapter hands on: changes of canonical signals, holes, and how each observation fared.
 
 Observations are counted where they are read, so that at each publication received = emitted + dropped(reason) + buffered.
 """
@@ -93,7 +93,7 @@ class ClockReading:
 
 @dataclass(frozen=True, slots=True)
 class SampleSet:
-    """What one frame gave. `offers` is None where it says nothing about which signals there are."""
+    """The content of one frame. `offers` is None where it says nothing about which signals there are."""
 
     samples: tuple[EdgeSample, ...] = ()
     gaps: tuple[Gap, ...] = ()
@@ -108,5 +108,5 @@ class SampleSet:
     clock: ClockReading | None = None  # what the control's clock showed, where the frame tells
 
     def accounted(self) -> bool:
-        """Whether each observation of the frame is a sample or a counted drop."""
+        """Return whether each observation of the frame is a sample or a counted drop."""
         return self.received == sum(sample.observations for sample in self.samples) + sum(self.dropped.values())

@@ -1,4 +1,4 @@
-"""Where commands keep what has to survive a restart, if nothing else is said: birth/death numbers, and where an edge stood."""
+"""The folder where commands keep what has to survive a restart by default: birth/death numbers, and the places of edges."""
 
 import os
 from pathlib import Path

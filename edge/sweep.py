@@ -152,12 +152,12 @@ class SweepPosition:
 
     @classmethod
     def resumed(cls, kept: Place) -> "SweepPosition":
-        """Where an edge stands that was here before: the time is known, the life is over."""
+        """Return where an edge stands that was here before: the time is known, the life is over."""
         return cls("", 0, kept.next_sequence)
 
 
 class Taken(NamedTuple):
-    """What became of a frame: the sweep to make samples of (None: refused, or taken before), and what is said of it already.
+    """The result of taking a frame: the sweep to make samples of (None: refused, or taken before), and what is known already.
 
     `about` has gaps, errors, duplicates and counts but no samples; add them with `dataclasses.replace`. `is_baseline`: the values
     are the state as found, not events.

@@ -44,7 +44,7 @@ _pattern = lru_cache(maxsize=64)(re.compile)
 
 
 class Phase(Enum):
-    """Where the machine stands."""
+    """The phase of the machine."""
 
     SETTLED = "settled"
     DOUBT = "doubt"
@@ -144,7 +144,7 @@ def _given_up(config: ToolChangeSection, what: str) -> str:
 
 
 def not_observable(now_ms: int) -> tuple[EdgeSample, ...]:
-    """What is published where the control offers neither a tool number nor the block text."""
+    """Return what is published where the control offers neither a tool number nor the block text."""
     reason = "the control offers neither tool number nor block text"
     return (
         EdgeSample("tool_change_active", None, now_ms, Quality.BAD, reason, observations=0),
@@ -154,7 +154,7 @@ def not_observable(now_ms: int) -> tuple[EdgeSample, ...]:
 
 
 def is_tool_change_block(config: ToolChangeSection, block: str) -> bool:
-    """Whether a block commands a tool change; comments do not.
+    """Return whether a block commands a tool change; comments do not.
 
     >>> [is_tool_change_block(ToolChangeSection(), b) for b in ("N10 T7 M06", "T7M6", "M602", "(M06) G0 X1", "TOOL CALL 5 Z")]
     [True, True, False, False, True]
@@ -193,7 +193,7 @@ def _rejoin(state: State, now_ms: int) -> Step:
 
 
 def _tool_of(config: ToolChangeSection, sample: EdgeSample) -> str:
-    """What tells one tool from another; "" is none. A name that is no number still is a tool, although its number is null."""
+    """Return what tells one tool from another; "" is none. A name that is no number still is a tool; its number is null."""
     if sample.value is None:
         return "" if sample.reason == EMPTY else str(sample.reason)
     return "" if config.zero_is_no_tool and sample.value == 0 else str(sample.value)

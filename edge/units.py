@@ -71,7 +71,7 @@ _TO: dict[str, dict[str, Conversion]] = {
 
 
 def conversion(native: str, canonical: str) -> Conversion:
-    """How to get from a native unit to a canonical one; ConfigError where there is no way."""
+    """Return how to get from a native unit to a canonical one; ConfigError where there is no way."""
     word = native.strip().upper().replace("REV/", "REVOLUTION/")
     if not word or native == canonical or not canonical:
         return IDENTITY

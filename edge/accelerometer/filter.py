@@ -43,14 +43,14 @@ class Carried(NamedTuple):
 
 
 class Sums(NamedTuple):
-    """Of so many samples, the sums of squares of acceleration in g and of velocity in mm/s."""
+    """The number of samples, and their sums of squares of acceleration in g and of velocity in mm/s."""
 
     samples: int = 0
     acceleration: float = 0.0
     velocity: float = 0.0
 
     def plus(self, other: "Sums") -> "Sums":
-        """Of both."""
+        """Return the sums of both."""
         return Sums(self.samples + other.samples, self.acceleration + other.acceleration, self.velocity + other.velocity)
 
     @property

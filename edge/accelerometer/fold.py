@@ -1,4 +1,4 @@
-"""What blocks of acceleration say: rms of each second in the band, and the blocks as they are published. A pure fold.
+"""The figures of blocks of acceleration: rms of each second in the band, and the blocks as they are published. A pure fold.
 
 Blocks are one stream while each has the number after the last one's and the same rate. A block that is lost, clipped, dead, or
 holds what no sensor measures breaks the stream: the values are null with the reason, the filters start anew, and the first half
@@ -37,7 +37,7 @@ NO_BLOCK = "no block from the accelerometer yet"
 
 
 class Delivery(NamedTuple):
-    """What came of a block: values and holes, blocks to publish as they are, and the envelope for `edge.clock.signals`.
+    """The result of a block: values and holes, blocks to publish as they are, and the envelope for `edge.clock.signals`.
 
     envelope: middle of each tenth of a second, in seconds since 1970 by the EDGE's clock, and its rms in g
     """

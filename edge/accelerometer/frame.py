@@ -37,7 +37,7 @@ RATE_HZ_MAX = 200_000.0
 
 
 class SampleType(IntEnum):
-    """How a sample is written."""
+    """The encoding of a sample."""
 
     FLOAT32 = 1
     INT16 = 2
@@ -89,11 +89,11 @@ class Frames:
 
     @property
     def is_between(self) -> bool:
-        """Whether no part of a frame waits."""
+        """Return whether no part of a frame waits."""
         return not self._waiting
 
     def _need(self) -> int:
-        """How many bytes the frame has that begins here; 0 while its header is not whole."""
+        """Return how many bytes the frame has that begins here; 0 while its header is not whole."""
         if self._waiting[: len(MAGIC)] != MAGIC[: len(self._waiting)]:
             raise DocumentError(
                 f"no frame of an accelerometer: it begins with {bytes(self._waiting[:4])!r} in place of {MAGIC!r}"

@@ -16,7 +16,7 @@ RATE_HZ_MIN = RATE_BANDS_MIN * HIGH_HZ
 
 
 class Publish(StrEnum):
-    """What goes to the broker: the figures that are computed here, the raw blocks, or both."""
+    """The choice of what goes to the broker: the figures that are computed here, the raw blocks, or both."""
 
     VALUES = "values"
     BLOCKS = "blocks"
@@ -51,7 +51,7 @@ class AccelerometerSection(Section):
 
     @property
     def is_file(self) -> bool:
-        """Whether blocks come from a file."""
+        """Return whether blocks come from a file."""
         return self.url.startswith("file:")
 
     @model_validator(mode="after")

@@ -88,7 +88,7 @@ class Accelerometer:
         return Offer(fold.RMS, self._section.url, "g"), Offer(fold.VELOCITY, self._section.url, "mm/s")
 
     def metrics(self) -> tuple[MetricSpec, ...]:
-        """What it publishes that is no canonical signal, for the birth certificate."""
+        """Return what it publishes that is no canonical signal, for the birth certificate."""
         return () if self._section.publish is Publish.VALUES else BLOCK_METRICS
 
     def health(self) -> dict[str, int | str]:

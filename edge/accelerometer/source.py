@@ -1,4 +1,4 @@
-"""Where blocks of acceleration come from: a TCP connection, or a file that is played at its own pace. I/O only.
+"""The source of blocks of acceleration: a TCP connection, or a file that is played at its own pace. I/O only.
 
 A TCP source reconnects by itself, waiting longer after each failure, with jitter. No call blocks for longer than `LOOK_S`, and
 `close` ends it from any thread. None in place of a block says that nothing came for so long.

@@ -1,4 +1,4 @@
-"""What each look at the control's clock proves of its offset, and what many of them prove together.
+"""Bounds of a clock's offset: what each look at the control's clock proves, and what many of them prove together.
 
 An offset is the control's clock minus the edge's, in seconds. A clock that was read over a round trip proves an interval: it was
 read somewhere between question and answer, and shows the start of the step of its resolution that it was in (clocks truncate):
@@ -26,9 +26,9 @@ from typing import NamedTuple
 from edge.sample import ClockReading
 
 DRIFT_PPM_MAX = 500.0
-"""Of a clock against another: a quartz is within 100, and NTP turns a clock by 500 at most."""
+"""The fastest drift of a clock against another: a quartz is within 100, and NTP turns a clock by 500 at most."""
 ROUNDING_MS = 1.0
-"""Of times that are whole milliseconds."""
+"""The error of times that are whole milliseconds."""
 QUICK_AMONG, QUICK_IN_ARC = 12, 8
 """Documents of which one at least took no more than the stated latency."""
 NEWEST_WEIGHT = 1.5
@@ -53,7 +53,7 @@ class Bound(NamedTuple):
         return (self.high_s - self.low_s) / 2.0
 
     def aged(self, at_s: float) -> "Bound":
-        """What is left of it at another time.
+        """Return what is left of it at another time.
 
         >>> Bound(0.0, 1.0, 2.0).aged(1000.0)
         Bound(at_s=1000.0, low_s=0.5, high_s=2.5)
@@ -66,16 +66,16 @@ class Bound(NamedTuple):
         return Bound(self.at_s, self.low_s + by_s, self.high_s + by_s)
 
     def meets(self, other: "Bound") -> bool:
-        """Whether both can be true."""
+        """Return whether both can be true."""
         return self.low_s <= other.high_s and other.low_s <= self.high_s
 
     def both(self, other: "Bound") -> "Bound":
-        """What is left where both are true; they have to meet."""
+        """Return what is left where both are true; they have to meet."""
         return Bound(self.at_s, max(self.low_s, other.low_s), min(self.high_s, other.high_s))
 
 
 class OneWay(NamedTuple):
-    """What came one way within a bucket: the offset is above `low_s`, the largest lower bound of them.
+    """Evidence that came one way within a bucket: the offset is above `low_s`, the largest lower bound of them.
 
     latency_s: what the quick ones took at most
     resolution_s: the step of the clock, the finest that they show
@@ -90,7 +90,7 @@ class OneWay(NamedTuple):
 
     @property
     def doubt_s(self) -> float:
-        """How far below the offset the bound of a quick one is at most."""
+        """Return how far below the offset the bound of a quick one is at most."""
         return self.latency_s + self.resolution_s
 
     def moved(self, by_s: float) -> "OneWay":
@@ -100,14 +100,14 @@ class OneWay(NamedTuple):
 
 
 class Agreement(NamedTuple):
-    """Where most bounds overlap, and how many do."""
+    """The overlap of most bounds, and how many they are."""
 
     bound: Bound
     number: int
 
 
 def of_reading(reading: ClockReading, at_s: float) -> Bound:
-    """What a reading over a round trip proves.
+    """Return what a reading over a round trip proves.
 
     A clock of whole seconds, read within 20 ms:
 
@@ -133,7 +133,7 @@ def arc_holding(phases: Sequence[float], number: int) -> float:
 
 
 def agreed(bounds: Sequence[Bound], at_s: float) -> Agreement:
-    """Where most of them overlap, as of `at_s`; the newest comes last. There has to be one.
+    """Return where most of them overlap, as of `at_s`; the newest comes last. There has to be one.
 
     >>> agreed([Bound(0.0, 1.0, 2.0), Bound(0.0, 1.5, 2.5), Bound(0.0, 8.0, 9.0)], 0.0)
     Agreement(bound=Bound(at_s=0.0, low_s=1.5, high_s=2.0), number=2)

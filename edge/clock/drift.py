@@ -1,4 +1,4 @@
-"""How fast a clock runs away: a robust line through bounds of its offset.
+"""The drift of a clock: a robust line through bounds of its offset.
 
 One bound a minute is kept, then every other one of them and one every two minutes, and so on, so that a day fits. The slope is
 the median of the slopes of all pairs (Theil, 1950; Sen, 1968); it is told once the bounds themselves leave no more than
@@ -81,5 +81,5 @@ def drift(series: Series) -> Drift | None:
 
 
 def _scatter(slopes: list[float], slope: float) -> float:
-    """Of a clock that does not run at one rate."""
+    """Return the doubt of a clock that does not run at one rate."""
     return median(abs(one - slope) for one in slopes)

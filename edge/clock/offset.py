@@ -1,4 +1,4 @@
-"""How far the control's clock is from the edge's, how fast they part, and whether one of them was set: a pure fold.
+"""The offset of the control's clock from the edge's, how fast they part, and whether one of them was set: a pure fold.
 
     done = clock.step(state, clock.heard(frame, at_s, arrival_ms))     # after each frame
     state, samples, health = done
@@ -74,7 +74,7 @@ class Heard(NamedTuple):
 
 
 def heard(frame: SampleSet, at_s: float, arrival_ms: float, peak: Bound | None = None) -> Heard:
-    """What a frame tells of the clock. Stamps of a state as found, or of a backlog, say nothing of how long they took."""
+    """Return what a frame tells of the clock. Stamps of a state as found, or of a backlog, say nothing of how long they took."""
     is_news = not frame.backlog and not any(sample.is_baseline for sample in frame.samples)
     return Heard(at_s, arrival_ms, frame.clock, frame.newest_ms if is_news else None, peak)
 
@@ -89,7 +89,7 @@ class OffsetEstimate(NamedTuple):
 
 
 class State(NamedTuple):
-    """What is known of one control's clock.
+    """The knowledge of one control's clock.
 
     bucket, document, stamp: of the bucket that is open until `until_s`: readings, documents, stamps
     readings, documents, stamps: one for each bucket that is closed; peaks: of the signals
@@ -164,7 +164,7 @@ def _edge_clock_set(state: State, by_s: float, at_s: float) -> State:
 
 
 def _gathered(state: State, heard: Heard) -> dict[str, Any]:
-    """What changes of the open bucket with one look more."""
+    """Return what changes of the open bucket with one look more."""
     reading, changes = heard.reading, dict[str, Any]()
     if reading is not None:
         changes["stamps_samples"] = reading.stamps_samples
@@ -260,14 +260,14 @@ def _way_stepped(window: tuple[OneWay, ...], at_s: float) -> tuple[tuple[OneWay,
 
 
 def _is_steady(ways: tuple[OneWay, ...], number: int) -> bool:
-    """Whether the last of them are no further apart than latencies are."""
+    """Return whether the last of them are no further apart than latencies are."""
     last = ways[-number:]
     lows = [way.low_s for way in last]
     return len(last) == number and max(lows) - min(lows) <= max(way.doubt_s for way in last)
 
 
 def _is_running_away(ways: tuple[OneWay, ...]) -> bool:
-    """Whether the last of them went the same way each time, by more than latencies do."""
+    """Return whether the last of them went the same way each time, by more than latencies do."""
     last = ways[-STEADY_BUCKETS:]
     moves = [(after.low_s - before.low_s) / before.doubt_s for before, after in pairwise(last)]
     return len(last) == STEADY_BUCKETS and (min(moves) > 1.0 or max(moves) < -1.0)
@@ -307,7 +307,7 @@ def _beside_stamps(state: State, read: Bound, method: str, stamps: tuple[OneWay,
 
 
 def _by_stamps(state: State, stamps: Bound, but: str = "") -> OffsetEstimate:
-    """Where there are no readings of the clock that stamps: the signals may know better what a sample takes."""
+    """Return the offset by stamps, for want of readings of their clock: the signals may know better what a sample takes."""
     if state.peaks:
         peak = agreed(state.peaks, stamps.at_s).bound
         if peak.high_s >= stamps.low_s:
@@ -334,7 +334,7 @@ def _followed(state: State, judged: OffsetEstimate) -> State:
 
 
 def _is_news(published: OffsetEstimate | None, judged: OffsetEstimate) -> bool:
-    """Whether what was published is no longer true, or much less than what is known."""
+    """Return whether what was published is no longer true, or much less than what is known."""
     if published is None or published[1:] != judged[1:] or published.bound is None or judged.bound is None:
         return published is None or published[1:] != judged[1:]
     before, now = published.bound, judged.bound.aged(judged.bound.at_s + 2.0 * BUCKET_S)  # when it is looked at again
@@ -376,7 +376,7 @@ def _health(state: State, judged: OffsetEstimate, at_s: float) -> dict[str, str 
 
 
 def _alarm(state: State, judged: OffsetEstimate, at_s: float) -> str:
-    """What a person has to look at; "" where there is nothing."""
+    """Return what a person has to look at; "" where there is nothing."""
     bound = judged.bound
     if state.step and at_s - state.step_s <= ALARM_STANDS_S:
         return state.step

@@ -156,7 +156,7 @@ def _coefficients(short: Sequence[float], long: Sequence[float]) -> list[float]:
 
 
 def _vertex(values: Sequence[float], place: int) -> float:
-    """Where the parabola through a peak and its neighbours has its top, in steps from the peak."""
+    """Return where the parabola through a peak and its neighbours has its top, in steps from the peak."""
     if not 0 < place < len(values) - 1:
         return 0.0
     left, top, right = values[place - 1], values[place], values[place + 1]

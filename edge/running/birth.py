@@ -1,4 +1,4 @@
-"""What the birth certificate of a machine declares: its signals with unit, limits and where they come from."""
+"""The birth certificate of a machine: its signals with unit, limits and where they come from."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace

@@ -48,7 +48,7 @@ _DROPS = {Eviction.AGE: Drop.STORE_AGE, Eviction.BYTES: Drop.STORE_BYTES, Evicti
 
 
 class Sender(Protocol):
-    """What is needed of `sparkplug.edge_node.EdgeNode`."""
+    """The part of `sparkplug.edge_node.EdgeNode` that is needed here."""
 
     def publish(self, device: str | None, changes: Sequence[Change]) -> bool: ...
     def barrier(self, token: int, session: int) -> bool: ...
@@ -100,11 +100,11 @@ class Forwarder:
     # What the loop has.
 
     def place(self) -> Place | None:
-        """Where the control has to be asked next, as stored."""
+        """Return where the control has to be asked next, as stored."""
         return self._ring.place()
 
     def memory(self) -> str | None:
-        """Of the pipeline, as stored."""
+        """Return the pipeline's memory, as stored."""
         return self._ring.memory()
 
     def metrics(self) -> Sequence[MetricSpec]:
@@ -113,7 +113,7 @@ class Forwarder:
         return (sequence, MetricSpec(RECEIPT, DataType.STRING)) if self._limits.await_receipt else (sequence,)
 
     def declare(self, names: Iterable[str]) -> None:
-        """What the present birth declares: history of anything else can't be told any more. Empty: the device is dead."""
+        """Note what the present birth declares: history of anything else can't be told any more. Empty: the device is dead."""
         self._declared = frozenset(names)
 
     def put(self, rows: Sequence[Sequence[EdgeSample]], place: Place | None, memory: str | None = None) -> Settled:
@@ -176,17 +176,17 @@ class Forwarder:
 
     @property
     def observations(self) -> int:
-        """How many are stored, or have come to their end since the last `pump`."""
+        """Return how many are stored, or have come to their end since the last `pump`."""
         return self._ring.observations + self._emitted + self._dropped.total()
 
     @property
     def is_done(self) -> bool:
-        """Whether all that was sent is confirmed."""
+        """Return whether all that was sent is confirmed."""
         return not self._flights
 
     @property
     def is_behind(self) -> bool:
-        """Whether history waits that could be sent now."""
+        """Return whether history waits that could be sent now."""
         return bool(self._waiting) and bool(self._declared) and self._node.online
 
     def health(self) -> dict[str, int | float | str | bool]:
@@ -220,7 +220,7 @@ class Forwarder:
         return True
 
     def _land(self, now_s: float) -> None:
-        """What was confirmed is done. Where the disk fails the flight stays, and lands with a later pump."""
+        """Finish what was confirmed. Where the disk fails the flight stays, and lands with a later pump."""
         while self._confirmed:
             self._landed = max(self._landed, self._confirmed.popleft())
         while self._flights and 0 < self._flights[0].token <= self._landed:
@@ -240,7 +240,7 @@ class Forwarder:
             self._receive(self._receipts, now_s)
 
     def _receive(self, receipts: Receipts, now_s: float) -> None:
-        """What a memory keeps is done; what it has missed is told again."""
+        """Finish what a memory keeps; send again what it has missed."""
         kept, missed = receipts.settle(now_s)
         for span in missed:
             self._waiting.add(*span)
@@ -250,7 +250,7 @@ class Forwarder:
             self._kept.popleft()
 
     def _strand(self, session: int) -> None:
-        """What was sent in another session, or is not confirmed for long, waits again."""
+        """Let wait again what was sent in another session, or is not confirmed for long."""
         while self._flights and (self._flights[0].session != session or len(self._flights) >= FLIGHTS_MAX):
             for first, last in self._flights.popleft().spans:
                 self._waiting.add(first, last)
@@ -331,7 +331,7 @@ class Forwarder:
             self._place = self._memory = None
 
     def _send_unstored(self, row: Sequence[EdgeSample]) -> None:
-        """Where the disk takes nothing the edge goes on without: what is not sent now is lost, and counted."""
+        """Send without a store, where the disk takes nothing: what is not sent now is lost, and counted."""
         if self._node.publish(self._device, [sample.change for sample in row]):
             self._emitted += observations_of(row)
         else:

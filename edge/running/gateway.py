@@ -93,7 +93,7 @@ class Gateway:
 
     @property
     def runtimes(self) -> Mapping[str, EdgeRuntime]:
-        """What runs now, by machine."""
+        """Return what runs now, by machine."""
         return {e.config.machine.name: e.runtime for e in self._edges.values() if e.runtime is not None and e.runs}
 
     def look(self) -> None:
@@ -239,7 +239,7 @@ class Gateway:
 
 
 def _own_things(config: EdgeConfig[Any]) -> set[tuple[str, str]]:
-    """What no other edge of this process may have."""
+    """Return what no other edge of this process may have."""
     things = {
         ("node", f"{config.broker.group}/{config.node}"),
         ("machine", f"{config.broker.group}/{config.machine.name.casefold()}"),

@@ -1,4 +1,4 @@
-"""How the edge itself is: lag, holes, reconnects, refused frames, published as metrics of the edge node."""
+"""The health of the edge itself: lag, holes, reconnects, refused frames, published as metrics of the edge node."""
 
 from collections.abc import Iterable, Mapping
 
@@ -46,7 +46,7 @@ class Health:
         self.lag_s: float | None = None
 
     def note(self, frame: SampleSet, now_s: float) -> None:
-        """What one frame says of the edge's own state."""
+        """Note what one frame says of the edge's own state."""
         if frame.error is not None:
             self.refused_frames += 1
             self.last_error = frame.error
@@ -59,7 +59,7 @@ class Health:
             self.lag_s = now_s - frame.newest_ms / 1000
 
     def holes_in(self, gaps: Iterable[Gap]) -> None:
-        """What nobody can get any more."""
+        """Count what nobody can get any more."""
         for gap in gaps:
             self.holes += 1
             self.lost_observations += gap.lost

@@ -60,7 +60,7 @@ class Ledger:
 
     @staticmethod
     def difference(counters: Mapping[str, int]) -> int:
-        """What is missing in a snapshot; anything but 0 is a bug of ours."""
+        """Return what is missing in a snapshot; anything but 0 is a bug of ours."""
         return counters[RECEIVED] - counters[EMITTED] - counters[DROPPED] - counters[BUFFERED]
 
     def metrics(self) -> list[MetricSpec]:

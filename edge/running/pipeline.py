@@ -37,7 +37,7 @@ class Outcome:
 
 
 class Memory(NamedTuple):
-    """What outlives a restart: the tool change's state, and what was last published of it."""
+    """The state that outlives a restart: the tool change's state, and what was last published of it."""
 
     change: tool_change.State
     last: tuple[EdgeSample, ...]
@@ -86,7 +86,7 @@ class Pipeline:
 
     @property
     def last(self) -> tuple[EdgeSample, ...]:
-        """What was published last, of each signal."""
+        """Return what was published last, of each signal."""
         return tuple(self._report.last.values())
 
     def take(self, frame: SampleSet, arrival_s: float) -> Outcome:
@@ -151,7 +151,7 @@ class Pipeline:
 
 
 def _remembered(text: str | None) -> Memory | None:
-    """What `Pipeline.memory` has written; None where that cannot be read, for instance by another version."""
+    """Return what `Pipeline.memory` has written; None where that cannot be read, for instance by another version."""
     if text is None:
         return None
     try:

@@ -62,7 +62,7 @@ class Receipts:
             spans.cut(upto)
 
     def settle(self, now_s: float) -> Settled:
-        """What has come to its end since the last time."""
+        """Return what has come to its end since the last time."""
         while self._heard:
             self._heard_s = now_s
             for first, last in spans_of(self._heard.popleft()):
@@ -92,7 +92,7 @@ def spans_of(text: str) -> list[tuple[int, int]]:
 
 
 def _both(waiting: Spans, early: Spans) -> list[tuple[int, int]]:
-    """What is in both, taken out of both."""
+    """Return what is in both, taken out of both."""
     both = [part for span in list(early) for part in waiting.discard(*span)]
     for part in both:
         early.discard(*part)

@@ -20,7 +20,7 @@ from sparkplug.quality import Quality
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """What was published last, by signal."""
+    """The last published sample of each signal."""
 
     last: Mapping[str, EdgeSample] = field(default_factory=lambda: MappingProxyType({}))
 

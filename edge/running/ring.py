@@ -184,7 +184,7 @@ class Ring:
         return str(found[0][0]) if found else None
 
     def spans(self) -> list[tuple[int, int]]:
-        """Which numbers are stored, as spans from first to last."""
+        """Return which numbers are stored, as spans from first to last."""
         # A row begins a span where the one before it is missing: number minus rank is the same within a span.
         asked = "SELECT min(sequence), max(sequence) FROM (SELECT sequence, sequence - row_number() OVER (ORDER BY sequence) AS g"
         return [(int(a), int(b)) for a, b in self._ask(f"{asked} FROM rows) GROUP BY g ORDER BY 1")]

@@ -1,4 +1,4 @@
-"""What every bounded ring on SQLite has: how its file is opened, how it is written, and when a limit is passed.
+"""The file of a bounded ring on SQLite: how its file is opened, how it is written, and when a limit is passed.
 
 WAL (https://sqlite.org/wal.html): with synchronous=NORMAL a commit survives the death of the process, with FULL that of the power
 too, at the price of an fsync each. The store of an edge (`edge.running.ring`) and the spool before InfluxDB are such rings;
@@ -25,7 +25,7 @@ class Eviction(StrEnum):
 
 
 class Limits(Protocol):
-    """How much a ring may hold; less than `free_bytes_min` is never left on the disk."""
+    """Limits of a ring; less than `free_bytes_min` is never left on the disk."""
 
     @property
     def age_s_max(self) -> float: ...

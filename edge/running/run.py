@@ -97,7 +97,7 @@ def edge_runtime(
 
 
 def _opener(config: EdgeConfig[Any]) -> Callable[[Publisher], Forwarder] | None:
-    """How the store of this edge is opened, by the thread that uses it; None where it has none."""
+    """Return what opens the store of this edge, in the thread that uses it; None where it has none."""
     limits, session_file = config.store, config.broker.session_file
     if not limits.enabled or not (limits.file or session_file):
         return None

@@ -40,7 +40,7 @@ REPORT_INTERVAL_S = 1.0
 
 
 class Publisher(Sender, Protocol):
-    """What the loop needs of `sparkplug.edge_node.EdgeNode`."""
+    """The part of `sparkplug.edge_node.EdgeNode` that is needed here."""
 
     def start(self) -> None: ...
     def stop(self, timeout_s: float = 5.0) -> None: ...
@@ -53,7 +53,7 @@ class Publisher(Sender, Protocol):
 
 
 class Store(Protocol):
-    """What the loop needs of a store: `Forwarder`, or `Unstored` where nothing is kept."""
+    """A store as the loop uses it: `Forwarder`, or `Unstored` where nothing is kept."""
 
     def place(self) -> Place | None: ...
     def memory(self) -> str | None: ...
@@ -217,7 +217,7 @@ class EdgeRuntime:
         )
 
     def _sense(self) -> None:
-        """What the accelerometer has sent: figures like those of the control, and raw blocks, which are live or lost."""
+        """Publish what the accelerometer has sent: figures like those of the control, and raw blocks, which are live or lost."""
         for delivery in self._sensor.taken():
             self.health.holes_in(delivery.frame.gaps)
             self._publish(self._pipeline.declare(delivery.frame.samples), None)
@@ -225,7 +225,7 @@ class EdgeRuntime:
                 self._node.publish(self.config.machine.name, [change])
 
     def _compare_clocks(self, arrival: Arrival) -> None:
-        """What the frame says of the control's clock."""
+        """Take in what the frame says of the control's clock."""
         known = None if self._clocks.published is None else self._clocks.published.bound
         peak = self._sensor.peak(arrival.frame.samples, arrival.at_s, 0.0 if known is None else known.offset_s)
         done = clock.step(self._clocks, clock.heard(arrival.frame, arrival.at_s, arrival.wall_ms, peak))

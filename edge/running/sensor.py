@@ -20,7 +20,7 @@ ENVELOPE_MAX = 3000  # ten a second
 
 
 class Sensor(Protocol):
-    """What the loop needs of a sensor."""
+    """A sensor as the loop uses it."""
 
     def start(self) -> None: ...
     def close(self) -> None: ...

@@ -1,4 +1,4 @@
-"""Which commands of the Ethernet protocol a call needs, and what their answers hold. No I/O.
+"""The commands of the Ethernet protocol that a call needs, and what their answers hold. No I/O.
 
 Two calls have no published command: cnc_modal and cnc_toolnum. The modal M, S, T and F are read from the system variables that
 FANUC's manuals define for them (#4113, #4119, #4120, #4109), whose reading is known from captures; cnc_toolnum is answered here
@@ -49,7 +49,7 @@ def identity(found: Sequence[Reply]) -> Identity:
 
 
 def exchange(request: Request, path: int = 1) -> Exchange | None:
-    """How this call is put; None where the protocol has no known command for it."""
+    """Return how this call is put; None where the protocol has no known command for it."""
     match request.call:
         case Call.STATUS:
             return Exchange((Block(0x19),), 32, _status)

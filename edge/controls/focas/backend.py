@@ -1,4 +1,4 @@
-"""Which way to the control the configuration chooses."""
+"""The way to the control that the configuration chooses."""
 
 from edge.controls.focas.calls import FocasBackend
 from edge.controls.focas.config import Backend, FocasConfig

@@ -1,4 +1,4 @@
-"""What a FANUC control is asked, by the names of its functions, and the shape of what it answers: the interface of both backends.
+"""The calls to a FANUC control, by the names of its functions, and the shape of what it answers: the interface of both backends.
 
 A call answers with values (`FocasValue`), each with a return code of its own: a control without the option for spindle loads
 still gives its servo loads.
@@ -55,7 +55,7 @@ class FocasValue(NamedTuple):
 
 
 class Identity(NamedTuple):
-    """What the control says of itself. `mt_type`: M a machining centre, T a lathe; axes by name, in their order."""
+    """The control's description of itself. `mt_type`: M a machining centre, T a lathe; axes by name, in their order."""
 
     cnc_type: str = ""
     mt_type: str = ""
@@ -65,7 +65,7 @@ class Identity(NamedTuple):
 
 
 class Opened(NamedTuple):
-    """Whether there is a handle, and whose."""
+    """The answer to opening: a handle or none, and whose."""
 
     code: int
     identity: Identity = Identity()
@@ -73,7 +73,7 @@ class Opened(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """What became of one request. `code` other than 0: nothing was found."""
+    """The result of one request. `code` other than 0: nothing was found."""
 
     code: int
     found: tuple[FocasValue, ...] = ()

@@ -1,4 +1,4 @@
-"""What an edge for a FANUC control would publish: one handle, one look, the same parser as in operation, no broker."""
+"""A preview of an edge for a FANUC control: one handle, one look, the same parser as in operation, no broker."""
 
 from edge.adapter import Row
 from edge.controls.focas.config import Backend, Config
@@ -11,7 +11,7 @@ from edge.sweep import Sweep
 
 
 def describe(config: Config) -> list[Row]:
-    """What would be published for the control that the configuration names; what it refuses is a null with the reason."""
+    """Return what would be published for the control that the configuration names; what it refuses is a null with the reason."""
     _, frame = look(config)
     last = {sample.signal: sample for sample in frame.samples}
     way = "experimental ethernet: " if config.source.backend is Backend.ETHERNET else ""

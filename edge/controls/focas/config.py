@@ -19,7 +19,7 @@ class Backend(StrEnum):
 
 
 class ToolSource(StrEnum):
-    """Where the tool number comes from."""
+    """The source of the tool number."""
 
     AUTO = "auto"  # cnc_toolnum; else the T code: on a lathe at once, on a machining centre when M6 works on it
     TOOLNUM = "toolnum"
@@ -28,7 +28,7 @@ class ToolSource(StrEnum):
 
 
 class Group(StrEnum):
-    """What can be left out, to ask the control less."""
+    """Groups of values that can be left out, to ask the control less."""
 
     BLOCK = "block"
     MODAL = "modal"

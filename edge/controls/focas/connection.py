@@ -147,7 +147,7 @@ class FocasConnection:
         return sweep
 
     def _is_due(self, last_s: float, interval_s: float) -> bool:
-        """Whether this look is the nearest to the end of an interval."""
+        """Return whether this look is the nearest to the end of an interval."""
         return self._clock() - last_s >= interval_s - self._config.interval_ms / 2000
 
     def _hole(self, t_ms: int, facts: int) -> tuple[Hole, ...]:

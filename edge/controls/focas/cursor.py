@@ -26,7 +26,7 @@ _NOT_SEEN = "the control tells only T codes, which programs call ahead; known fr
 
 @dataclass(frozen=True, slots=True)
 class Cursor:
-    """Where the parser stands.
+    """The parser's position.
 
     has_toolnum, has_name: whether the control answers cnc_toolnum, and names its program
     is_changing: the cue of the last sweep
@@ -75,7 +75,7 @@ def parse(config: Config, cursor: Cursor, raw: bytes) -> tuple[Cursor, SampleSet
 
 
 def _known(cursor: Cursor, facts: Mapping[str, Fact]) -> Cursor:
-    """What the first sweep of a connection tells for all that follow."""
+    """Return what the first sweep of a connection tells for all that follow."""
     if "control.series" in facts:
         mt_type = str(facts.get("control.mt_type", Fact("")).value or "").strip()
         cursor = replace(cursor, mt_type=mt_type, has_toolnum=False, has_name=False)
@@ -142,7 +142,7 @@ class _Look:
         return tuple(found.values())
 
     def _target_of(self, fact: Fact) -> Target | None:
-        """What a fact feeds, given which of several this control has."""
+        """Return what a fact feeds, given which of several this control has."""
         target = self._mapping.target(fact.key)
         if target is None:
             return None

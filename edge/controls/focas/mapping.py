@@ -1,4 +1,4 @@
-"""Which fact of a FANUC control is which canonical signal, worked out once for a configuration."""
+"""The mapping from facts of a FANUC control to canonical signals, worked out once for a configuration."""
 
 import re
 from collections.abc import Iterable
@@ -59,7 +59,7 @@ class FocasMapping:
         return self._targets[key]
 
     def source_of(self, key: str) -> str:
-        """Where a fact comes from, for births and `edge check`."""
+        """Return where a fact comes from, for births and `edge check`."""
         if axis := _AXIS.fullmatch(key):
             return f"{'cnc_rddynamic2 machine' if axis[1] == 'position' else 'cnc_rdsvmeter'} {axis[2]}"
         if key in self.overrides:

@@ -1,4 +1,4 @@
-"""What is asked when: at each look, once in a slow interval, and what the control has refused for good."""
+"""The plan of what is asked when: at each look, once in a slow interval, and what the control has refused for good."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
@@ -43,7 +43,7 @@ def change_bit(config: FocasConfig) -> PmcAddress | None:
 
 
 def quick(config: FocasConfig) -> tuple[Request, ...]:
-    """What each look asks. What belongs to a tool change comes first, to be of one moment."""
+    """Return what each look asks. What belongs to a tool change comes first, to be of one moment."""
     groups, signals, bit = config.groups, Signals.of(config.path), change_bit(config)
     requests = [Request(Call.STATUS), Request(Call.DYNAMIC)]
     if Group.MODAL in groups:
@@ -64,7 +64,7 @@ def quick(config: FocasConfig) -> tuple[Request, ...]:
 
 
 def slow(config: FocasConfig, tool: int) -> tuple[Request, ...]:
-    """What a slow look asks besides. `tool`: whose offset, 0 for none."""
+    """Return what a slow look asks besides. `tool`: whose offset, 0 for none."""
     requests = [Request(Call.PROGRAM)]
     if Group.ALARMS in config.groups:
         requests.append(Request(Call.ALARMS))
@@ -77,7 +77,7 @@ def slow(config: FocasConfig, tool: int) -> tuple[Request, ...]:
 
 @dataclass(slots=True)
 class Refusals:
-    """What this control has refused for good, and what it was too busy for. Forgotten with the handle: options can be bought."""
+    """Requests that this control has refused for good, or was too busy for. Forgotten with the handle: options can be bought."""
 
     given_up: dict[str, int] = field(default_factory=dict)
     busy: dict[str, int] = field(default_factory=dict)

@@ -18,7 +18,7 @@ FUNC, LENGTH, NUMBER, DATA, NOOPT = 1, 2, 3, 5, 6
 
 
 class Policy(Enum):
-    """What follows from a code. A control that hangs counts as SOCKET, once its time is over."""
+    """The consequence of a code. A control that hangs counts as SOCKET, once its time is over."""
 
     OK = "ok"
     RECONNECT = "reconnect"  # the handle is dropped, and made again after a while that grows
@@ -71,7 +71,7 @@ CODES = tuple(_CODES)
 
 
 def policy_of(code: int) -> Policy:
-    """What follows from this code; of one that is not known, that the value cannot be used."""
+    """Return what follows from this code; of one that is not known, that the value cannot be used."""
     return _CODES[code].policy if code in _CODES else Policy.BAD
 
 

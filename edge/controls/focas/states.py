@@ -1,4 +1,4 @@
-"""What the figures of a FANUC control mean: execution, mode, overrides, and whether it works on a tool change."""
+"""The meaning of a FANUC control's figures: execution, mode, overrides, and whether it works on a tool change."""
 
 import re
 from collections.abc import Collection, Mapping
@@ -60,14 +60,14 @@ def rapid_override_pct(g14: Plain) -> float | None:
 
 
 class Cue(NamedTuple):
-    """Whether the control works on a tool change (None: it does not tell), and what says so."""
+    """The tool change in progress, or not (None: the control does not tell), and what says so."""
 
     is_changing: bool | None
     why: str
 
 
 class CueRule(NamedTuple):
-    """Where the cue is found. `bit`: the fact and the bit of the machine's builder, "" where there is none."""
+    """The place of the cue. `bit`: the fact and the bit of the machine's builder, "" where there is none."""
 
     m_codes: Collection[int]
     strobe: str
@@ -106,7 +106,7 @@ def _told(is_changing: bool, why: str) -> Cue:
 
 
 def _is_other_strobe(block: Plain) -> bool:
-    """Whether the block that runs has a T, S or B word and no M word: then that is what the control is busy with."""
+    """Return whether the block that runs has a T, S or B word and no M word: then that is what the control is busy with."""
     if not isinstance(block, str):
         return False
     line = first_line(block).upper()

@@ -1,4 +1,4 @@
-"""What an edge for a HEIDENHAIN control would publish: one look, the same parser as in operation, no broker."""
+"""A preview of an edge for a HEIDENHAIN control: one look, the same parser as in operation, no broker."""
 
 from edge.adapter import Row
 from edge.controls.heidenhain.config import Config
@@ -14,7 +14,7 @@ NO_TOOL = "this control tells it to nobody over LSV2; give its PLC address as pl
 
 
 def describe(config: Config) -> list[Row]:
-    """What would be published for the control that the configuration names."""
+    """Return what would be published for the control that the configuration names."""
     frame = first_look(config)
     offers, last = looked_at_frame(config, frame)
     faults = {source_of(fact.key, config): fact.fault for fact in Sweep.decode(frame).facts if fact.fault}
@@ -25,7 +25,7 @@ def describe(config: Config) -> list[Row]:
 
 
 def looked_at_frame(config: Config, frame: bytes) -> tuple[tuple[Offer, ...], dict[str, EdgeSample]]:
-    """What is declared, and the samples of a first look."""
+    """Return what is declared, and the samples of a first look."""
     _, given = parse(config, start(config), frame)
     return given.offers or (), {sample.signal: sample for sample in given.samples}
 

@@ -20,7 +20,7 @@ SIGNALS_MAX = 64
 
 
 class ToolSource(StrEnum):
-    """Where the tool number comes from. `auto`: a PLC address if there is one, else the control if it tells, else the program."""
+    """The source of the tool number. `auto`: a PLC address if there is one, else the control if it tells, else the program."""
 
     AUTO = "auto"
     CONTROL = "control"

@@ -71,7 +71,7 @@ class HeidenhainConnection:
         self.last_error = ""
 
     def follow(self, cursor: Cursor) -> None:
-        """What is asked for next does not depend on the parser."""
+        """Nothing that is asked for next depends on the parser."""
 
     def silent_s(self) -> float:
         """Seconds since the last whole look."""

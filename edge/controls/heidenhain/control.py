@@ -113,13 +113,13 @@ class Control:
 
     @property
     def name(self) -> str:
-        """What the control calls itself, such as iTNC530 340490 06 SP3."""
+        """Return what the control calls itself, such as iTNC530 340490 06 SP3."""
         versions = self._lsv2.versions
         return f"{versions.control} {versions.nc_sw}".strip()
 
     @property
     def tells_tool(self) -> bool:
-        """Whether it may tell the tool in the spindle and its error messages: an iTNC 530, or a control that is not known."""
+        """Return whether it may tell its tool and its error messages: an iTNC 530, or a control that is not known."""
         return bool(self._lsv2.versions.is_itnc() or self._lsv2.versions.type.name == "UNKNOWN")
 
     def look(self) -> list[Fact]:

@@ -38,7 +38,7 @@ NO_SOURCE = "no telegram of LSV2 tells it; name its PLC address in [heidenhain.p
 
 @dataclass(frozen=True, slots=True)
 class Cursor:
-    """Where the parser stands. `texts`: path and text of the programs; `tool`, `speed`: what was seen last, None: not known.
+    """The parser's position. `texts`: path and text of the programs; `tool`, `speed`: what was seen last, None: not known.
 
     `unknown`: why the tool is not known; `state`: of the program in the last look; `at_call`: whether that was in a running TOOL
     CALL; `offers`: what was declared.
@@ -64,7 +64,7 @@ class Look(NamedTuple):
 
 
 class Where(NamedTuple):
-    """Where the program stands in a look; `block` None: the text of the block is not known, for the reason `fault`."""
+    """The running program's position in a look; `block` None: the text of the block is not known, for the reason `fault`."""
 
     state: Plain
     line: int | None
@@ -217,7 +217,7 @@ def _tool(cursor: Cursor, where: Where, look: Look) -> tuple[Cursor, list[EdgeSa
 
 
 def _in_progress(where: Where, in_spindle: Token | None, look: Look) -> tuple[bool | None, str]:
-    """Whether a tool change is in progress, and what says so; None: nothing does."""
+    """Return whether a tool change is in progress, and what says so; None: nothing does."""
     bit = look.facts.get(f"plc:{TOOL_CHANGE}")
     if bit is not None:
         return (bit.value if isinstance(bit.value, bool) else None), source_of(bit.key, look.config)
@@ -310,7 +310,7 @@ def _speed(cursor: Cursor, where: Where) -> tuple[Cursor, float | None]:
 
 
 def _offers(before: tuple[Offer, ...], look: Look) -> tuple[Offer, ...]:
-    """What the birth declares, once declared for good. Signals that cannot be had are in it too: null, with the reason."""
+    """Return what the birth declares, once declared for good. Signals that cannot be had are in it too: null, with the reason."""
     found = {offer.signal: offer for offer in before}
     for key in look.facts:
         name = signal_of(key)

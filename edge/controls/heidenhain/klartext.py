@@ -30,7 +30,7 @@ _END = re.compile(r"(?:^|\s)M0?2(?:\s|$)|(?:^|\s)M30(?:\s|$)|^END PGM\b")
 
 
 class Kind(Enum):
-    """What a block does to the tool or to the way through the program."""
+    """The effect of a block on the tool or on the way through the program."""
 
     TOOL_CALL = "tool call"
     LABEL = "label"

@@ -69,7 +69,7 @@ class ReadOnlyLink:
         self.last_error: Any = self._pylsv2.dat_cls.LSV2Error()
 
     def begin(self, within_s: float) -> None:
-        """What follows has so long, all in all."""
+        """Give what follows so long, all in all."""
         self._deadline_s = self._clock() + within_s
         self._telegrams = 0
 

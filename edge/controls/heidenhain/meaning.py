@@ -1,4 +1,4 @@
-"""What the values of a look mean: which fact feeds which signal, and the words for the control's numbers.
+"""The meaning of the values of a look: which fact feeds which signal, and the words for the control's numbers.
 
 | program state | `exec_state` | | execution mode | `controller_mode` |
 |---|---|---|---|---|
@@ -77,7 +77,7 @@ def _is_signal(name: str) -> bool:
 
 
 def source_of(key: str, config: Config) -> str:
-    """Where a fact comes from, as births and `edge check` say it."""
+    """Return where a fact comes from, as births and `edge check` say it."""
     kind, _, name = key.partition(":")
     if kind == "plc":
         return f"PLC {config.source.plc.get(name, '?')}"
@@ -96,7 +96,7 @@ def in_words(key: str, value: Plain) -> Plain:
 
 
 def target_of(key: str, name: str, config: Config) -> Target:
-    """How the value of a fact becomes that of a signal."""
+    """Return how the value of a fact becomes that of a signal."""
     section = config.signals.get(name, SignalSection())
     known = signal(name)
     factor, offset = conversion(section.native_unit, known.unit) if section.native_unit else (1.0, 0.0)

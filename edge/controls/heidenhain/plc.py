@@ -59,7 +59,7 @@ class PlcAddress(NamedTuple):
         return (start + self.number, size) if start >= 0 and self.number + size <= room else None
 
     def value(self, data: bytes) -> bool | int | str:
-        """What these bytes stand for.
+        """Return what these bytes stand for.
 
         >>> PlcAddress.parse("W1000").value(bytes([7, 0])), PlcAddress.parse("M1").value(bytes([1]))
         (7, True)

@@ -1,4 +1,4 @@
-"""Which tool can be in the spindle when a block of a program runs: reaching definitions over its labels, calls and jumps.
+"""The tool that can be in the spindle when a block of a program runs: reaching definitions over its labels, calls and jumps.
 
 A `TOOL CALL` defines the tool. What reaches a block is the set of definitions that some way through the program brings there:
 
@@ -34,7 +34,7 @@ NOTHING: Tokens = frozenset()
 
 @dataclass(frozen=True, slots=True)
 class Flow:
-    """What reaches the blocks: before and after each step, in the order of their numbers."""
+    """The tools that reach the blocks: before and after each step, in the order of their numbers."""
 
     numbers: tuple[int, ...] = ()
     before: tuple[Tokens, ...] = ()
@@ -42,7 +42,7 @@ class Flow:
     fault: str = ""
 
     def at(self, number: int) -> Tokens:
-        """What reaches this block, before it is done."""
+        """Return what reaches this block, before it is done."""
         if self.fault:
             return frozenset({self.fault})
         index = bisect_left(self.numbers, number)
@@ -77,7 +77,7 @@ def speed_of(step: Step) -> Token | None:
 
 @lru_cache(maxsize=16)
 def flow_of(text: str, definition: Definition) -> Flow:
-    """What reaches the blocks of this program.
+    """Return what reaches the blocks of this program.
 
     >>> flow = flow_of("0 BEGIN PGM P MM\\n1 TOOL CALL 5 Z S100\\n2 L X+1\\n3 END PGM P MM\\n", tool_of)
     >>> set(flow.at(1)), set(flow.at(2))
@@ -166,7 +166,7 @@ class _Analysis:
             self._due.extend(self._callers[label])
 
     def _entries(self) -> dict[str, Tokens]:
-        """What the callers of each label bring, through callers of callers."""
+        """Return what the callers of each label bring, through callers of callers."""
         entries = dict.fromkeys(self._callers, NOTHING)
         changed = True
         while changed:

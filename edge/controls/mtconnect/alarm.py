@@ -40,7 +40,7 @@ def observe(alarms: tuple[Alarm, ...], data_item_id: str, level: str, native_cod
 
 
 def text_of(alarms: tuple[Alarm, ...]) -> str:
-    """What a person reads: faults first, "" where there is none."""
+    """Return what a person reads: faults first, "" where there is none."""
     active = sorted(
         (a for a in alarms if a.level != "UNAVAILABLE"), key=lambda a: (a.level != "FAULT", a.data_item_id, a.native_code)
     )
@@ -48,5 +48,5 @@ def text_of(alarms: tuple[Alarm, ...]) -> str:
 
 
 def all_unavailable(alarms: tuple[Alarm, ...], conditions: int) -> bool:
-    """Whether none of the device's conditions is known."""
+    """Return whether none of the device's conditions is known."""
     return conditions > 0 and sum(a.level == "UNAVAILABLE" for a in alarms) >= conditions

@@ -1,4 +1,4 @@
-"""What an edge for MTConnect would publish: one probe, one current, the same parser as in operation, no broker."""
+"""A preview of an edge for MTConnect: one probe, one current, the same parser as in operation, no broker."""
 
 from edge.adapter import Row
 from edge.controls.mtconnect.connection import fetch
@@ -11,7 +11,7 @@ from edge.signals import signal
 
 
 def describe(config: Config) -> list[Row]:
-    """What would be published for the control that the configuration names."""
+    """Return what would be published for the control that the configuration names."""
     cursor = start(config)
     offers: tuple[Offer, ...] = ()
     last: dict[str, EdgeSample] = {}

@@ -52,7 +52,7 @@ class MtconnectConnection:
         self.last_error = ""
 
     def follow(self, cursor: Cursor) -> None:
-        """Where the parser stands now."""
+        """Take over where the parser stands now."""
         self._cursor = cursor
 
     def silent_s(self) -> float:

@@ -51,7 +51,7 @@ Config = EdgeConfig[MtconnectConfig]
 
 
 class Phase(StrEnum):
-    """Which document is asked for next."""
+    """The document that is asked for next."""
 
     PROBE = "probe"
     CURRENT = "current"
@@ -60,7 +60,7 @@ class Phase(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Cursor:
-    """Where the parser stands. `hole` is why a baseline is needed, "" where none is; `attempt` counts refused frames in a row.
+    """The parser's position. `hole` is why a baseline is needed, "" where none is; `attempt` counts refused frames in a row.
 
     left_instance, left_sequence: the place that was given up for another instance, as long as nothing of that one was taken
     """
@@ -83,7 +83,7 @@ class Cursor:
 
 
 class Request(NamedTuple):
-    """What to ask the agent: a path below its address, and parameters."""
+    """A request to the agent: a path below its address, and parameters."""
 
     path: str
     parameters: tuple[tuple[str, str | int], ...] = ()
@@ -106,7 +106,7 @@ def resume(_config: Config, kept: Place) -> Cursor:
 
 
 def next_request(config: Config, cursor: Cursor, *, streams: bool = True) -> Request:
-    """What to ask for, given where the parser stands. The count never exceeds the agent's buffer, which would be OUT_OF_RANGE."""
+    """Return what to ask for next. The count never exceeds the agent's buffer, which would be OUT_OF_RANGE."""
     if cursor.phase is Phase.PROBE:
         return Request("/probe")
     device = quote(cursor.device_name or cursor.device_uuid, safe="")
@@ -135,7 +135,7 @@ def parse(config: Config, cursor: Cursor, raw: bytes) -> tuple[Cursor, SampleSet
 
 
 def _clock(header: Header) -> ClockReading | None:
-    """What the agent's clock showed; when that was by the edge's, `edge.clock.offset` finds from when the document arrived."""
+    """Return what the agent's clock showed; when by the edge's, `edge.clock.offset` finds from when the document arrived."""
     if header.created_ms is None:
         return None
     return ClockReading(header.created_ms, 0, DOCUMENT_MS_MAX, header.resolution_ms)

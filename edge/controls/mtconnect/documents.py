@@ -20,7 +20,7 @@ SEQUENCE_MAX = 2**63
 
 
 class Header(NamedTuple):
-    """What each document says of the agent. Sequence numbers are None where the document has none.
+    """The header of a document: the agent, and where it is. Sequence numbers are None where the document has none.
 
     created_ms: the agent's clock when it made the document, to within `resolution_ms`; None where it cannot be read
     """
@@ -134,7 +134,7 @@ def _header(root: Element) -> Header:
 
 
 def _resolution_ms(text: str) -> int:
-    """How fine a time is that is written so. Both agents that were looked at write whole seconds, and truncate.
+    """Return how fine a time is that is written so. Both agents that were looked at write whole seconds, and truncate.
 
     >>> [_resolution_ms(f"2026-05-04T06:00:{seconds}") for seconds in ("00Z", "00.25Z", "00.000Z", "00.123456+09:00")]
     [1000, 10, 1000, 1]

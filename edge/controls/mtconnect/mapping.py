@@ -1,4 +1,4 @@
-"""Which data item of a device feeds which canonical signal.
+"""The mapping from data items of a device to canonical signals.
 
 In order: what the configuration says; what the name says (`names.toml`, the names of Okuma, Mazak, Fanuc, Heidenhain,
 Siemens and Hurco); what the standard's type says; axes by the letter of their component. An item feeds at most one signal.
@@ -49,7 +49,7 @@ class TypeRule:
     above: tuple[str, ...] = ()
 
     def rank(self, item: DataItem) -> int | None:
-        """How well the item fits, 0 best; None where it does not."""
+        """Return how well the item fits, 0 best; None where it does not."""
         if item.type not in self.types or (self.sub_types and item.sub_type not in self.sub_types):
             return None
         if self.above and not set(self.above) & {item.component, *item.parents}:
@@ -129,7 +129,7 @@ def _chosen_spindle(device: DeviceModel, spindles: Mapping[str, str], wanted: st
 
 
 def _readable(item: DataItem) -> bool:
-    """Whether it has one value that stands for itself: no condition, no set of values, no average over a while."""
+    """Return whether it has one value that stands for itself: no condition, no set of values, no average over a while."""
     return item.category in ("SAMPLE", "EVENT") and item.representation in ("", "VALUE") and not item.statistic
 
 
@@ -157,7 +157,7 @@ def _by_type(device: DeviceModel, spindles: Mapping[str, str], chosen: str) -> I
 
 
 def _fits_spindle(name: str, item: DataItem, spindles: Mapping[str, str], chosen: str) -> bool:
-    """Whether an item may feed this signal, given which spindle is ours. An override may also stand outside of all spindles."""
+    """Return whether an item may feed this signal, given our spindle. An override may also be outside of all spindles."""
     if not name.startswith("spindle_") or item.component_id == chosen:
         return True
     return name == "spindle_override_pct" and item.component_id not in spindles

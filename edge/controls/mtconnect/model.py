@@ -42,7 +42,7 @@ class DataItem:
 
     @property
     def label(self) -> str:
-        """What people call it."""
+        """Return what people call it."""
         return self.name or self.id
 
 

@@ -47,7 +47,7 @@ def leaf_of(chain: bytes) -> bytes:
 
 
 def folder_of(given: str) -> Path:
-    """Where certificates are kept: the given folder, else `opcua` in the program's state folder."""
+    """Return where certificates are kept: the given folder, else `opcua` in the program's state folder."""
     return Path(given) if given else state_dir() / "opcua"
 
 

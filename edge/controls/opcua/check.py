@@ -1,4 +1,4 @@
-"""What an edge for OPC UA would publish: one connection, one read of each node, the same parser as in operation, no broker."""
+"""A preview of an edge for OPC UA: one connection, one read of each node, the same parser as in operation, no broker."""
 
 import asyncio
 import time
@@ -18,7 +18,7 @@ AT_ONCE = 100
 
 
 def describe(config: Config) -> list[Row]:
-    """What would be published for the server that the configuration names; a row of its own where nothing is encrypted."""
+    """Return what would be published for the server that the configuration names; a row of its own where nothing is encrypted."""
     require()
     facts = run(_read(config))
     sweep = Sweep("check", 0, round(time.time() * 1000), facts)

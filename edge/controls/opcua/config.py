@@ -79,7 +79,7 @@ Config = EdgeConfig[OpcUaConfig]
 
 
 def points_of(config: Config) -> tuple[Point, ...]:
-    """What is to be read: the map's points, with the nodes that [signals.<name>] data_item puts in their place or adds."""
+    """Return what is to be read: the map's points, with the nodes that [signals.<name>] data_item puts in their place or adds."""
     ready = maps()[config.source.map].points if config.source.map else ()
     known = {point.signal: point for point in ready}
     own: dict[str, Point] = {}

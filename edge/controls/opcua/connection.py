@@ -90,7 +90,7 @@ class OpcUaConnection:
         self.last_error = _unsafe(config)
 
     def follow(self, cursor: Cursor) -> None:
-        """Where the parser stands; a subscription does not depend on it."""
+        """Hear where the parser stands; a subscription does not depend on it."""
 
     def silent_s(self) -> float:
         """Seconds since the server was heard."""
@@ -248,7 +248,7 @@ class OpcUaConnection:
             heard(result)
 
     def _compare(self, apart_ms: list[int | None]) -> None:
-        """How close the samples' stamps ever come to the server's clock; an old value may be far from it."""
+        """Note how close the samples' stamps ever come to the server's clock; an old value may be far from it."""
         for each in apart_ms:
             if each is not None and (self._stamps_apart_ms is None or each < self._stamps_apart_ms):
                 self._stamps_apart_ms = each
@@ -295,7 +295,7 @@ class OpcUaConnection:
 
 
 def resolution_ms(clocks: Sequence[tuple[int, int]]) -> int:
-    """How coarse a server's clock is, by what it and ours went on between readings; many are set forward once a second.
+    """Return how coarse a server's clock is, by what it and ours went on between readings; many are set forward once a second.
 
     >>> resolution_ms([(0, 0), (1000, 700), (1000, 1500), (2000, 2200)])
     800
@@ -305,6 +305,6 @@ def resolution_ms(clocks: Sequence[tuple[int, int]]) -> int:
 
 
 def _unsafe(config: Config) -> str:
-    """What health says as long as the connection is open for all to read."""
+    """Return what health says as long as the connection is open for all to read."""
     source = config.source
     return f'{source.url}: not encrypted, not authenticated: opcua.security = "none"' if source.security == "none" else ""

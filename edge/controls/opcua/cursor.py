@@ -28,7 +28,7 @@ MEANINGS_MAX = 4096
 
 @dataclass(frozen=True, slots=True)
 class Meaning:
-    """What the values of one key stand for."""
+    """The meaning of one key's values."""
 
     target: Target
     words: tuple[tuple[str, str], ...] = ()
@@ -39,7 +39,7 @@ class Meaning:
 
 @dataclass(frozen=True, slots=True)
 class Cursor:
-    """Where the parser stands; what the keys of this life mean; the tools, and which of them was told last ("?" = none yet)."""
+    """The parser's position; the meanings of this life's keys; the tools, and the one published last ("?" = none yet)."""
 
     position: SweepPosition = field(default_factory=SweepPosition)
     meanings: tuple[Meaning, ...] = ()
@@ -78,7 +78,7 @@ def parse(config: Config, cursor: Cursor, raw: bytes) -> tuple[Cursor, SampleSet
 
 
 def _learned(config: Config, cursor: Cursor, facts: Iterable[Fact]) -> Cursor:
-    """What keys mean that have not come before in this life."""
+    """Return what keys mean that have not come before in this life."""
     known = {meaning.target.data_item_id for meaning in cursor.meanings} | set(cursor.unmapped)
     fresh = [key for key in dict.fromkeys(fact.key for fact in facts) if key not in known and not _is_tool(key)]
     if not fresh or len(known) + len(fresh) > MEANINGS_MAX:

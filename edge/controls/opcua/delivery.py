@@ -1,4 +1,4 @@
-"""What the notifications of one subscription mean: which values are the state as found, and where something is missing.
+"""The meaning of one subscription's notifications: which values are the state as found, and where something is missing.
 
 Holes are found by themselves: a sequence number that is left out, a queue that ran over (the status of a value says so), a server
 that was silent for longer than it may be. How much was lost cannot be known; the most that it can have been is what could have
@@ -26,7 +26,7 @@ class Notification(NamedTuple):
 
 
 class Load(NamedTuple):
-    """What one frame is to carry."""
+    """The content of one frame."""
 
     facts: tuple[Fact, ...]
     holes: tuple[Hole, ...] = ()
@@ -62,7 +62,7 @@ class Delivery:
         self.heard_ms, self.heard_s = self.began_ms, self.began_s
 
     def take(self, told: Notification, now_ms: int, at_s: float) -> list[Load]:
-        """What to hand on after this notification."""
+        """Return what to hand on after this notification."""
         holes = [*self._silence(now_ms, at_s), *self._missing(told, now_ms), *self._overflows(told, now_ms)]
         self.heard_ms, self.heard_s = now_ms, at_s
         if self._opening is None:
@@ -90,7 +90,7 @@ class Delivery:
 
     @property
     def is_open(self) -> bool:
-        """Whether the state as found has been handed on."""
+        """Return whether the state as found has been handed on."""
         return self._opening is None
 
     def hole(self, reason: str, from_ms: int, to_ms: int, items: int | None = None) -> Hole:

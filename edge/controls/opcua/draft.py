@@ -35,7 +35,7 @@ _UNITS = {
 
 
 class Looked(NamedTuple):
-    """What was found: by model what it gives, the best of them, the units that it declares; else the server's variables."""
+    """The findings: by model what it gives, the best of them, the units that it declares; else the server's variables."""
 
     found: dict[str, SampleSet]
     best: str
@@ -92,7 +92,7 @@ async def _look(config: Config, client: Any) -> Looked:
 
 
 def _worth(found: SampleSet) -> tuple[bool, int]:
-    """Which of two models to take: the one that knows the tool, then the one with more signals that have a value."""
+    """Return which of two models to take: the one that knows the tool, then the one with more signals that have a value."""
     there = {sample.signal for sample in found.samples if sample.value is not None or sample.reason == "empty"}
     return "tool_number" in there, len(there)
 
@@ -122,7 +122,7 @@ def _text(config: Config, device: str, looked: Looked) -> str:
 
 
 def _signals(found: SampleSet, units: dict[str, str]) -> list[str]:
-    """What the map gives, as comments; a unit that the server declares and that is not ours becomes a table."""
+    """Return what the map gives, as comments; a unit that the server declares and that is not ours becomes a table."""
     values = {sample.signal: sample for sample in found.samples}
     lines = []
     for offer in found.offers or ():

@@ -32,13 +32,13 @@ def as_fact(key: str, value: ua.DataValue, *, element: int | None = None, stamps
 
 
 def overflowed(value: ua.DataValue) -> bool:
-    """Whether the server's queue ran over before this value."""
+    """Return whether the server's queue ran over before this value."""
     status = value.StatusCode
     return isinstance(status, ua.StatusCode) and int(status.value) & _OVERFLOW == _OVERFLOW
 
 
 def stamps_apart_ms(value: ua.DataValue) -> int | None:
-    """How far the source's stamp is from the server's; None where one is missing."""
+    """Return how far the source's stamp is from the server's; None where one is missing."""
     source, server = stamp_ms(value.SourceTimestamp), stamp_ms(value.ServerTimestamp)
     return None if source is None or server is None else abs(server - source)
 

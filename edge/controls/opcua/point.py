@@ -1,4 +1,4 @@
-"""Which node is which signal: a map, as a TOML file beside this one, or a line of the configuration.
+"""The signal that each node is: a map, as a TOML file beside this one, or a line of the configuration.
 
 A node is named by its namespace's URI and its identifier (OPC UA part 6, 5.3.1.11), since the index of a namespace may differ
 from server to server and after each start; identifiers that are texts are case-sensitive. A point of a companion model has no
@@ -85,7 +85,7 @@ class Point(_Frozen):
 
     @property
     def label(self) -> str:
-        """What people call it."""
+        """Return what people call it."""
         return self.node or f"{self.of}/{self.path}"
 
 

@@ -76,7 +76,7 @@ def node_id(name: NodeName, namespaces: Sequence[str]) -> ua.NodeId | None:
 
 
 def name_of(node: ua.NodeId, namespaces: Sequence[str]) -> str:
-    """How a configuration names this node.
+    """Return how a configuration names this node.
 
     >>> name_of(ua.NodeId("/Nck/State", 2), ["", "urn:x", "SinumerikVarProvider"])
     'nsu=SinumerikVarProvider;s=/Nck/State'
@@ -183,7 +183,7 @@ def _browse_path(start: ua.NodeId, path: str, index: int) -> ua.BrowsePath:
 
 
 async def browse(client: Client, namespaces: Sequence[str], model: str, stop_at: Iterable[str] = ()) -> list[BrowsedNode]:
-    """What is below Objects, breadth first, bounded in number, depth and time; with the model's type of each object."""
+    """Return what is below Objects, breadth first, bounded in number, depth and time; with the model's type of each object."""
     begun_s, found, seen = time.monotonic(), list[BrowsedNode](), set[str]()
     names: dict[str, str] = {}
     stops = set(stop_at) - {"CncChannelType"}  # a channel has spindles and axes below it, on some servers there alone

@@ -58,7 +58,7 @@ class Choice(NamedTuple):
 
 
 class ServerStatus(NamedTuple):
-    """What the server says of itself, and its clock; 0 and None where it gives no time."""
+    """The server's description of itself, and its clock; 0 and None where it gives no time."""
 
     started_ms: int
     current_ms: int | None
@@ -66,7 +66,7 @@ class ServerStatus(NamedTuple):
 
 
 def ranked(endpoints: Sequence[ua.EndpointDescription]) -> list[Choice]:
-    """What a server offers that is worth taking, best first: encrypted before signed, then by policy."""
+    """Return what a server offers that is worth taking, best first: encrypted before signed, then by policy."""
     offered = [(ep, str(ep.SecurityPolicyUri).rpartition("#")[2].replace("_", "")) for ep in endpoints]
     usable = [
         Choice(policy, ep.SecurityMode.name, leaf_of(bytes(ep.ServerCertificate or b"")))
@@ -184,7 +184,7 @@ async def _hang_up(client: Client, protocol: UASocketProtocol | None) -> None:
 
 
 def one_line(config: Config, error: Exception) -> str:
-    """What went wrong, where, and the way out."""
+    """Return what went wrong, where, and the way out."""
     url, folder = config.source.url, folder_of(config.source.certificate_folder)
     if isinstance(error, UaStatusCodeError):
         name = status_name(ua.StatusCode(ua.UInt32(error.code)))
