@@ -22,6 +22,7 @@ from typing import Any, NamedTuple, TypeVar
 
 from edge.clock.bounds import Bound, OneWay, above, agreed, of_reading
 from edge.clock.drift import Drift, Series, drift
+from edge.clock.steps import STEP_WAY_BUCKETS, Step, stepped, way_stepped
 from edge.sample import ClockReading, EdgeSample, SampleSet
 from sparkplug.datatype import DataType
 from sparkplug.metric import MetricSpec
@@ -42,9 +43,8 @@ BUCKET_PHASES_MAX = 32  # of documents
 WINDOW_BUCKETS_MAX = 60
 WAY_BUCKETS_MAX = 30  # of what came one way, whose upper bound grows with its age
 WINDOW_S = 3600.0  # evidence that is older is forgotten
-STEP_BUCKETS = 3  # of readings that agree on another offset
-STEP_WAY_BUCKETS = 6  # of what came one way
 STEADY_BUCKETS = 4
+ONE_STEP_S = 2 * STEP_WAY_BUCKETS * BUCKET_S  # in which what is still found of a step is part of it
 STAMP_LATENCY_S_MAX = 1.0  # of the fastest sample of a window, from its stamp to the edge
 STAMP_BEHIND_S_MAX = 10.0  # stamps that are further behind the clock of their server are those of another clock
 EDGE_STEP_S = 0.5
@@ -95,6 +95,7 @@ class State(NamedTuple):
     readings, documents, stamps: one for each bucket that is closed; peaks: of the signals
     stamps_samples: as the last reading says; None while there was none
     wall_ahead_s: the edge's wall clock minus its monotonic one
+    step_from_s: the offset before the last step; None where it was a step of the edge's clock
     """
 
     until_s: float = NEVER_S
@@ -113,6 +114,7 @@ class State(NamedTuple):
     began: Bound | None = None
     steps: int = 0
     step_s: float = NEVER_S
+    step_from_s: float | None = None
     step: str = ""
     published: OffsetEstimate | None = None
 
@@ -159,6 +161,7 @@ def _edge_clock_set(state: State, by_s: float, at_s: float) -> State:
         began=None if state.began is None else state.began.moved(by_s),
         steps=state.steps + 1,
         step_s=at_s,
+        step_from_s=None,
         step=f"the edge's own clock was set by {-by_s:+.3f} s",
     )
 
@@ -204,16 +207,16 @@ def _closed(state: State, at_s: float) -> State:
     """The bucket goes into the windows, and may be the one that shows a step."""
     readings = _kept(state.readings, at_s)
     documents, stamps = _kept(state.documents, at_s, WAY_BUCKETS_MAX), _kept(state.stamps, at_s, WAY_BUCKETS_MAX)
-    found: list[float | None] = []  # steps, as the evidence has them that is read now, best first
+    found: list[Step | None] = []  # steps, as the evidence has them that is read now, best first
     if state.bucket:
-        readings, by_s = _stepped((*readings, agreed(state.bucket, at_s).bound), at_s)
-        found.append(by_s)
+        readings, step = stepped((*readings, agreed(state.bucket, at_s).bound), at_s)
+        found.append(step)
     if state.document is not None:
-        documents, by_s = _way_stepped((*documents, state.document), at_s)
-        found.append(by_s)
+        documents, step = way_stepped((*documents, state.document), at_s)
+        found.append(step)
     if state.stamp is not None and state.stamps_samples:
-        stamps, by_s = _way_stepped((*stamps, state.stamp), at_s)
-        found = [by_s] if _is_by_stamps(state.published) else [*found, by_s]
+        stamps, step = way_stepped((*stamps, state.stamp), at_s)
+        found = [step] if _is_by_stamps(state.published) else [*found, step]
     after = state._replace(
         until_s=at_s + BUCKET_S,
         bucket=(),
@@ -224,11 +227,17 @@ def _closed(state: State, at_s: float) -> State:
         stamps=stamps,
         peaks=_kept(state.peaks, at_s),
     )
-    by_s = next(iter(found), None)
-    if by_s is None:
+    step = next(iter(found), None)
+    if step is None:
         return after
-    words = f"the control's clock was set by {by_s:+.3f} s"
-    after = after._replace(steps=state.steps + 1, step_s=at_s, step=words, series=Series(), drift=None, began=None, peaks=())
+    # A window that begins before the step shows a part of it; the rest follows when the window has moved on.
+    is_rest = state.step_from_s is not None and at_s - state.step_s <= ONE_STEP_S
+    steps, step_s = (state.steps, state.step_s) if is_rest else (state.steps + 1, at_s)
+    from_s = state.step_from_s if is_rest and state.step_from_s is not None else step.from_s
+    words = f"the control's clock was set by {step.to_s - from_s:+.3f} s"
+    after = after._replace(
+        steps=steps, step_s=step_s, step_from_s=from_s, step=words, series=Series(), drift=None, began=None, peaks=()
+    )
     is_read = not _is_by_stamps(state.published) and bool(state.bucket or state.document)
     return after._replace(documents=() if is_read and state.bucket else documents, stamps=() if is_read else stamps)
 
@@ -238,32 +247,6 @@ WayT = TypeVar("WayT", Bound, OneWay)
 
 def _kept(window: tuple[WayT, ...], at_s: float, buckets_max: int = WINDOW_BUCKETS_MAX) -> tuple[WayT, ...]:
     return tuple(one for one in window[1 - buckets_max :] if at_s - one.at_s <= WINDOW_S)
-
-
-def _stepped(window: tuple[Bound, ...], at_s: float) -> tuple[tuple[Bound, ...], float | None]:
-    """The window, and by how much the clock was set if the last buckets say so."""
-    before, last = window[:-STEP_BUCKETS], window[-STEP_BUCKETS:]
-    if not before:
-        return window, None
-    was, now = agreed(before, at_s), agreed(last, at_s)
-    if now.number < STEP_BUCKETS or now.bound.meets(was.bound):
-        return window, None
-    return last, now.bound.offset_s - was.bound.offset_s
-
-
-def _way_stepped(window: tuple[OneWay, ...], at_s: float) -> tuple[tuple[OneWay, ...], float | None]:
-    before, last = window[:-STEP_WAY_BUCKETS], window[-STEP_WAY_BUCKETS:]
-    if not before or not _is_steady(last, STEP_WAY_BUCKETS):
-        return window, None
-    was, now = above(before, at_s), above(last, at_s)
-    return (window, None) if now.meets(was) else (last, now.low_s - was.low_s)
-
-
-def _is_steady(ways: tuple[OneWay, ...], number: int) -> bool:
-    """Return whether the last of them are no further apart than latencies are."""
-    last = ways[-number:]
-    lows = [way.low_s for way in last]
-    return len(last) == number and max(lows) - min(lows) <= max(way.doubt_s for way in last)
 
 
 def _is_running_away(ways: tuple[OneWay, ...]) -> bool:

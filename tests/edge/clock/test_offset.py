@@ -154,6 +154,8 @@ def test_documents_cover_at_any_pace_and_drift_where_half_of_them_are_quick(
     resolution_ms=st.sampled_from([1, 1000]),
     one_way_ms=st.sampled_from([0, 500]),
 )
+@example(by_s=1.6, is_back=False, resolution_ms=1000, one_way_ms=500)
+@example(by_s=1.64, is_back=False, resolution_ms=1000, one_way_ms=500)
 @settings(max_examples=25, deadline=None)
 def test_a_clock_that_is_set_is_one_step_and_its_size_is_told(
     by_s: float, is_back: bool, resolution_ms: int, one_way_ms: int
@@ -169,6 +171,19 @@ def test_a_clock_that_is_set_is_one_step_and_its_size_is_told(
     assert abs(done.state.published.bound.offset_s - 3.0 - by_s - 20e-6 * look.at_s) <= done.state.published.bound.spread_s
     found_s = float(done.state.step.removeprefix("the control's clock was set by ").removesuffix(" s"))
     assert found_s == pytest.approx(by_s, abs=1.1)
+
+
+@pytest.mark.parametrize("by_s", [0.9, 1.0, 1.2, -1.0, 1.4])
+@pytest.mark.parametrize("seed", range(4))
+def test_a_small_step_is_never_counted_twice(by_s: float, seed: int) -> None:
+    """It is about as large as what one document in whole seconds leaves open, so the window straddles it for a while."""
+    before = Clock(3.0, 20.0, 1000, every_s=3.0, one_way_ms=500, stamps_samples=True, seed=seed)
+    state = after(before.looks(0.0, 600.0))
+    *_, (_, done) = folded(replace(before, offset_s=3.0 + by_s, seed=seed + 100).looks(600.0, 1200.0), state)
+    assert done.state.steps <= 1
+    if done.state.step:
+        found_s = float(done.state.step.removeprefix("the control's clock was set by ").removesuffix(" s"))
+        assert found_s == pytest.approx(by_s, abs=0.6)
 
 
 def test_what_the_edge_itself_was_set_by_is_no_step_of_the_control() -> None:
