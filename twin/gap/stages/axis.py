@@ -7,7 +7,7 @@ so that where the axis came to rest is not counted twice.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import reduce
+from functools import cache, reduce
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +37,7 @@ LANES = 32
 FACTORS = ("mass_kg", "newton_per_command", "coulomb_n", "static_n", "stribeck_velocity_mm_s", "viscous_n_s_per_mm")
 
 
+@cache
 def axis_effects() -> tuple[Effect, ...]:
     """The effects that are woven into the loops and mechanics of an axis."""
     return tuple(e for e in catalogue().values() if e.on is On.AXIS and set(e.changes) & set(axis_quantities()))
