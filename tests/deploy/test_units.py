@@ -35,7 +35,7 @@ def test_every_processor_runs_in_one_unit_and_is_configured_by_the_file_that_is_
     names = [name for unit in SERVICES if words(unit)[0] == "process" for name in parsed(words(unit))["names"]]
     assert len(names) == len(set(names))
     # Needs a detector that was trained on this machine.
-    assert set(discover()) - set(names) == {"tool_change_detector"}
+    assert set(discover()) - set(names) == {"tool_change_detector"}, "name it in the ExecStart of a unit in deploy/systemd/"
     assert len(configured(names, DEPLOY / "processors.toml")) == len(names)
 
 

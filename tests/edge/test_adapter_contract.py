@@ -35,7 +35,9 @@ every_adapter = pytest.mark.parametrize("adapter", adapters().values(), ids=lamb
 
 
 def frames_of(adapter: Adapter) -> list[Path]:
-    return sorted(path for path in (FRAMES / adapter.name).iterdir() if path.name != "expected.json")
+    frames = sorted(path for path in (FRAMES / adapter.name).glob("*") if path.name != "expected.json")
+    assert frames, f"an adapter needs recorded frames in tests/edge/frames/{adapter.name}/"
+    return frames
 
 
 def config_of(adapter: Adapter) -> EdgeConfig[Any]:
@@ -61,9 +63,9 @@ def plain(given_: SampleSet) -> dict[str, object]:
 
 @every_adapter
 def test_it_is_found_by_the_name_of_its_file(adapter: Adapter) -> None:
-    declaration = Path(__file__).parents[2] / f"{modules()[adapter.name].replace('.', '/')}.py"
+    declaration = ROOT / f"{modules()[adapter.name].replace('.', '/')}.py"
     assert declaration.read_text(encoding="utf-8").count("\nADAPTER = Adapter(") == 1
-    assert frames_of(adapter), "an adapter needs recorded frames"
+    assert frames_of(adapter)
 
 
 @every_adapter
@@ -112,6 +114,7 @@ def test_each_recorded_frame_gives_its_expected_samples(adapter: Adapter) -> Non
     if os.environ.get("CNCTWIN_WRITE_EXPECTED"):
         text = ",\n".join(f" {json.dumps(name)}: {json.dumps(one, ensure_ascii=False)}" for name, one in found.items())
         file.write_text("{\n" + text + "\n}\n", encoding="utf-8")
+    assert file.exists(), f"CNCTWIN_WRITE_EXPECTED=1 writes {file.name} from what the frames give; read it before you keep it"
     assert found == json.loads(file.read_text(encoding="utf-8"))
     assert any(one["gaps"] for one in found.values()), "one of the recorded holes must become a gap"
 

@@ -13,19 +13,30 @@ from twin.effects.effect import Effect, On, Recorded, called
 from twin.errors import EffectError
 from twin.gap.labels import AXIS
 from twin.gcode import interpret
+from twin.heat.run import HEAT
+from twin.kernels.weave import quantities
 from twin.machine import Program
 from twin.motion.control import LENGTH_OVER_FEED, QUANTITIES, changed
 from twin.motion.limits import Limits
 from twin.motion.path import path_from_moves
 from twin.motion.plan import Plan
 from twin.motion.sampling import sampled
-from twin.servo.kernel import axis_quantities
+from twin.process.kernel import CUT
+from twin.sensor.clock import looked_at, stamped
+from twin.sensor.reading import SENSOR
+from twin.servo.kernel import AXES, axis_quantities
 from twin.servo.run import AxisInput, AxisRun, run_axes
 from twin.sites import Site
+from twin.spindle.load import SPINDLE
 
 EFFECTS = list(catalogue().values())
 ON_AXES = [effect for effect in EFFECTS if set(effect.changes) & set(axis_quantities())]
 ON_PROGRAMS = [effect for effect in EFFECTS if set(effect.changes) & set(QUANTITIES)]
+MARKED = {
+    **{name: site for stage in (AXES, CUT, SPINDLE, HEAT, SENSOR) for name, site in stage.quantities().items()},
+    **quantities((looked_at, stamped)),
+}
+"""Quantity → the member of Site at which the physics marks it."""
 REFERENCE = reference(1500)
 PATH = path_from_moves(
     interpret(
@@ -64,6 +75,13 @@ def plan_with(values: dict[str, dict[str, float]], limits: Limits) -> Plan:
 
 def seconds_between(one: Plan, other: Plan) -> float:
     return float(np.abs(one.seconds_by_line() - other.seconds_by_line()).max())
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)
+def test_it_changes_quantities_that_its_site_has(effect: Effect) -> None:
+    for quantity in effect.changes:
+        has = sorted(QUANTITIES) if effect in ON_PROGRAMS else sorted(name for name in MARKED if MARKED[name] == effect.site.name)
+        assert quantity in has, f"{quantity!r} is no quantity of the {effect.site} site, which has: {', '.join(has)}"
 
 
 FOUND = ("backlash", "cutting_coefficient", "coolant_cooling", "sensor_bias", "tool_change_time")
