@@ -148,7 +148,8 @@ class _Declaration(Generic[C, S]):
     version: of the state's form; a snapshot of another version is not restored
     inputs: names of the metrics that are read; None = all, those of other processors too
     state: a frozen dataclass of JSON-able fields; `initial` makes the first one
-    reads: makes what the step needs of the files that a configuration names, by machine; raises ValueError where it cannot
+    reads: makes what the step needs of the files that a configuration names, by machine; raises ValueError where it cannot.
+        The step is given the whole configuration then, with what was read
     records: whether the runtime hands all that it hears to a recorder, as it comes, before the fold sees it
     """
 
@@ -191,9 +192,12 @@ class _Declaration(Generic[C, S]):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Processor(_Declaration[C, S]):
-    """A fold over what one machine says: a state for each machine, which is its own unit."""
+    """A fold over what one machine says: a state for each machine, which is its own unit.
 
-    step: Callable[[C, S, Sample], tuple[S, Outputs]]
+    step: takes the values that hold for the machine; with `reads`, the whole configuration
+    """
+
+    step: Callable[[C, S, Sample], tuple[S, Outputs]] | Callable[[Configuration[C], S, Sample], tuple[S, Outputs]]
     listens: ClassVar[tuple[str, ...]] = ()
     wakes: ClassVar[frozenset[str] | None] = None
     beats: ClassVar[bool] = False
@@ -215,9 +219,9 @@ class Processor(_Declaration[C, S]):
         """The values that hold for the stream of a machine, or the first state of a unit."""
         return configuration.of(machine)
 
-    def given(self, configuration: Configuration[C], unit: str) -> C:
+    def given(self, configuration: Configuration[C], unit: str) -> C | Configuration[C]:
         """The configuration that the step of a unit is given."""
-        return configuration.of(unit)
+        return configuration.of(unit) if self.reads is None else configuration
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
