@@ -147,6 +147,7 @@ class _Declaration(Generic[C, S]):
 
     version: of the state's form; a snapshot of another version is not restored
     inputs: names of the metrics that are read; None = all, those of other processors too
+    alarms: looks up the declared alarms that are read beside `inputs` (processors/alarms.py), once all processors can be imported
     state: a frozen dataclass of JSON-able fields; `initial` makes the first one
     reads: makes what the step needs of the files that a configuration names, by machine; raises ValueError where it cannot.
         The step is given the whole configuration then, with what was read
@@ -162,6 +163,7 @@ class _Declaration(Generic[C, S]):
     initial: Callable[[C], S]
     plain: tuple[PlainSpec, ...] = ()
     reads: Callable[[Configuration[C]], Mapping[str, Any]] | None = None
+    alarms: Callable[[], tuple[str, ...]] | None = None
     records: bool = False
 
     def __post_init__(self) -> None:
@@ -176,6 +178,11 @@ class _Declaration(Generic[C, S]):
         """The id of its edge node and of its host application."""
         return twin_node(self.name)
 
+    @property
+    def signals(self) -> frozenset[str] | None:
+        """The names of all metrics that are read, `inputs` and `alarms`; None = all."""
+        return self.inputs if self.inputs is None or self.alarms is None else self.inputs.union(self.alarms())
+
     def configured(self, table: Mapping[str, Any] | None = None) -> Configuration[C]:
         """The configuration out of a table, checked, with what it names on the disk. Raises ConfigurationError."""
         return Configuration(self.config, table, name=self.name, reads=self.reads)
@@ -186,7 +193,7 @@ class _Declaration(Generic[C, S]):
             return True
         if node == JOBS_NODE:
             return False
-        reads_twins = self.inputs is None or any(name.startswith(TWIN_PREFIX) for name in self.inputs)
+        reads_twins = self.inputs is None or self.alarms is not None or any(name.startswith(TWIN_PREFIX) for name in self.inputs)
         return reads_twins and node != self.node
 
 
