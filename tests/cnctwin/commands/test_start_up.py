@@ -63,7 +63,7 @@ def _loaded_by(name: str, folder: Path, table: str = "") -> tuple[str, set[str]]
 
 
 def test_a_processor_that_runs_loads_neither_alerts_nor_the_store(tmp_path: Path) -> None:
-    recorder, loaded = _loaded_by("thermal", tmp_path)
+    recorder, loaded = _loaded_by("thermal", tmp_path, "[alerts]\n[historian]\n[thermal]\n")
     assert recorder == "NoneType"
     ours = {name for name in loaded if name.startswith(("processors.", "cnctwin.memory"))}
     assert "processors.thermal" in ours
