@@ -147,8 +147,10 @@ class _Declaration(Generic[C, S]):
 
     version: of the state's form; a snapshot of another version is not restored
     inputs: names of the metrics that are read; None = all, those of other processors too
+    alarms: looks up the declared alarms that are read beside `inputs` (processors/alarms.py), once all processors can be imported
     state: a frozen dataclass of JSON-able fields; `initial` makes the first one
-    reads: makes what the step needs of the files that a configuration names, by machine; raises ValueError where it cannot
+    reads: makes what the step needs of the files that a configuration names, by machine; raises ValueError where it cannot.
+        The step is given the whole configuration then, with what was read
     records: whether the runtime hands all that it hears to a recorder, as it comes, before the fold sees it
     """
 
@@ -161,6 +163,7 @@ class _Declaration(Generic[C, S]):
     initial: Callable[[C], S]
     plain: tuple[PlainSpec, ...] = ()
     reads: Callable[[Configuration[C]], Mapping[str, Any]] | None = None
+    alarms: Callable[[], tuple[str, ...]] | None = None
     records: bool = False
 
     def __post_init__(self) -> None:
@@ -175,6 +178,11 @@ class _Declaration(Generic[C, S]):
         """The id of its edge node and of its host application."""
         return twin_node(self.name)
 
+    @property
+    def signals(self) -> frozenset[str] | None:
+        """The names of all metrics that are read, `inputs` and `alarms`; None = all."""
+        return self.inputs if self.inputs is None or self.alarms is None else self.inputs.union(self.alarms())
+
     def configured(self, table: Mapping[str, Any] | None = None) -> Configuration[C]:
         """The configuration out of a table, checked, with what it names on the disk. Raises ConfigurationError."""
         return Configuration(self.config, table, name=self.name, reads=self.reads)
@@ -185,15 +193,18 @@ class _Declaration(Generic[C, S]):
             return True
         if node == JOBS_NODE:
             return False
-        reads_twins = self.inputs is None or any(name.startswith(TWIN_PREFIX) for name in self.inputs)
+        reads_twins = self.inputs is None or self.alarms is not None or any(name.startswith(TWIN_PREFIX) for name in self.inputs)
         return reads_twins and node != self.node
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Processor(_Declaration[C, S]):
-    """A fold over what one machine says: a state for each machine, which is its own unit."""
+    """A fold over what one machine says: a state for each machine, which is its own unit.
 
-    step: Callable[[C, S, Sample], tuple[S, Outputs]]
+    step: takes the values that hold for the machine; with `reads`, the whole configuration
+    """
+
+    step: Callable[[C, S, Sample], tuple[S, Outputs]] | Callable[[Configuration[C], S, Sample], tuple[S, Outputs]]
     listens: ClassVar[tuple[str, ...]] = ()
     wakes: ClassVar[frozenset[str] | None] = None
     beats: ClassVar[bool] = False
@@ -215,9 +226,9 @@ class Processor(_Declaration[C, S]):
         """The values that hold for the stream of a machine, or the first state of a unit."""
         return configuration.of(machine)
 
-    def given(self, configuration: Configuration[C], unit: str) -> C:
+    def given(self, configuration: Configuration[C], unit: str) -> C | Configuration[C]:
         """The configuration that the step of a unit is given."""
-        return configuration.of(unit)
+        return configuration.of(unit) if self.reads is None else configuration
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -31,11 +31,16 @@ def discover() -> dict[str, AnyProcessor]:
     return {name: find(name) for name in modules()}
 
 
-def find(name: str) -> AnyProcessor:
-    """The processor `name`; imports no other. Raises UnknownProcessorError, DeclarationError."""
+def module_of(name: str) -> str:
+    """The module that declares the processor `name`, not imported. Raises UnknownProcessorError."""
     if name not in modules():
         raise UnknownProcessorError(f"no processor {name!r}; there are: {', '.join(modules())}")
-    module = importlib.import_module(modules()[name])
+    return modules()[name]
+
+
+def find(name: str) -> AnyProcessor:
+    """The processor `name`; imports no other. Raises UnknownProcessorError, DeclarationError."""
+    module = importlib.import_module(module_of(name))
     declared = getattr(module, "PROCESSOR", None)
     if not isinstance(declared, Processor | CellProcessor) or declared.name != name:
         raise DeclarationError(f"{module.__name__}: PROCESSOR has to be one, named {name!r}")

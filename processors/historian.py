@@ -11,6 +11,7 @@ from datetime import datetime
 
 from pydantic import Field
 
+from processors.alarms import machine_alarms
 from processors.config import ProcessorConfig
 from processors.contract import Output, OutputSpec, Pin, Processor, Provenance, Sample, SampleKind
 from sparkplug.datatype import DataType
@@ -30,11 +31,7 @@ class HistorianConfig(ProcessorConfig):
     pin_after_s: float = Field(default=600.0, ge=0.0, le=86_400.0)
     pin_s_max: float = Field(default=21_600.0, gt=0.0, le=604_800.0)
     pins_a_day_max: int = Field(default=50, ge=1, le=10_000)
-    flags: tuple[str, ...] = (
-        twin_signals.ANOMALY_ALARM,
-        twin_signals.GAP_GROWING,
-        *twin_signals.RULES,
-    )
+    flags: tuple[str, ...] = Field(default_factory=machine_alarms)
     raw_days: float = Field(default=365.0, gt=0.0, le=36_500.0)
     block_days: float = Field(default=7.0, gt=0.0, le=36_500.0)
     disk_gb: float = Field(default=0.0, ge=0.0, le=1e6)

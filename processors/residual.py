@@ -10,13 +10,12 @@ the processor `thermal` publishes as `twin/spindle_temp_residual_k`; it is not t
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar, Self
+from typing import TYPE_CHECKING, ClassVar
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from processors.config import ProcessorConfig
+from processors.config import Configuration, ProcessorConfig
 from processors.contract import Output, OutputSpec, Processor, Provenance, Sample, SampleKind
 from sparkplug.datatype import DataType
 from twin.errors import TwinError
@@ -44,26 +43,18 @@ class Config(ProcessorConfig):
     gain_over_s: float = Field(default=86_400.0, gt=0.0, le=31_536_000.0)
     gain_min_s: float = Field(default=3600.0, ge=0.0, le=604_800.0)
 
-    @cached_property
-    def loaded(self) -> "Mapping[str, ResidualModel]":
-        """The models by machine."""
-        return _models_in(Path(self.models)) if self.models else {}
 
-    @model_validator(mode="after")
-    def _models_are_whole(self) -> Self:
-        _ = self.loaded
-        return self
-
-
-@lru_cache(maxsize=4)
-def _models_in(folder: Path) -> "Mapping[str, ResidualModel]":
-    """Raises ValueError where a model cannot be read."""
+def read_models(configuration: Configuration[Config]) -> "Mapping[str, ResidualModel]":
+    """Return the models in the configured folder by machine. Raises ValueError where one cannot be read."""
+    folder = configuration.default.models
+    if not folder:
+        return {}
     try:
         from twin.residual.model import load_models  # noqa: PLC0415  numpy comes with it
     except ImportError as error:
         raise ValueError(f"a correction needs {error.name}: pip install 'cnctwin[twin]'") from error
     try:
-        return load_models(folder)
+        return load_models(Path(folder))
     except TwinError as error:
         raise ValueError(str(error)) from error
 
@@ -86,9 +77,10 @@ class State:
     gain: Gain = field(default_factory=Gain)
 
 
-def step(config: Config, state: State, sample: Sample) -> tuple[State, Sequence[Output]]:
+def step(configuration: Configuration[Config], state: State, sample: Sample) -> tuple[State, Sequence[Output]]:
     """Correct the physics at ticks; forget the means at a long hole."""
-    model = config.loaded.get(sample.machine)
+    config = configuration.of(sample.machine)
+    model: ResidualModel | None = configuration.read.get(sample.machine)
     if model is None:
         return state, _nulls(NO_MODEL) if sample.kind in (SampleKind.TICK, SampleKind.BIRTH) else ()
     if state.version != model.version:
@@ -188,4 +180,5 @@ PROCESSOR = Processor(
     state=State,
     initial=lambda _: State(),
     step=step,
+    reads=read_models,
 )

@@ -86,7 +86,7 @@ def test_every_name_of_the_vocabulary_is_published_by_someone() -> None:
 @pytest.mark.parametrize("name", PROCESSORS)
 def test_a_processor_reads_what_somebody_publishes(name: str) -> None:
     raw = {signals.VIBRATION_BLOCK_G, signals.VIBRATION_SAMPLE_RATE_HZ}
-    assert {one for one in PROCESSORS[name].inputs or () if canonical(one) is None} <= PUBLISHED | raw
+    assert {one for one in PROCESSORS[name].signals or () if canonical(one) is None} <= PUBLISHED | raw
 
 
 def test_the_metrics_for_prometheus_come_from_signals_that_somebody_publishes() -> None:

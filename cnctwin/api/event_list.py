@@ -10,6 +10,7 @@ from itertools import pairwise
 from typing import Any
 
 from cnctwin.api.live.trace import Sample
+from processors.alarms import alarm_signals
 from sparkplug.quality import Quality
 from twin.vocabulary import twin_signals
 
@@ -20,7 +21,6 @@ TEXTS = {
     twin_signals.STOP_REASON: "stop",
 }
 FLAGS = {"tool_change_active": ("tool_change", "tool change")}
-ALARMS = (twin_signals.ANOMALY_ALARM, twin_signals.GAP_GROWING, twin_signals.SCORE_DRIFT)
 NOTHING = frozenset({"", "none", "NORMAL", "UNAVAILABLE"})
 EVENTS_MAX = 5000
 Event = dict[str, Any]
@@ -28,9 +28,8 @@ Event = dict[str, Any]
 
 def event_signals(known: Iterable[str]) -> tuple[str, ...]:
     """Those of a machine's signals that tell events."""
-    rules = twin_signals.RULE_PREFIX
-    fixed = {*TEXTS, *FLAGS, *ALARMS, twin_signals.PART_RECORD, "tool_number"}
-    return tuple(sorted(name for name in known if name in fixed or (name.startswith(rules) and name != twin_signals.RULE_DETAIL)))
+    telling = {*TEXTS, *FLAGS, *alarm_signals(), twin_signals.PART_RECORD, "tool_number"}
+    return tuple(sorted(name for name in known if name in telling))
 
 
 def events_of(samples: Mapping[str, Sequence[Sample]]) -> list[Event]:

@@ -10,6 +10,8 @@ from processors.running.ports import Recorder
 from processors.running.runtime import Configured, run_configured
 from sparkplug.broker import BrokerAddress
 
+ALERTS = "alerts"
+
 
 def process(pairs: Sequence[Configured], broker: BrokerAddress, stop: threading.Event, *, group: str, state_dir: Path) -> None:
     """Run configured processors until `stop` is set. Raises ConfigurationError where a secret is missing, StoreError where the
@@ -23,14 +25,14 @@ def process(pairs: Sequence[Configured], broker: BrokerAddress, stop: threading.
 @contextmanager
 def _recorder(pairs: Sequence[Configured], group: str) -> Iterator[Recorder | None]:
     """The store's recorder, where the historian runs; else nothing, and no store is loaded."""
-    from processors.historian import HistorianConfig  # noqa: PLC0415  only what runs is loaded
-
-    config = next((one.default for _, one in pairs if isinstance(one.default, HistorianConfig)), None)
+    config = next((one.default for processor, one in pairs if processor.records), None)
     if config is None:
         yield None
         return
-    from cnctwin.memory.historian import StoreRecorder, store_of  # noqa: PLC0415
+    from cnctwin.memory.historian import StoreRecorder, store_of  # noqa: PLC0415  only what runs is loaded
+    from processors.historian import HistorianConfig  # noqa: PLC0415
 
+    assert isinstance(config, HistorianConfig)
     recorder = StoreRecorder(store_of(config), group)
     recorder.start()
     try:
@@ -42,10 +44,14 @@ def _recorder(pairs: Sequence[Configured], group: str) -> Iterator[Recorder | No
 @contextmanager
 def _courier(pairs: Sequence[Configured], broker: BrokerAddress, group: str) -> Iterator[None]:
     """The courier, where alerts run and somebody is to be told; else nothing, and httpx is not loaded."""
+    config = next((one.default for processor, one in pairs if processor.name == ALERTS), None)
+    if config is None:
+        yield
+        return
     from processors.alerts.config import AlertsConfig  # noqa: PLC0415  only what runs is loaded
 
-    config = next((one.default for _, one in pairs if isinstance(one.default, AlertsConfig)), None)
-    if config is None or not config.receivers:
+    assert isinstance(config, AlertsConfig)
+    if not config.receivers:
         yield
         return
     from processors.alerts.courier.thread import Courier  # noqa: PLC0415

@@ -6,7 +6,7 @@ from typing import Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
 
-from processors.alerts.alarms import alarm_signals
+from processors.alarms import alarm_signals, unknown_processors
 from processors.alerts.quiet import QuietHours
 from processors.alerts.receivers import AnyReceiver, Escalation, Heartbeat
 from processors.alerts.state import Severity
@@ -41,12 +41,18 @@ class Rule(BaseModel):
     raised_by_rule: bool = False
 
 
+NAMED = {
+    **dict.fromkeys(RULES, Rule(severity=Severity.HIGH)),
+    SCORE: Rule(severity=Severity.MEDIUM, raised_by_rule=True),
+    GAP: Rule(severity=Severity.MEDIUM),
+    DRIFT: Rule(severity=Severity.LOW),
+}
+"""The alarms whose severity is known here."""
+
+
 def _signals() -> dict[str, Rule]:
     """Every declared alarm; one that is not named here is of medium severity."""
-    rules = dict.fromkeys(RULES, Rule(severity=Severity.HIGH))
-    score = Rule(severity=Severity.MEDIUM, raised_by_rule=True)
-    named = {**rules, SCORE: score, GAP: Rule(severity=Severity.MEDIUM), DRIFT: Rule(severity=Severity.LOW)}
-    return named | {name: Rule(severity=Severity.MEDIUM) for name in alarm_signals() if name not in named}
+    return NAMED | {name: Rule(severity=Severity.MEDIUM) for name in alarm_signals() if name not in NAMED}
 
 
 class Route(BaseModel):
@@ -100,9 +106,10 @@ class AlertsConfig(CellConfig):
     def _names_are_known(self) -> Self:
         if self.cells:
             raise ValueError("cells: alerts watch all machines together; leave it out")
+        known = _signals()
         for signal in self.signals:
-            if signal not in alarm_signals():
-                raise ValueError(f"signals: {signal!r} is no alarm signal; there are: {', '.join(_signals())}")
+            if signal not in known and not unknown_processors():  # else it may be an alarm of one of these
+                raise ValueError(f"signals: {signal!r} is no alarm signal; there are: {', '.join(known)}")
         for name in self.labels:
             if not _LABEL.fullmatch(name) or name in _OWN_LABELS:
                 raise ValueError(

@@ -8,6 +8,7 @@ each notification, which the courier (`courier/`) sends. What became of it comes
 from collections.abc import Sequence
 from dataclasses import replace
 
+from processors.alarms import alarm_signals
 from processors.alerts.body import Notice
 from processors.alerts.config import AlertsConfig
 from processors.alerts.messages import COMMAND, DELIVERY, OUTBOX, TOPIC, taken
@@ -82,6 +83,7 @@ PROCESSOR = CellProcessor(
     name="alerts",
     version=1,
     inputs=INPUTS,
+    alarms=alarm_signals,
     outputs=(
         OutputSpec(
             STATE, DataType.STRING, None, "none, pending, firing or acknowledged: of the worst alert", Provenance.INFERRED

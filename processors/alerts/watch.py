@@ -4,8 +4,7 @@ from collections.abc import Iterator, Mapping, Set
 from dataclasses import replace
 from typing import NamedTuple
 
-from processors.alerts.alarms import alarm_signals
-from processors.alerts.config import MACHINE_OFFLINE, RULES, SOURCE_LOST, AlertsConfig, Rule
+from processors.alerts.config import MACHINE_OFFLINE, NAMED, RULES, SOURCE_LOST, AlertsConfig, Rule
 from processors.alerts.phases import Beat, Condition, advanced, begun, condition_of, raised
 from processors.alerts.state import ALERTS_MAX, Alert, AlertsState, Phase, Severity, fingerprint, labels_of
 from processors.config import Configuration
@@ -14,7 +13,7 @@ from sparkplug.quality import Quality
 from twin.vocabulary.twin_signals import SEVERITY, TWIN_PREFIX
 
 PROGRAM, TOOL = "program", "tool_number"
-INPUTS = frozenset({*alarm_signals(), SEVERITY, PROGRAM, TOOL})
+INPUTS = frozenset({*NAMED, SEVERITY, PROGRAM, TOOL})
 SEEN_S_MAX = 5.0  # of one beat: what lies between two that are further apart was not watched
 RESOLVED_SHOWN_S = 3600.0
 MACHINES_MAX = 2000

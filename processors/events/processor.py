@@ -9,10 +9,12 @@ reconnects says everything again), is no event.
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
+from functools import cache
 from typing import NamedTuple
 
 from pydantic import Field
 
+from processors.alarms import machine_alarms
 from processors.config import ProcessorConfig
 from processors.contract import Output, OutputSpec, Processor, Provenance, Sample, SampleKind
 from processors.events.execution import (
@@ -37,7 +39,7 @@ from processors.events.execution import (
 )
 from processors.events.record import INPUTS as RECORD_INPUTS
 from processors.events.record import record
-from processors.events.run import FLAGS, FORCE, VIBRATION, Run, begun, followed, lasted, why_standing
+from processors.events.run import FORCE, VIBRATION, Run, begun, followed, lasted, why_standing
 from processors.events.share import Shares, share_pct, with_time
 from sparkplug.datatype import DataType
 from twin.vocabulary.twin_signals import PART_RECORD, STOP_REASON, TWIN_PREFIX
@@ -48,7 +50,6 @@ INTERRUPTED = f"{TWIN_PREFIX}interrupted_s"
 UTILISATION, TODAY = f"{TWIN_PREFIX}utilisation_pct", f"{TWIN_PREFIX}utilisation_today_pct"
 STOP, STOP_S, PART = STOP_REASON, f"{TWIN_PREFIX}stop_s", PART_RECORD
 WATCHED = frozenset({EXECUTION, PROGRAM, MODE, ALARM, CHANGING, FEED_OVERRIDE})
-AT_ONCE = frozenset({TOOL, FORCE, *VIBRATION, *FLAGS})
 TOLD_EVERY_S = 60.0
 STAMP_MAX_S = 253_402_300_000.0
 
@@ -83,6 +84,12 @@ class State:
     told_s: float = 0.0
 
 
+@cache
+def _at_once() -> frozenset[str]:
+    """Return the signals that a run takes in with the message that tells them."""
+    return frozenset({TOOL, FORCE, *VIBRATION, *machine_alarms()})
+
+
 def step(config: Config, state: State, sample: Sample) -> tuple[State, Sequence[Output]]:
     """Add up the time that has passed, then follow what has changed."""
     if sample.is_history or abs(sample.at_s) > STAMP_MAX_S:
@@ -94,13 +101,13 @@ def step(config: Config, state: State, sample: Sample) -> tuple[State, Sequence[
         and WATCHED.isdisjoint(sample.changed)
         and not (FEED in sample.changed and _by_feed(sample))
     ):
-        if state.run is None or AT_ONCE.isdisjoint(sample.changed):
+        if state.run is None or _at_once().isdisjoint(sample.changed):
             return state, ()
         return replace(state, run=followed(state.run, sample)), ()
     state = _lasted(config, state, sample)
     outputs: list[Output] = []
     now = execution(sample, config.feed_mm_min_min)
-    if state.run is not None and not AT_ONCE.isdisjoint(sample.changed):
+    if state.run is not None and not _at_once().isdisjoint(sample.changed):
         state = replace(state, run=followed(state.run, sample))
     state = _moved(config, state, sample, now, outputs)
     state = _stopped(state, sample, now, outputs)
@@ -268,7 +275,8 @@ _TEXT, _NUMBER, _MEASURED = DataType.STRING, DataType.DOUBLE, Provenance.MEASURE
 PROCESSOR = Processor(
     name="events",
     version=1,
-    inputs=frozenset({EXECUTION, PROGRAM, MODE, ALARM, TOOL, CHANGING, FEED, *OVERRIDES, *FLAGS}) | RECORD_INPUTS,
+    inputs=frozenset({EXECUTION, PROGRAM, MODE, ALARM, TOOL, CHANGING, FEED, *OVERRIDES}) | RECORD_INPUTS,
+    alarms=machine_alarms,
     outputs=(
         OutputSpec(STATE, _TEXT, None, "MTConnect's execution state, or OFFLINE; null while it is not known", _MEASURED),
         OutputSpec(SINCE, _TEXT, None, "since when, UTC", _MEASURED),

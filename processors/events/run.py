@@ -7,6 +7,7 @@ tick (a second), values held; peaks of force and vibration at each message.
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
+from processors.alarms import machine_alarms
 from processors.events.execution import ACTIVE, OVERRIDES, is_changing_tool, stop_reason, tool
 from processors.sample import Sample, SampleKind
 from sparkplug.metric import Reading
@@ -20,11 +21,6 @@ GAPS = (
     f"{twin_signals.GAP_PREFIX}spindle_load_pct",
     f"{twin_signals.GAP_PREFIX}spindle_rpm",
     *(f"{twin_signals.GAP_PREFIX}axis_{axis}_load_pct" for axis in "xyzabc"),
-)
-FLAGS = (
-    twin_signals.ANOMALY_ALARM,
-    twin_signals.GAP_GROWING,
-    *twin_signals.RULES,
 )
 BASES = (
     twin_signals.SPINDLE_TEMP_BASIS,
@@ -143,8 +139,9 @@ def followed(run: Run, sample: Sample) -> Run:
     for name in VIBRATION:
         if name in changed and (value := figure_of(sample, name)) is not None:
             run = replace(run, figures={**run.figures, name: with_value(run.figures.get(name), value, 0.0)})
-    for name in changed if sample.kind is SampleKind.DATA else ():  # a birth only says again what stands
-        if name in FLAGS and _is_up(sample.row[name]):
+    alarms = machine_alarms() if sample.kind is SampleKind.DATA else ()  # a birth only says again what stands
+    for name in changed:
+        if name in alarms and _is_up(sample.row[name]):
             if len(run.raised) < FLAGS_MAX:
                 run = replace(run, raised=(*run.raised, Raised(name, sample.row[name].timestamp_ms)))
             else:

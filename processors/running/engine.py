@@ -45,6 +45,7 @@ class Engine:
         self.ledger = Ledger()
         self.counts = Counts()
         self._processor, self._configuration = processor, configuration
+        self._inputs = processor.signals
         self._margin_s, self._machines_max = lateness_margin_s, machines_max
         self._machines: dict[str, Machine] = {}
         self._units: dict[str, Unit] = {}
@@ -236,7 +237,7 @@ class Engine:
 
     def _lane(self, fold: Fold, machine: str) -> Lane:
         config = self._processor.config_of(self._configuration, machine)
-        return Lane(fold, self._processor.inputs, config, machine, self.counts)
+        return Lane(fold, self._inputs, config, machine, self.counts)
 
     def _unit_name(self, machine: str) -> str:
         return self._processor.unit_of(self._configuration, machine)
@@ -264,7 +265,7 @@ class Engine:
         if machine is None or event.node not in machine.online:
             return [], (DropReason.BEFORE_BIRTH,)
         readings: tuple[Reading, ...] | list[Reading] = event.readings
-        inputs = self._processor.inputs
+        inputs = self._inputs
         is_of_twin = inputs is not None and is_twin_node(event.node.node)
         excluded = machine.excluded.get(event.node)
         if excluded:
@@ -296,12 +297,12 @@ class Engine:
             if len(self._machines) >= self._machines_max and not self._forget_one():
                 return [], (DropReason.MACHINES_MAX,)
             machine = self._joined(event.device or "")
-        is_of_twin = self._processor.inputs is not None and is_twin_node(event.node.node)
+        is_of_twin = self._inputs is not None and is_twin_node(event.node.node)
         was_online = machine.is_online
         machine.online.add(event.node)
         machine.live.born(str(event.node), event.timestamp_ms)
         taken = self._taken(machine, event)
-        if not machine.is_online and self._processor.inputs is not None:  # another processor is quicker than the edge
+        if not machine.is_online and self._inputs is not None:  # another processor is quicker than the edge
             machine.live.note(taken)
             return [], FOLDED
         declared: list[Effect] = []
@@ -314,7 +315,7 @@ class Engine:
     def _taken(self, machine: Machine, event: HostEvent) -> list[Reading]:
         """The readings of a birth that this processor takes from this source. A signal belongs to the first source that is
         online with it; what a source offered before and does not offer any more is withdrawn."""
-        inputs, node, owner = self._processor.inputs, event.node, machine.owner
+        inputs, node, owner = self._inputs, event.node, machine.owner
         offered = [reading for reading in event.readings if inputs is None or reading.name in inputs]
         clashing = {r.name for r in offered if owner.get(r.name, node) != node and owner[r.name] in machine.online}
         machine.excluded[node] = frozenset(clashing)

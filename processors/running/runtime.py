@@ -9,8 +9,8 @@ from types import FrameType
 from typing import Any
 
 from processors.config import Configuration, ProcessorConfig, read_tables
-from processors.discovery import AnyProcessor, find
-from processors.errors import ConfigurationError
+from processors.discovery import AnyProcessor, find, module_of
+from processors.errors import ConfigurationError, UnknownProcessorError
 from processors.running.health import node_metrics
 from processors.running.ports import Recorder
 from processors.running.worker import Worker
@@ -78,7 +78,7 @@ def configured(names: Sequence[str], config_path: Path | None = None) -> "list[C
     tables = {} if config_path is None else read_tables(config_path)
     for table in tables:
         if table not in OTHERS:
-            _table_owner(table, config_path)
+            _check_table(table, config_path)
     processors = [find(name) for name in dict.fromkeys(names)]
     try:
         return [(processor, processor.configured(tables.get(processor.name))) for processor in processors]
@@ -86,11 +86,11 @@ def configured(names: Sequence[str], config_path: Path | None = None) -> "list[C
         raise ConfigurationError(f"{config_path}: {error}") from error
 
 
-def _table_owner(table: str, config_path: Path | None) -> AnyProcessor:
-    """The processor that a table of a configuration file is for, running or not. Raises ConfigurationError."""
+def _check_table(table: str, config_path: Path | None) -> None:
+    """Refuse a table that is for no processor; one that does not run is not imported. Raises ConfigurationError."""
     try:
-        return find(table)
-    except Exception as error:
+        module_of(table)
+    except UnknownProcessorError as error:
         raise ConfigurationError(f"{config_path}: [{table}]: {error}") from error
 
 

@@ -8,16 +8,16 @@ have seen a whole change, the answer is null with the reason, never "no".
 A control that reports `tool_change_active` itself is believed first by those who read both; this goes on beside it.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Self
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
-from pydantic import Field, PlainSerializer, PlainValidator, model_validator
+from pydantic import Field, PlainSerializer, PlainValidator
 
-from processors.config import ProcessorConfig
+from processors.config import MACHINES, Configuration, ProcessorConfig
 from processors.contract import Output, OutputSpec, Processor, Provenance, Sample, SampleKind
+from processors.errors import ConfigurationError
 from sparkplug.datatype import DataType
 from sparkplug.quality import Quality
 from twin.vocabulary.twin_signals import TOOL_CHANGE_ACTIVE, TWIN_PREFIX
@@ -35,6 +35,7 @@ RESTING_MM_MIN = 10.0
 UNKNOWN = -1.0
 NO_MODEL = "no model is configured: learn one from a captured change with `cnctwin train detector`"
 TOLD_S = 1.0
+OTHERS = ""
 BLOCK_CHARACTERS_MAX = 200
 
 
@@ -47,33 +48,49 @@ class Config(ProcessorConfig):
     pattern_score: float | None = Field(default=None, ge=0.0, lt=1.0, description="in place of the model's, by the signal alone")
     opens_early: bool = Field(default=True, description="whether the gate opens on the beginning alone")
 
-    @cached_property
-    def loaded(self) -> "tuple[Detector, str, int] | None":
-        """The detector, by what it is told from another, and ticks for each of its samples; None without a model."""
-        if self.model is None:
-            return None
+
+class Model(NamedTuple):
+    """A detector, the mark by which it is told from another, and the ticks for each of its samples."""
+
+    detector: "Detector"
+    mark: str
+    ticks_of_sample: int
+
+
+def read_models(configuration: Configuration[Config]) -> "Mapping[str, Model | None]":
+    """Return the models by machine; that of the machines without values of their own is named OTHERS.
+
+    Raises ValueError, and ConfigurationError that names the machine, where a model cannot be read or does not fit.
+    """
+    models = {OTHERS: _model_of(configuration.default)}
+    for machine in configuration.machines:
         try:
-            from twin.transient.artefact import load_detector  # noqa: PLC0415 - a light install has no arrays
-        except ImportError as error:
-            raise ValueError(f"a model needs {error.name}, which is not installed: pip install 'cnctwin[twin]'") from None
+            models[machine] = _model_of(configuration.of(machine))
+        except ValueError as error:
+            raise ConfigurationError(f"[tool_change_detector.{MACHINES}.{machine}] {error}") from error
+    return models
 
-        detector, mark = load_detector(self.model)
-        detector = replace(detector, shown_s=self.shown_s)
-        if self.pattern_score is not None:
-            detector = detector.with_score(self.pattern_score)
-        detector.warmed_up()
-        return detector, mark, round(detector.template.period_s / self.tick_s)
 
-    @model_validator(mode="after")
-    def _model_fits(self) -> Self:
-        if self.loaded is not None:
-            detector, _, ticks = self.loaded
-            period_s = detector.template.period_s
-            if ticks < 1 or abs(ticks * self.tick_s - period_s) > 1e-6 * period_s:
-                raise ValueError(
-                    f"tick_s {self.tick_s:g} does not go into the sample period {period_s:g} s of {self.model}: set it so"
-                )
-        return self
+def _model_of(config: Config) -> Model | None:
+    if config.model is None:
+        return None
+    try:
+        from twin.transient.artefact import load_detector  # noqa: PLC0415 - a light install has no arrays
+    except ImportError as error:
+        raise ValueError(f"a model needs {error.name}, which is not installed: pip install 'cnctwin[twin]'") from None
+
+    detector, mark = load_detector(config.model)
+    detector = replace(detector, shown_s=config.shown_s)
+    if config.pattern_score is not None:
+        detector = detector.with_score(config.pattern_score)
+    detector.warmed_up()
+    period_s = detector.template.period_s
+    ticks = round(period_s / config.tick_s)
+    if ticks < 1 or abs(ticks * config.tick_s - period_s) > 1e-6 * period_s:
+        raise ValueError(
+            f"tick_s {config.tick_s:g} does not go into the sample period {period_s:g} s of {config.model}: set it so"
+        )
+    return Model(detector, mark, ticks)
 
 
 def _dumped(search: "Search | None") -> Any:
@@ -112,26 +129,27 @@ class State:
     told_s: float = 0.0
 
 
-def step(config: Config, state: State, sample: Sample) -> tuple[State, Sequence[Output]]:
+def step(configuration: Configuration[Config], state: State, sample: Sample) -> tuple[State, Sequence[Output]]:
     """Sample at ticks; what a hole or a death leaves behind is not a stream."""
-    if config.loaded is None:
+    read, config = configuration.read, configuration.of(sample.machine)
+    model: Model | None = read[sample.machine] if sample.machine in read else read.get(OTHERS)
+    if model is None:
         return (state, _nulls("none", NO_MODEL)) if sample.kind is not SampleKind.DATA else (state, ())
     if sample.kind is SampleKind.TICK:
-        return _told(config, _ticked(config, state, sample), sample)
+        return _told(config, model.detector, _ticked(model, state, sample), sample)
     if sample.kind is SampleKind.HOLE:
-        return _told(config, State(why_not=sample.detail or "messages were lost"), sample)
+        return _told(config, model.detector, State(why_not=sample.detail or "messages were lost"), sample)
     if sample.kind is SampleKind.DATA:
         return state, ()
-    _, missing = sample.number(config.loaded[0].signal)
+    _, missing = sample.number(model.detector.signal)
     if sample.kind is SampleKind.DEATH and missing:
         state = State(why_not=missing)  # there are no ticks until it comes back: what goes on is not seen
-    return _told(config, replace(state, told=""), sample)
+    return _told(config, model.detector, replace(state, told=""), sample)
 
 
-def _ticked(config: Config, state: State, sample: Sample) -> State:
+def _ticked(model: Model, state: State, sample: Sample) -> State:
     """The state after a tick."""
-    assert config.loaded is not None
-    detector, mark, ticks_of_sample = config.loaded
+    detector, mark, ticks_of_sample = model
     value, why_not = sample.number(detector.signal)
     if value is None:
         return State(why_not=why_not or "", told=state.told, told_s=state.told_s)
@@ -165,10 +183,8 @@ def _block(sample: Sample) -> str | None:
     return None
 
 
-def _told(config: Config, state: State, sample: Sample) -> tuple[State, Sequence[Output]]:
+def _told(config: Config, detector: "Detector", state: State, sample: Sample) -> tuple[State, Sequence[Output]]:
     """The outputs where they differ from those before, and once a second."""
-    assert config.loaded is not None
-    detector = config.loaded[0]
     search: Search | None = state.search
     gate = None if search is None else search.gate
     key = state.why_not if gate is None else "none" if not gate.until else f"{gate.phase.value} {gate.confidence:.2f}"
@@ -241,4 +257,5 @@ PROCESSOR = Processor(
     state=State,
     initial=lambda _: State(),
     step=step,
+    reads=read_models,
 )

@@ -174,11 +174,9 @@ def test_another_model_begins_its_gain_anew(models: Path) -> None:
     (unit,) = engine._units.values()
     state = unit.live.state
     assert state.gain.seconds > 3600.0
-    config = Configuration(PROCESSOR.config, {"models": str(models)}, name="residual").default
-    model = config.loaded["okuma"]
-    assert state.version == model.version
-    config.__dict__["loaded"] = {"okuma": small_model(feature_set="lean").model}
-    unit.live._config = config
+    assert state.version == PROCESSOR.configured({"models": str(models)}).read["okuma"].version
+    lean = {"okuma": small_model(feature_set="lean").model}
+    unit.live._config = Configuration(PROCESSOR.config, {"tick_s": TICK_S}, reads=lambda _: lean)
     fed(engine, *list(_shift(begin=3 * HOUR, end=3 * HOUR + 4))[2:])
     assert unit.live.state.version == small_model(feature_set="lean").model.version
     assert unit.live.state.gain.seconds <= 4 * TICK_S
@@ -208,14 +206,14 @@ def test_a_damaged_model_is_refused_at_the_start_in_one_line(tmp_path: Path) -> 
     (tmp_path / "okuma" / "current").symlink_to(folder.name, target_is_directory=True)
     (folder / "arrays.npz").write_bytes(b"no arrays")
     with pytest.raises(ConfigurationError, match="copy the model again") as refused:
-        Configuration(PROCESSOR.config, {"models": str(tmp_path)}, name="residual")
+        PROCESSOR.configured({"models": str(tmp_path)})
     assert "\n" not in str(refused.value)
 
 
 def test_scoring_does_not_import_what_trains(models: Path) -> None:
     code = (
-        "import sys; from processors.residual import PROCESSOR; light = 'numpy' in sys.modules; from processors.config import "
-        f"Configuration; Configuration(PROCESSOR.config, {{'models': {str(models)!r}}}, name='residual'); "
+        "import sys; from processors.residual import PROCESSOR; light = 'numpy' in sys.modules; "
+        f"PROCESSOR.configured({{'models': {str(models)!r}}}); "
         "print(light, *(name in sys.modules for name in ('sklearn', 'pyarrow', 'pandas')))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=120)

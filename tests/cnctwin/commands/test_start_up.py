@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from pathlib import Path
 
 HEAVY = (
     "numpy",
@@ -33,3 +34,51 @@ def test_the_entry_point_loads_no_library_that_only_some_command_needs() -> None
         "twin.gap.diagnose",
     }
     assert loaded & services == set()
+
+
+RUN = """
+import sys, threading
+from pathlib import Path
+from cnctwin.running import processors
+from processors.running.runtime import configured
+from sparkplug.broker import BrokerAddress
+
+name, config, folder = sys.argv[1], sys.argv[2] or None, Path(sys.argv[3])
+recorders = []
+processors.run_configured = lambda *_, recorder, **__: recorders.append(type(recorder).__name__)
+pairs = configured([name], config and Path(config))
+processors.process(pairs, BrokerAddress("127.0.0.1", 9), threading.Event(), group="cnc", state_dir=folder)
+print(*recorders, *sys.modules, sep="\\n")
+"""
+"""`cnctwin process`, without a broker."""
+
+
+def _loaded_by(name: str, folder: Path, table: str = "") -> tuple[str, set[str]]:
+    """The recorder's type, and what is loaded where a processor runs."""
+    config = folder / "processors.toml"
+    config.write_text(table)
+    asked = [sys.executable, "-c", RUN, name, str(config) if table else "", str(folder)]
+    recorder, *loaded = subprocess.run(asked, capture_output=True, text=True, check=True, timeout=60).stdout.split()
+    return recorder, set(loaded)
+
+
+def test_a_processor_that_runs_loads_neither_alerts_nor_the_store(tmp_path: Path) -> None:
+    recorder, loaded = _loaded_by("thermal", tmp_path, "[alerts]\n[historian]\n[thermal]\n")
+    assert recorder == "NoneType"
+    ours = {name for name in loaded if name.startswith(("processors.", "cnctwin.memory"))}
+    assert "processors.thermal" in ours
+    assert not [name for name in ours if name.startswith(("processors.historian", "processors.alerts", "cnctwin.memory"))]
+    assert loaded & set(HEAVY) == set()
+
+
+def test_the_historian_brings_its_store_and_nothing_that_computes(tmp_path: Path) -> None:
+    recorder, loaded = _loaded_by("historian", tmp_path, f"[historian]\nstore = '{tmp_path / 'store'}'\n")
+    assert recorder == "StoreRecorder"
+    assert loaded & {"scipy", "numba", "sklearn", "httpx", "fastapi"} == set()
+
+
+def test_alerts_without_receivers_bring_no_courier(tmp_path: Path) -> None:
+    recorder, loaded = _loaded_by("alerts", tmp_path)
+    assert recorder == "NoneType"
+    assert "processors.alerts.courier.thread" not in loaded
+    assert loaded & set(HEAVY) == set()

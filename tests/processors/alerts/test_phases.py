@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from processors.alerts.alarms import alarm_signals
+from processors.alarms import alarm_signals
 from processors.alerts.config import AlertsConfig
 from processors.alerts.processor import PROCESSOR
 from processors.discovery import discover
@@ -31,8 +31,8 @@ def test_every_alarm_of_every_processor_is_an_alert() -> None:
     alarms = {spec.name for processor in discover().values() for spec in processor.outputs if spec.is_alarm}
     assert alarms == set(alarm_signals())
     assert set(AlertsConfig().signals) == alarms
-    assert PROCESSOR.inputs is not None
-    assert alarms <= PROCESSOR.inputs
+    assert PROCESSOR.signals is not None
+    assert alarms <= PROCESSOR.signals
 
 
 def test_an_alarm_pends_for_its_dwell_then_fires_and_is_resolved_after_its_hysteresis() -> None:

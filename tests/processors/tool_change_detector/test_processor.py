@@ -10,7 +10,6 @@ from pydantic import TypeAdapter
 
 from benchmarks import synthetic_changes as drive
 from benchmarks import tool_change_detector as bench
-from processors.config import Configuration
 from processors.effects import DeadLetter, Effect
 from processors.errors import ConfigurationError
 from processors.running.snapshot import decode_state, encode_state
@@ -196,7 +195,27 @@ def test_a_dead_machine_is_not_told_of(model: str) -> None:
 @pytest.mark.parametrize(("table", "words"), [({"tick_s": 0.3}, "sample period"), ({"model": "nowhere"}, "no detector")])
 def test_a_model_that_does_not_fit_is_refused_before_it_runs(model: str, table: dict[str, Any], words: str) -> None:
     with pytest.raises(ConfigurationError, match=words):
-        Configuration(PROCESSOR.config, {"model": model} | table, name=PROCESSOR.name)
+        PROCESSOR.configured({"model": model} | table)
+
+
+def test_a_machine_may_have_a_model_of_its_own(model: str) -> None:
+    stream = [*stream_of(change()), data(100.0, **{CURRENT: 1.1})]
+    for name, confirmed in (("okuma", 1), ("mazak", 0)):
+        effects = fed(engine_of(PROCESSOR, machines={name: {"model": model}}), *stream)
+        assert values_of(effects, PHASE).count("confirmed") == confirmed
+    odd = {"machines": {"okuma": {"opens_early": False}, "mazak": {"pattern_score": 0.99}}}
+    assert values_of(fed(engine_of(PROCESSOR, model=model, **odd), *stream), ACTIVE) == [False, True, False]
+
+
+def test_a_model_of_one_machine_that_does_not_fit_is_named_with_its_machine(model: str) -> None:
+    with pytest.raises(ConfigurationError, match=r"^\[tool_change_detector\.machines\.okuma\] nowhere: no detector"):
+        PROCESSOR.configured({"model": model, "machines": {"okuma": {"model": "nowhere"}}})
+    with pytest.raises(ConfigurationError, match=r"^\[tool_change_detector\] tick_s 0\.3 does not go into"):
+        PROCESSOR.configured({"model": model, "tick_s": 0.3})
+
+
+def test_values_are_checked_without_reading_the_disk() -> None:
+    assert str(PROCESSOR.config(model=Path("nowhere")).model) == "nowhere"
 
 
 def test_a_recorded_part_gives_what_the_replay_gives(tmp_path: Path) -> None:

@@ -7,11 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from cnctwin.api.event_list import events_of, part_records
+from cnctwin.api.event_list import event_signals, events_of, part_records
 from cnctwin.api.live.trace import AGE_MS_MAX, SAMPLES_MAX, Sample, Trace
 from cnctwin.api.store_reader import StoreReader
 from cnctwin.memory.store.contract import Message, Pinned
 from cnctwin.memory.store.opening import open_store
+from processors.alarms import alarm_signals
 from sparkplug.quality import Quality
 from tests.cnctwin.api.small_plant import Client, birth, client_of, data, death, now, small_plant
 
@@ -262,6 +263,11 @@ def test_reasons_without_end_do_not_grow_a_trace_without_end() -> None:
         trace.add(number, 1.0, Quality.BAD, f"reason {number}")
     assert len(trace.since(0, 10**9)) == SAMPLES_MAX
     assert {one.quality for one in trace.since(0, 10**9)} == {Quality.BAD}
+
+
+def test_every_declared_alarm_is_listed_as_an_event_and_what_is_told_beside_it_is_not() -> None:
+    beside = {"twin/rule_detail", "twin/gap_basis", "twin/raw_score", "spindle_rpm"}
+    assert set(event_signals({*alarm_signals(), *beside, "program"})) == {*alarm_signals(), "program"}
 
 
 def test_alarms_of_the_twin_are_events() -> None:

@@ -14,7 +14,6 @@ from cnctwin.errors import UsageError
 from cnctwin.memory.store.contract import Message
 from cnctwin.memory.store.opening import open_store
 from cnctwin.training.residual.recording import from_files, from_store
-from processors.config import Configuration
 from processors.residual import PROCESSOR
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId, Reading
@@ -58,7 +57,7 @@ def test_run_logs_become_a_model_that_the_processor_takes(folder: Path, tmp_path
     for said in ("gain over the physics alone: ", "90 % interval of", "in the region of training: ", "what a feature is worth",
                  "warm_up", "fewer hours were allowed", f'models = "{tmp_path}"'):  # fmt: skip
         assert said in done.output
-    model = Configuration(PROCESSOR.config, {"models": str(tmp_path)}, name="residual").default.loaded["okuma"]
+    model = PROCESSOR.configured({"models": str(tmp_path)}).read["okuma"]
     assert model.trained.physics == PHYSICS_TOLD
     assert model.version in done.output
     assert (tmp_path / "residual" / "okuma" / model.version / "manifest.json").exists()
@@ -69,7 +68,7 @@ def test_a_second_model_waits_to_be_promoted(folder: Path, tmp_path: Path) -> No
     first = json.loads(_ran(folder, *given, "--json").output)["model"]
     second = _ran(folder, *given, "--seed", "1")
     assert f"{first} goes on counting" in second.output
-    assert Configuration(PROCESSOR.config, {"models": str(tmp_path)}, name="residual").default.loaded["okuma"].version == first
+    assert PROCESSOR.configured({"models": str(tmp_path)}).read["okuma"].version == first
 
 
 def test_a_worthless_model_is_not_kept(folder: Path, tmp_path: Path) -> None:
