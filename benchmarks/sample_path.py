@@ -32,7 +32,8 @@ from typing import Any
 import paho.mqtt.client as paho
 from paho.mqtt.enums import CallbackAPIVersion
 
-from cnctwin.processes.private_broker import PrivateBroker, _any_port
+from cnctwin.processes.port import free_port
+from cnctwin.processes.private_broker import PrivateBroker
 from processors.config import Configuration, ProcessorConfig
 from processors.contract import NoState, Output, OutputSpec, Processor, Provenance, Sample, SampleKind
 from processors.effects import Publish as PublishEffect
@@ -309,7 +310,7 @@ def main() -> None:
     count = options.messages
     rows: list[dict[str, float]] = []
     with tempfile.TemporaryDirectory() as folder:
-        broker = PrivateBroker(Path(folder), _any_port())
+        broker = PrivateBroker(Path(folder), free_port())
         broker.start()
         try:
             for _ in range(options.rounds):

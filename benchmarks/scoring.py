@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.evaluation.baselines import constant_score, one_feature_score, random_score
-from benchmarks.evaluation.events import Event, Found, delays_s, false_alerts_a_week, found, recall
+from benchmarks.evaluation.events import Detections, Event, delays_s, detections, false_alerts_a_week, recall
 from benchmarks.evaluation.range_based import Range, range_based, ranges
 from benchmarks.evaluation.volume import vus_pr
 from benchmarks.simulated_cell.cell import Cell, draw_cell, machine_signals
@@ -88,7 +88,7 @@ class Frames:
 class Judged:
     """What came of one machine: what was found in all, alarm ranges and fault ranges in frames, the volume; faults in order."""
 
-    found: Found
+    detections: Detections
     alarms: Sequence[Range]
     events: Sequence[Range]
     vus: float
@@ -215,15 +215,17 @@ def judged(frames: Frames, method: str, alerts_per_week: float = 1.0) -> list[Ju
         alerts_s = [float(tick * FRAME_S) for tick in onsets(on)]
         spans = [Range(int(event.start_s) // FRAME_S, int(event.end_s) // FRAME_S + 1) for event in events]
         volume = vus_pr(np.where(shut[frames.judge, place], own.min(), own), spans, 60, steps=3)
-        result = found(events, alerts_s, len(own) * float(FRAME_S), GRACE_S, WAKE_S)
+        result = detections(events, alerts_s, len(own) * float(FRAME_S), GRACE_S, WAKE_S)
         results.append(Judged(result, ranges(on.tolist()), spans, volume, faults, threshold is not None))
     return results
 
 
-def of_faults(parts: Sequence[Judged], wanted: Callable[[Fault], bool]) -> list[Found]:
+def of_faults(parts: Sequence[Judged], wanted: Callable[[Fault], bool]) -> list[Detections]:
     """What was found of some faults only."""
     return [
-        Found(tuple(delay for delay, fault in zip(part.found.delays_s, part.faults, strict=True) if wanted(fault)), 0, 0.0)
+        Detections(
+            tuple(delay for delay, fault in zip(part.detections.delays_s, part.faults, strict=True) if wanted(fault)), 0, 0.0
+        )
         for part in parts
     ]
 
@@ -240,7 +242,7 @@ def row(parts: Sequence[Judged], rng: np.random.Generator) -> dict[str, str]:
     precise = bootstrapped([one.precision for _, one in pairs if part_has(one.precision)], lambda some: float(np.mean(some)), rng)
     recalled = bootstrapped([one.recall for _, one in pairs if part_has(one.recall)], lambda some: float(np.mean(some)), rng)
     return {
-        "false/week": str(false_alerts_a_week([part.found for part in parts])),
+        "false/week": str(false_alerts_a_week([part.detections for part in parts])),
         **{f"size {size:g}": str(recall(of_faults(parts, lambda fault, size=size: fault.size == size))) for size in SIZES},
         **{
             f"≥1 {overlap.value}": str(recall(of_faults(parts, lambda f, o=overlap: f.size >= 1.0 and f.overlap is o)))

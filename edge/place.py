@@ -11,6 +11,7 @@ import logging
 from pathlib import Path
 from typing import NamedTuple
 
+EDGE_RESTARTED = "edge restarted"  # the hole of an edge that knows where it was, but not what it had taken
 _log = logging.getLogger(__name__)
 
 

@@ -14,12 +14,11 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from edge.errors import DocumentError
-from edge.place import Place
+from edge.place import EDGE_RESTARTED, Place
 from edge.sample import ClockReading, Drop, Gap, SampleSet
 
 FRAME_BYTES_MAX = 4 * 1024 * 1024
 FACTS_MAX = 20_000
-EDGE_RESTARTED = "edge restarted"
 Plain = str | int | float | bool | None
 
 

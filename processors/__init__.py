@@ -1,4 +1,5 @@
-"""Stream processors: pure folds keyed by machine, one file each, and the runtime that feeds them from the broker.
+"""Stream processors: pure folds keyed by machine, a file or a folder each, and the runtime that feeds them from the broker.
 
-A processor is declared in `contract`, found by `discovery`, fed by `engine` (no I/O) and run by `runtime` (all the I/O).
+A processor is declared by `contract`, found by `discovery`, fed by `running/engine` (no I/O) and run by `running/runtime`
+(all the I/O).
 """

@@ -18,7 +18,7 @@ from sparkplug.connection import Listener, MqttConnection, now_ms
 from sparkplug.host_session import EventKind, HostEvent, HostSession
 from sparkplug.metric import Change, NodeId
 from sparkplug.node_picture import NodePicture
-from sparkplug.topics import NAMESPACE
+from sparkplug.topics import NAMESPACE, group_filter
 
 __all__ = ["EventKind", "HostApplication", "HostEvent"]
 
@@ -41,7 +41,7 @@ class HostApplication:
         self,
         broker: BrokerAddress,
         host_id: str,
-        topic_filters: Sequence[str] = ("spBv1.0/cnc/#",),
+        topic_filters: Sequence[str] = (group_filter("cnc"),),
         *,
         reorder_timeout_ms: int = 2000,
         rebirth_interval_ms_min: int = 5000,

@@ -25,7 +25,7 @@ from sparkplug.datatype import DataType
 from sparkplug.edge_node import EdgeNode
 from sparkplug.metric import Change, MetricSpec, NodeId
 from sparkplug.quality import Quality
-from tests.cnctwin.page.simulated_shop import Told, signals
+from tests.cnctwin.page.simulated_shop import SignalValue, signals
 
 WATCH = """() => {
   window.seen = { long: 0, longest: 0, frames: 0 };
@@ -56,7 +56,7 @@ def main() -> None:
         measure(given, Path(folder))
 
 
-def spec_of(name: str, told: Told) -> MetricSpec:
+def spec_of(name: str, told: SignalValue) -> MetricSpec:
     """A metric for what is told; a null is a number."""
     kinds = {bool: DataType.BOOLEAN, str: DataType.STRING, int: DataType.INT32}
     datatype = DataType.INT32 if name == "tool_number" else kinds.get(type(told.value), DataType.DOUBLE)
@@ -75,7 +75,7 @@ def publish(given: argparse.Namespace) -> None:
         twin.declare_device(name, [spec_of(signal_, one) for signal_, one in told.items() if signal_.startswith("twin/")])
         edge.start()
         edges.append(edge)
-        before.append(dict[str, Told]())
+        before.append(dict[str, SignalValue]())
     twin.start()
     begun_s, count = time.monotonic(), 0
     while True:
@@ -93,7 +93,7 @@ def publish(given: argparse.Namespace) -> None:
                 time.sleep(wait_s)
 
 
-def change(name: str, told: Told, now_ms: int) -> Change:
+def change(name: str, told: SignalValue, now_ms: int) -> Change:
     """What changed, as an edge tells it."""
     value = (
         float(told.value)

@@ -1,1 +1,4 @@
-"""The command line: one file for each command or group of commands. Nothing imports these but the entry point."""
+"""The command line: one file for each command or group of commands, which only the entry point imports.
+
+They share `extras.py`, `moment.py` and `options.py`.
+"""

@@ -7,7 +7,6 @@ import typer
 
 from cnctwin.commands.extras import needed_by
 from cnctwin.commands.moment import moment_ms
-from cnctwin.commands.store import export
 from cnctwin.errors import UsageError
 from cnctwin.terminal.console import standard_output
 
@@ -27,6 +26,8 @@ def import_recording(
     if machine is not None:
         if from_ is None or to is None:
             raise UsageError(f"--machine {machine}: say which stretch of the store with --from and --to")
+        with needed_by("a run log", "twin"):
+            from cnctwin.memory.store.run_export import export
         rows = export(recording, machine, (moment_ms(from_, "--from"), moment_ms(to, "--to")), out)
         standard_output().print(f"{out}: {rows} rows", markup=False, highlight=False)
     elif devices is None:
@@ -34,6 +35,6 @@ def import_recording(
             from cnctwin.importing.program_runs import import_program_runs
         import_program_runs(Path(recording), out, standard_output())
     else:
-        from cnctwin.importing.shdr import import_shdr
-
+        with needed_by("the twin", "twin"):
+            from cnctwin.importing.shdr import import_shdr
         import_shdr(Path(recording), devices, device, out, standard_output())

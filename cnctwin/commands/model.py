@@ -12,9 +12,8 @@ from rich.table import Table
 from rich.text import Text
 
 from cnctwin.commands.extras import needed_by
-from cnctwin.commands.moment import moment_ms
+from cnctwin.commands.moment import TIME, moment_ms
 from cnctwin.commands.options import AsJson
-from cnctwin.commands.validate import TIME
 from cnctwin.errors import UsageError
 from cnctwin.models import registry
 from cnctwin.models.card import DIGITS, faults_of

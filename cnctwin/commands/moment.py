@@ -7,6 +7,7 @@ from datetime import UTC, datetime
 from cnctwin.errors import UsageError
 
 FORMS = "2026-11-22T06:00 (UTC where no zone stands), ms since 1970, or -15m for a quarter of an hour ago (s, m, h, d)"
+TIME = "UTC, as 2026-11-21T06:00 or ms since 1970"
 _AGO = re.compile(r"-(\d+(?:\.\d+)?)([smhd])")
 _SECONDS = {"s": 1.0, "m": 60.0, "h": 3600.0, "d": 86_400.0}
 

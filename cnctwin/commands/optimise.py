@@ -23,6 +23,7 @@ from cnctwin.processes.stopping import stopped_by_signals
 
 if TYPE_CHECKING:
     import twin.optimisation.question as asked
+    from cnctwin.batch.optimisation import Files
     from twin.gcode import Settings
     from twin.machine import MachineFile
     from twin.optimisation.answer import Objective, Optimised, SpeedChanges
@@ -63,8 +64,8 @@ def optimise(
     """Find feed and spindle speed for each line, by time or cost, within the limits. Exit code 1: limits that cannot be kept."""
     with needed_by("the optimiser", "twin"):
         import twin.optimisation.question as asked
-    from twin.machine import machine_to_toml, read_machine
-
+        from cnctwin.batch.optimisation import Files
+        from twin.machine import machine_to_toml, read_machine
     described = _with_ranges(read_machine(machine), feed_range, speed_range)
     text, encoding = read_encoded(program)
     question = asked.Question(
@@ -84,7 +85,8 @@ def optimise(
         speed_changes=_speed_changes(speed_changes),
     )
     _check_out(out, program, machine)
-    how = Run(out, encoding, workers, dask, fresh=fresh, resimulate=not no_resimulation, paper=paper, as_json=as_json)
+    files = Files.beside(out, encoding)
+    how = Run(out, files, workers, dask, fresh=fresh, resimulate=not no_resimulation, paper=paper, as_json=as_json)
     raise typer.Exit(_run(question, how))
 
 
@@ -103,7 +105,7 @@ class Run:
     """The options that are not part of the question: how it is worked out and shown."""
 
     out: Path
-    encoding: str
+    files: "Files"
     workers: int
     dask: str | None
     fresh: bool
@@ -113,14 +115,14 @@ class Run:
 
 
 def _run(question: "asked.Question", how: Run) -> int:
-    from cnctwin.batch.optimisation import Files, run
+    from cnctwin.batch.optimisation import run
     from cnctwin.jobs.dask_cluster import DaskCluster
     from cnctwin.jobs.spread import spread_over
     from twin.errors import LimitsError
     from twin.optimisation.optimise import Stopped
     from twin.optimisation.paper import paper_search
 
-    files, kept = Files.beside(how.out, how.encoding), how.out.with_suffix(".checkpoint.json")
+    files, kept = how.files, how.out.with_suffix(".checkpoint.json")
     if how.fresh:
         kept.unlink(missing_ok=True)
     cluster = DaskCluster.from_text(how.dask) if how.dask is not None else None

@@ -22,7 +22,6 @@ from cnctwin.commands.extras import needed_by
 from cnctwin.commands.moment import moment_ms
 from cnctwin.commands.options import AsJson, StorePlace
 from cnctwin.errors import UsageError
-from cnctwin.files.output import check_suffix
 from cnctwin.memory.store.contract import Column, Query, Store, StoreError
 from cnctwin.memory.store.opening import default_place, open_store
 from cnctwin.memory.store.plan import Load, Plan, load_of, plan
@@ -129,6 +128,8 @@ def export_command(
     where: StorePlace = None,
 ) -> None:
     """Write a stretch of a machine as a run log, which gap diagnosis, identification and training read."""
+    with needed_by("a run log", "twin"):
+        from cnctwin.memory.store.run_export import export
     rows = export(where or default_place(), machine, (moment_ms(from_), moment_ms(to)), out, every_ms=_every_ms(every), held=held)
     sys.stdout.write(f"{rows} rows in {out}\n")
 
@@ -171,28 +172,6 @@ def seal_command(where: StorePlace = None) -> None:
     finally:
         store.close()
     sys.stdout.write(f"{sealed} hours sealed, {swept} files swept, {freed / 1e6:.1f} MB given back\n")
-
-
-def export(
-    where: str | Path, machine: str, span_ms: tuple[int, int], out: Path, *, every_ms: int | None = None, held: bool = False
-) -> int:
-    """Write a stretch of a store as a run log; how many rows it has. Raises ApplicationError in one line."""
-    check_suffix(out)
-    try:
-        from cnctwin.memory.store.run_export import run_of
-        from twin.errors import RunLogError
-        from twin.runlog import write_run
-    except ModuleNotFoundError as error:
-        raise UsageError(f"{error.name} is not installed; run: pip install 'cnctwin[twin]'") from None
-    store = open_store(where)
-    try:
-        run = run_of(store, machine, *span_ms, every_ms=every_ms, held=held)
-        write_run(run, out)
-    except (RunLogError, OSError) as error:
-        raise UsageError(f"{out}: {error}") from None
-    finally:
-        store.close()
-    return len(run)
 
 
 class _Opened:

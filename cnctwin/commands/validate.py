@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from cnctwin.commands.extras import needed_by
-from cnctwin.commands.moment import moment_ms
+from cnctwin.commands.moment import TIME, moment_ms
 from cnctwin.commands.options import AsJson, Group
 from cnctwin.errors import UsageError
 from cnctwin.processes.given_broker import address
@@ -16,7 +16,6 @@ from edge.state_dir import state_dir
 from twin.vocabulary.nodes import VALIDATION_NODE
 
 DAY_MS = 86_400_000
-TIME = "UTC, as 2026-11-21T06:00 or ms since 1970"
 
 
 def validate(

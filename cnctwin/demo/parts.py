@@ -12,7 +12,8 @@ from xml.etree import ElementTree
 
 from cnctwin.errors import ApplicationError, UsageError
 from cnctwin.processes.child import Child
-from cnctwin.processes.private_broker import PrivateBroker, is_free
+from cnctwin.processes.port import is_free
+from cnctwin.processes.private_broker import PrivateBroker
 from cnctwin.standins.simulated_machine import description
 from cnctwin.standins.simulated_machine.anomaly_model import place_model
 from sparkplug.errors import TopicError

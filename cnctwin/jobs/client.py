@@ -8,13 +8,13 @@ import json
 import os
 import time
 from collections.abc import Callable
-from datetime import UTC, datetime
 from types import TracebackType
 from typing import Any
 from uuid import uuid4
 
 from cnctwin.errors import ApplicationError, UsageError
 from cnctwin.jobs.request import read_request
+from cnctwin.processes import published_state
 from sparkplug.broker import BrokerAddress
 from sparkplug.host import HostApplication
 from sparkplug.host_session import EventKind
@@ -68,7 +68,7 @@ class JobsClient:
         state = self.until(lambda: self._heard.get(JOBS_STATE), wait_s)
         if state is None:
             raise NoAnswerError(f"{self.broker.url} knows nothing of jobs{self._why()}; is `cnctwin jobs run` there?")
-        age_s = _age_s(state)
+        age_s = published_state.age_s(state, time.time())
         if age_s > FRESH_S_MAX:
             raise NoAnswerError(f"the state of jobs is {age_s:.0f} s old: the consumer does not run any more (cnctwin jobs run)")
         return dict(state)
@@ -87,7 +87,7 @@ class JobsClient:
         while not (value := true()) and time.monotonic() < deadline_s:
             for event in self._host.poll(0.05):
                 if event.kind is EventKind.PLAIN and event.topic in self._wanted and event.payload:
-                    self._heard[event.topic] = _parsed(event.payload)
+                    self._heard[event.topic] = published_state.parsed(event.payload)
         return value or None
 
     def _ask(self, topic: str, document: dict[str, Any], job_id: str, wait_s: float) -> dict[str, Any] | None:
@@ -110,18 +110,3 @@ class JobsClient:
 
     def _why(self) -> str:
         return "" if self._host.online else f" ({self._host.last_error or 'no connection'})"
-
-
-def _parsed(payload: bytes) -> dict[str, Any]:
-    try:
-        document = json.loads(payload)
-    except (ValueError, RecursionError):
-        return {}
-    return document if isinstance(document, dict) else {}
-
-
-def _age_s(state: dict[str, Any]) -> float:
-    try:
-        return time.time() - datetime.fromisoformat(str(state["at"])).astimezone(UTC).timestamp()
-    except (KeyError, ValueError, OverflowError):
-        return float("inf")

@@ -3,6 +3,7 @@
 Loaded in the process of one job only: it needs all that the twin needs.
 """
 
+import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -79,8 +80,6 @@ def optimise(parameters: "OptimiseParameters", bench: Bench) -> dict[str, Any]:
 
 def identify(parameters: "IdentifyParameters", bench: Bench) -> dict[str, Any]:
     """As `cnctwin identify`: machine.toml, identification.json."""
-    import json  # noqa: PLC0415
-
     from cnctwin.batch.identification import identification_json  # noqa: PLC0415  with all of the twin
     from twin.case import read_case  # noqa: PLC0415
     from twin.identification.identify import identify as identified  # noqa: PLC0415

@@ -6,14 +6,14 @@ The topics are those of `processors/alerts` (docs/alerts.md).
 import json
 import os
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
 from typing import Any
 from uuid import uuid4
 
 from cnctwin.errors import UsageError
+from cnctwin.processes import published_state
 from sparkplug.broker import BrokerAddress
 from sparkplug.host import HostApplication
 from sparkplug.host_session import EventKind
@@ -36,7 +36,7 @@ class Desk:
         while True:
             for event in self.host.poll(0.05):
                 if event.kind is EventKind.PLAIN and event.topic == ALERT_STATE and event.payload:
-                    self.state = _parsed(event.payload)
+                    self.state = published_state.parsed(event.payload)
             if (value := true()) or time.monotonic() > deadline_s:
                 return value or None
 
@@ -71,24 +71,9 @@ def alert_desk(given: BrokerAddress | None, wait_s: float) -> Iterator[Desk]:
             if not host.online:
                 raise UsageError(host.last_error or f"no connection to {where.url}")
             raise UsageError(f"{where.url} knows nothing of alerts; does the processor run? (cnctwin process alerts)")
-        age_s = _age_s(desk.state)
+        age_s = published_state.age_s(desk.state, time.time())
         if age_s > FRESH_S_MAX:
             raise UsageError(f"the state of alerts is {age_s:.0f} s old: the processor `alerts` does not run any more")
         yield desk
     finally:
         host.stop()
-
-
-def _parsed(payload: bytes) -> dict[str, Any]:
-    try:
-        state = json.loads(payload)
-    except (ValueError, RecursionError):
-        return {}
-    return state if isinstance(state, dict) else {}
-
-
-def _age_s(state: Mapping[str, Any]) -> float:
-    try:
-        return time.time() - datetime.fromisoformat(str(state["at"])).astimezone(UTC).timestamp()
-    except (KeyError, ValueError, OverflowError):
-        return float("inf")

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from cnctwin.errors import BrokerStartError, UsageError
 from cnctwin.processes.child import Child
+from cnctwin.processes.port import free_port, is_free
 from sparkplug.broker import BrokerAddress
 
 DEFAULT_PORT = 1883
@@ -46,7 +47,7 @@ class PrivateBroker:
         program = find_mosquitto()
         if port is not None and not is_free(port):
             raise UsageError(f"port {port} of 127.0.0.1 is in use; name another one with --port")
-        self.port = port or (DEFAULT_PORT if is_free(DEFAULT_PORT) else _any_port())
+        self.port = port or (DEFAULT_PORT if is_free(DEFAULT_PORT) else free_port())
         folder = folder.resolve()
         folder.mkdir(parents=True, exist_ok=True)
         configuration = folder / "mosquitto.conf"
@@ -100,21 +101,3 @@ def answers(host: str, port: int) -> bool:
             return True
     except OSError:
         return False
-
-
-def is_free(port: int) -> bool:
-    """Return True if nobody on this computer listens on it."""
-    with socket.socket() as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind(("127.0.0.1", port))
-        except OSError:
-            return False
-        return True
-
-
-def _any_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port

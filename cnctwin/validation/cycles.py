@@ -11,9 +11,9 @@ from cnctwin.validation.cycle_time import Cycle
 from sparkplug.quality import Quality
 from sparkplug.values import Value
 from twin.runlog import RunLog, run_log
+from twin.vocabulary.signals import OVERRIDES
 
 STATE, PROGRAM, LINE = "exec_state", "program", "nc_line"
-OVERRIDES = ("feed_override_pct", "rapid_override_pct", "spindle_override_pct")
 TOLD = (LINE, "feed_mm_min", "tool_number")
 BEGUN_AFTER = (None, "READY", "PROGRAM_COMPLETED")
 CYCLES_MAX = 200

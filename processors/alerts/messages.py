@@ -19,7 +19,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from processors.alerts.body import Notice
 from processors.alerts.config import AlertsConfig
-from processors.alerts.notification import Notification
+from processors.alerts.notification import Name, Notification
 from processors.alerts.outbox import made, recalled, settled
 from processors.alerts.state import (
     OUTCOMES_MAX,
@@ -38,7 +38,6 @@ OUTBOX_BYTES_MAX = 200_000
 SILENCE_S_MAX = 30 * 86_400.0
 TEST_EXPIRES_S = 600.0
 
-Name = Annotated[str, Field(min_length=1, max_length=64)]
 Comment = Annotated[str, Field(max_length=500)]
 
 

@@ -12,7 +12,7 @@ from processors.alerts.config import AlertsConfig
 from processors.alerts.statement import Statement, statements_in
 
 SAYS_MAX, SAYS_CHARACTERS_MAX = 5000, 200
-_Name = Annotated[str, Field(min_length=1, max_length=64)]
+Name = Annotated[str, Field(min_length=1, max_length=64)]
 
 
 def written(key: str, notice: Notice, config: AlertsConfig, wall_s: float) -> str:
@@ -40,7 +40,7 @@ class _Model(BaseModel):
 class WrittenAlert(_Model):
     """One alert of a notification: the part of Alertmanager's JSON that identifies it."""
 
-    fingerprint: _Name
+    fingerprint: Name
     labels: dict[str, str]
     annotations: dict[str, str] = {}
     ended: str = Field(alias="endsAt")
@@ -51,9 +51,9 @@ class _Body(_Model):
 
 
 class _Document(_Model):
-    id: _Name
-    receiver: _Name
-    kind: _Name
+    id: Name
+    receiver: Name
+    kind: Name
     severity: str
     title: str
     text: str

@@ -11,10 +11,11 @@ from typing import NamedTuple
 from processors.sample import Sample, why_unknown
 from sparkplug.metric import Reading
 from sparkplug.quality import Quality
+from twin.vocabulary import signals
 
 EXECUTION, FEED, MODE, PROGRAM = "exec_state", "feed_mm_min", "controller_mode", "program"
 ALARM, TOOL, CHANGING = "alarm", "tool_number", "tool_change_active"
-OVERRIDES = ("feed_override_pct", "rapid_override_pct", "spindle_override_pct")
+OVERRIDES = signals.OVERRIDES
 FEED_OVERRIDE = OVERRIDES[0]
 ACTIVE, READY, COMPLETED, OFFLINE, WAIT = "ACTIVE", "READY", "PROGRAM_COMPLETED", "OFFLINE", "WAIT"
 STATES = frozenset(

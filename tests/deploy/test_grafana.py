@@ -44,8 +44,8 @@ def kind(query: dict[str, Any]) -> str:
     return str(query["datasource"]["type"])
 
 
-class Asked:
-    """A server that is asked over HTTP."""
+class QueryClient:
+    """A client of a server that answers queries over HTTP."""
 
     def __init__(self, server: ServerProcess) -> None:
         self.http = httpx.Client(base_url=f"http://127.0.0.1:{server.port}", timeout=60.0)
@@ -58,7 +58,7 @@ class Asked:
 
 
 @contextmanager
-def _filled(server: ServerProcess) -> Iterator[Asked]:
+def _filled(server: ServerProcess) -> Iterator[QueryClient]:
     """A server with the ten minutes in it, written by the historian's own sink."""
     if server.missing():
         pytest.skip(server.missing())
@@ -70,30 +70,30 @@ def _filled(server: ServerProcess) -> Iterator[Asked]:
         assert appended.stored > 5000 and not appended.refused
         assert store.drain(20.0), store.status()
         store.close()
-        asked = Asked(server)
-        yield asked
-        asked.http.close()
+        client = QueryClient(server)
+        yield client
+        client.http.close()
     finally:
         server.stop()
 
 
 @pytest.fixture(scope="module")
-def metrics_server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Asked]:
+def metrics_server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[QueryClient]:
     server = VictoriaMetrics(tmp_path_factory.mktemp("vm"))
     server.deduplicates = True
-    with _filled(server) as asked:
-        asked.http.post("/api/v1/import/prometheus", content=exposition(END_MS)).raise_for_status()
+    with _filled(server) as client:
+        client.http.post("/api/v1/import/prometheus", content=exposition(END_MS)).raise_for_status()
         server.flush()
-        yield asked
+        yield client
 
 
 @pytest.fixture(scope="module")
-def influx_server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Asked]:
-    with _filled(Influxd(tmp_path_factory.mktemp("influx"))) as asked:
-        yield asked
+def influx_server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[QueryClient]:
+    with _filled(Influxd(tmp_path_factory.mktemp("influx"))) as client:
+        yield client
 
 
-def asked_of_prometheus(server: Asked, expression: str, machine: str = MACHINES[0]) -> list[dict[str, Any]]:
+def asked_of_prometheus(server: QueryClient, expression: str, machine: str = MACHINES[0]) -> list[dict[str, Any]]:
     """The series that answer, as Grafana would ask for the whole ten minutes."""
     for variable, value in (("$machine", machine), ("$__rate_interval", "1m"), ("$__interval", f"{STEP_S}s")):
         expression = expression.replace(variable, value)
@@ -103,7 +103,7 @@ def asked_of_prometheus(server: Asked, expression: str, machine: str = MACHINES[
     return answer["data"]["result"]  # type: ignore[no-any-return]
 
 
-def asked_of_influxdb(server: Asked, query: str, machine: str = MACHINES[0]) -> list[dict[str, Any]]:
+def asked_of_influxdb(server: QueryClient, query: str, machine: str = MACHINES[0]) -> list[dict[str, Any]]:
     between = f"time >= {END_MS - SECONDS * 1000}ms and time <= {END_MS}ms"
     for variable, value in (
         ("${machine:regex}", re.escape(machine)),
@@ -179,7 +179,9 @@ def test_both_stores_have_the_same_panels() -> None:
 
 
 @pytest.mark.parametrize("path", DASHBOARDS, ids=lambda path: f"{path.parent.name}-{path.stem}")
-def test_each_question_of_a_dashboard_is_answered_with_data(path: Path, metrics_server: Asked, influx_server: Asked) -> None:
+def test_each_question_of_a_dashboard_is_answered_with_data(
+    path: Path, metrics_server: QueryClient, influx_server: QueryClient
+) -> None:
     without: list[str] = []
     for name, query in queries(document(path)):
         if kind(query) == "prometheus":
@@ -191,7 +193,7 @@ def test_each_question_of_a_dashboard_is_answered_with_data(path: Path, metrics_
     assert without == []
 
 
-def test_the_list_of_machines_is_found_in_both_stores(metrics_server: Asked, influx_server: Asked) -> None:
+def test_the_list_of_machines_is_found_in_both_stores(metrics_server: QueryClient, influx_server: QueryClient) -> None:
     variables = {
         store: document(FOLDER / store / "machine.json")["templating"]["list"][0] for store in ("victoriametrics", "influxdb")
     }
@@ -207,14 +209,14 @@ def _query(store: str, board: str, name: str) -> dict[str, Any]:
     return dict(queries(document(FOLDER / store / f"{board}.json")))[name]
 
 
-def test_a_value_that_is_bad_now_is_not_drawn_on(metrics_server: Asked) -> None:
+def test_a_value_that_is_bad_now_is_not_drawn_on(metrics_server: QueryClient) -> None:
     load = _query("victoriametrics", "machine", "Spindle load A")["expr"]
     healthy, ended = (points(asked_of_prometheus(metrics_server, load, machine)[0]) for machine in MACHINES)
     assert healthy[-1][0] == END_MS / 1000
     assert END_MS / 1000 - 60 - STEP_S <= ended[-1][0] <= END_MS / 1000 - 60
 
 
-def test_a_tool_change_is_marked_when_it_was(metrics_server: Asked, influx_server: Asked) -> None:
+def test_a_tool_change_is_marked_when_it_was(metrics_server: QueryClient, influx_server: QueryClient) -> None:
     at_s = END_MS / 1000 - SECONDS + TOOL_CHANGE_S[1]
     marked = asked_of_prometheus(metrics_server, _query("victoriametrics", "force", "Another tool")["expr"])
     assert [point[0] for series in marked for point in points(series)] == [pytest.approx(at_s, abs=STEP_S)]
@@ -222,7 +224,7 @@ def test_a_tool_change_is_marked_when_it_was(metrics_server: Asked, influx_serve
     assert [(t_ms / 1000, change) for t_ms, change in found[0]["values"]] == [(at_s, 4.0)]
 
 
-def test_no_peak_is_lost_between_two_points_of_the_screen(metrics_server: Asked, influx_server: Asked) -> None:
+def test_no_peak_is_lost_between_two_points_of_the_screen(metrics_server: QueryClient, influx_server: QueryClient) -> None:
     largest = max(fast(second) for second in range(0, SECONDS, 2))
     drawn = asked_of_prometheus(metrics_server, _query("victoriametrics", "anomaly", "Scores A")["expr"])
     assert max(float(value) for _, value in drawn[0]["values"]) == pytest.approx(largest)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from twin.identification.axis_fit import SIGNALS, AxisFit, AxisRecording, start_of
 from twin.identification.axis_parameters import constants_at, effects_of
 from twin.servo.constants import axis_constants
-from twin.servo.disturbance import Disturbance
+from twin.servo.disturbance import CORRELATIONS_S, Disturbance
 from twin.servo.run import AxisInput, run_axes
 
 Floats = NDArray[np.float64]
@@ -22,7 +22,6 @@ Floats = NDArray[np.float64]
 COURSES = 32
 SEED = 20
 FORCES_N = (0.4, 0.9, 1.8, 3.5)
-CORRELATIONS_S = (0.008, 0.035, 0.15)
 
 
 @dataclass(frozen=True, slots=True)

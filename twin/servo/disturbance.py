@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 Floats = NDArray[np.float64]
+CORRELATIONS_S = (0.008, 0.035, 0.15)
+"""The correlation times that are tried on recordings."""
 
 
 @dataclass(frozen=True, slots=True)

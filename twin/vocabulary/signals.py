@@ -90,6 +90,7 @@ _TABLE = (
     _text("stamp_clock", "the clock that values are stamped by", frozenset({"control", "edge"})),
 )
 SIGNALS = {entry.name: entry for entry in _TABLE}
+OVERRIDES = ("feed_override_pct", "rapid_override_pct", "spindle_override_pct")
 DERIVED = ("tool_change_active", "tool_change_source", "tool_change_evidence")
 # Beside the canonical signals: raw samples of an accelerometer, an array, which the processor `vibration` reads.
 VIBRATION_BLOCK_G, VIBRATION_SAMPLE_RATE_HZ = "vibration_block_g", "vibration_sample_rate_hz"

@@ -41,7 +41,6 @@ MACHINE_GAUGES = {
     "twin_raw_score": (twin_signals.RAW_SCORE, "anomaly score before gates"),
     "twin_adjusted_score": (twin_signals.ADJUSTED_SCORE, "anomaly score that alarms are made of"),
     "twin_spindle_temp_residual_kelvin": (twin_signals.SPINDLE_TEMP_RESIDUAL_K, "measured minus modelled"),
-    "twin_residual_rmse": ("twin/residual_rmse_k", "of the corrected temperature"),
     "twin_gap_growing": (twin_signals.GAP_GROWING, "1 where the gap of some signal grows"),
 }
 

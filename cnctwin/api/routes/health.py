@@ -1,7 +1,6 @@
 """GET /health, /livez, /readyz: which part is missing, and what to do about it."""
 
 import time
-from datetime import UTC, datetime
 from typing import Any
 
 from fastapi import APIRouter
@@ -17,6 +16,7 @@ from cnctwin.jobs.client import FRESH_S_MAX as JOBS_FRESH_S_MAX
 from cnctwin.page import WEB
 from cnctwin.plant.alert_desk import FRESH_S_MAX
 from cnctwin.plant.doctor import COME_AND_GO
+from cnctwin.processes import published_state
 from sparkplug.connection import now_ms
 from twin.vocabulary.nodes import JOBS_NODE, TWIN_NODE_PREFIX, is_twin_node
 
@@ -116,7 +116,7 @@ def _alerts(live: LivePlant) -> Part:
     state = live.alerts()
     if state is None:
         return Part(part="alerts", state="missing", reason="nothing was heard of alerts", do="cnctwin process alerts")
-    age_s = state_age_s(state, time.time())
+    age_s = published_state.age_s(state, time.time())
     if age_s > FRESH_S_MAX:
         line = f"the state of alerts is {age_s:.0f} s old: the processor does not run any more"
         return Part(part="alerts", state="degraded", reason=line, do="cnctwin process alerts")
@@ -138,7 +138,7 @@ def jobs_trouble(state: dict[str, Any] | None) -> str | None:
     """Why the state of jobs cannot be relied on; None where it can."""
     if state is None:
         return "nothing was heard of jobs; does the batch consumer run? (cnctwin jobs run)"
-    age_s = state_age_s(state, time.time())
+    age_s = published_state.age_s(state, time.time())
     if age_s > JOBS_FRESH_S_MAX:
         return f"the state of jobs is {age_s:.0f} s old: the batch consumer does not run any more (cnctwin jobs run)"
     return None
@@ -160,15 +160,3 @@ def _page() -> Part:
             part="page", state="missing", reason="the page's files are not installed", do="install cnctwin from its wheel"
         )
     return Part(part="page", state="ok")
-
-
-def state_age_s(state: dict[str, Any], now_s: float) -> float:
-    """Return the age of a state that says when it was written; infinite where it does not say.
-
-    >>> state_age_s({"at": "1970-01-01T00:01:00.000Z"}, 90.0)
-    30.0
-    """
-    try:
-        return now_s - datetime.fromisoformat(str(state["at"])).astimezone(UTC).timestamp()
-    except (KeyError, ValueError, OverflowError):
-        return float("inf")

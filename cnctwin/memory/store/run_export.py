@@ -2,13 +2,18 @@
 
 import re
 from collections.abc import Mapping
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cnctwin.errors import UsageError
+from cnctwin.files.output import check_suffix
 from cnctwin.memory.store.contract import Column, Query, Store, StoreError
+from cnctwin.memory.store.opening import open_store
 from sparkplug.quality import Quality
-from twin.runlog import AXIS_COLUMN, COLUMNS, TEXT_COLUMNS, RunLog, run_log
+from twin.errors import RunLogError
+from twin.runlog import AXIS_COLUMN, COLUMNS, TEXT_COLUMNS, RunLog, run_log, write_run
 
 _AXIS_POSITION = re.compile(r"^axis_([a-z][a-z0-9]?)_pos_mm$")
 _RENAMED = {"nc_line": "line"}
@@ -24,6 +29,22 @@ def column_name(signal: str) -> str | None:
         return f"{match[1]}_pos_mm"
     name = _RENAMED.get(signal, signal)
     return name if name in COLUMNS | TEXT_COLUMNS or AXIS_COLUMN.match(name) else None
+
+
+def export(
+    where: str | Path, machine: str, span_ms: tuple[int, int], out: Path, *, every_ms: int | None = None, held: bool = False
+) -> int:
+    """Write a stretch of a store as a run log and return its number of rows. Raises ApplicationError in one line."""
+    check_suffix(out)
+    store = open_store(where)
+    try:
+        run = run_of(store, machine, *span_ms, every_ms=every_ms, held=held)
+        write_run(run, out)
+    except (RunLogError, OSError) as error:
+        raise UsageError(f"{out}: {error}") from None
+    finally:
+        store.close()
+    return len(run)
 
 
 def run_of(store: Store, machine: str, from_ms: int, to_ms: int, *, every_ms: int | None = None, held: bool = False) -> RunLog:

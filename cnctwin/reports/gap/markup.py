@@ -57,6 +57,11 @@ def section(identity: str, title: str, lead: str | None, *inside: str | None) ->
     )
 
 
+def tile(term: str, value: str, meaning: str) -> Markup:
+    """A figure that matters: its name, its value, and its meaning in a few words."""
+    return tag("div", tag("dt", term), tag("dd", value, class_="value"), tag("dd", meaning, class_="meaning"))
+
+
 def scrollable(label: str, inside: str) -> Markup:
     """Return markup that may be wider than a small screen; it can be scrolled with the keyboard too."""
     return tag("div", inside, class_="scroll", tabindex="0", role="region", aria_label=label)

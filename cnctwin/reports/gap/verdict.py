@@ -1,6 +1,7 @@
 """The verdict in one sentence, and the figures that matter. Its sign has a shape of its own, so that it needs no colour."""
 
-from cnctwin.reports.gap.markup import Markup, joined, tag
+from cnctwin.reports.gap.markup import Markup, joined, tag, tile
+from cnctwin.reports.gap.sign import DISC, RING, TICK, diamond, drawn, ticked
 from cnctwin.reports.gap.written import known, share, times
 from twin.gap.diagnosis import Diagnosis, GapNumbers, Verdict
 
@@ -10,23 +11,17 @@ _WORD = {
     Verdict.PARTLY: "Partly explained",
     Verdict.UNKNOWN: "Unknown cause",
 }
-_TICK = "M8.5 16.8l5 5 10-11"
 _QUESTION = "M11.6 12.4a4.5 4.5 0 1 1 6.7 4c-1.6.9-2.3 1.8-2.3 3.4M16 23.6v.3"
 
 
 def sign(verdict: Verdict) -> Markup:
     """Healthy: a ring with a tick. Explained: a disc with one. Partly: a disc that is half full. Unknown: a diamond that asks."""
-    ring = tag("circle", cx=16, cy=16, r=13.5, class_="ring")
-    disc = tag("circle", cx=16, cy=16, r=15, class_="disc")
-    shape = {
-        Verdict.HEALTHY: joined([ring, tag("path", d=_TICK, class_="stroke")]),
-        Verdict.EXPLAINED: joined([disc, tag("path", d=_TICK, class_="stroke on")]),
-        Verdict.PARTLY: joined([ring, tag("path", d="M16 2.5a13.5 13.5 0 0 0 0 27z", class_="disc")]),
-        Verdict.UNKNOWN: joined(
-            [tag("path", d="M16 .6 31.4 16 16 31.4.6 16z", class_="disc"), tag("path", d=_QUESTION, class_="stroke on")]
-        ),
+    return {
+        Verdict.HEALTHY: ticked(),
+        Verdict.EXPLAINED: drawn(DISC, tag("path", d=TICK, class_="stroke on")),
+        Verdict.PARTLY: drawn(RING, tag("path", d="M16 2.5a13.5 13.5 0 0 0 0 27z", class_="disc")),
+        Verdict.UNKNOWN: diamond(_QUESTION),
     }[verdict]
-    return tag("svg", shape, viewBox="0 0 32 32", class_="sign", aria_hidden="true", focusable="false")
 
 
 def headline(diagnosis: Diagnosis, title: str) -> Markup:
@@ -46,10 +41,6 @@ def figures(diagnosis: Diagnosis) -> Markup:
     return tag("dl", _change(diagnosis), _closed(diagnosis), _floor(gap), _stated(gap), class_="figures")
 
 
-def _tile(term: str, value: str, meaning: str) -> Markup:
-    return tag("div", tag("dt", term), tag("dd", value, class_="value"), tag("dd", meaning, class_="meaning"))
-
-
 def _times(value: float) -> Markup:
     return joined([times(value), tag("small", " ×")]) if known(value) else joined([times(value)])
 
@@ -57,9 +48,9 @@ def _times(value: float) -> Markup:
 def _change(diagnosis: Diagnosis) -> Markup:
     gap = diagnosis.gap
     if not diagnosis.causes:
-        return _tile("Gap", _times(gap.before), "rms of twin − recording, over the floor")
+        return tile("Gap", _times(gap.before), "rms of twin − recording, over the floor")
     arrow = joined([tag("span", " → ", class_="arrow", aria_hidden="true"), tag("span", " to ", class_="unseen")])
-    return _tile(
+    return tile(
         "Gap, before → after", joined([times(gap.before), arrow, _times(gap.after)]), "rms of twin − recording, over the floor"
     )
 
@@ -67,17 +58,17 @@ def _change(diagnosis: Diagnosis) -> Markup:
 def _closed(diagnosis: Diagnosis) -> Markup:
     gap = diagnosis.gap
     if diagnosis.verdict is Verdict.HEALTHY:
-        return _tile("Closed", "nothing to close", "no gap beyond what repeated runs differ by")
+        return tile("Closed", "nothing to close", "no gap beyond what repeated runs differ by")
     if not diagnosis.causes:
-        return _tile("Closed", "nothing", "no effect of the catalogue is its cause")
+        return tile("Closed", "nothing", "no effect of the catalogue is its cause")
     between = f"{share(gap.closure_low).removesuffix(' %')} … {share(gap.closure_high)}, with 90 % confidence"
     meaning = between if known(gap.closure_low) and known(gap.closure_high) else "of the gap above the floor"
-    return _tile("Closed of what can be closed", share(gap.closure), meaning)
+    return tile("Closed of what can be closed", share(gap.closure), meaning)
 
 
 def _floor(gap: GapNumbers) -> Markup:
-    return _tile("Floor", _times(gap.floor), "what repeated runs of the machine differ by")
+    return tile("Floor", _times(gap.floor), "what repeated runs of the machine differ by")
 
 
 def _stated(gap: GapNumbers) -> Markup:
-    return _tile("As stated", _times(gap.as_stated), "by the machine's file, before its constants were refitted")
+    return tile("As stated", _times(gap.as_stated), "by the machine's file, before its constants were refitted")

@@ -1,10 +1,10 @@
 """The result in one sentence, and the figures that matter. The sign has a shape of its own, so that it needs no colour."""
 
-from cnctwin.reports.gap.markup import Markup, joined, tag
+from cnctwin.reports.gap.markup import Markup, tag, tile
+from cnctwin.reports.gap.sign import diamond, ticked
 from cnctwin.reports.optimisation.quantity import change, column, length_of_time, limit_text, percent, probability, shortened, to
 from twin.optimisation.answer import Optimised
 
-_TICK = "M8.5 16.8l5 5 10-11"
 _WARNING = "M16 8.5v10M16 22.6v.4"
 
 
@@ -34,12 +34,7 @@ def headline(answer: Optimised) -> Markup:
 
 def _sign(kept: bool) -> Markup:
     """A ring with a tick, or a diamond with an exclamation mark."""
-    shape = (
-        joined([tag("circle", cx=16, cy=16, r=13.5, class_="ring"), tag("path", d=_TICK, class_="stroke")])
-        if kept
-        else joined([tag("path", d="M16 .6 31.4 16 16 31.4.6 16z", class_="disc"), tag("path", d=_WARNING, class_="stroke on")])
-    )
-    return tag("svg", shape, viewBox="0 0 32 32", class_="sign", aria_hidden="true", focusable="false")
+    return ticked() if kept else diamond(_WARNING)
 
 
 def counted(count: int, noun: str) -> str:
@@ -55,7 +50,7 @@ def figures(answer: Optimised) -> Markup:
     before, after = answer.before, answer.after
     spoken = length_of_time(after.seconds)
     tiles = [
-        _tile(
+        tile(
             "Time, s",
             to(column(before.seconds), column(after.seconds)),
             change(before.seconds, after.seconds) + (f", now {spoken}" if spoken else ""),
@@ -63,20 +58,16 @@ def figures(answer: Optimised) -> Markup:
     ]
     if after.cost is not None:
         cost = to(column(before.cost), column(after.cost))
-        tiles.append(_tile(f"Cost, {answer.currency}", cost, f"{change(before.cost, after.cost)}, tool wear included"))
+        tiles.append(tile(f"Cost, {answer.currency}", cost, f"{change(before.cost, after.cost)}, tool wear included"))
     limit = limit_text(answer.limits, "force")
     force = to(column(before.force_n, 3), column(after.force_n, 3))
     tiles.append(
-        _tile("Greatest cutting force, N", force, f"limit {shortened(limit, 60)}" if limit else "no limit of force was set")
+        tile("Greatest cutting force, N", force, f"limit {shortened(limit, 60)}" if limit else "no limit of force was set")
     )
     reached = "which a program reaches: exact" if answer.bound.exact else "which no program need reach"
-    tiles.append(_tile("Above the bound", percent(answer.bound.distance), reached))
+    tiles.append(tile("Above the bound", percent(answer.bound.distance), reached))
     if answer.sensitivity is not None:
         asked = answer.sensitivity.asked
         wanted = "planned by the mean twin" if asked is None else f"{probability(asked)} was asked for"
-        tiles.append(_tile("Force limit kept with", probability(answer.sensitivity.kept), wanted))
+        tiles.append(tile("Force limit kept with", probability(answer.sensitivity.kept), wanted))
     return tag("dl", *tiles, class_="figures tiles")
-
-
-def _tile(term: str, value: str, meaning: str) -> Markup:
-    return tag("div", tag("dt", term), tag("dd", value, class_="value"), tag("dd", meaning, class_="meaning"))

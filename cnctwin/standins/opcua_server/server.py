@@ -7,7 +7,6 @@ must not do is counted.
 
 import asyncio
 import gc
-import socket
 import threading
 import time
 from collections.abc import Callable, Collection, Coroutine, Iterator, Mapping
@@ -26,6 +25,7 @@ from asyncua.ua.object_ids import ObjectIds
 from asyncua.ua.status_codes import StatusCodes
 
 from cnctwin.errors import ApplicationError
+from cnctwin.processes.port import free_port
 from cnctwin.standins.opcua_server.address_space import build, variant
 from cnctwin.standins.opcua_server.shown import MODELS, Shown, Value, shown
 from cnctwin.standins.simulated_control.control import SimulatedControl
@@ -83,7 +83,7 @@ class OpcUaServer:
         valid_days: int = 3650,
     ) -> None:
         self.control = control
-        self.port = port or _free_port()
+        self.port = port or free_port()
         self.url = f"opc.tcp://127.0.0.1:{self.port}"
         self.writes = self.calls = 0
         self.slow_s = 0.0
@@ -286,10 +286,3 @@ def _no_collection() -> Iterator[None]:
 
 def _is_named(one: Shown, names: Collection[str]) -> bool:
     return one.path[-1] in names or one.identifier in names
-
-
-def _free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port

@@ -41,7 +41,7 @@ def text_of(source: FocasConfig, device: str, sweep: Sweep, frame: SampleSet) ->
     signals = [offer.signal for offer in frame.offers or () if offer.signal not in nulls]
     lines = [
         f"# Drafted from focas://{source.host}:{source.port}. Values that are not here have their defaults; "
-        "see edge/controls/focas/focas.toml.",
+        "see edge/edge.toml and edge/controls/focas/focas.toml.",
         _comment(f"{told['cnc_type']}i-{told['mt_type']} series {told['series']} version {told['version']}, axes {told['axes']}"),
         "",
         "[machine]",

@@ -13,7 +13,7 @@ from enum import Enum
 from typing import NamedTuple
 
 OK = 0
-RESET, BUSY, HANDLE, NODLL, SOCKET, PROTOCOL = -2, -1, -8, -15, -16, -17
+HANDLE, NODLL, SOCKET, PROTOCOL = -8, -15, -16, -17
 FUNC, LENGTH, NUMBER, DATA, NOOPT = 1, 2, 3, 5, 6
 
 

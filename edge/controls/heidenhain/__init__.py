@@ -1,1 +1,1 @@
-"""The parts of the edge for HEIDENHAIN controls over LSV2."""
+"""HEIDENHAIN controls over LSV2: what is asked for and what it means, PLC addresses, tool calls in the program, read-only."""

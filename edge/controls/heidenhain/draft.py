@@ -24,7 +24,7 @@ def draft(url: str, device: str = "") -> str:
     control = next((str(fact.value) for fact in sweep.facts if fact.key == "control"), "")
     lines = [
         f"# Drafted from {url}, which calls itself {_one_line(control)}.",
-        "# Values that are not here have their defaults; see edge/controls/heidenhain/heidenhain.toml.",
+        "# Values that are not here have their defaults; see edge/edge.toml and edge/controls/heidenhain/heidenhain.toml.",
         "",
         "[machine]",
         f'name = "{_topic_word(device or control.split(" ")[0])}"',

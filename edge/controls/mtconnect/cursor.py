@@ -39,14 +39,13 @@ from edge.controls.mtconnect.documents import (
 from edge.controls.mtconnect.mapping import assign
 from edge.controls.mtconnect.model import DeviceModel
 from edge.errors import ConfigError, DocumentError
-from edge.place import Place
+from edge.place import EDGE_RESTARTED, Place
 from edge.reading import Target, read
 from edge.sample import UNAVAILABLE, ClockReading, Drop, EdgeSample, Gap, Offer, SampleSet
 from sparkplug.quality import Quality
 
 ATTEMPTS_BEFORE_PROBE = 3
 DOCUMENT_MS_MAX = 500  # from its making to the edge, for most documents; those that take longer are outvoted
-EDGE_RESTARTED = "edge restarted"  # the hole of an edge that knows where it was, but not what it had taken
 Config = EdgeConfig[MtconnectConfig]
 
 

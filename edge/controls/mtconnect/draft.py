@@ -39,7 +39,8 @@ def text_of(url: str, device: DeviceModel, machines: list[DeviceModel]) -> str:
     others = _one_line(", ".join(d.name or d.uuid for d in machines if d is not device))
     spindles = _one_line(", ".join(assignment.spindles))
     lines = [
-        f"# Drafted from {url}/probe. Values that are not here have their defaults; see edge/controls/mtconnect/mtconnect.toml.",
+        f"# Drafted from {url}/probe. Values that are not here have their defaults; "
+        "see edge/edge.toml and edge/controls/mtconnect/mtconnect.toml.",
         "",
         "[machine]",
         f"name = {_quoted(_topic_word(name))}",

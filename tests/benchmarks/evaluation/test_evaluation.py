@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from benchmarks.evaluation import events, range_based, volume
 from benchmarks.evaluation.baselines import constant_score, one_feature_score, random_score
-from benchmarks.evaluation.events import Event, delays_s, false_alerts_a_week, found, recall
+from benchmarks.evaluation.events import Event, delays_s, detections, false_alerts_a_week, recall
 from benchmarks.evaluation.range_based import Bias, Range, ranges
 from benchmarks.evaluation.range_based import range_based as measured
 from benchmarks.evaluation.volume import area_pr, vus_pr
@@ -34,20 +34,20 @@ EVENTS = [Event(100.0, 200.0), Event(1000.0, 1100.0)]
     ids=["silence", "at both edges", "too early", "twice is once", "in the grace", "in the wake", "false"],
 )
 def test_what_an_alert_finds(alerts: list[float], delays: tuple, false: int) -> None:
-    result = found(EVENTS, alerts, 2000.0, grace_s=60.0, wake_s=100.0)
+    result = detections(EVENTS, alerts, 2000.0, grace_s=60.0, wake_s=100.0)
     assert (result.delays_s, result.false) == (delays, false)
     assert result.quiet_s == 1600.0
 
 
 def test_parts_are_put_together() -> None:
-    parts = [found(EVENTS, [130.0, 600.0], 302_400.0, wake_s=0.0), found([], [5.0], 302_400.0)]
+    parts = [detections(EVENTS, [130.0, 600.0], 302_400.0, wake_s=0.0), detections([], [5.0], 302_400.0)]
     assert recall(parts).value == 0.5
     assert false_alerts_a_week(parts).value == pytest.approx(2.0, rel=1e-3)
     assert delays_s(parts) == [30.0]
 
 
 def test_events_that_overlap_are_quiet_time_once() -> None:
-    assert found([Event(0.0, 50.0), Event(20.0, 80.0)], [], 100.0, wake_s=10.0).quiet_s == 10.0
+    assert detections([Event(0.0, 50.0), Event(20.0, 80.0)], [], 100.0, wake_s=10.0).quiet_s == 10.0
 
 
 @pytest.mark.parametrize(("hits", "count"), [(0, 5), (5, 5), (3, 10)])

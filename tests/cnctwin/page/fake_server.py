@@ -14,7 +14,7 @@ from typing import Any
 from urllib.parse import parse_qs, unquote, urlsplit
 
 from cnctwin.page import WEB
-from tests.cnctwin.page.simulated_shop import FLEET, Told, fleet_item, row, signals, value_object
+from tests.cnctwin.page.simulated_shop import FLEET, SignalValue, fleet_item, row, signals, value_object
 from tests.wire.mosquitto import free_port
 
 POLICY = (
@@ -23,7 +23,7 @@ POLICY = (
 TYPES = {".html": "text/html; charset=utf-8", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
 KEYS = {*FLEET.values(), "twin/gap_spindle_temp_c", "twin/gap_spindle_load_pct"}
 Answer = tuple[int, Any]
-Values = Mapping[str, Told]
+Values = Mapping[str, SignalValue]
 
 
 def now_ms() -> int:
@@ -37,13 +37,13 @@ class Shop:
         self.numbers = {name: number for number, name in enumerate(machines)}
         self.period_s = period_s
         self.offline_since: dict[str, int] = {}
-        self.other: dict[str, dict[str, Told]] = {}
+        self.other: dict[str, dict[str, SignalValue]] = {}
         self.answers: dict[str, Callable[[str, dict[str, Any] | None], Answer]] = {}
         self.token: str | None = None
         self.broker = True
         self.posted: list[tuple[str, Any]] = []
 
-    def told(self, machine: str, t_ms: int) -> tuple[dict[str, Told], int]:
+    def told(self, machine: str, t_ms: int) -> tuple[dict[str, SignalValue], int]:
         """What a machine says at a moment, and of when that is."""
         t_ms = min(t_ms, self.offline_since.get(machine, t_ms))
         return {**signals(self.numbers[machine], t_ms / 1000.0), **self.other.get(machine, {})}, t_ms
@@ -234,7 +234,7 @@ class _Handler(BaseHTTPRequestHandler):
         self.end_headers()
         self.close_connection = True
         self._event("fleet" if machine is None else "state", shop.fleet() if machine is None else shop.state(machine))
-        before: dict[tuple[str, str], Told] = {}
+        before: dict[tuple[str, str], SignalValue] = {}
         offline = dict(shop.offline_since)
         while not self.stop.wait(shop.period_s):
             now = now_ms()

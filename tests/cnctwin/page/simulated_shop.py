@@ -18,8 +18,8 @@ THRESHOLD = 0.12
 MODELLED, INFERRED = "modelled", "inferred"
 
 
-class Told(NamedTuple):
-    """A value with what a birth certificate says of it."""
+class SignalValue(NamedTuple):
+    """The value of a signal, with what its birth certificate states."""
 
     value: Value
     unit: str | None = None
@@ -27,7 +27,7 @@ class Told(NamedTuple):
     reason: str | None = None
 
 
-def signals(number: int, at_s: float) -> dict[str, Told]:
+def signals(number: int, at_s: float) -> dict[str, SignalValue]:
     """All signals of machine `number`; the third of each four holds its feed, the fourth has no score."""
     _, into_s = divmod(at_s + 17.0 * number, CYCLE_S)
     held = number % 4 == 2
@@ -48,47 +48,52 @@ def signals(number: int, at_s: float) -> dict[str, Told]:
         + (0.22 if changing else 0.0)
     )
     gate = not held and (changing or 9.0 < into_s < 23.0)
-    told = {
-        "exec_state": Told("FEED_HOLD" if held else "ACTIVE"),
-        "controller_mode": Told("AUTOMATIC"),
-        "program": Told("BASE-PLATE.NC" if number % 3 else "HOUSING_2024-11_FIXTURE-B.NC"),
-        "nc_block": Told(block),
-        "nc_line": Told(40 + int(into_s * 3)),
-        "tool_number": Told(tool),
-        "tool_change_active": Told(changing),
-        "spindle_rpm": Told(rpm_now, "rev/min"),
-        "spindle_rpm_cmd": Told(0 if held else rpm, "rev/min"),
-        "spindle_load_pct": Told(load_now, "%"),
-        "feed_mm_min": Told(0 if held else feed, "mm/min"),
-        "feed_override_pct": Told(0 if held else 100, "%"),
-        "axis_x_load_pct": Told(round(12 + 3 * math.sin(at_s), 1), "%"),
-        "axis_z_load_pct": Told(round(28 + 2 * math.sin(at_s / 2), 1), "%"),
-        "coolant_on": Told(not changing),
-        "alarm": Told(""),
-        "spindle_temp_c": Told(round(22.0 + rise + off, 1), "°C"),
-        "ambient_temp_c": Told(22.0, "°C"),
-        "vibration_rms_g": Told(round(0.02 + load_now / 160.0, 3), "g"),
-        "twin/spindle_temp_c": Told(round(22.0 + rise, 2), "°C", MODELLED),
-        "twin/spindle_temp_residual_k": Told(round(off, 2), "K", MODELLED),
-        "twin/gap_growing": Told(number % 7 == 3, None, INFERRED),
-        "twin/gap_spindle_temp_c": Told(round(3.1 + 0.2 * number, 2), "floors", INFERRED),
-        "twin/gap_spindle_load_pct": Told(1.2, "floors", INFERRED),
-        "twin/tool_change_gate": Told(gate, None, INFERRED),
-        "twin/alert_state": Told("firing" if number % 9 == 5 else "none"),
+    values = {
+        "exec_state": SignalValue("FEED_HOLD" if held else "ACTIVE"),
+        "controller_mode": SignalValue("AUTOMATIC"),
+        "program": SignalValue("BASE-PLATE.NC" if number % 3 else "HOUSING_2024-11_FIXTURE-B.NC"),
+        "nc_block": SignalValue(block),
+        "nc_line": SignalValue(40 + int(into_s * 3)),
+        "tool_number": SignalValue(tool),
+        "tool_change_active": SignalValue(changing),
+        "spindle_rpm": SignalValue(rpm_now, "rev/min"),
+        "spindle_rpm_cmd": SignalValue(0 if held else rpm, "rev/min"),
+        "spindle_load_pct": SignalValue(load_now, "%"),
+        "feed_mm_min": SignalValue(0 if held else feed, "mm/min"),
+        "feed_override_pct": SignalValue(0 if held else 100, "%"),
+        "axis_x_load_pct": SignalValue(round(12 + 3 * math.sin(at_s), 1), "%"),
+        "axis_z_load_pct": SignalValue(round(28 + 2 * math.sin(at_s / 2), 1), "%"),
+        "coolant_on": SignalValue(not changing),
+        "alarm": SignalValue(""),
+        "spindle_temp_c": SignalValue(round(22.0 + rise + off, 1), "°C"),
+        "ambient_temp_c": SignalValue(22.0, "°C"),
+        "vibration_rms_g": SignalValue(round(0.02 + load_now / 160.0, 3), "g"),
+        "twin/spindle_temp_c": SignalValue(round(22.0 + rise, 2), "°C", MODELLED),
+        "twin/spindle_temp_residual_k": SignalValue(round(off, 2), "K", MODELLED),
+        "twin/gap_growing": SignalValue(number % 7 == 3, None, INFERRED),
+        "twin/gap_spindle_temp_c": SignalValue(round(3.1 + 0.2 * number, 2), "floors", INFERRED),
+        "twin/gap_spindle_load_pct": SignalValue(1.2, "floors", INFERRED),
+        "twin/tool_change_gate": SignalValue(gate, None, INFERRED),
+        "twin/alert_state": SignalValue("firing" if number % 9 == 5 else "none"),
     }
     if number % 4 == 3:
         why = "no model was given: [joint_anomaly] models names no folder"
-        told |= {f"twin/{name}": Told(None, None, INFERRED, why) for name in ("raw_score", "adjusted_score", "anomaly_threshold")}
+        values |= {
+            f"twin/{name}": SignalValue(None, None, INFERRED, why)
+            for name in ("raw_score", "adjusted_score", "anomaly_threshold")
+        }
     else:
-        told["twin/raw_score"] = Told(round(raw, 4), None, INFERRED)
-        told["twin/adjusted_score"] = Told(0.0 if gate else round(raw, 4), None, INFERRED)
-        told["twin/anomaly_threshold"] = Told(THRESHOLD, None, INFERRED)
+        values["twin/raw_score"] = SignalValue(round(raw, 4), None, INFERRED)
+        values["twin/adjusted_score"] = SignalValue(0.0 if gate else round(raw, 4), None, INFERRED)
+        values["twin/anomaly_threshold"] = SignalValue(THRESHOLD, None, INFERRED)
     if rpm_now < 50:
-        told["twin/cutting_force_n"] = Told(None, "N", INFERRED, "spindle below 50 rev/min: power over speed means nothing")
+        values["twin/cutting_force_n"] = SignalValue(
+            None, "N", INFERRED, "spindle below 50 rev/min: power over speed means nothing"
+        )
     else:
         force = 60000.0 * 0.85 * load_now / 100.0 * 7.5 / (math.pi * 12.0 * rpm_now) * 1000.0
-        told["twin/cutting_force_n"] = Told(round(force, 0), "N", INFERRED)
-    return told
+        values["twin/cutting_force_n"] = SignalValue(round(force, 0), "N", INFERRED)
+    return values
 
 
 def _phase(into_s: float) -> tuple[float, tuple[float, int | None, int, float, int, str]]:
@@ -99,15 +104,15 @@ def _phase(into_s: float) -> tuple[float, tuple[float, int | None, int, float, i
     return 0.0, PROGRAM[0]
 
 
-def value_object(told: Told, t_ms: int) -> dict[str, Any]:
+def value_object(signal: SignalValue, t_ms: int) -> dict[str, Any]:
     """As the interface gives it."""
-    said: dict[str, Any] = {"value": told.value, "t": t_ms, "unit": told.unit, "quality": "bad" if told.reason else "good"}
-    return {**said, "provenance": told.provenance, **({"reason": told.reason} if told.reason else {})}
+    said: dict[str, Any] = {"value": signal.value, "t": t_ms, "unit": signal.unit, "quality": "bad" if signal.reason else "good"}
+    return {**said, "provenance": signal.provenance, **({"reason": signal.reason} if signal.reason else {})}
 
 
-def row(name: str, told: Told, t_ms: int) -> list[Any]:
+def row(name: str, signal: SignalValue, t_ms: int) -> list[Any]:
     """As the stream gives it."""
-    return [t_ms, name, told.value, "bad" if told.reason else "good", told.reason]
+    return [t_ms, name, signal.value, "bad" if signal.reason else "good", signal.reason]
 
 
 FLEET = {
@@ -125,8 +130,8 @@ FLEET = {
 }
 
 
-def fleet_item(machine: str, told: Mapping[str, Told], t_ms: int, *, online: bool) -> dict[str, Any]:
+def fleet_item(machine: str, values: Mapping[str, SignalValue], t_ms: int, *, online: bool) -> dict[str, Any]:
     """A machine in short."""
-    item: dict[str, Any] = {key: told[name].value if name in told else None for key, name in FLEET.items()}
-    gaps = [one.value for name, one in told.items() if name.startswith("twin/gap_") and isinstance(one.value, float)]
+    item: dict[str, Any] = {key: values[name].value if name in values else None for key, name in FLEET.items()}
+    gaps = [one.value for name, one in values.items() if name.startswith("twin/gap_") and isinstance(one.value, float)]
     return {"machine": machine, "online": online, **item, "gap": max(gaps, default=None), "last_t": t_ms}

@@ -19,12 +19,12 @@ from sparkplug.quality import Quality
 from sparkplug.values import PropertySet, PropertyValue
 from tests.cnctwin.page.conftest import Visit
 from tests.cnctwin.page.fake_server import now_ms
-from tests.cnctwin.page.simulated_shop import Told, signals
+from tests.cnctwin.page.simulated_shop import SignalValue, signals
 
 EDGE, TWIN = NodeId("cnc", "edge-vmc"), NodeId("cnc", "twin-thermal")
 
 
-def event(kind: EventKind, node: NodeId, told: Mapping[str, Told], t_ms: int, quality: Quality | None = None) -> HostEvent:
+def event(kind: EventKind, node: NodeId, told: Mapping[str, SignalValue], t_ms: int, quality: Quality | None = None) -> HostEvent:
     """What a host application hears of the node; twins come of a node of their own."""
     is_twin = node is TWIN
     readings = tuple(

@@ -8,7 +8,7 @@ from playwright.sync_api import Browser, Page, expect
 from tests.cnctwin.page.conftest import SIZES, WAIT_MS_MAX, Visit
 from tests.cnctwin.page.documents import alerts, job
 from tests.cnctwin.page.fake_server import FakeServer, Shop, now_ms
-from tests.cnctwin.page.simulated_shop import Told
+from tests.cnctwin.page.simulated_shop import SignalValue
 
 VIEWS = ("fleet", "machine/vmc", "gap/vmc", "gap/mill-01", "alerts", "replay/vmc", "validation/vmc", "jobs")
 HOSTILE = '<img src=x onerror="window.hacked=1">'
@@ -61,7 +61,7 @@ def test_each_figure_says_where_it_comes_from_and_how_old_it_is(visit: Visit) ->
 
 
 def test_what_a_model_learned_stands_beside_the_physics_and_never_in_its_place(visit: Visit, shop: Shop) -> None:
-    shop.other["vmc"] = {"twin/spindle_temp_corrected_c": Told(31.4, "°C", "inferred")}
+    shop.other["vmc"] = {"twin/spindle_temp_corrected_c": SignalValue(31.4, "°C", "inferred")}
     page = visit.open("#/machine/vmc")
     tile = page.locator('[data-tile="spindle_temp_c"]')
     expect(tile).to_contain_text(re.compile(r"twin.*\d.*learned too.*31\.4.*gap.*\d"))
@@ -79,12 +79,12 @@ def test_the_signal_that_is_charted_can_be_chosen(visit: Visit) -> None:
 
 
 def test_a_chart_is_not_made_anew_when_the_tool_changes(visit: Visit, shop: Shop) -> None:
-    shop.other["vmc"] = {"tool_number": Told(5)}
+    shop.other["vmc"] = {"tool_number": SignalValue(5)}
     page = visit.open("#/machine/vmc")
     expect(page.locator(".machine-head .job")).to_contain_text("T5")
     page.evaluate("document.querySelector('.panel.own canvas').dataset.mine = 'yes'")
     for number in (None, 3):
-        shop.other["vmc"] = {"tool_number": Told(number)}
+        shop.other["vmc"] = {"tool_number": SignalValue(number)}
         expect(page.locator(".machine-head .job")).to_have_text(re.compile(r"T3" if number else r"NC · line"))
     assert page.evaluate("document.querySelector('.panel.own canvas').dataset.mine") == "yes"
 
@@ -100,7 +100,7 @@ def test_the_last_minutes_are_there_before_they_were_looked_at(visit: Visit) -> 
 
 def test_a_null_shows_its_reason(visit: Visit, shop: Shop) -> None:
     reason = "spindle below 50 rev/min: power over speed means nothing"
-    shop.other["vmc"] = {"twin/cutting_force_n": Told(None, "N", "inferred", reason)}
+    shop.other["vmc"] = {"twin/cutting_force_n": SignalValue(None, "N", "inferred", reason)}
     page = visit.open("#/machine/vmc")
     tile = page.locator('[data-tile="cutting_force"]')
     expect(tile.locator(".big .figure")).to_have_text("–")
@@ -249,9 +249,9 @@ def test_the_whole_page_can_be_gone_through_by_keyboard(visit: Visit) -> None:
 
 
 def test_text_from_a_machine_stays_text(visit: Visit, shop: Shop) -> None:
-    told = Told(HOSTILE)
+    told = SignalValue(HOSTILE)
     shop.other["vmc"] = dict.fromkeys(("program", "nc_block", "alarm", "exec_state"), told) | {
-        "twin/raw_score": Told(None, None, "inferred", HOSTILE)
+        "twin/raw_score": SignalValue(None, None, "inferred", HOSTILE)
     }
     hostile = alerts(["vmc", HOSTILE])
     hostile["alerts"][0] |= {"comment": HOSTILE, "acknowledged_by": HOSTILE, "phase": "acknowledged"}

@@ -13,20 +13,18 @@ from numpy.typing import NDArray
 from twin.gap.floors import Floors
 from twin.gap.labels import regimes_of
 from twin.gap.stages.axis import LANES, axis_effects
-from twin.gap.stages.axis_run import AxisRunData
+from twin.gap.stages.axis_run import OUTPUTS, AxisRunData
 from twin.machine import MachineFile
 from twin.runlog import RunLog
 from twin.servo.constants import axis_constants
-from twin.servo.disturbance import Disturbance
+from twin.servo.disturbance import CORRELATIONS_S, Disturbance
 from twin.servo.run import AxisInput, run_axes
 from twin.simulator.recorded import noise_of, start_of
 
 Floats = NDArray[np.float64]
 Spread = Mapping[tuple[str, str], float]
 FORCES_N = (0.3, 0.6, 1.2, 2.4, 4.8)
-CORRELATIONS_S = (0.008, 0.035, 0.15)
 TICKS_MAX = 30_000
-COLUMNS = {"pos_mm": "position_mm", "torque_a": "torque_a", "table_mm": "table_mm"}
 
 
 def disturbance_of_repeats(
@@ -55,7 +53,7 @@ def expected_spread(
     spread: dict[tuple[str, str], float] = {}
     for number, (letter, log, data) in enumerate(axes):
         variances = _variances(machine, letter, log, data, disturbance, number)
-        for column, output in COLUMNS.items():
+        for column, output in OUTPUTS.items():
             signal = f"{letter}_{column}"
             if not log.has(signal):
                 continue
@@ -72,7 +70,7 @@ def _variances(
 ) -> dict[str, Floats]:
     ticks = min(len(log), TICKS_MAX)
     if disturbance is None:
-        return {output: np.zeros(ticks) for output in COLUMNS.values()}
+        return {output: np.zeros(ticks) for output in OUTPUTS.values()}
     axis, period_s = machine.axes[letter], machine.machine.servo_period_s
     constants = {name: np.full(LANES, value) for name, value in axis_constants(axis).items()}
     if axis.screw_lead_mm is None:
@@ -87,7 +85,7 @@ def _variances(
         AxisInput(np.broadcast_to(data.reference_mm[:ticks], (LANES, ticks)), np.arange(LANES), force),
         period_s=period_s,
         effects=tuple(e.name for e in axis_effects()),
-        outputs=tuple(COLUMNS.values()),
+        outputs=tuple(OUTPUTS.values()),
         start=start_of(log, letter, axis, period_s),
     )
-    return {output: run.outputs[output].var(axis=0) for output in COLUMNS.values()}
+    return {output: run.outputs[output].var(axis=0) for output in OUTPUTS.values()}
