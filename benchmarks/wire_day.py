@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What goes over the wire of a recorded day, as digests: equal on two checkouts, the wire is byte-identical.
+"""The wire of a recorded day, as digests: where two checkouts print the same, their wire is byte-identical.
 
     .venv/bin/python benchmarks/wire_day.py okuma.txt --devices okuma_devices.xml [--device NAME] [--rows N] [--json]
 
@@ -92,7 +92,7 @@ class Processing:
         self._declared: set[str] = set()
 
     def send(self, effects: Iterable[Effect], at_ms: int) -> list[Sent]:
-        """What the engine asks for, as its worker does it."""
+        """Carry out what the engine asks for, as its worker does; return the messages sent."""
         sent: list[Sent] = []
         for effect in effects:
             if isinstance(effect, Publish) and effect.machine in self._declared:
@@ -138,7 +138,7 @@ class Plant:
         self._deliver(self._edge.declare("day", metrics, at_ms), at_ms)
 
     def row(self, row: Iterable[EdgeSample], at_ms: int) -> None:
-        """What changed at one time."""
+        """Publish a row of changes of one time."""
         changes = [Change(s.signal, s.value, s.timestamp_ms, s.quality, s.reason) for s in row]
         self._deliver(self._edge.publish("day", changes, at_ms), at_ms)
 
@@ -160,7 +160,7 @@ class Plant:
                             waiting.extend(one.send(one.engine.feed(event, at_ms / 1000), at_ms))
 
     def digests(self) -> dict[str, dict[str, dict[str, str | int]]]:
-        """Of each sender: its Sparkplug messages, plain messages and states."""
+        """Return the digests of each sender: its Sparkplug messages, plain messages and states."""
         found = {"edge": {"sparkplug": self._edge.digest.as_json()}}
         for one in self._processing:
             parts = {"sparkplug": one.sender.digest.as_json(), "plain": one.plain.as_json(), "snapshots": one.snapshots()}
