@@ -1,4 +1,4 @@
-"""How much the suite tries: a slice that is done in a quarter of an hour, or all of it with CNCTWIN_FULL=1.
+"""The depth of the suite: a slice that takes less than a quarter of an hour, or all of it with CNCTWIN_FULL=1.
 
 The slice tries the same examples everywhere, the full run draws new ones each time (tests/conftest.py).
 """

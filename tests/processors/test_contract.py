@@ -50,7 +50,7 @@ def test_the_sample_configuration_loads_and_equals_the_defaults(processor: AnyPr
 
 @every_processor
 def test_every_section_of_the_sample_configuration_holds_every_key_at_its_default(processor: AnyProcessor) -> None:
-    """What TOML cannot say (no value at all) stands there as a comment, and so may a whole section."""
+    """A value that TOML has no word for (none at all) stands in the sample as a comment, and so may a whole section."""
     path = sample_configuration(processor)
     given = read_tables(path)[processor.name]
     defaults = processor.config().model_dump(mode="json")

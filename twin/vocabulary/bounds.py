@@ -1,4 +1,4 @@
-"""What no spindle reaches: beyond it a figure is not a speed or a load, whatever its quality says.
+"""Bounds that no spindle reaches: a figure beyond them is not a speed or a load, whatever its quality says.
 
 Wider than the canonical signals' own limits (`signals.py`), since an edge of somebody else's may publish without them.
 """

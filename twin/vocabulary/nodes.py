@@ -25,6 +25,6 @@ def is_twin_node(node: str) -> bool:
 
 HISTORIAN_NODE = twin_node("historian")
 JOBS_NODE = twin_node("jobs")
-"""Of the jobs consumer: what it publishes is about jobs, and no processor's input."""
+"""The node of the jobs consumer: what it publishes is about jobs, and no processor's input."""
 VALIDATION_NODE = twin_node("validation")
-"""Of the nightly validation, which publishes its figures and ends."""
+"""The node of the nightly validation, which publishes its figures and ends."""

@@ -21,7 +21,7 @@ CONTROLLER_MODES = frozenset({"AUTOMATIC", "MANUAL", "MANUAL_DATA_INPUT", "SEMI_
 
 
 class Kind(Enum):
-    """What values of a signal are."""
+    """The kind of a signal's values."""
 
     NUMBER = "number"
     INTEGER = "integer"

@@ -5,7 +5,7 @@
 """
 
 OWN = "cnctwin/"
-"""What only our own processes and commands write: everything below belongs to them."""
+"""The prefix of topics that only our own processes and commands write."""
 
 ALERTS = f"{OWN}alerts/"
 ALERT_STATE = f"{ALERTS}state"

@@ -45,7 +45,7 @@ GAP_WINDOW = f"{GAP_PREFIX}window"
 GAP_LEFT_OUT_PCT = f"{GAP_PREFIX}left_out_pct"
 GAP_BASIS = f"{GAP_PREFIX}basis"
 GAP_NOTES = frozenset({GAP_GROWING, GAP_GROWING_SIGNAL, GAP_WINDOW, GAP_LEFT_OUT_PCT, GAP_BASIS})
-"""What is published about the comparison, beside the gaps themselves."""
+"""Metrics about the comparison, published beside the gaps themselves."""
 
 # rules
 RULE_PREFIX = f"{TWIN_PREFIX}rule_"

@@ -1,4 +1,4 @@
-"""What the bounded rings share: a transaction is all or nothing, and the limits have an order."""
+"""The shared part of the bounded rings: a transaction is all or nothing, and the limits have an order."""
 
 import sqlite3
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What every store answers (`tests/cnctwin/memory/store/influx/suite.py`), answered by the embedded one: hot, and sealed."""
+"""The suite of every store (`tests/cnctwin/memory/store/influx/suite.py`), run on the embedded one: hot, and sealed."""
 
 from pathlib import Path
 

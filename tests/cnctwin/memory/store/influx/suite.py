@@ -1,4 +1,4 @@
-"""What every store answers, wherever its bytes lie. Subclass it and give `opened`, a fixture that opens the same place each time.
+"""The suite of every store, wherever its bytes lie. Subclass it and give `opened`, a fixture that opens the same place each time.
 
 class TestEmbedded(StoreSuite):
     @pytest.fixture
