@@ -17,7 +17,8 @@ from tests.wire.proxy import Proxy
 # How long an example takes says more of the machine that it runs on than of the code. The examples of a law follow from its own
 # source, so that it fails in every clone or in none (tests/test_same_examples.py); CNCTWIN_FULL=1 draws new ones each time.
 settings.register_profile("house", deadline=None, max_examples=EXAMPLES, derandomize=True, database=None)
-settings.register_profile("random", deadline=None, max_examples=EXAMPLES, print_blob=True)
+# Where the environment says CI, Hypothesis is derandomised unless it is told otherwise.
+settings.register_profile("random", deadline=None, max_examples=EXAMPLES, derandomize=False, print_blob=True)
 settings.load_profile("random" if IS_FULL else "house")
 if not IS_FULL:
     # Hypothesis also draws constants that it reads in our modules, in those that are imported by then: a law's examples would

@@ -31,7 +31,7 @@ for run in runs:
 def examples(folder: Path, full: str, seed: str, *imported: str) -> tuple[str, str]:
     """Return what two runs of the law are tried on, in a process with those modules `imported` and hashes seeded by `seed`."""
     (folder / "law.py").write_text(LAW)
-    environment = os.environ | {"CNCTWIN_FULL": full, "PYTHONHASHSEED": seed, "PYTHONPATH": str(ROOT)}
+    environment = os.environ | {"CI": "true", "CNCTWIN_FULL": full, "PYTHONHASHSEED": seed, "PYTHONPATH": str(ROOT)}
     done = subprocess.run(
         [sys.executable, "law.py", *imported], cwd=folder, env=environment, capture_output=True, text=True, check=False
     )
