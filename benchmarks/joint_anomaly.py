@@ -22,9 +22,9 @@ from typing import Any
 import numpy as np
 from sklearn.ensemble import IsolationForest
 
+from processors.actions import Action, Publish
 from processors.config import Configuration
 from processors.contract import Output
-from processors.effects import Effect, Publish
 from processors.joint_anomaly.config import Config
 from processors.joint_anomaly.processor import PROCESSOR, RAW, State
 from processors.joint_anomaly.scoring import scorings
@@ -134,9 +134,9 @@ def later(event: HostEvent) -> tuple[Reading, ...]:
     return tuple(reading._replace(timestamp_ms=reading.timestamp_ms + TICK_MS) for reading in event.readings)
 
 
-def published(effects: Sequence[Effect]) -> list[Change]:
+def published(actions: Sequence[Action]) -> list[Change]:
     """All values that go out."""
-    return [change for effect in effects if isinstance(effect, Publish) for change in effect.changes]
+    return [change for action in actions if isinstance(action, Publish) for change in action.changes]
 
 
 def nothing(config: Configuration[Config], state: State, sample: Sample) -> tuple[State, tuple[()]]:

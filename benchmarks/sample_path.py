@@ -34,9 +34,9 @@ from paho.mqtt.enums import CallbackAPIVersion
 
 from cnctwin.processes.port import free_port
 from cnctwin.processes.private_broker import PrivateBroker
+from processors.actions import Publish as PublishAction
 from processors.config import Configuration, ProcessorConfig
 from processors.contract import NoState, Output, OutputSpec, Processor, Provenance, Sample, SampleKind
-from processors.effects import Publish as PublishEffect
 from processors.running.engine import Engine
 from processors.running.health import node_metrics
 from processors.running.worker import Worker
@@ -290,11 +290,11 @@ def stages(count: int) -> dict[str, float]:
     for message in births:
         for event in session.message(message.topic, message.payload, START_MS):
             engine.feed(event, 0.0)
-    events, effects = [], []
+    events, actions = [], []
     result = {"floor": timed(lambda: [floor_step(message.payload) for message in data] and None, count)}
     result["decode"] = timed(lambda: [events.extend(session.message(m.topic, m.payload, START_MS)) for m in data] and None, count)
-    result["fold"] = timed(lambda: [effects.extend(engine.feed(event, 0.0)) for event in events] and None, count)
-    published = [effect for effect in effects if isinstance(effect, PublishEffect)]
+    result["fold"] = timed(lambda: [actions.extend(engine.feed(event, 0.0)) for event in events] and None, count)
+    published = [action for action in actions if isinstance(action, PublishAction)]
     assert len(published) == count, "every message must bring a result"
     result["encode"] = timed(lambda: [out.publish(e.machine, e.changes, START_MS) for e in published] and None, count)
     return result

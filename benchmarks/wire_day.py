@@ -21,9 +21,9 @@ from random import Random
 from cnctwin.importing.shdr import recorded_rows
 from edge.running.birth import device_metrics
 from edge.sample import EdgeSample, Offer
+from processors.actions import Action, Declare, Publish, PublishPlain, Remove
 from processors.config import Configuration
 from processors.discovery import AnyProcessor, discover
-from processors.effects import Declare, Effect, Publish, PublishPlain, Remove
 from processors.running.engine import Engine
 from sparkplug.actions import Publish as Sent
 from sparkplug.edge_session import EdgeNodeSession
@@ -91,21 +91,21 @@ class Processing:
         self._specs = [spec.metric() for spec in processor.outputs]
         self._declared: set[str] = set()
 
-    def send(self, effects: Iterable[Effect], at_ms: int) -> list[Sent]:
+    def send(self, actions: Iterable[Action], at_ms: int) -> list[Sent]:
         """Carry out what the engine asks for, as its worker does; return the messages sent."""
         sent: list[Sent] = []
-        for effect in effects:
-            if isinstance(effect, Publish) and effect.machine in self._declared:
-                sent += self.sender.publish(effect.machine, effect.changes, at_ms)
-            elif isinstance(effect, PublishPlain):
-                self.plain.take(effect.topic, effect.payload)
-            elif isinstance(effect, Declare):
-                latest = {change.name: change for change in effect.latest}
-                self._declared.add(effect.machine)
-                sent += self.sender.declare(effect.machine, [_valued(spec, latest) for spec in self._specs], at_ms)
-            elif isinstance(effect, Remove) and effect.machine in self._declared:
-                self._declared.discard(effect.machine)
-                sent += self.sender.remove(effect.machine, at_ms)
+        for action in actions:
+            if isinstance(action, Publish) and action.machine in self._declared:
+                sent += self.sender.publish(action.machine, action.changes, at_ms)
+            elif isinstance(action, PublishPlain):
+                self.plain.take(action.topic, action.payload)
+            elif isinstance(action, Declare):
+                latest = {change.name: change for change in action.latest}
+                self._declared.add(action.machine)
+                sent += self.sender.declare(action.machine, [_valued(spec, latest) for spec in self._specs], at_ms)
+            elif isinstance(action, Remove) and action.machine in self._declared:
+                self._declared.discard(action.machine)
+                sent += self.sender.remove(action.machine, at_ms)
         return sent
 
     def snapshots(self) -> dict[str, str | int]:
@@ -145,8 +145,8 @@ class Plant:
     def silence(self, at_ms: int) -> None:
         """A moment at which nothing comes."""
         for one in self._processing:
-            effects = [*one.engine.silence(at_ms / 1000), *one.engine.beat(at_ms)]
-            self._deliver(one.send(effects, at_ms), at_ms)
+            actions = [*one.engine.silence(at_ms / 1000), *one.engine.beat(at_ms)]
+            self._deliver(one.send(actions, at_ms), at_ms)
 
     def _deliver(self, messages: Iterable[Sent], at_ms: int) -> None:
         """Every processor hears every message; what they publish of it comes behind what is on its way."""

@@ -12,8 +12,8 @@ from dataclasses import dataclass, is_dataclass
 from enum import Enum
 from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 
+from processors.actions import Pin
 from processors.config import ALL, CellConfig, Configuration, ProcessorConfig
-from processors.effects import Pin
 from processors.errors import DeclarationError
 from processors.sample import Sample, SampleKind
 from sparkplug.datatype import DataType

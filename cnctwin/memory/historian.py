@@ -17,7 +17,7 @@ from cnctwin.memory.store.retention import Retention
 from edge.running.forwarder import SEQUENCE
 from edge.running.receipts import RECEIPT, REPEAT_S
 from edge.running.spans import Spans
-from processors.effects import Pin
+from processors.actions import Pin
 from processors.historian import HistorianConfig
 from processors.running.ports import Receipt
 from sparkplug.host_session import EventKind, HostEvent

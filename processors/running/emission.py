@@ -4,9 +4,9 @@ import math
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
 
+from processors.actions import PublishPlain
 from processors.contract import PYTHON_TYPES, Output, OutputSpec, PlainOutput, PlainSpec
 from processors.discovery import AnyProcessor
-from processors.effects import PublishPlain
 from processors.errors import OutputError
 from sparkplug.metric import Change
 from sparkplug.quality import Quality

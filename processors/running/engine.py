@@ -8,9 +8,9 @@ import itertools
 from collections.abc import Callable, Collection, Mapping
 from operator import itemgetter
 
+from processors.actions import Action, Declare, PublishPlain, Remove
 from processors.config import Configuration, ProcessorConfig
 from processors.discovery import AnyProcessor
-from processors.effects import Declare, Effect, PublishPlain, Remove
 from processors.errors import SnapshotError
 from processors.running.counts import Counts
 from processors.running.fold import Fold, Folded
@@ -29,7 +29,7 @@ _IS_HISTORICAL: Callable[[Reading], bool] = itemgetter(Reading._fields.index("is
 
 
 class Engine:
-    """See the module. Every method that returns effects has already counted what it did; nobody else counts.
+    """See the module. Every method that returns actions has already counted what it did; nobody else counts.
 
     Only what is an input of another processor tells this one the time (`is_of_twin`): it may stamp by the wall's clock.
     """
@@ -76,7 +76,7 @@ class Engine:
         if self.is_message(event):
             self.ledger.count(() if has_room else (DropReason.QUEUE_FULL,))
 
-    def feed(self, event: HostEvent, wall_s: float, *, has_waited: bool = False) -> list[Effect]:
+    def feed(self, event: HostEvent, wall_s: float, *, has_waited: bool = False) -> list[Action]:
         """Take one event; `wall_s` is any clock that only goes forward. `has_waited`: `received` has counted it."""
         kind, node, device = event.kind, event.node, event.device
         self._emitted_before = self.ledger.emitted
@@ -87,20 +87,20 @@ class Engine:
             return self._node_event(event)
         machine = self._machines.get(device)
         if kind is EventKind.HOLE:  # no message
-            effects = [] if machine is None else machine.live.lost(event.detail)
+            actions = [] if machine is None else machine.live.lost(event.detail)
         else:
             if kind is EventKind.DATA:
-                effects, fates = self._data(machine, event, wall_s)
+                actions, fates = self._data(machine, event, wall_s)
             elif kind is EventKind.BIRTH:
-                effects, fates = self._birth(machine, event, wall_s)
+                actions, fates = self._birth(machine, event, wall_s)
             else:
-                effects, fates = self._death(machine, event)
+                actions, fates = self._death(machine, event)
             self.ledger.count(fates, 0 if has_waited else 1)
         if machine is None:
             machine = self._machines.get(device)
         if machine is not None:
             self._changed[machine.unit.name] = None
-        return effects
+        return actions
 
     def overflowed(self, count: int) -> None:
         """A full queue in front of us has lost so many messages."""
@@ -111,33 +111,33 @@ class Engine:
         if self.ledger.emitted > self._emitted_before:
             self.ledger.unsent()
 
-    def plain(self, topic: str, payload: bytes, at_ms: int) -> list[Effect]:
+    def plain(self, topic: str, payload: bytes, at_ms: int) -> list[Action]:
         """A plain message that the processor listens to; every cell is given it."""
         detail = payload.decode("utf-8", "replace")
         return self._of_no_machine(Sample("", SampleKind.PLAIN, at_ms / 1000, {}, detail=detail, topic=topic), at_ms)
 
-    def beat(self, at_ms: int) -> list[Effect]:
+    def beat(self, at_ms: int) -> list[Action]:
         """A second has passed on the wall, where the processor wants to know."""
         return self._of_no_machine(Sample("", SampleKind.BEAT, at_ms / 1000, {}), at_ms) if self._processor.beats else []
 
-    def _of_no_machine(self, sample: Sample, at_ms: int) -> list[Effect]:
-        effects: list[Effect] = []
+    def _of_no_machine(self, sample: Sample, at_ms: int) -> list[Action]:
+        actions: list[Action] = []
         for unit in self._units.values():
             before = unit.live.state
-            effects += unit.live.take(sample._replace(cell=unit.live.cell), at_ms)[0]
+            actions += unit.live.take(sample._replace(cell=unit.live.cell), at_ms)[0]
             if unit.live.state is not before:
                 self._changed[unit.name] = None
-        return effects
+        return actions
 
-    def silence(self, wall_s: float) -> list[Effect]:
+    def silence(self, wall_s: float) -> list[Action]:
         """No event waits: give ticks up to the present, less the margin. Call it only when the queue is empty."""
-        effects: list[Effect] = []
+        actions: list[Action] = []
         for machine in self._machines.values():
             clock_ms = machine.live.clock_ms
-            effects += machine.live.silence(wall_s, self._margin_s)
+            actions += machine.live.silence(wall_s, self._margin_s)
             if machine.live.clock_ms != clock_ms:
                 self._changed[machine.unit.name] = None
-        return effects
+        return actions
 
     # Snapshots.
 
@@ -198,28 +198,28 @@ class Engine:
         """The broker may have forgotten what it retained."""
         self._changed.update(dict.fromkeys(self._units))
 
-    def bury_unborn(self, at_ms: int) -> list[Effect]:
+    def bury_unborn(self, at_ms: int) -> list[Action]:
         """Machines that were restored and have not been born since are offline: say so."""
-        effects: list[Effect] = []
+        actions: list[Action] = []
         for machine in self._machines.values():
             if machine.live.is_restored and not machine.is_online:
                 machine.live.is_restored = False
                 reason = "not seen since the processor was started"
                 self.ledger.count(machine.live.drop_held(), 0)
-                effects += self._die(machine, list(machine.live.row), at_ms, reason, is_last=True)[0]
-        return effects
+                actions += self._die(machine, list(machine.live.row), at_ms, reason, is_last=True)[0]
+        return actions
 
     def farewell(self, at_ms: int) -> list[PublishPlain]:
         """The processor stops: what its plain messages say of online machines is no longer kept up. (Its twin devices die with
         its edge node.) The state is not to be saved after this."""
-        effects: list[Effect] = []
+        actions: list[Action] = []
         if not self._processor.plain:
             return []
         for machine in self._machines.values():
             if machine.is_online:
                 self.ledger.count(machine.live.drop_held(), 0)
-                effects += machine.live.death(list(machine.live.row), at_ms, "the processor was stopped", is_last=True)[0]
-        return [effect for effect in effects if isinstance(effect, PublishPlain)]
+                actions += machine.live.death(list(machine.live.row), at_ms, "the processor was stopped", is_last=True)[0]
+        return [action for action in actions if isinstance(action, PublishPlain)]
 
     # How it is done.
 
@@ -281,14 +281,14 @@ class Engine:
                 return [], FOLDED
         if True not in map(_IS_HISTORICAL, readings):
             return machine.live.data(readings, wall_s, is_of_twin=is_of_twin)
-        effects: list[Effect] = []
+        actions: list[Action] = []
         live = [reading for reading in readings if not reading.is_historical]
         if live:  # a message with both goes through both lanes, and counts as two
-            effects, fates = machine.live.data(live, wall_s, is_of_twin=is_of_twin)
+            actions, fates = machine.live.data(live, wall_s, is_of_twin=is_of_twin)
             self.ledger.count(fates)
         history = self._history_of(machine.unit, machine.name)
         late, fates = history.data([reading for reading in readings if reading.is_historical], wall_s)
-        return effects + late, fates
+        return actions + late, fates
 
     def _birth(self, machine: Machine | None, event: HostEvent, wall_s: float) -> Folded:
         if len(event.readings) > SIGNALS_MAX:
@@ -305,12 +305,12 @@ class Engine:
         if not machine.is_online and self._inputs is not None:  # another processor is quicker than the edge
             machine.live.note(taken)
             return [], FOLDED
-        declared: list[Effect] = []
+        declared: list[Action] = []
         if not was_online and self._processor.outputs:
             declared.append(Declare(machine.name, machine.live.emission.known(event.timestamp_ms)))
         offered = taken if is_of_twin else event.readings
-        effects, fates = machine.live.birth(offered, taken, wall_s, is_of_twin=is_of_twin)
-        return declared + effects, fates
+        actions, fates = machine.live.birth(offered, taken, wall_s, is_of_twin=is_of_twin)
+        return declared + actions, fates
 
     def _taken(self, machine: Machine, event: HostEvent) -> list[Reading]:
         """The readings of a birth that this processor takes from this source. A signal belongs to the first source that is
@@ -339,23 +339,23 @@ class Engine:
         names = [name for name, source in machine.owner.items() if source == event.node and name in machine.live.row]
         is_last = was_online and not machine.is_online
         late = machine.live.drop_held()
-        effects, fates = self._die(machine, names, event.timestamp_ms, event.detail or "offline", is_last=is_last)
-        return effects, late + fates
+        actions, fates = self._die(machine, names, event.timestamp_ms, event.detail or "offline", is_last=is_last)
+        return actions, late + fates
 
-    def _node_event(self, event: HostEvent) -> list[Effect]:
+    def _node_event(self, event: HostEvent) -> list[Action]:
         """A hole of an edge node concerns each machine that it stands for. Its death comes as one death for each device."""
-        effects: list[Effect] = []
+        actions: list[Action] = []
         if event.kind is not EventKind.HOLE:
-            return effects
+            return actions
         for machine in self._machines.values():
             if event.node in machine.online:
-                effects += machine.live.lost(event.detail)
+                actions += machine.live.lost(event.detail)
                 self._changed[machine.unit.name] = None
-        return effects
+        return actions
 
     def _die(self, machine: Machine, names: list[str], at_ms: int, reason: str, *, is_last: bool) -> Folded:
-        effects, fates = machine.live.death(names, at_ms, reason, is_last=is_last)
-        return ([*effects, Remove(machine.name)] if is_last and self._processor.outputs else effects), fates
+        actions, fates = machine.live.death(names, at_ms, reason, is_last=is_last)
+        return ([*actions, Remove(machine.name)] if is_last and self._processor.outputs else actions), fates
 
     def _forget_one(self) -> bool:
         """Make room: the machine that has been offline longest by order of arrival goes."""

@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
 
+from processors.actions import Action, DeadLetter, Pin, Publish
 from processors.config import Configuration, ProcessorConfig
 from processors.contract import Output, Outputs, PlainOutput
 from processors.discovery import AnyProcessor
-from processors.effects import DeadLetter, Effect, Pin, Publish
 from processors.errors import OutputError
 from processors.running.counts import Counts
 from processors.running.dead_letter import dead_letter
@@ -20,8 +20,8 @@ from processors.sample import Sample
 from sparkplug.metric import Reading
 
 Row = Mapping[str, Reading]
-Folded = tuple[list[Effect], Fates]
-"""The effects to be sent, and the fates of the message that brought them and of those that were held back before it."""
+Folded = tuple[list[Action], Fates]
+"""The actions to be sent, and the fates of the message that brought them and of those that were held back before it."""
 DEAD: Fates = (DropReason.DEAD_LETTER,)
 
 
@@ -81,18 +81,18 @@ class Fold:
         """Fold a sample."""
         try:
             state, outputs = self._step(self._config, self.state, sample)
-            effects = self._emitted(outputs, sample.machine, at_ms) if outputs else []
+            actions = self._emitted(outputs, sample.machine, at_ms) if outputs else []
         except Exception as error:  # whatever a step does, the stream goes on with the state before
             self._counts.dead_letters += 1
             letter = DeadLetter(sample.machine or self.name, dead_letter(self._processor.name, sample, error))
             return [letter], DEAD
         self.state = state
-        return effects, FOLDED
+        return actions, FOLDED
 
-    def _emitted(self, outputs: Outputs, machine: str, at_ms: int) -> list[Effect]:
+    def _emitted(self, outputs: Outputs, machine: str, at_ms: int) -> list[Action]:
         """All outputs of a step, or none: what is not declared raises before anything is remembered."""
         by_machine: dict[str, list[Output]] = {}
-        beside: list[Effect] = []
+        beside: list[Action] = []
         for output in outputs:
             if isinstance(output, Pin):
                 beside.append(output)
@@ -108,9 +108,9 @@ class Fold:
             if emission is None:
                 raise OutputError(f"{self._processor.name} emits {own[0].name!r} of {whose!r}, no machine of {self.name!r}")
             news.append((whose, emission, emission.news(own, at_ms)))
-        effects: list[Effect] = []
+        actions: list[Action] = []
         for whose, emission, changes in news:
             if changes:
                 emission.published(changes)
-                effects.append(Publish(whose, tuple(changes)))
-        return effects + beside if beside else effects
+                actions.append(Publish(whose, tuple(changes)))
+        return actions + beside if beside else actions

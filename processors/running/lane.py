@@ -17,8 +17,8 @@ from operator import itemgetter
 from types import MappingProxyType
 from typing import Any
 
+from processors.actions import Action
 from processors.config import ProcessorConfig
-from processors.effects import Effect
 from processors.running.counts import Counts
 from processors.running.fold import Fold, Folded
 from processors.running.ledger import FOLDED, DropReason, Fates
@@ -90,8 +90,8 @@ class Lane:
         if not self._held:
             return self._accept(readings, at_ms, wall_s)
         late = self.drop_held()
-        effects, fates = self._accept(readings, at_ms, wall_s)
-        return effects, late + fates
+        actions, fates = self._accept(readings, at_ms, wall_s)
+        return actions, late + fates
 
     def birth(
         self,
@@ -107,27 +107,27 @@ class Lane:
             self.is_restored = False
             return self._show(SampleKind.BIRTH, taken)
         late = self.drop_held()
-        effects: list[Effect] = []
+        actions: list[Action] = []
         at_ms = self._time_of(readings)
         if is_of_twin:
             at_ms = self._if_news(at_ms)
         before_ms = self.last_ms if self.clock_ms is not None else None
         if at_ms is not None:
             if before_ms is not None and max(map(_timestamp_ms, readings)) < before_ms - self._late_ms:
-                effects += self._jump_back(at_ms)
+                actions += self._jump_back(at_ms)
             if self.is_restored and before_ms is not None and at_ms > before_ms:
                 # Nobody heard what held meanwhile: no ticks, and so no figures, of that time.
                 self.ticking = False
-                effects += self._reach(at_ms, wall_s)
-                effects += self._hole((at_ms - before_ms) / 1000, "restarted: what came in between was not seen")
+                actions += self._reach(at_ms, wall_s)
+                actions += self._hole((at_ms - before_ms) / 1000, "restarted: what came in between was not seen")
             else:
-                effects += self._reach(at_ms, wall_s)
+                actions += self._reach(at_ms, wall_s)
         self.is_restored = False
         self.row.update((reading.name, reading) for reading in taken)
         self.ticking = True
         names = tuple(reading.name for reading in taken)
         folded, fates = self._fold(SampleKind.BIRTH, self._now_ms(readings), names)
-        return effects + folded, late + fates
+        return actions + folded, late + fates
 
     def born(self, node: str, stamp_ms: int) -> None:
         """A birth of this node is heard."""
@@ -149,9 +149,9 @@ class Lane:
 
     def death(self, names: Sequence[str], at_ms: int, reason: str, *, is_last: bool) -> Folded:
         """An edge of the machine went offline, and `names` with it. What was held back is to be dropped before."""
-        effects: list[Effect] = []
+        actions: list[Action] = []
         if self.clock_ms is not None and self.clock_ms < at_ms <= self.last_ms + self._gap_ms:
-            effects = self._pass_silence(at_ms)  # and no further than its last tick: each host stamps a death by its own clock
+            actions = self._pass_silence(at_ms)  # and no further than its last tick: each host stamps a death by its own clock
         self.ticking = self.ticking and not is_last
         for name in names:
             self.row[name] = self.row[name]._replace(quality=Quality.STALE, reason=reason)
@@ -159,9 +159,9 @@ class Lane:
             self.fold.hide(self._machine)
         now_ms = at_ms if self.clock_ms is None else self.clock_ms
         folded, fates = self._fold(SampleKind.DEATH, now_ms, tuple(names), detail=reason)
-        return effects + folded, fates
+        return actions + folded, fates
 
-    def lost(self, detail: str) -> list[Effect]:
+    def lost(self, detail: str) -> list[Action]:
         """Messages were lost on the way."""
         return self._hole(0.0, detail)
 
@@ -184,7 +184,7 @@ class Lane:
 
     # Time.
 
-    def silence(self, wall_s: float, margin_s: float) -> list[Effect]:
+    def silence(self, wall_s: float, margin_s: float) -> list[Action]:
         """No message waits: give the ticks up to the present, held back by a margin for what is still on its way."""
         if self.ticking and self._anchor_ms and self.clock_ms is not None and not self.is_silent:
             now_ms = self._anchor_ms + int((wall_s - self._anchor_wall_s - margin_s) * 1000)
@@ -213,66 +213,66 @@ class Lane:
         before_ms = self.last_ms
         if at_ms is not None and self.clock_ms is not None and at_ms < before_ms:
             self._counts.late += 1
-        effects = [] if at_ms is None else self._reach(at_ms, wall_s)
+        actions = [] if at_ms is None else self._reach(at_ms, wall_s)
         inputs = self._inputs
         if inputs is not None and not inputs.issuperset(map(_name, readings)):
             readings = [reading for reading in readings if reading[0] in inputs]
         if not readings:
-            return effects, FOLDED  # nothing in it for this processor, but the time
+            return actions, FOLDED  # nothing in it for this processor, but the time
         if not (changed := self._update(readings, before_ms)):
-            return effects, SUPERSEDED
+            return actions, SUPERSEDED
         if self.fold.wakes is not None and self.fold.wakes.isdisjoint(changed):
-            return effects, FOLDED  # the next tick sees it
+            return actions, FOLDED  # the next tick sees it
         folded, fates = self._fold(SampleKind.DATA, self._now_ms(readings), changed)
-        return (effects + folded if effects else folded), fates
+        return (actions + folded if actions else folded), fates
 
-    def _reach(self, at_ms: int, wall_s: float) -> list[Effect]:
+    def _reach(self, at_ms: int, wall_s: float) -> list[Action]:
         is_forward = self.clock_ms is not None and at_ms > self.clock_ms
-        effects = self._pass_silence(at_ms) if is_forward else []
+        actions = self._pass_silence(at_ms) if is_forward else []
         if is_forward or self.clock_ms is None:
             self.clock_ms = self.last_ms = at_ms
         else:
             self.last_ms = max(self.last_ms, at_ms)
         self.is_silent = False
         self._anchor_ms, self._anchor_wall_s = self.clock_ms, wall_s
-        return effects
+        return actions
 
-    def _pass_silence(self, to_ms: int) -> list[Effect]:
+    def _pass_silence(self, to_ms: int) -> list[Action]:
         """Give what silence up to `to_ms` brings: ticks, then a hole if it is long. Bounded by gap_s_max / tick_s."""
         clock_ms = self.clock_ms
-        effects: list[Effect] = []
+        actions: list[Action] = []
         if clock_ms is None or self.is_silent:
-            return effects
+            return actions
         end_ms = self.last_ms + self._gap_ms
         if self.ticking:
             tick_ms = self._tick_ms
             for at_ms in range((clock_ms // tick_ms + 1) * tick_ms, min(to_ms, end_ms) + 1, tick_ms):
                 self.clock_ms = at_ms
                 self._counts.ticks += 1
-                effects += self._fold(SampleKind.TICK, at_ms, ())[0]
+                actions += self._fold(SampleKind.TICK, at_ms, ())[0]
         if to_ms > end_ms:
             self.clock_ms, self.is_silent = end_ms, True
-            effects += self._hole(self._gap_ms / 1000, f"no message for {self._gap_ms / 1000:g} s")
-        return effects
+            actions += self._hole(self._gap_ms / 1000, f"no message for {self._gap_ms / 1000:g} s")
+        return actions
 
     def _follow_the_clock_back(self, wall_s: float) -> Folded:
         held = list(self._held)
         self._held.clear()
-        effects = self._jump_back(min(max(map(_timestamp_ms, readings)) for readings in held))
+        actions = self._jump_back(min(max(map(_timestamp_ms, readings)) for readings in held))
         fates: Fates = ()
         for readings in held:
             accepted, fate = self._accept(readings, self._time_of(readings), wall_s)
-            effects += accepted
+            actions += accepted
             fates += fate
-        return effects, fates
+        return actions, fates
 
-    def _jump_back(self, at_ms: int) -> list[Effect]:
+    def _jump_back(self, at_ms: int) -> list[Action]:
         gap_s = (self.last_ms - at_ms) / 1000
         self.clock_ms = self.last_ms = at_ms
         self.is_silent = False
         return self._hole(gap_s, "the machine's clock was set back")
 
-    def _hole(self, gap_s: float, detail: str) -> list[Effect]:
+    def _hole(self, gap_s: float, detail: str) -> list[Action]:
         self._counts.holes += 1
         return [] if self.clock_ms is None else self._fold(SampleKind.HOLE, self.clock_ms, (), gap_s=gap_s, detail=detail)[0]
 

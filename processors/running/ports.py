@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple, Protocol
 
-from processors.effects import Pin
+from processors.actions import Pin
 from sparkplug.host_session import HostEvent
 from sparkplug.metric import Change, MetricSpec, NodeId
 

@@ -15,9 +15,9 @@ from threading import Event
 
 from paho.mqtt.client import topic_matches_sub
 
+from processors.actions import Action, Declare, Pin, Publish, PublishPlain, Remove
 from processors.config import Configuration, ProcessorConfig
 from processors.discovery import AnyProcessor
-from processors.effects import Declare, Effect, Pin, Publish, PublishPlain, Remove
 from processors.errors import SnapshotError
 from processors.plain_topic import topic_level
 from processors.running.engine import Engine
@@ -183,7 +183,7 @@ class Worker:
         self._edge.stop()
         self._host.stop()
 
-    # Events and effects.
+    # Events and actions.
 
     def _take(self, event: HostEvent, now_s: float, *, has_waited: bool = False) -> None:
         if event.kind is not EventKind.PLAIN:
@@ -198,38 +198,38 @@ class Worker:
         elif event.payload and any(topic_matches_sub(wanted, event.topic) for wanted in self._listens):
             self._apply(self.engine.plain(event.topic, event.payload, event.timestamp_ms))
 
-    def _apply(self, effects: Sequence[Effect]) -> bool:
+    def _apply(self, actions: Sequence[Action]) -> bool:
         """Carry out what the engine asks; whether everything could be sent."""
         sent = True
-        for effect in effects:
-            if isinstance(effect, Publish):
-                sent = self._publish(effect) and sent
-            elif isinstance(effect, PublishPlain):
-                sent = self._host.publish_plain(effect.topic, effect.payload, qos=effect.qos, retain=effect.retain) and sent
-            elif isinstance(effect, Declare):
-                self._edge.declare_device(effect.machine, [_with_latest(spec, effect.latest) for spec in self._specs])
-                self._declared.add(effect.machine)
-            elif isinstance(effect, Remove):
-                if effect.machine in self._declared:
-                    self._declared.discard(effect.machine)
-                    self._edge.remove_device(effect.machine)
-            elif isinstance(effect, Pin):
+        for action in actions:
+            if isinstance(action, Publish):
+                sent = self._publish(action) and sent
+            elif isinstance(action, PublishPlain):
+                sent = self._host.publish_plain(action.topic, action.payload, qos=action.qos, retain=action.retain) and sent
+            elif isinstance(action, Declare):
+                self._edge.declare_device(action.machine, [_with_latest(spec, action.latest) for spec in self._specs])
+                self._declared.add(action.machine)
+            elif isinstance(action, Remove):
+                if action.machine in self._declared:
+                    self._declared.discard(action.machine)
+                    self._edge.remove_device(action.machine)
+            elif isinstance(action, Pin):
                 if self._recorder is not None:
-                    self._recorder.pin(effect)
+                    self._recorder.pin(action)
             elif self._letters_left > 0:
                 self._letters_left -= 1
-                _log.warning("%s: dead letter of %s: %s", self._processor.name, effect.machine, effect.payload.decode())
-                self._host.publish_plain(self._letter_prefix + topic_level(effect.machine), effect.payload)
+                _log.warning("%s: dead letter of %s: %s", self._processor.name, action.machine, action.payload.decode())
+                self._host.publish_plain(self._letter_prefix + topic_level(action.machine), action.payload)
         return sent
 
-    def _publish(self, effect: Publish) -> bool:
-        if effect.machine not in self._declared:
+    def _publish(self, action: Publish) -> bool:
+        if action.machine not in self._declared:
             return True  # of a machine that is offline; its next birth carries what is known then
         try:
-            return self._edge.publish(effect.machine, effect.changes)
+            return self._edge.publish(action.machine, action.changes)
         except SparkplugError as error:
             self.engine.counts.dead_letters += 1
-            _log.warning("%s: %s: %s", self._processor.name, effect.machine, error)
+            _log.warning("%s: %s: %s", self._processor.name, action.machine, error)
             return True
 
     # What is due.

@@ -6,8 +6,8 @@ from typing import Any
 
 from hypothesis import strategies as st
 
+from processors.actions import Action, Publish, PublishPlain
 from processors.discovery import AnyProcessor
-from processors.effects import Effect, Publish, PublishPlain
 from processors.running.engine import Engine
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId, Reading
@@ -56,24 +56,24 @@ def engine_of(processor: AnyProcessor, **table: Any) -> Engine:
     return Engine(processor, processor.configured(table))
 
 
-def fed(engine: Engine, *events: HostEvent, wall_s: float = 0.0) -> list[Effect]:
-    """Feed events one after the other; all effects."""
-    return [effect for one in events for effect in engine.feed(one, wall_s)]
+def fed(engine: Engine, *events: HostEvent, wall_s: float = 0.0) -> list[Action]:
+    """Feed events one after the other; all actions."""
+    return [action for one in events for action in engine.feed(one, wall_s)]
 
 
-def published(effects: list[Effect]) -> list[tuple[int, str, Any, bool]]:
+def published(actions: list[Action]) -> list[tuple[int, str, Any, bool]]:
     """What was published: (ms after the start, name, value, is_historical)."""
     return [
         (change.timestamp_ms - T0_MS, change.name, change.value, change.is_historical)
-        for effect in effects
-        if isinstance(effect, Publish)
-        for change in effect.changes
+        for action in actions
+        if isinstance(action, Publish)
+        for change in action.changes
     ]
 
 
-def plain(effects: list[Effect]) -> dict[str, bytes]:
+def plain(actions: list[Action]) -> dict[str, bytes]:
     """The last plain message on each topic."""
-    return {effect.topic: effect.payload for effect in effects if isinstance(effect, PublishPlain)}
+    return {action.topic: action.payload for action in actions if isinstance(action, PublishPlain)}
 
 
 SIGNALS = ("spindle_rpm", "spindle_load_pct", "ambient_temp_c", "spindle_temp_c", "tool_number", "program", "twin/raw_score")

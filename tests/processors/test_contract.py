@@ -11,9 +11,9 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from pydantic import TypeAdapter
 
+from processors.actions import Action, DeadLetter, Publish, PublishPlain, Remove
 from processors.config import Configuration, read_tables
 from processors.discovery import AnyProcessor, discover, modules, sample_configuration
-from processors.effects import DeadLetter, Effect, Publish, PublishPlain, Remove
 from processors.running.snapshot import decode_state, encode_state
 from sparkplug.host_session import HostEvent
 from tests.depth import examples
@@ -93,8 +93,8 @@ def test_the_same_stream_gives_the_same_answer(processor: AnyProcessor) -> None:
 @quickly
 def test_nothing_that_comes_crashes_it(processor: AnyProcessor, stream: list[HostEvent]) -> None:
     engine = engine_of(processor)
-    effects = fed(engine, *stream)
-    assert [effect for effect in effects if isinstance(effect, DeadLetter)] == []
+    actions = fed(engine, *stream)
+    assert [action for action in actions if isinstance(action, DeadLetter)] == []
     assert engine.ledger.balance == 0
 
 
@@ -103,13 +103,13 @@ def test_nothing_that_comes_crashes_it(processor: AnyProcessor, stream: list[Hos
 @quickly
 def test_it_emits_only_what_it_declares_and_every_null_says_why(processor: AnyProcessor, stream: list[HostEvent]) -> None:
     names = {spec.name for spec in processor.outputs}
-    for effect in fed(engine_of(processor), *stream):
-        if isinstance(effect, Publish):
-            assert {change.name for change in effect.changes} <= names
-            assert all(change.reason for change in effect.changes if change.value is None)
-        elif isinstance(effect, PublishPlain):
-            assert effect.topic.startswith(tuple(spec.prefix for spec in processor.plain))
-            json.loads(effect.payload, parse_constant=_no_constant)
+    for action in fed(engine_of(processor), *stream):
+        if isinstance(action, Publish):
+            assert {change.name for change in action.changes} <= names
+            assert all(change.reason for change in action.changes if change.value is None)
+        elif isinstance(action, PublishPlain):
+            assert action.topic.startswith(tuple(spec.prefix for spec in processor.plain))
+            json.loads(action.payload, parse_constant=_no_constant)
     assert all(name.startswith(TWIN_PREFIX) for name in names)
 
 
@@ -134,7 +134,7 @@ def test_a_restart_in_the_middle_changes_nothing(processor: AnyProcessor, stream
     assert _same(fed(restarted, *stream[cut:]), fed(whole, *stream[cut:]))
 
 
-def _same(left: list[Effect], right: list[Effect]) -> bool:
+def _same(left: list[Action], right: list[Action]) -> bool:
     return repr(left) == repr(right)  # NaN equals itself here
 
 
@@ -178,6 +178,6 @@ def test_every_snapshot_can_be_restored(processor: AnyProcessor, stream: list[Ho
 
 @every_processor
 def test_a_dead_machine_has_no_living_twin(processor: AnyProcessor) -> None:
-    effects = fed(engine_of(processor), *_day(), death(160.0))
+    actions = fed(engine_of(processor), *_day(), death(160.0))
     if processor.outputs:
-        assert effects[-1] == Remove("okuma")
+        assert actions[-1] == Remove("okuma")

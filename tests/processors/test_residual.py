@@ -13,8 +13,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pydantic import TypeAdapter
 
+from processors.actions import Action, DeadLetter, Publish
 from processors.config import Configuration
-from processors.effects import DeadLetter, Effect, Publish
 from processors.errors import ConfigurationError
 from processors.residual import BASIS, CORRECTED, CORRECTION, GAIN, IN_REGION, LEFT, NO_MODEL, PROCESSOR
 from processors.running.engine import Engine
@@ -56,14 +56,14 @@ def _shift(begin: int = 0, end: int = 4 * HOUR, **other: Any) -> Iterator[HostEv
         yield (birth if place == begin else data)(at_s, node=TWIN, **{PHYSICS: float(signals[PHYSICS][place])})
 
 
-def _last(effects: Sequence[Effect]) -> dict[str, tuple[Any, str | None]]:
-    changes = [change for effect in effects if isinstance(effect, Publish) for change in effect.changes]
+def _last(actions: Sequence[Action]) -> dict[str, tuple[Any, str | None]]:
+    changes = [change for action in actions if isinstance(action, Publish) for change in action.changes]
     return {change.name: (change.value, change.reason) for change in changes}
 
 
 def test_without_a_model_it_runs_and_says_what_makes_one() -> None:
-    effects = fed(engine_of(PROCESSOR, tick_s=TICK_S), *_shift(end=4))
-    assert _last(effects) == dict.fromkeys((CORRECTION, CORRECTED, LEFT, IN_REGION, GAIN, BASIS), (None, NO_MODEL))
+    actions = fed(engine_of(PROCESSOR, tick_s=TICK_S), *_shift(end=4))
+    assert _last(actions) == dict.fromkeys((CORRECTION, CORRECTED, LEFT, IN_REGION, GAIN, BASIS), (None, NO_MODEL))
     assert "cnctwin train residual" in NO_MODEL
 
 
@@ -84,14 +84,14 @@ def test_the_correction_is_what_training_would_have_said_of_that_moment(models: 
 
 
 def test_corrected_is_the_physics_and_the_correction_and_the_physics_own_residual_stays(models: Path) -> None:
-    effects = fed(_engine(models), *_shift(end=3 * HOUR))
-    last, signals = _last(effects), recorded().signals
+    actions = fed(_engine(models), *_shift(end=3 * HOUR))
+    last, signals = _last(actions), recorded().signals
     correction, corrected, left = (last[name][0] for name in (CORRECTION, CORRECTED, LEFT))
     physics = float(signals[PHYSICS][3 * HOUR - 2])  # what the last tick saw
     assert corrected == pytest.approx(physics + correction, abs=0.08)
     assert last[IN_REGION] == (True, None)
     assert abs(left) < 1.5
-    own = {change.name for effect in effects if isinstance(effect, Publish) for change in effect.changes}
+    own = {change.name for action in actions if isinstance(action, Publish) for change in action.changes}
     assert own.isdisjoint({spec.name for spec in THERMAL.outputs})
     assert {spec.name for spec in PROCESSOR.outputs}.isdisjoint({spec.name for spec in THERMAL.outputs})
 
@@ -110,9 +110,9 @@ def test_outside_the_region_there_is_no_correction_but_a_reason(models: Path) ->
 def test_a_reason_does_not_change_with_every_sample(models: Path) -> None:
     changes = [
         change.reason
-        for effect in fed(_engine(models), *_shift(end=2 * HOUR, spindle_rpm=30_000.0))
-        if isinstance(effect, Publish)
-        for change in effect.changes
+        for action in fed(_engine(models), *_shift(end=2 * HOUR, spindle_rpm=30_000.0))
+        if isinstance(action, Publish)
+        for change in action.changes
         if change.name == CORRECTION and change.reason
     ]
     assert len(changes) <= 3
@@ -196,7 +196,7 @@ def test_with_a_model_a_restart_in_the_middle_changes_nothing_and_nothing_crashe
                 fold.state = decode_state(adapter, json.loads(json.dumps(encode_state(adapter, fold.state))))
     rest = fed(whole, *stream[cut:])
     assert repr(fed(restarted, *stream[cut:])) == repr(rest)
-    assert not [effect for effect in [*expected, *rest] if isinstance(effect, DeadLetter)]
+    assert not [action for action in [*expected, *rest] if isinstance(action, DeadLetter)]
     assert whole.ledger.balance == 0
 
 

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from processors.effects import Effect, Publish
+from processors.actions import Action, Publish
 from processors.running.engine import Engine
 from processors.thermal import BASIS, PROCESSOR, RESIDUAL, RISE, TEMPERATURE
 from sparkplug.host_session import EventKind
@@ -22,9 +22,9 @@ def last(engine: Engine) -> dict[str, Change]:
     return engine._machines["okuma"].live.emission.latest
 
 
-def shown(effects: list[Effect], name: str) -> list[Any]:
+def shown(actions: list[Action], name: str) -> list[Any]:
     """The values of one output, in the order of their publication."""
-    return [c.value for effect in effects if isinstance(effect, Publish) for c in effect.changes if c.name == name]
+    return [c.value for action in actions if isinstance(action, Publish) for c in action.changes if c.name == name]
 
 
 def minutes(count: int, **values: Any) -> list[Any]:
@@ -101,10 +101,10 @@ def test_while_speed_or_load_is_unknown_the_estimate_is_null_and_bridges_the_tim
 
 def test_after_a_long_silence_the_estimate_starts_anew_and_is_null_meanwhile() -> None:
     engine = engine_of(PROCESSOR, ambient_temp_c=20.0, gap_s_max=60.0)
-    effects = fed(engine, birth(0.0, **RUNNING), *minutes(1, **RUNNING))
-    effects += fed(engine, data(2000.0, spindle_rpm=6000.0), data(2001.0, spindle_rpm=6000.0))
-    assert None in shown(effects, TEMPERATURE)
-    assert "no message for 60 s" in {c.reason for e in effects if isinstance(e, Publish) for c in e.changes}
+    actions = fed(engine, birth(0.0, **RUNNING), *minutes(1, **RUNNING))
+    actions += fed(engine, data(2000.0, spindle_rpm=6000.0), data(2001.0, spindle_rpm=6000.0))
+    assert None in shown(actions, TEMPERATURE)
+    assert "no message for 60 s" in {c.reason for e in actions if isinstance(e, Publish) for c in e.changes}
     assert engine._machines["okuma"].live.state.rise_k == pytest.approx(0.0, abs=0.02)
 
 
@@ -140,10 +140,10 @@ def test_implausible_inputs_are_no_inputs() -> None:
 
 def test_it_reports_by_exception_and_does_not_flood() -> None:
     engine = engine_of(PROCESSOR, ambient_temp_c=20.0)
-    effects = fed(engine, birth(0.0, **RUNNING), *(data(0.1 * i, **RUNNING) for i in range(1, 6001)))
-    rise = shown(effects, RISE)[1:]  # the first one is the null of the birth
+    actions = fed(engine, birth(0.0, **RUNNING), *(data(0.1 * i, **RUNNING) for i in range(1, 6001)))
+    rise = shown(actions, RISE)[1:]  # the first one is the null of the birth
     assert len(rise) <= rise[-1] / 0.05 + 2  # 600 s, 6000 messages, one publication for each 0.05 K
-    assert len(shown(effects, BASIS)) == 1
+    assert len(shown(actions, BASIS)) == 1
 
 
 def test_each_machine_may_have_constants_of_its_own() -> None:

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import TypeAdapter
 
-from processors.effects import DeadLetter, Effect, Publish
+from processors.actions import Action, DeadLetter, Publish
 from processors.running.engine import Engine
 from processors.running.snapshot import decode_state, encode_state
 from processors.vibration import BLOCK, CREST, KURTOSIS, NAMES, PEAK, PROCESSOR, RATE, RMS, VELOCITY
@@ -54,15 +54,15 @@ def last(engine: Engine) -> dict[str, Change]:
     return engine._machines["okuma"].live.emission.latest
 
 
-def shown(effects: list[Effect], name: str) -> list[Change]:
+def shown(actions: list[Action], name: str) -> list[Change]:
     """What was published of one output."""
-    return [c for effect in effects if isinstance(effect, Publish) for c in effect.changes if c.name == name]
+    return [c for action in actions if isinstance(action, Publish) for c in action.changes if c.name == name]
 
 
 def test_a_sine_of_1_g_at_100_hz_reads_as_on_paper() -> None:
     engine = engine_of(PROCESSOR)
-    effects = fed(engine, start(), *blocks(shaking(3.0)))
-    assert [effect for effect in effects if isinstance(effect, DeadLetter)] == []
+    actions = fed(engine, start(), *blocks(shaking(3.0)))
+    assert [action for action in actions if isinstance(action, DeadLetter)] == []
     assert last(engine)[VELOCITY].value == pytest.approx(SINE_MM_S, rel=1e-3)
     assert last(engine)[RMS].value == pytest.approx(1.0 / math.sqrt(2.0), rel=1e-3)
     assert last(engine)[PEAK].value == pytest.approx(1.0, abs=0.01)
@@ -91,8 +91,8 @@ def test_where_blocks_end_changes_no_figure(sizes: list[int]) -> None:
         any_length.append(data(at_s, **{BLOCK: tuple(part.tolist())}))
     plain, other = engine_of(PROCESSOR), engine_of(PROCESSOR)
     fed(plain, start(), *blocks(signal))
-    effects = fed(other, start(), *any_length)
-    assert not [c.reason for c in shown(effects, VELOCITY)[1:] if c.reason]
+    actions = fed(other, start(), *any_length)
+    assert not [c.reason for c in shown(actions, VELOCITY)[1:] if c.reason]
     for name in NAMES:
         assert last(other)[name].value == pytest.approx(last(plain)[name].value, rel=0.02)
     states = [engine._machines["okuma"].live.state for engine in (plain, other)]
@@ -161,8 +161,8 @@ def test_a_block_that_cannot_be_trusted_breaks_the_stream_and_says_so(
 )
 def test_a_first_block_that_is_none_gives_a_reason(table: dict[str, Any], block: Any, reason: str) -> None:
     engine = engine_of(PROCESSOR, **table)
-    effects = fed(engine, start(), data(0.1, **{BLOCK: block}))
-    assert [effect for effect in effects if isinstance(effect, DeadLetter)] == []
+    actions = fed(engine, start(), data(0.1, **{BLOCK: block}))
+    assert [action for action in actions if isinstance(action, DeadLetter)] == []
     assert last(engine)[VELOCITY].reason == reason
 
 
@@ -171,8 +171,8 @@ def test_a_lost_block_is_seen_by_the_stamps(lost: int) -> None:
     engine = engine_of(PROCESSOR)
     stream = blocks(shaking(9.0))
     fed(engine, start(), *stream[:20])
-    effects = fed(engine, *stream[20 + lost :])
-    velocity = shown(effects, VELOCITY)
+    actions = fed(engine, *stream[20 + lost :])
+    velocity = shown(actions, VELOCITY)
     assert velocity[0].reason == "vibration_block_g: a block is missing, or its sample rate is lower than it says"
     assert all(c.value == pytest.approx(SINE_MM_S, rel=2e-3) for c in velocity[1:] if c.value is not None)
     assert last(engine)[VELOCITY].value is not None
@@ -185,8 +185,8 @@ def test_after_a_break_so_much_is_settled_that_no_figure_is_wrong() -> None:
     quiet = 0.01 * np.sin(2.0 * math.pi * 100.0 * at_s)
     stream = blocks(quiet)
     wild = blocks(0.6 * np.sin(2.0 * math.pi * 20.0 * at_s[:1000]), start_s=1.0)
-    effects = fed(engine, start(), *stream[:10], *wild, *blocks(quiet[:25_000], start_s=1.6))
-    after = [c.value for c in shown(effects, VELOCITY) if c.value is not None]
+    actions = fed(engine, start(), *stream[:10], *wild, *blocks(quiet[:25_000], start_s=1.6))
+    after = [c.value for c in shown(actions, VELOCITY) if c.value is not None]
     assert after == pytest.approx([SINE_MM_S / 100.0], abs=0.002)
 
 
@@ -203,8 +203,8 @@ def test_a_sample_rate_that_the_stamps_contradict_is_not_believed(block_s: float
     engine = engine_of(PROCESSOR)
     signal = shaking(4.0)
     stream = [data(block_s * i, **{BLOCK: tuple(signal[1000 * i : 1000 * i + 1000].tolist())}) for i in range(1, 40)]
-    effects = fed(engine, start(), *stream)
-    assert [c.value for c in shown(effects, VELOCITY) if c.value is not None] == []
+    actions = fed(engine, start(), *stream)
+    assert [c.value for c in shown(actions, VELOCITY) if c.value is not None] == []
     assert last(engine)[VELOCITY].reason == reason
 
 
@@ -228,8 +228,8 @@ def test_an_edge_that_jitters_by_less_than_half_a_block_loses_nothing() -> None:
     late_s = np.abs(chance.normal(0.0, 0.01, 30))
     signal = shaking(3.0)
     stream = [data(0.1 * i + late_s[i - 1], **{BLOCK: tuple(signal[1000 * i - 1000 : 1000 * i].tolist())}) for i in range(1, 31)]
-    effects = fed(engine, start(), *stream)
-    assert not [c.reason for c in shown(effects, VELOCITY)[1:] if c.reason]
+    actions = fed(engine, start(), *stream)
+    assert not [c.reason for c in shown(actions, VELOCITY)[1:] if c.reason]
 
 
 def test_without_a_sample_rate_nothing_is_said_and_a_configured_one_serves() -> None:
@@ -252,8 +252,8 @@ def test_a_rate_too_low_for_the_band_is_refused_and_a_changed_one_starts_anew() 
     assert last(engine)[VELOCITY].reason == "the sample rate is outside 4000 to 200000 Hz"
     engine = engine_of(PROCESSOR)
     fed(engine, start(), *blocks(shaking(2.0)), data(2.0, **{RATE: 20_000.0}))
-    effects = fed(engine, *blocks(shaking(3.0, 20_000.0), start_s=2.0, rate_hz=20_000.0))
-    assert shown(effects, VELOCITY)[0].reason == "the sample rate has changed"
+    actions = fed(engine, *blocks(shaking(3.0, 20_000.0), start_s=2.0, rate_hz=20_000.0))
+    assert shown(actions, VELOCITY)[0].reason == "the sample rate has changed"
     assert last(engine)[VELOCITY].value == pytest.approx(SINE_MM_S, rel=1e-3)
 
 
@@ -273,8 +273,8 @@ def test_silence_death_and_a_hole_end_the_figures() -> None:
 def test_a_block_longer_than_the_window_is_a_window() -> None:
     engine = engine_of(PROCESSOR)
     quiet, loud = 0.1 * (shaking(5.0) - 1.0), shaking(5.0) - 1.0
-    effects = fed(engine, start(), *blocks(np.concatenate([loud, quiet, loud]), block_s=5.0))
-    values = [c.value for c in shown(effects, VELOCITY) if c.value is not None]
+    actions = fed(engine, start(), *blocks(np.concatenate([loud, quiet, loud]), block_s=5.0))
+    values = [c.value for c in shown(actions, VELOCITY) if c.value is not None]
     assert values[0] == pytest.approx(SINE_MM_S, rel=1e-3)
     assert len(values) == 3
     assert values[1] == pytest.approx(math.sqrt((0.5 + 4.5 * 0.01) / 5.0) * SINE_MM_S, rel=0.02)
@@ -297,13 +297,13 @@ def test_a_block_longer_than_the_window_is_a_window() -> None:
 )
 @settings(max_examples=60, deadline=None)
 def test_nothing_that_comes_as_a_block_crashes_it(stream: list[tuple[float, Any, Any]]) -> None:
-    engine, effects, at_s = engine_of(PROCESSOR), [], 0.0
-    effects += fed(engine, start())
+    engine, actions, at_s = engine_of(PROCESSOR), [], 0.0
+    actions += fed(engine, start())
     for step_s, block, rate in stream:
         at_s = max(at_s + step_s, 0.0)
-        effects += fed(engine, data(at_s, **{BLOCK: block}, **({} if rate is None else {RATE: rate})))
-    assert [effect for effect in effects if isinstance(effect, DeadLetter)] == []
-    assert all(c.reason for name in NAMES for c in shown(effects, name) if c.value is None)
+        actions += fed(engine, data(at_s, **{BLOCK: block}, **({} if rate is None else {RATE: rate})))
+    assert [action for action in actions if isinstance(action, DeadLetter)] == []
+    assert all(c.reason for name in NAMES for c in shown(actions, name) if c.value is None)
     lane = engine._machines["okuma"].live
     adapter: TypeAdapter[Any] = TypeAdapter(PROCESSOR.state)
     assert decode_state(adapter, json.loads(json.dumps(encode_state(adapter, lane.state)))) == lane.state

@@ -9,9 +9,9 @@ from collections.abc import Collection, Mapping, Sequence
 from cnctwin.memory.replay.comparison import Comparison, as_sent
 from cnctwin.memory.replay.lives import Restart, Start, births_of
 from cnctwin.memory.replay.log import is_twin
+from processors.actions import Action, DeadLetter, Declare, Publish, Remove
 from processors.config import Configuration, ProcessorConfig
 from processors.discovery import AnyProcessor
-from processors.effects import DeadLetter, Declare, Effect, Publish, Remove
 from processors.errors import SnapshotError
 from processors.running.engine import Engine
 from sparkplug.host_session import EventKind, HostEvent
@@ -229,24 +229,24 @@ class Rerun:
 
     # What came of it.
 
-    def _took(self, effects: Sequence[Effect]) -> None:
-        for effect in effects:
-            if isinstance(effect, Publish):
-                if effect.machine in self._declared:
-                    self._published(effect)
-            elif isinstance(effect, Declare):
-                self._declared.add(effect.machine)
-                self._said(EventKind.BIRTH, effect.machine, effect.latest)
-            elif isinstance(effect, Remove):
-                self._declared.discard(effect.machine)
-                self._said(EventKind.DEATH, effect.machine, ())
-            elif isinstance(effect, DeadLetter):
+    def _took(self, actions: Sequence[Action]) -> None:
+        for action in actions:
+            if isinstance(action, Publish):
+                if action.machine in self._declared:
+                    self._published(action)
+            elif isinstance(action, Declare):
+                self._declared.add(action.machine)
+                self._said(EventKind.BIRTH, action.machine, action.latest)
+            elif isinstance(action, Remove):
+                self._declared.discard(action.machine)
+                self._said(EventKind.DEATH, action.machine, ())
+            elif isinstance(action, DeadLetter):
                 self.dead_letters += 1
 
-    def _published(self, effect: Publish) -> None:
-        if effect.machine == self._machine:
-            self.comparison.recomputed(effect.machine, effect.changes, is_counted=self._is_counted)
-        self._said(EventKind.DATA, effect.machine, effect.changes)
+    def _published(self, action: Publish) -> None:
+        if action.machine == self._machine:
+            self.comparison.recomputed(action.machine, action.changes, is_counted=self._is_counted)
+        self._said(EventKind.DATA, action.machine, action.changes)
 
     def _said(self, kind: EventKind, machine: str, changes: Sequence[Change]) -> None:
         if not self._is_chained:

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from cnctwin.errors import UsageError
 from cnctwin.training.anomaly.held_rows import held_rows, milliseconds
 from cnctwin.training.anomaly.recorded_cell import TOOL_CHANGE, Stretch
+from processors.actions import DeadLetter
 from processors.config import Configuration
 from processors.contract import Output, Outputs, Sample
-from processors.effects import DeadLetter
 from processors.joint_anomaly.config import Config
 from processors.joint_anomaly.member import ADJUSTED, GATE
 from processors.joint_anomaly.processor import PROCESSOR, RAW
@@ -80,9 +80,9 @@ def replayed(stretch: Stretch, models: Mapping[str, AnomalyModel], settings: Map
     start_ms = START_MS - START_MS % tick_ms  # so that ticks are multiples in t_s as well
     streams = [_messages(name, run, models[name].features, _Times(start_ms, tick_ms, gap_ms)) for name, run in stretch.items()]
     for event in heapq.merge(*streams, key=lambda one: one.timestamp_ms):
-        for effect in engine.feed(event, 0.0):
-            if isinstance(effect, DeadLetter):
-                raise UsageError(f"{event.device}: a sample cannot be scored: {effect.payload.decode('utf-8', 'replace')[:300]}")
+        for action in engine.feed(event, 0.0):
+            if isinstance(action, DeadLetter):
+                raise UsageError(f"{event.device}: a sample cannot be scored: {action.payload.decode('utf-8', 'replace')[:300]}")
     tracks = {}
     for name, one in told.items():
         at_ms = np.array([row[0] - start_ms for row in one.judged], dtype=np.int64)

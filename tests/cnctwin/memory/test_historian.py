@@ -10,7 +10,7 @@ import pytest
 from cnctwin.memory import historian
 from cnctwin.memory.historian import StoreRecorder
 from cnctwin.memory.store.contract import Appended, Message, Pinned, Snapshot, Status, StoreError, Tidied
-from processors.effects import Pin
+from processors.actions import Pin
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import Reading
 from sparkplug.quality import Quality

@@ -6,8 +6,8 @@ from typing import Any
 
 from cnctwin.memory.store.contract import Message
 from cnctwin.memory.store.opening import open_store
+from processors.actions import Declare, Publish
 from processors.discovery import find
-from processors.effects import Declare, Publish
 from processors.running.engine import Engine
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import Change, NodeId, Reading
@@ -47,11 +47,11 @@ def twin_told(events: Sequence[HostEvent], names: Sequence[str], tables: Mapping
         yield event
         for name, engine in engines:
             node = NodeId("cnc", name)
-            for effect in engine.feed(event, event.timestamp_ms / 1000.0):
-                if isinstance(effect, Declare):
-                    yield _said(EventKind.BIRTH, node, event, effect.machine, effect.latest)
-                elif isinstance(effect, Publish):
-                    yield _said(EventKind.DATA, node, event, effect.machine, effect.changes)
+            for action in engine.feed(event, event.timestamp_ms / 1000.0):
+                if isinstance(action, Declare):
+                    yield _said(EventKind.BIRTH, node, event, action.machine, action.latest)
+                elif isinstance(action, Publish):
+                    yield _said(EventKind.DATA, node, event, action.machine, action.changes)
 
 
 def _said(kind: EventKind, node: NodeId, event: HostEvent, machine: str, changes: Sequence[Change]) -> HostEvent:

@@ -8,7 +8,7 @@ from typing import Any
 import jsonschema
 import pytest
 
-from processors.effects import Publish
+from processors.actions import Publish
 from processors.events.processor import PROCESSOR
 from processors.events.record import BYTES_MAX
 from sparkplug.host_session import EventKind, HostEvent
@@ -31,8 +31,8 @@ READY = {
 def told(*events: HostEvent, **table: Any) -> list[tuple[float, str, Any]]:
     """What is published: (s after the start, metric, value)."""
     engine = engine_of(PROCESSOR, **table)
-    effects = [effect for one in events for effect in engine.feed(one, 0.0)]
-    return [(at_ms / 1000, name.removeprefix("twin/"), value) for at_ms, name, value, _ in published(effects)]
+    actions = [action for one in events for action in engine.feed(one, 0.0)]
+    return [(at_ms / 1000, name.removeprefix("twin/"), value) for at_ms, name, value, _ in published(actions)]
 
 
 def of(found: list[tuple[float, str, Any]], name: str) -> list[tuple[float, Any]]:
@@ -172,7 +172,7 @@ def test_tools_force_and_temperature_of_a_part_are_in_its_record() -> None:
 
 def test_a_record_is_bounded_whatever_a_run_was_like() -> None:
     engine, flags = engine_of(PROCESSOR), ("twin/rule_vibration", "twin/anomaly_alarm")
-    rules, effects = NodeId("cnc", "twin-rules"), []
+    rules, actions = NodeId("cnc", "twin-rules"), []
     stream = [
         birth(0.0, **READY | {"program": "🂡" * 100}),
         birth(0.1, node=rules, **dict.fromkeys(flags, False)),
@@ -184,8 +184,8 @@ def test_a_record_is_bounded_whatever_a_run_was_like() -> None:
         stream.append(state(at_s + 5.0, "ACTIVE", alarm=""))
         stream.append(data(at_s + 6.0, node=rules, **dict.fromkeys(flags, number % 2 == 0)))
     for one in [*stream, state(20_000.0, "PROGRAM_COMPLETED")]:
-        effects += [effect for effect in engine.feed(one, 0.0) if isinstance(effect, Publish)]
-    text = [change.value for effect in effects for change in effect.changes if change.name == "twin/part_record"][-1]
+        actions += [action for action in engine.feed(one, 0.0) if isinstance(action, Publish)]
+    text = [change.value for action in actions for change in action.changes if change.name == "twin/part_record"][-1]
     assert len(text.encode()) <= BYTES_MAX
     jsonschema.validate(json.loads(text), SCHEMA)
     assert len(engine.snapshot("okuma")) < 30_000

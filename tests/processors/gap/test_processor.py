@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 from pydantic import TypeAdapter
 
+from processors.actions import Publish
 from processors.contract import Sample, SampleKind
-from processors.effects import Publish
 from processors.errors import ConfigurationError
 from processors.gap import processor as gap
 from processors.gap.growth import BLOCKS_MIN
@@ -91,8 +91,8 @@ def test_a_tool_change_and_the_settling_after_it_do_not_count() -> None:
     for start_s in range(0, 600, 60):
         events += [data(start_s + 20.0, tool_change_active=True, spindle_load_pct=90.0)]
         events += [data(start_s + 30.0, tool_change_active=False), data(start_s + 31.9, spindle_load_pct=4.0)]
-    effects = fed(engine, *events, data(601.0, **calm))
-    reasons = [c.reason for one in effects if isinstance(one, Publish) for c in one.changes if c.name == AXIS_Z]
+    actions = fed(engine, *events, data(601.0, **calm))
+    reasons = [c.reason for one in actions if isinstance(one, Publish) for c in one.changes if c.name == AXIS_Z]
     assert reasons == ["axis_z_load_pct is not offered"], "said once, through all tool changes"
     assert last(engine)[f"{LOAD}/mean"].value == pytest.approx(-1.0, abs=0.01)
     assert last(engine)[LEFT_OUT].value == pytest.approx(100.0 * 12.0 / 60.0, abs=2.0)
@@ -359,8 +359,8 @@ def test_a_clock_that_is_set_back_and_a_night_in_between_leave_what_was_learned(
 
 def test_history_that_an_edge_sends_late_is_left_to_the_historian() -> None:
     engine = engine_of(PROCESSOR, floors=FLOORS, **DRIVE)
-    effects = fed(engine, birth(0.0, **TURNING), *(data(60.0 * i, history=True, **TURNING) for i in range(30)))
-    assert len(effects) == 1
+    actions = fed(engine, birth(0.0, **TURNING), *(data(60.0 * i, history=True, **TURNING) for i in range(30)))
+    assert len(actions) == 1
     assert engine._machines["okuma"].history is not None
     assert engine._machines["okuma"].history.state == State()
 

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from processors.effects import Effect, Publish
+from processors.actions import Action, Publish
 from processors.errors import ConfigurationError
 from processors.joint_anomaly.member import ADJUSTED, ALARM, COMMON, GATE, PEER
 from processors.joint_anomaly.processor import PROCESSOR, RAW
@@ -53,22 +53,22 @@ def work(machine: str, until_s: int, changes: dict[float, dict[str, Any]]) -> li
     ]
 
 
-def reasons(effects: list[Effect], name: str, machine: str = "a") -> list[str | None]:
+def reasons(actions: list[Action], name: str, machine: str = "a") -> list[str | None]:
     return [
         change.reason
-        for effect in effects
-        if isinstance(effect, Publish) and effect.machine == machine
-        for change in effect.changes
+        for action in actions
+        if isinstance(action, Publish) and action.machine == machine
+        for change in action.changes
         if change.name == name and change.value is None
     ]
 
 
 def test_a_load_that_is_four_spreads_too_high_comes_up_with_the_smoothing_and_is_an_alarm() -> None:
-    effects = fed(cell("a"), *work("a", 40, {1.5: {"spindle_load_pct": 38.0}}))
-    assert dict(metric(effects, RAW))[2.0] == -1.0  # |y| = 4, at once
-    adjusted = dict(metric(effects, ADJUSTED))
+    actions = fed(cell("a"), *work("a", 40, {1.5: {"spindle_load_pct": 38.0}}))
+    assert dict(metric(actions, RAW))[2.0] == -1.0  # |y| = 4, at once
+    adjusted = dict(metric(actions, ADJUSTED))
     assert adjusted[2.0] == pytest.approx(4.0 * (1.0 - 2.718281828**-0.1), abs=1e-6)
-    assert metric(effects, ALARM)[-1] == (10.0, True)  # 4 (1 − exp(−t/10)) is at 2 after 7 s; three ticks
+    assert metric(actions, ALARM)[-1] == (10.0, True)  # 4 (1 − exp(−t/10)) is at 2 after 7 s; three ticks
     assert max(adjusted.values()) < 4.0
 
 
@@ -79,31 +79,31 @@ def test_what_the_peers_share_is_no_fault_and_what_they_do_not_still_is() -> Non
     assert metric(shared, COMMON)[-1][1] is True
     assert metric(shared, PEER)[-1][1] == "b"
     fault = {1.5: {"spindle_load_pct": 38.0, "spindle_rpm": 3960.0}}  # the speed is a's alone
-    effects = fed(cell("a", "b"), *together(work("a", 40, fault), work("b", 40, high)))
-    assert metric(effects, ALARM)[-1][1] is True
-    assert True not in [on for _, on in metric(effects, ALARM, "b")]
+    actions = fed(cell("a", "b"), *together(work("a", 40, fault), work("b", 40, high)))
+    assert metric(actions, ALARM)[-1][1] is True
+    assert True not in [on for _, on in metric(actions, ALARM, "b")]
 
 
 def test_a_peers_tool_change_neither_hides_a_fault_nor_makes_one() -> None:
     change = {3.5: {"tool_change_active": True, "spindle_load_pct": 90.0}, 30.5: {"tool_change_active": False}}
-    effects = fed(cell("a", "b"), *together(work("a", 40, {3.5: {"spindle_load_pct": 38.0}}), work("b", 40, change)))
-    assert metric(effects, ALARM)[-1][1] is True
-    assert metric(effects, GATE, "b")[1] == (4.0, True)
-    assert True not in [on for _, on in metric(effects, ALARM, "b")]
+    actions = fed(cell("a", "b"), *together(work("a", 40, {3.5: {"spindle_load_pct": 38.0}}), work("b", 40, change)))
+    assert metric(actions, ALARM)[-1][1] is True
+    assert metric(actions, GATE, "b")[1] == (4.0, True)
+    assert True not in [on for _, on in metric(actions, ALARM, "b")]
 
 
 def test_a_tool_that_was_not_in_the_training_is_not_judged_and_that_is_said() -> None:
-    effects = fed(cell("a"), *work("a", 20, {3.5: {"tool_number": 9, "spindle_load_pct": 60.0}}))
-    assert "no baseline for program O1, tool_number 9, feed_override_pct 100" in reasons(effects, ADJUSTED)
-    assert [at_s for at_s, raw in metric(effects, RAW) if raw is not None][-1] == 4.0  # the raw score is there all the same
+    actions = fed(cell("a"), *work("a", 20, {3.5: {"tool_number": 9, "spindle_load_pct": 60.0}}))
+    assert "no baseline for program O1, tool_number 9, feed_override_pct 100" in reasons(actions, ADJUSTED)
+    assert [at_s for at_s, raw in metric(actions, RAW) if raw is not None][-1] == 4.0  # the raw score is there all the same
 
 
 def test_a_standing_spindle_is_no_fault_and_no_peer() -> None:
     stands = {3.5: {"spindle_rpm": 0.0, "spindle_load_pct": 0.0}}
-    effects = fed(cell("a"), *work("a", 20, stands))
-    assert {score for _, score in metric(effects, ADJUSTED)} == {0.0}
-    assert reasons(effects, ADJUSTED) == []
-    assert True not in [on for _, on in metric(effects, ALARM)]
+    actions = fed(cell("a"), *work("a", 20, stands))
+    assert {score for _, score in metric(actions, ADJUSTED)} == {0.0}
+    assert reasons(actions, ADJUSTED) == []
+    assert True not in [on for _, on in metric(actions, ALARM)]
 
 
 def test_a_restart_in_the_middle_changes_nothing() -> None:

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from processors.effects import DeadLetter, Effect, Publish
+from processors.actions import Action, DeadLetter, Publish
 from processors.joint_anomaly.member import ADJUSTED, ALARM, COMMON, GATE
 from processors.joint_anomaly.processor import RAW
 from processors.running.engine import Engine
@@ -135,18 +135,18 @@ def messages(shift: Shift) -> list[HostEvent]:
     return sorted(told, key=lambda one: one.timestamp_ms)
 
 
-def lived(engine: Engine, arrivals: Sequence[tuple[float, HostEvent]], from_s: float = 0.0) -> list[Effect]:
+def lived(engine: Engine, arrivals: Sequence[tuple[float, HostEvent]], from_s: float = 0.0) -> list[Action]:
     """As the worker does it: each message as it comes, and silence twice a second, until all that was on its way has come."""
-    effects: list[Effect] = []
+    actions: list[Action] = []
     waiting = sorted(arrivals, key=lambda pair: pair[0])
     wall_s = from_s
     while wall_s < UNTIL_S + 20.0 or waiting:
         while waiting and waiting[0][0] <= wall_s:
             came_s, one = waiting.pop(0)
-            effects += engine.feed(one, came_s)
-        effects += engine.silence(wall_s)
+            actions += engine.feed(one, came_s)
+        actions += engine.silence(wall_s)
         wall_s += 0.5
-    return effects
+    return actions
 
 
 def prompt(shift: Shift) -> list[tuple[float, HostEvent]]:
@@ -164,10 +164,10 @@ def held(told: Sequence[tuple[float, Any]]) -> list[Any]:
     return series
 
 
-def everything(effects: Sequence[Effect], machine: str, until_s: float = UNTIL_S - 1) -> list[tuple[Any, ...]]:
+def everything(actions: Sequence[Action], machine: str, until_s: float = UNTIL_S - 1) -> list[tuple[Any, ...]]:
     """All that was published of a machine, by name and time, up to the last tick that counts."""
     changes = [
-        change for effect in effects if isinstance(effect, Publish) and effect.machine == machine for change in effect.changes
+        change for action in actions if isinstance(action, Publish) and action.machine == machine for change in action.changes
     ]
     until_ms = T0_MS + until_s * 1000
     return sorted((c.name, c.timestamp_ms, repr(c.value), c.reason or "") for c in changes if T0_MS < c.timestamp_ms <= until_ms)
@@ -177,12 +177,12 @@ def as_numbers(series: Sequence[Any]) -> NDArray[np.float64]:
     return np.array([np.nan if value is None else float(value) for value in series])
 
 
-def assert_agrees(effects: Sequence[Effect], machine: str, place: int, arrays: Expected) -> None:
+def assert_agrees(actions: Sequence[Action], machine: str, place: int, arrays: Expected) -> None:
     for name, column in ((RAW, arrays.raw), (ADJUSTED, arrays.adjusted)):
-        np.testing.assert_array_equal(as_numbers(held(metric(list(effects), name, machine))), column[:, place])
-    assert held(metric(list(effects), GATE, machine)) == arrays.gated[:, place].tolist()
+        np.testing.assert_array_equal(as_numbers(held(metric(list(actions), name, machine))), column[:, place])
+    assert held(metric(list(actions), GATE, machine)) == arrays.gated[:, place].tolist()
     known = ~np.isnan(arrays.adjusted[:, place])
-    common, alarm = held(metric(list(effects), COMMON, machine)), held(metric(list(effects), ALARM, machine))
+    common, alarm = held(metric(list(actions), COMMON, machine)), held(metric(list(actions), ALARM, machine))
     assert [bool(told) for told in common] == arrays.common[:, place].tolist()
     assert [told is None for told in common] == (~known).tolist()
     assert [bool(told) for told in alarm] == arrays.alarm[:, place].tolist()
@@ -194,11 +194,11 @@ def assert_agrees(effects: Sequence[Effect], machine: str, place: int, arrays: E
 def test_what_is_published_live_is_what_the_array_forms_give(seed: int) -> None:
     shift = drawn(seed)
     engine = engine_for(shift)
-    effects = [*fed(engine, *born(*shift.says)), *lived(engine, prompt(shift))]
+    actions = [*fed(engine, *born(*shift.says)), *lived(engine, prompt(shift))]
     arrays = expected(shift)
     for place, machine in enumerate(shift.says):
-        assert_agrees(effects, machine, place, arrays)
-    assert not [effect for effect in effects if isinstance(effect, DeadLetter)]
+        assert_agrees(actions, machine, place, arrays)
+    assert not [action for action in actions if isinstance(action, DeadLetter)]
     assert engine.ledger.balance == 0
 
 
@@ -261,7 +261,7 @@ def test_a_restart_at_any_point_changes_nothing(seed: int, cut: float) -> None:
     second.restore(first.snapshot("all"))
     births = [born_again(first, machine, at_s) for machine in shift.says]
     chance.shuffle(births)
-    after = [effect for one in births for effect in second.feed(one, at_s)]
+    after = [action for one in births for action in second.feed(one, at_s)]
     after += lived(second, rest, at_s)
     for machine in shift.says:
         alarms_and_scores = {RAW, ADJUSTED, COMMON, GATE, ALARM}
@@ -285,14 +285,14 @@ def test_a_death_takes_a_machine_out_of_the_frames_from_the_next_tick_on(seed: i
     again = birth(30.5, device="a", node=node, spindle_load_pct=[30.0, *loads][-1], tool_change_active=[False, *active][-1])
     engine = engine_for(shift)
     stream = [*prompt(shift), (20.5, death(20.5, device="a", node=node)), (30.5, again)]
-    effects = [*fed(engine, *born(*shift.says)), *lived(engine, stream)]
+    actions = [*fed(engine, *born(*shift.says)), *lived(engine, stream)]
     arrays = expected(shift, {"a": range(21, 31)})
     for place, machine in enumerate(shift.says):
         if machine != "a":
-            assert_agrees(effects, machine, place, arrays)
-    told = dict(metric(effects, ALARM, "a"))
+            assert_agrees(actions, machine, place, arrays)
+    told = dict(metric(actions, ALARM, "a"))
     assert not [at_s for at_s in told if 20.0 < at_s < 31.0]
-    assert not [effect for effect in effects if isinstance(effect, DeadLetter)]
+    assert not [action for action in actions if isinstance(action, DeadLetter)]
 
 
 class HalfBroken(PlainModel):
@@ -314,16 +314,16 @@ def test_a_model_that_fails_concerns_its_own_machine_only_and_is_said(load: floa
         for s in range(1, 12)
         for one in (says(s + 0.2, "a", spindle_load_pct=load), says(s + 0.3, "b", spindle_load_pct=90.0))
     ]
-    effects = fed(engine, *born("a", "b"), *stream)
+    actions = fed(engine, *born("a", "b"), *stream)
     changes = [
-        c for e in effects if isinstance(e, Publish) and e.machine == "a" for c in e.changes if c.timestamp_ms > T0_MS + 1500
+        c for e in actions if isinstance(e, Publish) and e.machine == "a" for c in e.changes if c.timestamp_ms > T0_MS + 1500
     ]
     assert {(c.name, c.value, c.reason) for c in changes if c.name in (RAW, ADJUSTED)} == {
         (RAW, None, why),
         (ADJUSTED, None, why),
     }
-    assert True in [on for _, on in metric(effects, ALARM, "b")]
-    assert not [effect for effect in effects if isinstance(effect, DeadLetter)]
+    assert True in [on for _, on in metric(actions, ALARM, "b")]
+    assert not [action for action in actions if isinstance(action, DeadLetter)]
 
 
 @pytest.mark.parametrize("leap_s", [-86_400.0, -100.0, -7.0, 100.0, 86_400.0])
@@ -335,12 +335,12 @@ def test_a_clock_that_is_set_costs_that_machine_its_dwell_and_its_peers_nothing(
         for s in range(40)
         for machine in "abc"
     ]
-    effects = fed(engine, *born("a", "b", "c"), *stream)
+    actions = fed(engine, *born("a", "b", "c"), *stream)
     for machine in "ab":
-        assert [at_s for at_s, _ in metric(effects, ADJUSTED, machine)] == [float(s) for s in range(1, 40)]
-        assert {peers for at_s, peers in metric(effects, "twin/common_mode_peers", machine) if at_s > 20} <= {1, 2}
-    assert metric(effects, ADJUSTED, "c")[-1][0] > 35.0 + leap_s
-    assert not [effect for effect in effects if isinstance(effect, DeadLetter)]
+        assert [at_s for at_s, _ in metric(actions, ADJUSTED, machine)] == [float(s) for s in range(1, 40)]
+        assert {peers for at_s, peers in metric(actions, "twin/common_mode_peers", machine) if at_s > 20} <= {1, 2}
+    assert metric(actions, ADJUSTED, "c")[-1][0] > 35.0 + leap_s
+    assert not [action for action in actions if isinstance(action, DeadLetter)]
 
 
 def test_what_is_known_of_a_machine_is_kept_while_it_is_offline_and_others_are_born() -> None:
@@ -357,11 +357,11 @@ def test_what_is_known_of_a_machine_is_kept_while_it_is_offline_and_others_are_b
 def test_a_thousand_machines_in_one_cell_in_any_order() -> None:
     machines, chance = [f"m{i}" for i in range(1000)], Random(7)
     engine = cell(*machines)
-    effects = fed(engine, *born(*machines))
+    actions = fed(engine, *born(*machines))
     for second in range(3):
         chance.shuffle(machines)
-        effects += fed(engine, *(says(second + 0.5, machine, spindle_load_pct=40.0 + second) for machine in machines))
-    peers = [c.value for e in effects if isinstance(e, Publish) for c in e.changes if c.name == "twin/common_mode_peers"]
+        actions += fed(engine, *(says(second + 0.5, machine, spindle_load_pct=40.0 + second) for machine in machines))
+    peers = [c.value for e in actions if isinstance(e, Publish) for c in e.changes if c.name == "twin/common_mode_peers"]
     assert peers == [999] * 1000
 
 
@@ -376,6 +376,6 @@ def test_a_change_of_tools_before_the_processor_was_restarted_still_has_its_tail
     fed(first, *born("a"), *opening)
     second.restore(first.snapshot("all"))
     again = birth(13.2, device="a", node=NodeId("cnc", "a"), spindle_load_pct=99.0, tool_change_active=False)
-    effects = fed(second, again, *(says(s + 0.5, "a", spindle_load_pct=99.0 - s / 10) for s in range(14, 30)))
-    assert metric(effects, GATE)[-1] == (19.0, False)
-    assert metric(effects, ALARM)[-1] == (21.0, True)
+    actions = fed(second, again, *(says(s + 0.5, "a", spindle_load_pct=99.0 - s / 10) for s in range(14, 30)))
+    assert metric(actions, GATE)[-1] == (19.0, False)
+    assert metric(actions, ALARM)[-1] == (21.0, True)

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
+from processors.actions import Action, DeadLetter, Publish
 from processors.config import Configuration
-from processors.effects import DeadLetter, Effect, Publish
 from processors.errors import ConfigurationError
 from processors.joint_anomaly.config import Config
 from processors.joint_anomaly.member import ADJUSTED, ALARM, COMMON, GATE, GATE_SOURCE, NO_MODEL, PEERS
@@ -47,13 +47,13 @@ def cell(*machines: str, calibration: Any = None, **table: Any) -> Engine:
     return engine_with(dict.fromkeys(machines, PlainModel(calibration)), {"threshold": A_TENTH} | table)
 
 
-def metric(effects: list[Effect], name: str, machine: str = "a") -> list[tuple[float, Any]]:
+def metric(actions: list[Action], name: str, machine: str = "a") -> list[tuple[float, Any]]:
     """(seconds after the start, value) of what was published of a metric."""
     return [
         ((change.timestamp_ms - T0_MS) / 1000, change.value)
-        for effect in effects
-        if isinstance(effect, Publish) and effect.machine == machine
-        for change in effect.changes
+        for action in actions
+        if isinstance(action, Publish) and action.machine == machine
+        for change in action.changes
         if change.name == name
     ]
 
@@ -84,21 +84,21 @@ def together(*streams: list[HostEvent]) -> list[HostEvent]:
 
 
 def test_without_a_model_the_score_is_null_and_says_what_to_do() -> None:
-    effects = fed(cell(), *born("a"), says(1.5, "a", spindle_load_pct=99.0))
-    reasons = {change.name: change.reason for effect in effects if isinstance(effect, Publish) for change in effect.changes}
+    actions = fed(cell(), *born("a"), says(1.5, "a", spindle_load_pct=99.0))
+    reasons = {change.name: change.reason for action in actions if isinstance(action, Publish) for change in action.changes}
     assert reasons[RAW] == reasons[ALARM] == NO_MODEL
 
 
 def test_the_raw_score_is_of_the_values_as_last_reported_at_each_tick() -> None:
     engine = cell("a")
-    effects = fed(engine, *born("a"), says(1.2, "a", spindle_load_pct=70.0), says(3.4, "a", spindle_load_pct=60.0))
-    assert metric(effects, RAW) == [(1.0, -0.2), (2.0, 0.2)]  # at 3 s as at 2 s
+    actions = fed(engine, *born("a"), says(1.2, "a", spindle_load_pct=70.0), says(3.4, "a", spindle_load_pct=60.0))
+    assert metric(actions, RAW) == [(1.0, -0.2), (2.0, 0.2)]  # at 3 s as at 2 s
 
 
 def test_an_unknown_feature_makes_the_score_unknown_and_names_it() -> None:
-    effects = fed(cell("a"), *born("a"), says(1.5, "a", spindle_load_pct=None), says(3.0, "a", tool_number=1))
+    actions = fed(cell("a"), *born("a"), says(1.5, "a", spindle_load_pct=None), says(3.0, "a", tool_number=1))
     last = next(
-        change for effect in reversed(effects) if isinstance(effect, Publish) for change in effect.changes if change.name == RAW
+        change for action in reversed(actions) if isinstance(action, Publish) for change in action.changes if change.name == RAW
     )
     assert last.value is None
     assert last.reason == "spindle_load_pct is null"
@@ -126,28 +126,28 @@ def change_of_15_s(machine: str = "a", load_until_s: float = 31.2) -> list[HostE
 
 def test_a_tool_change_is_gated_and_its_tail_runs_from_its_end() -> None:
     """The change says once that it is on, 15 s before its end; the gate holds that, and 8 s from the falling edge."""
-    effects = fed(cell("a"), *born("a"), *change_of_15_s())
-    assert metric(effects, GATE) == [(1.0, False), (11.0, True), (34.0, False)]
-    assert True not in [on for _, on in metric(effects, ALARM)]
-    assert max(score for _, score in metric(effects, RAW)) == pytest.approx(0.7)  # suppressing hides no data
-    assert max(score for _, score in metric(effects, ADJUSTED)) <= 0.0
+    actions = fed(cell("a"), *born("a"), *change_of_15_s())
+    assert metric(actions, GATE) == [(1.0, False), (11.0, True), (34.0, False)]
+    assert True not in [on for _, on in metric(actions, ALARM)]
+    assert max(score for _, score in metric(actions, RAW)) == pytest.approx(0.7)  # suppressing hides no data
+    assert max(score for _, score in metric(actions, ADJUSTED)) <= 0.0
 
 
 def test_without_the_gate_the_same_tool_change_is_an_alarm() -> None:
-    effects = fed(cell("a", tail_s=0.0), *born("a"), *[one._replace(readings=one.readings[:1]) for one in change_of_15_s()])
-    assert True in [on for _, on in metric(effects, ALARM)]
+    actions = fed(cell("a", tail_s=0.0), *born("a"), *[one._replace(readings=one.readings[:1]) for one in change_of_15_s()])
+    assert True in [on for _, on in metric(actions, ALARM)]
 
 
 def test_a_run_up_that_outlasts_the_tail_is_an_alarm() -> None:
-    effects = fed(cell("a"), *born("a"), *change_of_15_s(load_until_s=45.2))
-    assert metric(effects, ALARM)[-2:] == [(36.0, True), (48.0, False)]
+    actions = fed(cell("a"), *born("a"), *change_of_15_s(load_until_s=45.2))
+    assert metric(actions, ALARM)[-2:] == [(36.0, True), (48.0, False)]
 
 
 def test_a_fault_that_begins_in_a_gate_is_caught_on_the_first_clean_ticks_after_it() -> None:
     stream = course("a", 60, {10.2: {"tool_change_active": True}, 12.2: {"load": 90.0}, 14.2: {"tool_change_active": False}})
-    effects = fed(cell("a"), *born("a"), *stream)
-    assert metric(effects, GATE)[-1] == (23.0, False)
-    assert metric(effects, ALARM)[-1] == (25.0, True)
+    actions = fed(cell("a"), *born("a"), *stream)
+    assert metric(actions, GATE)[-1] == (23.0, False)
+    assert metric(actions, ALARM)[-1] == (25.0, True)
 
 
 def test_a_label_that_comes_late_gates_what_was_before_it() -> None:
@@ -158,24 +158,24 @@ def test_a_label_that_comes_late_gates_what_was_before_it() -> None:
         {10.4: {"load": 120.0}, 20.2: {"tool_change_active": True}, 21.2: {"tool_change_active": False}, 24.2: {"load": 30.0}},
     )
     assert True in [on for _, on in metric(fed(cell("a"), *born("a"), *late), ALARM)]
-    effects = fed(cell("a", look_back_s=10.0), *born("a"), *late)
-    assert True not in [on for _, on in metric(effects, ALARM)]
-    assert metric(effects, GATE) == [(1.0, False), (11.0, True), (30.0, False)]
+    actions = fed(cell("a", look_back_s=10.0), *born("a"), *late)
+    assert True not in [on for _, on in metric(actions, ALARM)]
+    assert metric(actions, GATE) == [(1.0, False), (11.0, True), (30.0, False)]
 
 
 def test_nobody_who_tells_of_tool_changes_is_not_taken_for_no_change() -> None:
     stream = [birth(0.0, device="a", node=NodeId("cnc", "a"), spindle_load_pct=30.0), *course("a", 10, {2.5: {"load": 90.0}})]
-    effects = fed(cell("a"), *stream)
-    gate = next(c for e in effects if isinstance(e, Publish) for c in e.changes if c.name == GATE)
+    actions = fed(cell("a"), *stream)
+    gate = next(c for e in actions if isinstance(e, Publish) for c in e.changes if c.name == GATE)
     assert (gate.value, gate.reason) == (None, "not gated: tool_change_active is not offered")
-    assert metric(effects, GATE_SOURCE) == [(1.0, "none")]
-    assert True in [on for _, on in metric(effects, ALARM)]
+    assert metric(actions, GATE_SOURCE) == [(1.0, "none")]
+    assert True in [on for _, on in metric(actions, ALARM)]
 
 
 def test_a_source_that_dies_makes_the_gate_stale() -> None:
     vibration, control = NodeId("cnc", "edge-vibration"), NodeId("cnc", "edge-control")
     engine = cell("a")
-    effects = fed(
+    actions = fed(
         engine,
         birth(0.0, device="a", node=control, tool_change_active=False),
         birth(0.0, device="a", node=vibration, spindle_load_pct=30.0),
@@ -183,14 +183,14 @@ def test_a_source_that_dies_makes_the_gate_stale() -> None:
         death(3.2, device="a", node=control),
         data(5.5, device="a", node=vibration, spindle_load_pct=32.0),
     )
-    assert metric(effects, GATE) == [(1.0, False), (4.0, None)]
-    assert metric(effects, GATE_SOURCE)[-1] == (4.0, "stale")
+    assert metric(actions, GATE) == [(1.0, False), (4.0, None)]
+    assert metric(actions, GATE_SOURCE)[-1] == (4.0, "stale")
 
 
 def test_a_change_that_never_ends_gates_for_three_minutes_and_then_says_so() -> None:
     stream = course("a", 300, {10.2: {"tool_change_active": True}})
-    effects = fed(cell("a"), *born("a"), *stream)
-    assert metric(effects, GATE) == [(1.0, False), (11.0, True), (191.0, None)]
+    actions = fed(cell("a"), *born("a"), *stream)
+    assert metric(actions, GATE) == [(1.0, False), (11.0, True), (191.0, None)]
 
 
 def test_the_detector_is_asked_where_the_control_tells_nothing() -> None:
@@ -202,9 +202,9 @@ def test_the_detector_is_asked_where_the_control_tells_nothing() -> None:
         data(2.5, device="a", node=detector, **{"twin/tool_change_active": True}),
         says(4.5, "a", spindle_load_pct=31.0),
     ]
-    effects = fed(engine, *stream)
-    assert metric(effects, GATE)[-1] == (3.0, True)
-    assert metric(effects, GATE_SOURCE) == [(1.0, "detector")]
+    actions = fed(engine, *stream)
+    assert metric(actions, GATE)[-1] == (3.0, True)
+    assert metric(actions, GATE_SOURCE) == [(1.0, "detector")]
 
 
 @pytest.mark.parametrize(
@@ -217,15 +217,15 @@ def test_the_detector_is_asked_where_the_control_tells_nothing() -> None:
     ],
 )
 def test_the_published_ratio_rule(own: float, peer: float, is_common: bool, adjusted: float) -> None:
-    effects = fed(
+    actions = fed(
         cell("a", "b"),
         *born("a", load=own),
         *born("b", load=peer),
         *together(course("a", 3, {0.5: {"load": own}}), course("b", 3, {0.5: {"load": peer}})),
     )
-    assert metric(effects, COMMON)[0] == (1.0, is_common)
-    assert metric(effects, ADJUSTED)[0] == (1.0, pytest.approx(adjusted))
-    assert metric(effects, PEERS)[0] == (1.0, 1)
+    assert metric(actions, COMMON)[0] == (1.0, is_common)
+    assert metric(actions, ADJUSTED)[0] == (1.0, pytest.approx(adjusted))
+    assert metric(actions, PEERS)[0] == (1.0, 1)
 
 
 def fault_beside_a_peers_change() -> list[HostEvent]:
@@ -250,10 +250,10 @@ def test_the_residual_keeps_a_fault_that_comes_with_a_common_disturbance() -> No
     calibrated = SimpleNamespace(raw_center=-0.2, raw_spread=0.1, threshold=1.0, in_words="", hourly_means=())
     engine = cell("a", "b", "c", "d", common_mode="residual", threshold=1.0, calibration=calibrated)
     loads = {"a": 90.0, "b": 60.0, "c": 60.0, "d": 62.0}  # z: 6.0, and 3.0, 3.0, 3.2 of the peers
-    effects = fed(engine, *born(*loads), *together(*(course(name, 10, {1.5: {"load": load}}) for name, load in loads.items())))
-    assert metric(effects, ADJUSTED)[-1] == (2.0, pytest.approx(3.0))
-    assert metric(effects, ALARM)[-1] == (4.0, True)
-    assert True not in [on for name in "bcd" for _, on in metric(effects, ALARM, name)]
+    actions = fed(engine, *born(*loads), *together(*(course(name, 10, {1.5: {"load": load}}) for name, load in loads.items())))
+    assert metric(actions, ADJUSTED)[-1] == (2.0, pytest.approx(3.0))
+    assert metric(actions, ALARM)[-1] == (4.0, True)
+    assert True not in [on for name in "bcd" for _, on in metric(actions, ALARM, name)]
 
 
 def test_frames_are_of_one_moment_however_late_a_peer_is() -> None:
@@ -279,9 +279,9 @@ def test_nobody_waits_for_a_machine_whose_clock_is_an_hour_off() -> None:
     ]
     on_time = together(course("a", 20, {5.2: {"load": 90.0}}), course("b", 20, {}))
     mixed = [one for pair in zip(on_time, off * 2, strict=False) for one in pair]
-    effects = fed(cell("a", "b", "c"), *born("a", "b"), *mixed)
-    assert metric(effects, PEERS)[0] == (1.0, 1)
-    assert metric(effects, ADJUSTED)[-1][1] == pytest.approx(0.4)
+    actions = fed(cell("a", "b", "c"), *born("a", "b"), *mixed)
+    assert metric(actions, PEERS)[0] == (1.0, 1)
+    assert metric(actions, ADJUSTED)[-1][1] == pytest.approx(0.4)
 
 
 def test_a_known_clock_offset_is_taken_off_before_machines_are_compared() -> None:
@@ -289,8 +289,8 @@ def test_a_known_clock_offset_is_taken_off_before_machines_are_compared() -> Non
     ahead = [says(100.0 + (one.timestamp_ms - T0_MS) / 1000, "b", spindle_load_pct=90.0) for one in course("b", 20, {})]
     b = [birth(100.0, device="b", node=NodeId("cnc", "b"), spindle_load_pct=90.0, clock_offset_s=100.0), *ahead]
     a = course("a", 20, {0.5: {"load": 90.0}})
-    effects = fed(cell("a", "b"), *born("a", load=90.0), *(one for pair in zip(a, b, strict=False) for one in pair))
-    assert metric(effects, COMMON)[0] == (1.0, True)
+    actions = fed(cell("a", "b"), *born("a", load=90.0), *(one for pair in zip(a, b, strict=False) for one in pair))
+    assert metric(actions, COMMON)[0] == (1.0, True)
 
 
 @pytest.mark.parametrize(("stamped_by", "common"), [("edge", [True]), ("control", [])])
@@ -300,8 +300,8 @@ def test_the_offset_of_a_clock_is_taken_off_the_stamps_of_that_clock_only(stampe
     b = [birth(0.0, device="b", node=NodeId("cnc", "b"), spindle_load_pct=90.0, **told)]
     b += [says((one.timestamp_ms - T0_MS) / 1000, "b", spindle_load_pct=90.0) for one in course("b", 20, {})]
     a = course("a", 20, {0.5: {"load": 90.0}})
-    effects = fed(cell("a", "b"), *born("a", load=90.0), *(one for pair in zip(a, b, strict=False) for one in pair))
-    assert [value for at_s, value in metric(effects, COMMON) if value] == common
+    actions = fed(cell("a", "b"), *born("a", load=90.0), *(one for pair in zip(a, b, strict=False) for one in pair))
+    assert [value for at_s, value in metric(actions, COMMON) if value] == common
 
 
 def test_a_restart_in_the_middle_of_a_change_loses_nothing() -> None:
@@ -331,8 +331,8 @@ def test_a_clock_that_jumps_starts_the_dwell_anew_and_crashes_nothing() -> None:
         says(90_000.0, "a", spindle_load_pct=90.0),
         says(90_001.5, "a", spindle_load_pct=90.0),
     ]
-    effects = fed(cell("a"), *stream)
-    assert [effect for effect in effects if isinstance(effect, DeadLetter)] == []
+    actions = fed(cell("a"), *stream)
+    assert [action for action in actions if isinstance(action, DeadLetter)] == []
 
 
 def test_history_that_comes_late_wakes_nobody() -> None:
@@ -367,5 +367,5 @@ def test_nobody_waits_for_a_machine_that_is_off_while_the_detector_still_speaks_
     engine = cell("a", "b")
     fed(engine, *born("a", "b"), birth(0.0, device="a", node=detector, **{"twin/tool_change_active": False}))
     fed(engine, *together(course("a", 4, {}), course("b", 4, {})), death(3.6, device="a", node=NodeId("cnc", "a")))
-    effects = fed(engine, says(4.2, "b", spindle_load_pct=40.0), says(5.2, "b", spindle_load_pct=30.0))
-    assert metric(effects, ADJUSTED, "b")[-1][0] == 5.0
+    actions = fed(engine, says(4.2, "b", spindle_load_pct=40.0), says(5.2, "b", spindle_load_pct=30.0))
+    assert metric(actions, ADJUSTED, "b")[-1][0] == 5.0

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from processors.actions import Action, DeadLetter, Publish
 from processors.contract import OutputSpec
-from processors.effects import DeadLetter, Effect, Publish
 from processors.errors import ConfigurationError
 from processors.rules.alarm import IDLE, Judgement, LimitState, Timing, latched
 from processors.rules.processor import DETAIL, PROCESSOR, RULES, SEVERITY, ZONE
@@ -34,20 +34,20 @@ def last(engine: Engine) -> dict[str, Change]:
     return engine._machines["okuma"].live.emission.latest
 
 
-def turns(effects: list[Effect], name: str) -> list[tuple[float, Any]]:
+def turns(actions: list[Action], name: str) -> list[tuple[float, Any]]:
     """Each value that was published of one output, with the second."""
     return [
         ((c.timestamp_ms - 1_644_501_060_000) / 1000, c.value)
-        for effect in effects
-        if isinstance(effect, Publish)
-        for c in effect.changes
+        for action in actions
+        if isinstance(action, Publish)
+        for c in action.changes
         if c.name == name
     ]
 
 
-def alarms(effects: list[Effect]) -> dict[str, int]:
+def alarms(actions: list[Action]) -> dict[str, int]:
     """How often each rule has alarmed."""
-    return {rule.name: sum(value is True for _, value in turns(effects, rule.metric)) for rule in RULES}
+    return {rule.name: sum(value is True for _, value in turns(actions, rule.metric)) for rule in RULES}
 
 
 def warm_engine(**table: Any) -> Engine:
@@ -68,12 +68,12 @@ def test_alarms_are_booleans_that_history_does_not_raise() -> None:
 
 def test_an_overload_alarms_after_its_dwell_and_ends_below_the_lower_limit() -> None:
     engine = warm_engine()
-    effects = fed(engine, data(201.0, spindle_load_pct=131.4), data(205.9, feed_mm_min=790.0), data(206.1, feed_mm_min=780.0))
-    assert turns(effects, LOAD) == [(206.0, True)]
+    actions = fed(engine, data(201.0, spindle_load_pct=131.4), data(205.9, feed_mm_min=790.0), data(206.1, feed_mm_min=780.0))
+    assert turns(actions, LOAD) == [(206.0, True)]
     assert last(engine)[DETAIL].value == ("load_over_limit: spindle_load_pct 131 % over 110 %, since 2022-02-10T13:54:21Z")
     assert last(engine)[SEVERITY].value == "high"
-    effects = fed(engine, data(210.0, spindle_load_pct=105.0), data(240.0, spindle_load_pct=99.0), data(246.5, feed_mm_min=1.0))
-    assert turns(effects, LOAD) == [(245.0, False)]
+    actions = fed(engine, data(210.0, spindle_load_pct=105.0), data(240.0, spindle_load_pct=99.0), data(246.5, feed_mm_min=1.0))
+    assert turns(actions, LOAD) == [(245.0, False)]
     assert last(engine)[DETAIL].value == "none"
 
 
@@ -93,8 +93,8 @@ def test_a_spindle_that_runs_up_is_not_overloaded() -> None:
     engine = engine_of(PROCESSOR)
     fed(engine, birth(0.0, **CUTTING | {"spindle_rpm": 0.0, "spindle_load_pct": 0.0}))
     ramp = [data(10.0 + i / 3, spindle_rpm=1000.0 * i / 3, spindle_load_pct=160.0) for i in range(1, 37)]
-    effects = fed(engine, *ramp, data(22.3, spindle_load_pct=40.0), data(60.0, spindle_load_pct=40.0))
-    assert alarms(effects)["load_over_limit"] == 0
+    actions = fed(engine, *ramp, data(22.3, spindle_load_pct=40.0), data(60.0, spindle_load_pct=40.0))
+    assert alarms(actions)["load_over_limit"] == 0
 
 
 def test_a_run_up_that_does_not_end_is_an_overload() -> None:
@@ -108,8 +108,8 @@ def test_a_run_up_that_does_not_end_is_an_overload() -> None:
 def test_a_speed_that_changed_after_long_silence_is_a_ramp() -> None:
     """Reported by exception: 4000 rev/min have stood for minutes, and the next report is 1500."""
     engine = warm_engine(load_dwell_s=0.0)
-    effects = fed(engine, data(300.0, spindle_rpm=1500.0, spindle_load_pct=170.0), data(301.0, spindle_load_pct=30.0))
-    assert alarms(effects)["load_over_limit"] == 0
+    actions = fed(engine, data(300.0, spindle_rpm=1500.0, spindle_load_pct=170.0), data(301.0, spindle_load_pct=30.0))
+    assert alarms(actions)["load_over_limit"] == 0
 
 
 def test_the_drift_of_constant_surface_speed_is_no_ramp() -> None:
@@ -143,26 +143,26 @@ def test_the_limit_of_5_k_a_minute_holds_for_whole_degrees_too(slope: float, cou
 
 def test_a_runaway_is_seen_within_two_minutes_and_ends_when_the_rise_does() -> None:
     engine = warm_engine()
-    effects = fed(engine, *heat(12.0, 240.0, 200.0), *heat(0.0, 400.0, 440.0, start_c=78.0))
-    (_, raised), (_, ended) = [(value, at_s - 200.0) for at_s, value in turns(effects, RUNAWAY)]
+    actions = fed(engine, *heat(12.0, 240.0, 200.0), *heat(0.0, 400.0, 440.0, start_c=78.0))
+    (_, raised), (_, ended) = [(value, at_s - 200.0) for at_s, value in turns(actions, RUNAWAY)]
     assert 60.0 < raised < 120.0
     assert 240.0 + 30.0 < ended < 240.0 + 180.0
-    assert [value for _, value in turns(effects, RUNAWAY)] == [True, False]
+    assert [value for _, value in turns(actions, RUNAWAY)] == [True, False]
 
 
 def test_zeros_of_the_sensor_are_no_cooling_and_their_end_is_no_heating() -> None:
     """As Mazak's do: 43, 0 for a second, 43, each few seconds; here on a slope of 2 K/min."""
     engine = warm_engine()
     stream = [data(200.0 + i, spindle_temp_c=0.0 if i % 4 == 0 else round(30.0 + i / 30.0)) for i in range(1, 400)]
-    effects = fed(engine, *stream)
-    assert turns(effects, RUNAWAY) == []  # False before, and ever since
+    actions = fed(engine, *stream)
+    assert turns(actions, RUNAWAY) == []  # False before, and ever since
     assert engine._machines["okuma"].live.state.trend.slope_k_per_min == pytest.approx(2.0, abs=0.35)
 
 
 def test_a_new_level_of_the_sensor_is_no_runaway() -> None:
     engine = warm_engine()
-    effects = fed(engine, data(210.0, spindle_temp_c=55.0), data(230.0, spindle_temp_c=55.0), data(600.0, spindle_temp_c=55.0))
-    assert [value for _, value in turns(effects, RUNAWAY)] == [None, False]
+    actions = fed(engine, data(210.0, spindle_temp_c=55.0), data(230.0, spindle_temp_c=55.0), data(600.0, spindle_temp_c=55.0))
+    assert [value for _, value in turns(actions, RUNAWAY)] == [None, False]
 
 
 def test_until_most_of_a_window_is_known_nothing_is_said() -> None:
@@ -189,8 +189,8 @@ def test_until_most_of_a_window_is_known_nothing_is_said() -> None:
 def test_load_without_feed_needs_load_speed_and_a_running_program(values: dict[str, Any], count: int) -> None:
     engine = warm_engine()
     stuck = CUTTING | {"spindle_load_pct": 70.0, "feed_mm_min": 0.0} | values
-    effects = fed(engine, data(201.0, **stuck), data(220.0, spindle_temp_c=30.0))
-    assert alarms(effects)["load_without_feed"] == count
+    actions = fed(engine, data(201.0, **stuck), data(220.0, spindle_temp_c=30.0))
+    assert alarms(actions)["load_without_feed"] == count
 
 
 def test_a_control_that_tells_no_state_can_be_judged_without() -> None:
@@ -212,8 +212,8 @@ def test_zone_d_alarms_whoever_measures_it(name: str) -> None:
     engine = engine_of(PROCESSOR)
     fed(engine, birth(0.0, **values, **{name: 7.0}), data(20.0, spindle_load_pct=40.0))
     assert (last(engine)[ZONE].value, last(engine)[VIBRATION].value) == ("C", False)
-    effects = fed(engine, data(21.0, **{name: 7.3}), data(40.0, spindle_load_pct=40.0))
-    assert turns(effects, VIBRATION) == [(31.0, True)]
+    actions = fed(engine, data(21.0, **{name: 7.3}), data(40.0, spindle_load_pct=40.0))
+    assert turns(actions, VIBRATION) == [(31.0, True)]
     assert last(engine)[ZONE].value == "D"
     assert "vibration 7.3 mm/s rms in zone D, over 7.1 mm/s" in last(engine)[DETAIL].value
 
@@ -315,16 +315,16 @@ def test_an_alarm_comes_back_with_its_inputs_and_needs_no_new_dwell() -> None:
     engine = warm_engine()
     fed(engine, data(201.0, spindle_load_pct=150.0), data(220.0, feed_mm_min=700.0))
     gone = reading("spindle_load_pct", None, 221.0, quality=Quality.BAD, reason="UNAVAILABLE")
-    effects = fed(engine, event(EventKind.DATA, 221.0, gone), data(290.0, spindle_load_pct=150.0))
-    assert [value for _, value in turns(effects, LOAD)] == [None, True]
+    actions = fed(engine, event(EventKind.DATA, 221.0, gone), data(290.0, spindle_load_pct=150.0))
+    assert [value for _, value in turns(actions, LOAD)] == [None, True]
 
 
 def test_a_long_silence_ends_every_alarm_as_unknown() -> None:
     engine = warm_engine(gap_s_max=60.0)
     fed(engine, data(201.0, spindle_load_pct=150.0), data(220.0, feed_mm_min=700.0))
-    effects = fed(engine, data(1000.0, spindle_load_pct=150.0))
-    assert [value for _, value in turns(effects, LOAD)] == [None, False]
-    assert not any(isinstance(effect, DeadLetter) for effect in effects)
+    actions = fed(engine, data(1000.0, spindle_load_pct=150.0))
+    assert [value for _, value in turns(actions, LOAD)] == [None, False]
+    assert not any(isinstance(action, DeadLetter) for action in actions)
 
 
 def test_what_lasts_is_published_once() -> None:
@@ -332,8 +332,8 @@ def test_what_lasts_is_published_once() -> None:
     stream = [
         data(201.0 + i / 10, spindle_load_pct=130.0 + i % 13, vibration_velocity_mm_s=8.0 + i % 5 / 10) for i in range(3000)
     ]
-    effects = fed(engine, *stream)
-    changes = [change for effect in effects if isinstance(effect, Publish) for change in effect.changes]
+    actions = fed(engine, *stream)
+    changes = [change for action in actions if isinstance(action, Publish) for change in action.changes]
     assert len(changes) <= 8
 
 

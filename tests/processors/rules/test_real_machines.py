@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from processors.effects import DeadLetter
+from processors.actions import DeadLetter
 from processors.rules.processor import PROCESSOR
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import Reading
@@ -63,13 +63,13 @@ def _recorded(name: str, text: str, at_ms: int) -> Reading:
 )
 def test_days_of_real_machines_on_which_no_fault_is_known_are_silent(name: str, keys: dict[str, str], since: str) -> None:
     """Spin-up peaks of 120 to 176 %, tool changes, sensors that drop to 0, a spindle that warms by 9 K in a minute."""
-    effects = fed(engine_of(PROCESSOR), *replayed(recording(name), keys, since))
-    assert not any(isinstance(effect, DeadLetter) for effect in effects)
-    assert sum(alarms(effects).values()) == 0
+    actions = fed(engine_of(PROCESSOR), *replayed(recording(name), keys, since))
+    assert not any(isinstance(action, DeadLetter) for action in actions)
+    assert sum(alarms(actions).values()) == 0
 
 
 def test_without_dwell_and_without_regard_to_ramps_the_okuma_would_have_alarmed_fifteen_times() -> None:
     """So that the silence above is not that of rules which see nothing."""
     naive = {"load_dwell_s": 0.0, "no_feed_dwell_s": 0.0, "ramp_rpm_per_s": 1e6}
-    effects = fed(engine_of(PROCESSOR, **naive), *replayed(recording("mtconnect/okuma.txt"), OKUMA, "2022"))
-    assert alarms(effects) == {"load_over_limit": 6, "thermal_runaway": 0, "load_without_feed": 9, "vibration": 0}
+    actions = fed(engine_of(PROCESSOR, **naive), *replayed(recording("mtconnect/okuma.txt"), OKUMA, "2022"))
+    assert alarms(actions) == {"load_over_limit": 6, "thermal_runaway": 0, "load_without_feed": 9, "vibration": 0}

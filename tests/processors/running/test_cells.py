@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import pytest
 
+from processors.actions import DeadLetter, Publish
 from processors.config import CellConfig, Configuration
 from processors.contract import CellProcessor, Output, OutputSpec, Provenance, Sample, SampleKind
-from processors.effects import DeadLetter, Publish
 from processors.errors import ConfigurationError
 from processors.running.engine import Engine
 from sparkplug.datatype import DataType
@@ -71,12 +71,12 @@ def test_machines_that_stand_in_no_cell_are_in_one_together() -> None:
 def test_a_fold_sees_the_rows_of_all_machines_that_are_online_and_may_speak_of_each() -> None:
     engine = engine_of(SUM, machines={"b": {"weight": 10.0}})
     fed(engine, birth(0.0, device="a", spindle_rpm=1.0), birth(0.0, device="b", spindle_rpm=2.0))
-    effects = fed(engine, data(0.5, device="a", spindle_rpm=3.0))
-    assert [(effect.machine, effect.changes[0].value) for effect in effects if isinstance(effect, Publish)] == [
+    actions = fed(engine, data(0.5, device="a", spindle_rpm=3.0))
+    assert [(action.machine, action.changes[0].value) for action in actions if isinstance(action, Publish)] == [
         ("a", 23.0),
         ("b", 23.0),
     ]
-    assert published(effects) == [(-500, "twin/total", 23.0, False)] * 2
+    assert published(actions) == [(-500, "twin/total", 23.0, False)] * 2
     fed(engine, death(0.6, device="a"))
     assert log(engine)[-1] == ("death", "a", ("b",)), "online are the others"
     assert published(fed(engine, data(0.7, device="b", spindle_rpm=4.0))) == [(-300, "twin/total", 40.0, False)]
@@ -87,9 +87,9 @@ def test_a_result_for_a_machine_that_nobody_knows_is_a_dead_letter_and_changes_n
         return State((("stray", "", ()),)), [Output("twin/total", 1.0), Output("twin/total", 1.0, machine="nobody")]
 
     engine = engine_of(CellProcessor(**{field: getattr(SUM, field) for field in SUM.__dataclass_fields__} | {"step": stray}))
-    effects = fed(engine, birth(0.0, spindle_rpm=1.0))
-    assert [effect for effect in effects if isinstance(effect, Publish)] == []
-    letter = next(effect for effect in effects if isinstance(effect, DeadLetter))
+    actions = fed(engine, birth(0.0, spindle_rpm=1.0))
+    assert [action for action in actions if isinstance(action, Publish)] == []
+    letter = next(action for action in actions if isinstance(action, DeadLetter))
     assert "no machine of 'all'" in json.loads(letter.payload)["error"]
     assert log(engine) == ()
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import pytest
 
+from processors.actions import DeadLetter, Declare, Publish, Remove
 from processors.contract import NoState, OutputSpec, PlainSpec, Provenance
-from processors.effects import DeadLetter, Declare, Publish, Remove
 from processors.errors import DeclarationError
 from processors.running.engine import Engine
 from processors.running.ledger import DropReason
@@ -174,8 +174,8 @@ def test_a_processor_never_reads_itself_and_reads_others_only_where_it_asks_to()
 def test_two_edges_of_one_machine_complete_each_other() -> None:
     engine = engine_of(RECORDER)
     fed(engine, birth(0.0, spindle_rpm=1.0), birth(0.1, node=VIBRATION, spindle_load_pct=5.0))
-    effects = fed(engine, death(0.2))
-    assert Remove("okuma") not in effects
+    actions = fed(engine, death(0.2))
+    assert Remove("okuma") not in actions
     row = engine._machines["okuma"].live.row
     assert (row["spindle_rpm"].quality, row["spindle_load_pct"].quality) == (Quality.STALE, Quality.GOOD)
     assert Remove("okuma") in fed(engine, death(0.3, node=VIBRATION))
@@ -242,11 +242,11 @@ def test_what_was_missed_while_the_processor_was_down_is_one_counted_hole() -> N
 
 
 def test_the_twin_device_is_born_before_its_first_value_and_dies_with_the_machine() -> None:
-    effects = fed(engine_of(RECORDER), birth(0.0, spindle_rpm=1.0), death(0.1), birth(0.2, spindle_rpm=1.0))
+    actions = fed(engine_of(RECORDER), birth(0.0, spindle_rpm=1.0), death(0.1), birth(0.2, spindle_rpm=1.0))
     # The birth tells the last known values: the device is a new one.
-    kinds = [type(effect) for effect in effects]
+    kinds = [type(action) for action in actions]
     assert kinds == [Declare, Publish, Publish, Remove, Declare, Publish]
-    first, second = effects[0], effects[4]
+    first, second = actions[0], actions[4]
     assert isinstance(first, Declare)
     assert isinstance(second, Declare)
     assert {(change.value, change.reason) for change in first.latest} == {(None, "nothing computed yet")}
@@ -255,13 +255,13 @@ def test_the_twin_device_is_born_before_its_first_value_and_dies_with_the_machin
 
 def test_a_number_is_published_again_only_when_it_left_the_deadband() -> None:
     engine = engine_of(RECORDER)
-    effects = fed(engine, birth(0.0, spindle_rpm=10.0), *(data(0.1 * i, spindle_rpm=10.0 + i) for i in range(1, 8)))
-    assert [value for _, name, value, _ in published(effects) if name == "twin/level"] == [10.0, 15.0]
+    actions = fed(engine, birth(0.0, spindle_rpm=10.0), *(data(0.1 * i, spindle_rpm=10.0 + i) for i in range(1, 8)))
+    assert [value for _, name, value, _ in published(actions) if name == "twin/level"] == [10.0, 15.0]
 
 
 def test_an_answer_that_is_not_finite_is_a_null_that_says_so() -> None:
-    effects = fed(engine_of(RECORDER), birth(0.0, spindle_rpm=888.0))
-    *_, change = (change for effect in effects if isinstance(effect, Publish) for change in effect.changes)
+    actions = fed(engine_of(RECORDER), birth(0.0, spindle_rpm=888.0))
+    *_, change = (change for action in actions if isinstance(action, Publish) for change in action.changes)
     assert (change.value, change.quality, change.reason) == (None, Quality.BAD, "the model has no finite answer")
 
 
@@ -276,8 +276,8 @@ def test_an_answer_that_is_not_finite_is_a_null_that_says_so() -> None:
 )
 def test_a_step_that_fails_leaves_the_state_before_and_a_letter(rpm: float, error: str) -> None:
     engine = engine_of(RECORDER, fail_at=13.0)
-    effects = fed(engine, birth(0.0, spindle_rpm=1.0), data(0.1, spindle_rpm=rpm), data(0.2, spindle_rpm=2.0))
-    (letter,) = [json.loads(effect.payload) for effect in effects if isinstance(effect, DeadLetter)]
+    actions = fed(engine, birth(0.0, spindle_rpm=1.0), data(0.1, spindle_rpm=rpm), data(0.2, spindle_rpm=2.0))
+    (letter,) = [json.loads(action.payload) for action in actions if isinstance(action, DeadLetter)]
     assert letter["error"] == error
     assert (letter["machine"], letter["kind"], letter["changed"]) == ("okuma", "data", {"spindle_rpm": rpm})
     assert log(engine) == [("birth", 0.0), ("data", 0.2)]
@@ -291,10 +291,10 @@ def test_a_step_that_fails_leaves_the_state_before_and_a_letter(rpm: float, erro
 def test_history_folds_into_a_state_of_its_own_and_its_outputs_say_so() -> None:
     engine = engine_of(RECORDER)
     fed(engine, birth(1000.0, spindle_rpm=1.0))
-    effects = fed(engine, data(10.0, history=True, spindle_rpm=50.0), data(12.0, history=True, spindle_rpm=60.0))
+    actions = fed(engine, data(10.0, history=True, spindle_rpm=50.0), data(12.0, history=True, spindle_rpm=60.0))
     assert log(engine) == [("birth", 1000.0)]
     assert log(engine, history=True) == [("data", 10.0), ("tick", 11.0), ("tick", 12.0), ("data", 12.0)]
-    assert {flag for *_, flag in published(effects)} == {True}
+    assert {flag for *_, flag in published(actions)} == {True}
     assert speeds(engine) == [1.0]
 
 
@@ -324,9 +324,9 @@ def test_the_row_is_read_only() -> None:
         return state, ()
 
     processor = replace(RECORDER, name="meddler", outputs=(), state=NoState, initial=lambda _: NoState(), step=meddle)
-    effects = fed(engine_of(processor), birth(0.0, spindle_rpm=1.0))
-    assert isinstance(effects[0], DeadLetter)
-    assert b"does not support item assignment" in effects[0].payload
+    actions = fed(engine_of(processor), birth(0.0, spindle_rpm=1.0))
+    assert isinstance(actions[0], DeadLetter)
+    assert b"does not support item assignment" in actions[0].payload
 
 
 def test_a_wrong_declaration_is_refused_where_it_stands() -> None:
@@ -372,8 +372,8 @@ def test_a_machine_whose_edge_is_offline_is_offline_whatever_other_processors_go
     assert engine.machines == (), "nobody's machine"
     fed(engine, birth(0.0, spindle_rpm=1.0), data(1.0, node=rules, **severe))
     assert engine.machines == ("okuma",)
-    effects = fed(engine, death(2.0))
-    assert effects[-1] == Remove("okuma")
+    actions = fed(engine, death(2.0))
+    assert actions[-1] == Remove("okuma")
     assert engine.machines == ()
     assert fed(engine, data(3.0, node=rules, **{"twin/severity": "high"}), birth(4.0, node=rules, **severe)) == []
     assert engine.machines == ()

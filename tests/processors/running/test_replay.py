@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from processors.actions import Action, DeadLetter
 from processors.discovery import AnyProcessor, discover
-from processors.effects import DeadLetter, Effect
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import Reading
 from sparkplug.quality import Quality
@@ -30,11 +30,11 @@ def test_the_day_and_its_replay_are_the_same(steps: list[tuple[float, str]], pau
     """
     day, replay = engine_of(RECORDER, gap_s_max=20.0), engine_of(RECORDER, gap_s_max=20.0)
     start = birth(0.0, spindle_rpm=0.0)
-    day_effects, replay_effects = list(day.feed(start, 0.0)), list(replay.feed(start, 0.0))
+    day_actions, replay_actions = list(day.feed(start, 0.0)), list(replay.feed(start, 0.0))
     now_s, alive = 0.0, True
     for number, (step_s, what) in enumerate(steps):
         for pause in sorted(pauses):
-            day_effects += day.silence(now_s + pause * step_s)
+            day_actions += day.silence(now_s + pause * step_s)
         now_s += step_s
         if what == "b" and not (alive and step_s > 20.0):
             happened = death(now_s) if alive else birth(now_s, spindle_rpm=float(number))
@@ -43,10 +43,10 @@ def test_the_day_and_its_replay_are_the_same(steps: list[tuple[float, str]], pau
             happened = data(now_s, spindle_rpm=float(number))
         else:
             continue
-        day_effects += day.feed(happened, now_s)
-        replay_effects += replay.feed(happened, 0.0)
+        day_actions += day.feed(happened, now_s)
+        replay_actions += replay.feed(happened, 0.0)
     assert day._machines["okuma"].live.state == replay._machines["okuma"].live.state
-    assert day_effects == replay_effects
+    assert day_actions == replay_actions
 
 
 KEYS = {
@@ -86,8 +86,8 @@ def test_the_okuma_recording_goes_through_whole(processor: AnyProcessor) -> None
     """Its four sections are not in time order, and lines step back by 80 ms: three holes, nothing dropped, nothing held back."""
     events = okuma(recording("mtconnect/okuma.txt"))
     engine = engine_of(processor)
-    effects: list[Effect] = fed(engine, *events)
+    actions: list[Action] = fed(engine, *events)
     assert len(events) > 3000
-    assert [effect for effect in effects if isinstance(effect, DeadLetter)] == []
+    assert [action for action in actions if isinstance(action, DeadLetter)] == []
     assert engine.counts.holes == (0 if processor.inputs is None else 3)  # who reads everything has no clock of its own
     assert (engine.ledger.emitted, engine.ledger.dropped_total, engine.ledger.buffered) == (len(events), 0, 0)

@@ -10,7 +10,7 @@ from pydantic import TypeAdapter
 
 from benchmarks import synthetic_changes as drive
 from benchmarks import tool_change_detector as bench
-from processors.effects import DeadLetter, Effect
+from processors.actions import Action, DeadLetter
 from processors.errors import ConfigurationError
 from processors.running.snapshot import decode_state, encode_state
 from processors.tool_change_detector.processor import ACTIVE, BASIS, CONFIDENCE, PHASE, PROCESSOR, SOURCE
@@ -56,35 +56,35 @@ def change(quiet_s: float = 40.0) -> Any:
     return np.concatenate([quiet, drive.changed(1.1, 1.5, 3.5), quiet])
 
 
-def values_of(effects: list[Effect], name: str) -> list[Any]:
+def values_of(actions: list[Action], name: str) -> list[Any]:
     """The values of one output, in the order of their publication, without the nulls."""
-    return [value for _, which, value, _ in published(effects) if which == name and value is not None]
+    return [value for _, which, value, _ in published(actions) if which == name and value is not None]
 
 
 def test_without_a_model_it_says_so_and_never_no() -> None:
     engine = engine_of(PROCESSOR)
-    effects = fed(engine, *stream_of(change()))
-    assert values_of(effects, ACTIVE) == []
+    actions = fed(engine, *stream_of(change()))
+    assert values_of(actions, ACTIVE) == []
     assert "cnctwin train detector" in (told(engine)[ACTIVE].reason or "")
     assert told(engine)[SOURCE].value == "none"
 
 
 def test_a_change_opens_the_gate_provisionally_is_confirmed_and_closes_it(model: str) -> None:
     engine = engine_of(PROCESSOR, model=model)
-    effects = fed(engine, *stream_of(change()), data(100.0, **{CURRENT: 1.1}))
-    assert values_of(effects, PHASE) == ["none", "provisional", "confirmed", "none"]
-    assert values_of(effects, ACTIVE) == [False, True, False]
+    actions = fed(engine, *stream_of(change()), data(100.0, **{CURRENT: 1.1}))
+    assert values_of(actions, PHASE) == ["none", "provisional", "confirmed", "none"]
+    assert values_of(actions, ACTIVE) == [False, True, False]
     assert told(engine)[SOURCE].value == "detector"
-    opened_ms = next(at for at, name, value, _ in published(effects) if name == ACTIVE and value is True)
+    opened_ms = next(at for at, name, value, _ in published(actions) if name == ACTIVE and value is True)
     assert 40_000 < opened_ms < 45_000, "while the spindle stops, not when all is over"
-    assert max(values_of(effects, CONFIDENCE)) > 0.9
+    assert max(values_of(actions, CONFIDENCE)) > 0.9
 
 
 def test_a_gate_that_may_not_open_early_opens_when_the_pattern_is_whole(model: str) -> None:
-    effects = fed(engine_of(PROCESSOR, model=model, opens_early=False), *stream_of(change()), data(100.0, **{CURRENT: 1.1}))
-    assert values_of(effects, PHASE) == ["none", "provisional", "confirmed", "none"]
-    confirmed_ms = next(at for at, name, value, _ in published(effects) if name == PHASE and value == "confirmed")
-    assert next(at for at, name, value, _ in published(effects) if name == ACTIVE and value is True) == confirmed_ms
+    actions = fed(engine_of(PROCESSOR, model=model, opens_early=False), *stream_of(change()), data(100.0, **{CURRENT: 1.1}))
+    assert values_of(actions, PHASE) == ["none", "provisional", "confirmed", "none"]
+    confirmed_ms = next(at for at, name, value, _ in published(actions) if name == PHASE and value == "confirmed")
+    assert next(at for at, name, value, _ in published(actions) if name == ACTIVE and value is True) == confirmed_ms
 
 
 def test_a_lower_score_finds_what_is_less_alike(model: str) -> None:
@@ -98,9 +98,9 @@ def test_a_lower_score_finds_what_is_less_alike(model: str) -> None:
 def test_a_stop_for_good_is_retracted(model: str) -> None:
     stop = drive.changed(1.0, 0.0, 3.0)[:22]
     engine = engine_of(PROCESSOR, model=model)
-    effects = fed(engine, *stream_of(np.concatenate([np.ones(400), stop, np.full(10, stop[-1])])), data(120.0, tool_number=3))
-    assert values_of(effects, PHASE) == ["none", "provisional", "retracted", "none"]
-    assert values_of(effects, ACTIVE)[-1] is False
+    actions = fed(engine, *stream_of(np.concatenate([np.ones(400), stop, np.full(10, stop[-1])])), data(120.0, tool_number=3))
+    assert values_of(actions, PHASE) == ["none", "provisional", "retracted", "none"]
+    assert values_of(actions, ACTIVE)[-1] is False
 
 
 def test_before_a_whole_change_could_have_been_seen_it_does_not_say_no(model: str) -> None:
@@ -163,7 +163,7 @@ def test_a_restart_in_the_middle_changes_nothing(model: str, cut: int) -> None:
     fold.state = decode_state(adapter, json.loads(json.dumps(encode_state(adapter, fold.state))))
     after, again = fed(whole, *stream[cut:]), fed(restarted, *stream[cut:])
     assert repr(after) == repr(again)
-    assert not any(isinstance(effect, DeadLetter) for effect in after)
+    assert not any(isinstance(action, DeadLetter) for action in after)
     assert json.loads(whole.snapshot("okuma")) == json.loads(restarted.snapshot("okuma"))
 
 
@@ -201,8 +201,8 @@ def test_a_model_that_does_not_fit_is_refused_before_it_runs(model: str, table: 
 def test_a_machine_may_have_a_model_of_its_own(model: str) -> None:
     stream = [*stream_of(change()), data(100.0, **{CURRENT: 1.1})]
     for name, confirmed in (("okuma", 1), ("mazak", 0)):
-        effects = fed(engine_of(PROCESSOR, machines={name: {"model": model}}), *stream)
-        assert values_of(effects, PHASE).count("confirmed") == confirmed
+        actions = fed(engine_of(PROCESSOR, machines={name: {"model": model}}), *stream)
+        assert values_of(actions, PHASE).count("confirmed") == confirmed
     odd = {"machines": {"okuma": {"opens_early": False}, "mazak": {"pattern_score": 0.99}}}
     assert values_of(fed(engine_of(PROCESSOR, model=model, **odd), *stream), ACTIVE) == [False, True, False]
 
@@ -234,8 +234,8 @@ def test_a_recorded_part_gives_what_the_replay_gives(tmp_path: Path) -> None:
             name, factor = names[row.key]
             events.append(data(max(row.t_s - begin_s, 0.0), **{name: float(row.value) * factor}))
     engine = engine_of(PROCESSOR, model=str(tmp_path))
-    effects = fed(engine, *events)
-    live = [at / 1000.0 + begin_s for at, name, value, _ in published(effects) if name == PHASE and value == "confirmed"]
+    actions = fed(engine, *events)
+    live = [at / 1000.0 + begin_s for at, name, value, _ in published(actions) if name == PHASE and value == "confirmed"]
     assert len(offline) >= 6
     assert len(live) == pytest.approx(len(offline), abs=1)
     assert all(min(abs(at_s - one.at_s) for at_s in live) < 1.0 for one in offline)

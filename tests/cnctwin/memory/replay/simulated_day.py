@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from random import Random
 
 from cnctwin.memory.store.contract import Message, Snapshot
+from processors.actions import Action, Declare, Publish, Remove
 from processors.discovery import AnyProcessor
-from processors.effects import Declare, Effect, Publish, Remove
 from processors.running.engine import Engine
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import Change, NodeId, Reading
@@ -50,30 +50,30 @@ class Living:
 
     def turn(self, now_s: float) -> list[HostEvent]:
         """What it publishes in one round of its loop."""
-        effects: list[Effect] = []
+        actions: list[Action] = []
         due = [event for at_s, event in self.waiting if at_s <= now_s]
         self.waiting = [(at_s, event) for at_s, event in self.waiting if at_s > now_s]
         for event in due:
             if event.kind is EventKind.BIRTH:
                 self._heard.add(event.node)
             if event.node in self._heard:
-                effects += self.engine.feed(event, now_s)
+                actions += self.engine.feed(event, now_s)
         if not due:
-            effects += self.engine.silence(now_s)
+            actions += self.engine.silence(now_s)
         if now_s - self.saved_s >= SAVE_S:
             self.saved_s = now_s
             self.snapshots |= {unit: self.engine.snapshot(unit) for unit in self.engine.units}
-        return [event for effect in effects for event in self._sent(effect, T0_MS + round(now_s * 1000))]
+        return [event for action in actions for event in self._sent(action, T0_MS + round(now_s * 1000))]
 
-    def _sent(self, effect: Effect, at_ms: int) -> list[HostEvent]:
-        if isinstance(effect, Declare):
-            self._declared[effect.machine] = {change.name: _read(change) for change in effect.latest}
-            return [HostEvent(EventKind.BIRTH, self.node, effect.machine, at_ms, tuple(map(_read, effect.latest)))]
-        if isinstance(effect, Remove):
-            del self._declared[effect.machine]
-            return [HostEvent(EventKind.DEATH, self.node, effect.machine, at_ms, (), "device offline")]
-        if isinstance(effect, Publish) and effect.machine in self._declared:
-            return [HostEvent(EventKind.DATA, self.node, effect.machine, at_ms, tuple(map(_read, effect.changes)))]
+    def _sent(self, action: Action, at_ms: int) -> list[HostEvent]:
+        if isinstance(action, Declare):
+            self._declared[action.machine] = {change.name: _read(change) for change in action.latest}
+            return [HostEvent(EventKind.BIRTH, self.node, action.machine, at_ms, tuple(map(_read, action.latest)))]
+        if isinstance(action, Remove):
+            del self._declared[action.machine]
+            return [HostEvent(EventKind.DEATH, self.node, action.machine, at_ms, (), "device offline")]
+        if isinstance(action, Publish) and action.machine in self._declared:
+            return [HostEvent(EventKind.DATA, self.node, action.machine, at_ms, tuple(map(_read, action.changes)))]
         return []
 
 

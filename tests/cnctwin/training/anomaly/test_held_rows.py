@@ -8,8 +8,8 @@ import pytest
 from cnctwin.training.anomaly.held_rows import held_rows, milliseconds
 from cnctwin.training.anomaly.recorded_cell import part
 from cnctwin.training.anomaly.replayed_cell import replayed
+from processors.actions import Publish
 from processors.config import Configuration
-from processors.effects import Publish
 from processors.joint_anomaly.config import Config
 from processors.joint_anomaly.processor import PROCESSOR
 from processors.joint_anomaly.scoring import scorings
@@ -58,10 +58,10 @@ def message_by_message(
             events.append(HostEvent(kind, NodeId("cnc", machine), machine, START_MS + at_ms, tuple(readings)))
     found: dict[tuple[str, str], list[tuple[float, Any]]] = {}
     for event in sorted(events, key=lambda one: one.timestamp_ms):
-        for effect in engine.feed(event, 0.0):
-            assert isinstance(effect, Publish) or type(effect).__name__ == "Declare", effect
-            for change in effect.changes if isinstance(effect, Publish) else ():
-                found.setdefault((effect.machine, change.name), []).append(
+        for action in engine.feed(event, 0.0):
+            assert isinstance(action, Publish) or type(action).__name__ == "Declare", action
+            for change in action.changes if isinstance(action, Publish) else ():
+                found.setdefault((action.machine, change.name), []).append(
                     ((change.timestamp_ms - START_MS) / 1000, change.value)
                 )
     return found

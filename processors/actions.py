@@ -1,4 +1,4 @@
-"""The requests of the engine to the runtime, in order."""
+"""The actions that an engine asks its worker to carry out, in order."""
 
 from typing import NamedTuple
 
@@ -50,4 +50,4 @@ class Pin(NamedTuple):
     reason: str
 
 
-Effect = Publish | PublishPlain | Declare | Remove | DeadLetter | Pin
+Action = Publish | PublishPlain | Declare | Remove | DeadLetter | Pin
