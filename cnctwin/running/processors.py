@@ -7,7 +7,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from processors.running.ports import Recorder
-from processors.running.runtime import Configured, run_configured
+from processors.running.runtime import Configured, run
 from sparkplug.broker import BrokerAddress
 
 ALERTS = "alerts"
@@ -19,7 +19,7 @@ def process(pairs: Sequence[Configured], broker: BrokerAddress, stop: threading.
     with ExitStack() as stack:
         recorder = stack.enter_context(_recorder(pairs, group))
         stack.enter_context(_courier(pairs, broker, group))
-        run_configured(pairs, broker, stop, group=group, session_dir=state_dir, recorder=recorder)
+        run(pairs, broker, stop, group=group, session_dir=state_dir, recorder=recorder)
 
 
 @contextmanager

@@ -1,12 +1,8 @@
-"""Running processors against a broker: one thread each, until SIGTERM, Ctrl-C or `stop`."""
+"""Running processors against a broker: one thread each, until they are stopped."""
 
-import signal
 import threading
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
-from types import FrameType
-from typing import Any
 
 from processors.config import Configuration, ProcessorConfig, read_tables
 from processors.discovery import AnyProcessor, find, module_of
@@ -22,58 +18,42 @@ from sparkplug.topics import group_filter
 
 JOIN_S_MAX = 15.0
 OTHERS = ("validation",)  # tables of the same file that are for no processor
-
-
-def run(
-    names: Sequence[str],
-    broker: BrokerAddress,
-    config_path: Path | None = None,
-    stop: threading.Event | None = None,
-    *,
-    group: str = "cnc",
-    session_dir: Path | None = None,
-) -> None:
-    """Run the processors `names` until `stop` is set, or SIGTERM or SIGINT comes where it is not given.
-
-    Everything is checked before anything connects. Raises UnknownProcessorError, ConfigurationError. `session_dir` keeps the
-    birth/death sequence numbers over restarts; all other state is kept on the broker.
-    """
-    run_configured(configured(names, config_path), broker, stop, group=group, session_dir=session_dir)
-
-
 Configured = tuple[AnyProcessor, Configuration[ProcessorConfig]]
 
 
-def run_configured(
+def run(
     pairs: Sequence[Configured],
     broker: BrokerAddress,
-    stop: threading.Event | None = None,
+    stop: threading.Event,
     *,
     group: str = "cnc",
     session_dir: Path | None = None,
     recorder: Recorder | None = None,
 ) -> None:
-    """The same of processors whose configuration has been checked. `recorder` is for the one that `records`."""
+    """Run processors whose configuration has been checked until `stop` is set, or one of them fails, which ends all.
+
+    session_dir: keeps the birth/death sequence numbers over restarts; all other state is kept on the broker
+    recorder: for the processor that `records`
+    """
     workers = [
         _worker(processor, configuration, broker, group, session_dir, recorder=recorder) for processor, configuration in pairs
     ]
     failures: list[BaseException] = []
-    with _stopped_by_signals(stop) as stopped:
-        threads = [
-            threading.Thread(target=_guarded, args=(worker, stopped, failures), name=pair[0].name, daemon=True)
-            for worker, pair in zip(workers, pairs, strict=True)
-        ]
-        for thread in threads:
-            thread.start()
-        while not stopped.wait(0.5):
-            pass
-        for thread in threads:
-            thread.join(JOIN_S_MAX)
+    threads = [
+        threading.Thread(target=_guarded, args=(worker, stop, failures), name=pair[0].name, daemon=True)
+        for worker, pair in zip(workers, pairs, strict=True)
+    ]
+    for thread in threads:
+        thread.start()
+    while not stop.wait(0.5):
+        pass
+    for thread in threads:
+        thread.join(JOIN_S_MAX)
     if failures:
         raise failures[0]
 
 
-def configured(names: Sequence[str], config_path: Path | None = None) -> "list[Configured]":
+def configured(names: Sequence[str], config_path: Path | None = None) -> list[Configured]:
     """The processors with their configuration, checked. Raises UnknownProcessorError, ConfigurationError."""
     tables = {} if config_path is None else read_tables(config_path)
     for table in tables:
@@ -117,22 +97,3 @@ def _guarded(worker: Worker, stop: threading.Event, failures: list[BaseException
         failures.append(error)
         stop.set()
         raise
-
-
-@contextmanager
-def _stopped_by_signals(stop: threading.Event | None) -> Iterator[threading.Event]:
-    """The given event, or one that SIGTERM and SIGINT set."""
-    if stop is not None:
-        yield stop
-        return
-    stopped = threading.Event()
-
-    def stop_now(_number: int, _frame: FrameType | None) -> None:
-        stopped.set()
-
-    before: dict[int, Any] = {number: signal.signal(number, stop_now) for number in (signal.SIGTERM, signal.SIGINT)}
-    try:
-        yield stopped
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)

@@ -14,7 +14,7 @@ from cnctwin.errors import UsageError
 from processors.alerts.config import AlertsConfig
 from processors.alerts.courier.thread import Courier
 from processors.config import read_tables
-from processors.running.runtime import run
+from processors.running.runtime import configured, run
 from sparkplug.broker import BrokerAddress
 from sparkplug.datatype import DataType
 from sparkplug.edge_node import EdgeNode
@@ -70,7 +70,7 @@ def edge(broker: BrokerAddress, server: ReceivingServer, tmp_path: Path) -> Iter
     edge.declare_device("okuma", [MetricSpec(VIBRATION, DataType.BOOLEAN, value=False)])
     edge.start()
     stop = threading.Event()
-    processor = threading.Thread(target=run, args=(("alerts",), broker, file, stop))
+    processor = threading.Thread(target=run, args=(configured(["alerts"], file), broker, stop))
     processor.start()
     courier = Courier(broker, AlertsConfig.model_validate(read_tables(file)["alerts"]))
     courier.start()

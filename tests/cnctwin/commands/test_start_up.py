@@ -45,7 +45,7 @@ from sparkplug.broker import BrokerAddress
 
 name, config, folder = sys.argv[1], sys.argv[2] or None, Path(sys.argv[3])
 recorders = []
-processors.run_configured = lambda *_, recorder, **__: recorders.append(type(recorder).__name__)
+processors.run = lambda *_, recorder, **__: recorders.append(type(recorder).__name__)
 pairs = configured([name], config and Path(config))
 processors.process(pairs, BrokerAddress("127.0.0.1", 9), threading.Event(), group="cnc", state_dir=folder)
 print(*recorders, *sys.modules, sep="\\n")

@@ -125,9 +125,10 @@ def process(broker: BrokerAddress, tmp_path: Path, *names: str) -> subprocess.Po
     config = tmp_path / "processors.toml"
     config.write_text(CONFIGURATION)
     code = (
-        "import sys; from pathlib import Path; from processors.running.runtime import run;"
-        "from sparkplug.broker import BrokerAddress;"
-        f"run({names!r}, BrokerAddress(port={broker.port}), Path(sys.argv[1]), session_dir=Path(sys.argv[2]))"
+        "import sys; from pathlib import Path; from processors.running.runtime import configured, run\n"
+        "from cnctwin.processes.stopping import stopped_by_signals; from sparkplug.broker import BrokerAddress\n"
+        f"pairs, broker = configured({names!r}, Path(sys.argv[1])), BrokerAddress(port={broker.port})\n"
+        "with stopped_by_signals() as stop: run(pairs, broker, stop, session_dir=Path(sys.argv[2]))"
     )
     command = [sys.executable, "-c", code, str(config), str(tmp_path / "sessions")]
     return subprocess.Popen(command, cwd=Path(__file__).parents[3])
@@ -205,7 +206,7 @@ def test_what_an_edge_sends_late_comes_out_as_history_and_leaves_the_present_alo
     broker: BrokerAddress, reader: Reader, edge: EdgeNode
 ) -> None:
     stop = threading.Event()
-    thread = threading.Thread(target=run, args=(("cutting_force", "mirror"), broker, None, stop))
+    thread = threading.Thread(target=run, args=(configured(["cutting_force", "mirror"]), broker, stop))
     thread.start()
     try:
         say(edge, 500.0, spindle_rpm=3000.0, spindle_load_pct=50.0)
@@ -242,7 +243,7 @@ def test_when_the_edge_dies_twin_and_mirror_are_stale_and_come_back(
     broker: BrokerAddress, reader: Reader, edge: EdgeNode
 ) -> None:
     stop = threading.Event()
-    thread = threading.Thread(target=run, args=(("thermal", "mirror"), broker, None, stop))
+    thread = threading.Thread(target=run, args=(configured(["thermal", "mirror"]), broker, stop))
     thread.start()
     try:
         say(edge, 0.0, spindle_rpm=3000.0, spindle_load_pct=50.0)
@@ -266,7 +267,7 @@ def test_a_broker_that_is_killed_and_comes_back_empty_is_given_everything_again(
     mosquitto: Mosquitto, broker: BrokerAddress, reader: Reader, edge: EdgeNode
 ) -> None:
     stop = threading.Event()
-    thread = threading.Thread(target=run, args=(("thermal", "mirror"), broker, None, stop))
+    thread = threading.Thread(target=run, args=(configured(["thermal", "mirror"]), broker, stop))
     thread.start()
     try:
         say(edge, 0.0, spindle_rpm=3000.0, spindle_load_pct=50.0)

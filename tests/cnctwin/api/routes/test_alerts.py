@@ -10,7 +10,7 @@ import pytest
 from cnctwin.api.access import Access
 from cnctwin.api.routes import alerts as alert_routes
 from cnctwin.api.server import Server
-from processors.running.runtime import run
+from processors.running.runtime import configured, run
 from sparkplug.broker import BrokerAddress
 from sparkplug.datatype import DataType
 from sparkplug.edge_node import EdgeNode
@@ -33,7 +33,7 @@ def firing(mosquitto: Mosquitto, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     file, stop = tmp_path / "alerts.toml", threading.Event()
     file.write_text("[alerts]\ngroup_wait_s = 0.0\n")
     broker = BrokerAddress(*mosquitto.address)
-    processor = threading.Thread(target=run, args=(("alerts",), broker, file, stop))
+    processor = threading.Thread(target=run, args=(configured(["alerts"], file), broker, stop))
     processor.start()
     edge = EdgeNode(broker, NodeId("cnc", "edge-vmc"), [MetricSpec(BEAT, DataType.INT64)])
     edge.declare_device("vmc", [MetricSpec(VIBRATION, DataType.BOOLEAN, value=True)])

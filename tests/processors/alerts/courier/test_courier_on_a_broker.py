@@ -14,7 +14,7 @@ import pytest
 
 from processors.alerts.config import AlertsConfig
 from processors.alerts.courier.thread import Courier
-from processors.running.runtime import run
+from processors.running.runtime import configured, run
 from sparkplug.broker import BrokerAddress
 from sparkplug.datatype import DataType
 from sparkplug.edge_node import EdgeNode
@@ -299,7 +299,7 @@ def test_from_the_alarm_on_a_machine_to_the_receiver_and_back(
     edge.start()
     until(lambda: edge.online, "the edge")
     stop = threading.Event()
-    processor = threading.Thread(target=run, args=(("alerts",), broker, tmp_path / "alerts.toml", stop))
+    processor = threading.Thread(target=run, args=(configured(["alerts"], tmp_path / "alerts.toml"), broker, stop))
     processor.start()
     courier()
     try:

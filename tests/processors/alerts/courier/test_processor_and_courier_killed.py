@@ -24,14 +24,16 @@ MARKER = "cnctwin/marker/alerts"
 CODE = """
 import sys
 from pathlib import Path
+from cnctwin.processes.stopping import stopped_by_signals
 from processors.alerts.config import AlertsConfig
 from processors.config import read_tables
 from processors.alerts.courier.thread import Courier
-from processors.running.runtime import run
+from processors.running.runtime import configured, run
 from sparkplug.broker import BrokerAddress
 broker, file = BrokerAddress(port=int(sys.argv[1])), Path(sys.argv[2])
 Courier(broker, AlertsConfig.model_validate(read_tables(file)["alerts"])).start()
-run(("alerts",), broker, file)
+with stopped_by_signals() as stop:
+    run(configured(["alerts"], file), broker, stop)
 """
 TABLE = """
 [alerts]
