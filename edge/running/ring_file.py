@@ -1,8 +1,8 @@
-"""The file of a bounded ring on SQLite: how its file is opened, how it is written, and when a limit is passed.
+"""The file of a bounded ring on SQLite: how it is opened, how it is written, and when a limit is passed.
 
 WAL (https://sqlite.org/wal.html): with synchronous=NORMAL a commit survives the death of the process, with FULL that of the power
 too, at the price of an fsync each. The store of an edge (`edge.running.ring`) and the spool before InfluxDB are such rings;
-what a row is, what else is in its transaction and how many rows go at once is their own.
+what a row is and what else is in its transaction is their own.
 """
 
 import sqlite3

@@ -3,7 +3,7 @@
 Each rule is a row of RULES: its name, what it reads, its dwell, and a pure function from the present sample to a judgement: over
 its limit, between, under, excused, or unknown with the reason. `processors/rules/alarm.py` makes an alarm of it. A rule whose
 inputs are unknown is null, never a silent no. Where a rule alarms, the severity is high; where only the anomaly score does, it is
-medium. A new rule is a function in a file `processors/rule_<noun>.py` and a row here.
+medium. A new rule is a function in a file `processors/rules/<noun>.py` and a row here.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -132,7 +132,7 @@ def step(config: Config, state: State, sample: Sample) -> tuple[State, Sequence[
 
 
 def _over_hole(state: State, sample: Sample) -> State:
-    """After a short hole no dwell runs on; a trend whose points lie ahead of the clock now is let go."""
+    """Return the state after a short hole: no dwell runs on; a trend whose points lie ahead of the clock now is let go."""
     latches = {name: rested(latch) for name, latch in state.latches.items()}
     newest_s = max((at_s for at_s, _ in state.trend.points), default=sample.at_s)
     is_ahead = max(newest_s, state.trend.stray_s or newest_s) > sample.at_s

@@ -67,13 +67,13 @@ class Engine:
 
     # Events.
 
-    def is_message(self, event: HostEvent) -> bool:
+    def _is_message(self, event: HostEvent) -> bool:
         """Return True if the ledger counts it: it is of a device, from a node that this processor reads."""
         return event.device is not None and event.kind is not EventKind.HOLE and self._processor.listens_to(event.node.node)
 
     def received(self, event: HostEvent, *, has_room: bool) -> None:
         """An event has come that cannot be fed yet: it waits outside, or is lost where there is no room."""
-        if self.is_message(event):
+        if self._is_message(event):
             self.ledger.count(() if has_room else (DropReason.QUEUE_FULL,))
 
     def feed(self, event: HostEvent, wall_s: float, *, has_waited: bool = False) -> list[Action]:
@@ -162,7 +162,7 @@ class Engine:
         return name
 
     def resume(self, payload: bytes, offers: Mapping[str, Mapping[NodeId, Collection[str]]]) -> str:
-        """As `restore`, to go on at the very message at which the snapshot was taken: a replay's start. A machine that was online
+        """Restore, to go on at the very message at which the snapshot was taken: a replay's start. A machine that was online
         still is, by the nodes whose births were heard: `offers` has their signals by machine and node; the first owns."""
         name = self.restore(payload)
         for machine in self._units[name].machines.values():

@@ -132,7 +132,7 @@ class State:
 def step(configuration: Configuration[Config], state: State, sample: Sample) -> tuple[State, Sequence[Output]]:
     """Sample at ticks; what a hole or a death leaves behind is not a stream."""
     read, config = configuration.read, configuration.of(sample.machine)
-    model: Model | None = read[sample.machine] if sample.machine in read else read.get(OTHERS)
+    model: Model | None = read.get(sample.machine, read.get(OTHERS))
     if model is None:
         return (state, _nulls("none", NO_MODEL)) if sample.kind is not SampleKind.DATA else (state, ())
     if sample.kind is SampleKind.TICK:
