@@ -61,7 +61,7 @@ class Sweep:
     error: str | None = None
 
     def encode(self) -> bytes:
-        """As JSON.
+        """Return the sweep as JSON.
 
         >>> Sweep.decode(Sweep("a", 0, 1, (Fact("acts", 3500),)).encode()).facts
         (Fact(key='acts', value=3500, fault='', t_ms=None),)
@@ -146,7 +146,7 @@ class SweepPosition:
     taken_ms: int = 0
 
     def place(self) -> Place | None:
-        """To be kept over a restart; None while nothing was taken."""
+        """The place to be kept over a restart; None while nothing was taken."""
         return Place(self.life, self.taken_ms) if self.life else None
 
     @classmethod

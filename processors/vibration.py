@@ -28,7 +28,7 @@ CREST, KURTOSIS = twin_signals.VIBRATION_CREST_FACTOR, twin_signals.VIBRATION_KU
 NAMES = (RMS, VELOCITY, PEAK, CREST, KURTOSIS)
 RATE_HZ_MAX = 200_000.0
 RATE_BANDS_MIN = 4.0
-"""As in twin.vibration, which is not loaded before there is a block."""
+"""The same as in twin.vibration, which is not loaded before there is a block."""
 BLOCK_MS_MIN = 10.0
 """The loss of a shorter block could not be seen from stamps in milliseconds."""
 SAMPLES_MAX = 1_000_000

@@ -92,7 +92,7 @@ def band(rate_hz: float) -> Band:
 
 
 def started(filters: Band, first_g: float) -> Carried:
-    """As if the first value had stood for ever: the first section rests at it, the others at nothing."""
+    """Return the state as if the first value had stood for ever: the first section rests at it, the others at nothing."""
     a1, a2 = filters.sections[0]
     rest = first_g / (1.0 + a1 + a2)
     return Carried((rest, rest) + (0.0,) * (2 * ORDER - 2))

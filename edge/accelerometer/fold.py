@@ -97,7 +97,7 @@ def step(section: AccelerometerSection, state: State, block: Block, arrival_us: 
 
 
 def _edge_us(state: State, block: Block, arrival_us: float) -> float:
-    """When the block's last sample was, by the edge's clock."""
+    """Return the time of the block's last sample by the edge's clock."""
     due_us = state.edge_us + 1e6 * len(block.samples_g) / block.rate_hz
     if state.number is None or block.number != state.number + 1 or abs(arrival_us - due_us) > STEERED_US_MAX:
         return arrival_us

@@ -32,7 +32,7 @@ ROUNDING_MS = 1.0
 QUICK_AMONG, QUICK_IN_ARC = 12, 8
 """Documents of which one at least took no more than the stated latency."""
 NEWEST_WEIGHT = 1.5
-"""Against 1 of each other bound: where two disagree, the newer one is believed."""
+"""The weight of the newest bound against 1 of each other: where two disagree, the newer one is believed."""
 
 
 class Bound(NamedTuple):
@@ -62,7 +62,7 @@ class Bound(NamedTuple):
         return Bound(at_s, self.low_s - wider_s, self.high_s + wider_s)
 
     def moved(self, by_s: float) -> "Bound":
-        """After the edge's own clock was set."""
+        """Return it moved `by_s`, for an edge whose own clock was set."""
         return Bound(self.at_s, self.low_s + by_s, self.high_s + by_s)
 
     def meets(self, other: "Bound") -> bool:
@@ -94,7 +94,7 @@ class OneWay(NamedTuple):
         return self.latency_s + self.resolution_s
 
     def moved(self, by_s: float) -> "OneWay":
-        """After the edge's own clock was set."""
+        """Return it moved `by_s`, for an edge whose own clock was set."""
         phases = tuple((phase - by_s / self.resolution_s) % 1.0 for phase in self.phases)
         return self._replace(low_s=self.low_s + by_s, phases=phases)
 

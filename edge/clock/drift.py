@@ -34,7 +34,7 @@ class Series:
     every_s: float = FIRST_S
 
     def taken(self, bound: Bound) -> "Series":
-        """With one more, where it is due.
+        """Return the series with one more bound, where it is due.
 
         >>> series = Series()
         >>> for minute in range(65):
@@ -50,7 +50,7 @@ class Series:
         return Series(points, self.every_s)
 
     def moved(self, by_s: float) -> "Series":
-        """After the edge's own clock was set."""
+        """Return it moved `by_s`, for an edge whose own clock was set."""
         return Series(tuple(point.moved(by_s) for point in self.points), self.every_s)
 
 

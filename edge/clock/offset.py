@@ -326,7 +326,7 @@ def _is_news(published: OffsetEstimate | None, judged: OffsetEstimate) -> bool:
 
 
 def _padded(judged: OffsetEstimate) -> OffsetEstimate:
-    """As it is published: with room for what it may move before it is published again."""
+    """Return it as it is published: with room for what it may move before it is published again."""
     bound = judged.bound
     if bound is None:
         return judged

@@ -31,7 +31,7 @@ def stepped(window: tuple[Bound, ...], at_s: float) -> tuple[tuple[Bound, ...], 
 
 
 def way_stepped(window: tuple[OneWay, ...], at_s: float) -> tuple[tuple[OneWay, ...], Step | None]:
-    """The same of what came one way."""
+    """Do the same with what came one way."""
     before, last = window[:-STEP_WAY_BUCKETS], window[-STEP_WAY_BUCKETS:]
     if not before or not _is_steady(last):
         return window, None

@@ -177,7 +177,7 @@ class Gateway:
             self._start(edge, now_s)
 
     def _ended(self, file: Path, edge: _Edge, now_s: float) -> None:
-        """By itself. One that was well for long begins again at once."""
+        """Begin an edge again that has ended by itself, at once if it was well for long."""
         if self._is_single and isinstance(edge.error, EdgeError):
             raise edge.error
         edge.pause_s = RESTART_S_MIN if now_s - edge.began_s > STABLE_S else min(2 * edge.pause_s, RESTART_S_MAX)

@@ -64,7 +64,7 @@ class Ledger:
         return counters[RECEIVED] - counters[EMITTED] - counters[DROPPED] - counters[BUFFERED]
 
     def metrics(self) -> list[MetricSpec]:
-        """For the birth certificate."""
+        """The counters in the birth certificate."""
         return [MetricSpec(name, DataType.INT64, "observations", value=0) for name in self.snapshot()]
 
     def changes(self, now_ms: int) -> list[Change]:

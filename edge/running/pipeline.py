@@ -1,4 +1,4 @@
-"""From what a frame gave to what is published: the tool change's state machine, then report by exception, then messages.
+"""The way from what a frame gave to what is published: the tool change's state machine, then report by exception, then messages.
 
 A message is one row of the machine: the changes of one moment, in the order in which they happened. A consumer that keeps the
 last value of each signal thus sees each state that the machine was in. The state as found on (re)joining is one row, whatever the

@@ -218,7 +218,7 @@ class Ring:
             self._give_back(RETURNED_AT_ONCE)
 
     def evict(self, upto: int) -> Evicted | None:
-        """After a look: the oldest rows with numbers up to `upto`, where a limit is passed, some at a time; else None."""
+        """Evict the oldest rows with numbers up to `upto` where the last look found a limit passed, some at a time; else None."""
         reason = self._passed()
         if reason is None:
             return None

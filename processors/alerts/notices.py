@@ -1,4 +1,4 @@
-"""When a receiver is told: grouping, the interval of a group, repeats, the rate limit, quiet hours.
+"""The times at which a receiver is told: grouping, the interval of a group, repeats, the rate limit, quiet hours.
 
 News waits group_wait_s, so that what happens together is told together. A group that was told is told again after
 group_interval_s; a high alert that begins does not wait for that. In quiet hours only high alerts go out; what is still so at
@@ -96,7 +96,7 @@ def _passed_in_silence(known: ReceiverState, state: AlertsState, silenced: Mappi
 
 
 def _without_resolved(known: ReceiverState, changes: list[Change], clock_s: float) -> tuple[ReceiverState, list[Change]]:
-    """For a receiver that wants no ends: they are noted as told, so that the next firing is news."""
+    """Note ends as told to a receiver that wants none of them, so that the next firing is news."""
     ended = [change for change in changes if change.what == RESOLVED]
     return _told(known, ended, clock_s), [change for change in changes if change.what != RESOLVED]
 

@@ -1,7 +1,7 @@
 """The outbox: from a notice that is due to a notification whose fate is known, and back again after a crash.
 
     made     the notice gets an id, the same for the same news, and is written
-    emitted  it is published, retained, and again while its fate is not known; what is settled is removed a while later
+    emitted  it is published, retained, and again while its fate is not known; once settled it is removed a while later
     settled  the courier has delivered it, or says why not
     recalled after a crash, an earlier life's notifications are read from the broker
 
@@ -47,7 +47,7 @@ RECALLED_EXPIRES_S = 600.0
 
 
 def notification_id(receiver: str, kind: str, says: Iterable[str]) -> str:
-    """The same for the same news to the same receiver, also after a crash."""
+    """Return the id of a notification: the same for the same news to the same receiver, also after a crash."""
     text = "\n".join((receiver, kind, *sorted(says)))
     return sha256(text.encode("utf-8", "surrogatepass")).hexdigest()[:16]
 

@@ -13,7 +13,7 @@ _CLOCK = re.compile(r"([01]\d|2[0-3]):([0-5]\d)")
 
 
 class QuietHours(BaseModel):
-    """From one time of the day to another, past midnight where the end is not after the start; the day is that of the start."""
+    """The hours from one time of day to another, past midnight where the end is not after the start; the day is the start's."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 

@@ -1,4 +1,4 @@
-"""Who is told of alerts: one typed model for each kind of receiver.
+"""The receivers of alerts: one typed model for each kind.
 
 No secret stands here. Where one is needed the configuration names the environment variable, `$NAME`, or a file that only its
 owner can read, `file:/path`; the courier reads it when it starts.

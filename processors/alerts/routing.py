@@ -25,7 +25,7 @@ class Change(NamedTuple):
 
 
 def receivers_of(alert: Alert, config: AlertsConfig, clock_s: float, told_by: Iterable[str]) -> set[str]:
-    """Who is to know of this alert now. Without any route every receiver is, but one that is there for the heartbeat.
+    """Return who is to know of this alert now. Without any route every receiver is, but one that is there for the heartbeat.
 
     An escalation goes out when nobody has acknowledged in time, or a notification has failed; who was told in this episode, by a
     route or an escalation, is told of its end too.

@@ -1,4 +1,4 @@
-"""From the rows of all machines to their alerts, once a beat."""
+"""The watch over all machines: from their rows to their alerts, once a beat."""
 
 from collections.abc import Iterator, Mapping, Set
 from dataclasses import replace

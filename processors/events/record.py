@@ -47,7 +47,7 @@ def record(run: Run, sample: Sample, *, number: int, ended_by: str, is_end_seen:
 
 
 def part_id(machine: str, program: str | None, began_ms: int) -> str:
-    """The same for the same run of the same machine, whoever computes it and when: by it a receiver knows a record again."""
+    """Return the id by which a receiver knows a record again: the same for a run of a machine, whoever computes it and when."""
     return "part-" + hashlib.sha256(f"{machine}\0{program}\0{began_ms}".encode()).hexdigest()[:20]
 
 

@@ -48,7 +48,7 @@ class Figure:
 
     @property
     def mean(self) -> float:
-        """By time; of no time, the last value."""
+        """The mean over time; of no time, the last value."""
         return self.sum / self.seconds if self.seconds > 0.0 else self.last
 
 
@@ -98,7 +98,7 @@ class Run:
 
     @property
     def seconds(self) -> float:
-        """From its beginning until now."""
+        """The seconds since it began."""
         return self.active_s + self.interrupted_s + self.unknown_s
 
 
@@ -109,7 +109,7 @@ def begun(sample: Sample, program: str | None, mode: str | None, *, is_begin_see
 
 
 def lasted(run: Run, sample: Sample, state: str | None, reason: str, dt_s: float) -> Run:
-    """After `dt_s` in a state (None: unknown), for a reason where it is not ACTIVE."""
+    """The run after `dt_s` in a state (None: unknown), for a reason where it is not ACTIVE."""
     if state is None:
         return replace(run, unknown_s=run.unknown_s + dt_s)
     if state == ACTIVE and not reason:

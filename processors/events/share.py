@@ -28,7 +28,7 @@ class Shares:
 
 
 def with_time(shares: Shares, at_s: float, dt_s: float, *, is_active: bool, window_s: float, day_begins_s: float) -> Shares:
-    """With the `dt_s` that end at `at_s`; they belong to the slot in which they end."""
+    """Add the `dt_s` that end at `at_s`; they belong to the slot in which they end."""
     slot_s = window_s / SLOTS
     number, day = floor(at_s / slot_s), floor((at_s - day_begins_s) / DAY_S)
     slots = shares.slots

@@ -16,7 +16,7 @@ from processors.gap.growth import Baseline, Chart, Rule, charted, is_enough, lea
 
 STRAY = 6.0
 STRAYS_CUT_S = 60.0
-"""Before so much of a regime was seen, nothing is taken for a stray."""
+"""The time of a regime before which nothing is taken for a stray."""
 BLOCK_PART_MIN = 1.0 / 60.0
 """A block that has seen its regime for less than this part of its length is carried on into the next one."""
 SPREAD_WORTH = math.log(1.5)
@@ -36,7 +36,7 @@ class Moments(NamedTuple):
         return math.sqrt(max(self.m2, 0.0) / self.seconds) if self.seconds > 0.0 else 0.0
 
     def held(self, value: float, seconds: float) -> "Moments":
-        """With `value` held for `seconds` more."""
+        """Add a `value` that was held for `seconds`."""
         total = self.seconds + seconds
         step = value - self.mean
         mean = self.mean + step * seconds / total
@@ -51,7 +51,7 @@ class Standing(NamedTuple):
     variance: float = 0.0
 
     def held(self, value: float, seconds: float, standing_s: float) -> "Standing":
-        """With `value` held for `seconds` more."""
+        """Add a `value` that was held for `seconds`."""
         total = min(self.seconds + seconds, standing_s)
         gain = min(seconds / total, 1.0)
         step = value - self.mean

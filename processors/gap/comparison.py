@@ -37,7 +37,7 @@ REGIMES = {TEMPERATURE: ("warm_up", "steady", "cool_down"), LOAD: ("air", "cutti
 REGIMES |= dict.fromkeys(AXIS_LOADS, ("standstill",))
 UNITS = {TEMPERATURE: "K", LOAD: "%", SPEED: "rev/min"} | dict.fromkeys(AXIS_LOADS, "%")
 RESOLUTIONS = {TEMPERATURE: 0.1, LOAD: 1.0, SPEED: 1.0} | dict.fromkeys(AXIS_LOADS, 1.0)
-"""To which a control commonly shows them; no floor is taken to be finer than this rounding."""
+"""The rounding of what a control commonly shows; no floor is taken to be finer than that."""
 TURNING_RPM_MIN, FEED_MM_MIN_MIN = 50.0, 1.0
 SPEED_CHANGE = 0.02
 HEATING_K, HEATING_S = 0.5, 1200.0

@@ -25,7 +25,7 @@ from typing import NamedTuple
 
 BLOCKS_MIN = 40
 INDEPENDENT_MIN = 8.0
-"""So many healthy blocks make a baseline, and so many that are independent of each other."""
+"""The healthy blocks that make a baseline, and how many of them have to be independent of each other."""
 BASELINES_MAX = 10_000
 """Baselines whose rules are cached; they are fixed once they are learned."""
 CORRELATION_MAX = 0.98

@@ -47,7 +47,7 @@ NAMES = {
     signal: {f"{GAP}{signal}": ""} | {f"{GAP}{signal}/{regime}": regime for regime in regimes if len(regimes) > 1}
     for signal, regimes in REGIMES.items()
 }
-"""By signal: the metrics of its figures, with the regime that each is of, "" for all."""
+"""The metrics of a signal's figures, with the regime that each is of, "" for all."""
 NONE = "none"
 PUBLISH_S = 60.0
 YEAR_S = 365.25 * 86_400.0
@@ -87,7 +87,7 @@ class Config(ProcessorConfig):
 
     @cached_property
     def blocks_of_window(self) -> int:
-        """So many blocks make a stretch that is long enough to diagnose."""
+        """The blocks of a stretch that is long enough to diagnose."""
         return max(2, round(self.window_hours * 3600.0 / self.block_s))
 
     @model_validator(mode="after")
@@ -248,7 +248,7 @@ def _figures(config: Config, state: State, signal: str, missing: str | None, at_
 
 
 def _known(config: Config, state: State, signal: str, cells: Mapping[str, Cell], at_s: float) -> dict[str, tuple[Cell, float]]:
-    """By regime, the cells that have a standing figure, with their floor."""
+    """The cells that have a standing figure, with their floor, by regime."""
     is_learned = at_s >= _healthy_s(config, state)[1]
     known = {}
     for regime, cell in cells.items():

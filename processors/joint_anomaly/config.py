@@ -57,7 +57,7 @@ class Config(CellConfig):
 
     @cached_property
     def gate_rule(self) -> GateRule:
-        """When scores are gated."""
+        """The rule by which scores are gated."""
         tail_ticks = math.ceil(self.tail_s / self.tick_s - TICK_ROUNDING)
         return GateRule(tail_ticks * self.tick_s, self.look_back_ticks * self.tick_s, self.gate_s_max)
 
@@ -68,17 +68,17 @@ class Config(CellConfig):
 
     @cached_property
     def tick_ms(self) -> int:
-        """As the lanes count (`processors/running/lane.py`)."""
+        """The tick in whole ms, as the lanes count it (`processors/running/lane.py`)."""
         return max(1, round(self.tick_s * 1000.0))
 
     @cached_property
     def wait_ticks(self) -> int:
-        """For peers."""
+        """The ticks for which peers are waited for."""
         return round(self.peer_wait_s / self.tick_s)
 
     @cached_property
     def look_back_ticks(self) -> int:
-        """Before a frame is judged."""
+        """The ticks that pass before a frame is judged."""
         return math.ceil(self.look_back_s / self.tick_s - TICK_ROUNDING)
 
     @model_validator(mode="after")

@@ -41,8 +41,8 @@ class InStep(NamedTuple):
     behind: int = 0
 
     def moved(self, before: int | None, tick: int) -> "InStep | None":
-        """After a machine has come from tick `before` to `tick`; None = it is to be found anew, since a frame is complete, or the
-        machine joins or leaves.
+        """Return who is in step after a machine has come from tick `before` to `tick`; None = that is to be found anew, since a
+        frame is complete, or the machine joins or leaves.
 
         >>> InStep(first=100, last=105, behind=2).moved(100, 101)
         InStep(first=100, last=105, behind=1)
@@ -59,7 +59,7 @@ class InStep(NamedTuple):
 
 
 def in_step(ticks: Collection[int], wait_ticks: int) -> InStep:
-    """Who is in step, of the last ticks of all machines: as many as lie within `wait_ticks`, the latest of those.
+    """Find who is in step, by the last ticks of all machines: as many as lie within `wait_ticks`, the latest of those.
 
     Three machines are at 100, 101 and 103, a fourth is an hour ahead:
 

@@ -111,7 +111,7 @@ def _ticked(config: Configuration[Config], state: State, sample: Sample) -> tupl
 
 
 def _by_name(members: dict[str, Member], online: Container[str]) -> dict[str, Member]:
-    """In an order that is not that of arrival; too many for one cell, those that are offline are forgotten."""
+    """Sort the members, lest their order be that of arrival; where they are too many, forget those that are offline."""
     kept = sorted(members if len(members) <= MEMBERS_MAX else [name for name in members if name in online])
     return {name: members[name] for name in kept}
 
@@ -186,7 +186,7 @@ def _judge(
 
 
 def _adjusted_by_scores(shared: Config, scorings: Mapping[str, Scoring], frame: Frame) -> dict[str, Adjustment]:
-    """By the published rule, or the residual of the scores."""
+    """Return the score of each machine of a frame by the published rule, or by the residual of the scores."""
     names = list(scorings)
     scores = [_on_the_scale(shared, scoring, frame[name][0].raw) for name, scoring in scorings.items()]
     judged = adjust_frame(shared.common_mode_rule, scores, [frame[name][1].is_on is True for name in names])

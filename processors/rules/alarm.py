@@ -1,4 +1,4 @@
-"""When a rule's condition becomes an alarm, and when it ends: dwell and hysteresis, in event time.
+"""The alarm of a rule: when its condition becomes one, and when that ends; dwell and hysteresis, in event time.
 
 A condition that is over its limit for `dwell_s` without a break raises the alarm; one that is under the lower limit for `clear_s`
 without a break ends it; in between, an alarm stays and none is raised. While a rule is excused (the spindle changes its speed)

@@ -29,7 +29,7 @@ KNOWN_PART = 0.75
 """The part of a window that has to be known."""
 STRAY_S = 10.0
 TEMPERATURES_C = (-60.0, 400.0)
-"""Beyond them nothing is a spindle's temperature."""
+"""The temperatures beyond which nothing is a spindle's."""
 
 
 class TemperatureLimits(ProcessorConfig):

@@ -44,7 +44,7 @@ class VibrationClass(Enum):
 
 
 class Zone(Enum):
-    """From good to bad."""
+    """The zones from good to bad."""
 
     A = "A"
     B = "B"

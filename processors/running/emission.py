@@ -1,4 +1,4 @@
-"""From what a step returns to what is published: checked against the declaration, and reported by exception."""
+"""The way from what a step returns to what is published: checked against the declaration, and reported by exception."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -63,7 +63,7 @@ class Emission:
 
 @lru_cache(maxsize=100)
 def _rules(outputs: tuple[OutputSpec, ...]) -> dict[str, tuple[OutputSpec, bool, float]]:
-    """By name: the declaration, whether it takes floats, and its deadband. The machines of a processor share them."""
+    """The declaration of each output, whether it takes floats, and its deadband. The machines of a processor share them."""
     return {spec.name: (spec, float in PYTHON_TYPES[spec.datatype], spec.deadband) for spec in outputs}
 
 

@@ -140,7 +140,7 @@ class Lane:
         self.row.update((reading.name, reading) for reading in readings)
 
     def _show(self, kind: SampleKind, readings: Sequence[Reading]) -> Folded:
-        """For a processor that reads everything, from several sources, each with a clock of its own: there is no common time.
+        """Fold for a processor that reads everything, from several sources, each with a clock of its own: no time is common.
 
         What comes last of a source is what it said last: the session has put its messages in order.
         """

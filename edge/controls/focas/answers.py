@@ -34,7 +34,7 @@ class Exchange(NamedTuple):
 
 
 def identity(found: Sequence[Reply]) -> Identity:
-    """Who answers, from `IDENTITY_BLOCKS`."""
+    """The identity of the control, from its answers to `IDENTITY_BLOCKS`."""
     system, count, axis_names = found
     if system.status != OK or len(system.data) < 18:
         raise DocumentError(f"no system information: {told(system.status)}")
@@ -91,7 +91,7 @@ def answer(request: Request, plan: Exchange, found: Sequence[Reply], who: Identi
 
 
 def unknown() -> Answer:
-    """To a call that the protocol has no known command for."""
+    """The answer to a call that the protocol has no known command for."""
     return Answer(FUNC)
 
 

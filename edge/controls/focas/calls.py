@@ -42,7 +42,7 @@ class Request(NamedTuple):
 
     @property
     def name(self) -> str:
-        """For messages, and to remember that it was refused."""
+        """The name in messages, by which a refusal is remembered too."""
         return f"{self.call} {self.argument}".rstrip()
 
 

@@ -1,4 +1,4 @@
-"""From sweeps of a FANUC control to samples: which fact is which signal. Pure.
+"""The way from sweeps of a FANUC control to samples: which fact is which signal. Pure.
 
 The tool number is what the builder's register says, or cnc_toolnum; where there is neither, the T code: on a lathe at once, on a
 machining centre when M6 has worked on it, because programs call the next tool ahead. So there it is not known until a change was
@@ -48,7 +48,7 @@ def start(config: Config) -> Cursor:
 
 
 def place(cursor: Cursor) -> Place | None:
-    """Up to where everything is taken."""
+    """The place up to which everything is taken."""
     return cursor.position.place()
 
 

@@ -57,7 +57,7 @@ def logins_of(config: Config) -> tuple[str, ...]:
 
 
 def plc_password(config: Config) -> str:
-    """From the environment variable that the configuration names; "" where it names none."""
+    """The password in the environment variable that the configuration names; "" where it names none."""
     name = config.source.plc_password_env
     if name and name not in os.environ:
         raise ConfigError(f"{config.path}: heidenhain.plc_password_env = {name!r}: no such environment variable; set it")
@@ -234,7 +234,7 @@ class Control:
         return bytes(answer[:8]).hex()
 
     def _text(self, path: str) -> str | None:
-        """In text mode, in which a zero byte ends each line."""
+        """Read a file in text mode, in which a zero byte ends each line."""
         bytes_max = self._config.source.program_kib_max * 1024
         info = self.link.telegram("R_FI", path.encode("latin-1") + b"\x00")
         if self._was_refused():

@@ -79,7 +79,7 @@ def start(_config: Config) -> Cursor:
 
 
 def place(cursor: Cursor) -> Place | None:
-    """Up to where everything is taken."""
+    """The place up to which everything is taken."""
     return cursor.position.place()
 
 

@@ -106,7 +106,7 @@ class _Analysis:
         self._due: list[tuple[str, int]] = []
 
     def flow(self) -> Flow:
-        """To the fixed point, or a fault where that is out of bounds."""
+        """Follow the program to the fixed point; a fault where that is out of bounds."""
         unknown = next(
             (s for s in self._steps if s.kind in (Kind.CALL, Kind.REPEAT, Kind.JUMP) and s.word not in self._labels), None
         )
@@ -181,5 +181,5 @@ class _Analysis:
 
 
 def _put(tokens: Tokens, brought: Tokens) -> Tokens:
-    """With what the caller brings in place of the word that stands for it."""
+    """Put what the caller brings in place of the word that stands for it."""
     return tokens if _IN not in tokens else (tokens - {_IN}) | brought

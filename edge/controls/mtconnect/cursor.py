@@ -94,7 +94,7 @@ def start(_config: Config) -> Cursor:
 
 
 def place(cursor: Cursor) -> Place | None:
-    """Up to where everything is taken; None while nothing is."""
+    """The place up to which everything is taken; None while nothing is."""
     taken = cursor.phase is Phase.SAMPLE and cursor.next_sequence > 0
     return Place(cursor.instance_id, cursor.next_sequence) if taken else None
 
@@ -134,7 +134,7 @@ def parse(config: Config, cursor: Cursor, raw: bytes) -> tuple[Cursor, SampleSet
 
 
 def _clock(header: Header) -> ClockReading | None:
-    """Return what the agent's clock showed; when by the edge's, `edge.clock.offset` finds from when the document arrived."""
+    """Return what the agent's clock showed; `edge.clock.offset` puts it beside the time at which the document arrived."""
     if header.created_ms is None:
         return None
     return ClockReading(header.created_ms, 0, DOCUMENT_MS_MAX, header.resolution_ms)
@@ -273,7 +273,7 @@ def _rejoin(ready: Cursor, document: StreamsDocument) -> tuple[Cursor, SampleSet
 
 
 def _alarms_anew(cursor: Cursor, samples: SampleSet, document: StreamsDocument) -> tuple[Cursor, SampleSet]:
-    """After a hole the active conditions are those that /current shows: one that ended in the hole has left no trace but that."""
+    """Take the active conditions as /current shows them after a hole: one that ended in it has left no other trace."""
     shown = sorted((o for o in document.observations if o.is_condition and _is_ours(cursor, o)), key=lambda o: o.sequence or 0)
     readable = [o for o in shown if o.sequence is not None and o.timestamp_ms is not None]
     if not readable or not cursor.publishes_alarm:

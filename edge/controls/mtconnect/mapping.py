@@ -178,7 +178,7 @@ def _axes(device: DeviceModel, spindles: Mapping[str, str], chosen: str) -> Iter
 
 
 def _is_axis_load(item: DataItem) -> bool:
-    """On a turning centre `Cload` beside `Sload` in one Rotary is the load of the C axis."""
+    """Return whether it is `Cload`: beside `Sload` in one Rotary of a turning centre, that is the load of the C axis."""
     return item.label.lower().startswith("c")
 
 

@@ -83,7 +83,7 @@ def _is_usable(identity: Identity) -> bool:
 
 
 def _self_signed(key: rsa.RSAPrivateKey, uri: str, name: str, valid_days: int, is_server: bool) -> bytes:
-    """With the extensions that part 6, 6.2.2 asks of an application instance certificate."""
+    """Make a certificate with the extensions that part 6, 6.2.2 asks of an application instance certificate."""
     subject = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, f"cnctwin {name} at {socket.gethostname()}"[:64])])
     now = datetime.now(UTC)
     usage = x509.KeyUsage(

@@ -54,7 +54,7 @@ def start(_config: Config) -> Cursor:
 
 
 def place(cursor: Cursor) -> Place | None:
-    """Up to when everything is taken; None while nothing is."""
+    """The time up to which everything is taken; None while nothing is."""
     return cursor.position.place()
 
 

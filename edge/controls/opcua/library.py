@@ -54,7 +54,7 @@ class ReadOnlyGuard:
         yield
 
     def on_request(self, request_type: str, duration: float, error: BaseException | None) -> None:
-        """After a request."""
+        """A request was answered."""
 
     def on_state_change(self, state: object) -> None:
         """The transport is in another state."""
