@@ -3,7 +3,7 @@
 Observations are counted where they are read, so that at each publication received = emitted + dropped(reason) + buffered.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -109,4 +109,9 @@ class SampleSet:
 
     def accounted(self) -> bool:
         """Return whether each observation of the frame is a sample or a counted drop."""
-        return self.received == sum(sample.observations for sample in self.samples) + sum(self.dropped.values())
+        return self.received == observations_of(self.samples) + sum(self.dropped.values())
+
+
+def observations_of(samples: Iterable[EdgeSample]) -> int:
+    """Return how many observations these samples account for."""
+    return sum(sample.observations for sample in samples)

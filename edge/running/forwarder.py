@@ -29,7 +29,7 @@ from edge.running.receipts import RECEIPT, Receipts
 from edge.running.ring import Ring, StoredRow
 from edge.running.ring_file import Eviction
 from edge.running.spans import Spans
-from edge.sample import Drop, EdgeSample
+from edge.sample import Drop, EdgeSample, observations_of
 from sparkplug.datatype import DataType
 from sparkplug.errors import SparkplugError
 from sparkplug.metric import Change, MetricSpec
@@ -341,11 +341,6 @@ class Forwarder:
         if str(error) != self.error:
             _log.warning("%s", error)
         self.error = str(error)
-
-
-def observations_of(row: Iterable[EdgeSample]) -> int:
-    """Return how many observations a row accounts for."""
-    return sum(sample.observations for sample in row)
 
 
 def _body(row: Iterable[EdgeSample]) -> str:

@@ -29,7 +29,7 @@ from edge.running.pipeline import Outcome, Pipeline
 from edge.running.receipts import RECEIPT
 from edge.running.sensor import sensor_of
 from edge.running.unstored import Unstored
-from edge.sample import UNAVAILABLE, Drop, EdgeSample, Offer, SampleSet
+from edge.sample import UNAVAILABLE, Drop, EdgeSample, Offer, SampleSet, observations_of
 from sparkplug.edge_session import Command
 from sparkplug.metric import Change, MetricSpec
 
@@ -271,8 +271,7 @@ class EdgeRuntime:
             if self._is_declared:
                 rows.append(row)
             else:
-                observations = sum(sample.observations for sample in row)
-                dropped[Drop.CONTROL_LOST] = dropped.get(Drop.CONTROL_LOST, 0) + observations
+                dropped[Drop.CONTROL_LOST] = dropped.get(Drop.CONTROL_LOST, 0) + observations_of(row)
         memory = self._pipeline.memory()
         settled = self._store.put(rows, place, memory)
         if memory is not None:

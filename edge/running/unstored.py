@@ -7,8 +7,8 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 
 from edge.place import Place, PlaceFile
-from edge.running.forwarder import Sender, Settled, observations_of
-from edge.sample import Drop, EdgeSample
+from edge.running.forwarder import Sender, Settled
+from edge.sample import Drop, EdgeSample, observations_of
 from sparkplug.metric import MetricSpec
 
 

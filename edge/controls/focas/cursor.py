@@ -14,7 +14,7 @@ from edge.controls.focas.mapping import FocasMapping, mapping_of
 from edge.controls.focas.states import cue_of, execution_of, feed_override_pct, first_line, mode_of, rapid_override_pct
 from edge.place import Place
 from edge.reading import Outcome, Target, bad, read_value
-from edge.sample import UNAVAILABLE, Drop, EdgeSample, Offer, SampleSet
+from edge.sample import UNAVAILABLE, Drop, EdgeSample, Offer, SampleSet, observations_of
 from edge.sweep import Fact, Plain, Sweep, SweepPosition, take
 from edge.tool_change import CUE
 from sparkplug.quality import Quality
@@ -68,7 +68,7 @@ def parse(config: Config, cursor: Cursor, raw: bytes) -> tuple[Cursor, SampleSet
     look = _Look(config, after, taken.sweep, is_baseline=taken.is_baseline, is_away=is_away)
     samples = tuple(look.samples())
     dropped: Counter[str] = Counter()
-    if more := len(taken.sweep.facts) - sum(sample.observations for sample in samples):
+    if more := len(taken.sweep.facts) - observations_of(samples):
         dropped[Drop.UNMAPPED] = more
     offers = look.offers() if "control.series" in facts else None
     return look.cursor, replace(taken.about, samples=samples, dropped=dict(dropped), offers=offers)

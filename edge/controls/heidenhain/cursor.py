@@ -24,7 +24,7 @@ from edge.controls.heidenhain.meaning import ONLY_PLC, in_words, signal_of, sour
 from edge.controls.heidenhain.tool_flow import BEFORE, PROGRAM_CALLED, Token, Tokens, flow_of, speed_of, tool_of
 from edge.place import Place
 from edge.reading import Target, bad, read_value
-from edge.sample import UNAVAILABLE, Drop, EdgeSample, Offer, SampleSet
+from edge.sample import UNAVAILABLE, Drop, EdgeSample, Offer, SampleSet, observations_of
 from edge.sweep import Fact, Plain, Sweep, SweepPosition, take
 from edge.tool_change import CUE
 from sparkplug.quality import Quality
@@ -110,7 +110,7 @@ def parse(config: Config, cursor: Cursor, raw: bytes) -> tuple[Cursor, SampleSet
     samples += _missing(cursor.offers, offers, samples, look)
     samples = [sample for sample in samples if _is_wanted(config, sample.signal)]
     dropped: dict[str, int] = {Drop.EVIDENCE: evidence} if evidence else {}
-    unmapped = len(sweep.facts) - evidence - sum(sample.observations for sample in samples)
+    unmapped = len(sweep.facts) - evidence - observations_of(samples)
     if unmapped:
         dropped[Drop.UNMAPPED] = unmapped
     after = replace(
