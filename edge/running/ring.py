@@ -104,7 +104,7 @@ class Ring:
             for tail in ("-wal", "-shm"):
                 self.file.with_name(self.file.name + tail).unlink(missing_ok=True)
             db = self._connect()
-            # Which numbers the lost store has given nobody knows; fewer than one a millisecond since 1970, that much is sure.
+            # The numbers that the lost store gave are unknown; they were fewer than one a millisecond since 1970.
             self.last = self._now_ms()
             db.execute("INSERT INTO sqlite_sequence VALUES ('rows', ?)", (self.last,))
             return db
@@ -253,7 +253,7 @@ class Ring:
         try:
             return self._free_bytes(self.file.parent) + self._spare_bytes
         except OSError as error:
-            raise StoreError(f"{self.file}: nobody knows how much the disk has left: {error}") from error
+            raise StoreError(f"{self.file}: cannot read the free space of its disk: {error}") from error
 
     def _ask(self, text: str, values: Iterable[int] = ()) -> list[tuple[Any, ...]]:
         try:

@@ -46,7 +46,9 @@ def status(
     try:
         free = free_bytes(folder)
     except OSError as error:
-        return Status(samples, sealed + hot, oldest, newest, None, 0, f"{folder}: nobody knows what the disk has left: {error}")
+        return Status(
+            samples, sealed + hot, oldest, newest, None, 0, f"{folder}: cannot read the free space of its disk: {error}"
+        )
     if free < FREE_BYTES_MIN:
         trouble.append(f"{folder}: the disk has {free // 1_000_000} MB left; nothing more is kept until there is room")
     elif free < SPARE_FREE_BYTES and sealed:

@@ -142,7 +142,7 @@ class Writer:
         try:
             free = self._free_bytes(self.folder)
         except OSError as error:
-            raise StoreError(f"{self.folder}: nobody knows how much the disk has left: {error}") from error
+            raise StoreError(f"{self.folder}: cannot read the free space of its disk: {error}") from error
         if free < FREE_BYTES_MIN:
             left, needed = free // 1_000_000, FREE_BYTES_MIN // 1_000_000
             raise StoreError(

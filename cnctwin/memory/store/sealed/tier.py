@@ -119,7 +119,7 @@ class SealedTier:
         try:
             return max(over, SPARE_FREE_BYTES - self._free_bytes(self._folder))
         except OSError as error:
-            raise StoreError(f"{self._folder}: nobody knows how much the disk has left: {error}") from error
+            raise StoreError(f"{self._folder}: cannot read the free space of its disk: {error}") from error
 
     def _remove(self, names: Iterable[str]) -> None:
         for name in names:
