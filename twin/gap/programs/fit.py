@@ -23,8 +23,7 @@ from twin.effects.effect import Effect, Parameter
 from twin.gap.diagnosis import Interval
 from twin.gap.programs.trial import Trial
 from twin.identification.estimate import clustered_covariance
-from twin.identification.programs.recording import NOMINAL, line_starts
-from twin.identification.programs.time import HICCUP_S, windows
+from twin.identification.programs.recording import NOMINAL, line_starts, windows
 from twin.motion.control import Control, changed
 from twin.motion.limits import Limits
 from twin.motion.plan import Plan
@@ -34,6 +33,8 @@ Ints = NDArray[np.int64]
 Values = Mapping[str, Mapping[str, float]]
 """Effect → parameter → value."""
 
+HICCUP_S = 0.3
+"""Residuals beyond this count linearly (soft L1)."""
 PRIOR_S = 0.1
 SPREAD = 1.5
 """One standard deviation of the logarithm of a parameter, a factor of 4.5; of those without a null value a third."""

@@ -127,6 +127,16 @@ def _nominal_position() -> tuple[float, float, float]:
     return NOMINAL.tool_change_x, NOMINAL.tool_change_y, NOMINAL.reference_z
 
 
+def windows(program: RecordedProgram, shortest_s: float) -> tuple[Floats, Ints]:
+    """Active seconds (k,) and lines (k,) at which the comparison is made, at least `shortest_s` apart."""
+    begin, line = program.run.line_changes()
+    kept = [0]
+    for k in range(1, len(begin)):
+        if begin[k] - begin[kept[-1]] >= shortest_s:
+            kept.append(k)
+    return begin[kept], line[kept]
+
+
 def line_starts(plan: Plan, lines: Ints) -> Floats:
     """Seconds at which each of `lines` begins in `plan`."""
     seconds = plan.seconds_by_line()
