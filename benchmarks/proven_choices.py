@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from scipy.stats import spearmanr, t
 
 from benchmarks.programs.time import fitted, is_fitted
+from benchmarks.programs.time_fit import PARAMETERS, ProgramTimes, compare
 from twin.identification.programs.recording import RecordedProgram, line_starts
-from twin.identification.programs.time import PARAMETERS, ProgramTimes, compare
 from twin.motion.candidates import Candidates
 from twin.motion.limits import Limits
 from twin.motion.path import EventKind, Kind, Path

@@ -31,8 +31,8 @@ from time import perf_counter
 import numpy as np
 
 from benchmarks.programs.spindle import SpindleRamp, run_ups, spindle_ramp
+from benchmarks.programs.time_fit import PARAMETERS, Comparison, ProgramTimes, compare, ideal_limits, identify_program_times
 from twin.identification.programs.recording import RecordedProgram, recorded_programs
-from twin.identification.programs.time import PARAMETERS, Comparison, ProgramTimes, compare, ideal_limits, identify_program_times
 from twin.recording.observations import read_observations
 from twin.recording.program_run import OVERRIDES, ProgramRun, program_runs
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from benchmarks import proven_choices as choices
+from benchmarks.programs.time_fit import ProgramTimes, identify_program_times
 from tests.recordings import recording
 from twin.identification.programs.recording import RecordedProgram, recorded_programs
-from twin.identification.programs.time import ProgramTimes, identify_program_times
 from twin.motion.limits import Limits
 from twin.motion.plan import plan
 

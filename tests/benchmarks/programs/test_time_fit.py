@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from benchmarks.programs.time_fit import PARAMETERS, ProgramTimes, compare, ideal_limits, identify_program_times
 from tests.recordings import recording
 from twin.errors import RunLogError
 from twin.gcode import Settings, interpret
 from twin.identification.programs.recording import NOMINAL, RecordedProgram, SetUp, rapid_rate_mm_min, recorded_programs, windows
-from twin.identification.programs.time import PARAMETERS, ProgramTimes, compare, ideal_limits, identify_program_times
 from twin.motion.limits import Limits
 from twin.motion.path import path_from_moves
 from twin.motion.plan import plan
