@@ -32,9 +32,9 @@ import numpy as np
 
 from benchmarks.programs.spindle import SpindleRamp, run_ups, spindle_ramp
 from benchmarks.programs.time_fit import PARAMETERS, Comparison, ProgramTimes, compare, ideal_limits, identify_program_times
-from twin.identification.programs.recording import RecordedProgram, recorded_programs
 from twin.recording.observations import read_observations
 from twin.recording.program_run import OVERRIDES, ProgramRun, program_runs
+from twin.recording.recorded_program import RecordedProgram, recorded_programs
 
 PLATES = ("01", "02", "03", "04", "10", "11", "13", "14", "15", "19")
 FITTED = ("13", "14", "15")

@@ -16,9 +16,9 @@ from scipy.optimize import least_squares
 from twin.errors import RunLogError
 from twin.gap.programs.fit import HICCUP_S
 from twin.identification.estimate import Estimate
-from twin.identification.programs.recording import NOMINAL, RecordedProgram, SetUp, line_starts, rapid_rate_mm_min, windows
 from twin.motion.limits import Limits
 from twin.motion.plan import Plan, plan
+from twin.recording.recorded_program import NOMINAL, RecordedProgram, SetUp, line_starts, rapid_rate_mm_min, windows
 
 Floats = NDArray[np.float64]
 WINDOW_S = 1.0

@@ -8,9 +8,9 @@ import pytest
 from benchmarks import proven_choices as choices
 from benchmarks.programs.time_fit import ProgramTimes, identify_program_times
 from tests.recordings import recording
-from twin.identification.programs.recording import RecordedProgram, recorded_programs
 from twin.motion.limits import Limits
 from twin.motion.plan import plan
+from twin.recording.recorded_program import RecordedProgram, recorded_programs
 
 NAMES = ("03", "04", "10", "13")
 

@@ -7,13 +7,13 @@ from benchmarks.programs.time_fit import PARAMETERS, ProgramTimes, compare, idea
 from tests.recordings import recording
 from twin.errors import RunLogError
 from twin.gcode import Settings, interpret
-from twin.identification.programs.recording import NOMINAL, RecordedProgram, SetUp, rapid_rate_mm_min, recorded_programs, windows
 from twin.motion.limits import Limits
 from twin.motion.path import path_from_moves
 from twin.motion.plan import plan
 from twin.motion.sampling import sampled
 from twin.recording.observations import Observation, Observations
 from twin.recording.program_run import program_runs
+from twin.recording.recorded_program import NOMINAL, RecordedProgram, SetUp, rapid_rate_mm_min, recorded_programs, windows
 
 TRUE = Limits(
     rapid_mm_min=20000.0,

@@ -23,10 +23,10 @@ from twin.effects.effect import Effect, Parameter
 from twin.gap.diagnosis import Interval
 from twin.gap.programs.trial import Trial
 from twin.identification.estimate import clustered_covariance
-from twin.identification.programs.recording import NOMINAL, line_starts, windows
 from twin.motion.control import Control, changed
 from twin.motion.limits import Limits
 from twin.motion.plan import Plan
+from twin.recording.recorded_program import NOMINAL, line_starts, windows
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
