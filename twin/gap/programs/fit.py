@@ -26,7 +26,7 @@ from twin.identification.estimate import clustered_covariance
 from twin.motion.control import Control, changed
 from twin.motion.limits import Limits
 from twin.motion.plan import Plan
-from twin.recording.recorded_program import NOMINAL, line_starts, windows
+from twin.recording.recorded_program import NOMINAL, kept_apart, line_starts, windows
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -92,11 +92,7 @@ class Watched:
     @cached_property
     def sparse(self) -> Ints:
         """Which of the lines are LONG_WINDOW_S or more apart."""
-        kept = [0]
-        for k in range(1, len(self.begin)):
-            if self.begin[k] - self.begin[kept[-1]] >= LONG_WINDOW_S:
-                kept.append(k)
-        return np.array(kept, dtype=np.int64)
+        return kept_apart(self.begin, LONG_WINDOW_S)
 
     def gaps_s(self, model: "Model") -> Floats:
         """Twin minus recording in each window, and then in each long one."""
