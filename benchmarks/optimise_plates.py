@@ -4,7 +4,7 @@
     .venv/bin/python benchmarks/optimise_plates.py [--json]
 
 One geometry, ten programs with other feeds and spindle speeds for each tool (NIST Smart Manufacturing Systems Test Bed;
-CNCTWIN_DATA or ../shared/data). The control is fitted to plates 13, 14 and 15 as in program_time.py; what is predicted takes the
+CNCTWIN_DATA or ../shared/data). The control is fitted to plates 13, 14 and 15 as in programs/time.py; what is predicted takes the
 feeds and speeds of a program and the overrides of its run, and is compared with the active time of that run.
 
 * times: each tool section of each run, predicted and recorded
@@ -19,11 +19,11 @@ What proven means is in proven_choices.py.
 import argparse
 import json
 import statistics
-import sys
 from collections.abc import Sequence
 from dataclasses import asdict
 
-from benchmarks.programs.time import cover_ramp, data_folder, is_fitted, plates
+from benchmarks.programs.plates import cover_ramp, data_folder, plates
+from benchmarks.programs.time import is_fitted
 from benchmarks.proven_choices import REFERENCE, Savings, Study, study, wholes
 
 
@@ -94,8 +94,6 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true")
     arguments = parser.parse_args()
-    if not (data_folder() / "nist").exists():
-        sys.exit(f"no recordings in {data_folder()}/nist; CNCTWIN_DATA names the folder that holds nist/")
     programs = [one for one in plates(data_folder()) if not one.refusal()]
     found = study(programs, cover_ramp(data_folder()).base_rpm)
     if arguments.json:

@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 from scipy.stats import spearmanr, t
 
 from benchmarks.programs.time import fitted, is_fitted
-from twin.identification.programs.recording import RecordedProgram, line_starts
-from twin.identification.programs.time import PARAMETERS, ProgramTimes, compare
+from benchmarks.programs.time_fit import PARAMETERS, ProgramTimes, compare
 from twin.motion.candidates import Candidates
 from twin.motion.limits import Limits
 from twin.motion.path import EventKind, Kind, Path
 from twin.motion.plan import plan
+from twin.recording.recorded_program import RecordedProgram, line_starts
 
 Floats = NDArray[np.float64]
 INCH_MM = 25.4

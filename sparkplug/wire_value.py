@@ -3,9 +3,9 @@
 Whole numbers are range-checked going out and sign-corrected coming in: a negative number travels as two's complement in an
 unsigned field, some peers widen it to 32 or 64 bits and some do not, so what comes in is cut to the declared width first.
 
->>> to_field(DataType.INT8, -23)
+>>> WRITE[DataType.INT8](-23)
 4294967273
->>> from_field(DataType.INT8, 4294967273), from_field(DataType.INT8, 0xE9)
+>>> READ[DataType.INT8](4294967273), READ[DataType.INT8](0xE9)
 (-23, -23)
 """
 
@@ -101,6 +101,7 @@ WRITE: dict[DataType, Callable[[Any], Any]] = {
     **{t: _exact(t, (bytes,), bytes) for t in BINARIES},
     **{t: _array_out(t) for t in ARRAYS},
 }
+"""The protobuf value of a value; raises MetricValueError where the type cannot carry it."""
 READ: dict[DataType, Callable[[Any], Any]] = {
     **{t: _integer_in(bits, signed=True) for t, bits in SIGNED_BITS.items()},
     **{t: _integer_in(bits, signed=False) for t, bits in UNSIGNED_BITS.items()},
@@ -110,13 +111,4 @@ READ: dict[DataType, Callable[[Any], Any]] = {
     **dict.fromkeys(BINARIES, _same),
     **{t: _array_in(t) for t in ARRAYS},
 }
-
-
-def to_field(datatype: DataType, value: Any) -> Any:
-    """The protobuf value of `value`; raises MetricValueError where the type cannot carry it."""
-    return WRITE[datatype](value)
-
-
-def from_field(datatype: DataType, value: Any) -> Any:
-    """The Python value of a protobuf field; raises PayloadError where an array's bytes do not fit."""
-    return READ[datatype](value)
+"""The Python value of a protobuf field; raises PayloadError where an array's bytes do not fit."""

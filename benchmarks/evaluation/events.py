@@ -8,7 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from twin.intervals import Estimate, rate, share
+from benchmarks.evaluation.intervals import rate, share
+from twin.intervals import Estimate
 
 WEEK_S = 604_800.0
 

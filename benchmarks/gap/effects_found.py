@@ -13,12 +13,8 @@ of another form is found, `cnctwin gap check` says.
 
 import argparse
 import json
-import sys
 from collections import Counter
-from pathlib import Path
 from time import perf_counter
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from tests.twin.effects.made_with import diagnosed, outcome
 from twin.effects.catalogue import catalogue, effect_named

@@ -12,8 +12,6 @@ case. Those of the back face and those that were aborted are among them: the dia
 
 import argparse
 import json
-import os
-import sys
 import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -23,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.programs.columns import program_columns
+from benchmarks.programs.plates import FITTED, PLATES, data_folder
 from twin.case import Case, read_case
 from twin.gap.diagnosis import Diagnosed
 from twin.gap.programs.diagnose import diagnose_programs
@@ -34,8 +33,6 @@ from twin.recording.observations import last_values, read_observations
 from twin.recording.program_run import OVERRIDES, program_runs
 from twin.runlog import run_log, write_run
 
-PLATES = ("01", "02", "03", "04", "10", "11", "13", "14", "15", "19")
-FITTED = ("13", "14", "15")
 MACHINE = "[machine]\nname = '{}'\n"
 RUN = "\n[[runs]]\nfile = '{}'\nkind = 'program'\nrole = '{}'\nprogram = '{}'\n"
 WITHHELD: Mapping[str, Mapping[str, Mapping[str, float]]] = {
@@ -50,11 +47,6 @@ WITHHELD: Mapping[str, Mapping[str, Mapping[str, float]]] = {
     },
     "block_overhead + feed_override": {"block_overhead": {"block_s": 0.08}, "feed_override": {"ratio": 1.1}},
 }
-
-
-def data_folder() -> Path:
-    """Where the recordings are."""
-    return Path(os.environ.get("CNCTWIN_DATA") or Path(__file__).resolve().parents[3] / "shared" / "data")
 
 
 def plates_case(
@@ -170,8 +162,6 @@ def main() -> None:
         rows = withheld(arguments.json)
         print(json.dumps(rows, indent=1) if arguments.json else "")
         return
-    if not (data_folder() / "nist").exists():
-        sys.exit(f"no recordings in {data_folder()}/nist; CNCTWIN_DATA names the folder that holds nist/")
     with tempfile.TemporaryDirectory() as made:
         begun = perf_counter()
         case = plates_case(data_folder(), Path(made), overrides=not arguments.without_overrides)

@@ -22,22 +22,16 @@ A run is judged on its active time (without the pauses that the recording shows)
 import argparse
 import json
 import math
-import os
 import statistics
-import sys
-from pathlib import Path
 from time import perf_counter
 
 import numpy as np
 
-from benchmarks.programs.spindle import SpindleRamp, run_ups, spindle_ramp
-from twin.identification.programs.recording import RecordedProgram, recorded_programs
-from twin.identification.programs.time import PARAMETERS, Comparison, ProgramTimes, compare, ideal_limits, identify_program_times
-from twin.recording.observations import read_observations
-from twin.recording.program_run import OVERRIDES, ProgramRun, program_runs
+from benchmarks.programs.plates import FITTED, cover_ramp, data_folder, plates
+from benchmarks.programs.time_fit import PARAMETERS, Comparison, ProgramTimes, compare, ideal_limits, identify_program_times
+from twin.recording.program_run import OVERRIDES, ProgramRun
+from twin.recording.recorded_program import RecordedProgram
 
-PLATES = ("01", "02", "03", "04", "10", "11", "13", "14", "15", "19")
-FITTED = ("13", "14", "15")
 LENGTH = ()
 CHANGE = (*LENGTH, "tool_change_s")
 CORNERS = (*CHANGE, "acceleration_mm_s2", "rapid_acceleration_mm_s2", "corner_speed_difference_mm_min")
@@ -65,35 +59,8 @@ MODELS: tuple[tuple[str, tuple[str, ...], bool], ...] = (
 )
 
 
-def data_folder() -> Path:
-    """Where the recordings are."""
-    return Path(os.environ.get("CNCTWIN_DATA") or Path(__file__).resolve().parents[3] / "shared" / "data")
-
-
-def plates(folder: Path, names: tuple[str, ...] = PLATES) -> list[RecordedProgram]:
-    """All runs in the recordings of the plates `names`."""
-    nist = folder / "nist"
-    return recorded_programs(
-        [
-            (
-                f"plate {name}",
-                (nist / "nc" / f"NIST_MTC_CRADA_PLATE-{int(name)}.NC").read_text(encoding="utf-8"),
-                (nist / "plate" / f"Plate-Hurco04-{name}of20.txt").read_text(encoding="utf-8"),
-            )
-            for name in names
-        ]
-    )
-
-
-def cover_ramp(folder: Path) -> SpindleRamp:
-    """The run-up of the same spindle, from the recordings of another part."""
-    recordings = sorted((folder / "nist" / "cover").glob("Cover-Hurco04-*.txt"))
-    runs = [run for path in recordings for run in program_runs(read_observations(path.read_text(encoding="utf-8"), path.name))]
-    return spindle_ramp([one for run in runs for one in run_ups(run)])
-
-
 def is_fitted(program: RecordedProgram) -> bool:
-    """Whether a run is one of those that the models are fitted to."""
+    """Return True for a run that the models are fitted to."""
     return program.name in {f"plate {name}" for name in FITTED}
 
 
@@ -151,8 +118,6 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true")
     arguments = parser.parse_args()
-    if not (data_folder() / "nist").exists():
-        sys.exit(f"no recordings in {data_folder()}/nist; CNCTWIN_DATA names the folder that holds nist/")
     every, ramp = plates(data_folder()), cover_ramp(data_folder())
     judged = [program for program in every if not program.refusal()]
     learned, held = [p for p in judged if is_fitted(p)], [p for p in judged if not is_fitted(p)]

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from benchmarks import proven_choices as choices
+from benchmarks.programs.plates import recorded_programs
+from benchmarks.programs.time_fit import ProgramTimes, identify_program_times
 from tests.recordings import recording
-from twin.identification.programs.recording import RecordedProgram, recorded_programs
-from twin.identification.programs.time import ProgramTimes, identify_program_times
 from twin.motion.limits import Limits
 from twin.motion.plan import plan
+from twin.recording.recorded_program import RecordedProgram
 
 NAMES = ("03", "04", "10", "13")
 

@@ -51,8 +51,8 @@ the feed are none. The end face of a ramp or plunge is sampled at 256 points (ab
 """
 
 from twin.engagement.engaged import Collision, Engagement
-from twin.engagement.removal import cut, engagement
+from twin.engagement.removal import cut
 from twin.engagement.workpiece import Workpiece
 from twin.errors import EngagementError
 
-__all__ = ["Collision", "Engagement", "EngagementError", "Workpiece", "cut", "engagement"]
+__all__ = ["Collision", "Engagement", "EngagementError", "Workpiece", "cut"]

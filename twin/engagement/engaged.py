@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from twin.engagement.sweep import Floats
 
@@ -64,11 +64,3 @@ class Engagement:
     def plunging(self) -> Flags:
         """The end face cuts."""
         return self.end_face_mm2 > 0.0
-
-    def row_at(self, segment: ArrayLike, fraction: ArrayLike) -> Ints:
-        """The rows at the given parts (0 … 1, of its length) of the given segments."""
-        index = np.asarray(segment)
-        count = self.first_row[index + 1] - self.first_row[index]
-        inside = np.clip((np.asarray(fraction) * count).astype(np.int64), 0, count - 1)
-        rows: Ints = self.first_row[index] + inside
-        return rows

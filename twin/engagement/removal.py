@@ -21,38 +21,10 @@ from twin.engagement.travel import (
     UNIFORM,
     travel,
 )
-from twin.engagement.workpiece import CELLS_MAX, Workpiece
+from twin.engagement.workpiece import Workpiece
 from twin.errors import EngagementError
-from twin.machine import Stock
 
 ROWS_MAX = 20_000_000
-CELLS_PER_DIAMETER = 16
-
-
-def engagement(
-    points_mm: ArrayLike,
-    tool_diameter_mm: float,
-    stock: Stock | None,
-    resolution_mm: float = 0.1,
-    cutting: ArrayLike | None = None,
-    cells_max: int = CELLS_MAX,
-) -> Engagement:
-    """The engagement of one tool along one path in a whole stock (None = nothing to cut: no engagement).
-
-    points_mm: (n, 3) polyline of the tool tip in machine coordinates; tool_diameter_mm: of a cylindrical flat end mill
-    resolution_mm: largest distance of the rows along the path
-    cutting: (n - 1,) True where a segment is a feed move; None = all are. What a rapid meets is a collision.
-
-    Raises EngagementError. A slot 2 mm deep with a 6 mm tool is 0 to π all along, 12 mm² of section:
-
-    >>> box = Stock(min_mm=(0, 0, -10), max_mm=(40, 30, 0))
-    >>> slot = engagement([(10, 15, -2), (30, 15, -2)], 6.0, box, resolution_mm=5.0)
-    >>> slot.axial_depth_mm.tolist(), slot.entry_angle_rad.tolist(), (slot.exit_angle_rad / np.pi).tolist()
-    ([2.0, 2.0, 2.0, 2.0], [0.0, 0.0, 0.0, 0.0], [1.0, 1.0, 1.0, 1.0])
-    """
-    _check_size("tool_diameter_mm", tool_diameter_mm)
-    workpiece = Workpiece.of(stock, tool_diameter_mm / CELLS_PER_DIAMETER, cells_max)
-    return cut(workpiece, points_mm, tool_diameter_mm, resolution_mm, cutting)[1]
 
 
 def cut(
@@ -64,7 +36,19 @@ def cut(
 ) -> tuple[Workpiece, Engagement]:
     """Return the workpiece after the cut, and the engagement along the path. The workpiece that was given stays as it was.
 
-    Parameters and errors as of `engagement`. Where the path begins, the tool is taken to have cut already.
+    points_mm: (n, 3) polyline of the tool tip in machine coordinates; tool_diameter_mm: of a cylindrical flat end mill
+    resolution_mm: largest distance of the rows along the path
+    cutting: (n - 1,) True where a segment is a feed move; None = all are. What a rapid meets is a collision.
+
+    Where the path begins, the tool is taken to have cut already. Raises EngagementError.
+
+    A slot 2 mm deep with a 6 mm tool is 0 to π all along:
+
+    >>> from twin.machine import Stock
+    >>> stock = Stock(min_mm=(0, 0, -10), max_mm=(40, 30, 0))
+    >>> _left, slot = cut(Workpiece.of(stock, cell_mm=0.4), [(10, 15, -2), (30, 15, -2)], 6.0, resolution_mm=5.0)
+    >>> slot.axial_depth_mm.tolist(), slot.entry_angle_rad.tolist(), (slot.exit_angle_rad / np.pi).tolist()
+    ([2.0, 2.0, 2.0, 2.0], [0.0, 0.0, 0.0, 0.0], [1.0, 1.0, 1.0, 1.0])
     """
     points, feed = _checked(points_mm, tool_diameter_mm, resolution_mm, cutting)
     lengths = np.sqrt(np.sum(np.diff(points, axis=0) ** 2, axis=1))

@@ -10,7 +10,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from twin.case import Run
 from twin.gap.floors import repeatability
@@ -18,8 +17,6 @@ from twin.gap.labels import measured_signals, regimes_of
 from twin.machine import MachineFile
 from twin.simulator.recorded import noise_of, told_of
 from twin.simulator.response import respond
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,14 +3,12 @@
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from twin.effects.catalogue import effect_named
 from twin.gap.diagnosis import Effected, Interval, closure_of
 from twin.gap.fitting import Fitted
 from twin.gap.score import Squares
 
-Floats = NDArray[np.float64]
 Z90 = 1.6448536269514722
 SEED = 4
 DRAWS = 400

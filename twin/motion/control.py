@@ -26,22 +26,6 @@ RAPID_MM_MIN = 30000.0
 """Rapid rate where nobody states one."""
 LENGTH_OVER_FEED = Limits(rapid_mm_min=RAPID_MM_MIN, acceleration_mm_s2=np.inf)
 """No limit but the rapid rate: the time of a block is its length over its feed."""
-QUANTITIES = (
-    "feed_acceleration_mm_s2",
-    "rapid_acceleration_mm_s2",
-    "across_acceleration_mm_s2",
-    "corner_speed_difference_mm_min",
-    "in_position_s",
-    "block_time_s",
-    "tool_change_s",
-    "spindle_acceleration_rpm_s",
-    "spindle_deceleration_rpm_s",
-    "spindle_base_rpm",
-    "axes_wait",
-    "feed_ratio",
-    "rapid_ratio",
-)
-"""What an effect at the site `program` can change."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,3 +144,7 @@ def _unless_same(
 ) -> PerAxis | None:
     """Return a quantity as an effect left it; untouched, it stays as the planner resolves it."""
     return otherwise if values[quantity] == stated[quantity] else values[quantity]
+
+
+QUANTITIES = tuple(_stated(LENGTH_OVER_FEED))
+"""The quantities that an effect at the site `program` can change."""

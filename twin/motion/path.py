@@ -4,8 +4,7 @@ A line of length L from p₀ to p₁ is p(s) = p₀ + (p₁ − p₀) s / L. An 
 second axis (u, v) is, with the fraction f = s / L, p_u = c_u + r(f) cos(φ₀ + θ f), p_v = c_v + r(f) sin(φ₀ + θ f); the axes
 outside the plane move with f (helix). r(f) goes linearly from the radius of the start to that of the end, which differ by the
 rounding of the program, so that the end is met exactly; L = √((r θ)² + h²) with the mean radius r and the helix height h.
-Planes: `twin.gcode.planes`. A sweep is positive counter-clockwise seen from the positive
-normal of its plane.
+The planes are those of `twin.gcode.planes`. A sweep is positive counter-clockwise seen from the positive normal of its plane.
 """
 
 from collections.abc import Sequence

@@ -116,7 +116,7 @@ def program_runs(recording: Observations, before: Mapping[str, str] | None = Non
 
 
 def _starts(rows: Sequence[Observation]) -> list[int]:
-    """Return the begin of each run: at ACTIVE after the end of another, or after a stop if the runtime counter starts again."""
+    """Return the start of each run: at ACTIVE after the end of another, or after a stop if the runtime counter starts again."""
     starts: list[int] = []
     status, runtime = None, 0.0
     for k, row in enumerate(rows):

@@ -73,7 +73,6 @@ class PatternMatch(NamedTuple):
     distance: float
     stretch: float
     begun_samples: int
-    stalled_samples: float
     feed_at_rest: float | None
     block_stands: float | None
     logit: float | None
@@ -257,8 +256,7 @@ class Detector:
         logit = None
         if self.weighing is not None and feed is not None and block is not None:
             logit = self.weighing.logit((rho, 1.0 - distance / 2.0, feed, block))
-        stalled = gap - len(template.between) * template.stretches[k]
-        return PatternMatch(rho, distance, template.stretches[k], d + gap + r, stalled, feed, block, logit)
+        return PatternMatch(rho, distance, template.stretches[k], d + gap + r, feed, block, logit)
 
 
 def restored(kept: Sequence[Sequence[float]], length: int, seen: int, gate: Sequence[Any]) -> State:

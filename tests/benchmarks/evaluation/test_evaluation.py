@@ -8,14 +8,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from benchmarks.evaluation import events, range_based, volume
+from benchmarks.evaluation import events, intervals, range_based, volume
 from benchmarks.evaluation.baselines import constant_score, one_feature_score, random_score
 from benchmarks.evaluation.events import Event, delays_s, detections, false_alerts_a_week, recall
+from benchmarks.evaluation.intervals import rate, share
 from benchmarks.evaluation.range_based import Bias, Range, ranges
 from benchmarks.evaluation.range_based import range_based as measured
 from benchmarks.evaluation.volume import area_pr, vus_pr
-from twin import intervals
-from twin.intervals import bootstrapped, rate, share
 
 EVENTS = [Event(100.0, 200.0), Event(1000.0, 1100.0)]
 
@@ -73,13 +72,6 @@ def test_the_interval_of_a_rate_has_at_least_its_coverage() -> None:
 def test_nothing_to_count_is_no_figure() -> None:
     assert math.isnan(share(0, 0).value)
     assert math.isnan(rate(0, 0.0).value)
-    assert math.isnan(bootstrapped([], lambda _: 1.0, np.random.default_rng(1)).value)
-
-
-def test_the_bootstrap_resamples_parts() -> None:
-    estimate = bootstrapped(list(range(100)), lambda parts: float(np.mean(parts)), np.random.default_rng(3))
-    assert estimate.value == 49.5
-    assert (estimate.low, estimate.high) == pytest.approx((44.7, 54.2), abs=1.0)
 
 
 # Worked by hand from the definitions of the paper.

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from twin.engagement import Engagement, Workpiece, cut, engagement
+from tests.twin.engagement.whole_stock import engagement
+from twin.engagement import Engagement, Workpiece, cut
 from twin.machine import Stock
 
 R = 3.0

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from tests.depth import examples
-from twin.engagement import Engagement, Workpiece, cut, engagement
+from tests.twin.engagement.whole_stock import engagement
+from twin.engagement import Engagement, Workpiece, cut
 from twin.machine import Stock
 
 R = 3.0

@@ -5,7 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from twin.engagement import Workpiece, cut, engagement
+from tests.twin.engagement.whole_stock import engagement
+from twin.engagement import Workpiece, cut
+from twin.engagement.along_path import PathRows
 from twin.machine import Stock
 
 R = 3.0
@@ -108,5 +110,8 @@ def test_a_move_of_no_length_has_a_row_of_nothing() -> None:
 def test_rows_are_found_by_segment_and_share_of_its_length() -> None:
     rows = engagement([(10, 30, -1), (20, 30, -1), (20, 31, -1)], 2 * R, PLATE, resolution_mm=1.0)
     assert len(rows) == 11
-    assert rows.row_at([0, 0, 0, 1, 1], [0.0, 0.55, 1.0, 0.0, 1.0]).tolist() == [0, 5, 9, 10, 10]
+    arc = rows.entry_angle_rad, rows.exit_angle_rad
+    of_path = PathRows(rows.first_row, rows.segment, rows.axial_depth_mm, *arc, rows.length_mm, rows.end_face_mm2, ())
+    there = of_path.row_at(np.array([0, 0, 0, 1, 1]), np.array([0.0, 0.55, 1.0, 0.0, 1.0]))
+    assert there.tolist() == [0, 5, 9, 10, 10]
     assert rows.start_mm.tolist() == [float(k) for k in range(11)]

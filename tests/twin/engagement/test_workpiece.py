@@ -1,12 +1,14 @@
 """What is left of the stock is a value that goes from tool to tool, of a size that follows the path."""
 
+import doctest
 import math
+from types import ModuleType
 
 import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
-from twin.engagement import EngagementError, Workpiece, cut, engagement, removal
+from twin.engagement import EngagementError, Workpiece, cut, removal, workpiece
 from twin.errors import TwinError
 from twin.machine import Stock
 
@@ -98,12 +100,12 @@ def test_what_is_wrong_is_named(
     points: ArrayLike, diameter: float, resolution: float, cutting: ArrayLike | None, words: str
 ) -> None:
     with pytest.raises(EngagementError, match=words):
-        engagement(points, diameter, PLATE, resolution, cutting)
+        cut(Workpiece.of(PLATE, 0.4), points, diameter, resolution, cutting)
 
 
 def test_too_many_cells_are_refused_with_a_size_that_will_do() -> None:
     with pytest.raises(TwinError, match=r"more than cells_max 1000; .*is coarse enough") as refused:
-        engagement(SLOT, 6.0, PLATE, cells_max=1000)
+        cut(Workpiece.of(PLATE, 6.0 / 16, cells_max=1000), SLOT, 6.0)
     size = float(str(refused.value).split("cell_mm=")[1].split(")")[0])
     left, rows = cut(Workpiece.of(PLATE, size, cells_max=1000), SLOT, 6.0)
     assert left.cells.floor.size <= 1000
@@ -113,10 +115,15 @@ def test_too_many_cells_are_refused_with_a_size_that_will_do() -> None:
 def test_walls_of_too_many_pieces_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(removal, "travel", lambda cells, *_: (cells, False))
     with pytest.raises(EngagementError, match="sample the arcs with longer chords"):
-        engagement(SLOT, 6.0, PLATE)
+        cut(Workpiece.of(PLATE, 0.4), SLOT, 6.0)
 
 
 @pytest.mark.parametrize("size", [0.0, -1.0, math.nan])
 def test_a_cell_has_a_size(size: float) -> None:
     with pytest.raises(EngagementError, match="cell_mm"):
         Workpiece.of(PLATE, size)
+
+
+@pytest.mark.parametrize("module", [removal, workpiece])
+def test_the_examples_are_true(module: ModuleType) -> None:
+    assert doctest.testmod(module).failed == 0

@@ -18,11 +18,11 @@ from twin.gap.diagnosis import Diagnosed, NotObservable
 from twin.gap.programs.answer import Answer, Trials
 from twin.gap.programs.search import search
 from twin.gap.programs.trial import Refused, Trial, trial_of
-from twin.identification.programs.recording import rapid_rate_mm_min
 from twin.machine import MachineFile, Program
 from twin.motion.control import RAPID_MM_MIN, program_effects
 from twin.motion.limits import Limits
 from twin.motion.path import EventKind, Kind
+from twin.recording.recorded_program import rapid_rate_mm_min
 from twin.sites import Site
 
 SHORTEST_BLOCK_S = 1.0

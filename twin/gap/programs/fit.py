@@ -23,17 +23,18 @@ from twin.effects.effect import Effect, Parameter
 from twin.gap.diagnosis import Interval
 from twin.gap.programs.trial import Trial
 from twin.identification.estimate import clustered_covariance
-from twin.identification.programs.recording import NOMINAL, line_starts
-from twin.identification.programs.time import HICCUP_S, windows
 from twin.motion.control import Control, changed
 from twin.motion.limits import Limits
 from twin.motion.plan import Plan
+from twin.recording.recorded_program import NOMINAL, kept_apart, line_starts, windows
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Values = Mapping[str, Mapping[str, float]]
 """Effect → parameter → value."""
 
+HICCUP_S = 0.3
+"""Residuals beyond this count linearly (soft L1)."""
 PRIOR_S = 0.1
 SPREAD = 1.5
 """One standard deviation of the logarithm of a parameter, a factor of 4.5; of those without a null value a third."""
@@ -91,11 +92,7 @@ class Watched:
     @cached_property
     def sparse(self) -> Ints:
         """Which of the lines are LONG_WINDOW_S or more apart."""
-        kept = [0]
-        for k in range(1, len(self.begin)):
-            if self.begin[k] - self.begin[kept[-1]] >= LONG_WINDOW_S:
-                kept.append(k)
-        return np.array(kept, dtype=np.int64)
+        return kept_apart(self.begin, LONG_WINDOW_S)
 
     def gaps_s(self, model: "Model") -> Floats:
         """Twin minus recording in each window, and then in each long one."""

@@ -27,7 +27,6 @@ from twin.gap.programs.trial import Trial
 from twin.motion.limits import Limits
 
 Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Names = frozenset[str]
 
 SHORT_WINDOW_S = 1.0

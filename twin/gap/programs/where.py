@@ -17,9 +17,9 @@ from twin.gap.programs.search import SHORT_WINDOW_S
 from twin.gap.programs.trial import Trial
 from twin.gap.significance import discoveries, means_of
 from twin.gap.wording import digits, percent
-from twin.identification.programs.recording import line_starts
 from twin.motion.path import EventKind, Kind, Path
 from twin.motion.plan import Plan
+from twin.recording.recorded_program import line_starts
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

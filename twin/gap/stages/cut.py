@@ -147,7 +147,7 @@ class CutStage:
             name: value * factors.get(f"tool.{name}", one) for name, value in tool_constants(self.machine.tool).items()
         }
         effects = acting(process_quantities())
-        constants |= self._effects(model, theta, effects)
+        constants |= model.effect_constants(theta, effects, self.standing)
         return milling_force(
             constants,
             self.machine.tool.teeth,
@@ -164,18 +164,8 @@ class CutStage:
             name: value * factors.get(f"spindle.{name}", one) for name, value in spindle_constants(self.machine.spindle).items()
         }
         effects = acting(spindle_quantities())
-        constants |= self._effects(model, theta, effects)
+        constants |= model.effect_constants(theta, effects, self.standing)
         return spindle_load_pct(constants, power_w, rpm, period_s=period_s, effects=tuple(e.name for e in effects))
-
-    def _effects(self, model: Model, theta: Floats, effects: tuple[Effect, ...]) -> dict[str, Floats]:
-        """Parameters of all these effects, null where the model has them not."""
-        given: dict[str, Floats] = {}
-        for effect in effects:
-            for key, value in effect.null_values().items():
-                given[f"{effect.name}__{key}"] = np.full(len(theta), self.standing.get(effect.name, {}).get(key, value))
-        for effected, values in model.values(theta).items():
-            given |= {f"{effected.effect}__{k}": v for k, v in values.items() if f"{effected.effect}__{k}" in given}
-        return given
 
 
 def cut_runs(machine: MachineFile, runs: tuple[Run, ...]) -> tuple[CutRun, ...]:

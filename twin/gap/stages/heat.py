@@ -107,12 +107,7 @@ class HeatStage:
         for name, value in thermal_constants(self.machine.thermal).items():
             key = "capacity_j_per_k" if name == "heat_capacity_j_per_k" else name
             constants[name] = value * factors.get(f"thermal.{key}", np.ones(len(theta)))
-        for effect in self.effects:
-            for key, null in effect.null_values().items():
-                given = self.standing.get(effect.name, {}).get(key, null)
-                constants[f"{effect.name}__{key}"] = np.full(len(theta), given)
-        for effected, found in values.items():
-            constants |= {f"{effected.effect}__{k}": v for k, v in found.items() if f"{effected.effect}__{k}" in constants}
+        constants |= model.effect_constants(theta, self.effects, self.standing)
         sensing = Sensing.of(values, SIGNAL)
         start = sensing.value(np.full(len(theta), start_temperature_c(data.log.t_s, data.log[SIGNAL])))
         shown = spindle_temperature_c(constants, data.warming, start, effects=tuple(e.name for e in self.effects))

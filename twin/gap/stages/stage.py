@@ -4,7 +4,7 @@ Stages are diagnosed in the order of the sites, each with everything before it e
 the spindle's load, each axis, the spindle's heat. What is wrong in one then isn't blamed on the next.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.effects.catalogue import effect_named
-from twin.effects.effect import Guesses
+from twin.effects.effect import Effect, Guesses
 from twin.gap.diagnosis import Effected
 from twin.gap.stages.free import Free, effect_parameters
 
@@ -111,6 +111,23 @@ class Model:
                 for name, i in zip(names, range(place.start, place.stop), strict=True)
             }
         return found
+
+    def effect_constants(
+        self, theta: Floats, effects: Iterable[Effect], standing: Mapping[str, Mapping[str, float]]
+    ) -> dict[str, Floats]:
+        """The constants that the effects of a stage bring at each row of θ, `effect__parameter` → (lanes,).
+
+        Null where neither the machine has the effect already (standing: effect → parameters) nor this model.
+        """
+        given = {
+            f"{effect.name}__{name}": np.full(len(theta), standing.get(effect.name, {}).get(name, null))
+            for effect in effects
+            for name, null in effect.null_values().items()
+        }
+        for effected, values in self.values(theta).items():
+            own = {f"{effected.effect}__{name}": value for name, value in values.items()}
+            given |= {name: value for name, value in own.items() if name in given}
+        return given
 
     def factors(self, theta: Floats) -> dict[str, Floats]:
         """The factor on each constant at each row of θ."""

@@ -88,7 +88,7 @@ def changes_in_material(program: Programmed, path: Path) -> tuple[int, ...]:
 
 
 def _clear(program: Programmed) -> Flags:
-    """Return True where the tool is clear of the material at the begin of a segment, (segments,)."""
+    """Return True where the tool is clear of the material where a segment begins, (segments,)."""
     path, stock = program.path, program.machine.stock
     if stock is None:
         clear = np.append(False, path.kind[:-1] == Kind.RAPID)[: len(path)]

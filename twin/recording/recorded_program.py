@@ -11,11 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.errors import RunLogError
-from twin.gcode import Settings, interpret
-from twin.motion.path import EventKind, Kind, Path, path_from_moves
+from twin.motion.path import EventKind, Kind, Path
 from twin.motion.plan import Plan
-from twin.recording.observations import last_values, read_observations
-from twin.recording.program_run import Ending, ProgramRun, program_runs
+from twin.recording.program_run import Ending, ProgramRun
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -40,7 +38,7 @@ NOMINAL = SetUp(300.125, -150.125, -250.125)
 
 @dataclass(frozen=True, slots=True)
 class RecordedProgram:
-    """`path` of a program, built with NOMINAL (`recorded_programs`), and one `run` of it."""
+    """`path` of a program, built with NOMINAL, and one `run` of it."""
 
     name: str
     path: Path
@@ -103,28 +101,24 @@ class RecordedProgram:
         return np.maximum(np.where(spans > 0.0, np.diff(total) / np.where(spans > 0.0, spans, 1.0), now), OVERRIDE_LEAST)
 
 
-def recorded_programs(texts: Sequence[tuple[str, str, str]]) -> list[RecordedProgram]:
-    """Every run in recordings of one machine, in order of time: (name, part program, recording) of each.
+def kept_apart(at_s: Floats, least_s: float) -> Ints:
+    """Return the indices of times that are `least_s` or more apart, from the first on.
 
-    A run is named after its recording, the second and third of one with `/2`, `/3`. What the knobs stood at is carried over. A
-    recording holds runs of other programs too: `refusal` tells which run is not one of the program beside it.
+    >>> kept_apart(np.array([0.0, 0.4, 1.2, 1.9, 2.3]), 1.0).tolist()
+    [0, 2, 4]
     """
-    settings = Settings(start_mm=_nominal_position(), references_mm=(_nominal_position(),), optional_stop=True)
-    before: dict[str, str] = {}
-    programs = []
-    for name, program, recording in texts:
-        observed = read_observations(recording, name)
-        path = path_from_moves(
-            interpret(program, settings), _nominal_position(), tool_change_mm=(NOMINAL.tool_change_x, NOMINAL.tool_change_y, None)
-        )
-        for n, run in enumerate(program_runs(observed, before)):
-            programs.append(RecordedProgram(f"{name}/{n + 1}" if n else name, path, run))
-        before |= last_values(observed.rows)
-    return programs
+    kept = [0]
+    for k in range(1, len(at_s)):
+        if at_s[k] - at_s[kept[-1]] >= least_s:
+            kept.append(k)
+    return np.array(kept, dtype=np.int64)
 
 
-def _nominal_position() -> tuple[float, float, float]:
-    return NOMINAL.tool_change_x, NOMINAL.tool_change_y, NOMINAL.reference_z
+def windows(program: RecordedProgram, shortest_s: float) -> tuple[Floats, Ints]:
+    """Active seconds (k,) and lines (k,) at which the comparison is made, at least `shortest_s` apart."""
+    begin, line = program.run.line_changes()
+    kept = kept_apart(begin, shortest_s)
+    return begin[kept], line[kept]
 
 
 def line_starts(plan: Plan, lines: Ints) -> Floats:

@@ -14,17 +14,15 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from twin.errors import RunLogError
+from twin.gap.programs.fit import HICCUP_S
 from twin.identification.estimate import Estimate
-from twin.identification.programs.recording import NOMINAL, RecordedProgram, SetUp, line_starts, rapid_rate_mm_min
 from twin.motion.limits import Limits
 from twin.motion.plan import Plan, plan
+from twin.recording.recorded_program import NOMINAL, RecordedProgram, SetUp, line_starts, rapid_rate_mm_min, windows
 
 Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 WINDOW_S = 1.0
 """Shortest time that is compared: several times what the recorder takes to ask."""
-HICCUP_S = 0.3
-"""Residuals beyond this count linearly (soft L1)."""
 DETERMINED = 0.5
 """A parameter is determined where one standard deviation of its logarithm is less than this (a factor of 1.65)."""
 
@@ -99,16 +97,6 @@ class Comparison:
         return self.predicted_s / self.recorded_s - 1.0
 
 
-def windows(program: RecordedProgram, shortest_s: float = WINDOW_S) -> tuple[Floats, Ints]:
-    """Active seconds (k,) and lines (k,) at which the comparison is made, at least `shortest_s` apart."""
-    begin, line = program.run.line_changes()
-    kept = [0]
-    for k in range(1, len(begin)):
-        if begin[k] - begin[kept[-1]] >= shortest_s:
-            kept.append(k)
-    return begin[kept], line[kept]
-
-
 def identify_program_times(
     programs: Sequence[RecordedProgram],
     parameters: Sequence[str] = PARAMETERS,
@@ -126,7 +114,7 @@ def identify_program_times(
         if why := program.refusal():
             raise RunLogError(f"{program.name}: {why}; leave it out")
     base = fixed or ideal_limits(programs).with_(rapid_waits_for_spindle=True, spindle_base_rpm=SPINDLE_BASE_RPM)
-    measured = [windows(program) for program in programs]
+    measured = [windows(program, WINDOW_S) for program in programs]
     driven = [program.overrides() if overrides else (1.0, 1.0) for program in programs]
 
     def residuals(free: Floats) -> Floats:

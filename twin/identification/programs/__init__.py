@@ -1,1 +1,0 @@
-"""Identification from recordings of part programs: where a machine spends its time."""
