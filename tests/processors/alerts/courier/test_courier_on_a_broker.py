@@ -222,7 +222,7 @@ def test_killed_at_any_moment_nothing_comes_twice_and_what_is_missing_is_said_to
     interrupted = [key for key in keys if outcomes[key] == {"failed"}]
     assert {office.deliveries[key][-1]["reason"] for key in interrupted} <= {"interrupted while sending; it may have arrived"}
     assert len(interrupted) <= kills
-    print(f"{kills} kills: {len(arrived)} of {len(keys)} arrived, {len(interrupted)} said to have failed")
+    print(f"{kills} kills: {len(arrived)} of {len(keys)} arrived, {len(interrupted)} reported as failed")
 
 
 # Emergencies at Pushover.
