@@ -1,6 +1,5 @@
 """Measures of detections, each on cases whose answer is known."""
 
-import doctest
 import math
 
 import numpy as np
@@ -8,13 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from benchmarks.evaluation import events, range_based, volume
 from benchmarks.evaluation.baselines import constant_score, one_feature_score, random_score
 from benchmarks.evaluation.events import Event, delays_s, detections, false_alerts_a_week, recall
 from benchmarks.evaluation.range_based import Bias, Range, ranges
 from benchmarks.evaluation.range_based import range_based as measured
 from benchmarks.evaluation.volume import area_pr, vus_pr
-from twin import intervals
 from twin.intervals import bootstrapped, rate, share
 
 EVENTS = [Event(100.0, 200.0), Event(1000.0, 1100.0)]
@@ -153,8 +150,3 @@ def test_random_scores_are_not_made_look_good() -> None:
 def test_one_feature_is_measured_in_its_own_scatter() -> None:
     training = np.random.default_rng(6).normal(10.0, 2.0, 10_000)
     assert one_feature_score(np.array([10.0, 16.0]), training) == pytest.approx((0.0, 3.0), abs=0.1)
-
-
-@pytest.mark.parametrize("module", [events, intervals, range_based, volume])
-def test_what_the_docstrings_show_holds(module: object) -> None:
-    assert doctest.testmod(module).failed == 0  # type: ignore[arg-type]
