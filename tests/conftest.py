@@ -52,6 +52,7 @@ LONG = (
     "cnctwin/commands/test_optimise.py",
     "cnctwin/validation/test_axes_and_programs.py",
     "processors/alerts/courier/test_processor_and_courier_killed.py",
+    "test_docstrings.py",
     "twin/process/test_peak.py",
     "cnctwin/memory/replay/test_replay_of_a_live_plant.py",
     "cnctwin/standins/simulated_machine/test_machining.py",

@@ -1,4 +1,4 @@
-"""A slice of the grid of `benchmarks/tool_change_detector.py`: two hours in place of days."""
+"""A slice of the grid of `benchmarks/tool_change_detector.py`: four hours in place of days."""
 
 from benchmarks import tool_change_detector
 

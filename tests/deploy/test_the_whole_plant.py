@@ -1,7 +1,6 @@
 """The real programs under the rules of deploy/: an edge, processors with the courier, a reader and an operator."""
 
 import json
-import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -20,6 +19,7 @@ from sparkplug.metric import Change, MetricSpec, NodeId
 from tests.deploy.plant import Plant, need_programs
 from tests.deploy.wire_client import WireClient
 from tests.processors.alerts.courier.receiving_server import ReceivingServer
+from tests.until_stopped import until_stopped
 
 pytestmark = pytest.mark.broker
 NODE = NodeId("cnc", "edge-okuma")
@@ -50,16 +50,9 @@ def at_work(plant: Plant, folder: Path, url: str) -> Iterator[None]:
     """The processors mirror, thermal and alerts, and the courier, as `cnctwin process` runs them."""
     config = folder / "processors.toml"
     config.write_text(TABLES.format(url=url))
-    stop = threading.Event()
-    pairs, where = configured(["mirror", "thermal", "alerts"], config), plant.of("processors")
-    thread = threading.Thread(target=process, args=(pairs, where, stop), kwargs={"group": "cnc", "state_dir": folder})
-    thread.start()
-    try:
+    pairs = configured(["mirror", "thermal", "alerts"], config)
+    with until_stopped(process, pairs, plant.of("processors"), group="cnc", state_dir=folder):
         yield
-    finally:
-        stop.set()
-        thread.join(20.0)
-        assert not thread.is_alive()
 
 
 def says(edge: EdgeNode, spindle_rpm: float) -> bool:

@@ -83,7 +83,9 @@ def test_its_sample_and_the_shared_one_name_every_key_once(adapter: Adapter) -> 
     assert tomllib.loads(own).keys() == keys.keys(), "what all edges share is in edge/edge.toml"
     shared = {one.name: getattr(config, one.name) for one in fields(config) if isinstance(getattr(config, one.name), Section)}
     shared = {name: section for name, section in shared.items() if name not in {"machine", "source"}}
-    tables = tomllib.loads(own) | tomllib.loads(SHARED.read_text(encoding="utf-8"))
+    of_all = tomllib.loads(SHARED.read_text(encoding="utf-8"))
+    assert of_all.keys() == shared.keys(), "what one control has is in its own sample"
+    tables = tomllib.loads(own) | of_all
     for name, section in (keys | shared).items():
         assert tables[name].keys() == type(section).model_fields.keys()
 

@@ -1,13 +1,10 @@
 """The genetic algorithm: what holds of any search with it."""
 
-import doctest
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from twin import genetic
 from twin.errors import TwinError
 from twin.genetic import Evolved, GeneticSettings, evolve
 
@@ -93,7 +90,3 @@ def test_settings_that_mean_nothing_are_refused(wrong: dict[str, float]) -> None
 def test_bounds_with_nothing_between_them_are_refused() -> None:
     with pytest.raises(TwinError, match=r"gene 1 .* 2 and 2"):
         evolve(distance, np.array([0.0, 2.0]), np.array([1.0, 2.0]), GeneticSettings(1, 0.0), 1)
-
-
-def test_docstrings() -> None:
-    assert doctest.testmod(genetic).failed == 0

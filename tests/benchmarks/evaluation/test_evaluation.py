@@ -1,6 +1,5 @@
 """Measures of detections, each on cases whose answer is known."""
 
-import doctest
 import math
 
 import numpy as np
@@ -8,7 +7,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from benchmarks.evaluation import events, intervals, range_based, volume
 from benchmarks.evaluation.baselines import constant_score, one_feature_score, random_score
 from benchmarks.evaluation.events import Event, delays_s, detections, false_alerts_a_week, recall
 from benchmarks.evaluation.intervals import rate, share
@@ -145,8 +143,3 @@ def test_random_scores_are_not_made_look_good() -> None:
 def test_one_feature_is_measured_in_its_own_scatter() -> None:
     training = np.random.default_rng(6).normal(10.0, 2.0, 10_000)
     assert one_feature_score(np.array([10.0, 16.0]), training) == pytest.approx((0.0, 3.0), abs=0.1)
-
-
-@pytest.mark.parametrize("module", [events, intervals, range_based, volume])
-def test_what_the_docstrings_show_holds(module: object) -> None:
-    assert doctest.testmod(module).failed == 0  # type: ignore[arg-type]

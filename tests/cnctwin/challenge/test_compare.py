@@ -1,6 +1,5 @@
 """What a challenger has to show, and what becomes of it."""
 
-import doctest
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +9,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from cnctwin.challenge import contest, losses
+from cnctwin.challenge import losses
 from cnctwin.challenge.contest import Losses, outcome
 from cnctwin.challenge.stretch import read_stretch, stretch_of_store
 from cnctwin.commands.model import model_app
@@ -37,10 +36,6 @@ def correlated(seed: int, rows: int = DAY_ROWS, memory: float = 0.98) -> np.ndar
     from scipy.signal import lfilter
 
     return np.asarray(lfilter([1.0], [1.0, -memory], np.random.default_rng(seed).standard_normal(rows))) * np.sqrt(1 - memory**2)
-
-
-def test_the_example() -> None:
-    assert doctest.testmod(contest).failed == 0
 
 
 def test_a_challenger_that_is_as_good_seldom_wins() -> None:

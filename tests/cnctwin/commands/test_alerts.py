@@ -2,7 +2,6 @@
 
 import json
 import sys
-import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -21,6 +20,7 @@ from sparkplug.edge_node import EdgeNode
 from sparkplug.metric import Change, MetricSpec, NodeId
 from tests.processors.alerts.courier.alert_shop import VIBRATION
 from tests.processors.alerts.courier.receiving_server import Answer, ReceivingServer
+from tests.until_stopped import until_stopped
 from tests.wire.mosquitto import Mosquitto
 
 pytestmark = pytest.mark.broker
@@ -69,14 +69,10 @@ def edge(broker: BrokerAddress, server: ReceivingServer, tmp_path: Path) -> Iter
     edge = EdgeNode(broker, NodeId("cnc", "edge-okuma"), [MetricSpec("health/beat", DataType.INT64)])
     edge.declare_device("okuma", [MetricSpec(VIBRATION, DataType.BOOLEAN, value=False)])
     edge.start()
-    stop = threading.Event()
-    processor = threading.Thread(target=run, args=(configured(["alerts"], file), broker, stop))
-    processor.start()
     courier = Courier(broker, AlertsConfig.model_validate(read_tables(file)["alerts"]))
-    courier.start()
-    yield edge
-    stop.set()
-    processor.join(20)
+    with until_stopped(run, configured(["alerts"], file), broker):
+        courier.start()
+        yield edge
     courier.stop()
     edge.stop()
 

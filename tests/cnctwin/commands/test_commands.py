@@ -1,12 +1,9 @@
 """The commands that run one part: the replay agent, an edge, and the check of its configuration."""
 
 import json
-import threading
 import urllib.request
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from threading import Event
 from typing import Any
 
 import pytest
@@ -20,31 +17,10 @@ from cnctwin.standins.simulated_machine.description import SPARE_PART as RECORDI
 from sparkplug.broker import BrokerAddress
 from sparkplug.host import HostApplication
 from tests.cnctwin.program import until
+from tests.until_stopped import until_stopped
 from tests.wire.mosquitto import Mosquitto, free_port
 
 LINES = len(RECORDING.read_text(encoding="utf-8").splitlines())
-
-
-@contextmanager
-def until_stopped(work: Any, *arguments: Any, **named: Any) -> Iterator[Event]:
-    """Run a command that ends when it is asked to; what it raised is raised here."""
-    stop, raised = Event(), []
-
-    def body() -> None:
-        try:
-            work(*arguments, stop, **named)
-        except BaseException as error:
-            raised.append(error)
-
-    thread = threading.Thread(target=body)
-    thread.start()
-    try:
-        yield stop
-    finally:
-        stop.set()
-        thread.join(15)
-    assert not thread.is_alive()
-    assert raised == []
 
 
 @pytest.fixture

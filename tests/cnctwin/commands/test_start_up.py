@@ -1,5 +1,6 @@
 """The command line before a command is chosen: quick, and with nothing of what the extras bring."""
 
+import importlib.util
 import subprocess
 import sys
 from pathlib import Path
@@ -33,6 +34,7 @@ def test_the_entry_point_loads_no_library_that_only_some_command_needs() -> None
         "cnctwin.running.edges",
         "twin.gap.diagnose",
     }
+    assert [name for name in services if importlib.util.find_spec(name) is None] == []
     assert loaded & services == set()
 
 

@@ -1,6 +1,5 @@
 """Pieces of a job give one answer, in this process, in others, and on a Dask cluster; also where workers are killed."""
 
-import doctest
 import json
 import os
 import signal
@@ -12,7 +11,6 @@ from pathlib import Path
 import pytest
 
 from cnctwin.errors import SpreadError, UsageError
-from cnctwin.jobs import dask_cluster, piece
 from cnctwin.jobs import spread as spreading
 from cnctwin.jobs.piece import name_of, opened, run_piece
 from cnctwin.jobs.spread import spread_over
@@ -120,10 +118,6 @@ def test_an_answer_of_another_version_is_none() -> None:
         SpreadError, match=r"piece 4 was computed by cnctwin 0\.0\.9, and this is .*; install the same everywhere"
     ):
         opened(json.dumps(envelope), 4)
-
-
-def test_the_examples_are_true() -> None:
-    assert [doctest.testmod(module).failed for module in (piece, dask_cluster)] == [0, 0]
 
 
 def test_no_workers_are_refused() -> None:

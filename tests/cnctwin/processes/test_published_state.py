@@ -1,14 +1,8 @@
 """States that processes publish, as they come over the wire."""
 
-import doctest
-
 import pytest
 
 from cnctwin.processes import published_state
-
-
-def test_the_docstrings_hold() -> None:
-    assert doctest.testmod(published_state) == (0, 2)
 
 
 @pytest.mark.parametrize("payload", [b"", b"null", b"[]", b"\xff", b"{" * 10, b"[" * 100_000])

@@ -1,11 +1,8 @@
 """Where a truth file lies on the machine's clock."""
 
-import doctest
-
 import numpy as np
 import pytest
 
-from cnctwin.validation import clock
 from cnctwin.validation.clock import Clock, Pair, placed
 from cnctwin.validation.track import Track
 
@@ -20,10 +17,6 @@ def part_of(track: Track, start: int, end: int, begins_s: float, noise: float = 
     """As another clock tells it, which reads `begins_s` at the first sample."""
     t_s, value = track.t_s[start:end], track.value[start:end]
     return Track(t_s - t_s[0] + begins_s, value + noise * np.random.default_rng(5).standard_normal(end - start))
-
-
-def test_the_examples() -> None:
-    assert doctest.testmod(clock).failed == 0
 
 
 @pytest.mark.parametrize("begins_s", [0.0, -500.0, 12_345.5])

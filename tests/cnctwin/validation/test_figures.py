@@ -1,13 +1,11 @@
 """Each figure against a truth that is known."""
 
-import doctest
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from cnctwin.validation import block_bootstrap, figure, track
 from cnctwin.validation.block_bootstrap import block_samples, block_sums, bootstrapped
 from cnctwin.validation.budgets import Budgets
 from cnctwin.validation.evidence import Evidence, of_run, with_truth
@@ -28,11 +26,6 @@ BUDGETS = Budgets()
 @pytest.fixture(scope="module")
 def night() -> RunLog:
     return warm_night(4.0)
-
-
-@pytest.mark.parametrize("module", [block_bootstrap, figure, track])
-def test_the_examples(module: object) -> None:
-    assert doctest.testmod(module).failed == 0  # type: ignore[arg-type]
 
 
 def test_the_interval_of_a_mean_covers_it_in_correlated_noise_as_often_as_it_says() -> None:

@@ -1,6 +1,5 @@
 """The nights that are kept, and when they call for retraining."""
 
-import doctest
 import json
 from pathlib import Path
 from typing import Any
@@ -8,7 +7,6 @@ from typing import Any
 import pytest
 
 from cnctwin.errors import UsageError
-from cnctwin.validation import history
 from cnctwin.validation.history import NIGHTS_MAX, file_of, kept, nights_of, retraining, validation_of
 
 OVER, WITHIN, LITTLE, UNSEEN = "over", "within", "not enough data", "not observable"
@@ -21,10 +19,6 @@ def night(day: int, *, twin: str = "a", t: int = 0, **verdicts: str) -> dict[str
         quantity, _, measure = name.rpartition("_")
         figures.append({"quantity": quantity, "measure": measure, "on": "", "verdict": verdict, "value": 1.0})
     return {"night": f"2026-11-{day:02d}", "t": t, "verdict": "", "twin": twin, "figures": figures}
-
-
-def test_the_examples() -> None:
-    assert doctest.testmod(history).failed == 0
 
 
 @pytest.mark.parametrize(

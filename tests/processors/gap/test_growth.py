@@ -1,12 +1,10 @@
 """The chart of a growing gap: it keeps its promise of false alarms, and what it learns is what there is."""
 
-import doctest
 import math
 from random import Random
 
 import pytest
 
-from processors.gap import growth as gap_growth
 from processors.gap.growth import BLOCKS_MIN, Baseline, Chart, Rule, charted, correlation, learned, rule_of, threshold
 
 
@@ -73,8 +71,3 @@ def test_one_stray_block_is_no_alarm() -> None:
     rule = rule_of(baseline, 0.5, 1000.0)
     assert rule is not None
     assert charted(Chart(), rule, baseline, 1e9, 0.0).grows == 0
-
-
-def test_the_examples_in_the_docstrings_are_right() -> None:
-    found = doctest.testmod(gap_growth)
-    assert (found.failed, found.attempted > 0) == (0, True)

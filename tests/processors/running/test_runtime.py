@@ -27,6 +27,7 @@ from tests.processors.alerts.courier.office import until
 from tests.processors.streams import T0_MS, UNITS, engine_of, fed
 from tests.processors.streams import birth as birth_event
 from tests.processors.streams import data as data_event
+from tests.until_stopped import until_stopped
 from tests.wire.mosquitto import Mosquitto
 from twin.thermal import rise_after
 
@@ -205,10 +206,7 @@ def test_three_processors_in_one_process_and_a_clean_stop(
 def test_what_an_edge_sends_late_comes_out_as_history_and_leaves_the_present_alone(
     broker: BrokerAddress, reader: Reader, edge: EdgeNode
 ) -> None:
-    stop = threading.Event()
-    thread = threading.Thread(target=run, args=(configured(["cutting_force", "mirror"]), broker, stop))
-    thread.start()
-    try:
+    with until_stopped(run, configured(["cutting_force", "mirror"]), broker):
         say(edge, 500.0, spindle_rpm=3000.0, spindle_load_pct=50.0)
 
         def force() -> Reading | None:
@@ -233,19 +231,13 @@ def test_what_an_edge_sends_late_comes_out_as_history_and_leaves_the_present_alo
 
         assert until(lambda: shown("twin/cutting_force_n"), "the mirror") == present.value
         assert until(lambda: shown("spindle_rpm"), "the mirror") == 3000.0
-    finally:
-        stop.set()
-        thread.join(60)
 
 
 @pytest.mark.broker
 def test_when_the_edge_dies_twin_and_mirror_are_stale_and_come_back(
     broker: BrokerAddress, reader: Reader, edge: EdgeNode
 ) -> None:
-    stop = threading.Event()
-    thread = threading.Thread(target=run, args=(configured(["thermal", "mirror"]), broker, stop))
-    thread.start()
-    try:
+    with until_stopped(run, configured(["thermal", "mirror"]), broker):
         say(edge, 0.0, spindle_rpm=3000.0, spindle_load_pct=50.0)
         say(edge, 2.0, spindle_rpm=3000.0)
         until(lambda: (r := reader.twin("twin/spindle_temp_rise_k")) and r.quality is Quality.GOOD, "the rise")
@@ -256,20 +248,13 @@ def test_when_the_edge_dies_twin_and_mirror_are_stale_and_come_back(
         say(edge, 4.0, spindle_rpm=3000.0, spindle_load_pct=50.0)
         until(lambda: reader.twin("twin/spindle_temp_rise_k").quality is Quality.GOOD, "the twin's rebirth")  # type: ignore[union-attr]
         until(lambda: json.loads(reader.plain["cnc/okuma/spindle_rpm"])["quality"] == "good", "a good mirror")
-    finally:
-        stop.set()
-        thread.join(60)
-    assert not thread.is_alive()
 
 
 @pytest.mark.broker
 def test_a_broker_that_is_killed_and_comes_back_empty_is_given_everything_again(
     mosquitto: Mosquitto, broker: BrokerAddress, reader: Reader, edge: EdgeNode
 ) -> None:
-    stop = threading.Event()
-    thread = threading.Thread(target=run, args=(configured(["thermal", "mirror"]), broker, stop))
-    thread.start()
-    try:
+    with until_stopped(run, configured(["thermal", "mirror"]), broker):
         say(edge, 0.0, spindle_rpm=3000.0, spindle_load_pct=50.0)
         until(lambda: reader.state() and "cnc/okuma/spindle_rpm" in reader.plain, "the start")
         mosquitto.kill()
@@ -282,10 +267,6 @@ def test_a_broker_that_is_killed_and_comes_back_empty_is_given_everything_again(
             ledger = until(lambda name=name: reader.ledger(name), "the ledger")
             dropped = ledger["ledger/dropped"] + ledger["ledger/buffered"]
             assert ledger["ledger/received"] == ledger["ledger/emitted"] + dropped
-    finally:
-        stop.set()
-        thread.join(60)
-    assert not thread.is_alive()
 
 
 def test_everything_is_checked_before_anything_connects(tmp_path: Path) -> None:

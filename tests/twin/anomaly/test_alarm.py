@@ -1,13 +1,10 @@
 """The alarm: dwell, hysteresis, what a gate does to both, and that the stream and arrays agree."""
 
-import doctest
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from twin.anomaly import alarm
 from twin.anomaly.alarm import AlarmRule, AlarmState, after_tick, dwell_score, is_alarm, onsets
 
 RULE = AlarmRule(threshold=10.0, dwell_ticks=2, clear_fraction=0.8)
@@ -67,7 +64,3 @@ def test_a_dwell_longer_than_the_recording_alarms_never() -> None:
 def test_rules_that_mean_nothing_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ValueError, match=next(iter(wrong))):
         AlarmRule(**({"threshold": 1.0} | wrong))  # type: ignore[arg-type]
-
-
-def test_what_the_docstrings_show_holds() -> None:
-    assert doctest.testmod(alarm).failed == 0

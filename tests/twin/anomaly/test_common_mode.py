@@ -1,6 +1,5 @@
 """Common mode: the published rule to the letter, the residual, and that the stream and arrays agree to the bit."""
 
-import doctest
 import subprocess
 import sys
 
@@ -9,7 +8,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from twin.anomaly import common_mode
 from twin.anomaly.common_mode import Adjusted, CommonModeRule, Method, adjust_frame, adjust_frames
 
 PUBLISHED = {
@@ -116,7 +114,3 @@ def test_a_factor_that_makes_everything_common_is_refused() -> None:
 def test_the_stream_needs_no_numpy() -> None:
     asked = "import sys, twin.anomaly.common_mode, twin.anomaly.alarm; sys.exit('numpy' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", asked], check=False).returncode == 0
-
-
-def test_what_the_docstrings_show_holds() -> None:
-    assert doctest.testmod(common_mode).failed == 0

@@ -1,13 +1,10 @@
 """The gate: tail from the falling edge, look-back, what is not known."""
 
-import doctest
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from twin.anomaly import gate as gates
 from twin.anomaly.gate import gate, held
 
 CASES = {
@@ -59,7 +56,3 @@ def test_the_gate_is_what_its_sentence_says(active: list[bool], tail: int, back:
 def test_durations_that_mean_nothing_are_refused(given_s: tuple[float, float, float]) -> None:
     with pytest.raises(ValueError, match="has to be above 0"):
         gate(np.zeros(3, dtype=bool), *given_s)
-
-
-def test_what_the_docstrings_show_holds() -> None:
-    assert doctest.testmod(gates).failed == 0

@@ -1,13 +1,10 @@
 """Features beside what is usual, smoothed, and beside those of the peers: the stream and arrays agree."""
 
-import doctest
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from twin.anomaly import common_features, preparation
 from twin.anomaly.common_features import left_over, left_over_rows, length, with_tails
 from twin.anomaly.preparation import (
     STANDING,
@@ -162,8 +159,3 @@ def test_the_length_is_in_tails_of_either_side(fitted: Preparation) -> None:
 def test_a_spindle_that_never_turns_teaches_nothing() -> None:
     with pytest.raises(ValueError, match="turns in none of 500 rows"):
         fit_preparation(np.zeros((500, 3)), np.zeros(500, dtype=int), NAMES, SIGNALS, 1.0)
-
-
-@pytest.mark.parametrize("module", [preparation, common_features])
-def test_what_the_docstrings_show_holds(module: object) -> None:
-    assert doctest.testmod(module).failed == 0  # type: ignore[arg-type]

@@ -1,7 +1,5 @@
 """Macro B and the order of blocks: arithmetic, null, jumps, loops, calls, system variables."""
 
-import doctest
-import importlib
 import math
 
 import pytest
@@ -246,11 +244,3 @@ def test_a_wrong_macro_is_named(text: str, line: int, word: str, reason: str) ->
 
 def test_a_thousand_terms_in_a_row_are_no_depth() -> None:
     assert value("+".join(["1"] * 3000)) == 3000.0
-
-
-MODULES = ("arcs", "codes", "corners", "cycles", "expressions", "interpreter", "planar", "tokens")
-
-
-@pytest.mark.parametrize("name", MODULES)
-def test_the_figures_in_the_docstrings_hold(name: str) -> None:
-    assert doctest.testmod(importlib.import_module(f"twin.gcode.{name}")).failed == 0

@@ -1,13 +1,10 @@
 """Points of the friction curve, and the curve through them."""
 
-import doctest
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from twin.identification import friction_points as module
 from twin.identification.axis_fit import AxisRecording
 from twin.identification.friction_points import FrictionPoint, fit_friction_curve, friction_points
 from twin.machine import Axis, Friction
@@ -109,7 +106,3 @@ def test_static_friction_below_the_slowest_speed_is_not_made_up() -> None:
     noise = np.array([3.0, -1.0, 0.5, -0.5, 0.2])
     curve, _ = fit_friction_curve(speed, 400.0 + 2.0 * speed + noise)
     assert curve.static_n < 450.0
-
-
-def test_docstrings() -> None:
-    assert doctest.testmod(module).failed == 0

@@ -1,20 +1,14 @@
 """current.json: which version counts, and which is kept warm."""
 
-import doctest
 from pathlib import Path
 
 import pytest
 
-from twin.models import pointer
 from twin.models.errors import PointerError
 from twin.models.pointer import Pointer, pointer_of, resolve, seconds, warm
 
 FOLDER = Path("models/residual/vmc")
 TEXT = Pointer("new", "old", "2026-11-22T00:10:00Z", "2026-11-24T00:10:00Z", "it won").text
-
-
-def test_the_examples() -> None:
-    assert doctest.testmod(pointer).failed == 0
 
 
 def test_what_was_written_is_read_back() -> None:

@@ -1,6 +1,5 @@
 """Look-ahead, events and sampling: hand-made figures, and the laws of every plan."""
 
-import doctest
 import math
 
 import numpy as np
@@ -8,8 +7,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import twin.motion.path
-import twin.motion.plan
 from benchmarks.programs.columns import program_columns
 from twin.errors import MachineError, PartProgramError
 from twin.gcode import canonical
@@ -27,11 +24,6 @@ TRAPEZOID = LIMITS.with_(jerk_mm_s3=math.inf)
 
 def line(*ends: tuple[float, float, float], feed: float = 3000.0) -> Path:
     return path_from_moves([canonical.Linear(k, end, feed) for k, end in enumerate(ends)])
-
-
-def test_the_examples_in_the_text_hold() -> None:
-    for module in (twin.motion.path, twin.motion.plan):
-        assert doctest.testmod(module).failed == 0
 
 
 def test_length_over_feed_and_a_ramp_at_each_end() -> None:

@@ -1,19 +1,12 @@
 """Lines of the recordings, whole and broken."""
 
-import doctest
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import twin.recording.observations
 from tests.recordings import recording
 from twin.errors import RunLogError
 from twin.recording.observations import last_values, read_observations
-
-
-def test_the_example_in_the_text_holds() -> None:
-    assert doctest.testmod(twin.recording.observations).failed == 0
 
 
 @pytest.mark.parametrize(

@@ -1,22 +1,15 @@
 """Features: the same numbers in training and at the machine, and none that follows the sensor."""
 
-import doctest
-
 import numpy as np
 import pytest
 
 from tests.twin.residual.days import recorded
-from twin.residual import features, judging, table
+from twin.residual import features
 from twin.residual.errors import ResidualError
 from twin.residual.features import MEASURED, SETS, Memory, feature, row_after, signals_of
 from twin.residual.table import Recorded, table_of
 
 EVERY = tuple(dict.fromkeys(one for own in SETS.values() for one in own))
-
-
-@pytest.mark.parametrize("module", [features, table, judging], ids=lambda module: module.__name__)
-def test_the_examples_in_the_docstrings_are_right(module: object) -> None:
-    assert doctest.testmod(module).failed == 0  # type: ignore[arg-type]
 
 
 def test_training_has_the_very_rows_that_the_processor_has() -> None:

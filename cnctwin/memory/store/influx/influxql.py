@@ -16,7 +16,7 @@ def literal(text: str) -> str:
     """A text in single quotes.
 
     >>> print(literal("Mill's"))
-    'Mill\\\\'s'
+    'Mill\\'s'
     """
     return "'" + text.replace("\\", "\\\\").replace("'", "\\'").replace("\n", "\\n") + "'"
 

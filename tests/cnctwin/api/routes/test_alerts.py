@@ -19,6 +19,7 @@ from tests.cnctwin.api.served_plant import PATIENCE_S, Stream, get, post, served
 from tests.cnctwin.api.small_plant import client_of, small_plant
 from tests.edge.host_watch import wait
 from tests.processors.alerts.courier.alert_shop import VIBRATION
+from tests.until_stopped import until_stopped
 from tests.wire.mosquitto import Mosquitto
 
 PROXIED = Access(proxy_header="X-Remote-User", proxy="127.0.0.1")
@@ -30,20 +31,15 @@ NAMED = {"X-Remote-User": "grace"}
 def firing(mosquitto: Mosquitto, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Mosquitto]:
     """A machine whose alarm fires, and the processor that says so."""
     monkeypatch.setattr(alert_routes, "ANSWER_S_MAX", PATIENCE_S)
-    file, stop = tmp_path / "alerts.toml", threading.Event()
+    file = tmp_path / "alerts.toml"
     file.write_text("[alerts]\ngroup_wait_s = 0.0\n")
     broker = BrokerAddress(*mosquitto.address)
-    processor = threading.Thread(target=run, args=(configured(["alerts"], file), broker, stop))
-    processor.start()
     edge = EdgeNode(broker, NodeId("cnc", "edge-vmc"), [MetricSpec(BEAT, DataType.INT64)])
     edge.declare_device("vmc", [MetricSpec(VIBRATION, DataType.BOOLEAN, value=True)])
-    edge.start()
-    beats = threading.Thread(target=beat, args=(edge, stop))
-    beats.start()
-    yield mosquitto
-    stop.set()
-    beats.join()
-    processor.join(20)
+    with until_stopped(run, configured(["alerts"], file), broker):
+        edge.start()
+        with until_stopped(beat, edge):
+            yield mosquitto
     edge.stop()
 
 

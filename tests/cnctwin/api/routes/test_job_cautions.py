@@ -1,13 +1,11 @@
 """What a job that is done leaves above a limit, as the interface tells it beside the job: in short and in full."""
 
-import doctest
 import json
 
 import pytest
 
 from cnctwin.api.live.plant import LivePlant
 from cnctwin.api.live.viewer import Viewer
-from cnctwin.api.routes import jobs as job_routes
 from sparkplug.broker import BrokerAddress
 from tests.cnctwin.api.small_plant import client_of
 from twin.vocabulary.topics import JOBS_STATE, state_of_job
@@ -31,7 +29,3 @@ def test_a_job_is_told_with_what_its_result_exceeds(result: dict[str, object], c
     with client_of(viewer=viewer) as client:
         (short,) = client.get("/jobs").json()["jobs"]
         assert (short["caution"], client.get("/jobs/night-7").json()["caution"]) == (caution, caution)
-
-
-def test_the_examples_are_true() -> None:
-    assert doctest.testmod(job_routes).failed == 0

@@ -1,6 +1,5 @@
 """Jobs over a real broker and the real consumer: asked for, shown, cancelled, their files; and where there is no consumer."""
 
-import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -18,6 +17,7 @@ from tests.cnctwin.jobs.consumer_on_trial import setting
 from tests.cnctwin.jobs.counting import chain_to
 from tests.edge.host_watch import wait
 from tests.recordings import PROJECT
+from tests.until_stopped import until_stopped
 from tests.wire.mosquitto import Mosquitto
 from twin.vocabulary.topics import JOBS_STATE
 
@@ -29,12 +29,9 @@ def folder(mosquitto: Mosquitto, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     """Of a consumer that runs, and whose jobs count."""
     monkeypatch.setenv("PYTHONPATH", str(PROJECT))
     monkeypatch.setattr(job_routes, "ANSWER_S_MAX", PATIENCE_S)
-    consumer, stop = Consumer(tmp_path / "jobs", BrokerAddress(*mosquitto.address), setting()), threading.Event()
-    thread = threading.Thread(target=consumer.run, args=(stop,))
-    thread.start()
-    yield tmp_path / "jobs"
-    stop.set()
-    thread.join(20)
+    consumer = Consumer(tmp_path / "jobs", BrokerAddress(*mosquitto.address), setting())
+    with until_stopped(consumer.run):
+        yield tmp_path / "jobs"
 
 
 def jobs(server: Server) -> dict[str, Any]:

@@ -13,54 +13,35 @@ from tests.cnctwin.memory.replay.simulated_day import EDGE, T0_MS, Day
 
 SECONDS = 130.0
 NAMES = ("thermal", "cutting_force", "gap", "rules")
+BORN: dict[str, object] = {
+    "spindle_rpm": 0.0,
+    "spindle_load_pct": 0.0,
+    "spindle_temp_c": 21.0,
+    "feed_mm_min": 0.0,
+    "exec_state": "READY",
+    "tool_number": 1,
+    "program": "O1",
+}
+BORN_AGAIN = BORN | {
+    "spindle_rpm": 100.0,
+    "spindle_load_pct": 3.0,
+    "spindle_temp_c": 22.0,
+    "exec_state": "ACTIVE",
+    "tool_number": 2,
+}
 
 
 def machine_events(seed: int, *, machine: str = "vmc", node=EDGE, silences: bool = True) -> list[tuple[float, HostEvent]]:
     """Three minutes of a machine: it cuts, stands silent, its edge dies and comes again."""
     chance, at_s = Random(seed), 0.2
-    events = [
-        (
-            at_s,
-            _event(
-                EventKind.BIRTH,
-                at_s,
-                machine,
-                node,
-                spindle_rpm=0.0,
-                spindle_load_pct=0.0,
-                spindle_temp_c=21.0,
-                feed_mm_min=0.0,
-                exec_state="READY",
-                tool_number=1,
-                program="O1",
-            ),
-        )
-    ]
+    events = [(at_s, _event(EventKind.BIRTH, at_s, machine, node, **BORN))]
     while at_s < SECONDS - 5.0:
         at_s += chance.choice((0.1, 0.1, 0.1, 0.2)) if not silences or chance.random() > 0.03 else chance.uniform(1.0, 12.0)
         if silences and 100.0 < at_s < 101.0:
-            events.append(
-                (at_s, HostEvent(EventKind.DEATH, node, machine, T0_MS + round(at_s * 1000) + 3, (), "edge node offline"))
-            )
+            death = HostEvent(EventKind.DEATH, node, machine, T0_MS + round(at_s * 1000) + 3, (), "edge node offline")
+            events.append((at_s, death))
             at_s += 4.0
-            events.append(
-                (
-                    at_s,
-                    _event(
-                        EventKind.BIRTH,
-                        at_s,
-                        machine,
-                        node,
-                        spindle_rpm=100.0,
-                        spindle_load_pct=3.0,
-                        spindle_temp_c=22.0,
-                        feed_mm_min=0.0,
-                        exec_state="ACTIVE",
-                        tool_number=2,
-                        program="O1",
-                    ),
-                )
-            )
+            events.append((at_s, _event(EventKind.BIRTH, at_s, machine, node, **BORN_AGAIN)))
             continue
         values = {"spindle_rpm": 3000.0 + chance.gauss(0, 3), "spindle_load_pct": 40.0 + chance.gauss(0, 2)}
         if chance.random() < 0.1:

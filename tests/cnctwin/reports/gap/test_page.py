@@ -16,11 +16,11 @@ from hatchling.builders.wheel import WheelBuilder
 from cnctwin.reports.gap.page import report_html
 from tests.cnctwin.reports.gap.diagnosed import DIAGNOSED, explained, healthy, partly, unknown
 from tests.cnctwin.reports.gap.page_reader import PageReader
+from tests.cnctwin.reports.hostile import HOSTILE, hostile
 from twin.gap.diagnosis import Candidate, Diagnosed, Interval, Pattern, Trace
 
 ROOT = Path(__file__).parents[4]
 ORDER = ["where", "traces", "far", "causes", "candidates", "patterns", "untold", "next", "notes", "judged"]
-HOSTILE = "</script><script>alert(1)</script><img src=x onerror=alert(2)>\"'&\x00\ud800"
 
 
 @pytest.mark.parametrize("name", DIAGNOSED)
@@ -53,19 +53,6 @@ def test_the_policy_names_the_style_and_the_script_that_are_there() -> None:
         digest = base64.b64encode(hashlib.sha256(inside.encode()).digest()).decode()
         assert f"{directive} 'sha256-{digest}'" in policy
     assert "unsafe" not in policy and "default-src 'none'" in policy
-
-
-def hostile(value: Any) -> Any:
-    """The same with every text replaced by one that would like to be run."""
-    if is_dataclass(value) and not isinstance(value, type):
-        return replace(value, **{f.name: hostile(getattr(value, f.name)) for f in fields(value)})
-    if type(value) is str:
-        return HOSTILE
-    if isinstance(value, tuple):
-        return tuple(hostile(part) for part in value)
-    if isinstance(value, dict):
-        return dict.fromkeys([HOSTILE], hostile(next(iter(value.values())))) if value else {}
-    return value
 
 
 def test_no_text_of_the_data_is_ever_markup_or_script() -> None:

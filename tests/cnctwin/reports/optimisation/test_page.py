@@ -15,11 +15,11 @@ from hypothesis import strategies as st
 
 from cnctwin.reports.optimisation.page import report_html
 from tests.cnctwin.reports.gap.page_reader import PageReader
+from tests.cnctwin.reports.hostile import hostile
 from tests.cnctwin.reports.optimisation.answers import ANSWERS, bare, long, mixed, nothing, paper, pareto
 from twin.optimisation.answer import Objective, Optimised
 
 ORDER = ["totals", "course", "binding", "lines", "front", "sensitivity", "search", "again", "diff", "alone", "notes", "limits"]
-HOSTILE = "</script><script>alert(1)</script></style><img src=x onerror=alert(2)>\"'&\x00\ud800"
 BYTES_MAX = 300_000
 
 
@@ -56,17 +56,6 @@ def test_the_policy_names_the_style_that_is_there_and_lets_no_script_run() -> No
     assert style
     assert f"style-src 'sha256-{base64.b64encode(hashlib.sha256(style[1].encode()).digest()).decode()}'" in policy
     assert "default-src 'none'" in policy and "script-src" not in policy and "unsafe" not in policy
-
-
-def hostile(value: Any) -> Any:
-    """The same with every text replaced by one that would like to be run."""
-    if is_dataclass(value) and not isinstance(value, type):
-        return replace(value, **{f.name: hostile(getattr(value, f.name)) for f in fields(value)})
-    if type(value) is str:
-        return HOSTILE
-    if isinstance(value, tuple):
-        return tuple(hostile(part) for part in value)
-    return {f"{key} {HOSTILE}": hostile(part) for key, part in value.items()} if isinstance(value, dict) else value
 
 
 @pytest.mark.parametrize("make", [paper, mixed, pareto])

@@ -1,15 +1,11 @@
 """What each section says: charts, lines, what binds, the front, the uncertainty, the difference."""
 
-import doctest
-import importlib
-import pkgutil
 import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-import cnctwin.reports.optimisation
 from cnctwin.reports.optimisation.binding import bound_by
 from cnctwin.reports.optimisation.course import blocks, edges_of, steps
 from cnctwin.reports.optimisation.kept import ranges
@@ -20,13 +16,6 @@ from cnctwin.reports.optimisation.totals import bounds
 from tests.cnctwin.reports.gap.page_reader import PageReader
 from tests.cnctwin.reports.optimisation.answers import SENSITIVITY, bare, long, mixed, paper, pareto
 from twin.optimisation.answer import Binds, Objective, Optimised
-
-MODULES = sorted(m.name for m in pkgutil.walk_packages(cnctwin.reports.optimisation.__path__, "cnctwin.reports.optimisation."))
-
-
-@pytest.mark.parametrize("name", MODULES)
-def test_the_examples_are_true(name: str) -> None:
-    assert doctest.testmod(importlib.import_module(name)).failed == 0
 
 
 def read(answer: Optimised) -> PageReader:

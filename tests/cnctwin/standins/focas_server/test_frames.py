@@ -1,6 +1,5 @@
 """The bytes of the protocol, held to those that real controls sent."""
 
-import doctest
 import random
 import struct
 
@@ -8,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cnctwin.standins.focas_server import faults, frames, shown
+from cnctwin.standins.focas_server import frames
 from cnctwin.standins.focas_server.faults import Wrong, spoiled
 from cnctwin.standins.focas_server.frames import (
     BODY_BYTES_MAX,
@@ -21,11 +20,6 @@ from cnctwin.standins.focas_server.frames import (
 )
 from tests.cnctwin.standins.focas_server import captured
 from tests.cnctwin.standins.focas_server.client import blocks, command
-
-
-@pytest.mark.parametrize("module", [frames, faults, shown])
-def test_the_examples_are_true(module: object) -> None:
-    assert doctest.testmod(module).failed == 0  # type: ignore[arg-type]
 
 
 def test_captured_requests_are_read() -> None:

@@ -1,15 +1,9 @@
 """What a simulated control shows, and when."""
 
-import doctest
 from itertools import pairwise
 
-from cnctwin.standins.simulated_control import state
 from cnctwin.standins.simulated_control.control import SimulatedControl
 from cnctwin.standins.simulated_control.state import production, tool_changes
-
-
-def test_the_examples_are_true() -> None:
-    assert doctest.testmod(state).failed == 0
 
 
 def test_ten_minutes_hold_parts_with_five_tool_changes_each() -> None:

@@ -1,15 +1,11 @@
 """The files of the simulated machine fit each other, and nobody pays for the simulation but who simulates."""
 
-import doctest
-import importlib
 import re
 import subprocess
 import sys
 import tomllib
 from collections.abc import Iterator
 from typing import Any
-
-import pytest
 
 from cnctwin.standins.simulated_machine import description
 from cnctwin.standins.simulated_machine.as_built import machine_as_built
@@ -24,7 +20,6 @@ LIGHT = (
     "edge.check",
     "processors.running.runtime",
 )
-MODULES = ("as_built", "moment", "part", "working_day", "machining")
 
 
 def figures(table: dict[str, Any], path: str = "") -> Iterator[tuple[str, float]]:
@@ -63,10 +58,3 @@ def test_start_up_imports_none_of_the_arrays() -> None:
     code = f"import sys, {', '.join(LIGHT)}; print([name for name in {HEAVY!r} if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
-
-
-@pytest.mark.parametrize("name", MODULES)
-def test_the_examples_in_the_docstrings_are_right(name: str) -> None:
-    module = importlib.import_module(f"cnctwin.standins.simulated_machine.{name}")
-    found = doctest.testmod(module)
-    assert (found.failed, found.attempted > 0) == (0, True)

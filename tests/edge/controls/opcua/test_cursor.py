@@ -1,13 +1,11 @@
 """Frames of an OPC UA server become samples."""
 
-import doctest
 import json
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from edge.config import EdgeConfig, SignalSection
-from edge.controls.opcua import point, spindle_tool
 from edge.controls.opcua.config import Config, OpcUaConfig
 from edge.controls.opcua.cursor import Cursor, parse, place, resume, start
 from edge.sample import EdgeSample, SampleSet
@@ -34,10 +32,6 @@ def played(edge: Config, *frames: bytes) -> tuple[Cursor, list[SampleSet]]:
 
 def shown(one: SampleSet) -> list[tuple[str, object, str | None]]:
     return [(sample.signal, sample.value, sample.reason) for sample in one.samples]
-
-
-def test_the_examples_are_true() -> None:
-    assert doctest.testmod(spindle_tool).failed + doctest.testmod(point).failed == 0
 
 
 def test_values_come_in_the_order_of_their_own_stamps_whatever_the_order_of_the_items() -> None:

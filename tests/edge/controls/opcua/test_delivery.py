@@ -1,11 +1,8 @@
 """What the notifications of a subscription mean."""
 
-import doctest
-
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from edge.controls.opcua import connection
 from edge.controls.opcua.delivery import OPENING_S_MAX, SEQUENCE_MAX, Delivery, Load, Notification
 from edge.sweep import Fact, Hole
 
@@ -23,10 +20,6 @@ def opened() -> Delivery:
     one = delivery()
     assert one.take(Notification(1, (Fact("a", 1), Fact("b", 2))), 10_100, 10.1)
     return one
-
-
-def test_the_examples_are_true() -> None:
-    assert doctest.testmod(connection).failed == 0
 
 
 def test_the_state_as_found_is_one_load_with_the_hole_before_it_and_what_cannot_be_watched() -> None:

@@ -1,6 +1,5 @@
 """One DataValue, one fact."""
 
-import doctest
 import math
 from datetime import UTC, datetime, timedelta, timezone
 from typing import Any
@@ -13,15 +12,11 @@ pytest.importorskip("asyncua")
 
 from asyncua import ua
 
-from edge.controls.opcua import plain, resolve
+from edge.controls.opcua import plain
 from edge.sweep import Fact, Sweep
 
 AT: Any = datetime.fromisoformat("2026-11-21T12:00:00.250")
 AT_MS = 1_795_262_400_250
-
-
-def test_the_examples_are_true() -> None:
-    assert doctest.testmod(plain).failed + doctest.testmod(resolve).failed == 0
 
 
 @pytest.mark.parametrize(

@@ -22,6 +22,7 @@ from sparkplug.metric import Change, MetricSpec, NodeId
 from tests.processors.alerts.courier.alert_shop import VIBRATION
 from tests.processors.alerts.courier.office import CLAIM, OUTBOX, RECEIPT, ROOT, STATE, Office, until
 from tests.processors.alerts.courier.receiving_server import Answer, ReceivingServer
+from tests.until_stopped import until_stopped
 from tests.wire.mosquitto import Mosquitto
 
 pytestmark = pytest.mark.broker
@@ -221,7 +222,7 @@ def test_killed_at_any_moment_nothing_comes_twice_and_what_is_missing_is_said_to
     interrupted = [key for key in keys if outcomes[key] == {"failed"}]
     assert {office.deliveries[key][-1]["reason"] for key in interrupted} <= {"interrupted while sending; it may have arrived"}
     assert len(interrupted) <= kills
-    print(f"{kills} kills: {len(arrived)} of {len(keys)} arrived, {len(interrupted)} said to have failed")
+    print(f"{kills} kills: {len(arrived)} of {len(keys)} arrived, {len(interrupted)} reported as failed")
 
 
 # Emergencies at Pushover.
@@ -298,27 +299,23 @@ def test_from_the_alarm_on_a_machine_to_the_receiver_and_back(
     edge.declare_device("okuma", [MetricSpec(VIBRATION, DataType.BOOLEAN)])
     edge.start()
     until(lambda: edge.online, "the edge")
-    stop = threading.Event()
-    processor = threading.Thread(target=run, args=(configured(["alerts"], tmp_path / "alerts.toml"), broker, stop))
-    processor.start()
-    courier()
     try:
-        until(lambda: STATE in office.topics, "the state")
-        edge.publish("okuma", [Change(VIBRATION, True, time.time_ns() // 1_000_000)])
-        until(lambda: server.received, "the notification")
-        (received,) = server.received
-        (alert,) = received.json["alerts"]
-        assert alert["labels"]["machine"] == "okuma"
+        with until_stopped(run, configured(["alerts"], tmp_path / "alerts.toml"), broker):
+            courier()
+            until(lambda: STATE in office.topics, "the state")
+            edge.publish("okuma", [Change(VIBRATION, True, time.time_ns() // 1_000_000)])
+            until(lambda: server.received, "the notification")
+            (received,) = server.received
+            (alert,) = received.json["alerts"]
+            assert alert["labels"]["machine"] == "okuma"
 
-        def shown() -> dict[str, Any]:
-            return dict(json.loads(office.topics[STATE]))
+            def shown() -> dict[str, Any]:
+                return dict(json.loads(office.topics[STATE]))
 
-        until(lambda: shown()["receivers"]["desk"]["delivered"] == 1, "the fate in the state")
-        command = {"id": "c1", "by": "ada", "fingerprint": alert["fingerprint"]}
-        office.publish("cnctwin/alerts/command/ack", json.dumps(command).encode(), retain=False)
-        until(lambda: shown()["alerts"][0]["acknowledged_by"] == "ada", "the acknowledgement")
+            until(lambda: shown()["receivers"]["desk"]["delivered"] == 1, "the fate in the state")
+            command = {"id": "c1", "by": "ada", "fingerprint": alert["fingerprint"]}
+            office.publish("cnctwin/alerts/command/ack", json.dumps(command).encode(), retain=False)
+            until(lambda: shown()["alerts"][0]["acknowledged_by"] == "ada", "the acknowledgement")
     finally:
-        stop.set()
-        processor.join(20)
         edge.stop()
     assert len(server.received) == 1
