@@ -87,8 +87,8 @@ def promote(
     models: Models = None,
 ) -> None:
     """Let a version count. The one before is kept warm for 48 h."""
-    from cnctwin.challenge.comparing import won
-
+    with needed_by("promoting", "twin"):
+        from cnctwin.challenge.comparing import won
     own = registry.shelf(_place(models), kind, machine)
     folder, before = own.named(version), own.pointer()
     is_won = before is None or won(own, folder.name, registry.comparisons(own))
@@ -135,8 +135,8 @@ def golden(
     models: Models = None,
 ) -> None:
     """Freeze a stretch of data, a week as a rule, as the standing test of every challenger."""
-    from cnctwin.models.golden import freeze
-
+    with needed_by("a golden week", "twin"):
+        from cnctwin.models.golden import freeze
     own = registry.shelf(_place(models), kind, machine)
     (log,) = _stretches(machine, [run] if run else [], store, from_, to)
     told = freeze(own, log, log.source, time.time())

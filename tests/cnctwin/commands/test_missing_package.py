@@ -18,6 +18,8 @@ COMMANDS = {
     "import p.txt --out r.parquet --devices d.xml": "the twin",
     "import store --machine vmc --from 1 --to 2 --out r.parquet": "a run log",
     "store export vmc --from 1 --to 2 --out r.parquet": "a run log",
+    "model promote residual vmc abc": "promoting",
+    "model golden residual vmc --run r.parquet": "a golden week",
     "model compare residual vmc abc --runs r.parquet": "comparing",
     "validate --machine vmc --runs r.parquet": "validation",
 }
