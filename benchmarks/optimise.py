@@ -32,7 +32,8 @@ from numpy.typing import NDArray
 from cnctwin.batch.diagnosis import in_threads
 from twin.case import read_case
 from twin.genetic import GeneticSettings, evolve
-from twin.machine import Limits, machine_to_toml
+from twin.machine import Limits
+from twin.machine_toml import machine_to_toml
 from twin.optimisation.answer import Objective
 from twin.optimisation.front import hypervolume, not_dominated
 from twin.optimisation.islands import fitness_of

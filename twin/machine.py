@@ -280,18 +280,3 @@ def read_machine(path: Path) -> MachineFile:
     except (OSError, UnicodeDecodeError) as error:
         raise MachineError(f"{path}: cannot be read: {error}") from None
     return machine_from_toml(text, str(path))
-
-
-def machine_to_toml(machine: MachineFile) -> str:
-    """The machine as TOML, sections without values left out. Reading it back gives the same machine.
-
-    >>> text = "[machine]\\nname = 'a'\\n[spindle]\\nrated_power_kw = 11.0\\nefficiency = 0.85"
-    >>> machine = machine_from_toml(text)
-    >>> machine_from_toml(machine_to_toml(machine)) == machine
-    True
-    """
-    import tomli_w  # noqa: PLC0415 - an extra; reading a machine needs nothing of it
-
-    values = machine.model_dump(mode="json", exclude_none=True)
-    values["control"] = {key: value for key, value in values["control"].items() if value not in ({}, [])}
-    return tomli_w.dumps({key: value for key, value in values.items() if value not in ({}, [])}, multiline_strings=False)

@@ -26,7 +26,8 @@ from twin.effects.effect import On
 from twin.errors import TwinError
 from twin.gap.diagnosis import Cause, Diagnosed, Diagnosis, GapNumbers, Verdict
 from twin.gap.labels import measured_signals, regimes_of
-from twin.machine import AddedEffect, MachineFile, machine_from_toml, machine_to_toml
+from twin.machine import AddedEffect, MachineFile, machine_from_toml
+from twin.machine_toml import machine_to_toml
 from twin.runlog import RunLog
 from twin.simulator.recorded import noise_of, told_of
 from twin.simulator.response import RunInput, respond

@@ -10,12 +10,11 @@ from threading import Event
 from typing import Any
 
 from cnctwin.errors import UsageError
-from cnctwin.standins.mtconnect_agent.serve import keep
+from cnctwin.processes.state_file import STATE_S, keep
 from sparkplug.broker import BrokerAddress
 
 TOKEN_VARIABLE = "CNCTWIN_PAGE_TOKEN"  # noqa: S105  the name of the variable, not a secret
 DEFAULT_PORT = 8080
-STATE_S = 0.5
 EXTRA = "pip install 'cnctwin[page]' brings it"
 
 

@@ -8,7 +8,7 @@ from cnctwin.reports.gap.page import report_html
 from twin.case import Case
 from twin.gap.diagnose import diagnose
 from twin.gap.diagnosis import Diagnosed
-from twin.machine import machine_to_toml
+from twin.machine_toml import machine_to_toml
 
 CORES = 2
 FILES = ("diagnosis.json", "report.html", "twin.toml")

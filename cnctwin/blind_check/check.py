@@ -21,7 +21,8 @@ from cnctwin.blind_check.unseen import closure_on_unseen
 from twin.case import Case, read_case
 from twin.errors import TwinError
 from twin.gap.diagnosis import Diagnosed, Verdict
-from twin.machine import machine_from_toml, machine_to_toml
+from twin.machine import machine_from_toml
+from twin.machine_toml import machine_to_toml
 
 Diagnose = Callable[[Case], Diagnosed]
 """A function at the top of a module, so that a worker process finds it by name."""

@@ -10,17 +10,19 @@ from collections.abc import Mapping
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.table import Table
-from rich.text import Text
 
 from cnctwin.commands.options import AsJson, Broker, Wait
 from cnctwin.errors import UsageError
 from cnctwin.plant.alert_desk import alert_desk
 from cnctwin.processes.given_broker import address
+from cnctwin.terminal.console import standard_output
+from cnctwin.terminal.table import text_table
 
 TEST_S_MAX = 30.0
 ID_SHOWN = 8
+TABLE_WIDTH = 140
+ALERT_COLUMNS = ("", "severity", "machine", "alert", "state", "since (UTC)", "told", "by")
+RECEIVER_COLUMNS = ("receiver", "delivered", "failed", "waiting", "held back", "last error")
 _DURATION = re.compile(r"(\d+(?:\.\d+)?)([smhd]?)")
 _SECONDS = {"": 1.0, "s": 1.0, "m": 60.0, "h": 3600.0, "d": 86_400.0}
 
@@ -38,7 +40,7 @@ def list_alerts(broker: Broker = None, wait_s: Wait = 5.0, as_json: AsJson = Fal
     if as_json:
         sys.stdout.write(json.dumps(state) + "\n")
     else:
-        _show(state, Console())
+        _show(state)
     raise typer.Exit(1 if any(alert.get("phase") == "firing" for alert in state.get("alerts", ())) else 0)
 
 
@@ -137,21 +139,11 @@ def _counts(state: Mapping[str, Any], receiver: str) -> tuple[int, int]:
     return int(known.get("delivered", 0)), int(known.get("failed", 0))
 
 
-def _show(state: Mapping[str, Any], console: Console) -> None:
-    if not console.is_terminal:
-        console.width = 140
+def _show(state: Mapping[str, Any]) -> None:
+    console = standard_output(TABLE_WIDTH)
     alerts = [alert for alert in state.get("alerts", ()) if alert.get("phase") != "resolved"]
     if alerts:
-        table = _table("", "severity", "machine", "alert", "state", "since (UTC)", "told", "by")
-        for alert in alerts:
-            notes = [name for name, is_so in (("flaps", alert["flapping"]), ("unknown", alert["unknown"])) if is_so]
-            notes += [f"silenced {alert['silenced_by']}"] if alert["silenced_by"] else []
-            notes += ["UNDELIVERED"] if alert["undelivered"] else []
-            phase = ", ".join([alert["phase"], *notes])
-            labels = alert["labels"]
-            row = (alert["fingerprint"][:ID_SHOWN], alert["severity"], labels["machine"], labels["alertname"], phase)
-            _row(table, *row, alert["startsAt"][:19], ", ".join(alert["told"]), alert["acknowledged_by"])
-        console.print(table)
+        console.print(text_table(ALERT_COLUMNS, map(_alert_row, alerts)))
     else:
         console.print("no alert fires")
     for one in state.get("silences", ()):
@@ -159,19 +151,19 @@ def _show(state: Mapping[str, Any], console: Console) -> None:
         line = f"silence {one['id']}: {what}, until {one['ends'][:19]} by {one['by']} {one['comment']}".rstrip()
         console.print(line, markup=False, highlight=False, soft_wrap=True)
     if state.get("receivers"):
-        table = _table("receiver", "delivered", "failed", "waiting", "held back", "last error")
-        for name, known in state["receivers"].items():
-            counts = (str(known[what]) for what in ("delivered", "failed", "waiting", "held_back"))
-            _row(table, name, *counts, known["last_error"])
-        console.print(table)
+        rows = (_receiver_row(name, known) for name, known in state["receivers"].items())
+        console.print(text_table(RECEIVER_COLUMNS, rows))
 
 
-def _table(*columns: str) -> Table:
-    table = Table(show_edge=False)
-    for column in columns:
-        table.add_column(column, overflow="fold")
-    return table
+def _alert_row(alert: Mapping[str, Any]) -> list[str]:
+    notes = [name for name, is_so in (("flaps", alert["flapping"]), ("unknown", alert["unknown"])) if is_so]
+    notes += [f"silenced {alert['silenced_by']}"] if alert["silenced_by"] else []
+    notes += ["UNDELIVERED"] if alert["undelivered"] else []
+    phase = ", ".join([alert["phase"], *notes])
+    labels = alert["labels"]
+    row = (alert["fingerprint"][:ID_SHOWN], alert["severity"], labels["machine"], labels["alertname"], phase)
+    return [*row, alert["startsAt"][:19], ", ".join(alert["told"]), alert["acknowledged_by"]]
 
 
-def _row(table: Table, *cells: str) -> None:
-    table.add_row(*(Text(cell) for cell in cells))  # as text: a bracket in a name is no markup
+def _receiver_row(name: str, known: Mapping[str, Any]) -> list[str]:
+    return [name, *(str(known[what]) for what in ("delivered", "failed", "waiting", "held_back")), known["last_error"]]

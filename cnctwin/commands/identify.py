@@ -44,7 +44,7 @@ def identify(
         from cnctwin.batch.identification import identification_json
         from twin.case import read_case
         from twin.identification import identify as identification
-        from twin.machine import machine_to_toml
+        from twin.machine_toml import machine_to_toml
     if method is Method.GA:
         _compare_methods(case, seed, as_json=as_json)
         return

@@ -6,6 +6,7 @@ Exit codes: 0 = done; 1 = refused, failed, cancelled, or nobody answers; 2 = wro
 import json
 import logging
 import sys
+from collections.abc import Mapping
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
@@ -13,18 +14,19 @@ from typing import Annotated, Any, NoReturn
 import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
-from rich.table import Table
-from rich.text import Text
 
+from cnctwin.commands.moment import moment_text
 from cnctwin.commands.options import AsJson, Broker, Group, Wait
 from cnctwin.errors import UsageError
-from cnctwin.files.program_text import decoded
+from cnctwin.files.program_text import read_encoded, read_text
 from cnctwin.jobs.client import JobsClient, NoAnswerError
 from cnctwin.jobs.consumer import Consumer, Setting
 from cnctwin.jobs.dask_cluster import DaskCluster
 from cnctwin.jobs.job_queue import Limits
 from cnctwin.processes.given_broker import address, broker_or_own
 from cnctwin.processes.stopping import stopped_by_signals
+from cnctwin.terminal.console import standard_output
+from cnctwin.terminal.table import text_table
 from edge.state_dir import state_dir
 from sparkplug.broker import BrokerAddress
 from twin.vocabulary.nodes import JOBS_NODE
@@ -32,7 +34,9 @@ from twin.vocabulary.nodes import JOBS_NODE
 jobs_app = typer.Typer(
     no_args_is_help=True, help="Optimise, identify, diagnose as jobs: asked for over the broker, done in turn."
 )
+JobId = Annotated[str, typer.Argument(metavar="ID", help="As `list` shows it")]
 GONE_S_MAX = 60.0
+TABLE_WIDTH = 140
 
 
 class Kind(StrEnum):
@@ -104,7 +108,7 @@ def submit(
         "speed_changes": speed_changes,
         "free_gains": free_gains or None,
     }
-    given |= {**_program(program), "machine_toml": _text(machine), "job": job and str(job)}
+    given |= {**_program(program), "machine_toml": None if machine is None else read_text(machine), "job": job and str(job)}
     document = {key: value for key, value in given.items() if value is not None}
     if request is not None and document:
         raise UsageError(f"{request}: give either a request or options (--{next(iter(document)).replace('_', '-')})")
@@ -130,25 +134,15 @@ def list_jobs(broker: Broker = None, wait_s: Wait = 5.0, as_json: AsJson = False
     if as_json:
         sys.stdout.write(json.dumps(state) + "\n")
         return
-    console = Console()
-    if not console.is_terminal:
-        console.width = 140
-    table = Table(show_edge=False)
-    for column in ("job", "kind", "machine", "state", "%", "attempt", "accepted (UTC)", "what"):
-        table.add_column(column, overflow="fold")
-    for one in state["jobs"]:
-        waits = f"{one['state']}, {one['place']}." if one["state"] == "queued" else one["state"]
-        what = one["doing"] if one["state"] == "running" else one["reason"] or one["sentence"]
-        row = (one["id"], one["kind"], one["machine"], waits, f"{one['progress_pct']:.0f}", str(one["attempt"]))
-        table.add_row(*(Text(str(cell)) for cell in (*row, _moment(one["accepted_ms"]), what)))
-    console.print(table)
+    columns = ("job", "kind", "machine", "state", "%", "attempt", "accepted (UTC)", "what")
+    standard_output(TABLE_WIDTH).print(text_table(columns, map(_row, state["jobs"])))
     if state["disk_trouble"]:
         _bad_news(f"the consumer cannot write: {state['disk_trouble']}")
 
 
 @jobs_app.command("show")
 def show(
-    job_id: Annotated[str, typer.Argument(metavar="ID", help="As `list` shows it")],
+    job_id: JobId,
     broker: Broker = None,
     wait_s: Wait = 5.0,
     as_json: AsJson = False,
@@ -162,7 +156,7 @@ def show(
 
 @jobs_app.command("cancel")
 def cancel(
-    job_id: Annotated[str, typer.Argument(metavar="ID", help="As `list` shows it")],
+    job_id: JobId,
     broker: Broker = None,
     wait_s: Wait = 15.0,
     as_json: AsJson = False,
@@ -173,6 +167,13 @@ def cancel(
     if answer["answer"] != "cancelled":
         _bad_news(answer["reason"])
     _print(answer, as_json)
+
+
+def _row(job: Mapping[str, Any]) -> list[str]:
+    waits = f"{job['state']}, {job['place']}." if job["state"] == "queued" else job["state"]
+    what = job["doing"] if job["state"] == "running" else job["reason"] or job["sentence"]
+    row = (job["id"], job["kind"], job["machine"], waits, f"{job['progress_pct']:.0f}", job["attempt"])
+    return [str(cell) for cell in (*row, moment_text(job["accepted_ms"]), what)]
 
 
 def _broker(url: str | None) -> BrokerAddress:
@@ -208,14 +209,8 @@ def _print(told: dict[str, Any], as_json: bool) -> None:
     console = Console(soft_wrap=True)
     for key, value in told.items():
         if value not in (None, "", {}):
-            shown = _moment(value) if key.endswith("_ms") else json.dumps(value, ensure_ascii=False)
+            shown = moment_text(value) if key.endswith("_ms") else json.dumps(value, ensure_ascii=False)
             console.print(f"{key}: {shown.strip(chr(34))}", markup=False, highlight=False)
-
-
-def _moment(ms: int) -> str:
-    from datetime import UTC, datetime
-
-    return datetime.fromtimestamp(ms / 1000, UTC).isoformat(sep=" ", timespec="seconds")[:19]
 
 
 def _document(file: Path) -> dict[str, Any]:
@@ -234,19 +229,8 @@ def _program(file: Path | None) -> dict[str, str]:
     """Its text, and its encoding where that is not the one which is taken without a word."""
     if file is None:
         return {}
-    text, encoding = decoded(_bytes(file))
+    text, encoding = read_encoded(file)
     return {"program_text": text, "name": file.name[-120:]} | ({} if encoding == "utf-8" else {"encoding": encoding})
-
-
-def _text(file: Path | None) -> str | None:
-    return None if file is None else decoded(_bytes(file))[0]
-
-
-def _bytes(file: Path) -> bytes:
-    try:
-        return file.read_bytes()
-    except OSError as error:
-        raise UsageError(f"{file}: cannot be read: {error.strerror}") from None
 
 
 def _bad_news(line: str) -> NoReturn:

@@ -4,12 +4,11 @@ import json
 import os
 import sys
 import time
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.table import Table
-from rich.text import Text
 
 from cnctwin.commands.extras import needed_by
 from cnctwin.commands.moment import TIME, moment_ms
@@ -18,6 +17,7 @@ from cnctwin.errors import UsageError
 from cnctwin.models import registry
 from cnctwin.models.card import DIGITS, faults_of
 from cnctwin.terminal.console import standard_output
+from cnctwin.terminal.table import text_table
 from edge.state_dir import state_dir
 
 VARIABLE = "CNCTWIN_MODELS"
@@ -42,15 +42,8 @@ def list_models(models: Models = None, as_json: AsJson = False) -> None:
     if as_json:
         _json(rows)
         return
-    table = Table(show_edge=False)
-    for column in ("", "kind", "machine", "version", "trained", "features", "added"):
-        table.add_column(column, overflow="fold")
-    for row in rows:
-        trained = f"{row['from']} … {row['to']}" if row["from"] else "–"
-        mark = "*" if row["champion"] else "~" if row["warm"] else ""
-        cells = (mark, row["kind"], row["machine"], row["version"], trained, str(len(row["features"])), row["added_at"][:16])
-        table.add_row(*map(Text, cells))
-    standard_output().print(table)
+    columns = ("", "kind", "machine", "version", "trained", "features", "added")
+    standard_output().print(text_table(columns, map(_cells, rows)))
 
 
 @model_app.command()
@@ -94,8 +87,8 @@ def promote(
     models: Models = None,
 ) -> None:
     """Let a version count. The one before is kept warm for 48 h."""
-    from cnctwin.challenge.comparing import won
-
+    with needed_by("promoting", "twin"):
+        from cnctwin.challenge.comparing import won
     own = registry.shelf(_place(models), kind, machine)
     folder, before = own.named(version), own.pointer()
     is_won = before is None or won(own, folder.name, registry.comparisons(own))
@@ -142,8 +135,8 @@ def golden(
     models: Models = None,
 ) -> None:
     """Freeze a stretch of data, a week as a rule, as the standing test of every challenger."""
-    from cnctwin.models.golden import freeze
-
+    with needed_by("a golden week", "twin"):
+        from cnctwin.models.golden import freeze
     own = registry.shelf(_place(models), kind, machine)
     (log,) = _stretches(machine, [run] if run else [], store, from_, to)
     told = freeze(own, log, log.source, time.time())
@@ -243,6 +236,12 @@ def _row(own: registry.Shelf, version: str) -> dict[str, Any]:
     pointer, beside = own.pointer(), own.warm(time.time())
     is_champion = pointer is not None and pointer.champion == version
     return own.card(version).as_json() | {"champion": is_champion, "warm": beside is not None and beside.name == version}
+
+
+def _cells(row: Mapping[str, Any]) -> list[str]:
+    trained = f"{row['from']} … {row['to']}" if row["from"] else "–"
+    mark = "*" if row["champion"] else "~" if row["warm"] else ""
+    return [mark, row["kind"], row["machine"], row["version"], trained, str(len(row["features"])), row["added_at"][:16]]
 
 
 def _turned(own: registry.Shelf, champion: str, previous: str | None, warm_until: str) -> str:

@@ -1,4 +1,4 @@
-"""A moment as people write it on the command line."""
+"""A moment as people write it on the command line, and as a table shows it."""
 
 import re
 import time
@@ -30,3 +30,12 @@ def moment_ms(text: str, option: str = "", now_ms: int | None = None) -> int:
     except ValueError:
         raise UsageError(f"{f'{option} ' if option else ''}{text!r} is no moment; write {FORMS}") from None
     return round((moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp() * 1000)
+
+
+def moment_text(at_ms: float) -> str:
+    """Return a moment in UTC as a table shows it.
+
+    >>> moment_text(1_795_327_200_999)
+    '2026-11-22 06:00:00'
+    """
+    return datetime.fromtimestamp(at_ms / 1000, UTC).strftime("%Y-%m-%d %H:%M:%S")

@@ -65,7 +65,8 @@ def optimise(
     with needed_by("the optimiser", "twin"):
         import twin.optimisation.question as asked
         from cnctwin.batch.optimisation import Files
-        from twin.machine import machine_to_toml, read_machine
+        from twin.machine import read_machine
+        from twin.machine_toml import machine_to_toml
     described = _with_ranges(read_machine(machine), feed_range, speed_range)
     text, encoding = read_encoded(program)
     question = asked.Question(

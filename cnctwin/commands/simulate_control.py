@@ -12,6 +12,9 @@ from cnctwin.standins.mtconnect_agent.serve import replay
 control_app = typer.Typer(no_args_is_help=True, help="Stand in for a control, to develop and test without a machine.")
 
 Speed = Annotated[float, typer.Option(help="How many times faster than real time")]
+HttpPort = Annotated[int, typer.Option(help="HTTP port on loopback; 0 = any", min=0, max=65535)]
+TcpPort = Annotated[int, typer.Option(help="TCP port on loopback; 0 = any", min=0, max=65535)]
+ClockOffset = Annotated[float, typer.Option(help="How far the control's clock is ahead")]
 StateFile = Annotated[Path | None, typer.Option(help="Keep address and ledger in this JSON file", hidden=True)]
 
 
@@ -28,7 +31,7 @@ def simulate_mtconnect(
     devices: Annotated[Path | None, typer.Option(help="Its Devices.xml; else a device model is drafted from its keys")] = None,
     device: Annotated[str | None, typer.Option(help="Which device of the model the recording belongs to")] = None,
     speed: Annotated[float, typer.Option(help="How many times faster than recorded")] = 1.0,
-    port: Annotated[int, typer.Option(help="HTTP port on loopback; 0 = any", min=0, max=65535)] = 0,
+    port: HttpPort = 0,
     style: Annotated[str, typer.Option(help="The generation of the agent: 2.3 or 1.4")] = "2.3",
     loop: Annotated[bool, typer.Option("--loop", help="Begin again at the end")] = False,
     wait: Annotated[bool, typer.Option("--wait", help="Begin when the first client asks for samples")] = False,
@@ -53,7 +56,7 @@ def simulate_mtconnect(
 @control_app.command("machine")
 def simulate_machine(
     speed: Speed = 1.0,
-    port: Annotated[int, typer.Option(help="HTTP port on loopback; 0 = any", min=0, max=65535)] = 0,
+    port: HttpPort = 0,
     state_file: StateFile = None,
 ) -> None:
     """Serve the simulated machine, which cuts one part after the other, as an MTConnect agent."""
@@ -66,8 +69,8 @@ def simulate_machine(
 @control_app.command("focas")
 def simulate_focas(
     speed: Speed = 1.0,
-    port: Annotated[int, typer.Option(help="TCP port on loopback; 0 = any", min=0, max=65535)] = 8193,
-    clock_offset_s: Annotated[float, typer.Option(help="How far the control's clock is ahead")] = 0.0,
+    port: TcpPort = 8193,
+    clock_offset_s: ClockOffset = 0.0,
     tool_number: Annotated[
         bool, typer.Option("--tool-number", help="With the option that tells the tool in the spindle")
     ] = False,
@@ -83,8 +86,8 @@ def simulate_focas(
 @control_app.command("opcua")
 def simulate_opcua(
     speed: Speed = 1.0,
-    port: Annotated[int, typer.Option(help="TCP port on loopback; 0 = any", min=0, max=65535)] = 4840,
-    clock_offset_s: Annotated[float, typer.Option(help="How far the control's clock is ahead")] = 0.0,
+    port: TcpPort = 4840,
+    clock_offset_s: ClockOffset = 0.0,
     is_open: Annotated[bool, typer.Option("--open", help="Also an endpoint without security")] = False,
     state_file: StateFile = None,
 ) -> None:
@@ -98,8 +101,8 @@ def simulate_opcua(
 @control_app.command("lsv2")
 def simulate_lsv2(
     speed: Speed = 1.0,
-    port: Annotated[int, typer.Option(help="TCP port on loopback; 0 = any", min=0, max=65535)] = 19000,
-    clock_offset_s: Annotated[float, typer.Option(help="How far the control's clock is ahead")] = 0.0,
+    port: TcpPort = 19000,
+    clock_offset_s: ClockOffset = 0.0,
     model: Annotated[HeidenhainModel, typer.Option(help="Which control")] = HeidenhainModel.TNC640,
     program: Annotated[Path | None, typer.Option(help="Shown in place of the program that is run")] = None,
     state_file: StateFile = None,

@@ -19,7 +19,7 @@ from rich.console import Console
 from rich.table import Table
 
 from cnctwin.commands.extras import needed_by
-from cnctwin.commands.moment import moment_ms
+from cnctwin.commands.moment import moment_ms, moment_text
 from cnctwin.commands.options import AsJson, StorePlace
 from cnctwin.errors import UsageError
 from cnctwin.memory.store.contract import Column, Query, Store, StoreError
@@ -77,7 +77,8 @@ def status_command(where: StorePlace = None, as_json: AsJson = False) -> None:
         for column in ("machine", "signals", "from", "to"):
             table.add_column(column)
         for name, about in machines.items():
-            table.add_row(name, str(about["signals"]), _moment_text(about["from_ms"]), _moment_text(about["to_ms"]))
+            span = ("–" if at_ms is None else moment_text(at_ms) for at_ms in (about["from_ms"], about["to_ms"]))
+            table.add_row(name, str(about["signals"]), *span)
         console.print(table)
         left = "not known yet" if status.days_left is None else f"{status.days_left:.0f} days"
         a_sample = f" ({status.bytes / status.samples:.2f} bytes a sample)" if status.samples else ""
@@ -270,10 +271,6 @@ def _about(store: Store, machine: str) -> dict[str, Any]:
         "from_ms": None if first is None else first // 1000,
         "to_ms": None if last is None else last // 1000,
     }
-
-
-def _moment_text(at_ms: int | None) -> str:
-    return "–" if at_ms is None else datetime.fromtimestamp(at_ms / 1000, UTC).strftime("%Y-%m-%d %H:%M:%S")
 
 
 def _rows(column: Column, *, is_windowed: bool) -> list[list[Any]]:

@@ -11,6 +11,7 @@ from urllib.parse import urlsplit
 from xml.etree import ElementTree
 
 from cnctwin.errors import ApplicationError, UsageError
+from cnctwin.processes import state_file
 from cnctwin.processes.child import Child
 from cnctwin.processes.port import is_free
 from cnctwin.processes.private_broker import PrivateBroker
@@ -197,7 +198,7 @@ class Demo:
             if not page.running and page.command[-1] != "0":  # somebody else has taken the port meanwhile
                 page.command = [*command, "0"]
                 page.start()
-            self.page_url = str(_read(self._page_state).get("url", ""))
+            self.page_url = str(state_file.read(self._page_state).get("url", ""))
             time.sleep(0.05)
         if self.page_url:  # killed and started again, it has to be where the browser looks for it
             page.command = [*command, str(urlsplit(self.page_url).port)]
@@ -214,7 +215,7 @@ class Demo:
         raise ApplicationError(f"the {what} does not start: {self.children[0].last_words()}")
 
     def _state(self) -> dict[str, Any]:
-        return _read(self._agent_state)
+        return state_file.read(self._agent_state)
 
     def _edge_toml(self, agent_url: str) -> str:
         # JSON strings are TOML strings too.
@@ -224,15 +225,6 @@ class Demo:
             f"session_file = {json.dumps(str(self._folder / 'edge-session.json'))}\n\n"
             f"[mtconnect]\nurl = {json.dumps(agent_url)}\ndevice = {json.dumps(str(self._state().get('device', '')))}\n"
         )
-
-
-def _read(state_file: Path) -> dict[str, Any]:
-    """Return a child's state as it writes it; empty before it has written any."""
-    try:
-        state: dict[str, Any] = json.loads(state_file.read_text())
-    except (OSError, ValueError):
-        return {}
-    return state
 
 
 def machine_name(devices: Path | None) -> str:

@@ -20,10 +20,8 @@ from sparkplug.errors import SparkplugError
 from sparkplug.host import HostApplication
 from sparkplug.metric import Change, MetricSpec
 from sparkplug.quality import Quality
-from twin.vocabulary.nodes import JOBS_NODE
 from twin.vocabulary.topics import JOBS_STATE, state_of_job
 
-NODE = JOBS_NODE
 JOB_ID, JOB_KIND, JOB_STATE = "twin/job_id", "twin/job_kind", "twin/job_state"
 PROGRESS, RESULT = "twin/job_progress_pct", "twin/job_result"
 DEVICE = "jobs"

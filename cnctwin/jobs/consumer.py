@@ -15,7 +15,7 @@ from pathlib import Path
 from threading import Event
 from typing import Any
 
-from cnctwin.jobs.announcer import CANCEL, NODE, NODE_METRICS, REQUEST, Announcer
+from cnctwin.jobs.announcer import CANCEL, NODE_METRICS, REQUEST, Announcer
 from cnctwin.jobs.attempt import Attempt, how_ended
 from cnctwin.jobs.durable import EXIT_DISK
 from cnctwin.jobs.files_root import FilesRoot
@@ -31,6 +31,7 @@ from sparkplug.host import HostApplication
 from sparkplug.host_session import HostEvent
 from sparkplug.metric import NodeId
 from twin.vocabulary import topics
+from twin.vocabulary.nodes import JOBS_NODE
 
 CHILD = (sys.executable, "-m", "cnctwin.jobs.child")
 POLL_S = 0.05
@@ -76,8 +77,8 @@ class Consumer:
         self._folder = JobsFolder(folder)
         self.queue = JobQueue(self._folder, FilesRoot(setting.files), setting.limits, _now_ms())
         self._commands: deque[Command] = deque()
-        self._host = HostApplication(broker, NODE, (), queue_max=INBOX_MAX)
-        node = NodeId(setting.group, NODE)
+        self._host = HostApplication(broker, JOBS_NODE, (), queue_max=INBOX_MAX)
+        node = NodeId(setting.group, JOBS_NODE)
         session_file = setting.session_file
         self._edge = EdgeNode(broker, node, NODE_METRICS, session_file=session_file, on_command=self._command_came)
         self.announcer = Announcer(self._host, self._edge, self.queue)

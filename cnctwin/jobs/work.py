@@ -83,7 +83,7 @@ def identify(parameters: "IdentifyParameters", bench: Bench) -> dict[str, Any]:
     from cnctwin.batch.identification import identification_json  # noqa: PLC0415  with all of the twin
     from twin.case import read_case  # noqa: PLC0415
     from twin.identification.identify import identify as identified  # noqa: PLC0415
-    from twin.machine import machine_to_toml  # noqa: PLC0415
+    from twin.machine_toml import machine_to_toml  # noqa: PLC0415
 
     case = read_case(bench.files.case(parameters.case, "case")[0])
     found = identified(case, free_gains=parameters.free_gains, progress=bench.steps())

@@ -1,1 +1,1 @@
-"""The terminal of whoever runs a command: its width, and a spinner while something takes long."""
+"""The terminal of whoever runs a command: its width, tables, and a spinner while something takes long."""

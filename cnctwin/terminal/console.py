@@ -5,9 +5,9 @@ from rich.console import Console
 WIDTH_ELSEWHERE = 120
 
 
-def standard_output() -> Console:
+def standard_output(width_elsewhere: int = WIDTH_ELSEWHERE) -> Console:
     """Return standard output; into a file or a pipe it is as wide as the tables need."""
     console = Console()
     if not console.is_terminal:
-        console.width = WIDTH_ELSEWHERE
+        console.width = width_elsewhere
     return console

@@ -88,7 +88,7 @@ NIGHT = (
 )  # fmt: skip
 COUNTERS = (
     'twin_dropped_total{node="edge-okuma",reason="store_age"}', f"twin_emitted_total{EDGE}",
-    'twin_seq_gaps_total{layer="sparkplug",node="edge-okuma"}', "twin_store_samples_total",
+    'twin_seq_gaps_total{layer="control",node="edge-okuma"}', "twin_store_samples_total",
 )  # fmt: skip
 
 

@@ -8,7 +8,8 @@ from tests.twin.axes import AXIS
 from twin.case import read_case
 from twin.errors import CaseError, MachineError
 from twin.gcode import IntegerWords, Settings, ToolOffset
-from twin.machine import machine_from_toml, machine_to_toml, read_machine
+from twin.machine import machine_from_toml, read_machine
+from twin.machine_toml import machine_to_toml
 from twin.simulator.response import check_effects
 
 HEAD = "[machine]\nname = 'a'\n"

@@ -155,7 +155,7 @@ def _nodes(nodes: Iterable[NodeView]) -> Iterator[Metric]:
     for node, is_online, values in told:
         online.add_metric([node], float(is_online))
         if (gaps := _count(values.get("health/holes"))) is not None:
-            holes.add_metric(["sparkplug" if is_twin_node(node) else "mtconnect", node], gaps)
+            holes.add_metric(["sparkplug" if is_twin_node(node) else "control", node], gaps)
         sums = {name: _count(values.get(f"{LEDGER_PREFIX}{name}")) for name in ("received", "emitted", "buffered", "dropped")}
         if sums["received"] is None:
             continue

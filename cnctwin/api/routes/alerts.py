@@ -124,7 +124,7 @@ def _one(state: Mapping[str, Any], start: str) -> Mapping[str, Any]:
 def _trouble(state: Mapping[str, Any] | None) -> str | None:
     if state is None:
         return "nothing was heard of alerts; does the processor run? (cnctwin process alerts)"
-    age_s = published_state.age_s(dict(state), time.time())
+    age_s = published_state.age_s(state, time.time())
     if age_s > FRESH_S_MAX:
         return f"the state of alerts is {age_s:.0f} s old: the processor `alerts` does not run any more"
     return None

@@ -4,9 +4,9 @@ from pathlib import Path
 from threading import Event
 
 from cnctwin.errors import UsageError
+from cnctwin.processes.state_file import STATE_S, keep
 from cnctwin.standins.focas_server.server import FocasServer
 from cnctwin.standins.focas_server.shown import ControlDescription, coded
-from cnctwin.standins.mtconnect_agent.serve import STATE_S, keep
 from cnctwin.standins.simulated_control.control import SimulatedControl
 from cnctwin.standins.simulated_control.state import production
 from cnctwin.standins.simulated_machine.description import PROGRAM

@@ -4,9 +4,9 @@ from pathlib import Path
 from threading import Event
 
 from cnctwin.errors import ApplicationError, UsageError
+from cnctwin.processes.state_file import STATE_S, keep
 from cnctwin.standins.lsv2_server.answers import Model
 from cnctwin.standins.lsv2_server.server import Lsv2Server
-from cnctwin.standins.mtconnect_agent.serve import STATE_S, keep
 from cnctwin.standins.simulated_control.control import SimulatedControl
 from cnctwin.standins.simulated_control.state import production
 

@@ -1,15 +1,14 @@
 """`cnctwin simulate-control mtconnect`: the replay agent as a program of its own."""
 
-import json
 from pathlib import Path
 from threading import Event
 from typing import Any
 
 from cnctwin.errors import ApplicationError, UsageError
+from cnctwin.processes.state_file import STATE_S, keep
 from cnctwin.standins.mtconnect_agent.errors import ReplayError
 from cnctwin.standins.mtconnect_agent.replay_agent import ReplayAgent
 
-STATE_S = 0.5
 STYLES = ("2.3", "1.4")
 
 
@@ -52,12 +51,3 @@ def replay(
 
 def _state(agent: ReplayAgent) -> dict[str, Any]:
     return {"url": agent.url, "device": agent.device_name, "finished": agent.finished, "ledger": agent.ledger.as_dict()}
-
-
-def keep(state_file: Path | None, state: dict[str, Any]) -> None:
-    """Replace the state file, where there is to be one, as a whole, so that a reader never sees half of it."""
-    if state_file is None:
-        return
-    fresh = state_file.with_name(state_file.name + ".new")
-    fresh.write_text(json.dumps(state))
-    fresh.replace(state_file)

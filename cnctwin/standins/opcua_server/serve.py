@@ -1,17 +1,16 @@
 """`cnctwin simulate-control opcua`: the simulated control behind an OPC UA server, as a program of its own."""
 
 import importlib.util
-import json
 import logging
 from pathlib import Path
 from threading import Event
 
 from cnctwin.errors import ApplicationError
+from cnctwin.processes.state_file import STATE_S, keep
 from cnctwin.standins.simulated_control.control import SimulatedControl
 from cnctwin.standins.simulated_control.state import production
 from edge.state_dir import state_dir
 
-STATE_S = 0.5
 DAY_S = 8 * 3600.0
 PORT = 4840
 
@@ -36,10 +35,7 @@ def simulate_opcua(
         discover = f"cnctwin edge discover '{server.url}?server_fingerprint={server.fingerprint}'"
         print(f"{server.url} serves a simulated control; Ctrl-C ends it\nto draft a configuration: {discover}", flush=True)
         while not stop.wait(STATE_S) and server.error is None:
-            if state_file is not None:
-                fresh = state_file.with_name(state_file.name + ".new")
-                fresh.write_text(json.dumps({"url": server.url, "fingerprint": server.fingerprint, "writes": server.writes}))
-                fresh.replace(state_file)
+            keep(state_file, {"url": server.url, "fingerprint": server.fingerprint, "writes": server.writes})
         if server.error is not None:
             raise ApplicationError(f"the OPC UA server broke down: {server.error}") from server.error
     print(f"written to by clients {server.writes} times, methods called {server.calls} times", flush=True)

@@ -6,8 +6,8 @@ from pathlib import Path
 from threading import Event
 
 from cnctwin.errors import ApplicationError
+from cnctwin.processes.state_file import STATE_S, keep
 from cnctwin.standins.mtconnect_agent.errors import ReplayError
-from cnctwin.standins.mtconnect_agent.serve import STATE_S, keep
 from cnctwin.standins.simulated_machine.agent import SimulatedMachine
 from cnctwin.standins.simulated_machine.description import PROGRAM
 

@@ -1,4 +1,4 @@
-"""What a dashboard shows, without a word of how a store is asked or how Grafana draws it."""
+"""The content of a dashboard, without a word of how a store is asked or how Grafana draws it."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -8,11 +8,11 @@ from twin.vocabulary.twin_signals import TWIN_PREFIX
 RAW, DERIVED = "cnc_raw", "cnc_twin_state"
 MINUTE_S, HOUR_S, DAY_S = 60, 3600, 86_400
 HOLD_S = 10 * MINUTE_S
-"""For so long a value that is not told again is drawn on: signals are told when they change."""
+"""Seconds for which a value that is not told again is drawn on: signals are told when they change."""
 
 
 class Shown(Enum):
-    """Which of the samples between two points of the screen is drawn.
+    """The choice of the sample that is drawn for all those between two points of the screen.
 
     LAST: the last one; of a signal that says when it changes, what is true at that moment
     PEAK: the largest one: no spike is lost by zooming out
@@ -23,7 +23,7 @@ class Shown(Enum):
 
 
 class Draw(Enum):
-    """How a series is drawn: a line, a broken line, points, or a grey area behind the others (of a signal that is 0 or 1)."""
+    """The drawing of a series: a line, a broken line, points, or a grey area behind the others (of a signal that is 0 or 1)."""
 
     LINE = "line"
     BROKEN = "broken"
@@ -33,7 +33,7 @@ class Draw(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Series:
-    """What is common to all series: legend ({} takes the machine's or signal's name where there are several), own axis, unit."""
+    """The common part of all series: legend ({} takes the machine's or signal's name where there are several), own axis, unit."""
 
     legend: str
     unit: str = ""
@@ -70,7 +70,7 @@ class Reading(_Series):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Metric(_Series):
-    """What the runtime interface says of itself at /metrics: an expression in PromQL. Legends are `{{label}}`."""
+    """A metric that the runtime interface shows at /metrics: an expression in PromQL. Legends are `{{label}}`."""
 
     expression: str
 
@@ -86,7 +86,7 @@ class View(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Limit:
-    """From here on a value has this colour."""
+    """The value from which on a colour is used."""
 
     at: float | None
     colour: str
@@ -111,7 +111,7 @@ class Panel:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Mark:
-    """What is marked in all panels of a dashboard: a moment for each change of a signal, or a stretch while it is not 0."""
+    """A mark in all panels of a dashboard: a moment for each change of a signal, or a stretch while it is not 0."""
 
     name: str
     signal: str

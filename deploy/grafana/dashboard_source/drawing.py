@@ -1,4 +1,4 @@
-"""How a dashboard is drawn: from its description to what Grafana reads.
+"""The drawing of a dashboard: from its description to what Grafana reads.
 
 What a store cannot know, the metrics of the runtime interface, is asked of Prometheus whatever the store.
 """
@@ -55,7 +55,7 @@ class _Ready(Builder[Dataquery]):
     query: Dataquery
 
     def build(self) -> Dataquery:
-        """As it is."""
+        """Return the query as it is."""
         return self.query
 
 
@@ -99,7 +99,7 @@ def _prometheus(expression: str, legend: str, letter: str, source: DataSourceRef
 
 
 def _overrides(panel: Panel) -> dict[str, list[DynamicConfigValue]]:
-    """By legend, what differs of a series from the others of its panel."""
+    """Return, by legend, how a series differs from the others of its panel."""
     drawn: dict[str, list[DynamicConfigValue]] = {}
     for series in panel.series:
         properties: dict[str, Any] = {"unit": series.unit} if series.unit else {}
@@ -178,7 +178,7 @@ def draw(board: Board, source: Source) -> str:
 
 
 def _text(drawn: Dashboard) -> str:
-    """As a file that shows a change as a change. The SDK puts links and annotations into a menu; they stay in sight."""
+    """Return the text, which shows a change as a change. The SDK puts links and annotations into a menu; they stay in sight."""
     document = json.loads(json.dumps(drawn, cls=JSONEncoder))
     for shown in (*document.get("links", ()), *document.get("annotations", {}).get("list", ())):
         shown.pop("placement", None)

@@ -1,4 +1,4 @@
-"""How InfluxDB is asked, in InfluxQL: version 2 answers it at /query, where a bucket is a database of its name.
+"""Queries to InfluxDB, in InfluxQL: version 2 answers it at /query, where a bucket is a database of its name.
 
 Not Flux: InfluxQL runs on what Debian has, so the tests try each query; Flux could not be tried. `fill(previous)` draws a value
 on until it is told again, from its first sample in the range on; what was before the range, and that a value has become bad, is
@@ -17,7 +17,7 @@ MACHINES = f'SHOW TAG VALUES ON "{RAW}" WITH KEY = "machine"'
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InfluxTarget(Dataquery):
-    """What Grafana's data source for InfluxDB takes as a query in words; the SDK has none."""
+    """A query in words for Grafana's data source for InfluxDB; the SDK has none."""
 
     query: str
     ref_id: str
@@ -26,7 +26,7 @@ class InfluxTarget(Dataquery):
     is_annotation: bool = False
 
     def to_json(self) -> dict[str, object]:
-        """As Grafana keeps it."""
+        """Return the query as Grafana keeps it."""
         common: dict[str, object] = {"datasource": self.datasource, "query": self.query, "refId": self.ref_id}
         if self.is_annotation:
             return {**common, "fromAnnotations": True, "rawQuery": True, "titleColumn": "", "textColumn": "", "tagsColumn": ""}

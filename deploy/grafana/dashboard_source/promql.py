@@ -1,4 +1,4 @@
-"""How VictoriaMetrics is asked: metric = measurement_field, the tags are labels.
+"""Queries to VictoriaMetrics: metric = measurement_field, the tags are labels.
 
 Prometheus forgets a series after five minutes without a sample; a signal that says when it changes may be silent for hours. So
 the last value is looked for as far back as `hold_s`, and left out where it is bad now: a null is not drawn as the number before.

@@ -12,7 +12,8 @@ import pytest
 from cnctwin.cli import main
 from tests.twin.gap.small_case import warm_case
 from twin.case import Case
-from twin.machine import AddedEffect, machine_to_toml, read_machine
+from twin.machine import AddedEffect, read_machine
+from twin.machine_toml import machine_to_toml
 from twin.runlog import run_log, write_run
 
 SECOND = AddedEffect(effect="second_thermal_mass", parameters={"conductance_w_per_k": 4.0, "capacity_j_per_k": 4e4})

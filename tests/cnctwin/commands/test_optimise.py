@@ -12,7 +12,8 @@ import pytest
 
 from cnctwin.cli import main
 from tests.twin.optimisation.benchmark import FOLDER, text
-from twin.machine import machine_from_toml, machine_to_toml
+from twin.machine import machine_from_toml
+from twin.machine_toml import machine_to_toml
 
 PROGRAM, MACHINE = FOLDER / "optimise_paper.nc", FOLDER / "optimise_paper.toml"
 Refused = Callable[..., str]

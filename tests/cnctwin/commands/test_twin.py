@@ -12,7 +12,8 @@ import pytest
 
 from cnctwin.cli import main
 from tests.twin.simulator.test_simulation import MACHINE, SLOT
-from twin.machine import machine_to_toml, read_machine
+from twin.machine import read_machine
+from twin.machine_toml import machine_to_toml
 from twin.runlog import read_run, write_run
 from twin.simulator.simulation import simulate
 

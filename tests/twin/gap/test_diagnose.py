@@ -19,7 +19,8 @@ from twin.gap.diagnose import diagnose
 from twin.gap.diagnosis import Diagnosed, Verdict, closure_of
 from twin.gap.experiment.run import with_constant
 from twin.gap.score_of import score_of
-from twin.machine import AddedEffect, machine_from_toml, machine_to_toml
+from twin.machine import AddedEffect, machine_from_toml
+from twin.machine_toml import machine_to_toml
 from twin.runlog import RunLog
 
 GRAVITY = AddedEffect(effect="gravity", on="z", parameters={"force_n": 400.0})

@@ -17,7 +17,8 @@ from twin.gap.stages.axis import axis_constant_path, axis_constants_free
 from twin.gap.stages.stage import Model
 from twin.identification.axis_parameters import axis_parameters
 from twin.identification.identify import stated_uncertainty
-from twin.machine import AddedEffect, machine_from_toml, machine_to_toml
+from twin.machine import AddedEffect, machine_from_toml
+from twin.machine_toml import machine_to_toml
 
 EDGE = Cause("edge_force", "", 1.0, {"tangential_n_per_mm": Interval(20.0, 18.0, 22.0, "N/mm")}, (), 1.0)
 

@@ -14,7 +14,8 @@ from twin.identification.axis_fit import AxisModel, AxisRecording, fit_axis
 from twin.identification.axis_parameters import VELOCITY_DELAY, axis_parameters
 from twin.identification.estimate import INTERVAL_Z
 from twin.identification.identify import Identification, identify
-from twin.machine import MachineFile, machine_from_toml, machine_to_toml
+from twin.machine import MachineFile, machine_from_toml
+from twin.machine_toml import machine_to_toml
 from twin.runlog import RunLog
 from twin.simulator.recorded import told_of
 from twin.simulator.response import respond

@@ -3,7 +3,8 @@
 from pathlib import Path
 from typing import Any
 
-from twin.machine import machine_from_toml, machine_to_toml
+from twin.machine import machine_from_toml
+from twin.machine_toml import machine_to_toml
 from twin.optimisation.question import Question
 
 FOLDER = Path(__file__).parent.parent.parent.parent / "benchmarks"

@@ -44,7 +44,7 @@ async function ask(path, options, limitMs) {
   }
 }
 
-/** What an error body says, in one line. */
+/** The message of an error body, in one line. */
 function told(body) {
   if (!body) return "";
   if (typeof body.error === "string") return body.error;

@@ -47,7 +47,7 @@ export const app = {
   pick: (name) => name ?? (app.plant.machines.has(app.chosen) ? app.chosen : (app.plant.names[0] ?? null)),
 };
 
-// Where we are.
+// The place where we are.
 
 function place() {
   const [path, search] = location.hash.replace(/^#\/?/, "").split("?");
@@ -220,7 +220,7 @@ async function askMachines() {
 }
 setInterval(askMachines, 30000);
 
-/** Where all that we look at is offline, it may be the server that has lost its broker: then it is not the machines' fault. */
+/** Ask whether the server has lost its broker, where all that we look at is offline: then it is not the machines' fault. */
 async function askBroker() {
   const { stream, plant, view } = app,
     seen = view?.machine ? [plant.machines.get(view.machine)] : [...plant.machines.values()];

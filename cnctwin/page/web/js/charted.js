@@ -1,4 +1,4 @@
-// What can be charted of a machine, and which of its signals belong together: measured, its twin, and what is between the two.
+// The charts of a machine, and which of its signals belong together: measured, its twin, and what is between the two.
 
 import { Ring, Steps } from "./ring.js";
 import { NAMING } from "./plant.js";
@@ -122,7 +122,7 @@ export function stretches(machine, signal, from, to) {
   return series instanceof Steps ? series.stretches(from, to) : [];
 }
 
-/** Where tools came: {t, text}. */
+/** The moments at which tools came: {t, text}. */
 export function toolMarks(machine, from, to) {
   const series = machine.series.get("tool_number");
   if (!(series instanceof Steps)) return [];

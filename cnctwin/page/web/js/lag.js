@@ -1,4 +1,4 @@
-// How far behind the paint is: from the stamp of a value to the moment after the frame that shows it was painted.
+// The lag of the paint: from the stamp of a value to the moment after the frame that shows it was painted.
 // The last SAMPLES_MAX of them are kept. The browser's clock is set by the server's, see clock.js.
 
 import { serverNow } from "./clock.js";

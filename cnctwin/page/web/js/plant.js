@@ -1,4 +1,4 @@
-// What is known of each machine: the last value of each signal with its age and quality, and the last minutes of what can be drawn.
+// The state of each machine as it is known: the last value of each signal with its age and quality, and the last minutes of what can be drawn.
 
 import { serverNow } from "./clock.js";
 import { Ring, Steps } from "./ring.js";
@@ -136,7 +136,7 @@ export class Machine {
     for (const series of this.series.values()) series.hole(t);
   }
 
-  /** What a message tells of the clock that stamps: `t` the newest stamp in it. */
+  /** Note what a message tells of the clock that stamps: `t` the newest stamp in it. */
   heard(t, now) {
     if (!(t > this.lastT)) return;
     this.lastT = t;

@@ -41,7 +41,7 @@ export class Stream extends EventTarget {
     this.#connect();
   }
 
-  /** What was found out otherwise: whether the server has its broker. */
+  /** Note what was found out otherwise: whether the server has lost its broker. */
   knowBroker(isLost) {
     this.isBrokerLost = isLost;
     if (this.link === "live" || this.link === "broker") this.#say(isLost ? "broker" : "live");

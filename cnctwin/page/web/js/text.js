@@ -163,7 +163,7 @@ export const signed = (value, unit = null) =>
 export const coarse = (value) =>
   !Number.isFinite(value) ? "–" : Math.abs(value) >= 10 ? MINUS(value.toFixed(0)) : MINUS(String(Number(value.toPrecision(2))));
 
-/** How long ago, from a number of ms. */
+/** An age in words, from a number of ms. */
 export function age(ms) {
   if (!Number.isFinite(ms)) return "";
   const s = Math.max(0, ms / 1000);
@@ -195,7 +195,7 @@ export function moment(t, { seconds = true, now = Date.now() } = {}) {
     : `${at.getFullYear()}-${two(at.getMonth() + 1)}-${two(at.getDate())} ${time}`;
 }
 
-/** What a `datetime-local` field holds for a moment, and back. */
+/** A moment as a `datetime-local` field holds it, and back. */
 export const localField = (t) => {
   const at = new Date(t);
   return `${at.getFullYear()}-${two(at.getMonth() + 1)}-${two(at.getDate())}T${two(at.getHours())}:${two(at.getMinutes())}:${two(at.getSeconds())}`;

@@ -84,7 +84,7 @@ def value(text: str, name: str, **labels: str) -> float:
         ("twin_buffer_depth", {"node": "edge-vmc"}, 1.0),
         ("twin_ledger_difference", {"node": "edge-vmc"}, 1.0),
         ("twin_ledger_difference", {"node": "twin-thermal"}, 0.0),
-        ("twin_seq_gaps_total", {"layer": "mtconnect", "node": "edge-vmc"}, 3.0),
+        ("twin_seq_gaps_total", {"layer": "control", "node": "edge-vmc"}, 3.0),
         ("twin_buffer_oldest_age_seconds", {"node": "edge-vmc"}, 4.5),
         ("twin_processor_lag_seconds", {"node": "twin-thermal"}, 0.25),
         ("twin_processor_lag_events", {"node": "twin-thermal"}, 7.0),

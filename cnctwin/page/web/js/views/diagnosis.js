@@ -1,4 +1,4 @@
-// What a diagnosis.json says, in sections: the verdict, how far the gap shrank, where it lies, the causes, what cannot be told, what next.
+// A diagnosis.json in sections: the verdict, how far the gap shrank, where it lies, the causes, what cannot be told, what next.
 
 import { drawn, el, say, symbol } from "../dom.js";
 import { number, recorded, sentence, share, words } from "../text.js";

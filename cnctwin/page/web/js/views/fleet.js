@@ -112,7 +112,7 @@ export function open(app) {
     arrange();
   }
 
-  /** Which machines are shown, and in which order; moves an element only where its place is another one. */
+  /** Choose the machines that are shown, and their order; moves an element only where its place is another one. */
   function arrange() {
     const machines = [...app.plant.machines.values()];
     for (const [name, unit] of units)
@@ -197,7 +197,7 @@ export function open(app) {
     } else rearrange();
   }
 
-  // What the load was before we looked: asked for one machine after the other.
+  // The load before we looked: asked for one machine after the other.
   const stop = new AbortController(),
     filled = new Set();
   async function fill() {

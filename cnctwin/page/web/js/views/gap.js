@@ -190,7 +190,7 @@ function noDiagnosis(name, gap) {
   );
 }
 
-/** What twin and machine differ by at this moment; there before any standing gap is. */
+/** The difference of twin and machine at this moment; there before any standing gap is. */
 function nowOf(machine) {
   const host = el("p", { class: "now livedata" });
   const write = () => {

@@ -1,4 +1,4 @@
-// What happened in a stretch: from the server's events, or read off the signals where it has none. As a list and as a lane of marks.
+// The events of a stretch: from the server's events, or read off the signals where it has none. As a list and as a lane of marks.
 
 import { get, part, query } from "../api.js";
 import { el, table } from "../dom.js";

@@ -1,4 +1,4 @@
-// What a job is asked for with: its kind, then what that kind needs. Files lie below the consumer's folder, or come from here.
+// The form that asks for a job: its kind, then what that kind needs. Files lie below the consumer's folder, or come from here.
 
 import { post } from "../api.js";
 import { openAsked } from "../dialogs.js";

@@ -1,4 +1,4 @@
-// What was the case at a moment of the past: state, program, tool, gate and figures.
+// A moment of the past: state, program, tool, gate and figures.
 
 import { SCORES } from "../charted.js";
 import { el, setText } from "../dom.js";

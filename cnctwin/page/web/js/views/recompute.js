@@ -63,7 +63,7 @@ function took(found) {
   return texts.length ? el("p", { class: "note" }, texts.join(", ")) : null;
 }
 
-/** What each processor gave again. */
+/** A table of what each processor gave again. */
 function processors(ran) {
   const rows = ran.map((one) => [
     words(one.name),

@@ -7,7 +7,7 @@ import { COMMON_MODE, TOOL_CHANGE_GATE } from "../vocabulary.js";
 
 const OLD_MS = 10000;
 
-/** How old a figure is, where that is worth a word: a value that does not change is not sent again, so age alone is no fault. */
+/** The age of a figure, where that is worth a word: a value that does not change is not sent again, so age alone is no fault. */
 function agedText(machine, held) {
   if (!held || !Number.isFinite(held.t)) return "";
   const ms = machine.now() - held.t;
