@@ -8,7 +8,7 @@ import twin.effects
 from twin.effects.effect import Effect
 from twin.errors import EffectError
 
-_MECHANISM = {"effect", "catalogue"}
+_MECHANISM = {"added", "catalogue", "effect"}
 
 
 @cache

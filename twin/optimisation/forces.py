@@ -11,8 +11,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from twin.effects.added import added_effects
 from twin.effects.catalogue import effect_named
-from twin.machine import MachineFile, Tool
+from twin.machine import Tool
 from twin.optimisation.program import Cuts, Programmed
 from twin.process.kernel import process_quantities
 from twin.process.milling import Milling, milling_force, peak_force, tool_constants
@@ -42,7 +43,7 @@ class CutForces:
     @classmethod
     def of(cls, program: Programmed) -> "CutForces":
         """The forces of a program on its machine, effects included."""
-        added = process_effects(program.machine)
+        added = added_effects(program.machine, process_quantities())
         constants = {f"{e}__{k}": v for e, given in added.items() for k, v in effect_named(e).checked(given).items()}
         tool = np.array([program.lines[int(line)].tool for line in program.cuts.line], dtype=np.int64)
         named = tuple(f"tools.{n}" if str(n) in program.machine.tools else "tool" for n, _ in program.tools)
@@ -122,11 +123,6 @@ class CutForces:
         arcs = (cuts.axial_depth_mm[mine], cuts.entry_angle_rad[mine], cuts.exit_angle_rad[mine])
         motion = Milling(zero, np.full(len(mine), 60.0), advance * tool.teeth, zero, *arcs)
         return np.asarray(milling_force(constants, tool.teeth, motion, period_s=1.0, effects=self.effects).mean_tangential_n[0])
-
-
-def process_effects(machine: MachineFile) -> dict[str, Mapping[str, float]]:
-    """The effects of a machine that act on the cut."""
-    return {e.effect: e.parameters for e in machine.effects if set(effect_named(e.effect).changes) & set(process_quantities())}
 
 
 def constant_name(path: str) -> tuple[str, str]:

@@ -10,6 +10,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from twin.effects.added import added_effects
 from twin.effects.catalogue import effect_named
 from twin.machine import MachineFile
 from twin.spindle.load import spindle_constants, spindle_load_pct, spindle_quantities
@@ -34,12 +35,8 @@ class SpindlePower:
         """Return the power of a machine's spindle; None where it has no [spindle]."""
         if machine.spindle is None:
             return None
-        known = set(spindle_quantities())
-        added = {
-            e.effect: e.parameters
-            for e in machine.effects
-            if (c := set(effect_named(e.effect).changes)) & known and c <= PHYSICAL
-        }
+        changing = added_effects(machine, spindle_quantities())
+        added = {effect: given for effect, given in changing.items() if set(effect_named(effect).changes) <= PHYSICAL}
         constants = spindle_constants(machine.spindle) | {"rated_power_kw": KILOWATT_AS_PCT}
         constants |= {f"{e}__{k}": v for e, given in added.items() for k, v in effect_named(e).checked(given).items()}
         asked = machine.limits.power_kw if machine.limits is not None else None

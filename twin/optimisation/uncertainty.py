@@ -11,10 +11,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from twin.effects.added import added_effects
 from twin.effects.catalogue import effect_named
 from twin.machine import MachineFile
 from twin.optimisation.answer import Parted, Sensitivity
-from twin.optimisation.forces import CutForces, process_effects
+from twin.optimisation.forces import CutForces
+from twin.process.kernel import process_quantities
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -38,7 +40,7 @@ def uncertain_constants(machine: MachineFile, tools: tuple[str, ...] = ("tool",)
     """The constants of the cut with their uncertainty, those left out that are exact. tools: where each is described."""
     stated = machine.uncertainty
     paths = [f"{tool}.{name}" for tool in dict.fromkeys(tools) for name in TOOL_CONSTANTS]
-    for name, given in process_effects(machine).items():
+    for name, given in added_effects(machine, process_quantities()).items():
         effect = effect_named(name)
         paths += [
             f"effects.{name}.{key}" for key, value in effect.checked(given).items() if value and not key.endswith("phase_rad")

@@ -18,12 +18,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from twin.effects.added import added_effects
 from twin.effects.catalogue import effect_named
 from twin.effects.effect import On
 from twin.errors import EffectError
 from twin.heat.run import Warming, spindle_temperature_c, thermal_constants, thermal_quantities
 from twin.kernels.weave import quantities
-from twin.machine import AddedEffect, MachineFile
+from twin.machine import MachineFile
 from twin.process.kernel import process_quantities
 from twin.process.milling import Milling, milling_force, peak_force, tool_constants
 from twin.sensor.clock import looked_at, resampled, stamped
@@ -78,17 +79,6 @@ class Response:
     spread: dict[str, Floats]
 
 
-@dataclass(frozen=True, slots=True)
-class _Added:
-    """The effects of a machine by where they act, each name → parameters."""
-
-    effects: tuple[AddedEffect, ...]
-
-    def at(self, known: Mapping[str, str], on: str = "") -> dict[str, Mapping[str, float]]:
-        """Those that change one of the `known` quantities of a stage, put on `on`."""
-        return {e.effect: e.parameters for e in self.effects if e.on == on and set(effect_named(e.effect).changes) & set(known)}
-
-
 def check_effects(machine: MachineFile) -> None:
     """Raises EffectError where an effect of the machine is unknown, out of bounds, doubled, or put on what there is not."""
     seen: set[tuple[str, str]] = set()
@@ -131,7 +121,7 @@ def respond(
     Raises EffectError where the machine's effects do not fit it.
     """
     check_effects(machine)
-    chain = _Chain(machine, told, _Added(machine.effects), recorded or {}, reference_run)
+    chain = _Chain(machine, told, recorded or {}, reference_run)
     chain.axes(chain.process(), seed, courses)
     chain.heat()
     chain.sensors()
@@ -169,7 +159,6 @@ class _Chain:
 
     machine: MachineFile
     told: RunInput
-    added: _Added
     recorded: Mapping[str, Floats]
     reference_run: bool
     columns: dict[str, Floats] = field(default_factory=dict)
@@ -183,7 +172,7 @@ class _Chain:
         power_w = np.zeros(len(told.t_s))
         mean: dict[str, Floats] = {}
         if milling is not None and machine.tool is not None:
-            effects = self.added.at(process_quantities())
+            effects = added_effects(self.machine, process_quantities())
             constants = tool_constants(machine.tool) | _named(effects)
             named = tuple(effects)
             force = milling_force(
@@ -199,7 +188,7 @@ class _Chain:
             if f"force_{axis}_n" in self.recorded:
                 mean[axis] = -np.nan_to_num(self.recorded[f"force_{axis}_n"])
         if machine.spindle is not None and told.spindle_rpm is not None and told.reference_mm:
-            effects = self.added.at(spindle_quantities())
+            effects = added_effects(self.machine, spindle_quantities())
             self.columns["spindle_load_pct"] = spindle_load_pct(
                 spindle_constants(machine.spindle) | _named(effects),
                 power_w,
@@ -229,14 +218,14 @@ class _Chain:
         """One axis over all its courses."""
         period_s = self.machine.machine.servo_period_s
         base = axis_constants(self.machine.axes[letter])
-        effects = self.added.at(axis_quantities(), letter)
+        effects = added_effects(self.machine, axis_quantities(), letter)
         for name, given in effects.items():
             base |= effect_constants(effect_named(name), given, base, letter)
         replaced = _replaced(letter, self.recorded, period_s)
         return run_axes(
             {name: np.full(many, value) for name, value in base.items()},
             AxisInput(
-                np.tile(_seen_reference(reference, self.told.t_s, self.added, letter), (many, 1)),
+                np.tile(_seen_reference(reference, self.told.t_s, self.machine, letter), (many, 1)),
                 np.arange(many),
                 force if force.any() else None,
                 {name: np.tile(values, (many, 1)) for name, values in replaced.items()},
@@ -255,7 +244,7 @@ class _Chain:
         if thermal is None or load is None or told.spindle_rpm is None or told.ambient_temp_c is None:
             return
         ambient_c = float(told.ambient_temp_c[np.isfinite(told.ambient_temp_c)][0])
-        effects = self.added.at(thermal_quantities())
+        effects = added_effects(self.machine, thermal_quantities())
         self.columns["spindle_temp_c"] = spindle_temperature_c(
             thermal_constants(thermal) | _named(effects),
             Warming(told.t_s, load, told.spindle_rpm, told.ambient_temp_c, told.coolant_on),
@@ -271,11 +260,11 @@ class _Chain:
         temperature = self.columns.get("spindle_temp_c")
         rise = None if temperature is None else temperature - temperature[0]
         for name in list(self.columns):
-            effects = self.added.at(sensor_quantities(), name)
+            effects = added_effects(self.machine, sensor_quantities(), name)
             if name.endswith("_table_mm"):
-                effects |= self.added.at(sensor_quantities(), name.removesuffix("_table_mm"))
+                effects |= added_effects(self.machine, sensor_quantities(), name.removesuffix("_table_mm"))
             self.columns[name] = readings(self.columns[name], since, effects, rise, self.reference_run)
-        drifting = self.added.at(quantities((stamped,)))
+        drifting = added_effects(self.machine, quantities((stamped,)))
         if drifting and self.told.reference_mm:
             at_s = _mapped(t_s, drifting, "feedback_time_s") - t_s[0]
             for values in (self.columns, self.spread):
@@ -315,9 +304,9 @@ def _replaced(letter: str, recorded: Mapping[str, Floats], period_s: float) -> d
     return replaced
 
 
-def _seen_reference(reference: Floats, t_s: Floats, added: _Added, letter: str) -> Floats:
+def _seen_reference(reference: Floats, t_s: Floats, machine: MachineFile, letter: str) -> Floats:
     """The reference that the loop of an axis sees."""
-    effects = added.at(quantities((looked_at,)), letter)
+    effects = added_effects(machine, quantities((looked_at,)), letter)
     if not effects:
         return reference
     return resampled(reference, period_of(t_s), _mapped(t_s, effects, "reference_time_s") - t_s[0])

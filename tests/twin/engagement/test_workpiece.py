@@ -1,14 +1,12 @@
 """What is left of the stock is a value that goes from tool to tool, of a size that follows the path."""
 
-import doctest
 import math
-from types import ModuleType
 
 import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
-from twin.engagement import EngagementError, Workpiece, cut, removal, workpiece
+from twin.engagement import EngagementError, Workpiece, cut, removal
 from twin.errors import TwinError
 from twin.machine import Stock
 
@@ -122,8 +120,3 @@ def test_walls_of_too_many_pieces_are_refused(monkeypatch: pytest.MonkeyPatch) -
 def test_a_cell_has_a_size(size: float) -> None:
     with pytest.raises(EngagementError, match="cell_mm"):
         Workpiece.of(PLATE, size)
-
-
-@pytest.mark.parametrize("module", [removal, workpiece])
-def test_the_examples_are_true(module: ModuleType) -> None:
-    assert doctest.testmod(module).failed == 0

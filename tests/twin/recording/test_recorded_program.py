@@ -1,12 +1,9 @@
 """A program beside the recording of its run: what is read off it, and where it is compared."""
 
-import doctest
-
 import numpy as np
 import pytest
 
 from tests.twin.recording.made_programs import made_programs
-from twin.recording import recorded_program
 from twin.recording.recorded_program import RecordedProgram, rapid_rate_mm_min, windows
 
 
@@ -25,7 +22,3 @@ def test_windows_are_apart(made: list[RecordedProgram]) -> None:
     begin, line = windows(made[0], 1.0)
     assert np.diff(begin).min() >= 1.0
     assert np.all(np.diff(line) > 0)
-
-
-def test_the_example_is_true() -> None:
-    assert doctest.testmod(recorded_program).failed == 0

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from twin.case import Run
+from twin.effects.added import added_effects
 from twin.effects.catalogue import catalogue, effect_named
 from twin.effects.effect import Effect, Guesses, On, Recorded
 from twin.gap.diagnosis import Effected
@@ -66,8 +67,7 @@ class CutStage:
     @cached_property
     def standing(self) -> dict[str, Mapping[str, float]]:
         """Effects that the machine has already."""
-        mine = {e.name for e in acting(process_quantities()) + acting(spindle_quantities())}
-        return {e.effect: e.parameters for e in self.machine.effects if e.effect in mine}
+        return added_effects(self.machine, {*process_quantities(), *spindle_quantities()})
 
     @property
     def constants(self) -> tuple[Free, ...]:
