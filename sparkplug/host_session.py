@@ -55,6 +55,9 @@ class HostEvent(NamedTuple):
     detail: str = ""
     topic: str = ""
     payload: bytes = b""
+    names: tuple[str, ...] = ()
+    oldest_ms: int = 0
+    newest_ms: int = 0
 
 
 @dataclass(slots=True)

@@ -34,7 +34,7 @@ class Emission:
         told: dict[str, Change] = {}  # in this step: a metric may have values of several moments
         for output in outputs:
             name, value, quality, reason, _, at_s = output
-            known = told.get(name) or latest.get(name)
+            known = (told.get(name) if told else None) or latest.get(name)
             if known is not None and known[1] == value and known[3] is quality and known[4] == reason:
                 continue
             if name not in rules:
@@ -69,10 +69,11 @@ def _rules(outputs: tuple[OutputSpec, ...]) -> dict[str, tuple[OutputSpec, bool,
 
 def plain_message(processor_name: str, declared: Sequence[PlainSpec], output: PlainOutput) -> PublishPlain:
     """A plain message as it is sent. Raises OutputError where its topic is not declared: our own bug."""
-    spec = next((spec for spec in declared if output.topic.startswith(spec.prefix)), None)
-    if spec is None:
-        raise OutputError(f"{processor_name} emits {output.topic!r}, which it does not declare")
-    return PublishPlain(*output, spec.qos)
+    topic, payload, retain = output
+    for spec in declared:
+        if topic.startswith(spec.prefix):
+            return PublishPlain(topic, payload, retain, spec.qos)
+    raise OutputError(f"{processor_name} emits {topic!r}, which it does not declare")
 
 
 def _checked(spec: OutputSpec, output: Output) -> tuple[Value, Quality, str | None]:

@@ -16,6 +16,8 @@ from processors.running.counts import Counts
 from processors.running.fold import Fold, Folded
 from processors.running.lane import Lane
 from processors.running.ledger import FOLDED, DropReason, Ledger
+from processors.running.picks import Picks
+from processors.running.silences import Silences
 from processors.running.snapshot import SnapshotCodec
 from processors.running.unit import Machine, Unit
 from processors.sample import Sample, SampleKind
@@ -45,9 +47,12 @@ class Engine:
         self.ledger = Ledger()
         self.counts = Counts()
         self._processor, self._configuration = processor, configuration
-        self._inputs = processor.signals
-        self._margin_s, self._machines_max = lateness_margin_s, machines_max
+        self._picks = Picks(processor.signals, processor.wakes)
+        self._inputs = self._picks.inputs
+        self._machines_max = machines_max
         self._machines: dict[str, Machine] = {}
+        self._numbers = itertools.count()
+        self._silences = Silences(lateness_margin_s)
         self._units: dict[str, Unit] = {}
         self._changed: dict[str, None] = {}
         self._codec = SnapshotCodec(processor)
@@ -65,6 +70,11 @@ class Engine:
         """The machines, or the cells, that have a state to be kept."""
         return tuple(dict.fromkeys(machine.unit.name for machine in self._machines.values() if machine.is_online))
 
+    def unit_of(self, machine: str) -> str | None:
+        """The unit of a machine that is online; None of another."""
+        known = self._machines.get(machine)
+        return known.unit.name if known is not None and known.is_online else None
+
     # Events.
 
     def _is_message(self, event: HostEvent) -> bool:
@@ -79,13 +89,21 @@ class Engine:
     def feed(self, event: HostEvent, wall_s: float, *, has_waited: bool = False) -> list[Action]:
         """Take one event; `wall_s` is any clock that only goes forward. `has_waited`: `received` has counted it."""
         kind, node, device = event.kind, event.node, event.device
-        self._emitted_before = self.ledger.emitted
+        ledger = self.ledger
+        self._emitted_before = ledger.emitted
+        machine = self._machines.get(device) if device is not None else None
+        if event.names and machine is not None and kind is EventKind.DATA and (way := machine.ways.get(node)) is not None:
+            actions, fates = way(event, wall_s)
+            ledger.count(fates, 0 if has_waited else 1)
+            self._changed[machine.unit.name] = None
+            if not machine.live.is_awaited:
+                self._silences.watch(machine)
+            return actions
         if not self._processor.listens_to(node.node):
             self.counts.ignored += 1
             return []
         if device is None:
             return self._node_event(event)
-        machine = self._machines.get(device)
         if kind is EventKind.HOLE:  # no message
             actions = [] if machine is None else machine.live.lost(event.detail)
         else:
@@ -95,11 +113,12 @@ class Engine:
                 actions, fates = self._birth(machine, event, wall_s)
             else:
                 actions, fates = self._death(machine, event)
-            self.ledger.count(fates, 0 if has_waited else 1)
+            ledger.count(fates, 0 if has_waited else 1)
         if machine is None:
             machine = self._machines.get(device)
         if machine is not None:
             self._changed[machine.unit.name] = None
+            self._silences.watch(machine)
         return actions
 
     def overflowed(self, count: int) -> None:
@@ -132,11 +151,12 @@ class Engine:
     def silence(self, wall_s: float) -> list[Action]:
         """No event waits: give ticks up to the present, less the margin. Call it only when the queue is empty."""
         actions: list[Action] = []
-        for machine in self._machines.values():
+        for machine in self._silences.due(wall_s):
             clock_ms = machine.live.clock_ms
-            actions += machine.live.silence(wall_s, self._margin_s)
+            actions += machine.live.silence(wall_s, self._silences.margin_s)
             if machine.live.clock_ms != clock_ms:
                 self._changed[machine.unit.name] = None
+            self._silences.watch(machine)
         return actions
 
     # Snapshots.
@@ -237,7 +257,7 @@ class Engine:
 
     def _lane(self, fold: Fold, machine: str) -> Lane:
         config = self._processor.config_of(self._configuration, machine)
-        return Lane(fold, self._inputs, config, machine, self.counts)
+        return Lane(fold, self._picks, config, machine, self.counts)
 
     def _unit_name(self, machine: str) -> str:
         return self._processor.unit_of(self._configuration, machine)
@@ -250,7 +270,7 @@ class Engine:
     def _restored(self, unit: Unit, name: str) -> Machine:
         """The machine of a unit, made where there is none; only the unit knows of it."""
         if name not in unit.machines:
-            unit.machines[name] = Machine(name, unit, self._lane(unit.live, name))
+            unit.machines[name] = Machine(name, next(self._numbers), unit, self._lane(unit.live, name))
         return unit.machines[name]
 
     def _history_of(self, unit: Unit, name: str) -> Lane:
@@ -261,12 +281,19 @@ class Engine:
             machine.history = self._lane(unit.history, name)
         return machine.history
 
+    def _is_of_twin(self, node: NodeId) -> bool:
+        """Return True if the node is another processor's, whose word a reader of signals of its choice takes for no clock."""
+        return self._inputs is not None and is_twin_node(node.node)
+
     def _data(self, machine: Machine | None, event: HostEvent, wall_s: float) -> Folded:
         if machine is None or event.node not in machine.online:
             return [], (DropReason.BEFORE_BIRTH,)
+        if event.names and machine.is_online and not machine.excluded.get(event.node):
+            way = machine.ways[event.node] = machine.live.twin if self._is_of_twin(event.node) else machine.live.stream
+            return way(event, wall_s)
         readings: tuple[Reading, ...] | list[Reading] = event.readings
         inputs = self._inputs
-        is_of_twin = inputs is not None and is_twin_node(event.node.node)
+        is_of_twin = self._is_of_twin(event.node)
         excluded = machine.excluded.get(event.node)
         if excluded:
             readings = [reading for reading in readings if reading.name not in excluded]
@@ -297,8 +324,9 @@ class Engine:
             if len(self._machines) >= self._machines_max and not self._forget_one():
                 return [], (DropReason.MACHINES_MAX,)
             machine = self._joined(event.device or "")
-        is_of_twin = self._inputs is not None and is_twin_node(event.node.node)
+        is_of_twin = self._is_of_twin(event.node)
         was_online = machine.is_online
+        machine.ways.clear()
         machine.online.add(event.node)
         machine.live.born(str(event.node), event.timestamp_ms)
         taken = self._taken(machine, event)
@@ -335,6 +363,7 @@ class Engine:
         if machine is None or event.node not in machine.online:
             return [], (DropReason.ALREADY_DEAD,)
         was_online = machine.is_online
+        machine.ways.clear()
         machine.online.discard(event.node)
         names = [name for name, source in machine.owner.items() if source == event.node and name in machine.live.row]
         is_last = was_online and not machine.is_online

@@ -91,13 +91,27 @@ class Fold:
 
     def _emitted(self, outputs: Outputs, machine: str, at_ms: int) -> list[Action]:
         """All outputs of a step, or none: what is not declared raises before anything is remembered."""
+        for output in outputs:
+            if type(output) is not Output or output[4] is not None:
+                return self._several_emitted(outputs, machine, at_ms)
+        emission = self.emissions.get(machine)
+        if emission is None:  # a step of no machine, which names one without saying whose it is
+            return self._several_emitted(outputs, machine, at_ms)
+        changes = emission.news(outputs, at_ms)  # type: ignore[arg-type]
+        if not changes:
+            return []
+        emission.published(changes)
+        return [Publish(machine, tuple(changes))]
+
+    def _several_emitted(self, outputs: Outputs, machine: str, at_ms: int) -> list[Action]:
+        """Outputs of several machines, or beside Sparkplug."""
         by_machine: dict[str, list[Output]] = {}
         beside: list[Action] = []
         for output in outputs:
-            if isinstance(output, Pin):
-                beside.append(output)
-            elif isinstance(output, PlainOutput):
+            if isinstance(output, PlainOutput):
                 beside.append(plain_message(self._processor.name, self._processor.plain, output))
+            elif isinstance(output, Pin):
+                beside.append(output)
             elif (own := by_machine.get(whose := output.machine or machine)) is None:
                 by_machine[whose] = [output]
             else:

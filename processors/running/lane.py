@@ -22,7 +22,9 @@ from processors.config import ProcessorConfig
 from processors.running.counts import Counts
 from processors.running.fold import Fold, Folded
 from processors.running.ledger import FOLDED, DropReason, Fates
+from processors.running.picks import Pick, Picks
 from processors.sample import Sample, SampleKind
+from sparkplug.host_session import HostEvent
 from sparkplug.metric import Reading
 from sparkplug.quality import Quality
 
@@ -31,6 +33,7 @@ SUPERSEDED: Fates = (DropReason.SUPERSEDED,)
 HELD: Fates = ()
 _name: Callable[[Reading], str] = itemgetter(Reading._fields.index("name"))
 _timestamp_ms: Callable[[Reading], int] = itemgetter(Reading._fields.index("timestamp_ms"))
+_new = tuple.__new__  # a named tuple's own constructor costs as much as the rest of a fold
 
 
 class Lane:
@@ -43,11 +46,12 @@ class Lane:
 
     __slots__ = (
         "_anchor_ms", "_anchor_wall_s", "_counts", "_fold_in", "_gap_ms", "_held", "_inputs", "_late_ms", "_machine",
-        "_tick_ms", "_view",
-        "births", "births_are_old", "clock_ms", "emission", "fold", "is_restored", "is_silent", "last_ms", "row", "ticking",
+        "_names", "_pick", "_picks", "_tick_ms", "_view", "_wakes",
+        "births", "births_are_old", "clock_ms", "emission", "fold", "is_awaited", "is_restored", "is_silent", "last_ms", "row",
+        "ticking",
     )  # fmt: skip
 
-    def __init__(self, fold: Fold, inputs: frozenset[str] | None, config: ProcessorConfig, machine: str, counts: Counts) -> None:
+    def __init__(self, fold: Fold, picks: Picks, config: ProcessorConfig, machine: str, counts: Counts) -> None:
         self.row: dict[str, Reading] = {}
         self.fold = fold
         self.emission = fold.join(machine)
@@ -58,8 +62,10 @@ class Lane:
         self.is_restored = False
         self.births: dict[str, int] = {}
         self.births_are_old = False
+        self.is_awaited = False  # its silence is watched (processors/running/silences.py)
         self._view: Mapping[str, Reading] = MappingProxyType(self.row)
-        self._fold_in, self._inputs, self._machine = fold.take, inputs, machine
+        self._fold_in, self._inputs, self._machine, self._wakes = fold.take, picks.inputs, machine, fold.wakes
+        self._picks, self._names, self._pick = picks, (), picks.of(())
         self._counts = counts
         self._tick_ms = max(1, round(config.tick_s * 1000))
         self._gap_ms = round(config.gap_s_max * 1000)
@@ -73,6 +79,41 @@ class Lane:
         return self.fold.state
 
     # Messages.
+
+    def stream(self, event: HostEvent, wall_s: float) -> Folded:
+        """A message of the machine's own edge has come whose names and stamps are given: as `data`, by the shortest way where it
+        is the next one in time, as nearly every message is."""
+        newest_ms, clock_ms, last_ms = event.newest_ms, self.clock_ms, self.last_ms
+        if self._inputs is None:
+            self.row.update(zip(event.names, event.readings, strict=True))
+            return self._fold(SampleKind.DATA, newest_ms if clock_ms is None else clock_ms, event.names)
+        if clock_ms is None or self._held or event.oldest_ms < last_ms or newest_ms > last_ms + self._gap_ms:
+            return self.data(event.readings, wall_s)
+        actions: list[Action] | None = None
+        if newest_ms > clock_ms:
+            if self.ticking and not self.is_silent and newest_ms // self._tick_ms != clock_ms // self._tick_ms:
+                actions = self._pass_silence(newest_ms)
+            self.clock_ms = clock_ms = newest_ms
+        self.last_ms, self.is_silent = newest_ms, False
+        self._anchor_ms, self._anchor_wall_s = clock_ms, wall_s
+        pick = self.picked(event.names)
+        if pick.names:
+            self.row.update(zip(pick.names, pick.get(event.readings), strict=True))
+        if not (pick.names and pick.wakes):
+            return actions or [], FOLDED  # nothing in it for this processor but the time; or the next tick sees it
+        folded, fates = self._fold(SampleKind.DATA, clock_ms, pick.names)
+        return (actions + folded if actions else folded), fates
+
+    def twin(self, event: HostEvent, wall_s: float) -> Folded:
+        """A message of another processor has come whose names and stamps are given: mostly nothing of it is for this one."""
+        pick = self.picked(event.names)
+        return self.data(pick.get(event.readings), wall_s, is_of_twin=True) if pick.names else ([], FOLDED)
+
+    def picked(self, names: tuple[str, ...]) -> Pick:
+        """Return which of a message's readings are for this processor; the messages of one layout share the tuple of names."""
+        if names is not self._names:
+            self._names, self._pick = names, self._picks.of(names)
+        return self._pick
 
     def data(self, readings: Sequence[Reading], wall_s: float, *, is_of_twin: bool = False) -> Folded:
         """A message with changes has come. What another processor says never sets the clock back: its figures may be of a while
@@ -192,6 +233,13 @@ class Lane:
                 return self._pass_silence(now_ms)
         return []
 
+    def silent_at_s(self, margin_s: float) -> float | None:
+        """The time on the wall before which `silence` has nothing to give, as things are; None where it never has."""
+        if not (self.ticking and self._anchor_ms and self.clock_ms is not None) or self.is_silent:
+            return None
+        due_ms = min(self.clock_ms + self._tick_ms, self.last_ms + self._gap_ms + 1)
+        return self._anchor_wall_s + margin_s + (due_ms - self._anchor_ms) / 1000
+
     def _time_of(self, readings: Sequence[Reading]) -> int | None:
         """Event time of a message: its newest reading; None where it has none to believe. When time leaps, only a good value is
         believed: an UNAVAILABLE may be stamped by another clock."""
@@ -221,7 +269,7 @@ class Lane:
             return actions, FOLDED  # nothing in it for this processor, but the time
         if not (changed := self._update(readings, before_ms)):
             return actions, SUPERSEDED
-        if self.fold.wakes is not None and self.fold.wakes.isdisjoint(changed):
+        if self._wakes is not None and self._wakes.isdisjoint(changed):
             return actions, FOLDED  # the next tick sees it
         folded, fates = self._fold(SampleKind.DATA, self._now_ms(readings), changed)
         return (actions + folded if actions else folded), fates
@@ -304,5 +352,10 @@ class Lane:
         detail: str = "",
     ) -> Folded:
         fold = self.fold
-        sample = Sample(self._machine, kind, at_ms / 1000, self._view, changed, gap_s, detail, fold.is_history, fold.cell)
-        return self._fold_in(sample, at_ms)
+        return self._fold_in(
+            _new(
+                Sample,
+                (self._machine, kind, at_ms / 1000, self._view, changed, gap_s, detail, fold.is_history, fold.cell, ""),
+            ),
+            at_ms,
+        )

@@ -1,4 +1,4 @@
-"""Running processors against a broker: one thread each, until they are stopped."""
+"""Running processors against a broker until they are stopped: all of a process on one host session, in one loop."""
 
 import threading
 from collections.abc import Sequence
@@ -9,6 +9,7 @@ from processors.discovery import AnyProcessor, find, module_of
 from processors.errors import ConfigurationError, UnknownProcessorError
 from processors.running.health import node_metrics
 from processors.running.ports import Recorder
+from processors.running.runner import Runner
 from processors.running.worker import Worker
 from sparkplug.broker import BrokerAddress
 from sparkplug.edge_node import EdgeNode
@@ -16,7 +17,6 @@ from sparkplug.host import HostApplication
 from sparkplug.metric import NodeId
 from sparkplug.topics import group_filter
 
-JOIN_S_MAX = 15.0
 OTHERS = ("validation",)  # tables of the same file that are for no processor
 Configured = tuple[AnyProcessor, Configuration[ProcessorConfig]]
 
@@ -30,27 +30,36 @@ def run(
     session_dir: Path | None = None,
     recorder: Recorder | None = None,
 ) -> None:
-    """Run processors whose configuration has been checked until `stop` is set, or one of them fails, which ends all.
+    """Run processors whose configuration has been checked until `stop` is set, or one of them fails, which ends all: half a set
+    of processors is worse than none, and a supervisor can start anew.
 
     session_dir: keeps the birth/death sequence numbers over restarts; all other state is kept on the broker
     recorder: for the processor that `records`
     """
-    workers = [
-        _worker(processor, configuration, broker, group, session_dir, recorder=recorder) for processor, configuration in pairs
-    ]
-    failures: list[BaseException] = []
-    threads = [
-        threading.Thread(target=_guarded, args=(worker, stop, failures), name=pair[0].name, daemon=True)
-        for worker, pair in zip(workers, pairs, strict=True)
-    ]
-    for thread in threads:
-        thread.start()
-    while not stop.wait(0.5):
-        pass
-    for thread in threads:
-        thread.join(JOIN_S_MAX)
-    if failures:
-        raise failures[0]
+    processors = [processor for processor, _ in pairs]
+    own = [NodeId(group, processor.node) for processor in processors]
+    host = HostApplication(
+        broker,
+        host_id(processors),
+        (group_filter(group),),
+        wanted=lambda node: any(processor.listens_to(node.node) for processor in processors),
+    )
+    workers = []
+    for (processor, configuration), node in zip(pairs, own, strict=True):
+        session_file = None if session_dir is None else session_dir / f"{processor.node}.json"
+        edge = EdgeNode(broker, node, node_metrics(records=processor.records), session_file=session_file)
+        workers.append(Worker(processor, configuration, host, edge, recorder if processor.records else None))
+    Runner(host, workers).run(stop)
+
+
+def host_id(processors: Sequence[AnyProcessor]) -> str:
+    """Return the id of the host application that processors share: that of the one that records, which edges may wait for, else
+    that of the first by name. No two processes have a processor in common, so no two have the same.
+
+    >>> host_id([find("thermal"), find("mirror")]), host_id([find("alerts"), find("historian")])
+    ('twin-mirror', 'twin-historian')
+    """
+    return min(processors, key=lambda processor: (not processor.records, processor.name)).node
 
 
 def configured(names: Sequence[str], config_path: Path | None = None) -> list[Configured]:
@@ -72,28 +81,3 @@ def _check_table(table: str, config_path: Path | None) -> None:
         module_of(table)
     except UnknownProcessorError as error:
         raise ConfigurationError(f"{config_path}: [{table}]: {error}") from error
-
-
-def _worker(
-    processor: AnyProcessor,
-    configuration: Configuration[ProcessorConfig],
-    broker: BrokerAddress,
-    group: str,
-    session_dir: Path | None,
-    *,
-    recorder: Recorder | None,
-) -> Worker:
-    host = HostApplication(broker, processor.node, (group_filter(group),), wanted=lambda node: processor.listens_to(node.node))
-    session_file = None if session_dir is None else session_dir / f"{processor.node}.json"
-    edge = EdgeNode(broker, NodeId(group, processor.node), node_metrics(records=processor.records), session_file=session_file)
-    return Worker(processor, configuration, host, edge, recorder if processor.records else None)
-
-
-def _guarded(worker: Worker, stop: threading.Event, failures: list[BaseException]) -> None:
-    """A thread that fails ends all: half a set of processors is worse than none, and a supervisor can start anew."""
-    try:
-        worker.run(stop)
-    except BaseException as error:
-        failures.append(error)
-        stop.set()
-        raise

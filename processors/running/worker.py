@@ -1,17 +1,14 @@
-"""One processor at work: reads from a host application, folds, writes to an edge node. All of it in the thread that calls `run`.
+"""One processor at work: folds what it is given, writes to an edge node of its own, keeps its state on the broker.
 
-Start: subscribe to the snapshots, then publish a marker behind them: when it comes back, all retained snapshots have come. Only
-then is anything folded; what comes before waits. A machine whose edges are all offline has its twin device die (DDEATH), so that
-every reader marks its values stale by Sparkplug's own rule, and is born again with it.
+A machine whose edges are all offline has its twin device die (DDEATH), so that every reader marks its values stale by Sparkplug's
+own rule, and is born again with it.
 """
 
 import logging
 import time
-from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from threading import Event
 
 from paho.mqtt.client import topic_matches_sub
 
@@ -22,24 +19,20 @@ from processors.errors import SnapshotError
 from processors.plain_topic import topic_level
 from processors.running.engine import Engine
 from processors.running.ports import EdgePort, HostPort, Recorder
+from processors.running.saves import Saves
 from sparkplug.errors import SparkplugError
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import Change, MetricSpec
 from twin.vocabulary import topics
 
-POLL_S = 0.05
-RESTORE_S_MAX = 1.0  # to wait for the snapshots, once the broker answers
-UNBORN_S_MAX = 15.0  # for a restored machine to be born again, before it is taken for offline
-SNAPSHOT_S = 2.0
 REPORT_S = 1.0
-STALL_S = 1.0  # a longer pause of this process is no silence of the machine
-WAITING_MAX = 100_000  # events, while the snapshots are awaited
+UNBORN_S_MAX = 15.0  # for a restored machine to be born again, before it is taken for offline
 DEAD_LETTERS_A_REPORT_MAX = 10  # that are published; all are counted
 _log = logging.getLogger(__name__)
 
 
 class Worker:
-    """See the module."""
+    """See the module. `run` of a Runner calls it, always in one thread."""
 
     def __init__(
         self,
@@ -49,154 +42,108 @@ class Worker:
         edge: EdgePort,
         recorder: Recorder | None = None,
     ) -> None:
+        self.name = processor.name
         self.engine = Engine(processor, configuration)
         self._processor, self._host, self._edge, self._recorder = processor, host, edge, recorder
         self._specs: tuple[MetricSpec, ...] = tuple(spec.metric() for spec in processor.outputs)
+        self._alarms = frozenset(spec.name for spec in processor.outputs if spec.is_alarm)
         self._snapshot_prefix = topics.snapshots_of(processor.name)
         self._letter_prefix = topics.dead_letters_of(processor.name)
-        self._marker_topic = topics.marker_of(processor.name)
         self._listens = processor.listens
         self._declared: set[str] = set()
-        self._waiting: deque[HostEvent] = deque()
-        self._unsaved: dict[str, float] = {}  # unit: since when
-        self._saved: set[str] = set()
+        self._saves = Saves()
         self._letters_left = DEAD_LETTERS_A_REPORT_MAX
-        self._reported_s = self._saved_s = 0.0
-        self._is_restored = False
-        self._turned_s = time.monotonic()
-        self._patient_until_s = 0.0
         self._unborn_until_s: float | None = None
-        self._queue_dropped = self._reconnects = 0
+        self._reconnects = 0
         self._lag_s = 0.0
 
-    def run(self, stop: Event) -> None:
-        """Work until `stop` is set, then save, say goodbye and disconnect."""
-        self._host.subscribe_plain(self._snapshot_prefix + "+")
-        self._host.subscribe_plain(self._marker_topic)
-        for wanted in self._listens:
-            self._host.subscribe_plain(wanted)
+    # Its life, in this order.
+
+    def plain_filters(self) -> Iterator[str]:
+        """The plain topics that it reads: its snapshots, what the processor listens to, what the recorder keeps."""
+        yield self._snapshot_prefix + "+"
+        yield from self._listens
         if self._recorder is not None:
-            self._host.subscribe_plain(self._recorder.keeps_plain)
-        self._host.start()
+            yield self._recorder.keeps_plain
+
+    def start(self) -> None:
+        """Have the edge node begin to connect."""
         self._edge.start()
-        try:
-            if self._restore(stop):
-                self._begin(stop)
-                while not stop.is_set():
-                    self.turn()
-        finally:
-            self._close()
 
-    def turn(self) -> None:
-        """One round: what has come, else silence; then what is due."""
-        called_s = time.monotonic()
-        events = self._host.poll(POLL_S)
-        now_s = time.monotonic()
-        for event in events:
-            self._take(event, now_s)
-        if max(now_s - called_s, called_s - self._turned_s) > STALL_S:
-            self._patient_until_s = now_s + STALL_S  # we slept: what came meanwhile is still on its way to the queue
-        self._turned_s = now_s
-        if self._host.online and not self._host.queue_depth and now_s >= self._patient_until_s:
-            self._apply(self.engine.silence(now_s))
-        if self._unborn_until_s is not None and now_s >= self._unborn_until_s:
-            self._unborn_until_s = None
-            self._apply(self.engine.bury_unborn(time.time_ns() // 1_000_000))
-        if now_s - self._reported_s >= REPORT_S:
-            self._reported_s = now_s
-            self._letters_left = DEAD_LETTERS_A_REPORT_MAX
-            self._apply(self.engine.beat(time.time_ns() // 1_000_000))
-            self._note_changed(now_s)
-            self._report(now_s)
-        if now_s - self._saved_s >= SNAPSHOT_S or not self._saved.issuperset(self.engine.units):
-            # What was never saved is saved at once: what its estimate was started from would be lost for good.
-            self._saved_s = now_s
-            self._save(now_s)
-
-    # Start and end.
-
-    def _restore(self, stop: Event) -> bool:
-        """Take the retained snapshots; False where `stop` came first, and nothing is known that may be saved."""
-        marked_s: float | None = None
-        while not stop.is_set():
-            if marked_s is None and self._host.publish_plain(self._marker_topic, b"all retained snapshots have come", qos=1):
-                marked_s = time.monotonic()
-            complete = False
-            for event in self._host.poll(POLL_S):
-                if event.topic == self._marker_topic:
-                    complete = marked_s is not None
-                elif event.topic.startswith(self._snapshot_prefix):
-                    self._take_snapshot(event)
-                else:
-                    self._wait_with(event)
-            if complete:
-                return True
-            if marked_s is not None and time.monotonic() - marked_s > RESTORE_S_MAX:
-                _log.warning(
-                    "%s: the broker took more than %g s; what has come by now is all", self._processor.name, RESTORE_S_MAX
-                )
-                return True
-        return False
-
-    def _begin(self, stop: Event) -> None:
-        """Fold what has come while the snapshots were awaited."""
-        self._is_restored = True
-        self._unborn_until_s = time.monotonic() + UNBORN_S_MAX
-        self._await_edge(stop)
-        self._reconnects = self._host.reconnects
-        now_s = time.monotonic()
-        while self._waiting:
-            self._take(self._waiting.popleft(), now_s, has_waited=True)
-
-    def _await_edge(self, stop: Event) -> None:
-        """Results can go out once our own node is born; a moment's patience saves the first ones."""
-        until_s = time.monotonic() + RESTORE_S_MAX
-        while not (self._edge.online or stop.is_set() or time.monotonic() > until_s):
-            for event in self._host.poll(POLL_S):
-                self._wait_with(event)
-
-    def _wait_with(self, event: HostEvent) -> None:
-        has_room = len(self._waiting) < WAITING_MAX
-        self.engine.received(event, has_room=has_room)
-        if has_room:
-            self._waiting.append(event)
-
-    def _take_snapshot(self, event: HostEvent) -> None:
-        if not event.payload:
+    def restore(self, event: HostEvent) -> None:
+        """Take a plain message that was there before us: a retained snapshot of this processor is restored."""
+        if not event.payload or not event.topic.startswith(self._snapshot_prefix):
             return
         try:
             machine = self.engine.restore(event.payload)
         except SnapshotError as error:
-            _log.warning(
-                "%s: snapshot on %s is not restored, the state starts fresh: %s", self._processor.name, event.topic, error
-            )
+            _log.warning("%s: snapshot on %s is not restored, the state starts fresh: %s", self.name, event.topic, error)
         else:
-            _log.info("%s: restored %s", self._processor.name, machine)
+            _log.info("%s: restored %s", self.name, machine)
 
-    def _close(self) -> None:
-        now_s = time.monotonic()
-        if self._is_restored:
-            self._save(now_s)
-            for plain in self.engine.farewell(time.time_ns() // 1_000_000):
-                self._host.publish_plain(plain.topic, plain.payload, qos=1, retain=plain.retain)
+    def begin(self, now_s: float) -> None:
+        """All snapshots have come."""
+        self._unborn_until_s = now_s + UNBORN_S_MAX
+        self._reconnects = self._host.reconnects
+
+    def turn(self, now_s: float, *, is_report_due: bool) -> None:
+        """Do what is due."""
+        if self._unborn_until_s is not None and now_s >= self._unborn_until_s:
+            self._unborn_until_s = None
+            self._apply(self.engine.bury_unborn(time.time_ns() // 1_000_000))
+        if is_report_due:
+            self._letters_left = DEAD_LETTERS_A_REPORT_MAX
+            self._apply(self.engine.beat(time.time_ns() // 1_000_000))
+            self._note_changed(now_s)
             self._report(now_s)
+        self._save(self._saves.due(now_s))
+
+    def finish(self, now_s: float) -> None:
+        """Save everything, and say goodbye."""
+        self._note_changed(now_s)
+        self._save(self._saves.all())
+        for plain in self.engine.farewell(time.time_ns() // 1_000_000):
+            self._host.publish_plain(plain.topic, plain.payload, qos=1, retain=plain.retain)
+        self._report(now_s)
+
+    def stop(self) -> None:
+        """Have the edge node die and disconnect."""
         self._edge.stop()
-        self._host.stop()
 
-    # Events and actions.
+    @property
+    def online(self) -> bool:
+        """True while its node is born."""
+        return self._edge.online
 
-    def _take(self, event: HostEvent, now_s: float, *, has_waited: bool = False) -> None:
-        if event.kind is not EventKind.PLAIN:
-            if self._recorder is not None and self._processor.listens_to(event.node.node):
-                self._recorder.keep(event, time.time_ns() // 1_000_000)
-            if not self._apply(self.engine.feed(event, now_s, has_waited=has_waited)):
-                self.engine.unsent()
-            if event.device is not None:
-                self._lag_s = time.time() - event.timestamp_ms / 1000
-        elif self._recorder is not None and topic_matches_sub(self._recorder.keeps_plain, event.topic):
+    # What it is given.
+
+    def listens_to(self, node: str) -> bool:
+        """Return True if the processor reads the node."""
+        return self._processor.listens_to(node)
+
+    def take(self, event: HostEvent, now_s: float, *, has_waited: bool = False) -> None:
+        """Fold an event of a node that it reads, and send what comes of it."""
+        if self._recorder is not None:
+            self._recorder.keep(event, time.time_ns() // 1_000_000)
+        actions = self.engine.feed(event, now_s, has_waited=has_waited)
+        if actions and not self._apply(actions):
+            self.engine.unsent()
+        if event.device is not None:
+            self._lag_s = time.time() - event.timestamp_ms / 1000
+            if event.kind is EventKind.BIRTH:
+                self._press(event.device, is_new=True)
+
+    def take_plain(self, event: HostEvent) -> None:
+        """Fold a plain message, where the processor listens to its topic; keep it, where the recorder wants it."""
+        if self._recorder is not None and topic_matches_sub(self._recorder.keeps_plain, event.topic):
             self._recorder.keep(event, event.timestamp_ms)
         elif event.payload and any(topic_matches_sub(wanted, event.topic) for wanted in self._listens):
             self._apply(self.engine.plain(event.topic, event.payload, event.timestamp_ms))
+
+    def silence(self, now_s: float) -> None:
+        """Nothing waits: give the ticks of machines that are silent."""
+        if actions := self.engine.silence(now_s):
+            self._apply(actions)
 
     def _apply(self, actions: Sequence[Action]) -> bool:
         """Carry out what the engine asks; whether everything could be sent."""
@@ -218,18 +165,20 @@ class Worker:
                     self._recorder.pin(action)
             elif self._letters_left > 0:
                 self._letters_left -= 1
-                _log.warning("%s: dead letter of %s: %s", self._processor.name, action.machine, action.payload.decode())
+                _log.warning("%s: dead letter of %s: %s", self.name, action.machine, action.payload.decode())
                 self._host.publish_plain(self._letter_prefix + topic_level(action.machine), action.payload)
         return sent
 
     def _publish(self, action: Publish) -> bool:
         if action.machine not in self._declared:
             return True  # of a machine that is offline; its next birth carries what is known then
+        if self._alarms and not self._alarms.isdisjoint(change[0] for change in action.changes):
+            self._press(action.machine)
         try:
             return self._edge.publish(action.machine, action.changes)
         except SparkplugError as error:
             self.engine.counts.dead_letters += 1
-            _log.warning("%s: %s: %s", self._processor.name, action.machine, error)
+            _log.warning("%s: %s: %s", self.name, action.machine, error)
             return True
 
     # What is due.
@@ -238,26 +187,26 @@ class Worker:
         if self._host.reconnects != self._reconnects:
             self._reconnects = self._host.reconnects
             self.engine.mark_all_changed()  # a broker that was killed may have forgotten what it retained
-        for machine in self.engine.take_changed():
-            self._unsaved.setdefault(machine, now_s)
+        self._saves.changed(self.engine.take_changed(), now_s)
 
-    def _save(self, now_s: float) -> None:
-        self._note_changed(now_s)
-        for machine in list(self._unsaved):
+    def _press(self, machine: str, *, is_new: bool = False) -> None:
+        """Have the unit of a machine that is online saved before others; with `is_new` only where it never was."""
+        unit = self.engine.unit_of(machine)
+        if unit is not None and not (is_new and self._saves.is_saved(unit)):
+            self._saves.press(unit, time.monotonic())
+
+    def _save(self, units: Sequence[str]) -> None:
+        for unit in units:
             try:
-                payload = self.engine.snapshot(machine)
+                payload = self.engine.snapshot(unit)
             except KeyError:  # forgotten since
-                del self._unsaved[machine]
+                self._saves.forget(unit)
                 continue
-            if self._host.publish_plain(self._snapshot_prefix + topic_level(machine), payload, qos=1, retain=True):
-                del self._unsaved[machine]
-                self._saved.add(machine)
+            if self._host.publish_plain(self._snapshot_prefix + topic_level(unit), payload, qos=1, retain=True):
+                self._saves.saved(unit)
 
     def _report(self, now_s: float) -> None:
         ledger, counts, host = self.engine.ledger, self.engine.counts, self._host
-        overflowed = host.dropped - self._queue_dropped
-        self._queue_dropped += overflowed
-        self.engine.overflowed(overflowed)
         at_ms = time.time_ns() // 1_000_000
         self._edge.publish(None, [Change(name, count, at_ms) for name, count in ledger.metrics().items()])
         health: dict[str, int | float | str] = {
@@ -269,7 +218,7 @@ class Worker:
             "ticks": counts.ticks,
             "dead_letters": counts.dead_letters,
             "ignored": counts.ignored,
-            "snapshot_age_s": round(max((now_s - since_s for since_s in self._unsaved.values()), default=0.0), 3),
+            "snapshot_age_s": round(self._saves.age_s(now_s), 3),
             "snapshots_rejected": counts.snapshots_rejected,
             "reconnects": host.reconnects,
         }

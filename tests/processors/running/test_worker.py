@@ -12,6 +12,7 @@ import pytest
 from processors.config import Configuration
 from processors.discovery import AnyProcessor
 from processors.running.ledger import DropReason
+from processors.running.runner import Runner
 from processors.running.worker import Worker
 from processors.thermal import PROCESSOR as THERMAL
 from sparkplug.host_session import EventKind, HostEvent
@@ -113,7 +114,7 @@ def worked(processor: AnyProcessor, host: FakeHost, edge: FakeEdge | None = None
     """Run a worker until its host has nothing more."""
     edge = edge or FakeEdge()
     worker = Worker(processor, Configuration(processor.config, table), host, edge)
-    worker.run(host.until_empty())
+    Runner(host, [worker]).run(host.until_empty())
     return worker, edge
 
 
@@ -137,12 +138,13 @@ def test_it_subscribes_first_and_folds_only_after_the_snapshots_have_come() -> N
 def test_a_broker_that_never_gives_the_marker_back_costs_a_second(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr("processors.running.worker.RESTORE_S_MAX", 0.01)
-    worker = Worker(RECORDER, Configuration(RECORDER.config), FakeHost(birth(0.0, spindle_rpm=1.0), marker=False), FakeEdge())
+    monkeypatch.setattr("processors.running.runner.RESTORE_S_MAX", 0.01)
+    host = FakeHost(birth(0.0, spindle_rpm=1.0), marker=False)
+    worker = Worker(RECORDER, Configuration(RECORDER.config), host, FakeEdge())
     stop = Event()
     Timer(0.2, stop.set).start()
     with caplog.at_level(logging.WARNING):
-        worker.run(stop)
+        Runner(host, [worker]).run(stop)
     assert worker.engine.ledger.emitted == 1
     assert "what has come by now is all" in caplog.text
 
@@ -209,12 +211,12 @@ def test_after_a_reconnect_every_snapshot_is_given_again() -> None:
     host = FakeHost(birth(0.0, spindle_rpm=1.0))
     edge = FakeEdge()
     worker = Worker(RECORDER, Configuration(RECORDER.config), host, edge)
-    worker.run(host.until_empty())
+    Runner(host, [worker]).run(host.until_empty())
     host.plain.clear()
-    worker._save(0.0)
+    worker.finish(0.0)
     assert snapshots(host) == {}
     host.reconnects = 1
-    worker._save(0.0)
+    worker.finish(0.0)
     assert list(snapshots(host)) == ["cnctwin/snapshot/recorder/okuma"]
 
 
@@ -223,6 +225,6 @@ def test_a_stop_before_the_snapshots_have_come_overwrites_none() -> None:
     worker = Worker(RECORDER, Configuration(RECORDER.config), host, FakeEdge())
     stop = Event()
     stop.set()
-    worker.run(stop)
+    Runner(host, [worker]).run(stop)
     assert snapshots(host) == {}
     assert host.stopped

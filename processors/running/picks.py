@@ -1,0 +1,53 @@
+"""The readings of a message that a processor takes, found once for all messages that carry the same names."""
+
+from collections.abc import Callable, Sequence
+from operator import itemgetter
+from typing import NamedTuple
+
+from sparkplug.metric import Reading
+
+LAYOUTS_MAX = 20_000  # that are remembered; then all are forgotten, and found again
+
+
+class Pick(NamedTuple):
+    """Which readings: their names, and how to get them out of the message, in its order.
+
+    wakes: one of them is a signal whose change is folded as it comes
+    """
+
+    names: tuple[str, ...]
+    get: Callable[[Sequence[Reading]], tuple[Reading, ...]]
+    wakes: bool
+
+
+class Picks:
+    """What a processor takes of messages, by their names. `inputs` None takes everything."""
+
+    def __init__(self, inputs: frozenset[str] | None, wakes: frozenset[str] | None) -> None:
+        self.inputs, self._wakes = inputs, wakes
+        self._known: dict[tuple[str, ...], Pick] = {}
+
+    def of(self, names: tuple[str, ...]) -> Pick:
+        """Return what is taken of a message with these names."""
+        known = self._known.get(names)
+        if known is None:
+            if len(self._known) >= LAYOUTS_MAX:
+                self._known.clear()
+            known = self._known[names] = self._found(names)
+        return known
+
+    def _found(self, names: tuple[str, ...]) -> Pick:
+        inputs = self.inputs
+        places = tuple(place for place, name in enumerate(names) if inputs is None or name in inputs)
+        taken = tuple(names[place] for place in places)
+        return Pick(taken, _getter(places, len(names)), self._wakes is None or not self._wakes.isdisjoint(taken))
+
+
+def _getter(places: tuple[int, ...], count: int) -> Callable[[Sequence[Reading]], tuple[Reading, ...]]:
+    """What takes these places out of a sequence."""
+    if len(places) == count:
+        return tuple
+    if len(places) == 1:
+        (place,) = places
+        return lambda readings: (readings[place],)
+    return itemgetter(*places) if places else lambda _: ()

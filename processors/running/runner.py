@@ -1,0 +1,166 @@
+"""The loop of a process: one host session for all of its processors, each message folded by those that read it.
+
+    read what has come ──► each processor that reads its node folds it ──► send once for each connection
+
+Start: subscribe to the snapshots, then publish a marker behind them: when it comes back, all retained snapshots have come. Only
+then is anything folded; what comes before waits.
+
+The order is that of arrival. A message is folded by its readers in the order of their names, before the next one is looked at.
+What a processor of this process publishes comes to the others of it without the way over the broker (`local`), behind what had
+come already: as the broker would have sent it, had it been quick.
+"""
+
+import logging
+import time
+from collections import deque
+from collections.abc import Sequence
+from threading import Event
+
+from processors.running.ports import HostPort
+from processors.running.worker import REPORT_S, Worker
+from sparkplug.host_session import EventKind, HostEvent
+from twin.vocabulary import topics
+
+POLL_S = 0.05
+RESTORE_S_MAX = 1.0  # to wait for the snapshots, once the broker answers
+STALL_S = 1.0  # a longer pause of this process is no silence of the machine
+WAITING_MAX = 100_000  # events, while the snapshots are awaited
+_log = logging.getLogger(__name__)
+
+
+class Runner:
+    """See the module. All of it happens in the thread that calls `run`."""
+
+    def __init__(self, host: HostPort, workers: Sequence[Worker]) -> None:
+        self._host = host
+        self._workers = tuple(sorted(workers, key=lambda worker: worker.name))
+        self._names = ", ".join(worker.name for worker in self._workers)
+        self._marker_topic = topics.marker_of(self._workers[0].name)
+        self._readers: dict[str, tuple[Worker, ...]] = {}  # by node
+        self._waiting: deque[HostEvent] = deque()
+        self._is_restored = False
+        self._turned_s = time.monotonic()
+        self._reported_s = 0.0
+        self._patient_until_s = 0.0
+        self._dropped = 0
+
+    def run(self, stop: Event) -> None:
+        """Work until `stop` is set, then save, say goodbye and disconnect."""
+        for worker in self._workers:
+            for topic_filter in worker.plain_filters():
+                self._host.subscribe_plain(topic_filter)
+        self._host.subscribe_plain(self._marker_topic)
+        self._host.start()
+        for worker in self._workers:
+            worker.start()
+        try:
+            if self._restore(stop):
+                self._begin(stop)
+                while not stop.is_set():
+                    self.turn()
+        finally:
+            self._close()
+
+    def turn(self) -> None:
+        """One round: what has come, else silence; then what is due."""
+        called_s = time.monotonic()
+        events = self._host.poll(POLL_S)
+        now_s = time.monotonic()
+        for event in events:
+            self._take(event, now_s)
+        if max(now_s - called_s, called_s - self._turned_s) > STALL_S:
+            self._patient_until_s = now_s + STALL_S  # we slept: what came meanwhile is still on its way to the queue
+        self._turned_s = now_s
+        if self._host.online and not self._host.queue_depth and now_s >= self._patient_until_s:
+            for worker in self._workers:
+                worker.silence(now_s)
+        is_report_due = now_s - self._reported_s >= REPORT_S
+        if is_report_due:
+            self._reported_s = now_s
+            self._note_dropped()
+        for worker in self._workers:
+            worker.turn(now_s, is_report_due=is_report_due)
+
+    # Start and end.
+
+    def _restore(self, stop: Event) -> bool:
+        """Take the retained snapshots; False where `stop` came first, and nothing is known that may be saved."""
+        marked_s: float | None = None
+        while not stop.is_set():
+            if marked_s is None and self._host.publish_plain(self._marker_topic, b"all retained snapshots have come", qos=1):
+                marked_s = time.monotonic()
+            complete = False
+            for event in self._host.poll(POLL_S):
+                if event.topic == self._marker_topic:
+                    complete = marked_s is not None
+                    continue
+                if event.kind is EventKind.PLAIN:
+                    for worker in self._workers:
+                        worker.restore(event)
+                self._wait_with(event)  # a snapshot too: a recorder may want it
+            if complete:
+                return True
+            if marked_s is not None and time.monotonic() - marked_s > RESTORE_S_MAX:
+                _log.warning("%s: the broker took more than %g s; what has come by now is all", self._names, RESTORE_S_MAX)
+                return True
+        return False
+
+    def _begin(self, stop: Event) -> None:
+        """Fold what has come while the snapshots were awaited."""
+        self._is_restored = True
+        self._await_edges(stop)
+        now_s = time.monotonic()
+        for worker in self._workers:
+            worker.begin(now_s)
+        while self._waiting:
+            self._take(self._waiting.popleft(), now_s, has_waited=True)
+
+    def _await_edges(self, stop: Event) -> None:
+        """Results can go out once our own nodes are born; a moment's patience saves the first ones."""
+        until_s = time.monotonic() + RESTORE_S_MAX
+        while not (all(worker.online for worker in self._workers) or stop.is_set() or time.monotonic() > until_s):
+            for event in self._host.poll(POLL_S):
+                self._wait_with(event)
+
+    def _wait_with(self, event: HostEvent) -> None:
+        has_room = len(self._waiting) < WAITING_MAX
+        for worker in self._readers_of(event):
+            worker.engine.received(event, has_room=has_room)
+        if has_room:
+            self._waiting.append(event)
+
+    def _close(self) -> None:
+        if self._is_restored:
+            self._note_dropped()
+            now_s = time.monotonic()
+            for worker in self._workers:
+                worker.finish(now_s)
+        for worker in self._workers:
+            worker.stop()
+        self._host.stop()
+
+    # What has come.
+
+    def _take(self, event: HostEvent, now_s: float, *, has_waited: bool = False) -> None:
+        if event.kind is EventKind.PLAIN:
+            for worker in self._workers:
+                worker.take_plain(event)
+            return
+        for worker in self._readers_of(event):
+            worker.take(event, now_s, has_waited=has_waited)
+
+    def _readers_of(self, event: HostEvent) -> tuple[Worker, ...]:
+        """The processors that read the node of an event; they are found once for each node."""
+        node = event.node.node
+        readers = self._readers.get(node)
+        if readers is None:
+            readers = tuple(worker for worker in self._workers if worker.listens_to(node))
+            self._readers[node] = readers
+        return readers
+
+    def _note_dropped(self) -> None:
+        """What the queue in front of us has lost, each of the processors has lost."""
+        overflowed = self._host.dropped - self._dropped
+        self._dropped += overflowed
+        for worker in self._workers:
+            worker.engine.overflowed(overflowed)
