@@ -27,7 +27,21 @@ def reading(
 
 def event(kind: EventKind, at_s: float, *readings: Reading, node: NodeId = EDGE, device: str | None = "okuma") -> HostEvent:
     """An event of a machine."""
-    return HostEvent(kind, node, device, T0_MS + round(at_s * 1000), readings)
+    return named(HostEvent(kind, node, device, T0_MS + round(at_s * 1000), readings))
+
+
+def named(event: HostEvent) -> HostEvent:
+    """The event as a host session hands it out: with the names and stamps of its readings, where they are live data."""
+    if event.kind is not EventKind.DATA or not event.readings or any(reading.is_historical for reading in event.readings):
+        return event
+    stamps_ms = [reading.timestamp_ms for reading in event.readings]
+    names = tuple(reading.name for reading in event.readings)
+    return event._replace(names=names, oldest_ms=min(stamps_ms), newest_ms=max(stamps_ms))
+
+
+def unnamed(event: HostEvent) -> HostEvent:
+    """The event without names and stamps: whoever takes it has to look at each reading."""
+    return event._replace(names=(), oldest_ms=0, newest_ms=0)
 
 
 def birth(at_s: float, node: NodeId = EDGE, device: str = "okuma", **values: Any) -> HostEvent:
@@ -121,7 +135,7 @@ def wild_stream(length: int, seed: int) -> list[HostEvent]:
         kind = chance.choice(_KINDS)
         device = None if kind is EventKind.HOLE else chance.choice(("okuma", "okuma", "mazak", None))
         readings = () if kind in (EventKind.DEATH, EventKind.HOLE) else _readings(chance, at_ms)
-        stream.append(HostEvent(kind, chance.choice(_NODES), device, at_ms, readings, "detail"))
+        stream.append(named(HostEvent(kind, chance.choice(_NODES), device, at_ms, readings, "detail")))
     return stream
 
 

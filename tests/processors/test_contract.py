@@ -17,7 +17,7 @@ from processors.discovery import AnyProcessor, discover, modules, sample_configu
 from processors.running.snapshot import decode_state, encode_state
 from sparkplug.host_session import HostEvent
 from tests.depth import examples
-from tests.processors.streams import birth, data, death, engine_of, fed, wild_streams
+from tests.processors.streams import birth, data, death, engine_of, fed, unnamed, wild_streams
 from twin.vocabulary.twin_signals import TWIN_PREFIX
 
 ROOT = Path(__file__).parents[2]
@@ -96,6 +96,21 @@ def test_nothing_that_comes_crashes_it(processor: AnyProcessor, stream: list[Hos
     actions = fed(engine, *stream)
     assert [action for action in actions if isinstance(action, DeadLetter)] == []
     assert engine.ledger.balance == 0
+
+
+@every_processor
+@given(stream=wild_streams())
+@example(stream=_day())
+@quickly
+def test_given_names_are_a_shorter_way_to_the_same(processor: AnyProcessor, stream: list[HostEvent]) -> None:
+    """A host session hands out a message with the names and stamps of its readings; a replay may not have them."""
+    short, long = engine_of(processor), engine_of(processor)
+    for number, event in enumerate(stream):
+        assert repr(short.feed(event, number / 3)) == repr(long.feed(unnamed(event), number / 3))  # NaN equals itself here
+        assert repr(short.silence(number / 3)) == repr(long.silence(number / 3))
+    assert short.ledger.metrics() == long.ledger.metrics()
+    assert short.counts == long.counts
+    assert [short.snapshot(unit) for unit in short.take_changed()] == [long.snapshot(unit) for unit in long.take_changed()]
 
 
 @every_processor
