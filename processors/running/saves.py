@@ -1,15 +1,17 @@
 """Which units of a processor are saved next.
 
-What has changed is saved every two seconds while few units change; of many, so many a second, the one that has waited longest
-first. Before its turn comes a unit that was never saved, since what its estimate was started from would be lost for good, and one
-that has raised or ended an alarm, since nobody is to be told twice.
+What has changed is saved every two seconds while that is little; of much, so many bytes a second, the unit that has waited the
+longest first. Before its turn comes a unit that was never saved, since what its estimate was started from would be lost for good, and one
+that has raised or ended an alarm, since nobody is to hear of it twice.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import chain, islice, takewhile
 
 AGAIN_S = 1.0  # after which a change is saved; it is noted once a second
-A_SECOND_MAX = 20  # units of one processor
-AT_ONCE_MAX = 60
+BYTES_A_SECOND = 40_000  # of one processor: some 30 machines
+BYTES_AT_ONCE = 120_000
+AT_ONCE_MAX = 100
 
 
 class Saves:
@@ -19,7 +21,7 @@ class Saves:
         self._since_s: dict[str, float] = {}  # of each unit that is not saved as it is, in the order in which they changed
         self._pressing: dict[str, None] = {}
         self._saved: set[str] = set()
-        self._left, self._filled_s = float(AT_ONCE_MAX), 0.0
+        self._bytes_left, self._filled_s = float(BYTES_AT_ONCE), 0.0
 
     def changed(self, units: Sequence[str], now_s: float) -> None:
         """Note that units have changed since they were saved last."""
@@ -35,36 +37,36 @@ class Saves:
         """Return True if the unit was saved before."""
         return unit in self._saved
 
-    def due(self, now_s: float) -> list[str]:
-        """Return the units that are to be saved now. Each is due again until it is `saved`."""
+    def due(self, now_s: float) -> Iterator[str]:
+        """Yield the units that are to be saved now. One that is not `saved` or forgotten before the next one is due again."""
         if not self._since_s:
-            return []
-        self._left = min(self._left + (now_s - self._filled_s) * A_SECOND_MAX, float(AT_ONCE_MAX))
+            return
+        self._bytes_left = min(self._bytes_left + (now_s - self._filled_s) * BYTES_A_SECOND, float(BYTES_AT_ONCE))
         self._filled_s = now_s
-        room = int(self._left)
-        units = [*self._pressing][:room]
-        for unit, since_s in self._since_s.items():
-            if len(units) >= room or now_s - since_s < AGAIN_S:
-                break
-            if unit not in self._pressing:
-                units.append(unit)
-        self._left -= len(units)
-        return units
+        if self._bytes_left <= 0.0:
+            return
+        waited = takewhile(lambda unit: now_s - self._since_s[unit] >= AGAIN_S, self._since_s)
+        for unit in list(dict.fromkeys(islice(chain(self._pressing, waited), AT_ONCE_MAX))):
+            if self._bytes_left <= 0.0:
+                return
+            yield unit
 
     def all(self) -> list[str]:
         """Return all units that are not saved as they are."""
         return list(self._since_s)
 
-    def saved(self, unit: str) -> None:
-        """Note that a unit is saved as it is."""
+    def saved(self, unit: str, size: int) -> None:
+        """Note that a unit is saved as it is, in so many bytes."""
+        self._bytes_left -= size
         self._saved.add(unit)
         self._since_s.pop(unit, None)
         self._pressing.pop(unit, None)
 
     def forget(self, unit: str) -> None:
         """Note that a unit is no more."""
-        self.saved(unit)
         self._saved.discard(unit)
+        self._since_s.pop(unit, None)
+        self._pressing.pop(unit, None)
 
     def age_s(self, now_s: float) -> float:
         """Return for how long the oldest change has not been saved, s."""

@@ -6,7 +6,7 @@ own rule, and is born again with it.
 
 import logging
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
@@ -195,7 +195,7 @@ class Worker:
         if unit is not None and not (is_new and self._saves.is_saved(unit)):
             self._saves.press(unit, time.monotonic())
 
-    def _save(self, units: Sequence[str]) -> None:
+    def _save(self, units: Iterable[str]) -> None:
         for unit in units:
             try:
                 payload = self.engine.snapshot(unit)
@@ -203,7 +203,7 @@ class Worker:
                 self._saves.forget(unit)
                 continue
             if self._host.publish_plain(self._snapshot_prefix + topic_level(unit), payload, qos=1, retain=True):
-                self._saves.saved(unit)
+                self._saves.saved(unit, len(payload))
 
     def _report(self, now_s: float) -> None:
         ledger, counts, host = self.engine.ledger, self.engine.counts, self._host

@@ -1,8 +1,10 @@
 """Which units are saved, and when."""
 
-import itertools
+from itertools import pairwise
 
-from processors.running.saves import A_SECOND_MAX, AT_ONCE_MAX, Saves
+from processors.running.saves import BYTES_A_SECOND, BYTES_AT_ONCE, Saves
+
+SIZE = 2000
 
 
 def run(saves: Saves, units: list[str], seconds: int) -> list[tuple[float, str]]:
@@ -13,7 +15,7 @@ def run(saves: Saves, units: list[str], seconds: int) -> list[tuple[float, str]]
         if tenth % 10 == 0:
             saves.changed(units, now_s)
         for unit in saves.due(now_s):
-            saves.saved(unit)
+            saves.saved(unit, SIZE)
             log.append((tenth / 10, unit))
     return log
 
@@ -22,38 +24,44 @@ def test_few_units_are_saved_every_two_seconds() -> None:
     log = run(Saves(), ["a", "b"], 20)
     times = [at_s for at_s, unit in log if unit == "a"]
     assert len(times) == 10
-    assert {round(later - earlier, 6) for earlier, later in itertools.pairwise(times)} == {2.0}
+    assert {round(later - earlier, 6) for earlier, later in pairwise(times)} == {2.0}
 
 
-def test_of_many_units_each_has_its_turn_and_so_many_a_second_are_saved() -> None:
+def test_of_many_units_each_has_its_turn_and_so_many_bytes_a_second_are_saved() -> None:
     units = [f"machine {number}" for number in range(200)]
     seconds = 60
     log = run(Saves(), units, seconds)
-    assert len(log) <= seconds * A_SECOND_MAX + AT_ONCE_MAX
-    ages_s = [later - earlier for unit in units for earlier, later in _pairs([at_s for at_s, name in log if name == unit])]
-    assert max(ages_s) <= len(units) / A_SECOND_MAX + 2.0
+    assert seconds * BYTES_A_SECOND * 0.9 <= len(log) * SIZE <= seconds * BYTES_A_SECOND + BYTES_AT_ONCE + SIZE
+    ages_s = [later - earlier for unit in units for earlier, later in pairwise([at_s for at_s, name in log if name == unit])]
+    assert max(ages_s) <= len(units) * SIZE / BYTES_A_SECOND + 2.0
 
 
-def _pairs(times: list[float]) -> list[tuple[float, float]]:
-    return list(itertools.pairwise(times))
+def test_a_unit_that_is_larger_than_all_that_may_be_saved_at_once_is_saved_all_the_same_and_waits_longer() -> None:
+    saves, times = Saves(), []
+    for second in range(120):
+        saves.changed(["cell"], float(second))
+        for unit in saves.due(float(second)):
+            saves.saved(unit, 5 * BYTES_AT_ONCE)
+            times.append(second)
+    assert {later - earlier for earlier, later in pairwise(times)} <= {13, 14, 15, 16}
+    assert len(times) >= 7
 
 
 def test_what_presses_comes_first_and_at_once() -> None:
     saves = Saves()
     saves.changed([f"machine {number}" for number in range(500)], 0.0)
-    while saves.due(100.0):
-        for unit in saves.due(100.0):
-            saves.saved(unit)
+    for unit in saves.due(100.0):
+        saves.saved(unit, SIZE)
     saves.press("alarmed", 100.5)
-    assert saves.due(100.5)[0] == "alarmed"
+    assert next(saves.due(100.5)) == "alarmed"
 
 
 def test_what_could_not_be_saved_is_due_again_and_its_age_is_known() -> None:
     saves = Saves()
     saves.changed(["a"], 10.0)
-    assert (saves.due(12.0), saves.due(13.0), saves.age_s(13.0)) == (["a"], ["a"], 3.0)
-    saves.saved("a")
-    assert (saves.due(14.0), saves.age_s(14.0), saves.is_saved("a")) == ([], 0.0, True)
+    assert (list(saves.due(12.0)), list(saves.due(13.0)), saves.age_s(13.0)) == (["a"], ["a"], 3.0)
+    saves.saved("a", SIZE)
+    assert (list(saves.due(14.0)), saves.age_s(14.0), saves.is_saved("a")) == ([], 0.0, True)
     saves.forget("a")
     assert not saves.is_saved("a")
 
