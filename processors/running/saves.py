@@ -1,8 +1,8 @@
 """Which units of a processor are saved next.
 
 What has changed is saved every two seconds while that is little; of much, so many bytes a second, the unit that has waited the
-longest first. Before its turn comes a unit that was never saved, since what its estimate was started from would be lost for good, and one
-that has raised or ended an alarm, since nobody is to hear of it twice.
+longest first. Before its turn comes a unit that was never saved, since what its estimate was started from would be lost for
+good, and one that has raised or ended an alarm, since nobody is to hear of it twice.
 """
 
 from collections.abc import Iterator, Sequence
