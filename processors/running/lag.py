@@ -22,16 +22,17 @@ class Lag:
 
     def __init__(self, now_s: float, cpu_s: float) -> None:
         self.folded_s = self.published_s = self.busy_pct = 0.0  # of the last report
+        self.caught_up_s = now_s  # when nothing was seen to wait
         self._ages_s: dict[str, float] = {}  # of the last message of each node since the last report
         self._usual_s: dict[str, float] = {}
-        self._caught_up_s = self._reported_s = now_s
+        self._reported_s = now_s
         self._cpu_s = cpu_s
         self._unpublished_s: float | None = None  # since when
         self._held_s = 0.0
 
     def caught_up(self, now_s: float) -> None:
         """Note that reading has found nothing that waited, while the broker was connected."""
-        self._caught_up_s = now_s
+        self.caught_up_s = now_s
 
     def folded(self, node: str, stamp_ms: int, now_s: float) -> None:
         """Note a message of an edge that was folded; none that is history, or was stamped by anybody else."""
@@ -48,7 +49,7 @@ class Lag:
 
     def report(self, now_s: float, cpu_s: float) -> None:
         """Work out the figures of the time since the last report; call it about once a second."""
-        behind_s_max = now_s - self._caught_up_s
+        behind_s_max = now_s - self.caught_up_s
         is_caught_up = behind_s_max <= CAUGHT_UP_S
         for node, age_s in self._ages_s.items():
             if is_caught_up:

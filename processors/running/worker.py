@@ -6,6 +6,8 @@ every reader marks its values stale by Sparkplug's own rule, and is born again w
 """
 
 import logging
+import os
+import socket
 import time
 from collections import deque
 from collections.abc import Sequence
@@ -19,18 +21,24 @@ from processors.actions import Action, Declare, Pin, Publish, PublishPlain, Remo
 from processors.config import Configuration, ProcessorConfig
 from processors.discovery import AnyProcessor
 from processors.errors import SnapshotError
+from processors.lag_report import SPOKEN_OF_S, LagReport, topic_of
 from processors.plain_topic import topic_level
 from processors.running.engine import Engine
+from processors.running.lag import Lag
 from processors.running.ports import EdgePort, HostPort, Recorder
 from sparkplug.errors import SparkplugError
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import Change, MetricSpec
 from twin.vocabulary import topics
+from twin.vocabulary.nodes import is_twin_node
 
+PROCESS = f"{socket.gethostname()}:{os.getpid()}"
 POLL_S = 0.05
 RESTORE_S_MAX = 1.0  # to wait for the snapshots, once the broker answers
 UNBORN_S_MAX = 15.0  # for a restored machine to be born again, before it is taken for offline
 SNAPSHOT_S = 2.0
+PROBE_EVERY_S = 0.5  # a busy processor looks so often whether anything waits ...
+PROBE_S = 0.001  # ... for so long
 REPORT_S = 1.0
 STALL_S = 1.0  # a longer pause of this process is no silence of the machine
 WAITING_MAX = 100_000  # events, while the snapshots are awaited
@@ -67,7 +75,8 @@ class Worker:
         self._patient_until_s = 0.0
         self._unborn_until_s: float | None = None
         self._queue_dropped = self._reconnects = 0
-        self._lag_s = 0.0
+        self._lag = Lag(self._turned_s, time.process_time())
+        self._speaks_of_lag = False
 
     def run(self, stop: Event) -> None:
         """Work until `stop` is set, then save, say goodbye and disconnect."""
@@ -92,8 +101,16 @@ class Worker:
         called_s = time.monotonic()
         events = self._host.poll(POLL_S)
         now_s = time.monotonic()
+        if events and now_s - self._lag.caught_up_s > PROBE_EVERY_S and not self._host.queue_depth:
+            more = self._host.poll(PROBE_S)
+            events, now_s = events + more, time.monotonic()
+        else:
+            more = events
+        if not more and self._host.online:
+            self._lag.caught_up(now_s)
         for event in events:
             self._take(event, now_s)
+        self._lag.published(time.monotonic())
         if max(now_s - called_s, called_s - self._turned_s) > STALL_S:
             self._patient_until_s = now_s + STALL_S  # we slept: what came meanwhile is still on its way to the queue
         self._turned_s = now_s
@@ -191,8 +208,9 @@ class Worker:
                 self._recorder.keep(event, time.time_ns() // 1_000_000)
             if not self._apply(self.engine.feed(event, now_s, has_waited=has_waited)):
                 self.engine.unsent()
-            if event.device is not None:
-                self._lag_s = time.time() - event.timestamp_ms / 1000
+            is_of_edge = event.kind is EventKind.DATA and not is_twin_node(event.node.node)
+            if is_of_edge and not any(reading.is_historical for reading in event.readings):
+                self._lag.folded(event.node.node, event.timestamp_ms, time.monotonic())
         elif self._recorder is not None and topic_matches_sub(self._recorder.keeps_plain, event.topic):
             self._recorder.keep(event, event.timestamp_ms)
         elif event.payload and any(topic_matches_sub(wanted, event.topic) for wanted in self._listens):
@@ -260,9 +278,13 @@ class Worker:
         self.engine.overflowed(overflowed)
         at_ms = time.time_ns() // 1_000_000
         self._edge.publish(None, [Change(name, count, at_ms) for name, count in ledger.metrics().items()])
+        lag = self._report_lag(now_s, at_ms)
         health: dict[str, int | float | str] = {
-            "machines": len(self.engine.machines),
-            "lag_s": round(self._lag_s, 3),
+            "machines": lag.machines,
+            "lag_s": round(self._lag.folded_s, 3),
+            "published_lag_s": lag.lag_s,
+            "busy_pct": lag.busy_pct,
+            "process": lag.process,
             "queue_depth": host.queue_depth,
             "holes": counts.holes,
             "late": counts.late,
@@ -277,6 +299,21 @@ class Worker:
             self._give_receipts(self._recorder, at_ms)
             health |= self._recorder.health()
         self._edge.publish(None, [Change(f"health/{name}", value, at_ms) for name, value in health.items()])
+
+    def _report_lag(self, now_s: float, at_ms: int) -> LagReport:
+        """Work out the lag, and say it where somebody should know. The alerts of this process hear of it without the way over the
+        broker, on which it would come late."""
+        self._lag.report(now_s, time.process_time())
+        lag_s, busy_pct = round(self._lag.published_s, 3), round(self._lag.busy_pct, 1)
+        report = LagReport((self._processor.name,), PROCESS, at_ms, lag_s, len(self.engine.machines), busy_pct)
+        speaks = lag_s >= SPOKEN_OF_S
+        if speaks or self._speaks_of_lag:
+            topic, payload = topic_of(self._processor.name), report.payload()
+            self._host.publish_plain(topic, payload)
+            if any(topic_matches_sub(wanted, topic) for wanted in self._listens):
+                self._apply(self.engine.plain(topic, payload, at_ms))
+        self._speaks_of_lag = speaks
+        return report
 
     def _give_receipts(self, recorder: Recorder, at_ms: int) -> None:
         """Tell the edges that wait for it what is kept."""
