@@ -1,12 +1,14 @@
 """`cnctwin doctor`: is everything connected, in order and accounted for?"""
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from cnctwin.plant.view import StageLedger, health, ledgers, machines
+from cnctwin.plant.lags import lag_reports
+from cnctwin.plant.view import StageLedger, health, ledgers, machines, own_values
 from cnctwin.plant.watch import viewer
+from processors.lag_report import BEHIND_S, LagReport
 from sparkplug.broker import BrokerAddress
 from sparkplug.host import HostApplication
 from sparkplug.metric import Reading
@@ -87,10 +89,36 @@ def diagnose(host: HostApplication, url: str) -> Report:
             if isinstance(count, int) and count:
                 findings.append(Finding(True, f"{node_id}: {count} {name.replace('_', ' ')} so far, counted"))
         findings += of_store(node_id, metrics)
+        findings += of_edge_store(node_id, metrics)
+    findings += of_lags(lag_reports(own_values(host)))
     counts = host.counts
     order = f"{counts.get('lost', 0)} messages lost, {counts.get('malformed', 0)} malformed while listening"
     findings.append(Finding(not counts.get("lost") and not counts.get("malformed"), order))
     return Report(tuple(findings), tuple(stages))
+
+
+def of_lags(reports: Sequence[LagReport]) -> list[Finding]:
+    """Return a finding for each process of processors: how far it is behind, or that it is in time."""
+    return [
+        Finding(False, report.sentence)
+        if report.lag_s >= BEHIND_S
+        else Finding(
+            True,
+            f"processors are in time: {report.lag_s:.1f} s behind, {report.machines} machines, one core, "
+            f"{report.busy_pct:.0f} % busy ({', '.join(report.processors)})",
+        )
+        for report in reports
+    ]
+
+
+def of_edge_store(node_id: str, metrics: Mapping[str, Reading]) -> list[Finding]:
+    """Return the finding that an edge has rows in its store that it has not sent yet; nothing where they are of this moment."""
+    waiting, age = (metrics[name].value if name in metrics else None for name in ("store_waiting_rows", "store_age_s"))
+    if not isinstance(waiting, int) or not isinstance(age, float) or not waiting or age < BEHIND_S:
+        return []
+    return [
+        Finding(False, f"{node_id} is {age:.0f} s behind: {waiting} rows of its store are not sent yet; they follow as history")
+    ]
 
 
 def of_store(node_id: str, metrics: Mapping[str, Reading]) -> list[Finding]:

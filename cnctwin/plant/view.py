@@ -6,6 +6,7 @@ from typing import Protocol
 from sparkplug.metric import NodeId, Reading
 from sparkplug.node_picture import NodePicture
 from sparkplug.quality import Quality
+from sparkplug.values import Value
 from twin.vocabulary.node_ledger import BUFFERED, DROPPED, DROPPED_PREFIX, EMITTED, LEDGER_PREFIX, RECEIVED
 from twin.vocabulary.nodes import JOBS_NODE, is_twin_node
 from twin.vocabulary.twin_signals import TWIN_PREFIX
@@ -102,6 +103,15 @@ def health(pictures: Pictures) -> dict[str, dict[str, Reading]]:
         picture.node.node: {n.removeprefix("health/"): r for n, r in picture.own.readings.items() if n.startswith("health/")}
         for picture in _pictures(pictures)
     }
+
+
+def own_values(pictures: Pictures) -> list[tuple[str, dict[str, Value]]]:
+    """Each node that is online, with the values of its own metrics."""
+    return [
+        (picture.node.node, {name: reading.value for name, reading in picture.own.readings.items()})
+        for picture in _pictures(pictures)
+        if picture.online
+    ]
 
 
 def text(reading: Reading | None) -> str:

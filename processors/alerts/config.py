@@ -11,12 +11,13 @@ from processors.alerts.quiet import QuietHours
 from processors.alerts.receivers import AnyReceiver, Escalation, Heartbeat
 from processors.alerts.state import Severity
 from processors.config import CellConfig
+from processors.lag_report import BEHIND_S
 from twin.vocabulary import twin_signals
 
 RULES = twin_signals.RULES
 SCORE = twin_signals.ANOMALY_ALARM
 GAP, DRIFT = twin_signals.GAP_GROWING, twin_signals.SCORE_DRIFT
-MACHINE_OFFLINE, SOURCE_LOST = "machine_offline", "alarm_source_lost"
+MACHINE_OFFLINE, SOURCE_LOST, PROCESSORS_BEHIND = "machine_offline", "alarm_source_lost", "processors_behind"
 RECEIVERS_MAX = 20
 ROUTES_MAX = 100
 _NAME = re.compile(r"[A-Za-z0-9_-]{1,32}")
@@ -39,6 +40,23 @@ class Rule(BaseModel):
     for_s: float = Field(default=0.0, ge=0.0, le=86_400.0)
     keep_firing_for_s: float = Field(default=60.0, ge=0.0, le=86_400.0)
     raised_by_rule: bool = False
+
+
+class LagRule(Rule):
+    """The rule of processors that fall behind.
+
+    behind_s: the alarm begins where a process is so late
+    caught_up_s: it is gone where all are less late than this
+    """
+
+    behind_s: float = Field(default=BEHIND_S, ge=1.0, le=86_400.0)
+    caught_up_s: float = Field(default=2.0, ge=1.0, le=86_400.0)
+
+    @model_validator(mode="after")
+    def _ends_below_where_it_begins(self) -> Self:
+        if self.caught_up_s > self.behind_s:
+            raise ValueError(f"caught_up_s {self.caught_up_s:g} has to be at most behind_s {self.behind_s:g}")
+        return self
 
 
 NAMED = {
@@ -74,6 +92,7 @@ class AlertsConfig(CellConfig):
     signals: dict[str, Rule] = Field(default_factory=_signals)
     machine_offline: Rule | None = Rule(severity=Severity.MEDIUM, for_s=60.0)
     alarm_source_lost: Rule | None = Rule(severity=Severity.MEDIUM, for_s=120.0)
+    processors_behind: LagRule | None = LagRule(severity=Severity.MEDIUM, for_s=30.0)
     labels: dict[str, str] = Field(default_factory=dict)
     group_by: Literal["machine", "all"] = "machine"
     group_wait_s: float = Field(default=10.0, ge=0.0, le=3600.0)
@@ -133,7 +152,12 @@ class AlertsConfig(CellConfig):
         """The rule of an alert; None where it is not watched (any more)."""
         if signal:
             return self.signals.get(signal)
-        return {MACHINE_OFFLINE: self.machine_offline, SOURCE_LOST: self.alarm_source_lost}.get(name)
+        rules = {
+            MACHINE_OFFLINE: self.machine_offline,
+            SOURCE_LOST: self.alarm_source_lost,
+            PROCESSORS_BEHIND: self.processors_behind,
+        }
+        return rules.get(name)
 
 
 def _receivers_of(route: Route) -> tuple[str, ...]:

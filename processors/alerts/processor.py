@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from processors.alarms import alarm_signals
+from processors.alerts import lag
 from processors.alerts.body import Notice
 from processors.alerts.config import AlertsConfig
 from processors.alerts.messages import COMMAND, DELIVERY, OUTBOX, TOPIC, taken
@@ -20,6 +21,7 @@ from processors.alerts.watch import INPUTS, next_beat, watched
 from processors.config import Configuration
 from processors.contract import CellProcessor, Output, OutputSpec, PlainOutput, PlainSpec, Provenance, Sample, SampleKind
 from sparkplug.datatype import DataType
+from twin.vocabulary.topics import LAG
 
 HEARTBEAT = "heartbeat"
 PULSES_MAX = 5000
@@ -35,6 +37,8 @@ def step(
     if sample.kind is SampleKind.BEAT:
         return _beat(configuration, state, sample)
     if sample.kind is SampleKind.PLAIN:
+        if sample.topic.startswith(LAG):
+            return lag.heard(state, sample.topic, sample.detail, sample.at_s), ()
         known = state if state.wall_s else replace(state, wall_s=sample.at_s)
         return taken(configuration.default, known, sample.topic, sample.detail), ()
     if sample.kind in (SampleKind.DATA, SampleKind.BIRTH):
@@ -81,7 +85,7 @@ def _beaten(config: AlertsConfig, state: AlertsState) -> AlertsState:
 
 PROCESSOR = CellProcessor(
     name="alerts",
-    version=1,
+    version=2,
     inputs=INPUTS,
     alarms=alarm_signals,
     outputs=(
@@ -98,6 +102,6 @@ PROCESSOR = CellProcessor(
     state=AlertsState,
     initial=lambda _: AlertsState(),
     step=step,
-    listens=(f"{COMMAND}#", f"{DELIVERY}+", f"{OUTBOX}+"),
+    listens=(f"{COMMAND}#", f"{DELIVERY}+", f"{OUTBOX}+", f"{LAG}+"),
     beats=True,
 )

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from hashlib import sha256
 
+from processors.lag_report import LagReport
+
 ALERTS_MAX = 5000
 OUTBOX_MAX = 1000
 SETTLED_MAX = 5000
@@ -180,6 +182,14 @@ class CommandOutcome:
 
 
 @dataclass(frozen=True, slots=True)
+class HeardLag:
+    """What a processor reported of its lag, and when it was heard (UTC)."""
+
+    heard_s: float
+    report: LagReport
+
+
+@dataclass(frozen=True, slots=True)
 class AlertsState:
     """All of it."""
 
@@ -188,6 +198,7 @@ class AlertsState:
     machines: dict[str, float] = field(default_factory=dict)  # UTC when last seen online
     deaths: dict[str, int] = field(default_factory=dict)  # event time of the last death, ms
     pulses: dict[str, int] = field(default_factory=dict)  # alarms that stood for a moment since the last beat
+    lags: dict[str, HeardLag] = field(default_factory=dict)  # by processor, of those that are behind
     alerts: dict[str, Alert] = field(default_factory=dict)
     receivers: dict[str, ReceiverState] = field(default_factory=dict)
     outbox: dict[str, Item] = field(default_factory=dict)

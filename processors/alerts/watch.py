@@ -1,10 +1,12 @@
 """The watch over all machines: from their rows to their alerts, once a beat."""
 
+import itertools
 from collections.abc import Iterator, Mapping, Set
 from dataclasses import replace
 from typing import NamedTuple
 
-from processors.alerts.config import MACHINE_OFFLINE, NAMED, RULES, SOURCE_LOST, AlertsConfig, Rule
+from processors.alerts import lag
+from processors.alerts.config import MACHINE_OFFLINE, NAMED, PROCESSORS_BEHIND, RULES, SOURCE_LOST, AlertsConfig, Rule
 from processors.alerts.phases import Beat, Condition, advanced, begun, condition_of, raised
 from processors.alerts.state import ALERTS_MAX, Alert, AlertsState, Phase, Severity, fingerprint, labels_of
 from processors.config import Configuration
@@ -24,13 +26,14 @@ Row = Mapping[str, Reading]
 
 
 class Watched(NamedTuple):
-    """One thing that may be an alert, as it stands now."""
+    """One thing that may be an alert, as it stands now; `context`: what there is to say of it, if not what the machine does."""
 
     machine: str
     name: str
     signal: str
     rule: Rule
     condition: Condition
+    context: str = ""
 
 
 def next_beat(state: AlertsState, wall_s: float) -> Beat:
@@ -45,7 +48,10 @@ def watched(configuration: Configuration[AlertsConfig], state: AlertsState, cell
     known = {(alert.machine, alert.name): alert for alert in state.alerts.values()}
     alerts: dict[str, Alert] = {}
     overflowed = state.overflowed
-    for one in _all(configuration, machines, state, cell, known.keys()):
+    everything = itertools.chain(
+        _all(configuration, machines, state, cell, known.keys()), _processors(configuration.default, state, beat, known)
+    )
+    for one in everything:
         config = configuration.of(one.machine)
         before = alert = known.pop((one.machine, one.name), None)
         if before is not None:
@@ -54,7 +60,10 @@ def watched(configuration: Configuration[AlertsConfig], state: AlertsState, cell
             alert = begun(_fresh(one, config), one.rule, one.condition, beat)
         else:
             overflowed += 1
-        if alert is not None and (before is None or before.episode != alert.episode):
+        if alert is not None and one.context:
+            if before is None or before.phase is not alert.phase:
+                alert = replace(alert, context=one.context)
+        elif alert is not None and (before is None or before.episode != alert.episode):
             alert = replace(alert, context=_context(cell.get(one.machine, {})))
         if alert is not None and _is_remembered(alert, state, beat, config):
             alerts[alert.fingerprint] = alert
@@ -69,6 +78,7 @@ def watched(configuration: Configuration[AlertsConfig], state: AlertsState, cell
         machines=machines,
         deaths={machine: at_ms for machine, at_ms in state.deaths.items() if machine in machines and machine not in cell},
         pulses={},
+        lags=lag.without_old(state.lags, beat.wall_s),
         alerts=_raised(configuration, alerts, cell, beat),
         overflowed=overflowed,
     )
@@ -116,6 +126,20 @@ def _all(
             lost = _source(config, row)
             if lost.stands or (machine, SOURCE_LOST) in known:
                 yield Watched(machine, SOURCE_LOST, "", config.alarm_source_lost, lost)
+
+
+def _processors(
+    config: AlertsConfig, state: AlertsState, beat: Beat, known: Mapping[tuple[str, str], Alert]
+) -> Iterator[Watched]:
+    """Yield the one alert of all processors that are behind."""
+    rule, before = config.processors_behind, known.get((lag.PLANT, PROCESSORS_BEHIND))
+    if rule is None:
+        return
+    condition, sentence = lag.condition_of(
+        state, beat, rule.caught_up_s if before is not None and before.is_on else rule.behind_s
+    )
+    if condition.stands or before is not None:
+        yield Watched(lag.PLANT, PROCESSORS_BEHIND, "", rule, condition, sentence)
 
 
 def _source(config: AlertsConfig, row: Row | None) -> Condition:

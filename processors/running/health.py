@@ -6,7 +6,13 @@ from sparkplug.metric import MetricSpec
 
 HEALTH = (
     MetricSpec("health/machines", DataType.INT64, properties={"meaning": "machines online"}),
-    MetricSpec("health/lag_s", DataType.DOUBLE, unit="s", properties={"meaning": "age of the last message when it was folded"}),
+    MetricSpec(
+        "health/lag_s", DataType.DOUBLE, unit="s", properties={"meaning": "how late messages are folded (running/lag.py)"}
+    ),
+    MetricSpec("health/published_lag_s", DataType.DOUBLE, unit="s", properties={"meaning": "how late results are handed on"}),
+    MetricSpec("health/busy_pct", DataType.DOUBLE, unit="%", properties={"meaning": "CPU time of the process; 100 is a core"}),
+    MetricSpec("health/process", DataType.STRING, properties={"meaning": "same text: processors that share a process"}),
+    MetricSpec("health/processors", DataType.INT64, properties={"meaning": "processors that share this process"}),
     MetricSpec("health/queue_depth", DataType.INT64, properties={"meaning": "messages behind the network thread"}),
     MetricSpec("health/holes", DataType.INT64, properties={"meaning": "times that messages are missing, or event time jumped"}),
     MetricSpec("health/late", DataType.INT64, properties={"meaning": "messages behind the machine's clock, folded all the same"}),

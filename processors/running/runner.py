@@ -11,17 +11,27 @@ come already: as the broker would have sent it, had it been quick.
 """
 
 import logging
+import os
+import socket
 import time
 from collections import deque
 from collections.abc import Sequence
 from threading import Event
 
+from processors.lag_report import SPOKEN_OF_S, LagReport, topic_of
+from processors.running.lag import Lag
 from processors.running.ports import HostPort
-from processors.running.worker import REPORT_S, Worker
+from processors.running.worker import Shared, Worker
 from sparkplug.host_session import EventKind, HostEvent
+from sparkplug.metric import NodeId
 from twin.vocabulary import topics
+from twin.vocabulary.nodes import is_twin_node
 
+PROCESS = f"{socket.gethostname()}:{os.getpid()}"
 POLL_S = 0.05
+PROBE_EVERY_S = 0.5  # a busy process looks so often whether anything waits ...
+PROBE_S = 0.001  # ... for so long
+REPORT_S = 1.0
 RESTORE_S_MAX = 1.0  # to wait for the snapshots, once the broker answers
 STALL_S = 1.0  # a longer pause of this process is no silence of the machine
 WAITING_MAX = 100_000  # events, while the snapshots are awaited
@@ -40,6 +50,8 @@ class Runner:
         self._waiting: deque[HostEvent] = deque()
         self._is_restored = False
         self._turned_s = time.monotonic()
+        self._lag = Lag(self._turned_s, time.process_time())
+        self._speaks_of_lag = False
         self._reported_s = 0.0
         self._patient_until_s = 0.0
         self._dropped = 0
@@ -64,22 +76,35 @@ class Runner:
     def turn(self) -> None:
         """One round: what has come, else silence; then what is due."""
         called_s = time.monotonic()
-        events = self._host.poll(POLL_S)
+        events = self._read()
         now_s = time.monotonic()
         for event in events:
             self._take(event, now_s)
+        self._lag.published(time.monotonic())
         if max(now_s - called_s, called_s - self._turned_s) > STALL_S:
             self._patient_until_s = now_s + STALL_S  # we slept: what came meanwhile is still on its way to the queue
         self._turned_s = now_s
         if self._host.online and not self._host.queue_depth and now_s >= self._patient_until_s:
             for worker in self._workers:
                 worker.silence(now_s)
-        is_report_due = now_s - self._reported_s >= REPORT_S
-        if is_report_due:
+        shared = None
+        if now_s - self._reported_s >= REPORT_S:
             self._reported_s = now_s
             self._note_dropped()
+            shared = self._report(now_s)
         for worker in self._workers:
-            worker.turn(now_s, is_report_due=is_report_due)
+            worker.turn(now_s, shared)
+
+    def _read(self) -> list[HostEvent]:
+        """What has come. Now and then a busy process looks whether anything waits behind it: if not, it has caught up."""
+        events = more = self._host.poll(POLL_S)
+        now_s = time.monotonic()
+        if events and now_s - self._lag.caught_up_s > PROBE_EVERY_S and not self._host.queue_depth:
+            more = self._host.poll(PROBE_S)
+            events += more
+        if not more and self._host.online:
+            self._lag.caught_up(time.monotonic())
+        return events
 
     # Start and end.
 
@@ -133,8 +158,9 @@ class Runner:
         if self._is_restored:
             self._note_dropped()
             now_s = time.monotonic()
+            shared = self._report(now_s)
             for worker in self._workers:
-                worker.finish(now_s)
+                worker.finish(now_s, shared)
         for worker in self._workers:
             worker.stop()
         self._host.stop()
@@ -148,6 +174,8 @@ class Runner:
             return
         for worker in self._readers_of(event):
             worker.take(event, now_s, has_waited=has_waited)
+        if event.kind is EventKind.DATA and not is_twin_node(event.node.node) and not _is_late(event):
+            self._lag.folded(event.node.node, event.timestamp_ms, time.monotonic())
 
     def _readers_of(self, event: HostEvent) -> tuple[Worker, ...]:
         """The processors that read the node of an event; they are found once for each node."""
@@ -158,9 +186,38 @@ class Runner:
             self._readers[node] = readers
         return readers
 
+    def _report(self, now_s: float) -> Shared:
+        """Work out the lag, and say it where somebody should know. The alerts of this process hear of it without the way over the
+        broker, on which it would come late."""
+        self._lag.report(now_s, time.process_time())
+        at_ms = time.time_ns() // 1_000_000
+        machines = max(len(worker.engine.machines) for worker in self._workers)
+        names = tuple(worker.name for worker in self._workers)
+        lag_s, busy_pct = round(self._lag.published_s, 3), round(self._lag.busy_pct, 1)
+        speaks = lag_s >= SPOKEN_OF_S
+        if speaks or self._speaks_of_lag:
+            report = LagReport(names, PROCESS, at_ms, lag_s, machines, busy_pct)
+            topic, payload = topic_of(names[0]), report.payload()
+            self._host.publish_plain(topic, payload)
+            for worker in self._workers:
+                worker.take_plain(HostEvent(EventKind.PLAIN, NodeId("", ""), None, at_ms, topic=topic, payload=payload))
+        self._speaks_of_lag = speaks
+        return {
+            "lag_s": round(self._lag.folded_s, 3),
+            "published_lag_s": lag_s,
+            "busy_pct": busy_pct,
+            "process": PROCESS,
+            "processors": len(names),
+        }
+
     def _note_dropped(self) -> None:
         """What the queue in front of us has lost, each of the processors has lost."""
         overflowed = self._host.dropped - self._dropped
         self._dropped += overflowed
         for worker in self._workers:
             worker.engine.overflowed(overflowed)
+
+
+def _is_late(event: HostEvent) -> bool:
+    """Return True if a message holds what its edge had buffered."""
+    return not event.names and any(reading.is_historical for reading in event.readings)

@@ -6,7 +6,7 @@ own rule, and is born again with it.
 
 import logging
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
@@ -25,9 +25,10 @@ from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import Change, MetricSpec
 from twin.vocabulary import topics
 
-REPORT_S = 1.0
 UNBORN_S_MAX = 15.0  # for a restored machine to be born again, before it is taken for offline
 DEAD_LETTERS_A_REPORT_MAX = 10  # that are published; all are counted
+Shared = Mapping[str, int | float | str]
+"""The health of the process, by the names that processors/running/health.py declares."""
 _log = logging.getLogger(__name__)
 
 
@@ -55,7 +56,6 @@ class Worker:
         self._letters_left = DEAD_LETTERS_A_REPORT_MAX
         self._unborn_until_s: float | None = None
         self._reconnects = 0
-        self._lag_s = 0.0
 
     # Its life, in this order.
 
@@ -86,25 +86,25 @@ class Worker:
         self._unborn_until_s = now_s + UNBORN_S_MAX
         self._reconnects = self._host.reconnects
 
-    def turn(self, now_s: float, *, is_report_due: bool) -> None:
-        """Do what is due."""
+    def turn(self, now_s: float, shared: Shared | None) -> None:
+        """Do what is due; report where a second has passed, with the state that all processors of the process share."""
         if self._unborn_until_s is not None and now_s >= self._unborn_until_s:
             self._unborn_until_s = None
             self._apply(self.engine.bury_unborn(time.time_ns() // 1_000_000))
-        if is_report_due:
+        if shared is not None:
             self._letters_left = DEAD_LETTERS_A_REPORT_MAX
             self._apply(self.engine.beat(time.time_ns() // 1_000_000))
             self._note_changed(now_s)
-            self._report(now_s)
+            self._report(now_s, shared)
         self._save(self._saves.due(now_s))
 
-    def finish(self, now_s: float) -> None:
+    def finish(self, now_s: float, shared: Shared) -> None:
         """Save everything, and say goodbye."""
         self._note_changed(now_s)
         self._save(self._saves.all())
         for plain in self.engine.farewell(time.time_ns() // 1_000_000):
             self._host.publish_plain(plain.topic, plain.payload, qos=1, retain=plain.retain)
-        self._report(now_s)
+        self._report(now_s, shared)
 
     def stop(self) -> None:
         """Have the edge node die and disconnect."""
@@ -128,10 +128,8 @@ class Worker:
         actions = self.engine.feed(event, now_s, has_waited=has_waited)
         if actions and not self._apply(actions):
             self.engine.unsent()
-        if event.device is not None:
-            self._lag_s = time.time() - event.timestamp_ms / 1000
-            if event.kind is EventKind.BIRTH:
-                self._press(event.device, is_new=True)
+        if event.kind is EventKind.BIRTH and event.device is not None:
+            self._press(event.device, is_new=True)
 
     def take_plain(self, event: HostEvent) -> None:
         """Fold a plain message, where the processor listens to its topic; keep it, where the recorder wants it."""
@@ -205,13 +203,13 @@ class Worker:
             if self._host.publish_plain(self._snapshot_prefix + topic_level(unit), payload, qos=1, retain=True):
                 self._saves.saved(unit, len(payload))
 
-    def _report(self, now_s: float) -> None:
+    def _report(self, now_s: float, shared: Shared) -> None:
         ledger, counts, host = self.engine.ledger, self.engine.counts, self._host
         at_ms = time.time_ns() // 1_000_000
         self._edge.publish(None, [Change(name, count, at_ms) for name, count in ledger.metrics().items()])
         health: dict[str, int | float | str] = {
             "machines": len(self.engine.machines),
-            "lag_s": round(self._lag_s, 3),
+            **shared,
             "queue_depth": host.queue_depth,
             "holes": counts.holes,
             "late": counts.late,

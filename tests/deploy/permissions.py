@@ -6,6 +6,7 @@ NODES = (*EDGE_NODES, "twin-mirror", "twin-jobs", "viewer", "operator", "process
 NODE_VERBS, DEVICE_VERBS = ("NBIRTH", "NDATA", "NDEATH"), ("DBIRTH", "DDATA", "DDEATH")
 STATES = ("spBv1.0/STATE/twin-mirror", "spBv1.0/STATE/scada")
 SNAPSHOT, LETTER, MARKER = "cnctwin/snapshot/mirror/okuma", "cnctwin/deadletter/mirror/okuma", "cnctwin/marker/mirror"
+LAG = "cnctwin/lag/mirror"
 OUTBOX = tuple(f"cnctwin/alerts/{kind}/a1" for kind in ("outbox", "claim", "delivery", "receipt"))
 ALERTS_STATE = "cnctwin/alerts/state"
 COMMANDS = tuple(f"cnctwin/alerts/command/{name}" for name in ("ack", "silence", "unsilence", "test"))
@@ -48,6 +49,7 @@ ALL = sorted(
         SNAPSHOT,
         LETTER,
         MARKER,
+        LAG,
         *OUTBOX,
         ALERTS_STATE,
         *COMMANDS,
@@ -64,7 +66,7 @@ MAY_WRITE: dict[str, frozenset[str]] = {
     | said_by("twin-jobs")
     | ASK_FOR_BIRTHS
     | RECEIPTS
-    | {STATES[0], SNAPSHOT, LETTER, MARKER, *OUTBOX, ALERTS_STATE, COMMANDS[0], *MIRROR}
+    | {STATES[0], SNAPSHOT, LETTER, MARKER, LAG, *OUTBOX, ALERTS_STATE, COMMANDS[0], *MIRROR}
     | {*ASK_FOR_JOBS, JOB, *JOBS},
     "viewer": frozenset(),
     "operator": ASK_FOR_BIRTHS | set(COMMANDS) | set(ASK_FOR_JOBS),
@@ -73,7 +75,7 @@ READERS = SPARKPLUG | {*STATES, ALERTS_STATE, LETTER, *MIRROR, *ASK_FOR_JOBS, JO
 MAY_READ: dict[str, frozenset[str]] = {
     **{edge: told(edge) | set(STATES) for edge in EDGE_NODES},
     "processors": SPARKPLUG
-    | {*STATES, SNAPSHOT, LETTER, MARKER, *OUTBOX, ALERTS_STATE, *COMMANDS, *ASK_FOR_JOBS, JOB, ELSEWHERE[2]},
+    | {*STATES, SNAPSHOT, LETTER, MARKER, LAG, *OUTBOX, ALERTS_STATE, *COMMANDS, *ASK_FOR_JOBS, JOB, ELSEWHERE[2]},
     "viewer": READERS,
     "operator": READERS,
 }

@@ -19,6 +19,9 @@ ALERT_CLAIM = f"{ALERTS}claim/"
 ALERT_DELIVERY = f"{ALERTS}delivery/"
 ALERT_RECEIPT = f"{ALERTS}receipt/"
 
+LAG = f"{OWN}lag/"
+"""Processor, not retained: how far it is behind, once a second while it is (processors/lag_report.py)."""
+
 SNAPSHOT = f"{OWN}snapshot/"
 """Processor and unit, retained: the state of a fold."""
 _DEAD_LETTER = f"{OWN}deadletter/"

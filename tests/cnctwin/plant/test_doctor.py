@@ -10,12 +10,16 @@ from contextlib import contextmanager
 import pytest
 
 from cnctwin.cli import main
-from cnctwin.plant.doctor import Report, examine, of_store
+from cnctwin.plant.doctor import Report, examine, of_edge_store, of_lags, of_store
+from cnctwin.plant.lags import behind, lag_reports
+from cnctwin.plant.view import own_values
 from sparkplug.broker import BrokerAddress
 from sparkplug.datatype import DataType
 from sparkplug.edge_node import EdgeNode
 from sparkplug.metric import Change, MetricSpec, NodeId, Reading
 from sparkplug.quality import Quality
+from sparkplug.values import Value
+from tests.cnctwin.plant.pictures import Pictures, owner
 from tests.cnctwin.program import until
 from tests.wire.mosquitto import Mosquitto, free_port
 
@@ -135,3 +139,57 @@ def test_a_store_that_cannot_keep_all_is_bad_news(dropped: int, trouble: str | N
         f"; {trouble}" if trouble else ""
     )
     assert of_store("twin-thermal", {}) == []
+
+
+def lag(lag_s: float, process: str | None, **more: float) -> dict[str, Value]:
+    """The health of a processor's node."""
+    values = {"lag_s": lag_s, "published_lag_s": lag_s + 0.2, "machines": 20, "busy_pct": 104.6, **more}
+    return {f"health/{name}": value for name, value in values.items()} | ({"health/process": process} if process else {})
+
+
+def plant(*nodes: tuple[str, dict[str, Value]], dead: tuple[str, ...] = ()) -> Pictures:
+    pictures = Pictures()
+    for node, values in nodes:
+        pictures.add(node, owner(values, online=node not in dead))
+    return pictures
+
+
+def test_processors_that_are_behind_are_one_bad_finding_a_process() -> None:
+    shared = [(f"twin-{name}", lag(18.2 if name == "mirror" else 17.0, "hall-3:4711")) for name in ("thermal", "mirror")]
+    alone = ("twin-historian", lag(0.1, "hall-3:4712", machines=20, busy_pct=40.0))
+    reports = lag_reports(own_values(plant(*shared, alone, ("edge-vmc", lag(3600.0, None)))))
+    bad_one, good_one = of_lags(reports)
+    sentence = "processors are 18 s behind: 20 machines, one core, 105 % busy; `cnctwin plan fleet` says what it takes"
+    assert (bad_one.good, bad_one.text) == (False, f"{sentence} (mirror, thermal)")
+    assert (good_one.good, good_one.text) == (
+        True,
+        "processors are in time: 0.3 s behind, 20 machines, one core, 40 % busy (historian)",
+    )
+    assert behind(reports) == bad_one.text
+    assert behind(reports[1:]) is None
+
+
+@pytest.mark.parametrize(
+    "values", [{}, {"health/lag_s": None}, {"health/lag_s": "late"}, {"health/lag_s": float("nan")}, {"health/lag_s": True}]
+)
+def test_a_node_that_does_not_report_a_lag_has_none(values: dict[str, Value]) -> None:
+    assert lag_reports(own_values(plant(("twin-thermal", values)))) == []
+
+
+def test_what_a_dead_processor_said_last_is_no_lag() -> None:
+    assert lag_reports(own_values(plant(("twin-thermal", lag(18.0, "a:1")), dead=("twin-thermal",)))) == []
+
+
+def test_a_processor_of_an_older_version_is_a_process_of_its_own() -> None:
+    (report,) = lag_reports(own_values(plant(("twin-thermal", {"health/lag_s": 7.0}))))
+    assert report.process == "twin-thermal"
+    assert not of_lags([report])[0].good
+
+
+@pytest.mark.parametrize(("waiting", "age_s", "is_told"), [(0, 600.0, False), (30, 0.5, False), (30, 80.0, True)])
+def test_an_edge_with_old_rows_to_send_is_behind(waiting: int, age_s: float, is_told: bool) -> None:
+    told = {"store_waiting_rows": waiting, "store_age_s": age_s}
+    metrics = {name: Reading(name, value, 0, Quality.GOOD, None, None, False) for name, value in told.items()}
+    found = of_edge_store("edge-vmc", metrics)
+    assert [finding.good for finding in found] == [False] * is_told
+    assert all("edge-vmc is 80 s behind: 30 rows" in finding.text for finding in found)

@@ -2,6 +2,7 @@
 
 import json
 import logging
+import time
 from collections import deque
 from collections.abc import Iterable, Sequence
 from threading import Event, Timer
@@ -9,8 +10,10 @@ from typing import Any
 
 import pytest
 
+from processors.alerts.processor import PROCESSOR as ALERTS
 from processors.config import Configuration
 from processors.discovery import AnyProcessor
+from processors.lag_report import parsed
 from processors.running.ledger import DropReason
 from processors.running.runner import Runner
 from processors.running.worker import Worker
@@ -18,7 +21,7 @@ from processors.thermal import PROCESSOR as THERMAL
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import Change, MetricSpec, NodeId
 from tests.processors.recorder import RECORDER
-from tests.processors.streams import birth, data, death, engine_of, fed
+from tests.processors.streams import T0_MS, birth, data, death, engine_of, fed
 
 NOWHERE = NodeId("", "")
 
@@ -213,10 +216,10 @@ def test_after_a_reconnect_every_snapshot_is_given_again() -> None:
     worker = Worker(RECORDER, Configuration(RECORDER.config), host, edge)
     Runner(host, [worker]).run(host.until_empty())
     host.plain.clear()
-    worker.finish(0.0)
+    worker.finish(0.0, {})
     assert snapshots(host) == {}
     host.reconnects = 1
-    worker.finish(0.0)
+    worker.finish(0.0, {})
     assert list(snapshots(host)) == ["cnctwin/snapshot/recorder/okuma"]
 
 
@@ -228,3 +231,69 @@ def test_a_stop_before_the_snapshots_have_come_overwrites_none() -> None:
     Runner(host, [worker]).run(stop)
     assert snapshots(host) == {}
     assert host.stopped
+
+
+class LateHost(FakeHost):
+    """A broker that gives a message a turn, each as late as `waits_s` says; nothing is ever seen not to wait."""
+
+    def __init__(self, *live: HostEvent, waits_s: float) -> None:
+        super().__init__(*live)
+        self.waits_s = waits_s
+
+    def poll(self, timeout_s: float) -> list[HostEvent]:
+        self.give(data(time.time() - self.waits_s - T0_MS / 1000, spindle_rpm=time.time()))
+        return super().poll(timeout_s)
+
+
+@pytest.fixture
+def fast_reports(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A report each turn."""
+    monkeypatch.setattr("processors.running.runner.REPORT_S", 0.0)
+    monkeypatch.setattr("processors.running.runner.PROBE_EVERY_S", 1e9)
+
+
+def health_of(edge: FakeEdge) -> dict[str, Any]:
+    messages = [{c.name: c.value for c in changes} for device, changes in edge.published if device is None]
+    return [message for message in messages if "health/lag_s" in message][-1]
+
+
+@pytest.mark.usefixtures("fast_reports")
+def test_a_processor_that_is_behind_says_so_until_it_has_caught_up() -> None:
+    host, edge = LateHost(birth(0.0, spindle_rpm=1.0), waits_s=0.0), FakeEdge()
+    runner = Runner(host, [Worker(RECORDER, Configuration(RECORDER.config), host, edge)])
+    runner.turn()
+    runner.turn()
+    assert [topic for topic, *_ in host.plain if topic.startswith("cnctwin/lag/")] == []
+    runner._lag.caught_up_s -= 60.0  # a minute passes in which something always waits
+    host.waits_s = 18.0
+    runner.turn()
+    assert health_of(edge)["health/lag_s"] == pytest.approx(18.0, abs=1.0)
+    assert health_of(edge)["health/published_lag_s"] == pytest.approx(18.0, abs=1.0)
+    assert health_of(edge)["health/busy_pct"] >= 0.0
+    host.waits_s = 0.0
+    runner.turn()
+    runner.turn()
+    said = [(parsed(payload.decode()), retain) for topic, payload, retain in host.plain if topic == "cnctwin/lag/recorder"]
+    assert [(round(report.lag_s), report.processors, retain) for report, retain in said] == [
+        (18, ("recorder",), False),
+        (0, ("recorder",), False),
+    ]
+
+
+@pytest.mark.usefixtures("fast_reports")
+def test_alerts_hear_of_the_lag_of_their_own_process_at_once() -> None:
+    host = LateHost(birth(0.0, spindle_rpm=1.0), waits_s=0.0)
+    worker = Worker(ALERTS, Configuration(ALERTS.config), host, FakeEdge())
+    runner = Runner(host, [worker])
+    runner.turn()
+    runner._lag.caught_up_s -= 60.0
+    host.waits_s = 18.0
+    runner.turn()
+    (unit,) = worker.engine._units.values()
+    assert unit.live.state.lags["alerts"].report.lag_s == pytest.approx(18.0, abs=1.0)
+
+
+def test_what_nothing_waits_behind_is_no_lag_however_old_its_stamps_are() -> None:
+    host = FakeHost(birth(0.0, spindle_rpm=1.0), *(data(float(i), spindle_rpm=float(i)) for i in range(1, 30)))
+    _, edge = worked(RECORDER, host)
+    assert health_of(edge)["health/lag_s"] == 0.0
