@@ -19,14 +19,13 @@ from processors.running.ledger import FOLDED, DropReason, Ledger
 from processors.running.picks import Picks
 from processors.running.silences import Silences
 from processors.running.snapshot import SnapshotCodec
-from processors.running.unit import Machine, Unit
+from processors.running.unit import SIGNALS_MAX, Machine, Unit
 from processors.sample import Sample, SampleKind
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId, Reading
 from twin.vocabulary.nodes import is_twin_node
 
 MACHINES_MAX = 1000
-SIGNALS_MAX = 5000
 _IS_HISTORICAL: Callable[[Reading], bool] = itemgetter(Reading._fields.index("is_historical"))
 
 
@@ -329,7 +328,7 @@ class Engine:
         machine.ways.clear()
         machine.online.add(event.node)
         machine.live.born(str(event.node), event.timestamp_ms)
-        taken = self._taken(machine, event)
+        taken = machine.taken(event, self._inputs)
         if not machine.is_online and self._inputs is not None:  # another processor is quicker than the edge
             machine.live.note(taken)
             return [], FOLDED
@@ -339,25 +338,6 @@ class Engine:
         offered = taken if is_of_twin else event.readings
         actions, fates = machine.live.birth(offered, taken, wall_s, is_of_twin=is_of_twin)
         return declared + actions, fates
-
-    def _taken(self, machine: Machine, event: HostEvent) -> list[Reading]:
-        """The readings of a birth that this processor takes from this source. A signal belongs to the first source that is
-        online with it; what a source offered before and does not offer any more is withdrawn."""
-        inputs, node, owner = self._inputs, event.node, machine.owner
-        offered = [reading for reading in event.readings if inputs is None or reading.name in inputs]
-        clashing = {r.name for r in offered if owner.get(r.name, node) != node and owner[r.name] in machine.online}
-        machine.excluded[node] = frozenset(clashing)
-        taken = [reading for reading in offered if reading.name not in clashing]
-        names = {reading.name for reading in taken}
-        gone = [name for name, source in owner.items() if source == node and name not in names]
-        machine.live.withdraw([name for name in gone if name in machine.live.row])
-        for name in gone:
-            del owner[name]
-        owner.update(dict.fromkeys(names, node))
-        if len(machine.live.row) > SIGNALS_MAX:
-            for name in [name for name in machine.live.row if name not in owner]:
-                del machine.live.row[name]
-        return taken
 
     def _death(self, machine: Machine | None, event: HostEvent) -> Folded:
         if machine is None or event.node not in machine.online:

@@ -6,8 +6,10 @@ from dataclasses import dataclass, field
 from processors.running.fold import Fold, Folded
 from processors.running.lane import Lane
 from sparkplug.host_session import HostEvent
-from sparkplug.metric import NodeId
+from sparkplug.metric import NodeId, Reading
 from twin.vocabulary.nodes import is_twin_node
+
+SIGNALS_MAX = 5000  # of a machine
 
 
 @dataclass(slots=True)
@@ -44,3 +46,22 @@ class Machine:
     def is_online(self) -> bool:
         """True while an edge of it is online."""
         return any(not is_twin_node(node.node) for node in self.online)
+
+    def taken(self, birth: HostEvent, inputs: frozenset[str] | None) -> list[Reading]:
+        """The readings of a birth that are taken from its source. A signal belongs to the first source that is online with it;
+        what a source offered before and does not offer any more is withdrawn."""
+        node, owner, row = birth.node, self.owner, self.live.row
+        offered = [reading for reading in birth.readings if inputs is None or reading.name in inputs]
+        clashing = {r.name for r in offered if owner.get(r.name, node) != node and owner[r.name] in self.online}
+        self.excluded[node] = frozenset(clashing)
+        taken = [reading for reading in offered if reading.name not in clashing]
+        names = {reading.name for reading in taken}
+        gone = [name for name, source in owner.items() if source == node and name not in names]
+        self.live.withdraw([name for name in gone if name in row])
+        for name in gone:
+            del owner[name]
+        owner.update(dict.fromkeys(names, node))
+        if len(row) > SIGNALS_MAX:
+            for name in [name for name in row if name not in owner]:
+                del row[name]
+        return taken
