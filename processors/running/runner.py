@@ -32,7 +32,7 @@ POLL_S = 0.05
 PROBE_EVERY_S = 0.5  # a busy process looks so often whether anything waits ...
 PROBE_S = 0.001  # ... for so long
 REPORT_S = 1.0
-RESTORE_S_MAX = 1.0  # to wait for the snapshots, once the broker answers
+RESTORE_S_MAX = 1.0  # to wait for the next snapshot, or for our own nodes
 STALL_S = 1.0  # a longer pause of this process is no silence of the machine
 WAITING_MAX = 100_000  # events, while the snapshots are awaited
 _log = logging.getLogger(__name__)
@@ -110,7 +110,7 @@ class Runner:
 
     def _restore(self, stop: Event) -> bool:
         """Take the retained snapshots; False where `stop` came first, and nothing is known that may be saved."""
-        marked_s: float | None = None
+        marked_s: float | None = None  # when the marker was published, or the last message before it has come
         while not stop.is_set():
             if marked_s is None and self._host.publish_plain(self._marker_topic, b"all retained snapshots have come", qos=1):
                 marked_s = time.monotonic()
@@ -122,11 +122,12 @@ class Runner:
                 if event.kind is EventKind.PLAIN:
                     for worker in self._workers:
                         worker.restore(event)
+                    marked_s = None if marked_s is None else time.monotonic()
                 self._wait_with(event)  # a snapshot too: a recorder may want it
             if complete:
                 return True
             if marked_s is not None and time.monotonic() - marked_s > RESTORE_S_MAX:
-                _log.warning("%s: the broker took more than %g s; what has come by now is all", self._names, RESTORE_S_MAX)
+                _log.warning("%s: the broker says nothing for %g s; what has come by now is all", self._names, RESTORE_S_MAX)
                 return True
         return False
 
