@@ -44,6 +44,7 @@ _GUESS = {
     "dataset_value": DataType.DATASET,
     "template_value": DataType.TEMPLATE,
 }
+_DATATYPES = {datatype.value: datatype for datatype in DataType}
 TypeOf = Callable[[str | None, int | None], DataType | None]
 
 
@@ -245,10 +246,10 @@ def read_metric(metric: Any, type_of: TypeOf | None = None, depth: int = 0) -> M
 
 def datatype_of(code: int) -> DataType:
     """The datatype with this code; raises PayloadError for a code that 3.0.0 does not know."""
-    try:
-        return DataType(code)
-    except ValueError:
-        raise PayloadError(f"datatype {code} is not one of Sparkplug 3.0.0 (1 to 34)") from None
+    datatype = _DATATYPES.get(code)
+    if datatype is None:
+        raise PayloadError(f"datatype {code} is not one of Sparkplug 3.0.0 (1 to 34)")
+    return datatype
 
 
 def read_value(field: Any, datatype: DataType | None, depth: int = 0) -> Value:

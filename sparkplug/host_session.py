@@ -7,7 +7,6 @@ for the application and, in `actions`, what is to be sent. A value is good only 
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from enum import Enum
 from random import Random
 from typing import Any, NamedTuple
 
@@ -16,6 +15,9 @@ from sparkplug.codec import encode, parse
 from sparkplug.datatype import DataType
 from sparkplug.edge_session import BD_SEQ, REBIRTH
 from sparkplug.errors import PayloadError, TopicError, UnknownMetricError
+from sparkplug.host_event import EventKind, HostEvent
+from sparkplug.layouts.memory import Memory, Room
+from sparkplug.layouts.route import Route
 from sparkplug.metric import Change, NodeId, Reading
 from sparkplug.node_picture import NodePicture, Owner, tells_quality
 from sparkplug.rebirth import RebirthRequests
@@ -23,41 +25,14 @@ from sparkplug.sequence import Delivery, Numbered, SequenceWindow, Verdict
 from sparkplug.topics import STATE_PREFIX, Topic, Verb, state_topic
 from sparkplug.values import Metric, Payload
 
+__all__ = ["EventKind", "HostEvent", "HostSession"]
+
 NODES_MAX = 10_000
 LATE_MS_MAX = 10_000
 DEVICE_BIRTH_MS_MAX = 2000
 DOUBTS_MAX = 3
 DOUBT_MS = 600_000
-
-
-class EventKind(Enum):
-    """What an event says."""
-
-    BIRTH = "birth"
-    DATA = "data"
-    DEATH = "death"
-    HOLE = "hole"
-    PLAIN = "plain"
-
-
-class HostEvent(NamedTuple):
-    """Something that an application should know; `device` None means the edge node itself.
-
-    BIRTH carries all readings, DATA what changed, DEATH what became stale; HOLE says in `detail` how many messages are lost
-    for good; PLAIN is a message outside Sparkplug, with `topic` and `payload`.
-    """
-
-    kind: EventKind
-    node: NodeId
-    device: str | None
-    timestamp_ms: int
-    readings: tuple[Reading, ...] = ()
-    detail: str = ""
-    topic: str = ""
-    payload: bytes = b""
-    names: tuple[str, ...] = ()
-    oldest_ms: int = 0
-    newest_ms: int = 0
+_DATA = EventKind.DATA
 
 
 @dataclass(slots=True)
@@ -69,6 +44,20 @@ class _Watched:
     received_ms: int = 0  # when its last birth or death came, by the host's clock
     awaiting: set[str] | None = None  # devices that were known before the last NBIRTH and have not been born since
     doubts_ms: deque[int] = field(default_factory=lambda: deque(maxlen=DOUBTS_MAX))  # when its numbers were last doubted
+    routes: dict[str | None, Route] = field(default_factory=dict)  # of the data of the node (None) and of its devices
+
+    def forget_layouts(self) -> None:
+        """Aliases and names may mean something else now."""
+        for route in self.routes.values():
+            route.layouts.forget()
+
+
+class _Received(NamedTuple):
+    """A message and the bytes from which it was parsed."""
+
+    topic: Topic
+    message: Any
+    payload: bytes
 
 
 def _anyone(_: NodeId) -> bool:
@@ -76,7 +65,7 @@ def _anyone(_: NodeId) -> bool:
 
 
 class HostSession:
-    """One host application on one broker. `wanted` tells which nodes are listened to."""
+    """One host application on one broker. `wanted` tells which nodes are listened to, always the same ones."""
 
     def __init__(
         self,
@@ -98,6 +87,8 @@ class HostSession:
         self._publish_state = publish_state
         self._wanted = wanted
         self._nodes: dict[NodeId, _Watched] = {}
+        self._routes: dict[str, Route] = {}
+        self._room = Room()
         self._requests = RebirthRequests(chance, interval_ms_min=rebirth_interval_ms_min)
         self._connect_ms = 0
 
@@ -139,6 +130,10 @@ class HostSession:
 
     def message(self, topic: str, payload: bytes, now_ms: int) -> list[HostEvent]:
         """A message of the Sparkplug namespace has come; a malformed one is counted and changes nothing."""
+        route = self._routes.get(topic)
+        if route is not None and (event := route.take(payload)) is not None:
+            self.counts["data"] += 1
+            return [event]
         try:
             if topic == self.state_topic:
                 return self._own_state(payload)
@@ -233,9 +228,10 @@ class HostSession:
         if stamp and stamp < watched.picture.own.birth_ms and now_ms - watched.received_ms < LATE_MS_MAX:
             self.counts["late"] += 1  # left over from before the birth; its number may look right all the same
             return []
+        received = _Received(topic, message, payload)
         if watched.window.is_next(message.seq, stamp):
-            return self._in_order(watched, (topic, message, tells_quality(payload)), now_ms)
-        delivery = watched.window.take(Numbered(message.seq, stamp, (topic, message, tells_quality(payload))), now_ms)
+            return self._in_order(watched, received, now_ms)
+        delivery = watched.window.take(Numbered(message.seq, stamp, received), now_ms)
         return self._deliver(watched, delivery, now_ms)
 
     def _node_birth(self, watched: _Watched, message: Any, now_ms: int) -> list[HostEvent]:
@@ -259,6 +255,7 @@ class HostSession:
         picture.aliases = {alias: known for alias, known in picture.aliases.items() if known[0] is picture.own}
         for owner in picture.devices.values():
             owner.bindings = {}  # their aliases may mean something else now; DBIRTHs follow
+        watched.forget_layouts()
         watched.awaiting = {device for device, owner in picture.devices.items() if owner.online}
         self._requests.born(picture.node)
         self.counts["births"] += 1
@@ -279,6 +276,7 @@ class HostSession:
     def _wither(self, watched: _Watched, now_ms: int, reason: str) -> list[HostEvent]:
         """The node and all its devices go offline by the host's clock."""
         watched.received_ms, watched.awaiting = now_ms, None
+        watched.forget_layouts()
         picture = watched.picture
         self.counts["deaths"] += 1
         return [
@@ -301,8 +299,8 @@ class HostSession:
                 self.counts["malformed"] += 1
         return events
 
-    def _in_order(self, watched: _Watched, received: tuple[Topic, Any, bool], now_ms: int) -> list[HostEvent]:
-        topic, message, may_tell_quality = received
+    def _in_order(self, watched: _Watched, received: _Received, now_ms: int) -> list[HostEvent]:
+        topic, message, payload = received
         picture, device = watched.picture, topic.device
         stamp = message.timestamp or now_ms
         if topic.verb is Verb.DBIRTH and device is not None:
@@ -312,6 +310,7 @@ class HostSession:
             except PayloadError as error:
                 self.counts["malformed"] += 1
                 return _death(picture.node, device, owner, stamp, f"birth certificate unreadable: {error}")
+            watched.forget_layouts()
             if watched.awaiting:
                 watched.awaiting.discard(device)
             self.counts["births"] += 1
@@ -326,12 +325,25 @@ class HostSession:
             if watched.awaiting and device is not None:
                 watched.awaiting.discard(device)
             return _death(picture.node, device, known, stamp, "device offline")
-        data, complete = picture.read_data(known, message, stamp, may_tell_quality=may_tell_quality)
+        data, complete = picture.read_data(known, message, stamp, may_tell_quality=tells_quality(payload))
+        readings = tuple(data)
+        names = known.take(readings)
         if not complete:
             self.counts["unknown_metrics"] += 1
             self._requests.want(picture.node, now_ms)
+        elif readings:
+            self._route(watched, topic, known).learn(payload, message, readings, names)
         self.counts["data"] += 1
-        return [HostEvent(EventKind.DATA, picture.node, device, stamp, tuple(data))]
+        oldest_ms, newest_ms = _span_ms(readings) if names else (0, 0)
+        return [HostEvent(_DATA, picture.node, device, stamp, readings, "", "", b"", names, oldest_ms, newest_ms)]
+
+    def _route(self, watched: _Watched, topic: Topic, owner: Owner) -> Route:
+        """Return the route of a data topic whose owner was born."""
+        route = watched.routes.get(topic.device)
+        if route is None:
+            route = Route(watched.picture, watched.window, owner, topic.device, Memory(self._room))
+            watched.routes[topic.device] = self._routes[str(topic)] = route
+        return route
 
     def _doubt(self, watched: _Watched, now_ms: int) -> None:
         """A peer that counts sloppily is let be; but its numbers may also have begun again with a birth that was lost.
@@ -356,6 +368,12 @@ class HostSession:
 
 def _death(node: NodeId, device: str | None, owner: Owner, stamp: int, reason: str) -> list[HostEvent]:
     return [HostEvent(EventKind.DEATH, node, device, stamp, owner.wither(stamp, reason), reason)] if owner.online else []
+
+
+def _span_ms(readings: Sequence[Reading]) -> tuple[int, int]:
+    """The oldest and the newest time stamp."""
+    stamps_ms = [reading.timestamp_ms for reading in readings]
+    return min(stamps_ms), max(stamps_ms)
 
 
 def _is_sloppy(message: Any) -> bool:

@@ -2,9 +2,10 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any, NamedTuple
 
-from sparkplug.codec import read_metric, read_properties, read_value
+from sparkplug.codec import datatype_of, read_properties, read_value
 from sparkplug.datatype import FIELD, DataType
 from sparkplug.errors import PayloadError
 from sparkplug.metric import UNIT_PROPERTY, NodeId, Reading
@@ -13,6 +14,12 @@ from sparkplug.values import PropertySet, Template
 from sparkplug.wire_value import READ
 
 METRICS_MAX = 100_000
+NAMES_KNOWN_MAX = 64
+NAMES_KNOWN_LENGTH_MAX = 1000
+BINDINGS_MAX = 16_384
+BINDING_NAME_MAX = 256
+TOLD_MAX = 4096
+TOLD_BYTES_MAX = 1024
 _QUALITY_BYTES = QUALITY_PROPERTY.encode()
 _REASON_BYTES = REASON_PROPERTY.encode()
 _HOST_BUILT = frozenset({"bdSeq", "Node Control/Rebirth"})
@@ -29,58 +36,105 @@ class Binding(NamedTuple):
     unit: str | None
 
 
-@dataclass(slots=True)
 class Owner:
     """An edge node's own metrics, or those of one device."""
 
-    online: bool = False
-    birth_ms: int = 0
-    properties: dict[str, PropertySet] = field(default_factory=dict)
-    templates: dict[str, Template] = field(default_factory=dict)
-    bindings: dict[str, Binding] = field(default_factory=dict)
-    readings: dict[str, Reading] = field(default_factory=dict)
+    __slots__ = (
+        "_aliases",
+        "_latest",
+        "_names",
+        "_names_known",
+        "_newest",
+        "bindings",
+        "birth_ms",
+        "online",
+        "properties",
+        "templates",
+    )
+
+    def __init__(self, *, online: bool = False, readings: dict[str, Reading] | None = None) -> None:
+        self.online = online
+        self.birth_ms = 0
+        self.properties: dict[str, PropertySet] = {}
+        self.templates: dict[str, Template] = {}
+        self.bindings: dict[str, Binding] = {}
+        self._aliases: list[int] = []
+        self._latest = readings or {}
+        self._names: tuple[str, ...] = ()
+        self._newest: tuple[Reading, ...] = ()
+        self._names_known: dict[tuple[str, ...], tuple[str, ...]] = {}
+
+    @property
+    def readings(self) -> dict[str, Reading]:
+        """The latest reading of each metric that the birth declared."""
+        self._settle()
+        return self._latest
+
+    def take(self, readings: tuple[Reading, ...]) -> tuple[str, ...]:
+        """Note what a data message said; hand back the names of its readings, () where one of them is historical."""
+        names = tuple([reading[0] for reading in readings])
+        if any(reading[6] for reading in readings):
+            self.take_history(readings)
+            return ()
+        if len(names) <= NAMES_KNOWN_LENGTH_MAX:
+            if len(self._names_known) >= NAMES_KNOWN_MAX:
+                self._names_known.clear()
+            names = self._names_known.setdefault(names, names)
+        self.take_present(names, readings)
+        return names
+
+    def take_present(self, names: tuple[str, ...], readings: tuple[Reading, ...]) -> None:
+        """Note readings of which none is historical, with their names as `take` gave them.
+
+        They are laid aside until somebody asks for the latest ones: as a rule the next message says all of them again.
+        """
+        if names is not self._names:
+            self._settle()
+            self._names = names
+        self._newest = readings
+
+    def take_history(self, readings: tuple[Reading, ...]) -> None:
+        """Note readings of which some may be historical."""
+        self.readings.update({reading.name: reading for reading in readings if not reading.is_historical})
+
+    def _settle(self) -> None:
+        if self._names:
+            self._latest.update(zip(self._names, self._newest, strict=True))
+            self._names = self._newest = ()
 
     def bear(self, message: Any, timestamp_ms: int, aliases: dict[int, tuple["Owner", Binding]]) -> tuple[Reading, ...]:
         """Take a birth certificate; everything known before is forgotten. Raises PayloadError before anything changes."""
-        metrics = [read_metric(metric) for metric in message.metrics]
-        if len(metrics) > METRICS_MAX:
-            raise PayloadError(f"birth declares {len(metrics)} metrics; the limit is {METRICS_MAX}")
-        for alias in [a for a, (owner, _) in aliases.items() if owner is self]:
-            del aliases[alias]
+        if len(message.metrics) > METRICS_MAX:
+            raise PayloadError(f"birth declares {len(message.metrics)} metrics; the limit is {METRICS_MAX}")
+        declared = [_declared(metric, timestamp_ms) for metric in message.metrics]
+        for old in self._aliases:
+            if old in aliases and aliases[old][0] is self:
+                del aliases[old]
         self.online, self.birth_ms = True, timestamp_ms
-        self.properties, self.templates, self.bindings, self.readings = {}, {}, {}, {}
-        for metric in metrics:
-            if metric.name is None or metric.name in _HOST_BUILT:
+        self.properties, self.templates, self.bindings, self._aliases = {}, {}, {}, []
+        readings: dict[str, Reading] = {}
+        for alias, binding, properties, reading in declared:
+            if binding is None:
                 continue
-            datatype = metric.datatype or DataType.UNKNOWN
-            if isinstance(metric.value, Template) and metric.value.is_definition:
-                self.templates[metric.name] = metric.value
+            name = binding.name
+            if isinstance(reading.value, Template) and reading.value.is_definition:
+                self.templates[name] = reading.value
                 continue
-            unit = metric.properties.get(UNIT_PROPERTY)
-            binding = Binding(
-                metric.name,
-                datatype,
-                FIELD[datatype] if datatype in READ else "",
-                None if datatype in _PLAIN_FIELDS else READ.get(datatype),
-                str(unit.value) if unit is not None and unit.value is not None else None,
-            )
-            self.bindings[metric.name] = binding
-            self.properties[metric.name] = metric.properties
-            if metric.alias is not None:
-                aliases[metric.alias] = (self, binding)
-            quality, reason = quality_of(metric.properties)
-            stamp = timestamp_ms if metric.timestamp_ms is None else metric.timestamp_ms
-            self.readings[metric.name] = Reading(metric.name, metric.value, stamp, quality, binding.unit, reason, False)
-        return tuple(self.readings.values())
+            self.bindings[name], self.properties[name], readings[name] = binding, properties, reading
+            if alias is not None:
+                aliases[alias] = (self, binding)
+                self._aliases.append(alias)
+        self._latest, self._names, self._newest, self._names_known = readings, (), (), {}
+        return tuple(readings.values())
 
     def wither(self, timestamp_ms: int, reason: str) -> tuple[Reading, ...]:
         """Go offline: every value becomes stale as of `timestamp_ms` (5.9)."""
         self.online = False
-        self.readings = {
-            name: reading._replace(timestamp_ms=timestamp_ms, quality=Quality.STALE, reason=reason)
-            for name, reading in self.readings.items()
-        }
-        return tuple(self.readings.values())
+        new, stale = tuple.__new__, Quality.STALE
+        known = self.readings
+        for name, (_, value, _, _, unit, _, historical) in known.items():
+            known[name] = new(Reading, (name, value, timestamp_ms, stale, unit, reason, historical))
+        return tuple(known.values())
 
 
 @dataclass(slots=True)
@@ -112,23 +166,18 @@ class NodePicture:
     ) -> tuple[list[Reading], bool]:
         """The readings of a data message, and whether all of its metrics were known and of their type.
 
-        This is the hot path of every processor: the birth has fixed name, field and type of each alias, so that a metric is
-        read with a handful of look-ups. A value that is not the field's default is certainly there and no null; everything
-        else takes the longer way. `may_tell_quality` False says that the bytes do not even hold the property's name.
+        The birth has fixed name, field and type of each alias, so that a metric is read with a handful of look-ups. A value that
+        is not the field's default is certainly there and no null; everything else takes the longer way. `may_tell_quality` False
+        says that the bytes do not even hold the property's name.
         """
         readings: list[Reading] = []
         complete = True
-        aliases, latest, new = self.aliases, owner.readings, tuple.__new__
+        binding_of, new = self.binding, tuple.__new__
         for metric in message.metrics:
-            alias = metric.alias
-            known = aliases.get(alias) if alias or metric.HasField("alias") else None  # 0 is an alias, too, if it is there
-            if known is None or known[0] is not owner:
-                binding = owner.bindings.get(metric.name) if metric.name else None
-                if binding is None:
-                    complete = False
-                    continue
-            else:
-                binding = known[1]
+            binding = binding_of(owner, metric)
+            if binding is None:
+                complete = False
+                continue
             name, datatype, field_name, read, unit = binding
             quality, reason = Quality.GOOD, None
             try:
@@ -142,12 +191,76 @@ class NodePicture:
             except PayloadError:
                 complete = False  # the metric is not, or no longer, what its birth declared
                 continue
-            historical = metric.is_historical
-            reading = new(Reading, (name, value, metric.timestamp or timestamp_ms, quality, unit, reason, historical))
-            readings.append(reading)
-            if not historical:
-                latest[name] = reading
+            stamp_ms = metric.timestamp or timestamp_ms
+            readings.append(new(Reading, (name, value, stamp_ms, quality, unit, reason, metric.is_historical)))
         return readings, complete
+
+    def binding(self, owner: Owner, metric: Any) -> Binding | None:
+        """Return what the birth said of a data metric: by its alias, else by its name."""
+        alias = metric.alias
+        known = self.aliases.get(alias) if alias or metric.HasField("alias") else None  # 0 is an alias, too, if it is there
+        if known is not None and known[0] is owner:
+            return known[1]
+        return owner.bindings.get(metric.name) if metric.name else None
+
+
+class _Told(NamedTuple):
+    """What the properties of a metric say."""
+
+    properties: PropertySet
+    unit: str | None
+    quality: Quality
+    reason: str | None
+
+
+_NOTHING_TOLD = _Told({}, None, Quality.GOOD, None)
+_told_before: dict[bytes, _Told] = {}  # by their bytes: machines of one kind declare the same units and meanings
+
+
+def _told(message: Any) -> _Told:
+    raw: bytes = message.SerializeToString()
+    told = _told_before.get(raw)
+    if told is None:
+        properties = read_properties(message)
+        unit = properties.get(UNIT_PROPERTY)
+        of_birth = None if unit is None or unit.value is None else str(unit.value)
+        told = _Told(properties, of_birth, *quality_of(properties))
+        if len(raw) <= TOLD_BYTES_MAX:
+            if len(_told_before) >= TOLD_MAX:
+                _told_before.clear()
+            _told_before[raw] = told
+    return told
+
+
+def _binding(name: str, datatype: DataType, unit: str | None) -> Binding:
+    read = None if datatype in _PLAIN_FIELDS else READ.get(datatype)
+    return Binding(name, datatype, FIELD[datatype] if datatype in READ else "", read, unit)
+
+
+_shared_binding = lru_cache(maxsize=BINDINGS_MAX)(_binding)
+
+
+def _declared(metric: Any, timestamp_ms: int) -> tuple[int | None, Binding | None, PropertySet, Reading]:
+    """Return a birth's metric: alias, binding (None where it is none of the application's), properties, and first reading."""
+    name = READ[DataType.STRING](metric.name)
+    code = metric.datatype
+    datatype = datatype_of(code) if code or metric.HasField("datatype") else DataType.UNKNOWN
+    value = read_value(metric, datatype)
+    told = _told(metric.properties) if metric.HasField("properties") else _NOTHING_TOLD
+    stamp_ms = metric.timestamp
+    if not stamp_ms and not metric.HasField("timestamp"):
+        stamp_ms = timestamp_ms
+    alias = metric.alias
+    if not alias and not metric.HasField("alias"):
+        alias = None
+    given = name not in _HOST_BUILT if name else metric.HasField("name")
+    binding = None
+    if given:
+        is_short = len(name) + len(told.unit or "") <= BINDING_NAME_MAX
+        binding = (_shared_binding if is_short else _binding)(name, datatype, told.unit)
+        name = binding.name
+    reading = tuple.__new__(Reading, (name, value, stamp_ms, told.quality, told.unit, told.reason, False))
+    return alias, binding, told.properties, reading
 
 
 def tells_quality(payload: bytes) -> bool:

@@ -1,0 +1,40 @@
+"""What a host session tells its application."""
+
+from enum import Enum
+from typing import NamedTuple
+
+from sparkplug.metric import NodeId, Reading
+
+
+class EventKind(Enum):
+    """What an event says."""
+
+    BIRTH = "birth"
+    DATA = "data"
+    DEATH = "death"
+    HOLE = "hole"
+    PLAIN = "plain"
+
+
+class HostEvent(NamedTuple):
+    """Something that an application should know; `device` None means the edge node itself.
+
+    BIRTH carries all readings, DATA what changed, DEATH what became stale; HOLE says in `detail` how many messages are lost
+    for good; PLAIN is a message outside Sparkplug, with `topic` and `payload`.
+
+    `names` are those of a DATA event's readings: the same tuple for all messages of one layout, so that it can be recognised by
+    identity. It is () where it is not given, and where a reading is historical. Where it is given, `oldest_ms` and `newest_ms`
+    are those of the readings' time stamps.
+    """
+
+    kind: EventKind
+    node: NodeId
+    device: str | None
+    timestamp_ms: int
+    readings: tuple[Reading, ...] = ()
+    detail: str = ""
+    topic: str = ""
+    payload: bytes = b""
+    names: tuple[str, ...] = ()
+    oldest_ms: int = 0
+    newest_ms: int = 0
