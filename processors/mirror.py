@@ -33,10 +33,9 @@ def step(_: Config, state: NoState, sample: Sample) -> tuple[NoState, Sequence[P
     """Publish what changed; at a death, what turned stale."""
     if sample.is_history or sample.kind in (SampleKind.TICK, SampleKind.HOLE):
         return state, ()
-    machine, row = sample.machine, sample.row
-    return state, [
-        PlainOutput(_topic(machine, name), mirrored(row[name])) for name in sample.changed if not _is_long(row[name].value)
-    ]
+    row, prefix = sample.row, _prefix(sample.machine)
+    readings = [row[name] for name in sample.changed]
+    return state, [PlainOutput(prefix + _path(one[0]), mirrored(one)) for one in readings if not _is_long(one[1])]
 
 
 def _is_long(value: object) -> bool:
@@ -50,29 +49,34 @@ def mirrored(reading: Reading) -> bytes:
     >>> mirrored(Reading("spindle_rpm", 2400.0, 1644501062250, Quality.GOOD, "rev/min", None, False)).decode()
     '{"value":2400.0,"t":"2022-02-10T13:51:02.250Z","unit":"rev/min","quality":"good"}'
     """
-    value, reason, quality = reading.value, reading.reason, _QUALITY.get(reading.quality, "bad")
+    _, value, timestamp_ms, quality, unit, reason, _ = reading
+    if type(value) is float and -math.inf < value < math.inf:  # what nearly every reading is
+        text = repr(value)  # which is JSON, and quicker
+    else:
+        text, quality, reason = _encoded(value, quality, reason)
+    why = f',"reason":{_ENCODE(reason)}}}' if reason else "}"
+    return f'{{"value":{text},"t":{_iso(timestamp_ms)}{_unit_and_quality(unit, quality)}{why}'.encode("utf-8", "replace")
+
+
+def _encoded(value: object, quality: Quality, reason: str | None) -> tuple[str, Quality, str | None]:
+    """Return any value as JSON, with its quality and reason; what JSON cannot say is null."""
     if isinstance(value, float):
         if math.isfinite(value):
-            text = repr(value)  # which is JSON, and quicker
-        else:
-            text, reason, quality = "null", f"not a finite number: {value}", "bad"
-    elif value is None:
-        text = "null"
-    elif isinstance(value, (str, int, tuple)):
-        try:
-            text = _ENCODE(value)
-        except ValueError:
-            text, reason, quality = "null", "an array with a number that is not finite", "bad"
-    else:
-        text, reason = "null", f"a {type(value).__name__} has no plain form; read it by Sparkplug"
-    why = f',"reason":{_ENCODE(reason)}' if reason else ""
-    shown = f'{{"value":{text},"t":{_iso(reading.timestamp_ms)},"unit":{_unit(reading.unit)},"quality":"{quality}"{why}}}'
-    return shown.encode("utf-8", "replace")
+            return repr(value), quality, reason
+        return "null", Quality.BAD, f"not a finite number: {value}"
+    if value is None:
+        return "null", quality, reason
+    if not isinstance(value, (str, int, tuple)):
+        return "null", quality, f"a {type(value).__name__} has no plain form; read it by Sparkplug"
+    try:
+        return _ENCODE(value), quality, reason
+    except ValueError:
+        return "null", Quality.BAD, "an array with a number that is not finite"
 
 
 @lru_cache(maxsize=1000)
-def _unit(unit: str | None) -> str:
-    return _ENCODE(unit)
+def _unit_and_quality(unit: str | None, quality: Quality) -> str:
+    return f',"unit":{_ENCODE(unit)},"quality":"{_QUALITY.get(quality, "bad")}"'
 
 
 @lru_cache(maxsize=1000)
@@ -86,8 +90,12 @@ def _iso(timestamp_ms: int) -> str:
 
 
 @lru_cache(maxsize=10_000)
-def _topic(machine: str, signal: str) -> str:
-    return f"{PREFIX}{topic_level(machine)}/{topic_path(signal)}"
+def _prefix(machine: str) -> str:
+    return f"{PREFIX}{topic_level(machine)}/"
+
+
+_path = lru_cache(maxsize=10_000)(topic_path)
+"""The machines share their signals, so names and machines are remembered apart."""
 
 
 PROCESSOR = Processor(

@@ -22,6 +22,10 @@ class SampleKind(Enum):
     BEAT = "beat"  # a second has passed on the wall; of no machine
 
 
+_GOOD = Quality.GOOD
+"""Looked up once: a member of an enumeration takes longer to look up than a whole reading."""
+
+
 class Sample(NamedTuple):
     """One call of the fold.
 
@@ -56,7 +60,7 @@ class Sample(NamedTuple):
         if reading is None:
             return None, f"{name} is not offered"
         value = reading.value
-        if type(value) is float and reading.quality is Quality.GOOD and math.isfinite(value):
+        if type(value) is float and reading.quality is _GOOD and -math.inf < value < math.inf:
             return value, None  # what nearly every reading is
         if (reason := why_unknown(reading)) is not None:
             return None, reason
@@ -71,7 +75,7 @@ class Sample(NamedTuple):
 
 def why_unknown(reading: Reading) -> str | None:
     """Why a reading says nothing of the present: stale, bad or null; None where it does."""
-    if reading.quality is not Quality.GOOD:
+    if reading.quality is not _GOOD:
         word = "stale" if reading.quality is Quality.STALE else "bad"
     elif reading.value is None:
         word = "null"

@@ -19,12 +19,28 @@ class LimitState(Enum):
     UNKNOWN = "unknown"
 
 
+_OVER, _UNDER, _UNKNOWN = LimitState.OVER, LimitState.UNDER, LimitState.UNKNOWN
+
+
 class Judgement(NamedTuple):
     """The finding of a rule at one moment. `reason`: why it is unknown; `finding`: what is over which limit, to be read."""
 
     limit_state: LimitState
     reason: str = ""
     finding: str = ""
+
+
+BETWEEN, UNDER, EXCUSED = Judgement(LimitState.BETWEEN), Judgement(LimitState.UNDER), Judgement(LimitState.EXCUSED)
+
+
+def unknown(reason: str) -> Judgement:
+    """Return the judgement that there is none."""
+    return Judgement(_UNKNOWN, reason)
+
+
+def over(finding: str) -> Judgement:
+    """Return the judgement that a value is over its limit."""
+    return Judgement(_OVER, "", finding)
 
 
 class Timing(NamedTuple):
@@ -55,26 +71,30 @@ class Latch(NamedTuple):
 IDLE = Latch()
 
 
-def over_under(value: float, limit: float, clear_limit: float) -> LimitState:
-    """Return how `value` stands to a limit and the lower one at which an alarm ends.
+def within(value: float, limit: float, clear_limit: float) -> Judgement | None:
+    """Return how `value` stands to a limit and the lower one at which an alarm ends; None where it is over the limit.
 
-    >>> [over_under(value, 110.0, 100.0).value for value in (111.0, 110.0, 99.0)]
-    ['over', 'between', 'under']
+    >>> [within(110.0, 110.0, 100.0).limit_state.value, within(99.0, 110.0, 100.0).limit_state.value]
+    ['between', 'under']
+    >>> within(111.0, 110.0, 100.0) is None
+    True
     """
     if value > limit:
-        return LimitState.OVER
-    return LimitState.BETWEEN if value >= clear_limit else LimitState.UNDER
+        return None
+    return BETWEEN if value >= clear_limit else UNDER
 
 
 def latched(latch: Latch, judgement: Judgement, timing: Timing, at_s: float) -> Latch:
     """The alarm after one more judgement."""
     limit_state, alarm_s = judgement.limit_state, latch.alarm_s
-    if limit_state is LimitState.OVER:
+    if alarm_s is None and limit_state is not _OVER:  # what nearly every judgement is
+        return rested(latch)
+    if limit_state is _OVER:
         over_s = at_s if latch.over_s is None else latch.over_s
         if alarm_s is None and at_s - over_s >= timing.dwell_s:
             return Latch(over_s, judgement.finding, over_s)
         return latch if latch.over_s is not None and latch.under_s is None else Latch(alarm_s, latch.finding, over_s)
-    if limit_state is LimitState.UNDER and alarm_s is not None:
+    if limit_state is _UNDER:
         under_s = at_s if latch.under_s is None else latch.under_s
         if at_s - under_s >= timing.clear_s:
             return IDLE

@@ -9,6 +9,7 @@ medium. A new rule is a function in a file `processors/rules/<noun>.py` and a ro
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 from processors.contract import Output, OutputSpec, Processor, Provenance, Sample, SampleKind
@@ -18,12 +19,14 @@ from processors.rules.spindle import (
     FEED,
     LOAD,
     SPEED,
+    Known,
     Motion,
     Spindle,
     SpindleLimits,
     load_over_limit,
     load_without_feed,
     motion,
+    spindle_load,
 )
 from processors.rules.spindle import followed as spindle_followed
 from processors.rules.temperature import TEMPERATURE, TemperatureLimits, Trend, thermal_runaway
@@ -31,15 +34,23 @@ from processors.rules.temperature import followed as trend_followed
 from processors.rules.vibration import RAMPS, SOURCES, STANDS, VibrationLimits, Zone, velocity, vibration, zone_of
 from processors.sample import why_unknown
 from sparkplug.datatype import DataType
+from sparkplug.quality import Quality
 from twin.vocabulary import twin_signals
 
 ANOMALY, RULE = twin_signals.ANOMALY_ALARM, twin_signals.RULE_PREFIX
 ZONE, SEVERITY, DETAIL = "twin/vibration_zone", twin_signals.SEVERITY, twin_signals.RULE_DETAIL
 NONE, MEDIUM, HIGH = "none", "medium", "high"
+NO_ANOMALY = f"{ANOMALY} is not offered"
+_HOLE, _GOOD, _UNKNOWN = SampleKind.HOLE, Quality.GOOD, LimitState.UNKNOWN
 
 
 class Config(SpindleLimits, TemperatureLimits, VibrationLimits):
     """The limits of all rules; each is described where its rule is."""
+
+    @cached_property
+    def rules(self) -> "tuple[tuple[str, Callable[[Given], Judgement], Timing], ...]":
+        """The name, the judgement and the timing of each of RULES."""
+        return tuple((rule.name, rule.judge, rule.timing(self)) for rule in RULES)
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,12 +64,16 @@ class State:
 
 
 class Given(NamedTuple):
-    """The inputs that a rule may look at."""
+    """The inputs that a rule may look at, each read once."""
 
     config: Config
-    state: State
-    moves: Motion
     sample: Sample
+    moves: Motion
+    load: Known
+    temperature: Known
+    trend: Trend
+    velocity: Known
+    zone: Zone | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,52 +98,54 @@ RULES = (
         "the spindle's load is over its limit, at a speed that is not being changed",
         frozenset({LOAD, SPEED}),
         lambda config: Timing(config.load_dwell_s, config.load_clear_s),
-        lambda given: load_over_limit(given.config, given.moves, given.sample),
+        lambda given: load_over_limit(given.config, given.moves, given.load),
     ),
     Rule(
         "thermal_runaway",
         "the spindle's temperature rises faster than it may",
         frozenset({TEMPERATURE}),
         lambda config: Timing(config.runaway_dwell_s, config.runaway_clear_s),
-        lambda given: thermal_runaway(given.config, given.state.trend, given.sample),
+        lambda given: thermal_runaway(given.config, given.trend, *given.temperature),
     ),
     Rule(
         "load_without_feed",
         "the spindle turns under load while the program runs and nothing is fed",
         frozenset({LOAD, SPEED, FEED, EXECUTION}),
         lambda config: Timing(config.no_feed_dwell_s, config.no_feed_clear_s),
-        lambda given: load_without_feed(given.config, given.moves, given.sample),
+        lambda given: load_without_feed(given.config, given.moves, given.load, given.sample),
     ),
     Rule(
         "vibration",
         "the velocity of vibration is in a zone that alarms",
         frozenset({SPEED, *SOURCES}),
         lambda config: Timing(config.vibration_dwell_s, config.vibration_clear_s),
-        lambda given: vibration(given.config, given.moves, given.state.zone, given.sample),
+        lambda given: vibration(given.config, given.moves, given.zone, given.velocity),
     ),
 )
 
 
 def step(config: Config, state: State, sample: Sample) -> tuple[State, Sequence[Output]]:
     """Judge every sample: what is held counts as long as it is held."""
-    if sample.kind is SampleKind.HOLE:
+    if sample.kind is _HOLE:
         if sample.gap_s >= config.gap_s_max:
-            return State(), _outputs(State(), {}, Judgement(LimitState.UNKNOWN, sample.detail), sample)
+            return State(), _outputs((sample.detail,) * len(RULES), False, sample.detail, _anomaly(sample))
         state = _over_hole(state, sample)
+    at_s, latches = sample.at_s, state.latches
     spindle = spindle_followed(state.spindle, config, sample)
-    moves = motion(spindle, config, sample.at_s)
-    zone, no_zone = _zone(config, state.zone, moves, sample)
-    state = State(spindle, trend_followed(state.trend, config, sample), zone, state.latches)
-    given = Given(config, state, moves, sample)
-    judged, latches, is_moved = {}, {}, False
-    for rule in RULES:
-        judged[rule.name] = judgement = rule.judge(given)
-        before = state.latches.get(rule.name, IDLE)
-        latches[rule.name] = latch = latched(before, judgement, rule.timing(config), sample.at_s)
-        is_moved = is_moved or latch is not before
-    if is_moved:
-        state = State(spindle, state.trend, zone, latches)
-    return state, _outputs(state, judged, Judgement(LimitState.UNKNOWN, no_zone), sample)
+    moves, load, speed_mm_s = motion(spindle, config, at_s), spindle_load(sample), velocity(sample)
+    temperature = sample.number(TEMPERATURE)
+    trend = trend_followed(state.trend, config, temperature[0], at_s)
+    zone, no_zone = _zone(config, state.zone, moves, speed_mm_s)
+    given = Given(config, sample, moves, load, temperature, trend, speed_mm_s, zone)
+    stands: list[Stand] = []
+    for name, judge, timing in config.rules:
+        judgement, before = judge(given), latches.get(name, IDLE)
+        latch = latched(before, judgement, timing, at_s)
+        if latch is not before:
+            latches = {rule.name: latches.get(rule.name, IDLE) for rule in RULES} | {name: latch}
+        stands.append(judgement.reason if judgement.limit_state is _UNKNOWN else None if latch.alarm_s is None else latch)
+    zone_name = no_zone if zone is None else zone.value
+    return State(spindle, trend, zone, latches), _outputs(tuple(stands), zone is not None, zone_name, _anomaly(sample))
 
 
 def _over_hole(state: State, sample: Sample) -> State:
@@ -139,9 +156,9 @@ def _over_hole(state: State, sample: Sample) -> State:
     return State(Spindle(), Trend() if is_ahead else state.trend, state.zone, latches)
 
 
-def _zone(config: Config, before: Zone | None, moves: Motion, sample: Sample) -> tuple[Zone | None, str]:
+def _zone(config: Config, before: Zone | None, moves: Motion, found: Known) -> tuple[Zone | None, str]:
     """The zone of vibration; None with the reason."""
-    velocity_mm_s, why_not = velocity(sample)
+    velocity_mm_s, why_not = found
     if velocity_mm_s is None or moves.rpm is None:
         return None, why_not or moves.why_not
     if not moves.is_turning or moves.is_ramping:
@@ -149,39 +166,45 @@ def _zone(config: Config, before: Zone | None, moves: Motion, sample: Sample) ->
     return zone_of(config, velocity_mm_s, before), ""
 
 
-def _outputs(state: State, judged: Mapping[str, Judgement], no_zone: Judgement, sample: Sample) -> tuple[Output, ...]:
-    """All metrics. Without judgements nothing is known, for the reason that there is no zone."""
-    outputs, alarms, unknown = [], [], []
-    for rule in RULES:
-        judgement = judged.get(rule.name, no_zone)
-        latch = state.latches.get(rule.name, IDLE)
-        if judgement.limit_state is LimitState.UNKNOWN:
+Stand = Latch | str | None
+"""A rule as it stands: its alarm, None without one, or the reason why it is not judged."""
+
+
+@lru_cache(maxsize=2000)
+def _outputs(stands: tuple[Stand, ...], has_zone: bool, zone: str, anomaly: bool | str) -> tuple[Output, ...]:
+    """All metrics; `zone` says why there is none where there is none. The same objects are the answer while nothing changes."""
+    outputs: list[Output] = []
+    alarms: list[str] = []
+    unknown: list[str] = []
+    for rule, stand in zip(RULES, stands, strict=True):
+        if isinstance(stand, str):
             unknown.append(rule.name)
-            outputs.append(Output.null(rule.metric, judgement.reason))
+            outputs.append(Output.null(rule.metric, stand))
             continue
-        outputs.append(Output(rule.metric, latch.is_alarm))
-        if latch.alarm_s is not None:
-            alarms.append(f"{rule.name}: {latch.finding}, since {_utc(latch.alarm_s)}")
-    outputs.append(Output(ZONE, state.zone.value) if state.zone is not None else Output.null(ZONE, no_zone.reason))
-    anomaly, no_anomaly = _anomaly(sample)
+        outputs.append(Output(rule.metric, stand is not None))
+        if stand is not None and stand.alarm_s is not None:
+            alarms.append(f"{rule.name}: {stand.finding}, since {_utc(stand.alarm_s)}")
+    outputs.append(Output(ZONE, zone) if has_zone else Output.null(ZONE, zone))
     if len(unknown) == len(RULES):
-        reason = judged.get(RULES[0].name, no_zone).reason
+        reason = outputs[0].reason or ""
         outputs.append(Output.null(DETAIL, reason))
-        if anomaly is None:
-            return (*outputs, Output.null(SEVERITY, f"no rule and no score can be judged: {reason}; {no_anomaly}"))
+        if isinstance(anomaly, str):
+            return (*outputs, Output.null(SEVERITY, f"no rule and no score can be judged: {reason}; {anomaly}"))
     else:
         left = f" (not judged: {', '.join(unknown)})" if unknown else ""
         outputs.append(Output(DETAIL, "; ".join(alarms or [NONE]) + left))
-    return (*outputs, Output(SEVERITY, HIGH if alarms else MEDIUM if anomaly else NONE))
+    return (*outputs, Output(SEVERITY, HIGH if alarms else MEDIUM if anomaly is True else NONE))
 
 
-def _anomaly(sample: Sample) -> tuple[bool | None, str]:
-    """Return True if the anomaly score alarms; None with the reason."""
+def _anomaly(sample: Sample) -> bool | str:
+    """Return True if the anomaly score alarms; the reason where that is not known."""
     reading = sample.row.get(ANOMALY)
-    reason = f"{ANOMALY} is not offered" if reading is None else why_unknown(reading)
-    if reading is None or reason is not None:
-        return None, reason or ""
-    return (reading.value, "") if isinstance(reading.value, bool) else (None, f"{ANOMALY} is no BOOLEAN")
+    if reading is None:
+        return NO_ANOMALY
+    value = reading.value
+    if type(value) is bool and reading.quality is _GOOD:
+        return value
+    return why_unknown(reading) or f"{ANOMALY} is no BOOLEAN"
 
 
 def _utc(at_s: float) -> str:

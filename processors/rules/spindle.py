@@ -15,13 +15,15 @@ from typing import NamedTuple, Self
 from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
 from processors.config import ProcessorConfig
-from processors.rules.alarm import Judgement, LimitState, over_under
+from processors.rules.alarm import EXCUSED, UNDER, Judgement, over, unknown, within
 from processors.sample import Sample, why_unknown
 from twin.vocabulary.bounds import SPINDLE_LOAD_PCT_MAX, SPINDLE_RPM_MAX
 
 LOAD, SPEED, FEED, EXECUTION = "spindle_load_pct", "spindle_rpm", "feed_mm_min", "exec_state"
+NOT_OFFERED = f"{EXECUTION} is not offered"
 REPORT_S_MIN, REPORT_S_MAX = 0.1, 1.0
-EXCUSED = Judgement(LimitState.EXCUSED)
+Known = tuple[float | None, str | None]
+"""A number, or None with the reason."""
 
 
 class SpindleLimits(ProcessorConfig):
@@ -83,10 +85,12 @@ def followed(spindle: Spindle, limits: SpindleLimits, sample: Sample) -> Spindle
     if spindle.rpm is None:
         return Spindle(rpm, "", sample.at_s)
     if rpm == spindle.rpm:
-        return spindle._replace(seen_s=sample.at_s) if SPEED in sample.changed else spindle
+        if SPEED not in sample.changed:
+            return spindle
+        return Spindle(spindle.rpm, spindle.why_not, sample.at_s, spindle.ramp_s, spindle.ramped_s)
     report_s = min(max(sample.at_s - spindle.seen_s, REPORT_S_MIN), REPORT_S_MAX)
     if abs(rpm - spindle.rpm) <= limits.ramp_rpm_per_s * report_s:
-        return spindle._replace(rpm=rpm, seen_s=sample.at_s)
+        return Spindle(rpm, spindle.why_not, sample.at_s, spindle.ramp_s, spindle.ramped_s)
     goes_on = spindle.ramped_s is not None and sample.at_s - spindle.ramped_s <= limits.ramp_settle_s
     return Spindle(rpm, "", sample.at_s, spindle.ramp_s if goes_on else sample.at_s, sample.at_s)
 
@@ -101,42 +105,42 @@ def motion(spindle: Spindle, limits: SpindleLimits, at_s: float) -> Motion:
     return Motion(spindle.rpm, "", abs(spindle.rpm) >= limits.spindle_rpm_min, ramping)
 
 
-def load_over_limit(limits: SpindleLimits, moves: Motion, sample: Sample) -> Judgement:
-    """Load over its limit, whatever the direction of the torque."""
-    load_pct, why_not = _load(sample)
+def spindle_load(sample: Sample) -> Known:
+    """Return the load, whatever the direction of the torque."""
+    load_pct, reason = sample.number(LOAD)
+    if load_pct is None:
+        return None, reason
+    load_pct = abs(load_pct)
+    return (None, f"{LOAD} is beyond any spindle") if load_pct > SPINDLE_LOAD_PCT_MAX else (load_pct, None)
+
+
+def load_over_limit(limits: SpindleLimits, moves: Motion, load: Known) -> Judgement:
+    """Load over its limit."""
+    load_pct, why_not = load
     if load_pct is None or moves.rpm is None:
-        return Judgement(LimitState.UNKNOWN, why_not or moves.why_not)
+        return unknown(why_not or moves.why_not)
     if moves.is_ramping:
         return EXCUSED
-    limit_state = over_under(load_pct, limits.load_limit_pct, limits.load_clear_pct)
-    if limit_state is not LimitState.OVER:
-        return Judgement(limit_state)
-    return Judgement(limit_state, finding=f"{LOAD} {load_pct:.0f} % over {limits.load_limit_pct:g} %")
+    judgement = within(load_pct, limits.load_limit_pct, limits.load_clear_pct)
+    return judgement or over(f"{LOAD} {load_pct:.0f} % over {limits.load_limit_pct:g} %")
 
 
-def load_without_feed(limits: SpindleLimits, moves: Motion, sample: Sample) -> Judgement:
+def load_without_feed(limits: SpindleLimits, moves: Motion, load: Known, sample: Sample) -> Judgement:
     """Load on a spindle that turns at its speed while the program runs and nothing is fed: it rubs, or something is wound up."""
-    load_pct, why_not = _load(sample)
+    load_pct, why_not = load
     feed, no_feed = sample.number(FEED)
     running, not_known = _is_running(limits, sample)
     if load_pct is None or feed is None or running is None or moves.rpm is None:
-        return Judgement(LimitState.UNKNOWN, why_not or no_feed or not_known or moves.why_not)
+        return unknown(why_not or no_feed or not_known or moves.why_not)
     if moves.is_ramping:
         return EXCUSED
     if not running or not moves.is_turning or abs(feed) >= limits.no_feed_mm_min:
-        return Judgement(LimitState.UNDER)
-    limit_state = over_under(load_pct, limits.no_feed_load_pct, limits.no_feed_clear_pct)
-    if limit_state is not LimitState.OVER:
-        return Judgement(limit_state)
-    over = f"{load_pct:.0f} % over {limits.no_feed_load_pct:g} %"
-    return Judgement(limit_state, finding=f"{LOAD} {over} with {FEED} below {limits.no_feed_mm_min:g} mm/min")
-
-
-def _load(sample: Sample) -> tuple[float | None, str]:
-    load_pct, reason = sample.number(LOAD)
-    if load_pct is None:
-        return None, reason or ""
-    return (None, f"{LOAD} is beyond any spindle") if abs(load_pct) > SPINDLE_LOAD_PCT_MAX else (abs(load_pct), "")
+        return UNDER
+    judgement = within(load_pct, limits.no_feed_load_pct, limits.no_feed_clear_pct)
+    if judgement is not None:
+        return judgement
+    limit = f"{load_pct:.0f} % over {limits.no_feed_load_pct:g} %"
+    return over(f"{LOAD} {limit} with {FEED} below {limits.no_feed_mm_min:g} mm/min")
 
 
 def _is_running(limits: SpindleLimits, sample: Sample) -> tuple[bool | None, str]:
@@ -144,7 +148,7 @@ def _is_running(limits: SpindleLimits, sample: Sample) -> tuple[bool | None, str
     if not limits.exec_states:
         return True, ""
     reading = sample.row.get(EXECUTION)
-    reason = f"{EXECUTION} is not offered" if reading is None else why_unknown(reading)
-    if reading is None or reason is not None:
-        return None, reason or ""
-    return reading.value in limits.exec_states, ""
+    if reading is None:
+        return None, NOT_OFFERED
+    reason = why_unknown(reading)
+    return (reading.value in limits.exec_states, "") if reason is None else (None, reason)

@@ -12,6 +12,7 @@ Theil, H.: A rank-invariant method of linear and polynomial regression analysis 
 """
 
 from collections.abc import Sequence
+from functools import cached_property
 from itertools import combinations
 from statistics import median
 from typing import NamedTuple, Self
@@ -19,8 +20,7 @@ from typing import NamedTuple, Self
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from processors.config import ProcessorConfig
-from processors.rules.alarm import Judgement, LimitState, over_under
-from processors.sample import Sample
+from processors.rules.alarm import Judgement, over, unknown, within
 
 TEMPERATURE = "spindle_temp_c"
 POINTS = 24
@@ -41,6 +41,11 @@ class TemperatureLimits(ProcessorConfig):
     runaway_dwell_s: NonNegativeFloat = 10.0
     runaway_clear_s: NonNegativeFloat = 30.0
     temperature_step_k_max: PositiveFloat = 10.0
+
+    @cached_property
+    def too_short(self) -> Judgement:
+        """The judgement while too little of a window is known."""
+        return unknown(f"{TEMPERATURE} is known for less than {KNOWN_PART * self.runaway_window_s:g} s")
 
     @model_validator(mode="after")
     def _a_slope_can_be_seen(self) -> Self:
@@ -73,15 +78,13 @@ def slope_per_s(points: Sequence[tuple[float, float]]) -> float:
     return median((b_c - a_c) / (b_s - a_s) for (a_s, a_c), (b_s, b_c) in combinations(points, 2))
 
 
-def followed(trend: Trend, limits: TemperatureLimits, sample: Sample) -> Trend:
-    """The temperature's trend as of this sample."""
-    temperature_c, _ = sample.number(TEMPERATURE)
+def followed(trend: Trend, limits: TemperatureLimits, temperature_c: float | None, at_s: float) -> Trend:
+    """The temperature's trend as of this moment."""
     if temperature_c is None or not TEMPERATURES_C[0] <= temperature_c <= TEMPERATURES_C[1]:
         return trend
-    at_s = sample.at_s
     if trend.level_c is not None and abs(temperature_c - trend.level_c) > limits.temperature_step_k_max:
         if trend.stray_s is None:
-            return trend._replace(stray_s=at_s)
+            return Trend(trend.points, trend.slope_k_per_min, trend.level_c, at_s)
         if at_s - trend.stray_s < STRAY_S:
             return trend
         trend = Trend()  # another level: what came before it says nothing of a slope
@@ -89,23 +92,20 @@ def followed(trend: Trend, limits: TemperatureLimits, sample: Sample) -> Trend:
     if trend.points and at_s - trend.points[-1][0] < grid_s:
         if temperature_c == trend.level_c and trend.stray_s is None:
             return trend
-        return trend._replace(level_c=temperature_c, stray_s=None)
+        return Trend(trend.points, trend.slope_k_per_min, temperature_c)
     points = (*(point for point in trend.points if at_s - point[0] <= limits.runaway_window_s), (at_s, temperature_c))
     known = len(points) >= POINTS // 4 and points[-1][0] - points[0][0] >= KNOWN_PART * limits.runaway_window_s
     return Trend(points, 60.0 * slope_per_s(points) if known else None, temperature_c)
 
 
-def thermal_runaway(limits: TemperatureLimits, trend: Trend, sample: Sample) -> Judgement:
+def thermal_runaway(limits: TemperatureLimits, trend: Trend, temperature_c: float | None, why_not: str | None) -> Judgement:
     """Temperature rises faster than it may."""
-    temperature_c, reason = sample.number(TEMPERATURE)
     if temperature_c is None:
-        return Judgement(LimitState.UNKNOWN, reason or "")
+        return unknown(why_not or "")
     if not TEMPERATURES_C[0] <= temperature_c <= TEMPERATURES_C[1]:
-        return Judgement(LimitState.UNKNOWN, f"{TEMPERATURE} is beyond any spindle")
+        return unknown(f"{TEMPERATURE} is beyond any spindle")
     slope = trend.slope_k_per_min
     if slope is None:
-        return Judgement(LimitState.UNKNOWN, f"{TEMPERATURE} is known for less than {KNOWN_PART * limits.runaway_window_s:g} s")
-    limit_state = over_under(slope, limits.runaway_k_per_min, limits.runaway_clear_k_per_min)
-    if limit_state is not LimitState.OVER:
-        return Judgement(limit_state)
-    return Judgement(limit_state, finding=f"{TEMPERATURE} rises by {slope:.1f} K/min, over {limits.runaway_k_per_min:g} K/min")
+        return limits.too_short
+    judgement = within(slope, limits.runaway_k_per_min, limits.runaway_clear_k_per_min)
+    return judgement or over(f"{TEMPERATURE} rises by {slope:.1f} K/min, over {limits.runaway_k_per_min:g} K/min")

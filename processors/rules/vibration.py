@@ -11,14 +11,16 @@ Neither is meant for a spindle in the cut. ISO/TR 17243 is for machine-tool spin
 are not here. Where you have a figure for your spindle, configure it.
 """
 
+from bisect import bisect_left, bisect_right
 from enum import Enum
+from functools import cached_property
 from typing import Self
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from processors.config import ProcessorConfig
-from processors.rules.alarm import Judgement, LimitState
-from processors.rules.spindle import EXCUSED, Motion
+from processors.rules.alarm import EXCUSED, UNDER, Judgement, over, unknown
+from processors.rules.spindle import Known, Motion
 from processors.sample import Sample
 from twin.vocabulary.twin_signals import VIBRATION_VELOCITY_MM_S
 
@@ -28,6 +30,7 @@ SOURCES = (VELOCITY, VIBRATION_VELOCITY_MM_S)
 VELOCITY_MM_S_MAX = 1000.0
 STANDS = "the spindle stands still"
 RAMPS = "the spindle changes its speed"
+NOT_OFFERED = f"neither {SOURCES[0]} nor {SOURCES[1]} is offered"
 
 
 class VibrationClass(Enum):
@@ -79,10 +82,16 @@ class VibrationLimits(ProcessorConfig):
     vibration_dwell_s: NonNegativeFloat = 10.0
     vibration_clear_s: NonNegativeFloat = 10.0
 
-    @property
+    @cached_property
     def boundaries_mm_s(self) -> tuple[float, float, float]:
         """A/B, B/C, C/D."""
         return self.vibration_boundaries_mm_s or BOUNDARIES_MM_S[self.vibration_class]
+
+    @cached_property
+    def lower_boundaries_mm_s(self) -> tuple[float, ...]:
+        """The same where a zone is left downwards."""
+        lower = 1.0 - self.vibration_hysteresis_pct / 100.0
+        return tuple(boundary * lower for boundary in self.boundaries_mm_s)
 
     @model_validator(mode="after")
     def _zones_follow_each_other(self) -> Self:
@@ -94,16 +103,16 @@ class VibrationLimits(ProcessorConfig):
         return self
 
 
-def velocity(sample: Sample) -> tuple[float | None, str]:
+def velocity(sample: Sample) -> Known:
     """The velocity, mm/s rms, of the edge or else of processor `vibration`; None with the reason."""
-    reasons = []
+    why_not = None
     for name in SOURCES:
-        value, reason = sample.number(name)
-        if value is not None and 0.0 <= value <= VELOCITY_MM_S_MAX:
-            return value, ""
         if name in sample.row:
-            reasons.append(reason or f"{name} is beyond any machine")
-    return None, reasons[0] if reasons else f"neither {SOURCES[0]} nor {SOURCES[1]} is offered"
+            value, reason = sample.number(name)
+            if value is not None and 0.0 <= value <= VELOCITY_MM_S_MAX:
+                return value, None
+            why_not = why_not or reason or f"{name} is beyond any machine"
+    return None, why_not or NOT_OFFERED
 
 
 def zone_of(limits: VibrationLimits, velocity_mm_s: float, before: Zone | None = None) -> Zone:
@@ -114,26 +123,23 @@ def zone_of(limits: VibrationLimits, velocity_mm_s: float, before: Zone | None =
     >>> zone_of(VibrationLimits(), 2.7, Zone.C).value, zone_of(VibrationLimits(), 2.5, Zone.C).value
     ('C', 'B')
     """
-    found = sum(velocity_mm_s > boundary for boundary in limits.boundaries_mm_s)
+    found = bisect_left(limits.boundaries_mm_s, velocity_mm_s)  # so many boundaries are exceeded
     if before is not None:
-        lower = 1.0 - limits.vibration_hysteresis_pct / 100.0
-        stays = sum(velocity_mm_s >= boundary * lower for boundary in limits.boundaries_mm_s)
+        stays = bisect_right(limits.lower_boundaries_mm_s, velocity_mm_s)
         found = max(found, min(stays, ZONES.index(before)))
     return ZONES[found]
 
 
-def vibration(limits: VibrationLimits, moves: Motion, zone: Zone | None, sample: Sample) -> Judgement:
+def vibration(limits: VibrationLimits, moves: Motion, zone: Zone | None, found: Known) -> Judgement:
     """The zone is one of those that alarm. A spindle that stands or changes its speed is not judged."""
     if moves.rpm is None:
-        return Judgement(LimitState.UNKNOWN, moves.why_not)
-    velocity_mm_s, why_not = velocity(sample)
+        return unknown(moves.why_not)
+    velocity_mm_s, why_not = found
     if velocity_mm_s is None:
-        return Judgement(LimitState.UNKNOWN, why_not)
+        return unknown(why_not or "")
     if moves.is_ramping or zone is None:
         return EXCUSED
     if ZONES.index(zone) < ZONES.index(limits.vibration_alarm_zone):
-        return Judgement(LimitState.UNDER)
+        return UNDER
     boundary = limits.boundaries_mm_s[ZONES.index(limits.vibration_alarm_zone) - 1]
-    return Judgement(
-        LimitState.OVER, finding=f"vibration {velocity_mm_s:.1f} mm/s rms in zone {zone.value}, over {boundary:g} mm/s"
-    )
+    return over(f"vibration {velocity_mm_s:.1f} mm/s rms in zone {zone.value}, over {boundary:g} mm/s")
