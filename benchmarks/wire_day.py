@@ -21,7 +21,7 @@ from random import Random
 from cnctwin.importing.shdr import recorded_rows
 from edge.running.birth import device_metrics
 from edge.sample import EdgeSample, Offer
-from processors.actions import Action, Declare, Publish, PublishPlain, Remove
+from processors.actions import Action, Declare, PlainOutput, Publish, Remove
 from processors.config import Configuration
 from processors.discovery import AnyProcessor, discover
 from processors.running.engine import Engine
@@ -97,7 +97,7 @@ class Processing:
         for action in actions:
             if isinstance(action, Publish) and action.machine in self._declared:
                 sent += self.sender.publish(action.machine, action.changes, at_ms)
-            elif isinstance(action, PublishPlain):
+            elif isinstance(action, PlainOutput):
                 self.plain.take(action.topic, action.payload)
             elif isinstance(action, Declare):
                 latest = {change.name: change for change in action.latest}

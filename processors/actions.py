@@ -12,12 +12,15 @@ class Publish(NamedTuple):
     changes: tuple[Change, ...]
 
 
-class PublishPlain(NamedTuple):
-    """Send a plain message, outside Sparkplug."""
+class PlainOutput(NamedTuple):
+    """Send a plain message on a declared topic, outside Sparkplug; retained, so that whoever comes later reads it too.
+
+    qos: is filled in by the declaration of its topic
+    """
 
     topic: str
     payload: bytes
-    retain: bool
+    retain: bool = True
     qos: int = 0
 
 
@@ -50,4 +53,4 @@ class Pin(NamedTuple):
     reason: str
 
 
-Action = Publish | PublishPlain | Declare | Remove | DeadLetter | Pin
+Action = Publish | PlainOutput | Declare | Remove | DeadLetter | Pin

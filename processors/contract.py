@@ -12,7 +12,7 @@ from dataclasses import dataclass, is_dataclass
 from enum import Enum
 from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 
-from processors.actions import Pin
+from processors.actions import Pin, PlainOutput
 from processors.config import ALL, CellConfig, Configuration, ProcessorConfig
 from processors.errors import DeclarationError
 from processors.sample import Sample, SampleKind
@@ -120,14 +120,6 @@ class Output(NamedTuple):
     def null(cls, name: str, reason: str, machine: str | None = None, at_s: float | None = None) -> "Output":
         """A null that says why. Keep live figures out of `reason`: a changed reason is published again."""
         return cls(name, None, Quality.BAD, reason, machine, at_s)
-
-
-class PlainOutput(NamedTuple):
-    """A plain message on a declared topic; retained, so that whoever comes later reads it too."""
-
-    topic: str
-    payload: bytes
-    retain: bool = True
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,6 @@ import math
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
 
-from processors.actions import PublishPlain
 from processors.contract import PYTHON_TYPES, Output, OutputSpec, PlainOutput, PlainSpec
 from processors.discovery import AnyProcessor
 from processors.errors import OutputError
@@ -67,12 +66,12 @@ def _rules(outputs: tuple[OutputSpec, ...]) -> dict[str, tuple[OutputSpec, bool,
     return {spec.name: (spec, float in PYTHON_TYPES[spec.datatype], spec.deadband) for spec in outputs}
 
 
-def plain_message(processor_name: str, declared: Sequence[PlainSpec], output: PlainOutput) -> PublishPlain:
+def plain_message(processor_name: str, declared: Sequence[PlainSpec], output: PlainOutput) -> PlainOutput:
     """A plain message as it is sent. Raises OutputError where its topic is not declared: our own bug."""
-    topic, payload, retain = output
+    topic = output[0]
     for spec in declared:
         if topic.startswith(spec.prefix):
-            return PublishPlain(topic, payload, retain, spec.qos)
+            return output if output[3] == spec.qos else output._replace(qos=spec.qos)
     raise OutputError(f"{processor_name} emits {topic!r}, which it does not declare")
 
 

@@ -8,7 +8,7 @@ import itertools
 from collections.abc import Callable, Collection, Mapping
 from operator import itemgetter
 
-from processors.actions import Action, Declare, PublishPlain, Remove
+from processors.actions import Action, Declare, PlainOutput, Remove
 from processors.config import Configuration, ProcessorConfig
 from processors.discovery import AnyProcessor
 from processors.errors import SnapshotError
@@ -228,7 +228,7 @@ class Engine:
                 actions += self._die(machine, list(machine.live.row), at_ms, reason, is_last=True)[0]
         return actions
 
-    def farewell(self, at_ms: int) -> list[PublishPlain]:
+    def farewell(self, at_ms: int) -> list[PlainOutput]:
         """The processor stops: what its plain messages say of online machines is no longer kept up. (Its twin devices die with
         its edge node.) The state is not to be saved after this."""
         actions: list[Action] = []
@@ -238,7 +238,7 @@ class Engine:
             if machine.is_online:
                 self.ledger.count(machine.live.drop_held(), 0)
                 actions += machine.live.death(list(machine.live.row), at_ms, "the processor was stopped", is_last=True)[0]
-        return [action for action in actions if isinstance(action, PublishPlain)]
+        return [action for action in actions if isinstance(action, PlainOutput)]
 
     # How it is done.
 

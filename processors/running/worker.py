@@ -12,7 +12,7 @@ from dataclasses import replace
 
 from paho.mqtt.client import topic_matches_sub
 
-from processors.actions import Action, Declare, Pin, Publish, PublishPlain, Remove
+from processors.actions import Action, Declare, Pin, PlainOutput, Publish, Remove
 from processors.config import Configuration, ProcessorConfig
 from processors.discovery import AnyProcessor
 from processors.errors import SnapshotError
@@ -149,7 +149,7 @@ class Worker:
         for action in actions:
             if isinstance(action, Publish):
                 sent = self._publish(action) and sent
-            elif isinstance(action, PublishPlain):
+            elif isinstance(action, PlainOutput):
                 sent = self._host.publish_plain(action.topic, action.payload, qos=action.qos, retain=action.retain) and sent
             elif isinstance(action, Declare):
                 self._edge.declare_device(action.machine, [_with_latest(spec, action.latest) for spec in self._specs])

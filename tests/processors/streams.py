@@ -6,7 +6,7 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from processors.actions import Action, Publish, PublishPlain
+from processors.actions import Action, PlainOutput, Publish
 from processors.discovery import AnyProcessor
 from processors.running.engine import Engine
 from sparkplug.host_session import EventKind, HostEvent
@@ -87,7 +87,7 @@ def published(actions: list[Action]) -> list[tuple[int, str, Any, bool]]:
 
 def plain(actions: list[Action]) -> dict[str, bytes]:
     """The last plain message on each topic."""
-    return {action.topic: action.payload for action in actions if isinstance(action, PublishPlain)}
+    return {action.topic: action.payload for action in actions if isinstance(action, PlainOutput)}
 
 
 SIGNALS = ("spindle_rpm", "spindle_load_pct", "ambient_temp_c", "spindle_temp_c", "tool_number", "program", "twin/raw_score")

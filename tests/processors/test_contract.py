@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from pydantic import TypeAdapter
 
-from processors.actions import Action, DeadLetter, Publish, PublishPlain, Remove
+from processors.actions import Action, DeadLetter, PlainOutput, Publish, Remove
 from processors.config import Configuration, read_tables
 from processors.discovery import AnyProcessor, discover, modules, sample_configuration
 from processors.running.snapshot import decode_state, encode_state
@@ -122,7 +122,7 @@ def test_it_emits_only_what_it_declares_and_every_null_says_why(processor: AnyPr
         if isinstance(action, Publish):
             assert {change.name for change in action.changes} <= names
             assert all(change.reason for change in action.changes if change.value is None)
-        elif isinstance(action, PublishPlain):
+        elif isinstance(action, PlainOutput):
             assert action.topic.startswith(tuple(spec.prefix for spec in processor.plain))
             json.loads(action.payload, parse_constant=_no_constant)
     assert all(name.startswith(TWIN_PREFIX) for name in names)
