@@ -6,14 +6,13 @@ import struct
 from random import Random
 from typing import Any
 
-import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from sparkplug.codec import encode, parse
 from sparkplug.datatype import DataType
 from sparkplug.errors import PayloadError
-from sparkplug.host_session import EventKind, HostEvent, HostSession
+from sparkplug.host_session import HostEvent, HostSession
 from sparkplug.layouts.layout import Layout
 from sparkplug.layouts.memory import Memory, Room
 from sparkplug.layouts.route import Route
@@ -145,7 +144,9 @@ def payloads(draw: st.DrawFn) -> bytes:
     parts += [field(2, LENGTH, metric) for metric in draw(st.lists(metrics(odd), max_size=4))]
     parts.append(field(3, VARINT, varint(draw(st.integers(0, 255)), int(draw(odd)))))
     if draw(odd):
-        parts.append(draw(st.sampled_from([b"", field(4, LENGTH, b"id"), field(5, LENGTH, b"x"), field(9, VARINT, b"\x01"), b"\x08"])))
+        parts.append(
+            draw(st.sampled_from([b"", field(4, LENGTH, b"id"), field(5, LENGTH, b"x"), field(9, VARINT, b"\x01"), b"\x08"]))
+        )
         parts = draw(st.permutations(parts))
     return b"".join(parts)
 
