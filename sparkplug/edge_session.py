@@ -16,9 +16,9 @@ from sparkplug.certificate import Certificate, definition_metrics
 from sparkplug.codec import decode, encode
 from sparkplug.datatype import DataType
 from sparkplug.errors import PayloadError, SparkplugError, TopicError, UnknownMetricError
+from sparkplug.layouts.varint import written
 from sparkplug.metric import Change, MetricSpec, NodeId
 from sparkplug.rebirth import RebirthAnswer
-from sparkplug.schema import PayloadMessage
 from sparkplug.topics import Topic, Verb, check_id, state_topic
 from sparkplug.values import Metric, Payload, Template, Value
 
@@ -26,6 +26,7 @@ BD_SEQ = "bdSeq"
 REBIRTH = "Node Control/Rebirth"
 REBIRTH_INTERVAL_MS_MIN = 1000
 COMMANDS_PENDING_MAX = 1000
+_SEQ_FIELDS = tuple(b"\x18" + written(seq) for seq in range(256))  # as the last field of a payload
 
 
 Aliases = dict[tuple[str | None, str], int]
@@ -38,6 +39,9 @@ class Phase(Enum):
     OFFLINE = "offline"
     WAITING = "waiting"
     BORN = "born"
+
+
+_BORN = Phase.BORN
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,16 +170,17 @@ class EdgeNodeSession:
 
     def publish(self, device: str | None, changes: Sequence[Change], now_ms: int) -> list[Action]:
         """Note the changes and, where the node is born, send them in one message."""
-        if self.phase is not Phase.BORN or self._rebirth.is_due or not changes:
+        if self.phase is not _BORN or self._rebirth.is_due or not changes:
             self.note(device, changes)  # between a request for a rebirth and the rebirth no data goes out
             return []
         certificate = self._certificate_of(device)
-        message = PayloadMessage()
-        message.timestamp = self._stamp(now_ms)
-        certificate.write_data(message, changes)
-        certificate.note(changes)
-        message.seq = self._next_seq()
-        return [Publish(_data_topic(self.node, device), message.SerializeToString())]
+        stamp_ms = self._stamp(now_ms)
+        metrics = certificate.take_plain(changes)
+        if metrics is None:
+            metrics = certificate.data(changes)
+            certificate.note(changes)
+        payload = b"\x08" + written(stamp_ms) + metrics + _SEQ_FIELDS[self._next_seq()]
+        return [tuple.__new__(Publish, (_data_topic(self.node, device), payload, 0, False))]
 
     def note(self, device: str | None, changes: Sequence[Change]) -> None:
         """Keep the changes for the next birth without sending them."""
@@ -201,8 +206,10 @@ class EdgeNodeSession:
 
     def _stamp(self, now_ms: int) -> int:
         """The time stamp of a payload: never earlier than the one before, so that a host can tell old from new (5.7)."""
-        self._clock_ms = max(now_ms, self._clock_ms)
-        return self._clock_ms
+        if now_ms <= self._clock_ms:
+            return self._clock_ms
+        self._clock_ms = now_ms
+        return now_ms
 
     def _next_seq(self) -> int:
         self._seq = (self._seq + 1) % 256

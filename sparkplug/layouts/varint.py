@@ -1,8 +1,8 @@
 """Base-128 varints of protobuf, read and written.
 
 >>> written(1_790_000_000_000).hex()
-'80bc91cf8c34'
->>> number(bytes.fromhex("80bc91cf8c34"))
+'80d8c1a28c34'
+>>> number(bytes.fromhex("80d8c1a28c34"))
 1790000000000
 """
 
@@ -38,6 +38,7 @@ class _Written(dict[int, bytes]):
 
 
 _READ, _WRITTEN = _Read(), _Written()
+_LOWEST = [bytes((low & 127 | 128, low >> 7 | 128)) for low in range(1 << 14)]  # the first two bytes of a longer varint
 
 
 def number(raw: bytes) -> int:
@@ -51,4 +52,4 @@ def written(value: int) -> bytes:
     """Return the shortest varint of a number that is not negative."""
     if value < 16384:
         return _WRITTEN[value]
-    return bytes((value & 127 | 128, value >> 7 & 127 | 128)) + _WRITTEN[value >> 14]
+    return _LOWEST[value & 16383] + _WRITTEN[value >> 14]

@@ -16,7 +16,6 @@ from sparkplug.datatype import DataType
 from sparkplug.errors import MetricValueError, SparkplugError, TopicError, UnknownMetricError
 from sparkplug.metric import Change, MetricSpec
 from sparkplug.quality import Quality
-from sparkplug.schema import PayloadMessage
 from sparkplug.values import DataSet, MetaData, Metric, Payload, PropertyValue, Template
 from tests.sparkplug.everything import ALL_VALUES, DEFINITION, EDGES, INSTANCE, same
 
@@ -38,10 +37,7 @@ def certificate(*specs: MetricSpec, now_ms: int = 5) -> Certificate:
 
 def written(owner: Certificate, *changes: Change) -> tuple[Metric, ...]:
     """The metrics of a data message."""
-    message = PayloadMessage()
-    owner.write_data(message, changes)
-    data: bytes = message.SerializeToString()
-    return decode(data).metrics
+    return decode(owner.data(changes)).metrics
 
 
 def test_a_birth_says_all_that_is_known() -> None:
@@ -130,10 +126,9 @@ def test_what_is_written_as_data_is_what_the_next_birth_carries(typed: tuple[Dat
     assume(datatype is not DataType.TEMPLATE)  # instances are bound to their definition, see below
     owner = certificate(MetricSpec("m", datatype))
     change = Change("m", value, 9)
-    message = PayloadMessage()
-    owner.write_data(message, [change])
+    written_data = owner.data([change])
     owner.note([change])
-    data = decode(message.SerializeToString(), lambda _name, _alias: datatype).metrics[0]
+    data = decode(written_data, lambda _name, _alias: datatype).metrics[0]
     born = decode(encode(Payload(1, owner.birth()))).metrics[0]
     assert same(data.value, value) and same(born.value, value)
 
