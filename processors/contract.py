@@ -194,11 +194,12 @@ class Processor(_Declaration[C, S]):
     """A fold over what one machine says: a state for each machine, which is its own unit.
 
     step: takes the values that hold for the machine; with `reads`, the whole configuration
+    wakes: signals whose change is folded as it comes; all others are seen at the next tick. None = every change is
     """
 
     step: Callable[[C, S, Sample], tuple[S, Outputs]] | Callable[[Configuration[C], S, Sample], tuple[S, Outputs]]
+    wakes: frozenset[str] | None = None
     listens: ClassVar[tuple[str, ...]] = ()
-    wakes: ClassVar[frozenset[str] | None] = None
     beats: ClassVar[bool] = False
 
     @property

@@ -6,7 +6,7 @@ reason.
 """
 
 from collections.abc import Sequence
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Self
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
@@ -20,6 +20,7 @@ from twin.vocabulary.bounds import SPINDLE_LOAD_PCT_MAX, SPINDLE_RPM_MAX
 
 SPEED, LOAD, TOOL = "spindle_rpm", "spindle_load_pct", "tool_number"
 FORCE, BASIS = twin_signals.CUTTING_FORCE_N, twin_signals.CUTTING_FORCE_BASIS
+_TICK, _DEATH = SampleKind.TICK, SampleKind.DEATH
 DRIVE_FIELDS = {"rated power": "rated_power_kw", "efficiency": "efficiency"}
 
 
@@ -59,19 +60,29 @@ class Config(ProcessorConfig):
 
 def step(config: Config, state: NoState, sample: Sample) -> tuple[NoState, Sequence[Output]]:
     """The force as of this sample."""
-    if sample.kind is SampleKind.TICK or sample.kind is SampleKind.DEATH:
+    if sample.kind is _TICK or sample.kind is _DEATH:
         return state, ()
     diameter_mm, basis = _diameter(config, sample)
     load_pct, no_load = sample.number(LOAD)
     rpm, no_rpm = sample.number(SPEED)
     if load_pct is None or rpm is None:
-        return state, (Output.null(FORCE, no_load or no_rpm or ""), Output(BASIS, basis))
+        return state, _unknown(no_load or no_rpm or "", basis)
     if abs(rpm) > SPINDLE_RPM_MAX or load_pct > SPINDLE_LOAD_PCT_MAX:
-        return state, (Output.null(FORCE, "spindle_rpm or spindle_load_pct is beyond any spindle"), Output(BASIS, basis))
+        return state, _unknown("spindle_rpm or spindle_load_pct is beyond any spindle", basis)
     force_n, reason = cutting_force(config.drive, load_pct, rpm, diameter_mm)
     if force_n is None:
-        return state, (Output.null(FORCE, reason or ""), Output(BASIS, basis))
-    return state, (Output(FORCE, round(force_n, 1)), Output(BASIS, basis))
+        return state, _unknown(reason or "", basis)
+    return state, (Output(FORCE, round(force_n, 1)), _basis(basis))
+
+
+@lru_cache(maxsize=1000)
+def _basis(basis: str) -> Output:
+    return Output(BASIS, basis)
+
+
+@lru_cache(maxsize=1000)
+def _unknown(why_not: str, basis: str) -> tuple[Output, Output]:
+    return Output.null(FORCE, why_not), _basis(basis)
 
 
 def _diameter(config: Config, sample: Sample) -> tuple[float, str]:

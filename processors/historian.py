@@ -8,6 +8,7 @@ finds the machine's own values and not a roll-up. A growing gap names the window
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
+from functools import cached_property
 
 from pydantic import Field
 
@@ -21,6 +22,7 @@ from twin.vocabulary import twin_signals
 
 PINS, REASON, WINDOW = "twin/history_pins", "twin/history_pin_reason", twin_signals.GAP_WINDOW
 DAY_MS = 86_400_000
+_DATA, _BIRTH = SampleKind.DATA, SampleKind.BIRTH
 
 
 class HistorianConfig(ProcessorConfig):
@@ -35,6 +37,11 @@ class HistorianConfig(ProcessorConfig):
     raw_days: float = Field(default=365.0, gt=0.0, le=36_500.0)
     block_days: float = Field(default=7.0, gt=0.0, le=36_500.0)
     disk_gb: float = Field(default=0.0, ge=0.0, le=1e6)
+
+    @cached_property
+    def watched(self) -> frozenset[str]:
+        """The signals that may ask for a pin."""
+        return frozenset({*self.flags, WINDOW})
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +65,7 @@ class HistorianState:
 
 def step(config: HistorianConfig, state: HistorianState, sample: Sample) -> tuple[HistorianState, Sequence[Output | Pin]]:
     """Pin what the flags that changed ask for."""
-    if sample.is_history or sample.kind not in (SampleKind.DATA, SampleKind.BIRTH):
+    if config.watched.isdisjoint(sample.changed) or sample.is_history or sample.kind not in (_DATA, _BIRTH):
         return state, ()
     pins: list[Pin] = []
     for name in sample.changed:

@@ -82,7 +82,7 @@ def step(configuration: Configuration[Config], state: State, sample: Sample) -> 
     config = configuration.of(sample.machine)
     model: ResidualModel | None = configuration.read.get(sample.machine)
     if model is None:
-        return state, _nulls(NO_MODEL) if sample.kind in (SampleKind.TICK, SampleKind.BIRTH) else ()
+        return state, _UNKNOWN_WITHOUT_MODEL if sample.kind in (SampleKind.TICK, SampleKind.BIRTH) else ()
     if state.version != model.version:
         state = State(model.version)
     if sample.kind is SampleKind.HOLE:
@@ -163,6 +163,8 @@ def _nulls(why: str) -> tuple[Output, ...]:
     return tuple(Output.null(name, why) for name in (CORRECTION, CORRECTED, LEFT, IN_REGION, GAIN, BASIS))
 
 
+_UNKNOWN_WITHOUT_MODEL = _nulls(NO_MODEL)
+
 _DOUBLE, _MODELLED, _INFERRED = DataType.DOUBLE, Provenance.MODELLED, Provenance.INFERRED
 PROCESSOR = Processor(
     name="residual",
@@ -180,5 +182,6 @@ PROCESSOR = Processor(
     state=State,
     initial=lambda _: State(),
     step=step,
+    wakes=frozenset(),
     reads=read_models,
 )

@@ -23,6 +23,8 @@ from twin.vocabulary.bounds import SPINDLE_LOAD_PCT_MAX, SPINDLE_RPM_MAX
 
 SPEED, LOAD, AMBIENT, MEASURED = "spindle_rpm", "spindle_load_pct", "ambient_temp_c", "spindle_temp_c"
 TEMPERATURE, RESIDUAL = twin_signals.SPINDLE_TEMP_C, twin_signals.SPINDLE_TEMP_RESIDUAL_K
+_NOT_YET = "no speed and load yet"
+_TICK, _HOLE = SampleKind.TICK, SampleKind.HOLE
 RISE, BASIS = twin_signals.SPINDLE_TEMP_RISE_K, twin_signals.SPINDLE_TEMP_BASIS
 
 
@@ -55,19 +57,19 @@ class State:
     ambient_c: float | None = None
     blind_since_s: float | None = None
     why_blind: str = ""
-    why_not: str = "no speed and load yet"
+    why_not: str = _NOT_YET
     started_from: str = ""
 
 
 def step(config: Config, state: State, sample: Sample) -> tuple[State, Sequence[Output]]:
     """Advance the estimate to the sample, then take over its inputs. Publishes at ticks, and at a hole."""
-    if sample.kind is SampleKind.TICK:
+    if sample.kind is _TICK:
         if state.at_s is None:
             # Time goes on again after a hole. A value that was not sent again has not changed: start from what is known.
             state = _with_inputs(config, state, sample)
         state = _advanced(config.network, state, sample.at_s)
         return state, _outputs(config, state, sample)
-    if sample.kind is SampleKind.HOLE:
+    if sample.kind is _HOLE:
         state = _with_inputs(config, _over_hole(config, state, sample), sample)
         return state, _outputs(config, state, sample)
     return _with_inputs(config, state, sample), ()
@@ -104,7 +106,9 @@ def _with_inputs(config: Config, state: State, sample: Sample) -> State:
         return replace(_advanced(config.network, state, sample.at_s), blind_since_s=since_s, why_blind=why_blind)
     if state.blind_since_s is not None and sample.at_s - state.blind_since_s > config.gap_s_max:
         state = State(why_not=state.why_blind)
-    ambient_c, _ = _ambient(config, sample)
+    ambient_c, _ = sample.number(AMBIENT)
+    if ambient_c is None:
+        ambient_c = config.ambient_temp_c
     if state.at_s is None:
         # A hole only ends an estimate: what the row holds then is from before it.
         return state if sample.kind in (SampleKind.HOLE, SampleKind.DEATH) else _started(sample, heat_w, ambient_c)
@@ -117,7 +121,8 @@ def _with_inputs(config: Config, state: State, sample: Sample) -> State:
         rise_k = rise_after(config.network, rise_k, state.heat_w, sample.at_s - state.at_s)
     if ambient_c is not None and state.ambient_c is not None:
         rise_k += state.ambient_c - ambient_c  # the spindle's temperature does not jump with the ambient's
-    return State(max(sample.at_s, state.at_s), rise_k, heat_w, ambient_c, started_from=state.started_from)
+    at_s = max(sample.at_s, state.at_s)
+    return State(at_s, rise_k, heat_w, ambient_c, None, "", _NOT_YET, state.started_from)
 
 
 def _started(sample: Sample, heat_w: float, ambient_c: float | None) -> State:

@@ -30,6 +30,7 @@ _BY_STATE = {
     WAIT: "waits for an event",
 }
 TEXT_MAX = 80
+_GOOD, _STALE = Quality.GOOD, Quality.STALE
 
 
 class Execution(NamedTuple):
@@ -38,6 +39,10 @@ class Execution(NamedTuple):
     state: str | None
     reason: str = ""
     basis: str = BY_CONTROL
+
+
+_TOLD = {state: Execution(state) for state in STATES}
+_FED, _UNFED = Execution(ACTIVE, basis=BY_FEED), Execution(READY, basis=BY_FEED)
 
 
 def execution(sample: Sample, feed_mm_min_min: float) -> Execution:
@@ -50,27 +55,27 @@ def execution(sample: Sample, feed_mm_min_min: float) -> Execution:
     reading = sample.row.get(EXECUTION)
     if reading is None and FEED in sample.row:
         feed = sample.row[FEED]
-        if feed.quality is Quality.STALE and feed.reason != "not offered any more":
+        if feed.quality is _STALE and feed.reason != "not offered any more":
             return Execution(OFFLINE, basis=BY_FEED)
         mm_min, unknown = sample.number(FEED)
         if mm_min is None:
             return Execution(None, unknown or "", BY_FEED)
-        return Execution(ACTIVE if mm_min >= feed_mm_min_min else READY, basis=BY_FEED)
+        return _FED if mm_min >= feed_mm_min_min else _UNFED
     if reading is None:
         return Execution(None, f"{EXECUTION} is not offered")
-    if reading.quality is Quality.STALE and reading.reason != "not offered any more":
+    if reading.quality is _STALE and reading.reason != "not offered any more":
         return Execution(OFFLINE)
     if (reason := why_unknown(reading)) is not None:
         return Execution(None, reason)
     if not isinstance(reading.value, str) or reading.value not in STATES:
         return Execution(None, f"{EXECUTION} is no state that is known")
-    return Execution(reading.value)
+    return _TOLD[reading.value]
 
 
 def text(row: Mapping[str, Reading], name: str) -> str | None:
     """A good text of the row, cut to a length; None where there is none."""
     reading = row.get(name)
-    if reading is None or reading.quality is not Quality.GOOD or not isinstance(reading.value, str):
+    if reading is None or reading.quality is not _GOOD or not isinstance(reading.value, str):
         return None
     return reading.value[:TEXT_MAX]
 
@@ -78,7 +83,7 @@ def text(row: Mapping[str, Reading], name: str) -> str | None:
 def tool(row: Mapping[str, Reading]) -> int | None:
     """The tool in the spindle; None where there is none, or it is not known."""
     reading = row.get(TOOL)
-    if reading is None or reading.quality is not Quality.GOOD or type(reading.value) is not int:
+    if reading is None or reading.quality is not _GOOD or type(reading.value) is not int:
         return None
     return reading.value if abs(reading.value) < 2**31 else None
 
@@ -86,7 +91,7 @@ def tool(row: Mapping[str, Reading]) -> int | None:
 def is_changing_tool(row: Mapping[str, Reading]) -> bool:
     """Return True if a tool change is reported."""
     reading = row.get(CHANGING)
-    return reading is not None and reading.quality is Quality.GOOD and reading.value is True
+    return reading is not None and reading.quality is _GOOD and reading.value is True
 
 
 def is_held_by_override(sample: Sample) -> bool:

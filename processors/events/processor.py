@@ -52,6 +52,7 @@ STOP, STOP_S, PART = STOP_REASON, f"{TWIN_PREFIX}stop_s", PART_RECORD
 WATCHED = frozenset({EXECUTION, PROGRAM, MODE, ALARM, CHANGING, FEED_OVERRIDE})
 TOLD_EVERY_S = 60.0
 STAMP_MAX_S = 253_402_300_000.0
+_DATA, _TICK, _BIRTH, _HOLE = SampleKind.DATA, SampleKind.TICK, SampleKind.BIRTH, SampleKind.HOLE
 
 
 class Config(ProcessorConfig):
@@ -83,6 +84,13 @@ class State:
     shares: Shares = field(default_factory=Shares)
     told_s: float = 0.0
 
+    def having(self, run: Run | None, at_s: float | None, is_blind: bool, stop_s: float, shares: Shares) -> "State":
+        """Return the state with these. Spelled out, since `replace` looks up each field, and there are many a second."""
+        return State(
+            at_s, is_blind, self.execution, self.since_ms, self.is_known, self.is_held, self.reason,
+            stop_s, run, self.number, shares, self.told_s,
+        )  # fmt: skip
+
 
 @cache
 def _at_once() -> frozenset[str]:
@@ -94,24 +102,21 @@ def step(config: Config, state: State, sample: Sample) -> tuple[State, Sequence[
     """Add up the time that has passed, then follow what has changed."""
     if sample.is_history or abs(sample.at_s) > STAMP_MAX_S:
         return state, ()
-    if sample.kind is SampleKind.HOLE:
+    kind, changed = sample.kind, sample.changed
+    if kind is _HOLE:
         return _over_hole(config, state, sample), ()
-    if (
-        sample.kind is SampleKind.DATA
-        and WATCHED.isdisjoint(sample.changed)
-        and not (FEED in sample.changed and _by_feed(sample))
-    ):
-        if state.run is None or _at_once().isdisjoint(sample.changed):
+    if kind is _DATA and WATCHED.isdisjoint(changed) and not (FEED in changed and _by_feed(sample)):
+        if state.run is None or _at_once().isdisjoint(changed):
             return state, ()
-        return replace(state, run=followed(state.run, sample)), ()
+        return state.having(followed(state.run, sample), state.at_s, state.is_blind, state.stop_s, state.shares), ()
     state = _lasted(config, state, sample)
     outputs: list[Output] = []
     now = execution(sample, config.feed_mm_min_min)
-    if state.run is not None and not _at_once().isdisjoint(sample.changed):
+    if state.run is not None and not _at_once().isdisjoint(changed):
         state = replace(state, run=followed(state.run, sample))
     state = _moved(config, state, sample, now, outputs)
     state = _stopped(state, sample, now, outputs)
-    if sample.kind in (SampleKind.TICK, SampleKind.BIRTH) and not 0.0 <= sample.at_s - state.told_s < TOLD_EVERY_S:
+    if kind in (_TICK, _BIRTH) and not 0.0 <= sample.at_s - state.told_s < TOLD_EVERY_S:
         state = replace(state, told_s=sample.at_s)
         outputs += _shares(config, state)
         if state.reason != NO_STOP and now.state is not None:
@@ -135,7 +140,7 @@ def _lasted(config: Config, state: State, sample: Sample) -> State:
     """The state with the time since it was last looked at, spent as it then was."""
     before_s, at_s = state.at_s, sample.at_s
     if before_s is None or at_s <= before_s:
-        return replace(state, at_s=at_s, is_blind=state.is_blind and at_s == before_s)
+        return state if at_s == before_s else replace(state, at_s=at_s, is_blind=False)
     dt_s = at_s - before_s
     is_seen = state.is_known and not state.is_blind and state.execution not in (None, OFFLINE)
     shares, run, stop_s = state.shares, state.run, state.stop_s
@@ -148,7 +153,7 @@ def _lasted(config: Config, state: State, sample: Sample) -> State:
         run = lasted(run, sample, state.execution if is_seen else None, reason, dt_s)
     if state.reason != NO_STOP:
         stop_s += dt_s
-    return replace(state, at_s=at_s, is_blind=False, shares=shares, run=run, stop_s=stop_s)
+    return state.having(run, at_s, False, stop_s, shares)
 
 
 def _moved(config: Config, state: State, sample: Sample, now: Execution, outputs: list[Output]) -> State:
@@ -160,10 +165,11 @@ def _moved(config: Config, state: State, sample: Sample, now: Execution, outputs
             outputs.append(unknown)
         elif state.execution is None:
             outputs.append(Output.null(STATE, now.reason or "offline"))
-        return replace(state, is_known=False, is_held=False)
+        return replace(state, is_known=False, is_held=False) if state.is_known or state.is_held else state
     before, was_known = state.execution, state.is_known
     is_held = now.state == ACTIVE and is_held_by_override(sample)
-    state = replace(state, is_known=True, is_held=is_held)
+    if not was_known or is_held is not state.is_held:
+        state = replace(state, is_known=True, is_held=is_held)
     program = text(sample.row, PROGRAM)
     if now.state == before and was_known:
         return _named(state, program)
@@ -236,6 +242,9 @@ def _ended(config: Config, state: State, run: Run, turn: _Turn, ended_by: str) -
     return replace(state, number=number)
 
 
+_WORKS = Output(STOP, NO_STOP)
+
+
 def _stopped(state: State, sample: Sample, now: Execution, outputs: list[Output]) -> State:
     """Why the machine stands: the first reason that is told, or an alarm that comes while it stands."""
     if now.state is None:
@@ -245,7 +254,7 @@ def _stopped(state: State, sample: Sample, now: Execution, outputs: list[Output]
     if reason == NO_STOP:
         if state.reason != NO_STOP:
             outputs.append(Output(STOP_S, round(state.stop_s, 1)))
-        outputs.append(Output(STOP, NO_STOP))
+        outputs.append(_WORKS)
         return state if state.reason == NO_STOP else replace(state, reason=NO_STOP, stop_s=0.0)
     if reason != state.reason:
         if state.reason != NO_STOP and state.stop_s > 0.0:

@@ -6,6 +6,7 @@ tick (a second), values held; peaks of force and vibration at each message.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cache
 
 from processors.alarms import machine_alarms
 from processors.events.execution import ACTIVE, OVERRIDES, is_changing_tool, stop_reason, tool
@@ -34,6 +35,7 @@ TOOLS_MAX, REASONS_MAX, FLAGS_MAX, PROFILE_MAX = 24, 12, 40, 240
 OTHER_TOOLS = -1
 MINUTE_S = 60.0
 FIGURE_MAX = 1e9
+_DATA, _GOOD = SampleKind.DATA, Quality.GOOD
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,6 +103,15 @@ class Run:
         """The seconds since it began."""
         return self.active_s + self.interrupted_s + self.unknown_s
 
+    def having(self, tools: tuple[ToolUse, ...], figures: Mapping[str, Figure]) -> "Run":
+        """Return the run with these. Spelled out, since `replace` looks up each field, and there are many a second."""
+        return Run(
+            self.program, self.mode, self.began_ms, self.is_begin_seen,
+            self.active_s, self.interrupted_s, self.unknown_s, self.holes, self.interruptions, self.reasons,
+            tools, self.tool, self.tool_changes, figures, self.raised, self.raised_more,
+            self.profile, self.profile_s, self.minute_s, self.minute_sum, self.minute_seen_s,
+        )  # fmt: skip
+
 
 def begun(sample: Sample, program: str | None, mode: str | None, *, is_begin_seen: bool) -> Run:
     """A run that begins now."""
@@ -112,19 +123,26 @@ def lasted(run: Run, sample: Sample, state: str | None, reason: str, dt_s: float
     """The run after `dt_s` in a state (None: unknown), for a reason where it is not ACTIVE."""
     if state is None:
         return replace(run, unknown_s=run.unknown_s + dt_s)
+    active_s, interrupted_s, reasons, tools = run.active_s, run.interrupted_s, run.reasons, run.tools
     if state == ACTIVE and not reason:
-        run = replace(run, active_s=run.active_s + dt_s, tools=_with_tool_time(run, sample, dt_s))
+        active_s += dt_s
+        tools = _with_tool_time(run, sample, dt_s)
     else:
-        told = reason if reason in run.reasons or len(run.reasons) < REASONS_MAX else "other"
-        reasons = {**run.reasons, told: run.reasons.get(told, 0.0) + dt_s}
-        run = replace(run, interrupted_s=run.interrupted_s + dt_s, reasons=reasons)
-    figures = dict(run.figures)
+        told = reason if reason in reasons or len(reasons) < REASONS_MAX else "other"
+        reasons = {**reasons, told: reasons.get(told, 0.0) + dt_s}
+        interrupted_s += dt_s
+    figures, row = dict(run.figures), sample.row
     for name in FIGURES:
-        if name in sample.row:
+        if name in row:
             value = figure_of(sample, name)
             if value is not None:
                 figures[name] = with_value(figures.get(name), value, dt_s)
-    return _with_profile(replace(run, figures=figures), sample, dt_s)
+    return Run(
+        run.program, run.mode, run.began_ms, run.is_begin_seen,
+        active_s, interrupted_s, run.unknown_s, run.holes, run.interruptions, reasons,
+        tools, run.tool, run.tool_changes, figures, run.raised, run.raised_more,
+        *_profiled(run, figure_of(sample, TEMPERATURE), dt_s),
+    )  # fmt: skip
 
 
 def followed(run: Run, sample: Sample) -> Run:
@@ -135,13 +153,14 @@ def followed(run: Run, sample: Sample) -> Run:
         if number is not None and number != run.tool:
             run = replace(run, tool=number, tool_changes=run.tool_changes + 1, tools=_with_change(run.tools, number))
     if FORCE in changed and (force := figure_of(sample, FORCE)) is not None:
-        run = replace(run, tools=_with_force(run, force, 0.0))
+        run = run.having(_with_force(run, force, 0.0), run.figures)
     for name in VIBRATION:
         if name in changed and (value := figure_of(sample, name)) is not None:
-            run = replace(run, figures={**run.figures, name: with_value(run.figures.get(name), value, 0.0)})
-    alarms = machine_alarms() if sample.kind is SampleKind.DATA else ()  # a birth only says again what stands
+            run = run.having(run.tools, {**run.figures, name: with_value(run.figures.get(name), value, 0.0)})
+    if sample.kind is not _DATA or _alarms().isdisjoint(changed):
+        return run  # a birth only says again what stands
     for name in changed:
-        if name in alarms and _is_up(sample.row[name]):
+        if name in _alarms() and _is_up(sample.row[name]):
             if len(run.raised) < FLAGS_MAX:
                 run = replace(run, raised=(*run.raised, Raised(name, sample.row[name].timestamp_ms)))
             else:
@@ -154,6 +173,11 @@ def why_standing(state: str, sample: Sample, *, is_held: bool) -> str:
     if state == ACTIVE and not is_held:
         return ""
     return "tool change" if state != ACTIVE and is_changing_tool(sample.row) else stop_reason(state, sample)
+
+
+@cache
+def _alarms() -> frozenset[str]:
+    return frozenset(machine_alarms())
 
 
 def figure_of(sample: Sample, name: str) -> float | None:
@@ -175,7 +199,7 @@ def with_value(known: Figure | None, value: float, dt_s: float) -> Figure:
 
 
 def _is_up(reading: Reading) -> bool:
-    return reading.quality is Quality.GOOD and reading.value is True
+    return reading.quality is _GOOD and reading.value is True
 
 
 def _with_change(tools: tuple[ToolUse, ...], number: int) -> tuple[ToolUse, ...]:
@@ -187,39 +211,48 @@ def _with_change(tools: tuple[ToolUse, ...], number: int) -> tuple[ToolUse, ...]
 
 
 def _with_tool_time(run: Run, sample: Sample, dt_s: float) -> tuple[ToolUse, ...]:
-    force = figure_of(sample, FORCE)
-    tools = run.tools if force is None else _with_force(run, force, dt_s)
-    number = _kept_as(run)
-    return tuple(replace(use, active_s=use.active_s + dt_s) if use.number == number else use for use in tools)
+    force, number = figure_of(sample, FORCE), _kept_as(run)
+    return tuple(
+        ToolUse(use.number, use.changes, use.active_s + dt_s, use.force if force is None else with_value(use.force, force, dt_s))
+        if use.number == number
+        else use
+        for use in run.tools
+    )
 
 
 def _with_force(run: Run, force: float, dt_s: float) -> tuple[ToolUse, ...]:
     number = _kept_as(run)
-    return tuple(replace(use, force=with_value(use.force, force, dt_s)) if use.number == number else use for use in run.tools)
+    return tuple(
+        ToolUse(use.number, use.changes, use.active_s, with_value(use.force, force, dt_s)) if use.number == number else use
+        for use in run.tools
+    )
 
 
 def _kept_as(run: Run) -> int | None:
-    return run.tool if any(use.number == run.tool for use in run.tools) else OTHER_TOOLS
+    number = run.tool
+    for use in run.tools:
+        if use.number == number:
+            return number
+    return OTHER_TOOLS
 
 
-def _with_profile(run: Run, sample: Sample, dt_s: float) -> Run:
+_Profile = tuple[tuple[float | None, ...], float, float, float, float]
+"""profile, profile_s, minute_s, minute_sum, minute_seen_s"""
+
+
+def _profiled(run: Run, value: float | None, dt_s: float) -> _Profile:
     """The mean temperature of each minute; where there are too many, of twice as long."""
-    value = figure_of(sample, TEMPERATURE)
+    minute_s = run.minute_s + dt_s
     seen_s = run.minute_seen_s + (0.0 if value is None else dt_s)
-    run = replace(
-        run,
-        minute_s=run.minute_s + dt_s,
-        minute_seen_s=seen_s,
-        minute_sum=run.minute_sum + (0.0 if value is None else value * dt_s),
-    )
-    if run.minute_s < run.profile_s:
-        return run
-    mean = round(run.minute_sum / seen_s, 2) if seen_s > 0.0 else None
+    minute_sum = run.minute_sum + (0.0 if value is None else value * dt_s)
+    if minute_s < run.profile_s:
+        return run.profile, run.profile_s, minute_s, minute_sum, seen_s
+    mean = round(minute_sum / seen_s, 2) if seen_s > 0.0 else None
     profile, profile_s = (*run.profile, mean), run.profile_s
     if len(profile) > PROFILE_MAX:
         pairs = zip(profile[::2], profile[1::2], strict=False)
         profile, profile_s = tuple(_mean(first, second) for first, second in pairs), 2.0 * profile_s
-    return replace(run, profile=profile, profile_s=profile_s, minute_s=0.0, minute_sum=0.0, minute_seen_s=0.0)
+    return profile, profile_s, 0.0, 0.0, 0.0
 
 
 def _mean(first: float | None, second: float | None) -> float | None:

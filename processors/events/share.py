@@ -3,7 +3,7 @@
 Time in which the state was not known (offline, null, a hole) is neither: the share is of what was seen.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import floor
 
 SLOTS = 96
@@ -32,10 +32,12 @@ def with_time(shares: Shares, at_s: float, dt_s: float, *, is_active: bool, wind
     slot_s = window_s / SLOTS
     number, day = floor(at_s / slot_s), floor((at_s - day_begins_s) / DAY_S)
     slots = shares.slots
+    today = shares.day if shares.day.number == day else Slot(day)
+    if slots and slots[-1].number == number and slots[0].number > number - SLOTS:  # no slot begins and none ends
+        return Shares((*slots[:-1], _more(slots[-1], dt_s, is_active)), _more(today, dt_s, is_active))
     last = slots[-1] if slots and slots[-1].number == number else Slot(number)
     before = slots[:-1] if slots and slots[-1].number == number else slots
     kept = tuple(slot for slot in before if number - SLOTS < slot.number < number)
-    today = shares.day if shares.day.number == day else Slot(day)
     return Shares((*kept[-SLOTS:], _more(last, dt_s, is_active)), _more(today, dt_s, is_active))
 
 
@@ -50,4 +52,4 @@ def share_pct(slots: tuple[Slot, ...]) -> tuple[float | None, float]:
 
 
 def _more(slot: Slot, dt_s: float, is_active: bool) -> Slot:
-    return replace(slot, active_s=slot.active_s + (dt_s if is_active else 0.0), seen_s=slot.seen_s + dt_s)
+    return Slot(slot.number, slot.active_s + (dt_s if is_active else 0.0), slot.seen_s + dt_s)

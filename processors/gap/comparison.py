@@ -46,6 +46,10 @@ GAP_MAX = 1e5
 PROGRAM_CHARACTERS_MAX = 40
 
 
+_DATA, _HOLE = SampleKind.DATA, SampleKind.HOLE
+_CHANGES = frozenset({CHANGE, DETECTED, CHANGE_SOURCE})
+
+
 class Feeding(StrEnum):
     """The cut as the feed shows it."""
 
@@ -62,6 +66,9 @@ class ToolChange(StrEnum):
     UNKNOWN = "unknown"  # it says nothing now
     NONE = "none"
     ACTIVE = "active"
+
+
+_UNKNOWN, _REST, _FEED, _RAPID = Feeding.UNKNOWN, Feeding.REST, Feeding.FEED, Feeding.RAPID
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,13 +115,15 @@ class Comparison(NamedTuple):
 def watched(watch: Watch, given: Given, sample: Sample) -> Watch:
     """The watch after a sample of any kind."""
     at_s = sample.at_s
-    if sample.kind is SampleKind.HOLE:  # what happened meanwhile is not known
+    if sample.kind is _HOLE:  # what happened meanwhile is not known
         return replace(watch, rpm_since_s=at_s, feeding_since_s=at_s, change_since_s=at_s)
     rpm, _ = sample.number(SPEED)
     known = watch.rpm
     if rpm != known and (rpm is None or known is None or abs(rpm - known) > max(SPEED_CHANGE * abs(known), TURNING_RPM_MIN / 2)):
         watch = replace(watch, rpm=rpm, rpm_since_s=at_s)
-    feeding, change = _feeding(given, sample), _change(sample)
+    feeding, change = _feeding(given, sample), watch.change
+    if sample.kind is not _DATA or not _CHANGES.isdisjoint(sample.changed):
+        change = _change(sample)
     if feeding is not watch.feeding:
         watch = replace(watch, feeding=feeding, feeding_since_s=at_s)
     if change is not watch.change:
@@ -127,10 +136,13 @@ def heated(watch: Watch, sample: Sample, seconds: float) -> Watch:
     rise_k, _ = sample.number(RISE)
     if rise_k is None or abs(rise_k) > GAP_MAX:
         return watch if watch.rise_mean_k is None else replace(watch, rise_mean_k=None)
-    if watch.rise_mean_k is None:
-        return replace(watch, rise_mean_k=rise_k)
-    gain = 1.0 - math.exp(-seconds / HEATING_S)
-    return replace(watch, rise_mean_k=watch.rise_mean_k + gain * (rise_k - watch.rise_mean_k))
+    if watch.rise_mean_k is not None:
+        gain = 1.0 - math.exp(-seconds / HEATING_S)
+        rise_k = watch.rise_mean_k + gain * (rise_k - watch.rise_mean_k)
+    # Spelled out, since `replace` looks up each field.
+    return Watch(
+        watch.rpm, watch.rpm_since_s, watch.feeding, watch.feeding_since_s, watch.change, watch.change_since_s, rise_k
+    )  # fmt: skip
 
 
 def comparison(watch: Watch, given: Given, sample: Sample) -> Comparison:
@@ -164,12 +176,12 @@ def _load(watch: Watch, given: Given, sample: Sample) -> Compared | str | None:
     rpm, no_rpm = sample.number(SPEED)
     if load_pct is None or rpm is None:
         return why or no_rpm or ""
-    if watch.feeding is Feeding.UNKNOWN:
+    if watch.feeding is _UNKNOWN:
         return sample.number(FEED)[1] or f"{FEED} is not known"
     since_s = max(watch.rpm_since_s, watch.feeding_since_s)
     if abs(rpm) < TURNING_RPM_MIN or sample.at_s < since_s + given.settle_s:
         return None
-    if watch.feeding is not Feeding.FEED:
+    if watch.feeding is not _FEED:
         twin_pct = given.idle_load_pct
         return Compared(LOAD, "air", (twin_pct or 0.0) - load_pct, twin_pct is None)
     if not _runs(sample):
@@ -195,9 +207,9 @@ def _at_rest(watch: Watch, given: Given, sample: Sample, signal: str) -> Compare
     load_pct, why = sample.number(signal)
     if load_pct is None:
         return why or ""
-    if watch.feeding is Feeding.UNKNOWN:
+    if watch.feeding is _UNKNOWN:
         return sample.number(FEED)[1] or f"{FEED} is not known"
-    if watch.feeding is not Feeding.REST or sample.at_s < watch.feeding_since_s + given.settle_s or not _runs(sample):
+    if watch.feeding is not _REST or sample.at_s < watch.feeding_since_s + given.settle_s or not _runs(sample):
         return None
     return Compared(signal, "standstill", -load_pct, True)
 
@@ -211,10 +223,10 @@ def _runs(sample: Sample) -> bool:
 def _feeding(given: Given, sample: Sample) -> Feeding:
     feed_mm_min, _ = sample.number(FEED)
     if feed_mm_min is None:
-        return Feeding.UNKNOWN
+        return _UNKNOWN
     if abs(feed_mm_min) < FEED_MM_MIN_MIN:
-        return Feeding.REST
-    return Feeding.FEED if abs(feed_mm_min) < given.rapid_feed_mm_min else Feeding.RAPID
+        return _REST
+    return _FEED if abs(feed_mm_min) < given.rapid_feed_mm_min else _RAPID
 
 
 def _change(sample: Sample) -> ToolChange:

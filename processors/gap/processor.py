@@ -49,6 +49,7 @@ NAMES = {
 }
 """The metrics of a signal's figures, with the regime that each is of, "" for all."""
 NONE = "none"
+_TICK = SampleKind.TICK
 PUBLISH_S = 60.0
 YEAR_S = 365.25 * 86_400.0
 SIDES = 3
@@ -120,9 +121,12 @@ def step(config: Config, state: State, sample: Sample) -> tuple[State, Sequence[
     if sample.is_history:
         return state, ()
     watch = watched(state.watch, config.given, sample)
-    if sample.kind is not SampleKind.TICK:
+    if sample.kind is not _TICK:
         return (state if watch is state.watch else replace(state, watch=watch)), ()
-    state = _begun(config, replace(state, watch=heated(watch, sample, config.tick_s)), sample.at_s)
+    watch = heated(watch, sample, config.tick_s)
+    if watch is not state.watch:
+        state = replace(state, watch=watch)
+    state = _begun(config, state, sample.at_s)
     state = _block_closed(config, state, sample.at_s)
     found = comparison(state.watch, config.given, sample)
     state = _compared(config, state, found.compared, sample.at_s, is_left_out=found.is_left_out)
@@ -199,7 +203,8 @@ def _compared(config: Config, state: State, compared: Sequence[Compared], at_s: 
         cells[key] = seen(cell, _terms(config, state, key, cell, at_s), one.gap, at_s, config.tick_s, is_healthy=is_healthy)
     seconds = min(state.seconds + config.tick_s, config.standing_hours * 3600.0)
     left_out = state.left_out + config.tick_s / seconds * (is_left_out - state.left_out)
-    return replace(state, cells=cells, seconds=seconds, left_out=left_out)
+    # Spelled out, since `replace` looks up each field.
+    return State(state.watch, state.healthy_from_s, state.block, state.minute, seconds, left_out, cells)
 
 
 def _cells_of(cells: Mapping[str, Cell], signal: str) -> dict[str, Cell]:

@@ -16,6 +16,7 @@ ACTIVE = "tool_change_active"
 DETECTED = twin_signals.TOOL_CHANGE_ACTIVE
 INPUTS = frozenset({ACTIVE, DETECTED})
 CONTROLLER, DETECTOR, NONE, STALE = "controller", "detector", "none", "stale"
+_GOOD = Quality.GOOD
 
 
 class ToolChangeContext(NamedTuple):
@@ -35,7 +36,7 @@ def tool_change_context(row: Mapping[str, Reading]) -> ToolChangeContext:
     """
     control, detected = row.get(ACTIVE), row.get(DETECTED)
     for reading, source in ((control, CONTROLLER), (detected, DETECTOR)):
-        if reading is not None and type(reading.value) is bool and reading.quality is Quality.GOOD:
+        if reading is not None and type(reading.value) is bool and reading.quality is _GOOD:
             return ToolChangeContext(reading.value, source, reading.timestamp_ms / 1000)
     for reading in (control, detected):
         if reading is not None and reading.quality is Quality.STALE and type(reading.value) is bool:

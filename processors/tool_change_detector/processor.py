@@ -134,7 +134,7 @@ def step(configuration: Configuration[Config], state: State, sample: Sample) -> 
     read, config = configuration.read, configuration.of(sample.machine)
     model: Model | None = read.get(sample.machine, read.get(OTHERS))
     if model is None:
-        return (state, _nulls("none", NO_MODEL)) if sample.kind is not SampleKind.DATA else (state, ())
+        return (state, _UNKNOWN_WITHOUT_MODEL) if sample.kind is not SampleKind.DATA else (state, ())
     if sample.kind is SampleKind.TICK:
         return _told(config, model.detector, _ticked(model, state, sample), sample)
     if sample.kind is SampleKind.HOLE:
@@ -234,6 +234,8 @@ def _nulls(source: str, reason: str) -> tuple[Output, ...]:
     return *(Output.null(name, reason) for name in named), Output(SOURCE, source), Output(BASIS, f"none: {reason}")
 
 
+_UNKNOWN_WITHOUT_MODEL = _nulls("none", NO_MODEL)
+
 _INFERRED = Provenance.INFERRED
 PROCESSOR = Processor(
     name="tool_change_detector",
@@ -257,5 +259,6 @@ PROCESSOR = Processor(
     state=State,
     initial=lambda _: State(),
     step=step,
+    wakes=frozenset(),
     reads=read_models,
 )
