@@ -40,8 +40,8 @@ class Memory:
     def pin(self, pinned: Pinned) -> None:
         self.told.append(pinned)
 
-    def keep_snapshot(self, snapshot: Snapshot) -> None:
-        self.told.append(snapshot)
+    def keep_snapshot(self, *snapshots: Snapshot) -> None:
+        self.told += snapshots
 
     def machines(self) -> list[str]:
         return ["vmc"]
