@@ -24,6 +24,7 @@ from processors.historian import HistorianConfig
 from processors.running.ports import Receipt
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.topics import NodeId
+from sparkplug.values import Value
 from twin.vocabulary.nodes import HISTORIAN_NODE, TWIN_NODE_PREFIX
 from twin.vocabulary.topics import SNAPSHOT
 
@@ -48,6 +49,13 @@ def store_of(config: HistorianConfig) -> Store:
     """The store that a historian is told to write. Raises StoreError."""
     retention = Retention(raw_days=config.raw_days, block_days=config.block_days, disk_bytes=round(config.disk_gb * 1e9) or None)
     return open_store(config.store or default_place(), writable=True, retention=retention)
+
+
+def _long_bytes(value: Value) -> int:
+    """The memory of a value that is no number, beyond that of a number."""
+    if isinstance(value, tuple):
+        return ELEMENT_BYTES * len(value)
+    return len(value) if isinstance(value, str | bytes) else 0
 
 
 class _Queue:
@@ -172,9 +180,8 @@ class StoreRecorder:
             return
         readings, size = event.readings, 0
         for reading in readings:
-            value = reading[1]
-            if type(value) in _LONG:
-                size += len(value) * (ELEMENT_BYTES if type(value) is tuple else 1)  # type: ignore[arg-type]
+            if type(reading[1]) in _LONG:
+                size += _long_bytes(reading[1])
         if not self._queue.put(Message(received_ms, event), len(readings), size):
             self._dropped += 1
         if event.kind is EventKind.DEATH:

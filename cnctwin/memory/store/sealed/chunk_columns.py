@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 from cnctwin.memory.store.chunk import KINDS, Chunk
 from cnctwin.memory.store.intake import order_of
-from cnctwin.memory.store.sealed.rows import HeaderOf, Ints, Part
+from cnctwin.memory.store.sealed.rows import HeaderOf, Ints, Part, Rows
 
 _TYPES = {"d": "<f8", "q": "<i8", "?": "?"}
 _Piece = tuple[Ints, Any, Ints, Ints]
 """Time in µs, values, flags and numbers of messages of one series."""
 
 
-def columns_of(chunks: Iterable[Chunk]) -> tuple[dict[int, Part], dict[int, HeaderOf]]:
+def columns_of(chunks: Iterable[Chunk]) -> Rows:
     """The samples of chunks by series, and their messages by number."""
     alike: dict[bytes, list[Chunk]] = {}
     for chunk in chunks:
@@ -35,7 +35,7 @@ def columns_of(chunks: Iterable[Chunk]) -> tuple[dict[int, Part], dict[int, Head
             t = times[0 if first.is_single else place]
             pieces.setdefault(sid, []).append((t, _values(some, place, letter), flags[flag], numbers))
     join = _Joining()
-    return {sid: join.part(kinds[sid], some) for sid, some in pieces.items()}, headers
+    return Rows({sid: join.part(kinds[sid], some) for sid, some in pieces.items()}, headers)
 
 
 class _Joining:

@@ -147,20 +147,22 @@ class Sealer:
         kinds, classes, about = self._series(job.machine)
         done = Done(0, 0, ())
         with transaction(self._db, self._file, is_durable=True):
+            chunks = read_chunks(self._db, *job)
             for stored_class in (StoredClass.RAW, StoredClass.BLOCK, StoredClass.TWIN):
-                of_chunks, headers = columns_of(c for c in read_chunks(self._db, *job) if c.stored_class == stored_class)
+                of_chunks = columns_of(chunk for chunk in chunks if chunk.stored_class == stored_class)
                 hot = ((sid, self._hot(sid, kinds[sid], job)) for sid in kinds if classes[sid] == stored_class)
-                parts = _joined(of_chunks, {sid: part for sid, part in hot if part is not None})
+                of_rows = {sid: part for sid, part in hot if part is not None}
+                headers = of_chunks.headers | self._headers(job, of_rows, about) if of_rows else of_chunks.headers
+                parts = _joined(of_chunks.parts, of_rows)
                 if parts:
                     done = self._seal_class(job, stored_class, Rows(parts, headers), about, done)
             self._remove(job, list(kinds))
         return done
 
     def _seal_class(self, job: Job, stored_class: StoredClass, new: Rows, series: Mapping[int, Any], done: Done) -> Done:
-        parts = new.parts
+        parts, headers = new
         names = {number: name for name, number in self._table.machines.items()}
         reasons: dict[int, str | None] = {number: text for text, number in self._table.reasons.items()}
-        headers = new.headers | self._headers(job, parts, series, new.headers)
         samples = done.samples + sum(len(part.t) for part in parts.values())
         left_over = done.left_over
         there = files(self._db, job.machine, job.from_ms, job.to_ms)
@@ -195,9 +197,7 @@ class Sealer:
         t, forms, flags, numbers = zip(*rows, strict=True)
         return Part(kind, np.array(t, np.int64), list(forms), np.array(flags, np.int64), np.array(numbers, np.int64))
 
-    def _headers(
-        self, job: Job, parts: Mapping[int, Part], series: Mapping[int, Any], known: Mapping[int, HeaderOf]
-    ) -> dict[int, HeaderOf]:
+    def _headers(self, job: Job, parts: Mapping[int, Part], series: Mapping[int, Any]) -> dict[int, HeaderOf]:
         first = min(int(part.numbers.min()) for part in parts.values())
         last = max(int(part.numbers.max()) for part in parts.values())
         rows = self._db.execute(_HEADERS, (job.machine, first, last, job.to_ms, job.from_ms))
@@ -206,7 +206,7 @@ class Sealer:
             for number, received_ms, stamp_ms, node, kind, place in rows
         }
         for sid, part in parts.items():  # of a birth that was swept before its samples were sealed these are all that is left
-            for number in set(part.numbers.tolist()) - found.keys() - known.keys():
+            for number in set(part.numbers.tolist()) - found.keys():
                 t_ms = int(part.t[part.numbers == number][0]) // 1000
                 found[number] = HeaderOf(t_ms, t_ms, series[sid][0], is_data=False, place=None)
         return found
