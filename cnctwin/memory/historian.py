@@ -1,14 +1,16 @@
 """The historian's way into a store: a bounded queue, and a thread that writes batches.
 
-What is in the queue is not safe yet; what the store has taken is. So the thread writes as soon as anything waits. Where the store
-cannot write (a full disk), the batch is kept and tried again, and what does not fit into the queue meanwhile is counted.
+What is in the queue is not safe yet; what the store has taken is. The thread writes twice a second what has gathered, since few
+large transactions cost a fraction of many small ones: a kill takes that half second, but for the rows of edges that wait for
+receipts. Where the store cannot write (a full disk), the batch is kept and tried again, and what does not fit into the queue
+meanwhile is counted.
 """
 
 import logging
 import threading
 import time
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 from cnctwin.memory.store.contract import Message, Pinned, Snapshot, Store, StoreError
@@ -22,12 +24,15 @@ from processors.historian import HistorianConfig
 from processors.running.ports import Receipt
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.topics import NodeId
+from sparkplug.values import Value
 from twin.vocabulary.nodes import HISTORIAN_NODE, TWIN_NODE_PREFIX
 from twin.vocabulary.topics import SNAPSHOT
 
-QUEUE_MAX = 400_000  # samples
-BATCH_MAX = 20_000  # samples
-GATHER_S = 0.05
+QUEUE_MAX, QUEUE_BYTES_MAX = 400_000, 128_000_000  # samples, and about so much memory
+SAMPLE_BYTES, ELEMENT_BYTES = 160, 32  # a reading in memory, an element of an array; texts and bytes by their length
+BATCH_MAX = 50_000  # samples
+GATHER_S = 0.5
+LATE_S = 10.0  # waiting for longer is a trouble
 TIDY_S, STATUS_S = 60.0, 5.0
 AGAIN_S = 5.0  # after a `tidy` that sealed something
 RETRY_S_MAX = 10.0
@@ -35,6 +40,8 @@ BEHIND_S, BEHIND_S_MAX = 1.0, REPEAT_S - 1.0  # from when on nobody is told that
 HOUR_MS = 3_600_000
 MACHINES_MAX = 1_000  # that are given receipts
 UNITS_MAX = 20_000  # of processors, whose snapshots are kept
+SNAPSHOT_BYTES_MAX = 64_000_000  # of last snapshots; of a unit without one a replay begins with the first of its hour
+_LONG = frozenset({str, bytes, tuple})
 _log = logging.getLogger(__name__)
 
 
@@ -44,56 +51,97 @@ def store_of(config: HistorianConfig) -> Store:
     return open_store(config.store or default_place(), writable=True, retention=retention)
 
 
+def _long_bytes(value: Value) -> int:
+    """The memory of a value that is no number, beyond that of a number."""
+    if isinstance(value, tuple):
+        return ELEMENT_BYTES * len(value)
+    return len(value) if isinstance(value, str | bytes) else 0
+
+
 class _Queue:
-    """Messages, pins and snapshots in the order in which they came, as many samples as fit."""
+    """Messages, pins and snapshots in the order in which they came, as many as fit. One thread puts, another takes."""
 
     def __init__(self) -> None:
-        self._items: deque[Message | Pinned | Snapshot] = deque()
-        self.samples = 0
-        self.filled = threading.Event()
-        self._lock = threading.Lock()
+        self._items: deque[tuple[Message | Pinned | Snapshot, int, int]] = deque()  # with their samples and bytes
+        self._put_samples = self._put_bytes = 0  # each of these is written by one of the threads
+        self._taken_samples = self._taken_bytes = 0
 
-    def put(self, item: Message | Pinned | Snapshot) -> bool:
+    @property
+    def samples(self) -> int:
+        """The samples that wait; a pin or a snapshot counts as one."""
+        return self._put_samples - self._taken_samples
+
+    def put(self, item: Message | Pinned | Snapshot, samples: int, size: int) -> bool:
         """Put it in; return True if there was room."""
-        size = _size(item)
-        with self._lock:
-            if self.samples + size > QUEUE_MAX:
-                return False
-            self._items.append(item)
-            self.samples += size
-        self.filled.set()
+        samples = samples or 1
+        size += samples * SAMPLE_BYTES
+        is_full = self._put_samples - self._taken_samples + samples > QUEUE_MAX
+        if is_full or self._put_bytes - self._taken_bytes + size > QUEUE_BYTES_MAX:
+            return False
+        self._items.append((item, samples, size))
+        self._put_samples += samples
+        self._put_bytes += size
         return True
 
     def take(self) -> "_Batch":
-        """Return what goes in one transaction: messages up to the first pin or snapshot, or that one alone."""
+        """Return what is written together: messages and snapshots up to the first pin, or that one alone."""
         messages: list[Message] = []
-        samples = 0
-        with self._lock:
-            while self._items and samples < BATCH_MAX:
-                item = self._items[0]
-                if not isinstance(item, Message):
-                    if not messages:
-                        self._items.popleft()
-                        self.samples -= 1
-                        return _Batch((), item, 1)
-                    break
-                self._items.popleft()
+        snapshots: list[Snapshot] = []
+        pinned = None
+        samples = size = 0
+        while self._items and samples < BATCH_MAX and pinned is None:
+            item, of_item, bytes_of_item = self._items[0]
+            if isinstance(item, Message):
                 messages.append(item)
-                samples += _size(item)
-            self.samples -= samples
-            if not self._items:
-                self.filled.clear()
-        return _Batch(tuple(messages), None, samples)
+            elif isinstance(item, Snapshot):
+                snapshots.append(item)
+            elif samples:
+                break
+            else:
+                pinned = item
+            self._items.popleft()
+            samples += of_item
+            size += bytes_of_item
+        self._taken_samples += samples
+        self._taken_bytes += size
+        return _Batch(messages, snapshots, pinned, samples)
 
 
 class _Batch(NamedTuple):
-    messages: tuple[Message, ...]
-    other: Pinned | Snapshot | None
+    messages: list[Message]
+    snapshots: list[Snapshot]
+    pinned: Pinned | None
     samples: int
 
 
-def _size(item: Message | Pinned | Snapshot) -> int:
-    return max(len(item.event.readings), 1) if isinstance(item, Message) else 1
+class _LastSnapshots:
+    """The last snapshot of each unit; where all are too large, those go that were heard longest ago."""
+
+    def __init__(self) -> None:
+        self._heard: dict[tuple[str, str], Snapshot] = {}  # the latest at the end
+        self._units: dict[str, set[str]] = {}
+        self._bytes = 0
+
+    def put(self, snapshot: Snapshot) -> None:
+        """Remember one in place of the one before."""
+        self._pop(snapshot.processor, snapshot.unit)
+        self._heard[snapshot.processor, snapshot.unit] = snapshot
+        self._units.setdefault(snapshot.processor, set()).add(snapshot.unit)
+        self._bytes += len(snapshot.payload)
+        while self._bytes > SNAPSHOT_BYTES_MAX:
+            oldest = next(iter(self._heard))
+            self._pop(*oldest)
+            self._units[oldest[0]].discard(oldest[1])
+
+    def _pop(self, processor: str, unit: str) -> Snapshot | None:
+        found = self._heard.pop((processor, unit), None)
+        self._bytes -= 0 if found is None else len(found.payload)
+        return found
+
+    def take(self, processor: str) -> list[Snapshot]:
+        """Return those of a processor, and forget them."""
+        units = self._units.pop(processor, ())
+        return [found for unit in sorted(units) if (found := self._pop(processor, unit)) is not None]
 
 
 class StoreRecorder:
@@ -111,7 +159,7 @@ class StoreRecorder:
         self._thread = threading.Thread(target=self._run, name="store", daemon=True)
         self._stopping = threading.Event()
         self._kept_hours: dict[tuple[str, str], int] = {}
-        self._last_snapshots: dict[tuple[str, str], Snapshot] = {}
+        self._last_snapshots = _LastSnapshots()
         self._stored = self._repeated = self._refused = self._dropped = self._pins = 0
         self._writing = 0  # samples in the hands of the thread
         self._caught_up_s = time.monotonic()  # all that was heard before it is in the store
@@ -130,9 +178,15 @@ class StoreRecorder:
         if event.kind is EventKind.PLAIN:
             self._hear_snapshot(event, received_ms)
             return
-        self._put(Message(received_ms, event))
+        readings, size = event.readings, 0
+        for reading in readings:
+            if type(reading[1]) in _LONG:
+                size += _long_bytes(reading[1])
+        if not self._queue.put(Message(received_ms, event), len(readings), size):
+            self._dropped += 1
         if event.kind is EventKind.DEATH:
-            self._keep_last_snapshots(event.node.node.removeprefix(TWIN_NODE_PREFIX))
+            for snapshot in self._last_snapshots.take(event.node.node.removeprefix(TWIN_NODE_PREFIX)):
+                self._put(snapshot)
 
     def pin(self, pin: Pin) -> None:
         """Queue a pin behind the messages that it concerns."""
@@ -140,15 +194,17 @@ class StoreRecorder:
 
     def health(self) -> Mapping[str, int | float | str]:
         """Return its state, by the names that `processors.running.health` declares."""
+        behind_s = self._behind_s()
         health: dict[str, int | float | str] = {
             "store_samples": self._stored,
             "store_repeated": self._repeated,
             "store_refused": self._refused,
             "store_dropped": self._dropped,
             "store_waiting": self._queue.samples + self._writing + self._store_waiting,
+            "store_behind_s": round(behind_s, 1),
             "store_bytes": self._bytes,
             "store_pins": self._pins,
-            "store_trouble": self._trouble,
+            "store_trouble": self._trouble or (f"what was heard waits for {behind_s:.0f} s" if behind_s > LATE_S else ""),
         }
         if self._days_left is not None:
             health["store_days_left"] = round(self._days_left, 1)
@@ -183,36 +239,31 @@ class StoreRecorder:
             detail = f"the historian began; the newest sample before it is {away_s:.0f} s old"
             node = NodeId(self._group, HISTORIAN_NODE)
             for machine in self._store.machines():
-                self._queue.put(Message(now_ms, HostEvent(EventKind.HOLE, node, machine, now_ms, detail=detail)))
+                self._queue.put(Message(now_ms, HostEvent(EventKind.HOLE, node, machine, now_ms, detail=detail)), 1, 0)
         self._thread.start()
 
     def stop(self) -> None:
         """Write what waits, and close the store."""
         self._stopping.set()
-        self._queue.filled.set()
         self._thread.join()
         self._store.close()
 
-    def _put(self, item: Message | Pinned | Snapshot) -> None:
-        if not self._queue.put(item):
+    def _put(self, item: Pinned | Snapshot) -> None:
+        if not self._queue.put(item, 1, len(item.payload) if isinstance(item, Snapshot) else 0):
             self._dropped += 1
 
     def _hear_snapshot(self, event: HostEvent, received_ms: int) -> None:
         """Keep the first of each hour of a processor's unit, and remember the last."""
         processor, _, unit = event.topic.removeprefix(SNAPSHOT).partition("/")
         key, hour = (processor, unit), received_ms // HOUR_MS
-        if not event.payload or not unit or (key not in self._kept_hours and len(self._kept_hours) >= UNITS_MAX):
+        kept_hour = self._kept_hours.get(key)
+        if not event.payload or not unit or (kept_hour is None and len(self._kept_hours) >= UNITS_MAX):
             return
         snapshot = Snapshot(processor, unit, received_ms, event.payload)
-        if self._kept_hours.get(key) != hour:
+        if kept_hour != hour:
             self._kept_hours[key] = hour
             self._put(snapshot)
-        self._last_snapshots[key] = snapshot
-
-    def _keep_last_snapshots(self, processor: str) -> None:
-        """A processor died: what it goes on from, so that a replay can go on from there too."""
-        for key in [key for key in self._last_snapshots if key[0] == processor]:
-            self._put(self._last_snapshots.pop(key))
+        self._last_snapshots.put(snapshot)
 
     # The thread.
 
@@ -225,9 +276,9 @@ class StoreRecorder:
 
     def _work(self) -> None:
         tidied_s = status_s = time.monotonic()
+        is_all = True
         while not (self._stopping.is_set() and not self._queue.samples):
-            if not self._stopping.is_set():
-                self._queue.filled.wait(1.0)
+            if is_all:
                 self._stopping.wait(GATHER_S)  # what comes within it goes into the same transaction
             took_s = time.monotonic()
             batch = self._queue.take()
@@ -250,11 +301,14 @@ class StoreRecorder:
                 self._look()
 
     def _write(self, batch: _Batch) -> bool:
-        """Until the store has taken it; False where we are to stop and it cannot."""
+        """Write a batch; False where we are to stop and the store cannot take it."""
+        return all(self._until_taken(step, batch) for step in (self._append, self._pin, self._keep_snapshots))
+
+    def _until_taken(self, step: Callable[[_Batch], None], batch: _Batch) -> bool:
         pause_s = 0.1
         while True:
             try:
-                self._hand_over(batch)
+                step(batch)
             except StoreError as error:
                 if str(error) != self._trouble:
                     _log.warning("the store cannot write: %s; %d samples wait", error, batch.samples + self._queue.samples)
@@ -267,33 +321,39 @@ class StoreRecorder:
             self._stopping.wait(pause_s)
             pause_s = min(2 * pause_s, RETRY_S_MAX)
 
-    def _hand_over(self, batch: _Batch) -> None:
+    def _append(self, batch: _Batch) -> None:
         if batch.messages:
             appended = self._store.append(batch.messages)
             self._stored += appended.stored
             self._repeated += appended.repeated
             self._refused += appended.refused
             self._note_kept(batch.messages)
-        if isinstance(batch.other, Pinned):
-            self._store.pin(batch.other)
+
+    def _pin(self, batch: _Batch) -> None:
+        if batch.pinned is not None:
+            self._store.pin(batch.pinned)
             self._pins += 1
-        elif batch.other is not None:
-            self._store.keep_snapshot(batch.other)
+
+    def _keep_snapshots(self, batch: _Batch) -> None:
+        if batch.snapshots:
+            self._store.keep_snapshot(*batch.snapshots)
 
     def _note_kept(self, messages: Sequence[Message]) -> None:
         """Note which devices wait for receipts, and the numbers of their rows; a birth shows the state after a row, not it."""
         with self._receipts_lock:
             for _, event in messages:
-                if event.device is None or not event.readings:
+                if event.device is None:
                     continue
-                key = event.node, event.device
-                if event.kind is EventKind.BIRTH and any(reading.name == RECEIPT for reading in event.readings):
-                    self._receipts.setdefault(key, Spans())
-                elif event.kind is EventKind.DATA and key in self._receipts:
-                    number = next((one.value for one in reversed(event.readings) if one.name == SEQUENCE), None)
-                    if isinstance(number, int):
-                        self._receipts[key].discard(number, number)
-                        self._receipts[key].add(number, number)
+                if event.kind is EventKind.DATA:
+                    spans = self._receipts.get((event.node, event.device))
+                    number = (
+                        None if spans is None else next((one[1] for one in reversed(event.readings) if one[0] == SEQUENCE), None)
+                    )
+                    if spans is not None and isinstance(number, int):
+                        spans.discard(number, number)
+                        spans.add(number, number)
+                elif event.kind is EventKind.BIRTH and any(reading.name == RECEIPT for reading in event.readings):
+                    self._receipts.setdefault((event.node, event.device), Spans())
 
     def _tidy(self) -> bool:
         """Tidy; return True if hours were sealed."""

@@ -30,6 +30,7 @@ STORE = (
     MetricSpec("health/store_refused", DataType.INT64, properties={"meaning": "samples that the store cannot keep"}),
     MetricSpec("health/store_dropped", DataType.INT64, properties={"meaning": "messages for which there was no room to wait"}),
     MetricSpec("health/store_waiting", DataType.INT64, properties={"meaning": "samples that wait to be written"}),
+    MetricSpec("health/store_behind_s", DataType.DOUBLE, unit="s", properties={"meaning": "for how long samples have waited"}),
     MetricSpec("health/store_bytes", DataType.INT64, unit="bytes", properties={"meaning": "on the disk"}),
     MetricSpec("health/store_days_left", DataType.DOUBLE, unit="d", properties={"meaning": "that the disk lasts at this rate"}),
     MetricSpec("health/store_pins", DataType.INT64, properties={"meaning": "stretches that no sweep may take"}),

@@ -52,16 +52,18 @@ class Answering:
             every = {s.sid: s for asked in wanted.values() for s in asked.series}
             found = db.execute("SELECT id FROM machines WHERE name = ?", (query.machine,)).fetchone()
             there = [] if found is None else files(db, found[0], query.from_ms, query.to_ms)
+            chunks = hot.chunk_samples(db, -1 if found is None else found[0], *span_us)
             if query.every_ms is None:
                 told: dict[str, list[StoredSample]] = {
-                    name: [one for s in asked.series for one in hot.told(db, s, *span_us)] for name, asked in wanted.items()
+                    name: [one for s in asked.series for one in hot.told(db, chunks, s, *span_us)]
+                    for name, asked in wanted.items()
                 }
                 windows: dict[str, Windows] = {}
             else:
                 windows = {name: Windows(query.every_ms) for name in wanted}
                 for name, asked in wanted.items():
                     for s in asked.series:
-                        hot.fill(db, windows[name], s, *span_us)
+                        hot.fill(db, chunks, windows[name], s, span_us)
         classes = {s.stored_class for s in every.values()}
         sealed = self._sound([f for f in there if f.state == State.SEALED and f.stored_class in classes])
         of = {s.sid: name for name, asked in wanted.items() for s in asked.series}

@@ -166,8 +166,8 @@ class Store(Protocol):
     def pins(self, machine: str | None = None) -> list[Pinned]:
         """All pins, oldest first."""
 
-    def keep_snapshot(self, snapshot: Snapshot) -> None:
-        """Keep one snapshot an hour of each processor and unit: the first of the hour."""
+    def keep_snapshot(self, *snapshots: Snapshot) -> None:
+        """Keep one snapshot an hour of each processor and unit: the first of the hour. All that are given are kept, or none."""
 
     def snapshot_before(self, processor: str, unit: str, at_ms: int) -> Snapshot | None:
         """The last snapshot that was received before a moment."""

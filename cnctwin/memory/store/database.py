@@ -1,8 +1,9 @@
 """The SQLite file of a store: its tables, how it is opened, and the connections of those who only ask.
 
-`events` is the log: one row a message, numbered in the order of arrival. What the readings of a DATA message said lies in
-`samples`, by series and time; a BIRTH or DEATH keeps its readings whole in `body` beside that. `files` is the manifest of the
-sealed hours. A reader who takes the manifest and the hot rows in one transaction sees each sample once.
+`chunks` are DATA messages as columns, which nearly all are (`chunk`). `events` are the others, one row a message; what the
+readings of such a one said lies in `samples`, by series and time, and a BIRTH or DEATH keeps its readings whole in `body` beside
+that. All are numbered in the order of arrival. `files` is the manifest of the sealed hours. A reader who takes the manifest and
+the hot rows in one transaction sees each sample once.
 
 WAL with synchronous=NORMAL (https://sqlite.org/wal.html): a commit survives a kill -9; what the power takes is at most the last
 moments, never the file.
@@ -10,14 +11,18 @@ moments, never the file.
 
 import sqlite3
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
+from itertools import chain
 from pathlib import Path
+from typing import Any
 
 from cnctwin.memory.store.contract import StoreError
 
 FILE_NAME = "store.sqlite"
-VERSION = 1
+VERSION, VERSIONS = 2, (0, 1, 2)
+"""Version 1 had no chunks; a store of it is read as it is, and becomes one of version 2 when it is written."""
+ROWS_AT_ONCE = 256
 CONNECTIONS_KEPT = 4
 BUSY_S = 10.0
 SCHEMA = """
@@ -42,6 +47,12 @@ CREATE TABLE IF NOT EXISTS events(
     stamp_ms INTEGER NOT NULL, detail TEXT, body BLOB, place BLOB, from_ms INTEGER, to_ms INTEGER);
 CREATE INDEX IF NOT EXISTS events_of_machine ON events(machine, number, received_ms);
 CREATE INDEX IF NOT EXISTS events_of_node ON events(node, number) WHERE machine IS NULL;
+CREATE TABLE IF NOT EXISTS chunks(
+    number INTEGER PRIMARY KEY, machine INTEGER NOT NULL, minute INTEGER NOT NULL, class INTEGER NOT NULL, node INTEGER NOT NULL,
+    last_number INTEGER NOT NULL, first_received_ms INTEGER NOT NULL, last_received_ms INTEGER NOT NULL,
+    samples INTEGER NOT NULL, body BLOB NOT NULL);
+CREATE INDEX IF NOT EXISTS chunks_of_machine ON chunks(
+    machine, minute, class, number, last_number, first_received_ms, last_received_ms, samples);
 CREATE TABLE IF NOT EXISTS files(
     id INTEGER PRIMARY KEY AUTOINCREMENT, class INTEGER NOT NULL, machine INTEGER NOT NULL, from_ms INTEGER NOT NULL,
     to_ms INTEGER NOT NULL, name TEXT NOT NULL, state INTEGER NOT NULL, bytes INTEGER NOT NULL, crc INTEGER NOT NULL,
@@ -63,6 +74,12 @@ CREATE TRIGGER IF NOT EXISTS file_removed AFTER DELETE ON files
 CREATE TRIGGER IF NOT EXISTS file_changed AFTER UPDATE OF bytes ON files
     BEGIN UPDATE meta SET value = value + NEW.bytes - OLD.bytes WHERE name = 'file_bytes'; END;
 """
+_NO_CHUNKS = "\n".join(
+    statement.replace("IF NOT EXISTS chunks", "temp.chunks").replace("INDEX IF NOT EXISTS ", "INDEX temp.") + ";"
+    for statement in SCHEMA.split(";\n")
+    if "chunks" in statement
+)
+"""In place of the table that a store of version 1 lacks."""
 
 
 def connect(file: Path, *, writable: bool) -> sqlite3.Connection:
@@ -76,20 +93,38 @@ def connect(file: Path, *, writable: bool) -> sqlite3.Connection:
             db.execute("PRAGMA journal_size_limit = 16777216")
             db.execute("PRAGMA cache_size = -16384")
         else:
-            db.execute("PRAGMA query_only = ON")
             db.execute("PRAGMA cache_size = -4096")
-        found = int(db.execute("PRAGMA user_version").fetchone()[0])
-        if found not in (0, VERSION):
+        found = version(db)
+        if found not in VERSIONS:
             raise StoreError(
                 f"{file}: is a store of version {found}, this program knows {VERSION}; use the program that wrote it"
             )
         if writable:
             db.executescript(SCHEMA)
             db.execute(f"PRAGMA user_version = {VERSION}")
+        else:
+            if found == 1:
+                db.executescript(_NO_CHUNKS)
+            db.execute("PRAGMA query_only = ON")
     except BaseException:
         db.close()
         raise
     return db
+
+
+def version(db: sqlite3.Connection) -> int:
+    """The version of a store; 0: it has just begun."""
+    return int(db.execute("PRAGMA user_version").fetchone()[0])
+
+
+def insert(db: sqlite3.Connection, what: str, rows: Sequence[tuple[Any, ...]]) -> None:
+    """Insert rows, many with each statement: a thread lets go of the interpreter at each, and has to get hold of it again."""
+    at = 0
+    while at < len(rows):
+        count = min(ROWS_AT_ONCE, 1 << (len(rows) - at).bit_length() - 1)  # few statements, which stay prepared
+        places = ", ".join([f"({', '.join('?' * len(rows[0]))})"] * count)
+        db.execute(f"{what} {places}", list(chain.from_iterable(rows[at : at + count])))
+        at += count
 
 
 @contextmanager
@@ -159,11 +194,13 @@ class Readers:
     def _give(self, db: sqlite3.Connection, of: tuple[int, int]) -> None:
         try:
             db.execute("ROLLBACK" if db.in_transaction else "SELECT 1")
+            is_old = db.execute("SELECT 1 FROM temp.sqlite_master LIMIT 1").fetchone() is not None  # its writer may bring it up
         except sqlite3.Error:
             db.close()
             return
         with self._lock:
-            if not self._closed and of == self._of and len(self._kept) < CONNECTIONS_KEPT:
+            is_kept = not (is_old or self._closed) and of == self._of and len(self._kept) < CONNECTIONS_KEPT
+            if is_kept:
                 self._kept.append(db)
                 return
         db.close()

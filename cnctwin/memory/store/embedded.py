@@ -75,9 +75,9 @@ class EmbeddedStore:
         """Keep a stretch from being swept."""
         self._writer.pin(pinned)
 
-    def keep_snapshot(self, snapshot: Snapshot) -> None:
-        """Keep the state of a processor."""
-        self._writer.keep_snapshot(snapshot)
+    def keep_snapshot(self, *snapshots: Snapshot) -> None:
+        """Keep states of processors."""
+        self._writer.keep_snapshot(*snapshots)
 
     def tidy(self, now_ms: int) -> Tidied:
         """Seal, roll up and sweep what is due, in bounded steps."""

@@ -2,9 +2,11 @@
 
 import math
 import sqlite3
+from bisect import bisect_left
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
+from cnctwin.memory.store.chunk import ChunkSamples, read_chunks
 from cnctwin.memory.store.contract import Sample, Series
 from cnctwin.memory.store.series_table import RANK_MASK, RANKS, REASON_SHIFT
 from cnctwin.memory.store.value_form import NUMBERS, Kind, given
@@ -46,6 +48,7 @@ _WINDOWS = """
 SELECT t / ?1, count(*), total(value), min(value), max(value) FROM samples WHERE sid = ?2 AND t >= ?3 AND t < ?4 GROUP BY 1
 """
 _SAMPLES = "SELECT t, value, flag FROM samples WHERE sid = ? AND t >= ? AND t < ?"
+_NO_CHUNKS = ChunkSamples(())
 
 
 def asked(db: sqlite3.Connection, machine: str, signals: Sequence[str]) -> dict[str, SignalSeries]:
@@ -71,22 +74,32 @@ def reasons(db: sqlite3.Connection, numbers: Iterable[int]) -> dict[int, str | N
     return texts
 
 
-def told(db: sqlite3.Connection, series: SeriesOf, from_us: int, to_us: int) -> list[StoredSample]:
+def chunk_samples(db: sqlite3.Connection, machine: int, from_us: int, to_us: int) -> ChunkSamples:
+    """The chunks of a machine in [from_us, to_us), for `told` and `fill`."""
+    return ChunkSamples(read_chunks(db, machine, from_us // 1000, -(-to_us // 1000)))
+
+
+def told(db: sqlite3.Connection, chunks: ChunkSamples, series: SeriesOf, from_us: int, to_us: int) -> list[StoredSample]:
     """The samples of a series in [from_us, to_us)."""
-    rows = db.execute(_SAMPLES, (series.sid, from_us, to_us)).fetchall()
+    rows = db.execute(_SAMPLES, (series.sid, from_us, to_us)).fetchall() + chunks.within(series.sid, from_us, to_us)
+    return _with_reasons(db, rows, series.kind)
+
+
+def _with_reasons(db: sqlite3.Connection, rows: Sequence[tuple[int, Any, int]], kind: Kind) -> list[StoredSample]:
     texts = reasons(db, {flag >> REASON_SHIFT for _, _, flag in rows})
-    kind = series.kind
     return [
         (t, value if type(value) is float else given(kind, value), flag & RANK_MASK, texts[flag >> REASON_SHIFT])
         for t, value, flag in rows
     ]
 
 
-def fill(db: sqlite3.Connection, windows: Windows, series: SeriesOf, from_us: int, to_us: int) -> None:
-    """Put the samples of a series into their windows; those that hold nothing but good, finite numbers SQLite sums up itself."""
+def fill(db: sqlite3.Connection, chunks: ChunkSamples, windows: Windows, series: SeriesOf, span_us: tuple[int, int]) -> None:
+    """Put the samples of a series into their windows; those that hold nothing but good, finite numbers are summed up at once."""
+    from_us, to_us = span_us
     if series.kind not in NUMBERS:
-        windows.add(told(db, series, from_us, to_us))
+        windows.add(told(db, chunks, series, from_us, to_us))
         return
+    _fill_of_chunks(db, chunks, windows, series, span_us)
     every_us = windows.every_us
     values = (every_us, series.sid, from_us, to_us)
     odd = {number for (number,) in db.execute(_ODD, values)}
@@ -95,7 +108,28 @@ def fill(db: sqlite3.Connection, windows: Windows, series: SeriesOf, from_us: in
         if number not in odd and type(high) is not bytes and -math.inf < total < math.inf:
             windows.put(number, Numbers(count, count, total, float(low), float(high), number * every_us))
         else:
-            windows.add(told(db, series, max(from_us, number * every_us), min(to_us, (number + 1) * every_us)))
+            windows.add(told(db, _NO_CHUNKS, series, max(from_us, number * every_us), min(to_us, (number + 1) * every_us)))
+
+
+def _fill_of_chunks(
+    db: sqlite3.Connection, chunks: ChunkSamples, windows: Windows, series: SeriesOf, span_us: tuple[int, int]
+) -> None:
+    from_us, to_us = span_us
+    stamps, values, flags = chunks.column(series.sid)
+    every_us, at, end = windows.every_us, bisect_left(stamps, -(-from_us // 1000)), bisect_left(stamps, -(-to_us // 1000))
+    is_odd = any(flag & RANK_MASK for flag in set(flags))
+    while at < end:
+        number = stamps[at] * 1000 // every_us
+        until = bisect_left(stamps, -(-(number + 1) * every_us // 1000), at, end)
+        some = values[at:until]
+        total = float(sum(some))
+        if math.isfinite(total) and not (is_odd and any(flag & RANK_MASK for flag in flags[at:until])):
+            count = until - at
+            windows.put(number, Numbers(count, count, total, float(min(some)), float(max(some)), number * every_us))
+        else:
+            rows = list(zip([ms * 1000 for ms in stamps[at:until]], some, flags[at:until], strict=True))
+            windows.add(_with_reasons(db, rows, series.kind))
+        at = until
 
 
 def _last_rows(db: sqlite3.Connection, machine: str) -> list[tuple[Any, ...]]:

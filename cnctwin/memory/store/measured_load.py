@@ -12,8 +12,11 @@ SELECT class, sum(bytes), min(from_ms), max(to_ms), sum(samples), count(DISTINCT
 WHERE state = 0 AND from_ms >= (SELECT max(to_ms) FROM files) - ? GROUP BY class
 """
 _HOT = """
-SELECT series.class, count(*), min(t) / 1000, max(t) / 1000 FROM samples JOIN series ON series.sid = samples.sid
-GROUP BY series.class
+SELECT class, sum(samples), (SELECT min(first_us) / 1000 FROM latest), (SELECT max(last_us) / 1000 FROM latest) FROM (
+    SELECT series.class AS class, count(*) AS samples FROM samples JOIN series ON series.sid = samples.sid GROUP BY 1
+    UNION ALL
+    SELECT class, sum(samples) FROM chunks GROUP BY 1)
+GROUP BY class
 """
 
 

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 from cnctwin.memory.store import hot
 from cnctwin.memory.store.birth_body import unpacked
+from cnctwin.memory.store.chunk import Chunk, read_chunks_of_page
 from cnctwin.memory.store.contract import Message
 from cnctwin.memory.store.intake import DATA_CODE, EVENT_KINDS, HOUR_MS
 from cnctwin.memory.store.series_table import HISTORY_BIT, RANK_MASK, RANKS, REASON_SHIFT
@@ -24,6 +25,8 @@ PAGE_FIRST, PAGE_MESSAGES, PAGE_NUMBERS_MAX = 2_000, 4_000, 1_000_000
 """Its holes say that nobody wrote down what came: they concern every machine."""
 Parts = dict[int, list[tuple[int, int, Reading]]]
 """The parts of each message, by number: time, series and reading of its samples."""
+_Series = Mapping[int, tuple[str, str | None, Kind]]
+"""Name, unit and kind, by series."""
 
 
 class Header(NamedTuple):
@@ -79,6 +82,9 @@ SELECT min(number), max(number) FROM events WHERE machine = ?1 AND received_ms >
 UNION ALL
 SELECT min(number), max(number) FROM events WHERE machine IS NULL AND received_ms >= ?2 AND received_ms < ?3
 UNION ALL
+SELECT min(number), max(last_number) FROM chunks INDEXED BY chunks_of_machine
+WHERE machine = ?1 AND last_received_ms >= ?2 AND first_received_ms < ?3
+UNION ALL
 SELECT min(first_number), max(last_number) FROM files WHERE machine = ?1 AND last_received_ms >= ?2 AND first_received_ms < ?3
 """
 _EVENTS = """
@@ -119,8 +125,11 @@ def _page(db: sqlite3.Connection, sealed: SealedPage, machine: str, first: int, 
             done[of] = Message(received_ms, HostEvent(EVENT_KINDS[kind], _node(node), machine, stamp_ms, readings, detail or ""))
     for of, received_ms, node, stamp_ms, detail in db.execute(_HOLES, (number, first, until)):
         done[of] = Message(received_ms, HostEvent(EventKind.HOLE, _node(node), None, stamp_ms, (), detail or ""))
+    series = hot.by_sid(db, machine)
+    for chunk in read_chunks_of_page(db, number, first, until):
+        done.update(told for told in _chunk_messages(db, machine, series, chunk) if first <= told[0] < until)
     if spans:
-        _hot_parts(db, machine, (first, until), spans, parts)
+        _hot_parts(db, series, (first, until), spans, parts)
     for of, header in headers.items():
         done[of] = _data(machine, header, parts.get(of, []))
     return [done[of] for of in sorted(done)]
@@ -139,6 +148,22 @@ def _data(machine: str, header: Header, samples: list[tuple[int, int, Reading]])
     return Message(header.received_ms, event)
 
 
+def _chunk_messages(db: sqlite3.Connection, machine: str, series: _Series, chunk: Chunk) -> Iterator[tuple[int, Message]]:
+    """Yield the messages of a chunk, each behind its number."""
+    texts = hot.reasons(db, {flag >> REASON_SHIFT for flag in chunk.flags})
+    columns: list[list[Reading]] = []
+    new = tuple.__new__
+    for place, (sid, flag) in enumerate(zip(chunk.sids, chunk.flags, strict=True)):
+        name, unit, _ = series[sid]
+        marks = RANKS[flag & RANK_MASK], unit, texts[flag >> REASON_SHIFT], bool(flag & HISTORY_BIT)
+        told = zip(chunk.values(place), chunk.stamps(place), strict=True)
+        columns.append([new(Reading, (name, value, stamp_ms, *marks)) for value, stamp_ms in told])
+    node = _node(chunk.node)
+    rows = zip(chunk.numbers(), chunk.received_ms(), chunk.message_stamps(), zip(*columns, strict=True), strict=True)
+    for number, received_ms, stamp_ms, readings in rows:
+        yield number, Message(received_ms, HostEvent(EventKind.DATA, node, machine, stamp_ms, readings))
+
+
 def _node(text: str) -> NodeId:
     group, _, node = text.partition("/")
     return NodeId(group, node)
@@ -155,9 +180,10 @@ def _stretches(spans: list[tuple[int, int]]) -> list[tuple[int, int]]:
     return [(from_ms, to_ms) for from_ms, to_ms in joined]
 
 
-def _hot_parts(db: sqlite3.Connection, machine: str, page: tuple[int, int], spans: list[tuple[int, int]], parts: Parts) -> None:
+def _hot_parts(
+    db: sqlite3.Connection, series: _Series, page: tuple[int, int], spans: list[tuple[int, int]], parts: Parts
+) -> None:
     asked = "SELECT t, value, flag, number FROM samples WHERE sid = ? AND t >= ? AND t < ? AND number >= ? AND number < ?"
-    series: Mapping[int, tuple[str, str | None, Kind]] = hot.by_sid(db, machine)
     texts: dict[int, str | None] = {0: None}
     for from_ms, to_ms in _stretches(spans):
         for sid, (name, unit, kind) in series.items():

@@ -9,7 +9,9 @@ from collections.abc import Iterable
 from enum import IntEnum
 from typing import Any
 
+from cnctwin.memory.store.database import insert
 from cnctwin.memory.store.value_form import BLOCKS, Kind, given
+from sparkplug.metric import NodeId
 from sparkplug.quality import Quality
 from sparkplug.values import Value
 from twin.vocabulary.twin_signals import TWIN_PREFIX
@@ -50,6 +52,23 @@ class Signal:
         self.first_us = self.last_us = self.last_ms = -1
 
 
+class Source:
+    """A machine as one node tells it: its signals by name, and how its messages look.
+
+    newest_ms: no sample of its signals is newer; layouts: for `ChunkWriter`, as are the last messages that no signal knows of yet
+    """
+
+    __slots__ = ("last_layout", "layouts", "machine", "newest_ms", "node", "signals", "unsettled")
+
+    def __init__(self, machine: int, node: int) -> None:
+        self.machine, self.node = machine, node
+        self.signals: dict[str, Signal] = {}
+        self.newest_ms = -1
+        self.layouts: dict[Any, Any] = {}
+        self.last_layout: Any = None
+        self.unsettled: dict[Any, tuple[Any, ...]] = {}
+
+
 class SeriesTable:
     """All signals. New ones are written at once, in the transaction that is under way; `load` forgets what was not committed."""
 
@@ -63,18 +82,22 @@ class SeriesTable:
         self.machines: dict[str, int] = dict(ask("SELECT name, id FROM machines"))
         self.nodes: dict[str, int] = dict(ask("SELECT name, id FROM nodes"))
         self.reasons: dict[str | None, int] = {None: 0, **dict(ask("SELECT text, id FROM reasons"))}
-        self._of: dict[tuple[int, int], dict[str, Signal]] = {}
-        by_id: dict[int, Signal] = {}
+        self._of: dict[tuple[int, int], Source] = {}
+        self._named: dict[tuple[NodeId, str], Source] = {}
+        by_id: dict[int, tuple[Signal, Source]] = {}
         for identity, machine, node, name in ask("SELECT id, machine, node, name FROM signals"):
-            by_id[identity] = self._of.setdefault((machine, node), {})[name] = Signal(identity, machine, name)
+            source = self._source(machine, node)
+            signal = source.signals[name] = Signal(identity, machine, name)
+            by_id[identity] = signal, source
         self.kinds = kinds = dict[int, Kind]()
-        for sid, signal, unit, kind in ask("SELECT sid, signal, unit, kind FROM series"):
+        for sid, of, unit, kind in ask("SELECT sid, signal, unit, kind FROM series"):
             kinds[sid] = Kind(kind)
-            by_id[signal].sids[unit, kinds[sid]] = sid
+            by_id[of][0].sids[unit, kinds[sid]] = sid
         for identity, sid, first_us, last_us, value, flag in ask(
             "SELECT signal, sid, first_us, last_us, value, flag FROM latest"
         ):
-            signal = by_id[identity]
+            signal, source = by_id[identity]
+            source.newest_ms = max(source.newest_ms, last_us // 1000)
             signal.first_us, signal.last_us, signal.last_ms = first_us, last_us, last_us // 1000
             signal.last, signal.last_sid, signal.last_flag = given(kinds[sid], value), sid, flag
 
@@ -96,14 +119,25 @@ class SeriesTable:
             number = known[text] = int(self._db.execute(f"INSERT INTO {column} VALUES (?)", (text,)).lastrowid or 0)  # noqa: S608
         return number
 
-    def signals(self, machine: int, node: int) -> dict[str, Signal]:
-        """Return the signals that a node tells of a machine, by name."""
-        return self._of.setdefault((machine, node), {})
+    def source(self, node: NodeId, machine: str) -> Source:
+        """Return what is known of a machine from a node."""
+        key = (node, machine)
+        found = self._named.get(key)
+        if found is None:
+            found = self._named[key] = self._source(self.machine(machine), self.node(str(node)))
+        return found
 
-    def signal(self, machine: int, node: int, name: str) -> Signal:
+    def _source(self, machine: int, node: int) -> Source:
+        found = self._of.get((machine, node))
+        if found is None:
+            found = self._of[machine, node] = Source(machine, node)
+        return found
+
+    def signal(self, source: Source, name: str) -> Signal:
         """A signal that nobody told before."""
-        done = self._db.execute("INSERT INTO signals(machine, node, name) VALUES (?, ?, ?)", (machine, node, name))
-        made = self.signals(machine, node)[name] = Signal(int(done.lastrowid or 0), machine, name)
+        told = (source.machine, source.node, name)
+        done = self._db.execute("INSERT INTO signals(machine, node, name) VALUES (?, ?, ?)", told)
+        made = source.signals[name] = Signal(int(done.lastrowid or 0), source.machine, name)
         return made
 
     def series(self, signal: Signal, unit: str | None, kind: Kind) -> int:
@@ -118,7 +152,5 @@ class SeriesTable:
 
     def keep_latest(self, signals: Iterable[tuple[Signal, Any]]) -> None:
         """Write the last samples; with each its value as SQLite is given it."""
-        self._db.executemany(
-            "INSERT OR REPLACE INTO latest VALUES (?, ?, ?, ?, ?, ?)",
-            [(s.id, s.last_sid, s.first_us, s.last_us, value, s.last_flag) for s, value in signals],
-        )
+        rows = [(s.id, s.last_sid, s.first_us, s.last_us, value, s.last_flag) for s, value in signals]
+        insert(self._db, "INSERT OR REPLACE INTO latest VALUES", rows)

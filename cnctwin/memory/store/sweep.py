@@ -7,7 +7,7 @@ that history which comes for it later is known to be too late.
 import sqlite3
 from collections.abc import Sequence
 
-from cnctwin.memory.store.intake import STAMP_MS_MAX
+from cnctwin.memory.store.chunk_writer import STAMP_MS_MAX
 from cnctwin.memory.store.retention import Retention
 from cnctwin.memory.store.sealed.manifest import DAY_MS, HOUR_MS, File, State
 from cnctwin.memory.store.series_table import StoredClass

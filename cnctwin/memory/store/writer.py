@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cnctwin.memory.store.contract import Appended, Message, Pinned, Snapshot, StoreError, Tidied
-from cnctwin.memory.store.database import FILE_NAME, connect, transaction
+from cnctwin.memory.store.database import FILE_NAME, connect, insert, transaction
 from cnctwin.memory.store.extra import MISSING, extra_is_there
 from cnctwin.memory.store.intake import Batch, Known
 from cnctwin.memory.store.retention import Retention
@@ -157,10 +157,10 @@ class Writer:
         with transaction(self.db, self.file):
             self.db.execute("INSERT OR IGNORE INTO pins VALUES (?, ?, ?, ?)", pinned)
 
-    def keep_snapshot(self, snapshot: Snapshot) -> None:
-        """Keep the state of a processor."""
+    def keep_snapshot(self, *snapshots: Snapshot) -> None:
+        """Keep states of processors."""
         with transaction(self.db, self.file):
-            self.db.execute("INSERT OR REPLACE INTO snapshots VALUES (?, ?, ?, ?)", snapshot)
+            insert(self.db, "INSERT OR REPLACE INTO snapshots VALUES", snapshots)
 
     def tidy(self, now_ms: int) -> Tidied:
         """Do what is due; without the extra `historian` nothing is, since SQLite keeps all."""

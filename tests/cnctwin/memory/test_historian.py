@@ -40,8 +40,8 @@ class Memory:
     def pin(self, pinned: Pinned) -> None:
         self.told.append(pinned)
 
-    def keep_snapshot(self, snapshot: Snapshot) -> None:
-        self.told.append(snapshot)
+    def keep_snapshot(self, *snapshots: Snapshot) -> None:
+        self.told += snapshots
 
     def machines(self) -> list[str]:
         return ["vmc"]
@@ -116,6 +116,54 @@ def test_what_does_not_fit_is_counted(recorder: StoreRecorder, memory: Memory, m
     health = recorder.health()
     assert health["store_dropped"] in (19, 20)  # one may be in the hands of the thread already
     assert int(health["store_waiting"]) + int(health["store_dropped"]) == 30
+
+
+def test_what_takes_too_much_memory_is_counted(memory: Memory, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(historian, "QUEUE_BYTES_MAX", 100_000)
+    recorder = StoreRecorder(memory)  # type: ignore[arg-type]
+    block = Reading("vibration", (0.5,) * 1000, 0, Quality.GOOD, "g", None, False)
+    for number in range(5):
+        recorder.keep(HostEvent(EventKind.DATA, EDGE, "vmc", number, (block,)), number)
+        recorder.keep(data(number), number)
+    assert recorder.health()["store_dropped"] == 2, "three blocks of 32 kB are all that fit; small ones still do"
+    recorder.start()
+    recorder.stop()
+    assert len(memory.told) == 8
+
+
+def test_what_waits_for_long_is_a_trouble(recorder: StoreRecorder, memory: Memory, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(historian, "LATE_S", 0.3)
+    monkeypatch.setattr(recorder, "_queue", historian._Queue())
+    monkeypatch.setattr(recorder._queue, "take", lambda: time.sleep(0.01) or historian._Batch([], [], None, 0))
+    recorder.keep(data(1), 1)
+    until(lambda: str(recorder.health()["store_trouble"]).startswith("what was heard waits for"))
+    assert float(recorder.health()["store_behind_s"]) >= 0.3
+    monkeypatch.undo()
+
+
+def test_snapshots_do_not_break_a_batch(memory: Memory) -> None:
+    recorder = StoreRecorder(memory)  # type: ignore[arg-type]
+    for number in range(20):
+        recorder.keep(data(number), number)
+        topic = f"cnctwin/snapshot/thermal/vmc-{number}"
+        recorder.keep(HostEvent(EventKind.PLAIN, NodeId("", ""), None, 0, topic=topic, payload=b"state"), number)
+    recorder.start()
+    recorder.stop()
+    assert [type(one) for one in memory.told] == [Message] * 20 + [Snapshot] * 20
+
+
+def test_last_snapshots_are_bounded_and_the_latest_stay(memory: Memory, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(historian, "SNAPSHOT_BYTES_MAX", 1000)
+    recorder = StoreRecorder(memory)  # type: ignore[arg-type]
+    for time_ms in (1, 2):
+        for number in range(20):
+            topic = f"cnctwin/snapshot/thermal/vmc-{number}"
+            recorder.keep(HostEvent(EventKind.PLAIN, NodeId("", ""), None, 0, topic=topic, payload=b"x" * 100), time_ms)
+    recorder.keep(data(9, EventKind.DEATH, TWIN), 9)
+    recorder.start()
+    recorder.stop()
+    last = [one.unit for one in memory.told if isinstance(one, Snapshot)][20:]
+    assert sorted(last) == sorted(f"vmc-{number}" for number in range(10, 20))
 
 
 def test_our_own_bug_ends_the_processor(memory: Memory, monkeypatch: pytest.MonkeyPatch) -> None:

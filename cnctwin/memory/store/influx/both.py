@@ -68,9 +68,9 @@ class Both:
         """All pins, oldest first."""
         return self._embedded.pins(machine)
 
-    def keep_snapshot(self, snapshot: Snapshot) -> None:
-        """Keep a snapshot in the embedded store."""
-        self._embedded.keep_snapshot(snapshot)
+    def keep_snapshot(self, *snapshots: Snapshot) -> None:
+        """Keep snapshots in the embedded store."""
+        self._embedded.keep_snapshot(*snapshots)
 
     def snapshot_before(self, processor: str, unit: str, at_ms: int) -> Snapshot | None:
         """The last snapshot that was received before a moment."""

@@ -116,7 +116,7 @@ class ReadOnlyServer:
         """Raises StoreError: opened for reading."""
         self._refuse()
 
-    def keep_snapshot(self, snapshot: Snapshot) -> None:
+    def keep_snapshot(self, *snapshots: Snapshot) -> None:
         """Raises StoreError: opened for reading."""
         self._refuse()
 
@@ -192,7 +192,7 @@ class ServerStore(ReadOnlyServer):
         """All pins, oldest first."""
         return self._pins.all(machine)
 
-    def keep_snapshot(self, snapshot: Snapshot) -> None:
+    def keep_snapshot(self, *snapshots: Snapshot) -> None:
         """Not kept: without messages there is no replay that would begin there."""
 
     def oldest_waiting_ms(self) -> int | None:

@@ -12,6 +12,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from cnctwin.memory.store.chunk import CHUNK_MS
 from cnctwin.memory.store.sealed.manifest import State
 from cnctwin.memory.store.sealed.rows import METADATA
 from cnctwin.memory.store.series_table import StoredClass
@@ -20,6 +21,10 @@ _HOT = """
 SELECT count(*) FROM machines JOIN signals ON signals.machine = machines.id JOIN series ON series.signal = signals.id
     JOIN samples ON samples.sid = series.sid
 WHERE machines.name = ? AND samples.t >= ? AND samples.t < ? AND series.class = ?
+"""
+_CHUNKS = """
+SELECT coalesce(sum(samples), 0) FROM machines JOIN chunks INDEXED BY chunks_of_machine ON machine = machines.id
+WHERE machines.name = ? AND minute >= ? AND minute < ? AND class = ?
 """
 _NAMED = f"""
 SELECT coalesce(sum(samples), 0), coalesce(max(files.id), 0) FROM files JOIN machines ON machines.id = files.machine
@@ -49,7 +54,8 @@ class LeftOver:
         if number < newest:
             return True
         (hot,) = self._db.execute(_HOT, (machine, from_ms * 1000, to_ms * 1000, stored_class)).fetchone()
-        return int(samples) + int(hot) >= int(found.num_rows)
+        (chunks,) = self._db.execute(_CHUNKS, (machine, from_ms // CHUNK_MS, to_ms // CHUNK_MS, stored_class)).fetchone()
+        return int(samples) + int(hot) + int(chunks) >= int(found.num_rows)
 
     def _named(self, machine: str, from_ms: int, to_ms: int, stored_class: int) -> tuple[int, int]:
         samples, newest = self._db.execute(_NAMED, (machine, to_ms, from_ms, int(stored_class))).fetchone()

@@ -8,7 +8,7 @@ nothing.
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -65,7 +65,7 @@ def made(
     parts: Mapping[int, Part], headers: Mapping[int, HeaderOf], reasons: Mapping[int, str | None], about: Mapping[str, Any]
 ) -> Made:
     """The file that holds these samples."""
-    t, n, flags = (np.concatenate(arrays) for arrays in zip(*((p.t, p.numbers, p.flags) for p in parts.values()), strict=True))
+    places, (t, n, flags) = _places(parts.values())
     order = np.lexsort((flags, n, t))
     t, n, flags = t[order], n[order], flags[order]
     is_new = np.concatenate([[True], (np.diff(t) != 0) | (np.diff(n) != 0) | (np.diff(flags) != 0)])
@@ -76,10 +76,9 @@ def made(
     encodings = dict.fromkeys(_INTS, "DELTA_BINARY_PACKED")
     endings: dict[int, str] = {}
     nulls: list[list[int] | None] = [None] * rows
-    texts, start = list(_TEXTS), 0
-    for sid, part in parts.items():
-        at = row_of[start : start + len(part.t)]
-        start += len(part.t)
+    texts = list(_TEXTS)
+    for (sid, part), place in zip(parts.items(), places, strict=True):
+        at = row_of[place]
         if part.kind is Kind.NULL:
             for row in at.tolist():
                 nulls[row] = [*(nulls[row] or ()), sid]
@@ -97,7 +96,23 @@ def made(
     null_sids = [sid for sid, part in parts.items() if part.kind is Kind.NULL]
     is_odd = bool(null_sids) or bool(np.any(flags & RANK_MASK))
     figures = (int(n.min()), int(n.max()), int(received.min()), int(received.max()))
-    return Made(body, len(t), endings, null_sids, is_odd, *figures)
+    return Made(body, sum(len(part.t) for part in parts.values()), endings, null_sids, is_odd, *figures)
+
+
+def _places(parts: Iterable[Part]) -> tuple[list[slice], tuple[Ints, Ints, Ints]]:
+    """Times, numbers and flags of all samples, and where among them those of each part are; parts may share theirs."""
+    known: dict[tuple[int, int, int], slice] = {}
+    places: list[slice] = []
+    arrays: list[tuple[Ints, Ints, Ints]] = []
+    end = 0
+    for part in parts:
+        key = id(part.t), id(part.numbers), id(part.flags)
+        if key not in known:
+            known[key] = slice(end, end := end + len(part.t))
+            arrays.append((part.t, part.numbers, part.flags))
+        places.append(known[key])
+    t, n, flags = (np.concatenate(some) for some in zip(*arrays, strict=True))
+    return places, (t, n, flags)
 
 
 def parquet(table: Any, about: Mapping[str, Any], **how: Any) -> bytes:

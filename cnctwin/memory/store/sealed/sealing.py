@@ -18,8 +18,10 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from cnctwin.memory.store.chunk import CHUNK_MS, read_chunks
 from cnctwin.memory.store.database import transaction
 from cnctwin.memory.store.intake import DATA_CODE
+from cnctwin.memory.store.sealed.chunk_columns import columns_of
 from cnctwin.memory.store.sealed.manifest import DAY_MS, HOUR_MS, Checked, File, State, file_name, files, put
 from cnctwin.memory.store.sealed.rows import HeaderOf, Made, Part, Rows, made, read_rows
 from cnctwin.memory.store.series_table import SeriesTable, StoredClass
@@ -27,6 +29,7 @@ from cnctwin.memory.store.value_form import Kind
 
 SAMPLES_MIN = 20_000
 """The samples that a file is worth; a quiet machine's hours wait for one another up to the end of the day."""
+MINUTES = HOUR_MS // CHUNK_MS
 AHEAD_MS = DAY_MS
 """An hour that is still to come (of a machine whose clock is ahead) is due when nothing came into it for so long."""
 _log = logging.getLogger(__name__)
@@ -49,6 +52,10 @@ class Done(NamedTuple):
 
 
 _HOURS = "SELECT t / 3600000000, count(*) FROM samples WHERE sid = ? GROUP BY 1"
+_CHUNK_HOURS = f"""
+SELECT minute / {MINUTES}, sum(samples), max(last_received_ms) FROM chunks INDEXED BY chunks_of_machine
+WHERE machine = ? GROUP BY 1
+"""  # noqa: S608
 _ARRIVED = """
 SELECT from_ms / 3600000, to_ms / 3600000, max(received_ms) FROM events
 WHERE machine = ? AND to_ms >= ? AND from_ms IS NOT NULL GROUP BY 1, 2
@@ -86,9 +93,12 @@ class Sealer:
         ).fetchall():
             for hour, count in self._db.execute(_HOURS, (sid,)):
                 counts[hour] = counts.get(hour, 0) + count
+        arrived: dict[int, int] = {}
+        for hour, count, received_ms in self._db.execute(_CHUNK_HOURS, (machine,)):
+            counts[hour] = counts.get(hour, 0) + count
+            arrived[hour] = received_ms
         if not counts:
             return [], next_ms
-        arrived: dict[int, int] = {}
         for first, last, received_ms in self._db.execute(_ARRIVED, (machine, min(counts) * HOUR_MS)):
             # One message may reach over many hours only in history, which is rare and short.
             for hour in {first, last, *(h for h in counts if first < h < last)}:
@@ -137,20 +147,22 @@ class Sealer:
         kinds, classes, about = self._series(job.machine)
         done = Done(0, 0, ())
         with transaction(self._db, self._file, is_durable=True):
+            chunks = read_chunks(self._db, *job)
             for stored_class in (StoredClass.RAW, StoredClass.BLOCK, StoredClass.TWIN):
+                of_chunks = columns_of(chunk for chunk in chunks if chunk.stored_class == stored_class)
                 hot = ((sid, self._hot(sid, kinds[sid], job)) for sid in kinds if classes[sid] == stored_class)
-                parts = {sid: part for sid, part in hot if part is not None}
+                of_rows = {sid: part for sid, part in hot if part is not None}
+                headers = of_chunks.headers | self._headers(job, of_rows, about) if of_rows else of_chunks.headers
+                parts = _joined(of_chunks.parts, of_rows)
                 if parts:
-                    done = self._seal_class(job, stored_class, parts, about, done)
+                    done = self._seal_class(job, stored_class, Rows(parts, headers), about, done)
             self._remove(job, list(kinds))
         return done
 
-    def _seal_class(
-        self, job: Job, stored_class: StoredClass, parts: dict[int, Part], series: Mapping[int, Any], done: Done
-    ) -> Done:
+    def _seal_class(self, job: Job, stored_class: StoredClass, new: Rows, series: Mapping[int, Any], done: Done) -> Done:
+        parts, headers = new
         names = {number: name for name, number in self._table.machines.items()}
         reasons: dict[int, str | None] = {number: text for text, number in self._table.reasons.items()}
-        headers = self._headers(job, parts, series)
         samples = done.samples + sum(len(part.t) for part in parts.values())
         left_over = done.left_over
         there = files(self._db, job.machine, job.from_ms, job.to_ms)
@@ -218,6 +230,8 @@ class Sealer:
         self._db.executemany("DELETE FROM samples WHERE sid = ? AND t >= ? AND t < ?", [(sid, *span) for sid in sids])
         inside = f"DELETE FROM events WHERE machine = ? AND kind = {DATA_CODE} AND from_ms >= ? AND to_ms < ?"  # noqa: S608
         self._db.execute(inside, job)
+        minutes = (job.machine, job.from_ms // CHUNK_MS, job.to_ms // CHUNK_MS)
+        self._db.execute("DELETE FROM chunks WHERE machine = ? AND minute >= ? AND minute < ?", minutes)
         across = f"""SELECT number, from_ms, to_ms FROM events
             WHERE machine = ? AND kind = {DATA_CODE} AND from_ms < ? AND to_ms >= ?"""  # noqa: S608
         for number, from_ms, to_ms in self._db.execute(across, (job.machine, job.to_ms, job.from_ms)).fetchall():
@@ -263,7 +277,7 @@ def _joined(before: Mapping[int, Part], new: Mapping[int, Part]) -> dict[int, Pa
             joined[sid] = Part(
                 part.kind,
                 np.concatenate([old.t, part.t]),
-                old.forms + part.forms,
+                [*old.forms, *part.forms],
                 np.concatenate([old.flags, part.flags]),
                 np.concatenate([old.numbers, part.numbers]),
             )

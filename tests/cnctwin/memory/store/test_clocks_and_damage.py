@@ -186,7 +186,7 @@ def test_a_damaged_database_is_put_aside_also_after_a_stop_in_good_order(tmp_pat
     store.append(steady(0, 2000))
     store.close()
     with sqlite3.connect(tmp_path / "store.sqlite") as db:
-        (page,) = db.execute("SELECT rootpage FROM sqlite_master WHERE name = 'samples'").fetchone()
+        (page,) = db.execute("SELECT rootpage FROM sqlite_master WHERE name = 'chunks'").fetchone()
     db.close()
     with (tmp_path / "store.sqlite").open("r+b") as file:
         file.seek((page - 1) * 4096)
@@ -203,7 +203,7 @@ def test_a_damaged_database_is_put_aside_also_after_a_stop_in_good_order(tmp_pat
 def test_a_batch_that_failed_leaves_nothing_in_memory(tmp_path: Path) -> None:
     store = EmbeddedStore(tmp_path, writable=True)
     db = store._writer.db
-    db.execute("CREATE TRIGGER no BEFORE INSERT ON events BEGIN SELECT RAISE(ABORT, 'no'); END")
+    db.execute("CREATE TRIGGER no BEFORE INSERT ON chunks BEGIN SELECT RAISE(ABORT, 'no'); END")
     with pytest.raises(StoreError):
         store.append(steady(0, 2))
     db.execute("DROP TRIGGER no")
