@@ -49,7 +49,7 @@ def tried(setup: Setup, *, with_stages: bool = False, spy: str = "") -> dict[str
         result = trial.measured(running)
         result["all_live"] = is_live
         if with_stages:
-            result["stages"] = stages.profiled(running, Path(folder), spy)
+            result["stages"] = stages.profiled(running, Path(folder), result["used"]["processors"], spy)
     return result
 
 
@@ -97,7 +97,10 @@ def many(options: argparse.Namespace) -> list[dict[str, Any]]:
                 for stage, share in result.get("stages", {}).items():
                     print(f"        {stage:28} {share['pct']:5.1f} %  {share['us_a_message']:7.1f} us", flush=True)
                 written(options.json, {"trials": results})
-    for name, _ in trees(options.old):
+    for result in results if options.idle else ():
+        machine_us = result["used"]["processors"]["cores"] / result["machines"] * 1e6
+        print(f"{result['tree']}: {result['machines']} idle machines, {machine_us:.0f} us of CPU time a machine and second")
+    for name, _ in () if options.idle else trees(options.old):
         print(f"{name}: {holds.told([result for result in results if result['tree'] == name])}")
     return results
 
