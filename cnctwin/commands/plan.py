@@ -73,7 +73,9 @@ def _show(made: "FleetPlan", console: Console) -> None:
     console.print(table)
     if made.groups > 1:
         share = -(-fleet.machines // made.groups)
-        console.print(f"each process {made.groups} times: {made.groups} groups of {share} machines (--group)", soft_wrap=True)
+        console.print(
+            f"all of it {made.groups} times: {made.groups} groups of {share} machines, each with a broker", soft_wrap=True
+        )
     console.print(
         f"{made.cores:.1f} cores used, {made.memory_mb / 1000:.1f} GB of memory with a margin; "
         f"{made.in_mbit_s:.1f} Mbit/s from the edges, {made.mirror_mbit_s:.1f} Mbit/s to one reader of the whole mirror",
@@ -90,8 +92,9 @@ def _show(made: "FleetPlan", console: Console) -> None:
         )
     if made.limits:
         console.print(
-            f"One computer is not enough: {'; '.join(made.limits)}. About {made.machines_max} machines fit. Beyond, take several "
-            "computers with a group of machines each, a broker cluster, and Kafka under the folds where groups must move.",
+            f"One computer is not enough: {'; '.join(made.limits)}. With a margin it holds about {made.machines_max} machines "
+            "like these. Beyond that take several computers with a group of machines each, or a broker cluster and Kafka "
+            "under the folds.",
             soft_wrap=True,
             highlight=False,
         )

@@ -3,7 +3,8 @@
     cost of a process = (shared + sum of its processors) · messages a second · speed of this computer / speed of the measured one
 
 A process computes on one core, so it may cost at most `CORE_SHARE` of one: processors that do not fit together are spread over
-several processes, each of which receives everything once more, and machines that do not fit are split into Sparkplug groups.
+several processes, each of which receives everything once more. Machines that do not fit are split into groups, each with a broker
+and processes of its own, since a processor has one name on a broker; and Mosquitto computes on one core too.
 """
 
 import math
@@ -67,7 +68,10 @@ class Computer:
 
 @dataclass(frozen=True, slots=True)
 class FleetPlan:
-    """The needs of a fleet; `limits` is empty where one computer is enough, else what is not."""
+    """The needs of a fleet: processes and broker of each group; `cores` and what follows it are of all groups.
+
+    limits: why one computer is not enough; empty where it is
+    """
 
     fleet: Fleet
     groups: int
@@ -101,8 +105,8 @@ def plan_fleet(
         Process(names, cost.of(names) * rate_hz / 1e6, measured.process_mb + measured.machine_mb * fleet.machines / groups)
         for names in packed
     )
-    broker_cores = cost.broker(processes, mirrors="mirror" in processors) * fleet.machines * fleet.hz / 1e6
-    cores = broker_cores + groups * sum(one.cores for one in processes)
+    broker_cores = cost.broker(len(processes), mirrors="mirror" in processors) * rate_hz / 1e6
+    cores = groups * (broker_cores + sum(one.cores for one in processes))
     memory_mb = MEMORY_MARGIN * groups * sum(one.memory_mb for one in processes)
     message_bits = 8 * (MESSAGE_BYTES + VALUE_BYTES * fleet.changing)
     store = None
@@ -119,8 +123,8 @@ def plan_fleet(
         in_mbit_s=fleet.machines * fleet.hz * message_bits / 1e6,
         mirror_mbit_s=fleet.machines * fleet.hz * fleet.changing * 8 * MIRROR_BYTES / 1e6 if "mirror" in processors else 0.0,
         store=store,
-        machines_max=math.floor(fleet.machines / max(cores / (CORE_SHARE * computer.cores), broker_cores / CORE_SHARE)),
-        limits=_limits(cores, broker_cores, computer),
+        machines_max=math.floor(fleet.machines * CORE_SHARE * computer.cores / cores),
+        limits=_limits(cores, groups, computer),
         basis=f"measured {measured.date} on {measured.computer}{spread}; processes planned to {100 * CORE_SHARE:.0f} % of a core",
     )
 
@@ -142,19 +146,22 @@ class _Cost:
         """Return the cost of one process."""
         return self._scaled(self.measured.shared_us + sum(self.measured.each_us[name] for name in names))
 
-    def broker(self, processes: Sequence[Process], *, mirrors: bool) -> float:
-        """Return the cost of the broker."""
-        return self._scaled(self.measured.broker_us * len(processes) + (self.measured.broker_mirror_us if mirrors else 0.0))
+    def broker(self, processes: int, *, mirrors: bool) -> float:
+        """Return the cost of the broker that feeds so many processes."""
+        return self._scaled(self.measured.broker_us * processes + (self.measured.broker_mirror_us if mirrors else 0.0))
 
 
 def _packed(fleet: Fleet, processors: Sequence[str], cost: _Cost) -> tuple[int, list[tuple[str, ...]]]:
-    """Return groups of machines and the processes of each: as few processes as there can be, of these as few groups."""
+    """Return groups of machines and the processes of each: as few processes with brokers as there can be."""
     best: tuple[int, list[tuple[str, ...]]] | None = None
     for groups in range(math.ceil(fleet.machines / MACHINES_MAX), min(fleet.machines, GROUPS_MAX) + 1):
-        if best is not None and groups >= best[0] * len(best[1]):
+        if best is not None and 2 * groups >= best[0] * (1 + len(best[1])):
             break
-        packed = _fitted(processors, cost, CORE_SHARE * 1e6 / (fleet.machines * fleet.hz / groups))
-        if packed is not None and (best is None or groups * len(packed) < best[0] * len(best[1])):
+        us_max = CORE_SHARE * 1e6 / (fleet.machines * fleet.hz / groups)
+        packed = _fitted(processors, cost, us_max)
+        if packed is None or cost.broker(len(packed), mirrors="mirror" in processors) > us_max:
+            continue
+        if best is None or groups * (1 + len(packed)) < best[0] * (1 + len(best[1])):
             best = groups, packed
     if best is None:
         raise UsageError(
@@ -178,11 +185,11 @@ def _fitted(processors: Sequence[str], cost: _Cost, us_max: float) -> list[tuple
     return [tuple(sorted(one)) for one in packed]
 
 
-def _limits(cores: float, broker_cores: float, computer: Computer) -> tuple[str, ...]:
+def _limits(cores: float, groups: int, computer: Computer) -> tuple[str, ...]:
     """Return why one computer is not enough; empty where it is."""
     found = []
     if cores > CORE_SHARE * computer.cores:
         found.append(f"{cores:.1f} cores are used and {computer.cores} are here")
-    if broker_cores > CORE_SHARE:
-        found.append(f"the broker takes {broker_cores:.1f} of a core, and Mosquitto computes on one")
+    if groups > 1:
+        found.append(f"one broker and one set of processors are not either: it takes {groups}")
     return tuple(found)
