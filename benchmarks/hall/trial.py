@@ -258,6 +258,7 @@ def figures(  # noqa: PLR0917
     """Return the figures of a window as one JSON object."""
     sent, late = sum(tally.sent for tally in tallies), sorted(ms for tally in tallies for ms in tally.late_ms)
     whole = sum(tally.whole.get(name_of(number), 0) for tally in tallies for number in observed(setup.machines))
+    mirrors = any("mirror" in names for names in setup.processors)
     used = {name: _share(before[name], after[name], wall_s, sent) for name in before}
     used["processors"]["pss_mb"] = round(memory_mb, 1)
     planned = setup.machines * setup.hz * setup.seconds
@@ -271,7 +272,7 @@ def figures(  # noqa: PLR0917
         "elsewhere_cores": round(max(0.0, busy / wall_s - sum(part["cores"] for part in used.values())), 3),
         "age_ms": quantiles(seen.mirror_s),
         "result_age_ms": quantiles(seen.results_s),
-        "in_time_pct": round(100.0 * seen.in_time / whole, 2) if whole else None,
+        "in_time_pct": round(min(100.0, 100.0 * seen.in_time / whole), 2) if whole and mirrors else None,
         "late_ms_99": round(late[len(late) * 99 // 100], 1) if late else 0.0,
         "late_ms_max": round(late[-1], 1) if late else 0.0,
         "outages": sum(tally.outages for tally in tallies),

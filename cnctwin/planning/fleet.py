@@ -102,8 +102,7 @@ def plan_fleet(
     groups, packed = _packed(fleet, processors, cost)
     rate_hz = fleet.machines * fleet.hz / groups
     processes = tuple(
-        Process(names, cost.of(names) * rate_hz / 1e6, measured.process_mb + measured.machine_mb * fleet.machines / groups)
-        for names in packed
+        Process(names, cost.of(names) * rate_hz / 1e6, _memory_mb(names, fleet.machines / groups, measured)) for names in packed
     )
     broker_cores = cost.broker(len(processes), mirrors="mirror" in processors) * rate_hz / 1e6
     cores = groups * (broker_cores + sum(one.cores for one in processes))
@@ -183,6 +182,11 @@ def _fitted(processors: Sequence[str], cost: _Cost, us_max: float) -> list[tuple
         else:
             place.append(name)
     return [tuple(sorted(one)) for one in packed]
+
+
+def _memory_mb(names: Sequence[str], machines: float, measured: Measured) -> float:
+    """Return the memory of one process, without a margin."""
+    return measured.process_mb + measured.machine_mb * machines * len(names) / len(measured.each_us)
 
 
 def _limits(cores: float, groups: int, computer: Computer) -> tuple[str, ...]:

@@ -19,6 +19,7 @@ class Measured:
     broker_us: Mosquitto's CPU time to take a message and to give it to one process
     broker_mirror_us: the same to take all that the mirror publishes of it, retained, with no reader
     grows_share: how much of a processor's cost goes with the number of changing values; the rest is paid for each message
+    process_mb: memory of a process without machines; machine_mb: of each machine in all processors
     """
 
     date: str
