@@ -49,7 +49,7 @@ def tried(setup: Setup, *, with_stages: bool = False, spy: str = "") -> dict[str
         result = trial.measured(running)
         result["all_live"] = is_live
         if with_stages:
-            result["stages"] = stages.profiled(running, Path(folder), spy)
+            result["stages"] = stages.profiled(running, Path(folder), result["used"]["processors"], spy)
     return result
 
 
@@ -59,17 +59,20 @@ def line(name: str, result: dict[str, Any]) -> str:
     own, broker, load = used["processors"], used["broker"], used["load"]
     ages = " ".join(f"{age[q]:8.0f}" for q in ("p50", "p95", "p99")) if age else "       –        –        –"
     in_time = "–" if result["in_time_pct"] is None else f"{result['in_time_pct']:.1f}"
+    invalid = "".join(f"  INVALID: {words}" for words in result["complaints"])
     each = [f"{part['us_a_message'] or 0:8.0f}" for part in (own, broker, load)]
     return (
-        f"{name:5} {result['machines']:5d} {each[0]} {own['cores']:6.2f} {each[1]} {broker['cores']:6.2f} {each[2]} {ages} "
+        f"{name:{NAME}.{NAME}} {result['machines']:5d} {each[0]} {own['cores']:6.2f} {each[1]} {broker['cores']:6.2f} {each[2]} "
+        f"{ages} "
         f"{in_time:>6} {own['pss_mb']:6.0f} {own['threads']:4d} {own['switches_a_message'] or 0:8.2f} "
-        f"{result['elsewhere_cores']:5.2f}" + "".join(f"  INVALID: {words}" for words in result["complaints"])
+        f"{result['elsewhere_cores']:5.2f}{invalid}"
     )
 
 
+NAME = 8
 HEAD = (
-    "            processors            broker      load   age at the reader, ms      in 1 s     MB       switches else-\n"
-    "tree  mach. us/message  cores us/mess.  cores us/mess.   median     95 %     99 %      %    PSS thr. /message where"
+    "               processors            broker      load   age at the reader, ms      in 1 s     MB       switches else-\n"
+    "tree     mach. us/message  cores us/mess.  cores us/mess.   median     95 %     99 %      %    PSS thr. /message where"
 )
 
 
@@ -96,8 +99,11 @@ def many(options: argparse.Namespace) -> list[dict[str, Any]]:
                 print(line(name, result), flush=True)
                 for stage, share in result.get("stages", {}).items():
                     print(f"        {stage:28} {share['pct']:5.1f} %  {share['us_a_message']:7.1f} us", flush=True)
-                written(options.json, {"trials": results})
-    for name, _ in trees(options.old):
+                written(options, results)
+    for result in results if options.idle else ():
+        machine_us = result["used"]["processors"]["cores"] / result["machines"] * 1e6
+        print(f"{result['tree']}: {result['machines']} idle machines, {machine_us:.0f} us of CPU time a machine and second")
+    for name, _ in () if options.idle else trees(options.old):
         print(f"{name}: {holds.told([result for result in results if result['tree'] == name])}")
     return results
 
@@ -117,6 +123,24 @@ def one_against_all(options: argparse.Namespace) -> list[dict[str, Any]]:
         print(
             f"{name}: all {len(names_of(ALL)[0])} processors cost {spent[1] / spent[0]:.2f} times what {options.one} alone costs"
         )
+    return results
+
+
+def each(options: argparse.Namespace) -> list[dict[str, Any]]:
+    """Try every processor alone, then all together, and print the figures that `cnctwin plan fleet` rests on."""
+    results, spent = [], dict[str, float]()
+    print(HEAD, flush=True)
+    for given in (*discover(), ALL):
+        options.processors = given
+        result = {"tree": "new"} | tried(setup_of(options, OWN, numbers(options.machines)[0]))
+        print(line(given, result), flush=True)
+        results.append(result)
+        spent[given] = result["used"]["processors"]["us_a_message"]
+    together = spent.pop(ALL)
+    # Alone, each pays what is shared; together it is paid once.
+    shared = min(max(0.0, (sum(spent.values()) - together) / (len(spent) - 1)), *spent.values())
+    print(f"shared_us={shared:.1f}\neach_us={ {name: round(us - shared, 1) for name, us in spent.items()} }")
+    print(f"sum {shared + sum(us - shared for us in spent.values()):.0f} us, together {together:.0f} us")
     return results
 
 
@@ -147,19 +171,39 @@ def numbers(given: str) -> list[int]:
     return found
 
 
-def written(file: Path | None, what: dict[str, Any]) -> None:
+def kind_of(options: argparse.Namespace) -> str:
+    """Return the kind of trials that is asked for."""
+    kinds = ("storm", "idle", "each", "one_against_twelve")
+    return "soak" if options.soak is not None else next((kind for kind in kinds if getattr(options, kind)), "many")
+
+
+def written(options: argparse.Namespace, results: Sequence[dict[str, Any]]) -> None:
     """Write the figures, with when and on what they were measured."""
+    file: Path | None = options.json
     if file is not None:
         model = [
             line.partition(":")[2].strip() for line in Path("/proc/cpuinfo").read_text().splitlines() if "model name" in line
         ]
         about = {
+            "kind": kind_of(options),
             "measured": time.strftime("%Y-%m-%d", time.gmtime()),
-            "command": f"python -m benchmarks.fleet {' '.join(sys.argv[1:])}",
+            "command": _command(),
             "cpu": model[0] if model else "",
             "cores": os.cpu_count(),
         }
-        file.write_text(json.dumps(about | what, indent=1) + "\n")
+        file.write_text(json.dumps(about | {"trials": results}, indent=1) + "\n")
+
+
+def _command() -> str:
+    """Return the command without what names places of this computer."""
+    words = list(sys.argv[1:])
+    for option in ("--json", "--py-spy"):
+        while option in words:
+            at = words.index(option)
+            del words[at : at + 2]
+    if "--old" in words:
+        words[words.index("--old") + 1] = "OLDER_CHECKOUT"
+    return " ".join(("python -m benchmarks.fleet", *words))
 
 
 def options_of(given: Sequence[str] | None = None) -> argparse.Namespace:
@@ -185,6 +229,7 @@ def options_of(given: Sequence[str] | None = None) -> argparse.Namespace:
     )
     what.add_argument("--storm", action="store_true", help="all machines are born at once: seconds until all are live")
     what.add_argument("--idle", action="store_true", help="machines that say nothing but their births")
+    what.add_argument("--each", action="store_true", help="every processor alone, then all: the figures of `cnctwin plan fleet`")
     what.add_argument("--one-against-twelve", action="store_true", help="one processor, then all, with the same machines")
     parser.add_argument("--one", default="thermal", help="that one")
     return parser.parse_args(given)
@@ -204,11 +249,13 @@ def main() -> None:
             for machines in numbers(options.machines)
             for name, tree in trees(options.old)
         ]
+    elif options.each:
+        results = each(options)
     elif options.one_against_twelve:
         results = one_against_all(options)
     else:
         results = many(options)
-    written(options.json, {"trials": results})
+    written(options, results)
     missing = {node: told["missing"] for result in results for node, told in result["nodes"].items() if told.get("missing")}
     if missing:
         print(f"ledgers that do not balance, and by how much: {missing}")

@@ -22,6 +22,7 @@ from cnctwin.commands.jobs import jobs_app
 from cnctwin.commands.model import model_app
 from cnctwin.commands.optimise import optimise
 from cnctwin.commands.parts import parts_app
+from cnctwin.commands.plan import plan_app
 from cnctwin.commands.process import process
 from cnctwin.commands.replay import replay_history
 from cnctwin.commands.serve import serve
@@ -50,6 +51,7 @@ app.add_typer(train_app, name="train")
 app.add_typer(store_app, name="store")
 app.add_typer(parts_app, name="parts")
 app.add_typer(jobs_app, name="jobs")
+app.add_typer(plan_app, name="plan")
 train_app.command("detector")(train_detector)
 train_app.command("residual")(train_residual)
 app.add_typer(model_app, name="model")

@@ -16,19 +16,20 @@ def by_time(trials: Sequence[dict[str, Any]]) -> float | None:
     >>> round(by_time(made))
     90
     """
-    points = sorted((t["machines"], t["used"]["processors"]["cores"]) for t in trials if has_kept_up(t))
+    spent: dict[int, list[float]] = {}
+    for one in trials:
+        if has_kept_up(one):
+            spent.setdefault(one["machines"], []).append(one["used"]["processors"]["cores"])
+    points = sorted((machines, sum(cores) / len(cores)) for machines, cores in spent.items())
     if not points:
         return None
-    if len({machines for machines, _ in points}) == 1:
-        machines, cores = points[0][0], sum(cores for _, cores in points) / len(points)
-        return machines / cores if cores else None
-    (low, low_cores), (high, high_cores) = next(
-        (pair for pair in pairwise(points) if pair[1][1] >= 1.0 and pair[0][0] < pair[1][0]),
-        (points[0], points[-1]) if len(points) == 2 else (points[-2], points[-1]),
-    )
-    if high == low or high_cores <= low_cores:
+    if len(points) == 1:
+        return points[0][0] / points[0][1]
+    pairs = list(pairwise(points))
+    (low, low_cores), (high, high_cores) = next((pair for pair in pairs if pair[1][1] >= 1.0), pairs[-1])
+    if high_cores <= low_cores:
         return high / high_cores
-    return float(low + (high - low) * (1.0 - low_cores) / (high_cores - low_cores))
+    return low + (high - low) * (1.0 - low_cores) / (high_cores - low_cores)
 
 
 def in_time(trials: Sequence[dict[str, Any]]) -> int | None:

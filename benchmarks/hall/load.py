@@ -77,7 +77,7 @@ class Load:
             self._slots[index % len(self._slots)].append(one)
         self._slot_s = 1.0 / order.hz / len(self._slots)
         self._selector = selectors.DefaultSelector()
-        self._events = {
+        self._events: dict[int, tuple[str, dict[str, Any]]] = {
             0: ("change", {"tool_change_active": True}),
             round(CHANGE_S * order.hz): ("cut", {"tool_change_active": False}),
             self._round // 2: ("stand", {"exec_state": "STOPPED"}),

@@ -4,13 +4,12 @@ It reads the plain mirror of one signal of some machines (`cnc/<machine>/axis_x_
 the ledger and the health of each processor's node.
 """
 
-import select
 import time
 from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
-from multiprocessing.connection import Connection
+from multiprocessing.connection import Connection, wait
 from typing import Any
 
 from benchmarks.hall.load import hurry
@@ -66,7 +65,7 @@ class Reader:
         """Read until the pipe says that it is enough."""
         pinged_s = time.monotonic()
         while True:
-            ready, _, _ = select.select([self._sock, pipe], [], [], 10.0)
+            ready = wait([self._sock, pipe], 10.0)
             if self._sock in ready:
                 data = self._sock.recv(READ_BYTES)
                 if not data:

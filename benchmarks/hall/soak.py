@@ -32,6 +32,7 @@ def soaked(setup: Setup, minutes: float) -> dict[str, Any]:
     later = looks[len(looks) // 3 :]
     result |= {
         "all_live": is_live,
+        "missing": sum(abs(node.get("missing", 0)) for node in result["nodes"].values()),
         "looks": looks,
         "slope_mb_an_hour": slope([(look["at_s"] / 3600.0, look["pss_mb"]) for look in later]),
         "queue_depth_max": max((look["queue_depth"] for look in looks), default=None),
@@ -92,7 +93,7 @@ def _tell(result: dict[str, Any]) -> None:
         f"memory {own['pss_mb']:.0f} MB, {result['slope_mb_an_hour']} MB/h; threads {result['threads_max']}, "
         f"{own['switches_a_second']:.0f} voluntary switches a second; store {result['store_mb']:.0f} MB on the disk\n"
         f"queues: {result['queue_depth_max']} messages at most, {result['store_waiting_max']} samples before the store; "
-        f"lag {result['lag_s_max']} s at most; ledgers miss {sum(abs(n.get('missing', 0)) for n in result['nodes'].values())}"
+        f"lag {result['lag_s_max']} s at most; ledgers miss {result['missing']}"
         + "".join(f"\nINVALID: {words}" for words in result["complaints"]),
         flush=True,
     )

@@ -1,14 +1,16 @@
-"""Where the time goes: samples of the running processors by py-spy (MIT), put in stages by the files that they were in."""
+"""Where the time goes: samples of the running processors by py-spy (MIT), put in stages by the files that they were in.
+
+Only the thread that holds the interpreter's lock is sampled, since one that waits for it looks busy too. The CPU time that is
+left, by the kernel's count, went into system calls and compiled code without the lock.
+"""
 
 import re
 import shutil
 import subprocess
-import time
 from collections import Counter
 from pathlib import Path
 
 from benchmarks.hall.trial import Running
-from benchmarks.hall.usage import usage_of
 
 SECONDS, RATE_HZ = 15, 200
 FRAME = re.compile(r"\(([^()]+?):\d+\)$")
@@ -32,6 +34,7 @@ STAGES = (
     ("sparkplug/", "decode"),
     ("paho/", "transport"),
 )
+_SHARED = ("contract", "sample", "config", "actions", "alarms")
 _PROCESSOR = re.compile(r"(?:^|/)processors/([a-z_]+)(?:/|\.py)")
 
 
@@ -51,51 +54,31 @@ def stage_of(stack: str) -> str:
                 return stage
         processor = _PROCESSOR.search(file)
         if processor is not None:
-            return f"fold: {processor[1]}"
+            return "folding: rows, order, ledger" if processor[1] in _SHARED else f"fold: {processor[1]}"
     return "other"
 
 
-def profiled(running: Running, folder: Path, program: str = "") -> dict[str, dict[str, float]]:
-    """Sample the processors for 15 s and return the share of each stage, and µs a machine-message, the largest first."""
+def profiled(running: Running, folder: Path, spent: dict[str, float], program: str = "") -> dict[str, dict[str, float]]:
+    """Sample the processors for 15 s and return the share of each stage, the largest first.
+
+    spent: what the processors took before they were sampled, cores and µs a machine-message, which is split here
+    """
     spy = program or shutil.which("py-spy")
     if not spy:
         raise SystemExit("py-spy is not installed; pip install py-spy, or give the program with --py-spy")
     counts: Counter[str] = Counter()
-    spent_s = 0.0
-    running.open(time.time(), time.time() + 10 * SECONDS)
-    tallied = 0
     for index, child in enumerate(running.processors):
         file = folder / f"stacks-{index}.txt"
-        assert child.pid is not None
-        before_s, sent = usage_of(child.pid).cpu_s, _sent(running)
-        command = [
-            spy,
-            "record",
-            "-p",
-            str(child.pid),
-            "-d",
-            str(SECONDS),
-            "-r",
-            str(RATE_HZ),
-            "-f",
-            "raw",
-            "-F",
-            "-o",
-            str(file),
-        ]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        sampling = ("-d", str(SECONDS), "-r", str(RATE_HZ), "--gil", "-f", "raw", "-F", "-o", str(file))
+        done = subprocess.run([spy, "record", "-p", str(child.pid), *sampling], capture_output=True, text=True, check=False)
         if done.returncode or not file.exists():
-            raise SystemExit(f"py-spy failed: {done.stderr.strip().splitlines()[-1:]}")
-        spent_s += usage_of(child.pid).cpu_s - before_s
-        tallied += _sent(running) - sent
+            raise SystemExit(f"py-spy failed: {' '.join(done.stderr.strip().splitlines()[-1:])}")
         for stack, _, count in (entry.rpartition(" ") for entry in file.read_text().splitlines()):
             counts[stage_of(stack)] += int(count)
-    total, us = sum(counts.values()) or 1, spent_s / max(1, tallied) * 1e6 * len(running.processors)
+    with_lock = {stage: count / RATE_HZ / SECONDS for stage, count in counts.items()}
+    with_lock["without the lock"] = max(0.0, spent["cores"] - sum(with_lock.values()))
+    total = sum(with_lock.values()) or 1.0
     return {
-        stage: {"pct": round(100.0 * count / total, 1), "us_a_message": round(us * count / total, 1)}
-        for stage, count in counts.most_common()
+        stage: {"pct": round(100.0 * cores / total, 1), "us_a_message": round(spent["us_a_message"] * cores / total, 1)}
+        for stage, cores in sorted(with_lock.items(), key=lambda entry: -entry[1])
     }
-
-
-def _sent(running: Running) -> int:
-    return sum(tally.sent for tally in running.tallies()[0])

@@ -32,7 +32,7 @@ def weathered(setup: Setup) -> dict[str, Any]:
         after, seen = running.used(), running.seen()
         live = sorted(seen.live.values())
         last = {node: round(max(born.values()) - births_s, 2) for node, born in seen.twins.items()}
-        result = {
+        result: dict[str, Any] = {
             "machines": setup.machines,
             "hz": setup.hz,
             "live": len(live),

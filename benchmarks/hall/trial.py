@@ -238,9 +238,10 @@ def measured(running: Running) -> dict[str, Any]:
             raise SystemExit(f"the processors have ended: {words}")
     after, busy_after_s, wall_s = running.used(), busy_s(), time.monotonic() - began_s
     memory = sum(pss_mb(one.pid) for one in running.processors if one.pid is not None)
+    folded = {node: count - nodes_before.get(node, 0) for node, count in _received(running.seen()).items()}
     time.sleep(1.5)  # what was sent at the end of the window has so long to come
     seen, (tallies, _) = running.seen(), running.tallies()
-    return figures(setup, before, after, wall_s, busy_after_s - busy_before_s, memory, seen, tallies, nodes_before)
+    return figures(setup, before, after, wall_s, busy_after_s - busy_before_s, memory, seen, tallies, folded)
 
 
 def figures(  # noqa: PLR0917
@@ -252,11 +253,12 @@ def figures(  # noqa: PLR0917
     memory_mb: float,
     seen: Seen,
     tallies: Sequence[Tally],
-    nodes_before: dict[str, int],
+    folded: dict[str, int],
 ) -> dict[str, Any]:
     """Return the figures of a window as one JSON object."""
     sent, late = sum(tally.sent for tally in tallies), sorted(ms for tally in tallies for ms in tally.late_ms)
     whole = sum(tally.whole.get(name_of(number), 0) for tally in tallies for number in observed(setup.machines))
+    mirrors = any("mirror" in names for names in setup.processors)
     used = {name: _share(before[name], after[name], wall_s, sent) for name in before}
     used["processors"]["pss_mb"] = round(memory_mb, 1)
     planned = setup.machines * setup.hz * setup.seconds
@@ -270,14 +272,13 @@ def figures(  # noqa: PLR0917
         "elsewhere_cores": round(max(0.0, busy / wall_s - sum(part["cores"] for part in used.values())), 3),
         "age_ms": quantiles(seen.mirror_s),
         "result_age_ms": quantiles(seen.results_s),
-        "in_time_pct": round(100.0 * seen.in_time / whole, 2) if whole else None,
+        "in_time_pct": round(min(100.0, 100.0 * seen.in_time / whole), 2) if whole and mirrors else None,
         "late_ms_99": round(late[len(late) * 99 // 100], 1) if late else 0.0,
         "late_ms_max": round(late[-1], 1) if late else 0.0,
         "outages": sum(tally.outages for tally in tallies),
         "rebirths": sum(tally.rebirths for tally in tallies),
         "nodes": health(seen),
     }
-    folded = {node: count - nodes_before.get(node, 0) for node, count in _received(seen).items()}
     result["folded_share"] = round(min(folded.values()) / sent, 3) if sent and folded else None
     complaints = []
     if late and result["late_ms_99"] > LATE_MS_MAX:

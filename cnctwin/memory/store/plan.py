@@ -84,7 +84,7 @@ def plan(load: Load, disk_bytes: int) -> Plan:
     room = disk_bytes * SPARE - load.for_ever * DAYS_A_YEAR
     wished = Retention(disk_bytes=disk_bytes)
     block_days = wished.block_days
-    if load.blocks * block_days > room / 2:
+    if load.blocks and load.blocks * block_days > room / 2:
         block_days = max(BLOCK_DAYS_LEAST, min(block_days, room / 2 / load.blocks))
     left = room - load.blocks * block_days
     raw_days = min(RAW_DAYS_MOST, left / load.slow) if load.slow else RAW_DAYS_MOST

@@ -120,3 +120,8 @@ def test_a_plan_for_forty_gigabytes() -> None:
     assert not vibration.fits and 3 < vibration.days_to_full < 60
     assert vibration.proposed.block_days >= 1.0
     assert vibration.load.blocks * vibration.proposed.block_days + vibration.load.slow * vibration.proposed.raw_days < 10e9
+
+
+def test_a_disk_too_small_for_what_stays_for_ever_is_planned_as_such_and_not_divided_by_nothing() -> None:
+    made = plan(load_of(500, 11, 10.0), 10_000_000_000)
+    assert not made.fits and made.years_for_ever is not None and made.years_for_ever < 1.0

@@ -1,0 +1,1 @@
+"""Planning: what a plant of so many machines needs, by what was measured."""
