@@ -37,8 +37,6 @@ POLL_S = 0.05
 RESTORE_S_MAX = 1.0  # to wait for the snapshots, once the broker answers
 UNBORN_S_MAX = 15.0  # for a restored machine to be born again, before it is taken for offline
 SNAPSHOT_S = 2.0
-PROBE_EVERY_S = 0.5  # a busy processor looks so often whether anything waits ...
-PROBE_S = 0.001  # ... for so long
 REPORT_S = 1.0
 STALL_S = 1.0  # a longer pause of this process is no silence of the machine
 WAITING_MAX = 100_000  # events, while the snapshots are awaited
@@ -101,15 +99,10 @@ class Worker:
         called_s = time.monotonic()
         events = self._host.poll(POLL_S)
         now_s = time.monotonic()
-        if events and now_s - self._lag.caught_up_s > PROBE_EVERY_S and not self._host.queue_depth:
-            more = self._host.poll(PROBE_S)
-            events, now_s = events + more, time.monotonic()
-        else:
-            more = events
-        if not more and self._host.online:
-            self._lag.caught_up(now_s)
         for event in events:
             self._take(event, now_s)
+            if (folded_s := time.monotonic()) - self._reported_s >= REPORT_S:  # however much has come
+                self._report_due(folded_s)
         self._lag.published(time.monotonic())
         if max(now_s - called_s, called_s - self._turned_s) > STALL_S:
             self._patient_until_s = now_s + STALL_S  # we slept: what came meanwhile is still on its way to the queue
@@ -120,11 +113,7 @@ class Worker:
             self._unborn_until_s = None
             self._apply(self.engine.bury_unborn(time.time_ns() // 1_000_000))
         if now_s - self._reported_s >= REPORT_S:
-            self._reported_s = now_s
-            self._letters_left = DEAD_LETTERS_A_REPORT_MAX
-            self._apply(self.engine.beat(time.time_ns() // 1_000_000))
-            self._note_changed(now_s)
-            self._report(now_s)
+            self._report_due(now_s)
         if now_s - self._saved_s >= SNAPSHOT_S or not self._saved.issuperset(self.engine.units):
             # What was never saved is saved at once: what its estimate was started from would be lost for good.
             self._saved_s = now_s
@@ -251,6 +240,13 @@ class Worker:
             return True
 
     # What is due.
+
+    def _report_due(self, now_s: float) -> None:
+        self._reported_s = now_s
+        self._letters_left = DEAD_LETTERS_A_REPORT_MAX
+        self._apply(self.engine.beat(time.time_ns() // 1_000_000))
+        self._note_changed(now_s)
+        self._report(now_s)
 
     def _note_changed(self, now_s: float) -> None:
         if self._host.reconnects != self._reconnects:
