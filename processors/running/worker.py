@@ -73,7 +73,7 @@ class Worker:
         self._patient_until_s = 0.0
         self._unborn_until_s: float | None = None
         self._queue_dropped = self._reconnects = 0
-        self._lag = Lag(self._turned_s, time.process_time())
+        self._lag = Lag(self._turned_s, time.time(), time.process_time())
         self._speaks_of_lag = False
 
     def run(self, stop: Event) -> None:
@@ -299,7 +299,7 @@ class Worker:
     def _report_lag(self, now_s: float, at_ms: int) -> LagReport:
         """Work out the lag, and say it where somebody should know. The alerts of this process hear of it without the way over the
         broker, on which it would come late."""
-        self._lag.report(now_s, time.process_time())
+        self._lag.report(now_s, time.time(), time.process_time())
         lag_s, busy_pct = round(self._lag.published_s, 3), round(self._lag.busy_pct, 1)
         report = LagReport((self._processor.name,), PROCESS, at_ms, lag_s, len(self.engine.machines), busy_pct)
         speaks = lag_s >= SPOKEN_OF_S
