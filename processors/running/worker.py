@@ -99,11 +99,12 @@ class Worker:
         called_s = time.monotonic()
         events = self._host.poll(POLL_S)
         now_s = time.monotonic()
+        if not (self._host.backlog or self._edge.backlog):
+            self._lag.published(now_s)  # all of the turns before
         for event in events:
             self._take(event, now_s)
             if (folded_s := time.monotonic()) - self._reported_s >= REPORT_S:  # however much has come
                 self._report_due(folded_s)
-        self._lag.published(time.monotonic())
         if max(now_s - called_s, called_s - self._turned_s) > STALL_S:
             self._patient_until_s = now_s + STALL_S  # we slept: what came meanwhile is still on its way to the queue
         self._turned_s = now_s

@@ -44,6 +44,10 @@ class FakeHost:
     def queue_depth(self) -> int:
         return len(self._events)
 
+    @property
+    def backlog(self) -> int:
+        return 0
+
     def start(self) -> None:
         self.started = True
 
@@ -84,6 +88,7 @@ class FakeEdge:
 
     def __init__(self) -> None:
         self.online = True
+        self.backlog = 0
         self.devices: dict[str, tuple[MetricSpec, ...]] = {}
         self.removed: list[str] = []
         self.published: list[tuple[str | None, tuple[Change, ...]]] = []
@@ -236,7 +241,6 @@ class Clock:
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.leapt_s = 0.0
-        monkeypatch.setattr("processors.running.worker.REPORT_S", 0.0)  # a report each turn
         monkeypatch.setattr("processors.running.worker.time.monotonic", lambda: time.perf_counter() + self.leapt_s)
 
     def message(self, waits_s: float) -> HostEvent:
@@ -252,8 +256,8 @@ def health_of(edge: FakeEdge) -> dict[str, Any]:
 def test_a_processor_that_is_behind_says_so_until_it_has_caught_up(monkeypatch: pytest.MonkeyPatch) -> None:
     clock, host, edge = Clock(monkeypatch), FakeHost(birth(0.0, spindle_rpm=1.0)), FakeEdge()
     worker = Worker(RECORDER, Configuration(RECORDER.config), host, edge)
-    said = [(0.0, 0.0), (60.0, 18.0), (1.0, 18.5), (1.0, 0.0), (1.0, 0.0)]
-    for passed_s, waits_s in said:
+    for passed_s, waits_s in ((0.0, 0.0), (60.0, 18.0), (2.0, 18.5), (2.0, 0.0), (2.0, 0.0)):
+        worker.turn()
         clock.leapt_s += passed_s
         host.give(clock.message(waits_s))
         worker.turn()
@@ -266,10 +270,25 @@ def test_a_processor_that_is_behind_says_so_until_it_has_caught_up(monkeypatch: 
     assert not any(retain for _, retain in reports)
 
 
+def test_results_that_cannot_be_sent_yet_are_not_published(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock, host, edge = Clock(monkeypatch), FakeHost(birth(0.0, spindle_rpm=1.0)), FakeEdge()
+    worker = Worker(RECORDER, Configuration(RECORDER.config), host, edge)
+    for backlog, late_s in ((0, 0.0), (1, 0.0), (1, 7.0), (1, 14.0), (0, 21.0), (0, 0.0)):
+        edge.backlog = backlog
+        host.give(clock.message(0.0))
+        worker.turn()
+        assert health_of(edge)["health/lag_s"] == pytest.approx(0.0, abs=0.5)
+        assert health_of(edge)["health/published_lag_s"] == pytest.approx(late_s, abs=0.5)
+        if not backlog:
+            worker.turn()
+        clock.leapt_s += 7.0
+
+
 def test_alerts_hear_of_the_lag_of_their_own_process_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     clock, host = Clock(monkeypatch), FakeHost(birth(0.0, spindle_rpm=1.0))
     worker = Worker(ALERTS, Configuration(ALERTS.config), host, FakeEdge())
     for passed_s, waits_s in ((0.0, 0.0), (60.0, 18.0)):
+        worker.turn()
         clock.leapt_s += passed_s
         host.give(clock.message(waits_s))
         worker.turn()
