@@ -117,6 +117,11 @@ class HostApplication:
         return len(self._inbox)
 
     @property
+    def backlog(self) -> int:
+        """How many messages wait to be sent."""
+        return self._connection.backlog
+
+    @property
     def counts(self) -> dict[str, int]:
         """What the session has counted: births, data, holes, lost, late, malformed, …"""
         return dict(self._session.counts)

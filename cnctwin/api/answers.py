@@ -39,6 +39,7 @@ class State(Answer):
     machine: MachineName
     now: T
     online: bool
+    behind: str | None = Field(None, description="which processors are behind, and how far: the twin's values are so old")
     measured: dict[str, ValueObject]
     twin: dict[str, ValueObject]
 

@@ -1,43 +1,57 @@
-"""The lag of a process: how long its messages have waited, whatever the clocks of the edges show.
+"""The lag of a process: how late its messages are folded, and its results handed on, whatever the clocks of the edges show.
 
-    extra delay of a message = (its age when it was folded) - (the usual age of messages of that node)
-    lag = min(median over the nodes of the extra delay, time since nothing waited)
+    extra delay of a node = age of its last message when it was folded - the least age that its messages have
+    lag = median over the nodes of the extra delay; it grows by no more than a second a second
 
-An age is our monotonic clock minus the stamp of the message, so its zero means nothing; a clock that is wrong, or another that is
-set, moves the usual age of its node and no lag. The usual age is that of the node's last message while the process was caught up:
-reading found nothing that waited within the last second. So what waits in the socket, or in the broker, counts as well, and one
-edge that is late, or whose clock is set back, is no lag of ours: the others are in time.
+An age is our monotonic clock minus the stamp of the message, so its zero means nothing, and a clock that is wrong is no lag: it
+moves the least age as well. (One-way delay over base delay, as in RFC 6817, LEDBAT.) So all that waits counts, in this process,
+in the socket or in the broker, and one edge that sends late does not: the others are in time.
 
-It cannot see what waits in front of the broker, and a delay that all messages have had since the process began.
+Many messages may wait when a process starts, so the first of a node says nothing of its least age. A clock that can be right,
+since its first message is less than a minute old, is taken to be right. A lag that stands still, while the process has time to
+spare, was a wrong clock, and is forgotten. The least age is learned anew where stamps go back: the clock was set. While the
+process is in time it creeps up, faster than clocks drift. What this cannot see: a delay that never changes, of edges whose clocks
+are more than a minute off, and one that hardly changes while the process has time to spare.
 """
 
 from statistics import median_low
 
-CAUGHT_UP_S = 1.0
+CREEP = 2e-4  # seconds a second: more than a clock drifts
+IN_TIME_S = 1.0
+SET_BACK_MS = 1000
+MAY_BE_RIGHT_S = 60.0
+STANDS_STILL_S = 10.0
+STANDS_STILL_WITHIN_S = 0.5
+SPARE_PCT = 90.0
 NODES_MAX = 5000
 
 
 class Lag:
-    """The lag of one process. `now_s` is of a clock that only goes forward, `cpu_s` the CPU time of the process."""
+    """The lag of one process. `now_s` is of a clock that only goes forward, `wall_s` UTC, `cpu_s` the CPU time of the process."""
 
-    def __init__(self, now_s: float, cpu_s: float) -> None:
+    def __init__(self, now_s: float, wall_s: float, cpu_s: float) -> None:
         self.folded_s = self.published_s = self.busy_pct = 0.0  # of the last report
-        self.caught_up_s = now_s  # when nothing was seen to wait
+        self._stamps_ms: dict[str, int] = {}
         self._ages_s: dict[str, float] = {}  # of the last message of each node since the last report
-        self._usual_s: dict[str, float] = {}
-        self._reported_s = now_s
-        self._cpu_s = cpu_s
+        self._least_s: dict[str, float] = {}
+        self._reported_s, self._cpu_s = now_s, cpu_s
+        self._to_wall_s = wall_s - now_s
+        self._still_s, self._still_since_s = 0.0, now_s  # the extra delay that stands still, and since when
         self._unpublished_s: float | None = None  # since when
         self._held_s = 0.0
 
-    def caught_up(self, now_s: float) -> None:
-        """Note that reading has found nothing that waited, while the broker was connected."""
-        self.caught_up_s = now_s
-
     def folded(self, node: str, stamp_ms: int, now_s: float) -> None:
-        """Note a message of an edge that was folded; none that is history, or was stamped by anybody else."""
-        if node in self._usual_s or node in self._ages_s or len(self._usual_s) + len(self._ages_s) < NODES_MAX:
-            self._ages_s[node] = now_s - stamp_ms / 1000
+        """Note a message of an edge that was folded, by the stamp of the message; none that holds history."""
+        before_ms = self._stamps_ms.get(node)
+        if before_ms is None and len(self._stamps_ms) >= NODES_MAX:
+            return
+        self._ages_s[node] = age_s = now_s - stamp_ms / 1000
+        if before_ms is None:
+            wall_age_s = age_s + self._to_wall_s
+            self._least_s[node] = -self._to_wall_s if wall_age_s <= MAY_BE_RIGHT_S else age_s - self.folded_s
+        elif stamp_ms < before_ms - SET_BACK_MS:
+            self._least_s[node] = age_s - self.folded_s  # as late as it was
+        self._stamps_ms[node] = stamp_ms
         if self._unpublished_s is None:
             self._unpublished_s = now_s
 
@@ -47,22 +61,28 @@ class Lag:
             self._held_s = max(self._held_s, now_s - self._unpublished_s)
             self._unpublished_s = None
 
-    def report(self, now_s: float, cpu_s: float) -> None:
+    def report(self, now_s: float, wall_s: float, cpu_s: float) -> None:
         """Work out the figures of the time since the last report; call it about once a second."""
-        behind_s_max = now_s - self.caught_up_s
-        is_caught_up = behind_s_max <= CAUGHT_UP_S
+        passed_s = now_s - self._reported_s
+        self.busy_pct = 100.0 * (cpu_s - self._cpu_s) / passed_s if passed_s > 0.0 else 0.0
+        self._reported_s, self._cpu_s, self._to_wall_s = now_s, cpu_s, wall_s - now_s
+        creep_s = CREEP * passed_s if self.folded_s < IN_TIME_S else 0.0
+        least_s = self._least_s
         for node, age_s in self._ages_s.items():
-            if is_caught_up:
-                self._usual_s[node] = age_s
-            elif node not in self._usual_s:  # born while we are behind: it is as late as the others
-                self._usual_s[node] = age_s - self.folded_s
-        extra_s = [age_s - self._usual_s[node] for node, age_s in self._ages_s.items()]
-        self.folded_s = max(0.0, min(behind_s_max, median_low(extra_s))) if extra_s else 0.0
+            least_s[node] = min(least_s[node] + creep_s, age_s)
+        extra_s = median_low([age_s - least_s[node] for node, age_s in self._ages_s.items()]) if self._ages_s else 0.0
+        if self._stands_still(extra_s, now_s):
+            self._least_s.update(self._ages_s)
+            extra_s = 0.0
+        self.folded_s = min(extra_s, self.folded_s + passed_s)
         if self._unpublished_s is not None:
             self._held_s = max(self._held_s, now_s - self._unpublished_s)
         self.published_s = self.folded_s + self._held_s
-        passed_s = now_s - self._reported_s
-        self.busy_pct = 100.0 * (cpu_s - self._cpu_s) / passed_s if passed_s > 0.0 else 0.0
-        self._reported_s, self._cpu_s = now_s, cpu_s
         self._ages_s.clear()
         self._held_s = 0.0
+
+    def _stands_still(self, extra_s: float, now_s: float) -> bool:
+        is_still = extra_s >= IN_TIME_S and abs(extra_s - self._still_s) <= STANDS_STILL_WITHIN_S
+        if not is_still or self.busy_pct >= SPARE_PCT:
+            self._still_s, self._still_since_s = extra_s, now_s
+        return now_s - self._still_since_s >= STANDS_STILL_S

@@ -29,8 +29,6 @@ from twin.vocabulary.nodes import is_twin_node
 
 PROCESS = f"{socket.gethostname()}:{os.getpid()}"
 POLL_S = 0.05
-PROBE_EVERY_S = 0.5  # a busy process looks so often whether anything waits ...
-PROBE_S = 0.001  # ... for so long
 REPORT_S = 1.0
 RESTORE_S_MAX = 1.0  # to wait for the next snapshot, or for our own nodes
 STALL_S = 1.0  # a longer pause of this process is no silence of the machine
@@ -50,7 +48,7 @@ class Runner:
         self._waiting: deque[HostEvent] = deque()
         self._is_restored = False
         self._turned_s = time.monotonic()
-        self._lag = Lag(self._turned_s, time.process_time())
+        self._lag = Lag(self._turned_s, time.time(), time.process_time())
         self._speaks_of_lag = False
         self._reported_s = 0.0
         self._patient_until_s = 0.0
@@ -76,35 +74,24 @@ class Runner:
     def turn(self) -> None:
         """One round: what has come, else silence; then what is due."""
         called_s = time.monotonic()
-        events = self._read()
+        events = self._host.poll(POLL_S)
         now_s = time.monotonic()
+        if not (self._host.backlog or any(worker.backlog for worker in self._workers)):
+            self._lag.published(now_s)  # all of the turns before
         for event in events:
             self._take(event, now_s)
-        self._lag.published(time.monotonic())
+            if (folded_s := time.monotonic()) - self._reported_s >= REPORT_S:  # however much has come
+                self._report_due(folded_s)
         if max(now_s - called_s, called_s - self._turned_s) > STALL_S:
             self._patient_until_s = now_s + STALL_S  # we slept: what came meanwhile is still on its way to the queue
         self._turned_s = now_s
         if self._host.online and not self._host.queue_depth and now_s >= self._patient_until_s:
             for worker in self._workers:
                 worker.silence(now_s)
-        shared = None
         if now_s - self._reported_s >= REPORT_S:
-            self._reported_s = now_s
-            self._note_dropped()
-            shared = self._report(now_s)
+            self._report_due(now_s)
         for worker in self._workers:
-            worker.turn(now_s, shared)
-
-    def _read(self) -> list[HostEvent]:
-        """What has come. Now and then a busy process looks whether anything waits behind it: if not, it has caught up."""
-        events = more = self._host.poll(POLL_S)
-        now_s = time.monotonic()
-        if events and now_s - self._lag.caught_up_s > PROBE_EVERY_S and not self._host.queue_depth:
-            more = self._host.poll(PROBE_S)
-            events += more
-        if not more and self._host.online:
-            self._lag.caught_up(time.monotonic())
-        return events
+            worker.turn(now_s)
 
     # Start and end.
 
@@ -187,10 +174,17 @@ class Runner:
             self._readers[node] = readers
         return readers
 
+    def _report_due(self, now_s: float) -> None:
+        self._reported_s = now_s
+        self._note_dropped()
+        shared = self._report(now_s)
+        for worker in self._workers:
+            worker.beat(now_s, shared)
+
     def _report(self, now_s: float) -> Shared:
         """Work out the lag, and say it where somebody should know. The alerts of this process hear of it without the way over the
         broker, on which it would come late."""
-        self._lag.report(now_s, time.process_time())
+        self._lag.report(now_s, time.time(), time.process_time())
         at_ms = time.time_ns() // 1_000_000
         machines = max(len(worker.engine.machines) for worker in self._workers)
         names = tuple(worker.name for worker in self._workers)

@@ -86,17 +86,19 @@ class Worker:
         self._unborn_until_s = now_s + UNBORN_S_MAX
         self._reconnects = self._host.reconnects
 
-    def turn(self, now_s: float, shared: Shared | None) -> None:
-        """Do what is due; report where a second has passed, with the state that all processors of the process share."""
+    def turn(self, now_s: float) -> None:
+        """Do what is due."""
         if self._unborn_until_s is not None and now_s >= self._unborn_until_s:
             self._unborn_until_s = None
             self._apply(self.engine.bury_unborn(time.time_ns() // 1_000_000))
-        if shared is not None:
-            self._letters_left = DEAD_LETTERS_A_REPORT_MAX
-            self._apply(self.engine.beat(time.time_ns() // 1_000_000))
-            self._note_changed(now_s)
-            self._report(now_s, shared)
         self._save(self._saves.due(now_s))
+
+    def beat(self, now_s: float, shared: Shared) -> None:
+        """A second has passed: report, with the state that all processors of the process share."""
+        self._letters_left = DEAD_LETTERS_A_REPORT_MAX
+        self._apply(self.engine.beat(time.time_ns() // 1_000_000))
+        self._note_changed(now_s)
+        self._report(now_s, shared)
 
     def finish(self, now_s: float, shared: Shared) -> None:
         """Save everything, and say goodbye."""
@@ -114,6 +116,11 @@ class Worker:
     def online(self) -> bool:
         """True while its node is born."""
         return self._edge.online
+
+    @property
+    def backlog(self) -> int:
+        """How much waits in its edge node for the broker to take it."""
+        return self._edge.backlog
 
     # What it is given.
 

@@ -51,6 +51,11 @@ def fleet_rows(now_ms: int, rows: Sequence[tuple[str, Row]]) -> Batch:
     return Batch(None, event("fleet_rows", {"now": now_ms, "rows": said}))
 
 
+def behind_batch(now_ms: int, behind: str | None) -> Batch:
+    """The sentence on processors that are behind, or that all have caught up, for everybody."""
+    return Batch(ALL, event("processors", {"now": now_ms, "behind": behind}))
+
+
 def alerts_batch(now_ms: int, alerts: dict[str, Any]) -> Batch:
     """The state of alerts, for everybody."""
     return Batch(ALL, event("alerts", {**alerts, "now": now_ms, "available": True, "reason": None}))

@@ -12,14 +12,15 @@ from math import isfinite
 from typing import Any, NamedTuple
 
 from cnctwin.api.fleet import fleet_item, is_key_signal
-from cnctwin.api.live.batches import Batch, Row, alerts_batch, fleet_rows, machine_rows, state_batch
+from cnctwin.api.live.batches import Batch, Row, alerts_batch, behind_batch, fleet_rows, machine_rows, state_batch
 from cnctwin.api.live.trace import Sample, Trace
 from cnctwin.api.value_object import plain, value_object
+from cnctwin.plant.lags import behind, lag_reports
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId, Reading
 from sparkplug.quality import Quality
 from sparkplug.values import DataSet, PropertySet, Template
-from twin.vocabulary.nodes import JOBS_NODE
+from twin.vocabulary.nodes import JOBS_NODE, is_twin_node
 from twin.vocabulary.twin_signals import TWIN_PREFIX
 
 MACHINES_MAX = 1000
@@ -27,6 +28,7 @@ SIGNALS_MAX = 2000  # of one device; what is beyond is counted
 ROWS_MAX = 5000  # that wait for one flush, of one machine
 EVENTS_A_LOCK = 50  # so that who asks waits a millisecond or two
 SILENCE_MS_MAX = 2000  # readers hear something at least so often
+LAG_MS = 1000  # between two looks at what the processors report of their lag
 MEASURED = "measured"
 _UNSHOWN = (tuple, bytes, DataSet, Template)  # NaN is kept as a null
 Describe = Callable[[NodeId, str | None], Mapping[str, PropertySet]]
@@ -89,6 +91,8 @@ class LivePlant:
         self._fleet_told_ms = 0
         self._alerts: dict[str, Any] | None = None
         self._alerts_are_new = False
+        self._behind: str | None = None
+        self._behind_looked_ms = 0
 
     # What the feeding thread tells.
 
@@ -124,7 +128,12 @@ class LivePlant:
                 self._fleet_told_ms = now_ms
             alerts = self._alerts if self._alerts_are_new and (self._fleet_readers or self._waiting) else None
             self._alerts_are_new = False
+            behind_before = self._behind
+            if not 0 <= now_ms - self._behind_looked_ms < LAG_MS:
+                self._behind_looked_ms, self._behind = now_ms, self._sentence()
         batches = [job() for job in jobs]
+        if self._behind != behind_before:
+            batches.append(behind_batch(now_ms, self._behind))
         if tell_fleet:
             batches.append(fleet_rows(now_ms, [(machine, row) for (machine, _), row in fleet]))
         if alerts is not None:
@@ -178,6 +187,11 @@ class LivePlant:
         with self._lock:
             return self._alerts
 
+    def behind(self) -> str | None:
+        """The sentence on processors that are behind; None where all are in time."""
+        with self._lock:
+            return self._behind
+
     def nodes(self) -> list[NodeView]:
         """Each node with its own metrics."""
         with self._lock:
@@ -205,6 +219,10 @@ class LivePlant:
                     del self._waiting[machine]
 
     # How it is done; the lock is held.
+
+    def _sentence(self) -> str | None:
+        own = ((node.node, owner) for node, owner in self._nodes.items() if owner.online and is_twin_node(node.node))
+        return behind(lag_reports((node, {n: one.reading.value for n, one in owner.signals.items()}) for node, owner in own))
 
     def _owner(self, event: HostEvent) -> Owner | None:
         if event.device is None:
@@ -353,7 +371,7 @@ class LivePlant:
         for name, signal in _sorted(signals):
             side = twin if name.startswith(TWIN_PREFIX) else measured
             side[name] = value_object(signal.reading, signal.provenance, signal.meaning)
-        return {"machine": machine, "now": now_ms, "online": online, "measured": measured, "twin": twin}
+        return {"machine": machine, "now": now_ms, "online": online, "behind": self._behind, "measured": measured, "twin": twin}
 
 
 def _row(reading: Reading) -> Row:

@@ -19,7 +19,9 @@ from twin.vocabulary.nodes import is_twin_node
 
 PHASES = ("pending", "firing", "acknowledged", "resolved")
 NODE_GAUGES = {
-    "twin_processor_lag_seconds": ("health/lag_s", "age of the last message when it was taken"),
+    "twin_processor_lag_seconds": ("health/lag_s", "how late messages are folded; of an edge, how old they are when taken"),
+    "twin_processor_published_lag_seconds": ("health/published_lag_s", "how late results are handed to the broker"),
+    "twin_processor_busy_percent": ("health/busy_pct", "CPU time of the processor's process; 100 is a core"),
     "twin_processor_lag_events": ("health/queue_depth", "messages behind the network thread"),
     "twin_processor_queue_depth": ("health/queue_depth", "messages behind the network thread"),
     "twin_state_checkpoint_age_seconds": ("health/snapshot_age_s", "age of the oldest unsaved state"),

@@ -41,13 +41,14 @@ def plant_routes(live: LivePlant, fan_out: FanOut) -> APIRouter:
 
         Of a machine: `state` (as /state), then `rows`: `{"now", "rows": [[t, signal, value, quality, reason]], "online"}`, and
         `state` again where signals or the connection have changed. Without a machine: `fleet`, then `fleet_rows`:
-        `{"now", "rows": [[machine, t, signal, value, quality]]}`. On both: `alerts`, as /alerts.
+        `{"now", "rows": [[machine, t, signal, value, quality]]}`. On both: `alerts`, as /alerts, and `processors`:
+        `{"now", "behind"}`, the sentence on processors that fall behind or null, on change.
         """
         if machine is not None:
             known_state(live, machine)
         reader = fan_out.open(machine)
         if machine is None:
-            first = event("fleet", {"now": now_ms(), "machines": live.fleet()})
+            first = event("fleet", {"now": now_ms(), "behind": live.behind(), "machines": live.fleet()})
         else:
             first = event("state", known_state(live, machine))
         return EventStream(fan_out, reader, first)

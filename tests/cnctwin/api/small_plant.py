@@ -41,7 +41,7 @@ def data(values: Mapping[str, Value], t_ms: int, node: NodeId = EDGE, machine: s
     return HostEvent(EventKind.DATA, node, machine, t_ms, tuple(reading(name, value, t_ms) for name, value in values.items()))
 
 
-def death(values: Mapping[str, Value], t_ms: int, node: NodeId = EDGE, machine: str = "vmc") -> HostEvent:
+def death(values: Mapping[str, Value], t_ms: int, node: NodeId = EDGE, machine: str | None = "vmc") -> HostEvent:
     """The end of a connection: all values are stale."""
     stale = tuple(reading(name, value, t_ms, Quality.STALE, "edge node offline") for name, value in values.items())
     return HostEvent(EventKind.DEATH, node, machine, t_ms, stale, "edge node offline")

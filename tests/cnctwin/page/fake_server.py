@@ -41,6 +41,7 @@ class Shop:
         self.answers: dict[str, Callable[[str, dict[str, Any] | None], Answer]] = {}
         self.token: str | None = None
         self.broker = True
+        self.behind: str | None = None
         self.posted: list[tuple[str, Any]] = []
 
     def told(self, machine: str, t_ms: int) -> tuple[dict[str, SignalValue], int]:
@@ -52,7 +53,7 @@ class Shop:
         """As the stream begins."""
         now = now_ms()
         items = [fleet_item(name, *self.told(name, now), online=name not in self.offline_since) for name in self.numbers]
-        return {"now": now, "machines": items}
+        return {"now": now, "behind": self.behind, "machines": items}
 
     def state(self, machine: str) -> dict[str, Any]:
         """All of a machine."""
@@ -63,7 +64,7 @@ class Shop:
         for name, one in told.items():
             said = value_object(one, t_ms)
             sides["twin" if name.startswith("twin/") else "measured"][name] = said if online else {**said, "quality": "stale"}
-        return {"machine": machine, "now": now, "online": online, **sides}
+        return {"machine": machine, "now": now, "online": online, "behind": self.behind, **sides}
 
     def history(self, machine: str, names: list[str], start: int, end: int, every: int) -> dict[str, Any]:
         """Columns, from the same function of time as the stream."""
@@ -235,9 +236,12 @@ class _Handler(BaseHTTPRequestHandler):
         self.close_connection = True
         self._event("fleet" if machine is None else "state", shop.fleet() if machine is None else shop.state(machine))
         before: dict[tuple[str, str], SignalValue] = {}
-        offline = dict(shop.offline_since)
+        offline, behind = dict(shop.offline_since), shop.behind
         while not self.stop.wait(shop.period_s):
             now = now_ms()
+            if behind != shop.behind:
+                behind = shop.behind
+                self._event("processors", {"now": now, "behind": behind})
             if offline != shop.offline_since:
                 offline = dict(shop.offline_since)
                 self._event("fleet" if machine is None else "state", shop.fleet() if machine is None else shop.state(machine))

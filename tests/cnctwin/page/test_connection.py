@@ -3,6 +3,7 @@
 import re
 import time
 
+import pytest
 from playwright.sync_api import Browser, expect
 
 from tests.cnctwin.page.conftest import SIZES, WAIT_MS_MAX, Visit
@@ -41,6 +42,33 @@ def test_a_server_without_its_broker_is_not_live(visit: Visit, shop: Shop) -> No
     shop.offline_since = {}
     expect(page.locator("#banner")).to_be_hidden()
     expect(page.locator(".unit.stale")).to_have_count(0)
+
+
+@pytest.mark.parametrize("place", ["#/fleet", "#/machine/vmc"])
+@pytest.mark.parametrize("size", SIZES)
+def test_processors_that_fall_behind_are_said_above_everything(
+    browser: Browser, server: FakeServer, shop: Shop, place: str, size: str
+) -> None:
+    names = "alerts, cutting_force, events, gap, historian, joint_anomaly, mirror, residual, rules, thermal, vibration"
+    visit = Visit(browser, server.url, SIZES[size])
+    page = visit.open(place)
+    line = page.locator("#behind")
+    expect(page.locator("#link")).to_have_text("live")
+    expect(line).to_be_hidden()
+    shop.behind = (
+        f"processors are 18 s behind: 20 machines, one core, 105 % busy; `cnctwin plan fleet` says what it takes ({names})"
+    )
+    expect(line).to_contain_text("Late.")
+    expect(line).to_contain_text("Processors are 18 s behind: 20 machines, one core, 105 % busy")
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    page.reload()
+    expect(line).to_contain_text("18 s behind")
+    shop.behind = "<img src=x onerror=alert(1)> is 19 s behind"
+    expect(line).to_contain_text("<img src=x")
+    shop.behind = None
+    expect(line).to_be_hidden()
+    assert visit.errors == []
+    visit.context.close()
 
 
 def test_a_hole_in_the_connection_is_a_hole_in_the_line_and_is_filled_from_the_store(visit: Visit) -> None:

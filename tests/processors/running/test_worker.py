@@ -21,7 +21,7 @@ from processors.thermal import PROCESSOR as THERMAL
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import Change, MetricSpec, NodeId
 from tests.processors.recorder import RECORDER
-from tests.processors.streams import T0_MS, birth, data, death, engine_of, fed
+from tests.processors.streams import birth, data, death, engine_of, fed
 
 NOWHERE = NodeId("", "")
 
@@ -44,6 +44,10 @@ class FakeHost:
     @property
     def queue_depth(self) -> int:
         return len(self._events)
+
+    @property
+    def backlog(self) -> int:
+        return 0
 
     def start(self) -> None:
         self.started = True
@@ -85,6 +89,7 @@ class FakeEdge:
 
     def __init__(self) -> None:
         self.online = True
+        self.backlog = 0
         self.devices: dict[str, tuple[MetricSpec, ...]] = {}
         self.removed: list[str] = []
         self.published: list[tuple[str | None, tuple[Change, ...]]] = []
@@ -233,23 +238,16 @@ def test_a_stop_before_the_snapshots_have_come_overwrites_none() -> None:
     assert host.stopped
 
 
-class LateHost(FakeHost):
-    """A broker that gives a message a turn, each as late as `waits_s` says; nothing is ever seen not to wait."""
+class Clock:
+    """The worker's clock, which a test can let leap; `waits_s` of what it shows have passed since a message was sent."""
 
-    def __init__(self, *live: HostEvent, waits_s: float) -> None:
-        super().__init__(*live)
-        self.waits_s = waits_s
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.leapt_s = 0.0
+        monkeypatch.setattr("processors.running.runner.time.monotonic", lambda: time.perf_counter() + self.leapt_s)
 
-    def poll(self, timeout_s: float) -> list[HostEvent]:
-        self.give(data(time.time() - self.waits_s - T0_MS / 1000, spindle_rpm=time.time()))
-        return super().poll(timeout_s)
-
-
-@pytest.fixture
-def fast_reports(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A report each turn."""
-    monkeypatch.setattr("processors.running.runner.REPORT_S", 0.0)
-    monkeypatch.setattr("processors.running.runner.PROBE_EVERY_S", 1e9)
+    def message(self, waits_s: float) -> HostEvent:
+        """A message that has waited so long."""
+        return data(time.perf_counter() + self.leapt_s - waits_s, spindle_rpm=1.0)
 
 
 def health_of(edge: FakeEdge) -> dict[str, Any]:
@@ -257,43 +255,58 @@ def health_of(edge: FakeEdge) -> dict[str, Any]:
     return [message for message in messages if "health/lag_s" in message][-1]
 
 
-@pytest.mark.usefixtures("fast_reports")
-def test_a_processor_that_is_behind_says_so_until_it_has_caught_up() -> None:
-    host, edge = LateHost(birth(0.0, spindle_rpm=1.0), waits_s=0.0), FakeEdge()
+def test_a_processor_that_is_behind_says_so_until_it_has_caught_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock, host, edge = Clock(monkeypatch), FakeHost(birth(0.0, spindle_rpm=1.0)), FakeEdge()
     runner = Runner(host, [Worker(RECORDER, Configuration(RECORDER.config), host, edge)])
-    runner.turn()
-    runner.turn()
-    assert [topic for topic, *_ in host.plain if topic.startswith("cnctwin/lag/")] == []
-    runner._lag.caught_up_s -= 60.0  # a minute passes in which something always waits
-    host.waits_s = 18.0
-    runner.turn()
-    assert health_of(edge)["health/lag_s"] == pytest.approx(18.0, abs=1.0)
-    assert health_of(edge)["health/published_lag_s"] == pytest.approx(18.0, abs=1.0)
-    assert health_of(edge)["health/busy_pct"] >= 0.0
-    host.waits_s = 0.0
-    runner.turn()
-    runner.turn()
-    said = [(parsed(payload.decode()), retain) for topic, payload, retain in host.plain if topic == "cnctwin/lag/recorder"]
-    assert [(round(report.lag_s), report.processors, retain) for report, retain in said] == [
-        (18, ("recorder",), False),
-        (0, ("recorder",), False),
-    ]
+    for passed_s, waits_s in ((0.0, 0.0), (60.0, 18.0), (2.0, 18.5), (2.0, 0.0), (2.0, 0.0)):
+        runner.turn()
+        clock.leapt_s += passed_s
+        host.give(clock.message(waits_s))
+        runner.turn()
+        assert health_of(edge)["health/lag_s"] == pytest.approx(waits_s, abs=0.5)
+        assert health_of(edge)["health/published_lag_s"] == pytest.approx(waits_s, abs=0.5)
+        assert health_of(edge)["health/busy_pct"] >= 0.0
+    reports = [(parsed(payload.decode()), retain) for topic, payload, retain in host.plain if topic == "cnctwin/lag/recorder"]
+    assert [report.processors for report, _ in reports] == [("recorder",)] * 3
+    assert [report.lag_s for report, _ in reports] == pytest.approx([18.0, 18.5, 0.0], abs=0.5)
+    assert not any(retain for _, retain in reports)
 
 
-@pytest.mark.usefixtures("fast_reports")
-def test_alerts_hear_of_the_lag_of_their_own_process_at_once() -> None:
-    host = LateHost(birth(0.0, spindle_rpm=1.0), waits_s=0.0)
+def test_results_that_cannot_be_sent_yet_are_not_published(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock, host, edge = Clock(monkeypatch), FakeHost(birth(0.0, spindle_rpm=1.0)), FakeEdge()
+    runner = Runner(host, [Worker(RECORDER, Configuration(RECORDER.config), host, edge)])
+    for backlog, late_s in ((0, 0.0), (1, 0.0), (1, 7.0), (1, 14.0), (0, 21.0), (0, 0.0)):
+        edge.backlog = backlog
+        host.give(clock.message(0.0))
+        runner.turn()
+        assert health_of(edge)["health/lag_s"] == pytest.approx(0.0, abs=0.5)
+        assert health_of(edge)["health/published_lag_s"] == pytest.approx(late_s, abs=0.5)
+        if not backlog:
+            runner.turn()
+        clock.leapt_s += 7.0
+
+
+def test_alerts_hear_of_the_lag_of_their_own_process_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock, host = Clock(monkeypatch), FakeHost(birth(0.0, spindle_rpm=1.0))
     worker = Worker(ALERTS, Configuration(ALERTS.config), host, FakeEdge())
     runner = Runner(host, [worker])
-    runner.turn()
-    runner._lag.caught_up_s -= 60.0
-    host.waits_s = 18.0
-    runner.turn()
+    for passed_s, waits_s in ((0.0, 0.0), (60.0, 18.0)):
+        runner.turn()
+        clock.leapt_s += passed_s
+        host.give(clock.message(waits_s))
+        runner.turn()
     (unit,) = worker.engine._units.values()
-    assert unit.live.state.lags["alerts"].report.lag_s == pytest.approx(18.0, abs=1.0)
+    assert unit.live.state.lags["alerts"].report.lag_s == pytest.approx(18.0, abs=0.5)
 
 
-def test_what_nothing_waits_behind_is_no_lag_however_old_its_stamps_are() -> None:
+def test_a_batch_that_takes_long_is_reported_amid(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("processors.running.runner.REPORT_S", 0.0)
+    host, edge = FakeHost(birth(0.0, spindle_rpm=1.0), *(data(i / 10, spindle_rpm=float(i)) for i in range(1, 5))), FakeEdge()
+    Runner(host, [Worker(RECORDER, Configuration(RECORDER.config), host, edge)]).turn()
+    assert sum("health/lag_s" in {c.name for c in changes} for _, changes in edge.published) >= 5
+
+
+def test_stamps_of_years_ago_are_no_lag() -> None:
     host = FakeHost(birth(0.0, spindle_rpm=1.0), *(data(float(i), spindle_rpm=float(i)) for i in range(1, 30)))
     _, edge = worked(RECORDER, host)
     assert health_of(edge)["health/lag_s"] == 0.0

@@ -31,6 +31,7 @@ const ALERTS_MS = 5000;
 
 const main = document.getElementById("main"),
   banner = document.getElementById("banner");
+const behindBanner = document.getElementById("behind");
 const pill = document.getElementById("link"),
   pillWord = pill.querySelector(".word");
 
@@ -130,11 +131,13 @@ function onStream(event, take) {
   });
 }
 onStream("fleet", (detail) => {
+  heardBehind(detail.behind);
   app.plant.fleet(detail.machines ?? []);
   tabs();
 });
 onStream("fleet_rows", (detail) => app.plant.fleetRows(detail));
 onStream("state", (detail) => {
+  heardBehind(detail.behind);
   app.plant.state(detail);
   tabs();
 });
@@ -144,6 +147,15 @@ app.stream.addEventListener("hole", ({ detail }) => {
   app.view?.onHole?.();
 });
 app.stream.addEventListener("alerts", ({ detail }) => heardAlerts(detail));
+app.stream.addEventListener("processors", ({ detail }) => heardBehind(detail.behind));
+
+/** Processors that fall behind: what the twin says is late, and looks live all the same. */
+function heardBehind(sentence) {
+  setHidden(behindBanner, !sentence);
+  if (!sentence) return;
+  if (!behindBanner.firstChild) behindBanner.append(el("strong", {}, "Late."), el("span"));
+  setText(behindBanner.lastChild, `${sentence[0].toUpperCase()}${sentence.slice(1)}.`);
+}
 
 function link() {
   const { link: state, lostAt, heardMs } = app.stream;

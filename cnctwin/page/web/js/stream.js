@@ -11,7 +11,7 @@ const BROKEN_MS = 2000; // after a connection that broke audibly
 const HOLE_MS = 4000;
 const TRY_MS_MAX = 8000;
 const HIDDEN_MS_MAX = 60000;
-const EVENTS = ["state", "rows", "fleet", "fleet_rows", "alerts", "ping"];
+const EVENTS = ["state", "rows", "fleet", "fleet_rows", "alerts", "processors", "ping"];
 
 export class Stream extends EventTarget {
   constructor() {

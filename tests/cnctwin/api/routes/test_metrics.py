@@ -30,6 +30,8 @@ THERMAL_OWN = {
     "ledger/dropped": 0,
     "health/queue_depth": 7,
     "health/lag_s": 0.25,
+    "health/published_lag_s": 0.5,
+    "health/busy_pct": 42.0,
 }
 NIGHT = {
     "night": "2026-05-01",
@@ -87,6 +89,8 @@ def value(text: str, name: str, **labels: str) -> float:
         ("twin_seq_gaps_total", {"layer": "control", "node": "edge-vmc"}, 3.0),
         ("twin_buffer_oldest_age_seconds", {"node": "edge-vmc"}, 4.5),
         ("twin_processor_lag_seconds", {"node": "twin-thermal"}, 0.25),
+        ("twin_processor_published_lag_seconds", {"node": "twin-thermal"}, 0.5),
+        ("twin_processor_busy_percent", {"node": "twin-thermal"}, 42.0),
         ("twin_processor_lag_events", {"node": "twin-thermal"}, 7.0),
         ("twin_processor_queue_depth", {"node": "twin-thermal"}, 7.0),
         ("twin_gate_active", {"machine": "vmc"}, 1.0),

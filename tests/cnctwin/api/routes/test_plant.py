@@ -1,5 +1,6 @@
 """The plant as it is now: machines, states, and clear refusals."""
 
+import json
 import math
 from collections.abc import Iterator
 
@@ -157,3 +158,39 @@ def test_a_bug_is_500_without_its_inside_and_with_the_security_headers(monkeypat
     assert failed.status_code == 500
     assert failed.json() == {"error": "the server failed at this; its log says how"}
     assert "default-src 'self'" in failed.headers["content-security-policy"]
+
+
+BEHIND = "processors are 18 s behind: 20 machines, one core, 105 % busy; `cnctwin plan fleet` says what it takes (thermal)"
+
+
+def told(live: LivePlant, t_ms: int) -> list[object]:
+    """What the stream says of processors at a moment."""
+    said = [batch.payload for batch in live.flush(t_ms) if batch.payload.startswith(b"event: processors")]
+    return [json.loads(payload.split(b"data: ")[1])["behind"] for payload in said]
+
+
+def test_processors_that_fall_behind_are_told_on_change_and_stand_in_each_state() -> None:
+    live = small_plant(1_000)
+    own = {"health/lag_s": 18.0, "health/published_lag_s": 18.2, "health/machines": 20, "health/busy_pct": 104.6}
+    live.take([birth(dict.fromkeys(own, 0.0), 1_000, THERMAL, None)], 1_000)
+    assert told(live, 1_000) == []
+    live.take([data(own, 2_000, THERMAL, None)], 2_000)
+    assert [told(live, t_ms) for t_ms in (2_000, 2_100, 3_000, 4_000)] == [[BEHIND], [], [], []]
+    state = live.state("vmc", 4_000)
+    assert state is not None
+    assert (state["behind"], live.behind()) == (BEHIND, BEHIND)
+    with client_of(live) as client:
+        assert client.get("/state/vmc").json()["behind"] == BEHIND
+        (part,) = [part for part in client.get("/health").json()["parts"] if part["part"] == "processors"]
+        assert (part["state"], part["reason"]) == ("degraded", BEHIND)
+    live.take([data({"health/lag_s": 0.1, "health/published_lag_s": 0.1}, 5_000, THERMAL, None)], 5_000)
+    assert told(live, 5_000) == [None]
+    assert live.behind() is None
+
+
+def test_a_processor_that_has_died_is_behind_no_longer() -> None:
+    live = small_plant(1_000)
+    live.take([birth({"health/lag_s": 18.0}, 1_000, THERMAL, None)], 1_000)
+    assert len(told(live, 1_000)) == 1
+    live.take([death({"health/lag_s": 18.0}, 2_000, THERMAL, None)], 2_000)
+    assert told(live, 2_000) == [None]
