@@ -5,38 +5,20 @@ import time
 from collections.abc import Callable, Iterator
 
 import pytest
-from paho.mqtt.enums import CallbackAPIVersion, MQTTErrorCode
+from paho.mqtt.enums import MQTTErrorCode
 from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.reasoncodes import ReasonCode
 
-from sparkplug.actions import Connect, Publish, Subscribe
+from sparkplug.actions import Publish, Subscribe
 from sparkplug.broker import BrokerAddress
 from sparkplug.transport import connection as connection_module
 from sparkplug.transport.connection import MqttConnection
 from sparkplug.transport.dialling import UnreachableError
-from sparkplug.transport.listener import Listener
 from sparkplug.transport.paho_client import StreamClient
 from sparkplug.transport.paho_path import PahoPath
-from sparkplug.transport.stream import Stream
+from tests.sparkplug.transport.pair import client_on, listener_of, nothing
 
 CONNACK = bytes.fromhex("20 02 00 00")
-
-
-def nothing(*_: object) -> None:
-    pass
-
-
-def listener_of(**told: object) -> Listener:
-    calls = dict.fromkeys(("unsent", "connected", "message", "lost", "tick"), nothing)
-    return Listener(**{"connecting": lambda _: Connect(None), **calls, **told})  # type: ignore[arg-type]
-
-
-def client_on(sock: socket.socket) -> StreamClient:
-    """A client that seems to have dialled this socket."""
-    client = StreamClient(CallbackAPIVersion.VERSION2, "test")
-    sock.setblocking(False)
-    client.stream = client._sock = Stream(sock)
-    return client
 
 
 class FakeBroker:
@@ -51,7 +33,7 @@ class FakeBroker:
         theirs.settimeout(5.0)
         theirs.sendall(CONNACK)
         self.ends.append(theirs)
-        return client_on(ours)
+        return client_on(ours)[0]
 
     def close(self) -> None:
         for end in self.ends:
@@ -127,15 +109,15 @@ def test_a_message_with_the_packet_id_of_a_barrier_confirms_nothing(monkeypatch:
     confirmed: list[int] = []
     ours, theirs = socket.socketpair()
     with ours, theirs:
-        client = client_on(ours)
-        path = PahoPath(client, client.stream, listener_of(confirmed=confirmed.append), nothing)  # type: ignore[arg-type]
+        client, stream = client_on(ours)
+        path = PahoPath(client, stream, listener_of(confirmed=confirmed.append), nothing)
         path._barriers[7] = 1
         reason = ReasonCode(PacketTypes.PUBACK)
         path._on_publish(client, None, 7, reason, None)  # as paho does when it has written a QoS 0 message
         assert confirmed == []
 
         def acknowledged() -> MQTTErrorCode:
-            client.stream.recv(4)  # type: ignore[union-attr]
+            stream.recv(4)
             path._on_publish(client, None, 7, reason, None)
             return MQTTErrorCode.MQTT_ERR_SUCCESS
 
