@@ -1,19 +1,21 @@
 """What a birth certificate declares: a table of metrics with their aliases, types and present values."""
 
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
-from sparkplug.codec import write_properties, write_value
+from sparkplug.codec import encode, write_properties, write_value
 from sparkplug.datatype import PROPERTY_ONLY, DataType
 from sparkplug.errors import MetricValueError, SparkplugError, UnknownMetricError
 from sparkplug.layouts.varint import written
 from sparkplug.metric import Change, MetricSpec, quality_properties
-from sparkplug.metric_bytes import DOUBLE_TAG, STAMP_MS_MAX, STAMP_MS_MIN, DataTemplate, pack_double
-from sparkplug.quality import QUALITY_PROPERTY, Quality
-from sparkplug.schema import PayloadMessage
+from sparkplug.metric_bytes import DOUBLE_TAG, STAMP_MS_MAX, STAMP_MS_MIN, DataTemplate, data_template, pack_double
+from sparkplug.quality import QUALITY_PROPERTY, REASON_PROPERTY, Quality
+from sparkplug.schema import PayloadMessage, PropertySetMessage
 from sparkplug.template_rules import Definitions, check_instance, merged
-from sparkplug.values import Metric, PropertySet, PropertyValue, Template, Value
+from sparkplug.values import Metric, Payload, PropertySet, PropertyValue, Template, Value
 from sparkplug.wire_value import WRITE
 
 _GOOD = Quality.GOOD
@@ -27,7 +29,7 @@ class _Slot:
     spec: MetricSpec
     alias: int
     template: DataTemplate
-    properties: PropertySet
+    properties: tuple[bytes, bytes] | None
     value: Value = None
     timestamp_ms: int = 0
     quality: Quality = Quality.GOOD
@@ -56,8 +58,8 @@ class Certificate:
             if spec.datatype is DataType.UNKNOWN or spec.datatype in PROPERTY_ONLY:
                 raise SparkplugError(f"{owner}: metric {spec.name!r}: {spec.datatype.name} is no type of a metric")
             alias = alias_of(spec.name)
-            template = DataTemplate(alias, spec.datatype, is_transient=spec.is_transient)
-            slot = _Slot(spec, alias, template, spec.property_set(), *spec.first(now_ms)[1:5])
+            template = data_template(alias, spec.datatype, is_transient=spec.is_transient)
+            slot = _Slot(spec, alias, template, _property_parts(spec), *spec.first(now_ms)[1:5])
             self._slots[spec.name] = slot
             self._check(slot, spec.value, whole=True)
 
@@ -105,22 +107,9 @@ class Certificate:
                     value = merged(slot.value, value)  # noqa: PLW2901
                 slot.value, slot.timestamp_ms, slot.quality, slot.reason = value, timestamp_ms, quality, reason
 
-    def birth(self) -> tuple[Metric, ...]:
+    def birth(self) -> bytes:
         """The metrics of a birth, oldest first: name, alias, type, properties and the present value of each."""
-        slots = sorted(self._slots.values(), key=lambda slot: slot.timestamp_ms)
-        return tuple(
-            Metric(
-                name=slot.spec.name,
-                value=slot.value,
-                datatype=slot.spec.datatype,
-                timestamp_ms=slot.timestamp_ms,
-                alias=slot.alias,
-                is_transient=slot.spec.is_transient,
-                properties={**slot.properties, **quality_properties(slot.quality, slot.reason)},
-                metadata=slot.spec.metadata,
-            )
-            for slot in slots
-        )
+        return b"".join(map(_declared, sorted(self._slots.values(), key=_time_of)))
 
     def take_plain(self, changes: Sequence[Change]) -> bytes | None:
         """Do what `data` and `note` do for good numbers, oldest first; None, and nothing is noted, where one is anything else."""
@@ -213,6 +202,65 @@ class Certificate:
                 write_value(PayloadMessage().metrics.add(), datatype, value)  # else only the next birth would fail, and every one
         except (MetricValueError, ValueError) as error:
             raise MetricValueError(f"{self._owner}: metric {slot.spec.name!r}: {error}") from error
+
+
+def _time_of(slot: _Slot) -> int:
+    return slot.timestamp_ms
+
+
+def _declared(slot: _Slot) -> bytes:
+    """Return the metric of a birth, as a field of its payload."""
+    spec, value, timestamp_ms = slot.spec, slot.value, slot.timestamp_ms
+    if slot.properties is not None and spec.metadata is None:
+        keys, values = slot.properties
+        with suppress(MetricValueError, ValueError):  # which protobuf tells better
+            more_keys, more_values = _quality_parts(slot.quality, slot.reason)
+            raw = slot.template.declared(spec.name, value, timestamp_ms, keys + more_keys + values + more_values)
+            if raw is not None:
+                return raw
+    metric = Metric(
+        name=spec.name,
+        value=value,
+        datatype=spec.datatype,
+        timestamp_ms=timestamp_ms,
+        alias=slot.alias,
+        is_transient=spec.is_transient,
+        properties={**spec.property_set(), **quality_properties(slot.quality, slot.reason)},
+        metadata=spec.metadata,
+    )
+    return encode(Payload(None, (metric,)))
+
+
+def _parts(properties: PropertySet) -> tuple[bytes, bytes]:
+    """The bytes of a property set: all keys come before all values."""
+    keys, values = PropertySetMessage(), PropertySetMessage()
+    write_properties(keys, properties)
+    values.CopyFrom(keys)
+    keys.ClearField("values")
+    values.ClearField("keys")
+    return keys.SerializeToString(), values.SerializeToString()
+
+
+@lru_cache(maxsize=256)
+def _quality_parts(quality: Quality, reason: str | None) -> tuple[bytes, bytes]:
+    return _parts(quality_properties(quality, reason))
+
+
+@lru_cache(maxsize=4096)
+def _shared(parts: tuple[bytes, bytes]) -> tuple[bytes, bytes]:
+    """The same object for equal properties: machines of one kind declare the same units and meanings."""
+    return parts
+
+
+def _property_parts(spec: MetricSpec) -> tuple[bytes, bytes] | None:
+    """The parts of the declared properties; None where a birth has to put them together."""
+    properties = spec.property_set()
+    if QUALITY_PROPERTY in properties or REASON_PROPERTY in properties:
+        return None
+    try:
+        return _shared(_parts(properties))
+    except (MetricValueError, ValueError):
+        return None  # the birth says what is wrong
 
 
 def _oldest_first(changes: Sequence[Change]) -> Sequence[Change]:

@@ -230,13 +230,14 @@ class EdgeNodeSession:
             Metric(BD_SEQ, self.bd_seq, DataType.INT64, now_ms),
             Metric(REBIRTH, False, DataType.BOOLEAN, now_ms),
         )
-        metrics = self._certificate.birth() + definition_metrics(self._templates, now_ms) + control
-        node = Publish(str(Topic(Verb.NBIRTH, self.node)), encode(Payload(now_ms, metrics, seq=0)))
+        others = encode(Payload(None, definition_metrics(self._templates, now_ms) + control))
+        payload = b"\x08" + written(now_ms) + self._certificate.birth() + others + _SEQ_FIELDS[0]
+        node = Publish(str(Topic(Verb.NBIRTH, self.node)), payload)
         return [node, *(self._device_birth(device, now_ms) for device in self._devices)]
 
     def _device_birth(self, device: str, now_ms: int) -> Publish:
-        payload = Payload(self._stamp(now_ms), self._devices[device].birth(), seq=self._next_seq())
-        return Publish(str(Topic(Verb.DBIRTH, self.node, device)), encode(payload))
+        payload = b"\x08" + written(self._stamp(now_ms)) + self._devices[device].birth() + _SEQ_FIELDS[self._next_seq()]
+        return Publish(str(Topic(Verb.DBIRTH, self.node, device)), payload)
 
     def _host_state(self, state: HostState, now_ms: int) -> list[Action]:
         if state.timestamp_ms < self._state_timestamps_ms.get(self._server, state.timestamp_ms):

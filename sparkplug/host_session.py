@@ -44,12 +44,6 @@ class _Watched:
     received_ms: int = 0  # when its last birth or death came, by the host's clock
     awaiting: set[str] | None = None  # devices that were known before the last NBIRTH and have not been born since
     doubts_ms: deque[int] = field(default_factory=lambda: deque(maxlen=DOUBTS_MAX))  # when its numbers were last doubted
-    routes: dict[str | None, Route] = field(default_factory=dict)  # of the data of the node (None) and of its devices
-
-    def forget_layouts(self) -> None:
-        """Aliases and names may mean something else now."""
-        for route in self.routes.values():
-            route.layouts.forget()
 
 
 class _Received(NamedTuple):
@@ -255,7 +249,7 @@ class HostSession:
         picture.aliases = {alias: known for alias, known in picture.aliases.items() if known[0] is picture.own}
         for owner in picture.devices.values():
             owner.bindings = {}  # their aliases may mean something else now; DBIRTHs follow
-        watched.forget_layouts()
+            owner.forget_layouts()
         watched.awaiting = {device for device, owner in picture.devices.items() if owner.online}
         self._requests.born(picture.node)
         self.counts["births"] += 1
@@ -276,7 +270,6 @@ class HostSession:
     def _wither(self, watched: _Watched, now_ms: int, reason: str) -> list[HostEvent]:
         """The node and all its devices go offline by the host's clock."""
         watched.received_ms, watched.awaiting = now_ms, None
-        watched.forget_layouts()
         picture = watched.picture
         self.counts["deaths"] += 1
         return [
@@ -310,7 +303,6 @@ class HostSession:
             except PayloadError as error:
                 self.counts["malformed"] += 1
                 return _death(picture.node, device, owner, stamp, f"birth certificate unreadable: {error}")
-            watched.forget_layouts()
             if watched.awaiting:
                 watched.awaiting.discard(device)
             self.counts["births"] += 1
@@ -339,10 +331,11 @@ class HostSession:
 
     def _route(self, watched: _Watched, topic: Topic, owner: Owner) -> Route:
         """Return the route of a data topic whose owner was born."""
-        route = watched.routes.get(topic.device)
+        name = str(topic)
+        route = self._routes.get(name)
         if route is None:
-            route = Route(watched.picture, watched.window, owner, topic.device, Memory(self._room))
-            watched.routes[topic.device] = self._routes[str(topic)] = route
+            owner.layouts = Memory(self._room)
+            route = self._routes[name] = Route(watched.picture, watched.window, owner, topic.device, owner.layouts)
         return route
 
     def _doubt(self, watched: _Watched, now_ms: int) -> None:

@@ -5,6 +5,7 @@
 """
 
 from collections.abc import Callable
+from functools import lru_cache
 from struct import Struct
 from typing import Any
 
@@ -19,9 +20,11 @@ pack_double = Struct("<d").pack
 _pack_float = Struct("<f").pack
 _TAGS = {"int_value": b"\x50", "long_value": b"\x58", "float_value": b"\x65", "double_value": DOUBLE_TAG}
 _FLAGS = {True: b"\x70\x01", False: b"\x70\x00"}
-_TRANSIENT = b"\x30\x01"
+_TRANSIENT, _NULL = b"\x30\x01", b"\x38\x01"
+TEMPLATES_MAX = 65_536
 
 
+@lru_cache
 def _value_writer(datatype: DataType) -> Callable[[Any], bytes] | None:
     """Return what writes a value with its tag, raising MetricValueError as `WRITE` does; None where only protobuf can."""
     if datatype not in WRITE:
@@ -44,24 +47,40 @@ def _text(raw: bytes) -> bytes:
 
 
 class DataTemplate:
-    """What is constant in the bytes of a metric: alias, and whether it is transient.
+    """What is constant in the bytes of a metric: alias, type, and whether it is transient.
 
     `head` is what goes before the time stamp where the metric is a plain double: with STAMP_BYTES bytes of time stamp, the tag
     and eight bytes of value its length is known; else it is empty.
     """
 
-    __slots__ = ("_alias", "_flags", "_write", "head")
+    __slots__ = ("_alias", "_datatype", "_flags", "_write", "head")
 
     def __init__(self, alias: int, datatype: DataType, *, is_transient: bool = False) -> None:
         self._alias = b"\x10" + written(alias) + b"\x18"
+        self._datatype = b"\x20" + written(datatype)
         self._flags = _TRANSIENT if is_transient else b""
         self._write = _value_writer(datatype)
         is_plain = datatype is DataType.DOUBLE and not is_transient
         self.head = b"\x12" + written(len(self._alias) + STAMP_BYTES + 9) + self._alias if is_plain else b""
 
     def written(self, value: Any, timestamp_ms: int) -> bytes | None:
-        """Return the metric as a field of its payload; None where protobuf has to write it."""
+        """Return the metric of a data message as a field of its payload; None where protobuf has to write it."""
         if self._write is None or type(timestamp_ms) is not int or not 0 <= timestamp_ms <= STAMP_MS_MAX:
             return None
         body = self._alias + written(timestamp_ms) + self._flags + self._write(value)
         return b"\x12" + written(len(body)) + body
+
+    def declared(self, name: str, value: Any, timestamp_ms: int, properties: bytes) -> bytes | None:
+        """Return the metric of a birth, which has a name, its type and properties, in the same way."""
+        if self._write is None or type(timestamp_ms) is not int or not 0 <= timestamp_ms <= STAMP_MS_MAX:
+            return None
+        raw, told = name.encode(), b""
+        if properties:
+            told = b"\x4a" + written(len(properties)) + properties
+        what = _NULL + told if value is None else told + self._write(value)
+        body = b"\x0a" + written(len(raw)) + raw + self._alias + written(timestamp_ms) + self._datatype + self._flags + what
+        return b"\x12" + written(len(body)) + body
+
+
+data_template = lru_cache(maxsize=TEMPLATES_MAX)(DataTemplate)
+"""The template of an alias and type: nodes that number their metrics alike share it."""

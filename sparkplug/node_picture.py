@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 from sparkplug.codec import datatype_of, read_properties, read_value
 from sparkplug.datatype import FIELD, DataType
 from sparkplug.errors import PayloadError
+from sparkplug.layouts.memory import Memory
 from sparkplug.metric import UNIT_PROPERTY, NodeId, Reading
 from sparkplug.quality import QUALITY_PROPERTY, REASON_PROPERTY, Quality
 from sparkplug.values import PropertySet, Template
@@ -47,6 +48,7 @@ class Owner:
         "_newest",
         "bindings",
         "birth_ms",
+        "layouts",
         "online",
         "properties",
         "templates",
@@ -58,6 +60,7 @@ class Owner:
         self.properties: dict[str, PropertySet] = {}
         self.templates: dict[str, Template] = {}
         self.bindings: dict[str, Binding] = {}
+        self.layouts: Memory | None = None  # of its data messages; None until one came
         self._aliases: list[int] = []
         self._latest = readings or {}
         self._names: tuple[str, ...] = ()
@@ -97,6 +100,11 @@ class Owner:
         """Note readings of which some may be historical."""
         self.readings.update({reading.name: reading for reading in readings if not reading.is_historical})
 
+    def forget_layouts(self) -> None:
+        """Aliases and names may mean something else now."""
+        if self.layouts is not None:
+            self.layouts.forget()
+
     def _settle(self) -> None:
         if self._names:
             self._latest.update(zip(self._names, self._newest, strict=True))
@@ -110,6 +118,7 @@ class Owner:
         for old in self._aliases:
             if old in aliases and aliases[old][0] is self:
                 del aliases[old]
+        self.forget_layouts()
         self.online, self.birth_ms = True, timestamp_ms
         self.properties, self.templates, self.bindings, self._aliases = {}, {}, {}, []
         readings: dict[str, Reading] = {}
@@ -122,6 +131,8 @@ class Owner:
                 continue
             self.bindings[name], self.properties[name], readings[name] = binding, properties, reading
             if alias is not None:
+                if alias in aliases and aliases[alias][0] is not self:
+                    aliases[alias][0].forget_layouts()
                 aliases[alias] = (self, binding)
                 self._aliases.append(alias)
         self._latest, self._names, self._newest, self._names_known = readings, (), (), {}
@@ -130,6 +141,7 @@ class Owner:
     def wither(self, timestamp_ms: int, reason: str) -> tuple[Reading, ...]:
         """Go offline: every value becomes stale as of `timestamp_ms` (5.9)."""
         self.online = False
+        self.forget_layouts()
         new, stale = tuple.__new__, Quality.STALE
         known = self.readings
         for name, (_, value, _, _, unit, _, historical) in known.items():

@@ -88,3 +88,4 @@ def _file() -> descriptor_pb2.FileDescriptorProto:
 # The classes are made at run time, so a type checker can know nothing of their fields.
 _CLASSES: dict[str, Any] = message_factory.GetMessages([_file()], pool=descriptor_pool.DescriptorPool())
 PayloadMessage: Any = _CLASSES["cnctwin.sparkplug_b.Payload"]
+PropertySetMessage: Any = _CLASSES["cnctwin.sparkplug_b.PropertySet"]

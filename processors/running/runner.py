@@ -29,6 +29,7 @@ from twin.vocabulary.nodes import is_twin_node
 
 PROCESS = f"{socket.gethostname()}:{os.getpid()}"
 POLL_S = 0.05
+GATHER_S = 0.01  # what comes within it is read together: at the rates of a cell it is waking up that costs most
 REPORT_S = 1.0
 RESTORE_S_MAX = 1.0  # to wait for the next snapshot, or for our own nodes
 STALL_S = 1.0  # a longer pause of this process is no silence of the machine
@@ -74,7 +75,7 @@ class Runner:
     def turn(self) -> None:
         """One round: what has come, else silence; then what is due."""
         called_s = time.monotonic()
-        events = self._host.poll(POLL_S)
+        events = self._host.poll(POLL_S, GATHER_S)
         now_s = time.monotonic()
         if not (self._host.backlog or any(worker.backlog for worker in self._workers)):
             self._lag.published(now_s)  # all of the turns before

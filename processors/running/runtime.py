@@ -16,6 +16,7 @@ from sparkplug.edge_node import EdgeNode
 from sparkplug.host import HostApplication
 from sparkplug.metric import NodeId
 from sparkplug.topics import group_filter
+from sparkplug.transport.loop import Loop
 
 OTHERS = ("validation",)  # tables of the same file that are for no processor
 Configured = tuple[AnyProcessor, Configuration[ProcessorConfig]]
@@ -37,17 +38,26 @@ def run(
     recorder: for the processor that `records`
     """
     processors = [processor for processor, _ in pairs]
-    own = [NodeId(group, processor.node) for processor in processors]
+    loop = Loop("processors")
     host = HostApplication(
         broker,
         host_id(processors),
         (group_filter(group),),
         wanted=lambda node: any(processor.listens_to(node.node) for processor in processors),
+        local=[NodeId(group, processor.node) for processor in processors],
+        loop=loop,
     )
     workers = []
-    for (processor, configuration), node in zip(pairs, own, strict=True):
-        session_file = None if session_dir is None else session_dir / f"{processor.node}.json"
-        edge = EdgeNode(broker, node, node_metrics(records=processor.records), session_file=session_file)
+    for processor, configuration in pairs:
+        is_heard = any(other.listens_to(processor.node) for other in processors)
+        edge = EdgeNode(
+            broker,
+            NodeId(group, processor.node),
+            node_metrics(records=processor.records),
+            session_file=None if session_dir is None else session_dir / f"{processor.node}.json",
+            loop=loop,
+            on_sent=host.hear if is_heard else None,
+        )
         workers.append(Worker(processor, configuration, host, edge, recorder if processor.records else None))
     Runner(host, workers).run(stop)
 

@@ -40,8 +40,13 @@ def written(owner: Certificate, *changes: Change) -> tuple[Metric, ...]:
     return decode(owner.data(changes)).metrics
 
 
+def declared_by(owner: Certificate) -> tuple[Metric, ...]:
+    """The metrics of a birth."""
+    return decode(owner.birth()).metrics
+
+
 def test_a_birth_says_all_that_is_known() -> None:
-    load, tool = certificate(LOAD, TOOL).birth()
+    load, tool = declared_by(certificate(LOAD, TOOL))
     assert load == Metric(
         "load",
         5.0,
@@ -74,20 +79,20 @@ def test_changes_are_written_in_the_order_of_time() -> None:
 def test_the_next_birth_carries_the_newest_value_whatever_order_the_changes_came_in() -> None:
     owner = certificate(LOAD)
     owner.note([Change("load", 2.0, 20), Change("load", 1.0, 10)])
-    assert [(m.value, m.timestamp_ms) for m in owner.birth()] == [(2.0, 20)]
+    assert [(m.value, m.timestamp_ms) for m in declared_by(owner)] == [(2.0, 20)]
 
 
 def test_history_does_not_change_the_present() -> None:
     owner = certificate(TOOL)
     owner.note([Change("tool", 7, 1, is_historical=True)])
-    assert owner.birth()[0].value == -1
+    assert declared_by(owner)[0].value == -1
     (metric,) = written(owner, Change("tool", 7, 1, is_historical=True))
     assert metric.is_historical and metric.is_transient
 
 
 def test_a_metric_without_a_value_is_not_good() -> None:
     owner = certificate(MetricSpec("load", DataType.DOUBLE))
-    (born,) = owner.birth()
+    (born,) = declared_by(owner)
     assert born.value is None
     assert {name: p.value for name, p in born.properties.items()} == {"Quality": 0, "reason": "not known yet"}
     (metric,) = written(owner, Change("load", 37.5, 9))
@@ -96,7 +101,7 @@ def test_a_metric_without_a_value_is_not_good() -> None:
 
 def test_a_first_value_may_have_its_own_time_and_quality() -> None:
     spec = MetricSpec("load", DataType.DOUBLE, value=1.0, timestamp_ms=3, quality=Quality.STALE, reason="agent gone")
-    (born,) = certificate(spec).birth()
+    (born,) = declared_by(certificate(spec))
     assert (born.value, born.timestamp_ms) == (1.0, 3)
     assert {name: p.value for name, p in born.properties.items()} == {"Quality": 500, "reason": "agent gone"}
 
@@ -115,7 +120,7 @@ def test_a_quality_is_told_until_it_is_good_again_and_that_once() -> None:
 def test_a_birth_carries_the_quality_and_its_reason() -> None:
     owner = certificate(TOOL)
     owner.note([Change("tool", None, 8, Quality.STALE, "agent gone")])
-    (metric,) = owner.birth()
+    (metric,) = declared_by(owner)
     assert (metric.value, metric.timestamp_ms) == (None, 8)
     assert {name: p.value for name, p in metric.properties.items()} == {"Quality": 500, "reason": "agent gone"}
 
@@ -129,7 +134,7 @@ def test_what_is_written_as_data_is_what_the_next_birth_carries(typed: tuple[Dat
     written_data = owner.data([change])
     owner.note([change])
     data = decode(written_data, lambda _name, _alias: datatype).metrics[0]
-    born = decode(encode(Payload(1, owner.birth()))).metrics[0]
+    born = declared_by(owner)[0]
     assert same(data.value, value) and same(born.value, value)
 
 
@@ -159,7 +164,7 @@ def test_a_wrong_first_value_is_refused_when_it_is_declared(datatype: DataType, 
 
 
 def test_an_instance_of_a_template_may_be_declared_a_definition_stands_apart() -> None:
-    (metric,) = certificate(MetricSpec("x", DataType.TEMPLATE, value=INSTANCE)).birth()
+    (metric,) = declared_by(certificate(MetricSpec("x", DataType.TEMPLATE, value=INSTANCE)))
     assert metric.value == INSTANCE
     assert definition_metrics({"Axis": DEFINITION}, 5) == (Metric("Axis", DEFINITION, DataType.TEMPLATE, 5),)
 
@@ -183,12 +188,12 @@ def test_a_new_declaration_keeps_the_values_of_metrics_of_the_same_type() -> Non
     older.note([Change("load", 40.0, 8), Change("tool", 3, 9, Quality.BAD, "debounce")])
     newer = certificate(MetricSpec("tool", DataType.INT64), LOAD, now_ms=20)
     newer.keep_values(older)
-    assert [(m.name, m.value, m.timestamp_ms) for m in newer.birth()] == [("load", 40.0, 8), ("tool", None, 20)]
+    assert [(m.name, m.value, m.timestamp_ms) for m in declared_by(newer)] == [("load", 40.0, 8), ("tool", None, 20)]
 
 
 def test_metadata_travels_with_the_birth() -> None:
     metadata = MetaData(content_type="text/plain", file_name="part.nc")
-    (metric,) = certificate(MetricSpec("program", DataType.FILE, value=b"M30", metadata=metadata)).birth()
+    (metric,) = declared_by(certificate(MetricSpec("program", DataType.FILE, value=b"M30", metadata=metadata)))
     assert decode(encode(Payload(1, (metric,)))).metrics[0].metadata == metadata
 
 

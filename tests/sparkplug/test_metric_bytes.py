@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import count
 from typing import Any
 
 import pytest
@@ -10,15 +11,16 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from sparkplug.actions import Publish
-from sparkplug.certificate import GOOD_AGAIN
-from sparkplug.codec import write_properties, write_value
+from sparkplug.certificate import GOOD_AGAIN, Certificate
+from sparkplug.codec import encode, write_properties, write_value
 from sparkplug.datatype import DataType
 from sparkplug.edge_session import EdgeNodeSession
-from sparkplug.errors import MetricValueError
+from sparkplug.errors import MetricValueError, PayloadError
 from sparkplug.metric import Change, MetricSpec, NodeId, quality_properties
 from sparkplug.quality import Quality
 from sparkplug.schema import PayloadMessage
-from tests.sparkplug.everything import ALL_VALUES
+from sparkplug.values import Metric, Payload
+from tests.sparkplug.everything import ALL_VALUES, METADATA
 
 NOW_MS = 1_790_000_000_000
 QUICK = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -108,15 +110,58 @@ def test_plain_numbers_are_what_protobuf_writes_and_what_the_next_birth_carries(
     assert sent.payload == by_protobuf(specs, good, changes, NOW_MS + later_ms, 2)
     other = session(specs)
     other.note("vmc", changes)
-    assert repr(edge._devices["vmc"].birth()) == repr(other._devices["vmc"].birth())
+    assert edge._devices["vmc"].birth() == other._devices["vmc"].birth()
+
+
+PROPERTY = st.one_of(
+    st.booleans(), st.integers(-(2**63), 2**63 - 1), st.floats(), st.sampled_from(["", "feed of the axis", "Größe"])
+)
+
+
+@QUICK
+@given(st.data())
+def test_a_birth_is_what_protobuf_writes(data: st.DataObject) -> None:
+    """Of the metrics one after another; the payload's own fields stand around them."""
+    specs, expected = [], []
+    for alias in range(1, 1 + data.draw(st.integers(1, 5), "metrics")):
+        datatype = data.draw(st.sampled_from(TYPES), "type")
+        properties = data.draw(st.dictionaries(st.sampled_from(["meaning", "axis", "reason", "Quality"]), PROPERTY), "properties")
+        spec = MetricSpec(
+            f"m{alias}",
+            datatype,
+            unit=data.draw(st.sampled_from([None, "mm"])),
+            low=data.draw(st.sampled_from([None, -1.5])),
+            properties=properties,
+            value=data.draw(st.none() | ALL_VALUES[datatype], "value"),
+            timestamp_ms=data.draw(STAMPS, "stamp"),
+            quality=data.draw(st.sampled_from(Quality)),
+            reason=data.draw(st.sampled_from([None, "agent gone"])),
+            is_transient=data.draw(st.booleans()),
+            metadata=data.draw(st.sampled_from([None, None, METADATA])),
+        )
+        specs.append(spec)
+        _, value, stamp_ms, quality, reason, _ = spec.first(NOW_MS)
+        told = {**spec.property_set(), **quality_properties(quality, reason)}
+        metric = Metric(
+            spec.name, value, datatype, stamp_ms, alias, is_transient=spec.is_transient, properties=told, metadata=spec.metadata
+        )
+        expected.append((stamp_ms, encode(Payload(None, (metric,)))))
+    aliases = count(1)
+    owner = Certificate("device vmc", specs, lambda _: next(aliases), NOW_MS)
+    assert owner.birth() == b"".join(raw for _, raw in sorted(expected, key=lambda one: one[0]))
+
+
+def test_a_name_that_utf_8_cannot_write_is_refused_by_the_birth() -> None:
+    with pytest.raises(PayloadError, match="name, alias, time or metadata"):
+        session([MetricSpec("\ud800", DataType.DOUBLE, value=1.0)])
 
 
 def test_the_sequence_number_counts_over_255() -> None:
     edge = session([MetricSpec("m", DataType.DOUBLE, value=0.0)])
-    for count in range(2, 600):
-        (sent,) = edge.publish("vmc", [Change("m", float(count), NOW_MS)], NOW_MS)
+    for number in range(2, 600):
+        (sent,) = edge.publish("vmc", [Change("m", float(number), NOW_MS)], NOW_MS)
         assert isinstance(sent, Publish)
-        assert PayloadMessage.FromString(sent.payload).seq == count % 256
+        assert PayloadMessage.FromString(sent.payload).seq == number % 256
 
 
 @pytest.mark.parametrize(

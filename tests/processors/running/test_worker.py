@@ -68,7 +68,7 @@ class FakeHost:
             self._events.extend([*snapshots, HostEvent(EventKind.PLAIN, NOWHERE, None, 0, (), "", topic, payload)])
         return True
 
-    def poll(self, timeout_s: float) -> list[HostEvent]:
+    def poll(self, timeout_s: float, gather_s: float = 0.0) -> list[HostEvent]:
         events = list(self._events)
         self._events.clear()
         if not events and self._stop_when_empty is not None:

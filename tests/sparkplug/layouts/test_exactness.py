@@ -339,7 +339,8 @@ def test_a_host_with_layouts_says_what_a_host_without_says(seed: int) -> None:
             seq = 0
             pair.hear("spBv1.0/cnc/NBIRTH/edge", birth(device=None, seq=0, stamp_ms=stamp_ms, first_alias=0, turned=turned))
         for device in ("a", "b"):
-            first = chance.choice((10, 20)) if chance.random() < 0.1 else {"a": 20, "b": 40}[device]
+            # Now and then with aliases of the node or of the other device.
+            first = chance.choice((5, 35)) if chance.random() < 0.2 else {"a": 20, "b": 40}[device]
             data = birth(device=device, seq=counted(), stamp_ms=stamp_ms, first_alias=first, turned=turned)
             pair.hear(f"spBv1.0/cnc/DBIRTH/edge/{device}", data)
 
