@@ -8,9 +8,12 @@ mirrored: a topic holds the present. Neither are arrays of more than 256 numbers
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from functools import lru_cache
+from types import MappingProxyType
+
+from pydantic_core import to_json
 
 from processors.config import ProcessorConfig
 from processors.contract import NoState, PlainOutput, PlainSpec, Processor, Sample, SampleKind
@@ -21,6 +24,8 @@ from twin.vocabulary import topics
 
 PREFIX = topics.MIRROR
 ARRAY_MAX = 256
+DECIMAL_MIN, DECIMAL_END = 1e-4, 1e16
+"""The numbers between which `repr` writes no exponent."""
 _QUALITY = {Quality.GOOD: "good", Quality.STALE: "stale", Quality.BAD: "bad"}
 _ENCODE = json.JSONEncoder(ensure_ascii=False, allow_nan=False, separators=(",", ":")).encode
 
@@ -34,8 +39,9 @@ def step(_: Config, state: NoState, sample: Sample) -> tuple[NoState, Sequence[P
     if sample.is_history or sample.kind in (SampleKind.TICK, SampleKind.HOLE):
         return state, ()
     row, prefix = sample.row, _prefix(sample.machine)
-    readings = [row[name] for name in sample.changed]
-    return state, [PlainOutput(prefix + _path(one[0]), mirrored(one)) for one in readings if not _is_long(one[1])]
+    readings = [row[name] for name in sample.changed if not _is_long(row[name].value)]
+    texts = _texts([one.value for one in readings if type(one.value) is float])
+    return state, [PlainOutput(prefix + _path(one.name), mirrored(one, texts)) for one in readings]
 
 
 def _is_long(value: object) -> bool:
@@ -43,15 +49,21 @@ def _is_long(value: object) -> bool:
     return isinstance(value, tuple) and len(value) > ARRAY_MAX
 
 
-def mirrored(reading: Reading) -> bytes:
-    """One reading as JSON that any parser takes; what JSON cannot say is null with a reason.
+def _texts(numbers: list[float]) -> dict[float, str]:
+    """Return numbers as `repr` writes them, all at once: that takes a third of the time. Those with an exponent are left out."""
+    plain = [number for number in numbers if DECIMAL_MIN <= abs(number) < DECIMAL_END]
+    return dict(zip(plain, to_json(plain)[1:-1].decode().split(","), strict=True)) if plain else {}
+
+
+def mirrored(reading: Reading, texts: Mapping[float, str] = MappingProxyType({})) -> bytes:
+    """One reading as JSON that any parser takes; what JSON cannot say is null with a reason. `texts` has numbers as JSON.
 
     >>> mirrored(Reading("spindle_rpm", 2400.0, 1644501062250, Quality.GOOD, "rev/min", None, False)).decode()
     '{"value":2400.0,"t":"2022-02-10T13:51:02.250Z","unit":"rev/min","quality":"good"}'
     """
     _, value, timestamp_ms, quality, unit, reason, _ = reading
     if type(value) is float and -math.inf < value < math.inf:  # what nearly every reading is
-        text = repr(value)  # which is JSON, and quicker
+        text = texts.get(value) or repr(value)  # which is JSON
     else:
         text, quality, reason = _encoded(value, quality, reason)
     why = f',"reason":{_ENCODE(reason)}}}' if reason else "}"

@@ -1,6 +1,7 @@
 """The plain mirror: any client reads it, any JSON parser takes it, and nothing stays good when its edge is gone."""
 
 import json
+import math
 from typing import Any
 
 import pytest
@@ -108,3 +109,15 @@ def test_no_two_names_share_a_topic_and_none_holds_a_wildcard(one: str, other: s
     assert (topic_level(one) == topic_level(other)) is (one == other)
     assert not set("+#\0") & set(topic_path(one))
     assert "/" not in topic_level(one)
+
+
+@given(st.lists(st.floats() | st.floats(1e-5, 1e17) | st.floats(-1e4, 1e4).map(lambda value: round(value, 3)), max_size=20))
+def test_numbers_of_one_message_are_written_as_each_would_be_alone(values: list[float]) -> None:
+    readings = [reading(f"s{place}", value) for place, value in enumerate(values)]
+    engine = engine_of(PROCESSOR)
+    fed(engine, birth(0.0, spindle_rpm=1.0))
+    shown = plain(fed(engine, event(EventKind.DATA, 0.0, *readings)))
+    assert shown == {f"cnc/okuma/{one.name}": mirrored(one) for one in readings}
+    for one, value in zip(readings, values, strict=True):
+        if math.isfinite(value):
+            assert f'"value":{value!r},'.encode() in mirrored(one)

@@ -13,6 +13,7 @@ from processors.rules.alarm import IDLE, Judgement, LimitState, Timing, latched
 from processors.rules.processor import DETAIL, PROCESSOR, RULES, SEVERITY, ZONE
 from processors.rules.vibration import BOUNDARIES_MM_S
 from processors.running.engine import Engine
+from processors.sample import Sample, SampleKind
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import Change
 from sparkplug.quality import Quality
@@ -360,3 +361,17 @@ def test_an_alarm_needs_its_dwell_without_a_break_and_its_end_too(
             run.append(past[1])
         lasted = bool(run) and at_s - run[-1] >= (clear_s if was else dwell_s)
         assert latch.is_alarm is (was if not lasted else not was)
+
+
+def test_while_nothing_changes_the_outputs_are_the_same_objects() -> None:
+    engine = engine_of(PROCESSOR)
+    fed(
+        engine, birth(0.0, spindle_rpm=3000.0, spindle_load_pct=20.0, feed_mm_min=500.0, exec_state="ACTIVE", spindle_temp_c=30.0)
+    )
+    lane = engine.lane_of("okuma")
+    assert lane is not None
+    config = PROCESSOR.configured().default
+    calm = [Sample("okuma", SampleKind.TICK, 1e9 + second, lane.row) for second in range(2)]
+    state, first = PROCESSOR.step(config, lane.state, calm[0])
+    _, second = PROCESSOR.step(config, state, calm[1])
+    assert second is first
