@@ -14,7 +14,7 @@ from processors.discovery import AnyProcessor
 from processors.errors import SnapshotError
 from processors.running.counts import Counts
 from processors.running.fold import Fold, Folded
-from processors.running.lane import Lane
+from processors.running.lane import Lane, Stream, stream_of
 from processors.running.ledger import FOLDED, DropReason, Ledger
 from processors.running.picks import Picks
 from processors.running.silences import Silences
@@ -88,21 +88,13 @@ class Engine:
     def feed(self, event: HostEvent, wall_s: float, *, has_waited: bool = False) -> list[Action]:
         """Take one event; `wall_s` is any clock that only goes forward. `has_waited`: `received` has counted it."""
         kind, node, device = event.kind, event.node, event.device
-        ledger = self.ledger
-        self._emitted_before = ledger.emitted
-        machine = self._machines.get(device) if device is not None else None
-        if event.names and machine is not None and kind is EventKind.DATA and (way := machine.ways.get(node)) is not None:
-            actions, fates = way(event, wall_s)
-            ledger.count(fates, 0 if has_waited else 1)
-            self._changed[machine.unit.name] = None
-            if not machine.live.is_awaited:
-                self._silences.watch(machine)
-            return actions
+        self._emitted_before = self.ledger.emitted
         if not self._processor.listens_to(node.node):
             self.counts.ignored += 1
             return []
         if device is None:
             return self._node_event(event)
+        machine = self._machines.get(device)
         if kind is EventKind.HOLE:  # no message
             actions = [] if machine is None else machine.live.lost(event.detail)
         else:
@@ -112,11 +104,32 @@ class Engine:
                 actions, fates = self._birth(machine, event, wall_s)
             else:
                 actions, fates = self._death(machine, event)
-            ledger.count(fates, 0 if has_waited else 1)
+            self.ledger.count(fates, 0 if has_waited else 1)
         if machine is None:
             machine = self._machines.get(device)
         if machine is not None:
             self._changed[machine.unit.name] = None
+            self._silences.watch(machine)
+        return actions
+
+    def stream(self, device: str, message: Stream, wall_s: float) -> list[Action] | None:
+        """Take data of a device whose names are given, as `feed`, by the shortest way; None where it has to be fed.
+
+        There is such a way once a message of the node was fed, until the next birth or death of the machine.
+        """
+        machine = self._machines.get(device)
+        if machine is None or (way := machine.ways.get(message[0])) is None:
+            return None
+        ledger = self.ledger
+        self._emitted_before = ledger.emitted
+        actions, fates = way(message, wall_s)
+        if fates is FOLDED:  # what nearly every message is
+            ledger.received += 1
+            ledger.emitted += 1
+        else:
+            ledger.count(fates)
+        self._changed[machine.unit_name] = None
+        if not machine.live.is_awaited:
             self._silences.watch(machine)
         return actions
 
@@ -289,7 +302,7 @@ class Engine:
             return [], (DropReason.BEFORE_BIRTH,)
         if event.names and machine.is_online and not machine.excluded.get(event.node):
             way = machine.ways[event.node] = machine.live.twin if self._is_of_twin(event.node) else machine.live.stream
-            return way(event, wall_s)
+            return way(stream_of(event), wall_s)
         readings: tuple[Reading, ...] | list[Reading] = event.readings
         inputs = self._inputs
         is_of_twin = self._is_of_twin(event.node)

@@ -22,10 +22,10 @@ from processors.config import ProcessorConfig
 from processors.running.counts import Counts
 from processors.running.fold import Fold, Folded
 from processors.running.ledger import FOLDED, DropReason, Fates
-from processors.running.picks import Pick, Picks
+from processors.running.picks import Picks
 from processors.sample import Sample, SampleKind
 from sparkplug.host_session import HostEvent
-from sparkplug.metric import Reading
+from sparkplug.metric import NodeId, Reading
 from sparkplug.quality import Quality
 
 REWIND_MESSAGES = 3  # so many messages in a row, far behind, mean that the clock was set back
@@ -34,6 +34,15 @@ HELD: Fates = ()
 _name: Callable[[Reading], str] = itemgetter(Reading._fields.index("name"))
 _timestamp_ms: Callable[[Reading], int] = itemgetter(Reading._fields.index("timestamp_ms"))
 _new = tuple.__new__  # a named tuple's own constructor costs as much as the rest of a fold
+
+
+Stream = tuple[NodeId, tuple[Reading, ...], tuple[str, ...], int, int]
+"""A message of live data: its node, its readings, their names, their oldest and their newest stamp."""
+
+
+def stream_of(event: HostEvent) -> Stream:
+    """The data of an event whose names are given."""
+    return event.node, event.readings, event.names, event.oldest_ms, event.newest_ms
 
 
 class Lane:
@@ -80,15 +89,16 @@ class Lane:
 
     # Messages.
 
-    def stream(self, event: HostEvent, wall_s: float) -> Folded:
+    def stream(self, message: Stream, wall_s: float) -> Folded:
         """A message of the machine's own edge has come whose names and stamps are given: as `data`, by the shortest way where it
         is the next one in time, as nearly every message is."""
-        newest_ms, clock_ms, last_ms = event.newest_ms, self.clock_ms, self.last_ms
+        _, readings, names, oldest_ms, newest_ms = message
+        clock_ms, last_ms, fold = self.clock_ms, self.last_ms, self.fold
         if self._inputs is None:
-            self.row.update(zip(event.names, event.readings, strict=True))
-            return self._fold(SampleKind.DATA, newest_ms if clock_ms is None else clock_ms, event.names)
-        if clock_ms is None or self._held or event.oldest_ms < last_ms or newest_ms > last_ms + self._gap_ms:
-            return self.data(event.readings, wall_s)
+            self.row.update(zip(names, readings, strict=True))
+            return self._fold(SampleKind.DATA, newest_ms if clock_ms is None else clock_ms, names)
+        if clock_ms is None or self._held or oldest_ms < last_ms or newest_ms > last_ms + self._gap_ms:
+            return self.data(readings, wall_s)
         actions: list[Action] | None = None
         if newest_ms > clock_ms:
             if self.ticking and not self.is_silent and newest_ms // self._tick_ms != clock_ms // self._tick_ms:
@@ -96,24 +106,25 @@ class Lane:
             self.clock_ms = clock_ms = newest_ms
         self.last_ms, self.is_silent = newest_ms, False
         self._anchor_ms, self._anchor_wall_s = clock_ms, wall_s
-        pick = self.picked(event.names)
-        if pick.names:
-            self.row.update(zip(pick.names, pick.get(event.readings), strict=True))
-        if not (pick.names and pick.wakes):
-            return actions or [], FOLDED  # nothing in it for this processor but the time; or the next tick sees it
-        folded, fates = self._fold(SampleKind.DATA, clock_ms, pick.names)
-        return (actions + folded if actions else folded), fates
-
-    def twin(self, event: HostEvent, wall_s: float) -> Folded:
-        """A message of another processor has come whose names and stamps are given: mostly nothing of it is for this one."""
-        pick = self.picked(event.names)
-        return self.data(pick.get(event.readings), wall_s, is_of_twin=True) if pick.names else ([], FOLDED)
-
-    def picked(self, names: tuple[str, ...]) -> Pick:
-        """Return which of a message's readings are for this processor; the messages of one layout share the tuple of names."""
         if names is not self._names:
             self._names, self._pick = names, self._picks.of(names)
-        return self._pick
+        taken, get, wakes = self._pick
+        if not taken:
+            return actions or [], FOLDED  # nothing in it for this processor but the time
+        self.row.update(zip(taken, get(readings), strict=True))
+        if not wakes:
+            return actions or [], FOLDED  # the next tick sees it
+        sample = (self._machine, SampleKind.DATA, clock_ms / 1000, self._view, taken, 0.0, "", fold.is_history, fold.cell, "")
+        folded, fates = self._fold_in(_new(Sample, sample), clock_ms)
+        return (actions + folded if actions else folded), fates
+
+    def twin(self, message: Stream, wall_s: float) -> Folded:
+        """A message of another processor has come whose names and stamps are given: mostly nothing of it is for this one."""
+        names = message[2]
+        if names is not self._names:
+            self._names, self._pick = names, self._picks.of(names)
+        pick = self._pick
+        return self.data(pick.get(message[1]), wall_s, is_of_twin=True) if pick.names else ([], FOLDED)
 
     def data(self, readings: Sequence[Reading], wall_s: float, *, is_of_twin: bool = False) -> Folded:
         """A message with changes has come. What another processor says never sets the clock back: its figures may be of a while

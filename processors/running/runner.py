@@ -20,6 +20,7 @@ from threading import Event
 
 from processors.lag_report import SPOKEN_OF_S, LagReport, topic_of
 from processors.running.lag import Lag
+from processors.running.lane import stream_of
 from processors.running.ports import HostPort
 from processors.running.worker import Shared, Worker
 from sparkplug.host_session import EventKind, HostEvent
@@ -161,10 +162,17 @@ class Runner:
             for worker in self._workers:
                 worker.take_plain(event)
             return
-        for worker in self._readers_of(event):
-            worker.take(event, now_s, has_waited=has_waited)
-        if event.kind is EventKind.DATA and not is_twin_node(event.node.node) and not _is_late(event):
-            self._lag.folded(event.node.node, event.timestamp_ms, time.monotonic())
+        node = event.node.node
+        readers = self._readers.get(node) or self._readers_of(event)
+        if event.names and not has_waited:
+            message = stream_of(event)
+            for worker in readers:
+                worker.stream(event, message, now_s)
+        else:
+            for worker in readers:
+                worker.take(event, now_s, has_waited=has_waited)
+        if event.kind is EventKind.DATA and not is_twin_node(node) and not _is_late(event):
+            self._lag.folded(node, event.timestamp_ms, time.monotonic())
 
     def _readers_of(self, event: HostEvent) -> tuple[Worker, ...]:
         """The processors that read the node of an event; they are found once for each node."""

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from processors.running.fold import Fold, Folded
-from processors.running.lane import Lane
+from processors.running.lane import Lane, Stream
 from sparkplug.host_session import HostEvent
 from sparkplug.metric import NodeId, Reading
 from twin.vocabulary.nodes import is_twin_node
@@ -40,7 +40,11 @@ class Machine:
     online: set[NodeId] = field(default_factory=set)
     owner: dict[str, NodeId] = field(default_factory=dict)
     excluded: dict[NodeId, frozenset[str]] = field(default_factory=dict)
-    ways: dict[NodeId, Callable[[HostEvent, float], Folded]] = field(default_factory=dict)
+    ways: dict[NodeId, Callable[[Stream, float], Folded]] = field(default_factory=dict)
+    unit_name: str = ""
+
+    def __post_init__(self) -> None:
+        self.unit_name = self.unit.name
 
     @property
     def is_online(self) -> bool:

@@ -18,6 +18,7 @@ from processors.discovery import AnyProcessor
 from processors.errors import SnapshotError
 from processors.plain_topic import topic_level
 from processors.running.engine import Engine
+from processors.running.lane import Stream
 from processors.running.ports import EdgePort, HostPort, Recorder
 from processors.running.saves import Saves
 from sparkplug.errors import SparkplugError
@@ -132,11 +133,25 @@ class Worker:
         """Fold an event of a node that it reads, and send what comes of it."""
         if self._recorder is not None:
             self._recorder.keep(event, time.time_ns() // 1_000_000)
-        actions = self.engine.feed(event, now_s, has_waited=has_waited)
-        if actions and not self._apply(actions):
-            self.engine.unsent()
+        self.send(self.engine.feed(event, now_s, has_waited=has_waited))
         if event.kind is EventKind.BIRTH and event.device is not None:
             self._press(event.device, is_new=True)
+
+    def stream(self, event: HostEvent, message: Stream, now_s: float) -> None:
+        """Take data whose names are given: as `take`, by the shortest way."""
+        actions = self.engine.stream(event[2] or "", message, now_s)
+        if actions is None:
+            self.take(event, now_s)
+            return
+        if self._recorder is not None:
+            self._recorder.keep(event, time.time_ns() // 1_000_000)
+        if actions:
+            self.send(actions)
+
+    def send(self, actions: Sequence[Action]) -> None:
+        """Send what came of the last event."""
+        if actions and not self._apply(actions):
+            self.engine.unsent()
 
     def take_plain(self, event: HostEvent) -> None:
         """Fold a plain message, where the processor listens to its topic; keep it, where the recorder wants it."""
