@@ -35,6 +35,7 @@ class Lag:
         self._ages_s: dict[str, float] = {}  # of the last message of each node since the last report
         self._least_s: dict[str, float] = {}
         self._reported_s, self._cpu_s = now_s, cpu_s
+        self._most_s = 0.0  # that the lag can be: the last one that was seen, and the time since
         self._to_wall_s = wall_s - now_s
         self._still_s, self._still_since_s = 0.0, now_s  # the extra delay that stands still, and since when
         self._unpublished_s: float | None = None  # since when
@@ -74,7 +75,10 @@ class Lag:
         if self._stands_still(extra_s, now_s):
             self._least_s.update(self._ages_s)
             extra_s = 0.0
-        self.folded_s = min(extra_s, self.folded_s + passed_s)
+        self._most_s += passed_s
+        self.folded_s = min(extra_s, self._most_s)
+        if self._ages_s:
+            self._most_s = self.folded_s
         if self._unpublished_s is not None:
             self._held_s = max(self._held_s, now_s - self._unpublished_s)
         self.published_s = self.folded_s + self._held_s

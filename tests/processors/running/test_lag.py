@@ -146,6 +146,15 @@ def test_wrong_clocks_do_not_hide_a_lag() -> None:
     assert fall_behind(process, 36) == pytest.approx(18.0, abs=0.15)
 
 
+def test_a_second_without_a_message_is_no_lag_and_hides_none() -> None:
+    process = Process()
+    fall_behind(process, 36)
+    edges, process.edges = process.edges, ()
+    assert process.second() == 0.0
+    process.edges = edges
+    assert process.second(18.0) == pytest.approx(18.0, abs=0.15)
+
+
 def test_results_that_are_held_are_later_than_what_was_folded() -> None:
     lag = Lag(0.0, STAMP_S, 0.0)
     lag.folded("edge-1", 1000, 0.1)
