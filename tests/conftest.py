@@ -10,6 +10,8 @@ from hypothesis import settings
 from hypothesis.internal.conjecture import providers
 from xdist.scheduler import LoadFileScheduling
 
+from sparkplug.transport import connection
+from sparkplug.transport.paho_path import PahoPath
 from tests.depth import EXAMPLES, IS_FULL
 from tests.wire.mosquitto import Mosquitto, find_mosquitto
 from tests.wire.proxy import Proxy
@@ -127,3 +129,12 @@ def proxy(mosquitto: Mosquitto) -> Iterator[Proxy]:
     """A recording, fault-injecting proxy in front of that broker."""
     with Proxy(upstream=mosquitto.address) as between:
         yield between
+
+
+@pytest.fixture(scope="module", params=["data path", "paho"])
+def way(request: pytest.FixtureRequest) -> Iterator[str]:
+    """Messages go past paho, as they do unless a connection is told otherwise; then all of them through it."""
+    with pytest.MonkeyPatch.context() as patch:
+        if request.param == "paho":
+            patch.setattr(connection, "DataPath", PahoPath)
+        yield request.param

@@ -99,8 +99,8 @@ class Loop:
                 self._wake_writer.setblocking(False)
                 self._selector.register(self._wake_reader, selectors.EVENT_READ, None)
             self._served[served] = None
+            self._rest.clear()
             if self._thread is None:
-                self._rest.clear()
                 self._thread = threading.Thread(target=self._run, name=self._name, daemon=True)
                 self._thread.start()
 
@@ -173,29 +173,34 @@ class Loop:
 
     def _run(self) -> None:
         while True:
-            if self._turning.locked() or time.monotonic() - self._driven_s < DRIVEN_S:
-                if not self._rest.wait(DRIVEN_S):
-                    continue
-                self._rest.clear()
-            with self._turning:
-                with self.lock:
-                    if not self._served:
-                        self._shut()
-                        return
-                self._in_charge = threading.get_ident()
+            is_over = not self._served
+            if not is_over and (self._is_driven or time.monotonic() - self._driven_s < DRIVEN_S):
+                self._rest.wait(DRIVEN_S)
+            elif self._turning.acquire(timeout=DRIVEN_S):
                 try:
-                    self._serve_due()
-                    self._turn(TICK_S)
+                    if self._end():
+                        return
+                    if time.monotonic() - self._driven_s >= DRIVEN_S:
+                        self._in_charge = threading.get_ident()
+                        self._serve_due()
+                        self._turn(TICK_S)
                 except Exception:
                     _log.exception("%s: the loop failed", self._name)  # a bug of ours; each connection guards its own
                     time.sleep(TICK_S)
+                finally:
+                    self._turning.release()
 
-    def _shut(self) -> None:
-        assert self._selector and self._wake_reader and self._wake_writer
-        self._selector.close()
-        self._wake_reader.close()
-        self._wake_writer.close()
-        self._selector = self._wake_reader = self._wake_writer = self._thread = None
+    def _end(self) -> bool:
+        """End the loop where it has nobody left to serve."""
+        with self.lock:
+            if self._served:
+                return False
+            assert self._selector and self._wake_reader and self._wake_writer
+            self._selector.close()
+            self._wake_reader.close()
+            self._wake_writer.close()
+            self._selector = self._wake_reader = self._wake_writer = self._thread = None
+            return True
 
     def _serve_due(self) -> None:
         if self.due:

@@ -16,7 +16,7 @@ from sparkplug.host import EventKind, HostApplication
 from sparkplug.metric import Change, MetricSpec, NodeId
 from tests.wire.mosquitto import free_port
 
-pytestmark = pytest.mark.broker
+pytestmark = [pytest.mark.broker, pytest.mark.usefixtures("way")]
 NODE = NodeId("cnc", "edge-tls")
 PATIENCE_S = 60.0
 LONG = "G01 X" * 20_000  # several TLS records: what the socket still holds is not seen by select

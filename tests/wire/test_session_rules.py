@@ -20,7 +20,7 @@ from tests.wire.proxy import Proxy
 from tests.wire.recording import Recorded
 from tests.wire.session_rules import violations
 
-pytestmark = pytest.mark.broker
+pytestmark = [pytest.mark.broker, pytest.mark.usefixtures("way")]
 
 NODE = NodeId("cnc", "edge")
 LOAD = MetricSpec("load", DataType.DOUBLE)
@@ -70,7 +70,7 @@ def _poll_until(host: HostApplication, ready: Callable[[], Any]) -> None:
 
 
 @pytest.fixture(scope="module")
-def recordings() -> Iterator[dict[int, list[Recorded]]]:
+def recordings(way: str) -> Iterator[dict[int, list[Recorded]]]:
     """The same life with MQTT 3.1.1 (4) and MQTT 5."""
     lives = {}
     for version in (4, 5):

@@ -23,7 +23,7 @@ from tests.wire.mqtt_packets import Acknowledgement, Connack, Connect, Disconnec
 from tests.wire.proxy import Proxy
 from tests.wire.recording import Recorded
 
-pytestmark = pytest.mark.broker
+pytestmark = [pytest.mark.broker, pytest.mark.usefixtures("way")]
 
 NDEATH = "spBv1.0/cnc/NDEATH/edge-okuma"
 STATE = "spBv1.0/STATE/scada"
@@ -79,7 +79,7 @@ def new_broker() -> Callable[[], AbstractContextManager[Mosquitto]]:
 
 @pytest.fixture(scope="module")
 def lives(
-    tmp_path_factory: pytest.TempPathFactory, new_broker: Callable[[], AbstractContextManager[Mosquitto]]
+    way: str, tmp_path_factory: pytest.TempPathFactory, new_broker: Callable[[], AbstractContextManager[Mosquitto]]
 ) -> Iterator[dict[int, Proxy]]:
     """The recordings of the same life with MQTT 3.1.1 (4) and with MQTT 5."""
     with new_broker() as broker, Proxy(broker.address) as with_311, Proxy(broker.address) as with_5:

@@ -17,7 +17,7 @@ from tests.wire.mosquitto import Mosquitto
 from tests.wire.mqtt_packets import Acknowledgement, Connack, Connect, Disconnect, Packet, Publish, Suback, Subscribe, Will
 from tests.wire.proxy import Proxy
 
-pytestmark = pytest.mark.broker
+pytestmark = [pytest.mark.broker, pytest.mark.usefixtures("way")]
 
 CLOCK_S_MAX = 10.0
 
@@ -80,7 +80,7 @@ def new_broker() -> Callable[[], AbstractContextManager[Mosquitto]]:
 
 
 @pytest.fixture(scope="module")
-def lives(new_broker: Callable[[], AbstractContextManager[Mosquitto]]) -> Iterator[dict[int, Proxy]]:
+def lives(way: str, new_broker: Callable[[], AbstractContextManager[Mosquitto]]) -> Iterator[dict[int, Proxy]]:
     """The recordings of the same life with MQTT 3.1.1 (4) and with MQTT 5."""
     recordings = {}
     for version in (4, 5):
