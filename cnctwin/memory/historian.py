@@ -30,18 +30,18 @@ from twin.vocabulary.topics import SNAPSHOT
 
 QUEUE_MAX, QUEUE_BYTES_MAX = 400_000, 128_000_000  # samples, and about so much memory
 SAMPLE_BYTES, ELEMENT_BYTES = 160, 32  # a reading in memory, an element of an array; texts and bytes by their length
+WEIGHED_MAX, WEIGHED_FROM = 4, 20_000  # messages of so few readings are weighed, which arrays come in; all, while so many wait
 BATCH_MAX = 50_000  # samples
 GATHER_S = 0.5
 LATE_S = 10.0  # waiting for longer is a trouble
 TIDY_S, STATUS_S = 60.0, 5.0
-AGAIN_S = 5.0  # after a `tidy` that sealed something
+AGAIN_S = 1.0  # after a `tidy` that sealed something
 RETRY_S_MAX = 10.0
 BEHIND_S, BEHIND_S_MAX = 1.0, REPEAT_S - 1.0  # from when on nobody is told that we are here; nor anything else
 HOUR_MS = 3_600_000
 MACHINES_MAX = 1_000  # that are given receipts
 UNITS_MAX = 20_000  # of processors, whose snapshots are kept
 SNAPSHOT_BYTES_MAX = 64_000_000  # of last snapshots; of a unit without one a replay begins with the first of its hour
-_LONG = frozenset({str, bytes, tuple})
 _log = logging.getLogger(__name__)
 
 
@@ -62,7 +62,7 @@ class _Queue:
     """Messages, pins and snapshots in the order in which they came, as many as fit. One thread puts, another takes."""
 
     def __init__(self) -> None:
-        self._items: deque[tuple[Message | Pinned | Snapshot, int, int]] = deque()  # with their samples and bytes
+        self._items: deque[tuple[HostEvent | Pinned | Snapshot, int, int, int]] = deque()  # when they came, samples, bytes
         self._put_samples = self._put_bytes = 0  # each of these is written by one of the threads
         self._taken_samples = self._taken_bytes = 0
 
@@ -71,14 +71,14 @@ class _Queue:
         """The samples that wait; a pin or a snapshot counts as one."""
         return self._put_samples - self._taken_samples
 
-    def put(self, item: Message | Pinned | Snapshot, samples: int, size: int) -> bool:
+    def put(self, item: HostEvent | Pinned | Snapshot, received_ms: int, samples: int, size: int) -> bool:
         """Put it in; return True if there was room."""
         samples = samples or 1
         size += samples * SAMPLE_BYTES
         is_full = self._put_samples - self._taken_samples + samples > QUEUE_MAX
         if is_full or self._put_bytes - self._taken_bytes + size > QUEUE_BYTES_MAX:
             return False
-        self._items.append((item, samples, size))
+        self._items.append((item, received_ms, samples, size))
         self._put_samples += samples
         self._put_bytes += size
         return True
@@ -90,9 +90,9 @@ class _Queue:
         pinned = None
         samples = size = 0
         while self._items and samples < BATCH_MAX and pinned is None:
-            item, of_item, bytes_of_item = self._items[0]
-            if isinstance(item, Message):
-                messages.append(item)
+            item, received_ms, of_item, bytes_of_item = self._items[0]
+            if isinstance(item, HostEvent):
+                messages.append(Message(received_ms, item))
             elif isinstance(item, Snapshot):
                 snapshots.append(item)
             elif samples:
@@ -175,16 +175,17 @@ class StoreRecorder:
         """Queue a message, or a snapshot of a processor."""
         if self._failure is not None:
             raise self._failure
-        if event.kind is EventKind.PLAIN:
+        kind = event.kind
+        if kind is EventKind.PLAIN:
             self._hear_snapshot(event, received_ms)
             return
         readings, size = event.readings, 0
-        for reading in readings:
-            if type(reading[1]) in _LONG:
-                size += _long_bytes(reading[1])
-        if not self._queue.put(Message(received_ms, event), len(readings), size):
+        samples = len(readings)
+        if samples < WEIGHED_MAX or self._queue.samples > WEIGHED_FROM:
+            size = sum(_long_bytes(reading.value) for reading in readings)
+        if not self._queue.put(event, received_ms, samples, size):
             self._dropped += 1
-        if event.kind is EventKind.DEATH:
+        if kind is EventKind.DEATH:
             for snapshot in self._last_snapshots.take(event.node.node.removeprefix(TWIN_NODE_PREFIX)):
                 self._put(snapshot)
 
@@ -239,7 +240,7 @@ class StoreRecorder:
             detail = f"the historian began; the newest sample before it is {away_s:.0f} s old"
             node = NodeId(self._group, HISTORIAN_NODE)
             for machine in self._store.machines():
-                self._queue.put(Message(now_ms, HostEvent(EventKind.HOLE, node, machine, now_ms, detail=detail)), 1, 0)
+                self._queue.put(HostEvent(EventKind.HOLE, node, machine, now_ms, detail=detail), now_ms, 1, 0)
         self._thread.start()
 
     def stop(self) -> None:
@@ -249,7 +250,7 @@ class StoreRecorder:
         self._store.close()
 
     def _put(self, item: Pinned | Snapshot) -> None:
-        if not self._queue.put(item, 1, len(item.payload) if isinstance(item, Snapshot) else 0):
+        if not self._queue.put(item, 0, 1, len(item.payload) if isinstance(item, Snapshot) else 0):
             self._dropped += 1
 
     def _hear_snapshot(self, event: HostEvent, received_ms: int) -> None:

@@ -93,6 +93,5 @@ def _put_headers(headers: dict[int, HeaderOf], some: Sequence[Chunk], numbers: I
     received = [ms for chunk in some for ms in chunk.received_ms()]
     stamps = [ms for chunk in some for ms in chunk.message_stamps()]
     nodes = [node for chunk in some for node in repeat(chunk.node, chunk.count)]
-    rows = zip(numbers.tolist(), received, stamps, nodes, places, strict=False)  # the places may be one for all
-    for number, received_ms, stamp_ms, node, place in rows:
-        headers[number] = HeaderOf(received_ms, stamp_ms, node, True, place)
+    told = zip(received, stamps, nodes, repeat(True), places, strict=False)  # what is the same for all has no end
+    headers.update(zip(numbers.tolist(), map(HeaderOf._make, told), strict=True))

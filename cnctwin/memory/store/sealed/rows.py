@@ -127,20 +127,20 @@ def parquet(table: Any, about: Mapping[str, Any], **how: Any) -> bytes:
 def _header_columns(
     t: Ints, n: Ints, flags: Ints, headers: Mapping[int, HeaderOf], reasons: Mapping[int, str | None]
 ) -> dict[str, Any]:
-    told = [headers[number] for number in n.tolist()]
+    received, stamps, nodes, is_data, places = zip(*map(headers.__getitem__, n.tolist()), strict=True)
     ms = t // 1000
     return {
         "n": pa.array(n),
         "t": pa.array(ms),
         "sub": pa.array((t - ms * 1000).astype(np.int32)),
-        "received": pa.array(np.array([header.received_ms for header in told], dtype=np.int64)),
-        "lag": pa.array(np.array([header.stamp_ms for header in told], dtype=np.int64) - ms),
-        "node": pa.array([header.node for header in told], pa.string()),
-        "data": pa.array([header.is_data for header in told], pa.bool_()),
+        "received": pa.array(np.array(received, dtype=np.int64)),
+        "lag": pa.array(np.array(stamps, dtype=np.int64) - ms),
+        "node": pa.array(nodes, pa.string()),
+        "data": pa.array(is_data, pa.bool_()),
         "quality": pa.array((flags & RANK_MASK).astype(np.int8)),
         "history": pa.array(flags & HISTORY_BIT != 0),
         "reason": pa.array([reasons[flag] for flag in (flags >> REASON_SHIFT).tolist()], pa.string()),
-        "place": pa.array([header.place for header in told], pa.binary()),
+        "place": pa.array(places, pa.binary()),
     }
 
 

@@ -80,9 +80,9 @@ class Sealer:
                 jobs, self._not_before_ms[machine] = self._due_of(machine, now_ms)
                 yield from jobs
 
-    def look_again(self) -> None:
-        """Not all that was due was done."""
-        self._not_before_ms.clear()
+    def look_again(self, machine: int) -> None:
+        """Not all that was due of a machine may have been done."""
+        self._not_before_ms.pop(machine, None)
 
     def _due_of(self, machine: int, now_ms: int) -> tuple[list[Job], int]:
         horizon_ms = (now_ms - self._margin_ms) // HOUR_MS * HOUR_MS

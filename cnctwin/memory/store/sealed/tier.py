@@ -21,8 +21,8 @@ from cnctwin.memory.store.series_table import SeriesTable, StoredClass
 from cnctwin.memory.store.store_status import SPARE_FREE_BYTES
 from cnctwin.memory.store.sweep import beyond, past, sweep, sweep_log
 
-SAMPLES_AT_ONCE = 600_000
-"""About so many samples leave SQLite in one `tidy`, which holds up what is appended meanwhile."""
+SAMPLES_AT_ONCE = 300_000
+"""About so many samples leave SQLite in one `tidy`, which holds up what is appended meanwhile: an hour of a machine."""
 DAYS_AT_ONCE = 2
 _log = logging.getLogger(__name__)
 
@@ -68,7 +68,7 @@ class SealedTier:
             left_over += done.left_over
             self._dirty.add((job.machine, job.from_ms // DAY_MS))
             if samples >= SAMPLES_AT_ONCE:
-                self._sealer.look_again()
+                self._sealer.look_again(job.machine)
                 break
         left_over += self._roll_up(now_ms)
         swept, freed, pinned = self._sweep(retention, now_ms, left_over)
