@@ -14,7 +14,10 @@ import select
 import socket
 import threading
 import time
+from collections import deque
+from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from typing import Protocol
 
 from edge.adapter import Wait
@@ -43,7 +46,7 @@ class Driver:
     """Between `start` and `stop` it serves whoever was added."""
 
     def __init__(self) -> None:
-        self._lock = threading.Lock()  # held while it works, so that who is removed is not at work any more
+        self._asked: deque[Callable[[], None]] = deque()  # by other threads; done by ours, which alone touches the tables
         self._turns: dict[Turning, float] = {}  # and when each is due
         self._watched: dict[int, tuple[Watching, float]] = {}  # by descriptor; and until when each waits
         self._next_s = 0.0
@@ -73,36 +76,45 @@ class Driver:
 
     def add(self, edge: Turning) -> None:
         """Give this edge turns from now on."""
-        with self._lock:
-            # Not all at one moment: what an edge does once a second would hold up the others.
-            self._turns[edge] = time.monotonic() + GATHER_S * (len(self._turns) % round(TURN_S / GATHER_S))
-        self._wake()
+        self._ask(partial(self._add, edge))
 
     def remove(self, edge: Turning) -> None:
         """No more turns; none is under way when this returns."""
-        with self._lock:
+        is_done = threading.Event()
+
+        def removed() -> None:
             self._turns.pop(edge, None)
+            is_done.set()
+
+        self._ask(removed)
+        while self._thread.is_alive() and not is_done.wait(TURN_S):
+            pass
 
     def watch(self, reader: Watching, wait: Wait) -> None:
         """Resume this reader when its socket can be read."""
-        assert wait.sock is not None
-        with self._lock:
-            descriptor = wait.sock.fileno()
-            if descriptor < 0:  # closed meanwhile; the reader finds that out
-                raise OSError("the connection was closed")
-            self._watched[descriptor] = reader, time.monotonic() + wait.seconds
-            self._poll.register(descriptor, select.EPOLLIN)
+        self._ask(partial(self._watch, reader, wait))
 
     def _run(self) -> None:
         while not self._is_over:
             now_s = time.monotonic()
             events = self._poll.poll(min(max(self._next_s - now_s, 0.0), TURN_S))
-            with self._lock:
-                for descriptor, _ in events:
-                    self._resume(descriptor)
-                self._take_turns()
+            while self._asked:
+                self._asked.popleft()()
+            for descriptor, _ in events:
+                self._resume(descriptor)
+            self._take_turns()
             if events:
                 time.sleep(GATHER_S)
+
+    def _add(self, edge: Turning) -> None:
+        # Not all at one moment: what an edge does once a second would hold up the others.
+        self._turns[edge] = time.monotonic() + GATHER_S * (len(self._turns) % round(TURN_S / GATHER_S))
+
+    def _watch(self, reader: Watching, wait: Wait) -> None:
+        assert wait.sock is not None
+        descriptor = wait.sock.fileno()
+        self._poll.register(descriptor, select.EPOLLIN)
+        self._watched[descriptor] = reader, time.monotonic() + wait.seconds
 
     def _resume(self, descriptor: int) -> None:
         watched = self._watched.get(descriptor)
@@ -121,17 +133,18 @@ class Driver:
 
     def _take_turns(self) -> None:
         now_s = time.monotonic()
-        if now_s < self._next_s and len(self._turns):
-            return
         for edge, due_s in list(self._turns.items()):
-            if due_s <= now_s and edge in self._turns:
+            if due_s <= now_s:
                 self._turns[edge] = now_s + edge.turn()
         self._next_s = min(self._turns.values(), default=now_s + TURN_S)
         for descriptor, (_, until_s) in list(self._watched.items()):
             if until_s <= now_s:
                 self._resume(descriptor)
 
+    def _ask(self, what: Callable[[], None]) -> None:
+        self._asked.append(what)
+        self._wake()
+
     def _wake(self) -> None:
-        self._next_s = 0.0
         with suppress(OSError):  # full: it is awake
             self._wake_writer.send(b"w")

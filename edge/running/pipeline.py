@@ -18,13 +18,12 @@ from typing import Any, NamedTuple
 from pydantic import TypeAdapter, ValidationError
 
 from edge import tool_change
-from edge.config import EdgeConfig, SignalSection
-from edge.running import report_by_exception
+from edge.config import EdgeConfig
+from edge.running.report_by_exception import verdict
 from edge.sample import Drop, EdgeSample, SampleSet
 from twin.vocabulary.signals import DERIVED
 
 _log = logging.getLogger(__name__)
-_DEFAULT = SignalSection()
 _TAKEN_IN = ("tool_number", tool_change.CUE)  # signals that the state machine keeps, to hand on what it makes of them
 
 
@@ -56,7 +55,7 @@ class Pipeline:
         self._sections = config.signals
         self._interval_ms_max = round(config.report.interval_s_max * 1000)
         self._change = tool_change.State()
-        self._report = report_by_exception.State()
+        self._last: dict[str, EdgeSample] = {}  # published, of each signal
         self._heard: tuple[int, float] | None = None
         self._before = _remembered(memory)
         self._kept: Memory | None = None
@@ -79,15 +78,15 @@ class Pipeline:
 
     def _lasting(self) -> Memory:
         """The memory without its clock, which goes on with each frame."""
-        last = tuple(self._report.last[name] for name in _REMEMBERED if name in self._report.last)
+        last = tuple(self._last[name] for name in _REMEMBERED if name in self._last)
         change = self._change
         # A block that commands nothing changes nothing, and a program shows ten of them a second.
-        return Memory(replace(change, clock_ms=None, block=change.block if change.shows_change else None), last)
+        return Memory(change.changed(clock_ms=None, block=change.block if change.shows_change else None), last)
 
     @property
     def last(self) -> tuple[EdgeSample, ...]:
         """Return what was published last, of each signal."""
-        return tuple(self._report.last.values())
+        return tuple(self._last.values())
 
     def take(self, frame: SampleSet, arrival_s: float) -> Outcome:
         """The samples of one frame that arrived at this (monotonic) time."""
@@ -103,6 +102,9 @@ class Pipeline:
                     dropped[Drop.DUPLICATE] += sample.observations
                 else:
                     news.extend(self._reported((sample,), dropped))
+                continue
+            if tool_change.tells_nothing(self._change, sample):
+                news.extend(self._reported((sample,), dropped))
                 continue
             done = tool_change.step(self._tool_change, self._change, sample)
             self._change = done.state
@@ -141,10 +143,13 @@ class Pipeline:
         return done.samples
 
     def _reported(self, samples: Iterable[EdgeSample], dropped: Counter[Drop]) -> Iterator[EdgeSample]:
+        sections, published = self._sections, self._last
         for sample in samples:
-            deadband = self._sections.get(sample.signal, _DEFAULT).deadband
-            self._report, drop = self._report.decide(sample, deadband=deadband, interval_ms_max=self._interval_ms_max)
+            name = sample.signal
+            deadband = sections[name].deadband if name in sections else 0.0
+            drop = verdict(published.get(name), sample, deadband=deadband, interval_ms_max=self._interval_ms_max)
             if drop is None:
+                published[name] = sample
                 yield sample
             else:
                 dropped[drop] += sample.observations

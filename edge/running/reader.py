@@ -44,15 +44,12 @@ class Reader:
         return None
 
     def _run(self) -> None:
-        try:
-            while not self._is_over:
-                wait = self._advance()
-                if wait is not None and wait.sock is not None:
-                    self._is_back.clear()
-                    self._driver.watch(self, wait)
-                    self._is_back.wait()
-        except OSError as error:
-            self._error = error
+        while not self._is_over:
+            wait = self._advance()
+            if wait is not None and wait.sock is not None:
+                self._is_back.clear()
+                self._driver.watch(self, wait)
+                self._is_back.wait()
         self._ended(self._error)
 
     def _advance(self) -> Wait | None:

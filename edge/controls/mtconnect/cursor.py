@@ -223,7 +223,9 @@ def _streams(cursor: Cursor, document: StreamsDocument) -> tuple[Cursor, SampleS
     if header.instance_id != cursor.instance_id:
         refused, samples = _refused(cursor, f"instance {header.instance_id} in place of {cursor.instance_id}")
         return _new_instance(replace(refused, phase=Phase.PROBE), cursor, header), samples
-    cursor = replace(cursor, attempt=0, buffer_size=header.buffer_size or cursor.buffer_size)
+    buffer_size = header.buffer_size or cursor.buffer_size
+    if (cursor.attempt, cursor.buffer_size) != (0, buffer_size):
+        cursor = replace(cursor, attempt=0, buffer_size=buffer_size)
     if cursor.phase is Phase.CURRENT:
         return _baseline(cursor, document, header.next_sequence)
     sequences = [o.sequence for o in document.observations if o.sequence is not None]
