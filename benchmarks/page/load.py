@@ -117,15 +117,16 @@ def measure(given: argparse.Namespace, folder: Path) -> None:
             thread.start()
         time.sleep(3.0)
         lags_ms.clear()
-        before_s, begun_s = cpu_s(pid), time.monotonic()
+        messages, before_s, begun_s = counted(url, "messages"), cpu_s(pid), time.monotonic()
         asked_ms = ask(url, given.seconds)
-        share = 100.0 * (cpu_s(pid) - before_s) / (time.monotonic() - begun_s)
+        used_s, messages = cpu_s(pid) - before_s, counted(url, "messages") - messages
+        share = 100.0 * used_s / (time.monotonic() - begun_s)
         stop.set()
         taken = list(lags_ms)
-        metrics = httpx.get(f"{url}/metrics").text
-        dropped = sum(float(line.split()[-1]) for line in metrics.splitlines() if line.startswith("twin_page_dropped_total"))
+        dropped = counted(url, "dropped")
         print(f"{given.machines} machines x {given.hz:g} Hz x {given.signals} signals, {len(names)} streams, {given.seconds:g} s")
-        print(f"server: {share:.1f} % of a core, {memory_mb(pid):.0f} MB resident, {dropped:.0f} messages dropped")
+        print(f"server: {share:.1f} % of a core, {1e6 * used_s / messages:.0f} us a message, with all that is asked")
+        print(f"{memory_mb(pid):.0f} MB resident, {dropped:.0f} messages dropped")
         cuts = statistics.quantiles(taken, n=100)
         print(f"event to reader: median {cuts[49]:.0f} ms, 95 % {cuts[94]:.0f} ms, {len(taken)} rows")
         for path, times_ms in asked_ms.items():
@@ -135,6 +136,12 @@ def measure(given: argparse.Namespace, folder: Path) -> None:
             child.terminate()
             child.wait(10)
         broker.stop()
+
+
+def counted(url: str, what: str) -> float:
+    """Return a count of the server."""
+    metrics = httpx.get(f"{url}/metrics").text.splitlines()
+    return sum(float(line.split()[-1]) for line in metrics if line.startswith(f"twin_page_{what}_total"))
 
 
 def ask(url: str, seconds: float) -> dict[str, list[float]]:
