@@ -25,6 +25,7 @@ class Stream:
 
     def __init__(self, url: SplitResult, target: str, *, login: tuple[str, str] | None, timeout_s: float, head_s: float) -> None:
         self._http = h11.Connection(h11.CLIENT)
+        self._is_over = False
         self.socket = socket.create_connection((url.hostname or "", url.port or 80), timeout_s)
         try:
             self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -87,18 +88,19 @@ class Stream:
     def _body(self) -> bytes | None:
         """Return all of the body that was received and not given yet; None for nothing, b"" at the end."""
         parts: list[bytes] = []
-        while True:
+        while not self._is_over:
             event = self._event()
             if isinstance(event, h11.Data):
                 parts.append(bytes(event.data))
             elif event is h11.NEED_DATA:
                 return b"".join(parts) or None
-            else:  # of the end we hear again with the next call
-                return b"".join(parts)
+            else:
+                self._is_over = True
+        return b"".join(parts)
 
     def _event(self) -> object:
         try:
-            return h11.PAUSED if self._http.their_state is h11.DONE else self._http.next_event()
+            return self._http.next_event()
         except h11.RemoteProtocolError as error:
             raise ConnectionLostError(f"no HTTP: {error}") from error
 
