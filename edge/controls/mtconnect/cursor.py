@@ -130,7 +130,7 @@ def parse(config: Config, cursor: Cursor, raw: bytes) -> tuple[Cursor, SampleSet
             after, given = _streams(cursor, document)
     except (DocumentError, ConfigError) as error:
         return _refused(cursor, str(error))
-    return after, replace(given, clock=_clock(document.header))
+    return after, given if given.clock is not None else replace(given, clock=_clock(document.header))
 
 
 def _clock(header: Header) -> ClockReading | None:
@@ -329,6 +329,7 @@ def _take(
         backlog=backlog,
         newest_ms=newest,
         available=available,
+        clock=_clock(document.header),
     )
 
 
