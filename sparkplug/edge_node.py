@@ -4,14 +4,17 @@ import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
-from sparkplug.actions import Action, Barrier, Connect
+from sparkplug.actions import Action, Barrier, Connect, Disconnect, Publish, WalkToNextServer
 from sparkplug.alias_file import AliasFile
 from sparkplug.bdseq import BdSeq
 from sparkplug.broker import BrokerAddress
-from sparkplug.connection import Listener, MqttConnection, now_ms
+from sparkplug.clock import now_ms
 from sparkplug.edge_session import Command, EdgeNodeSession, Phase
 from sparkplug.errors import SparkplugError
 from sparkplug.metric import Change, MetricSpec, NodeId
+from sparkplug.transport.connection import MqttConnection
+from sparkplug.transport.listener import Listener
+from sparkplug.transport.loop import Loop
 from sparkplug.values import Template
 
 
@@ -21,7 +24,9 @@ class EdgeNode:
     `brokers` is one address, or a list that is walked while the primary host is offline. `session_file` keeps bdSeq over
     restarts, and a file beside it the aliases. `mqtt_version` (4 or 5) goes before that of the first address. `on_command` is
     called from the connection's thread for each value that a host wants written, `on_confirmed` for each `barrier` that the
-    broker has acknowledged; they are published on `barrier_topic`.
+    broker has acknowledged; they are published on `barrier_topic`. `loop` serves the connection, which has a loop of its own
+    otherwise. `on_sent` is called with the topic and the payload of each message of the session that is handed to a connected
+    broker, in their order, and with the death that the broker publishes when the connection is lost; it must not call this node.
     """
 
     def __init__(
@@ -37,6 +42,8 @@ class EdgeNode:
         on_command: Callable[[Command], None] | None = None,
         barrier_topic: str = "",
         on_confirmed: Callable[[int], None] = lambda _: None,
+        loop: Loop | None = None,
+        on_sent: Callable[[str, bytes], None] | None = None,
     ) -> None:
         self._bd_seq = BdSeq(session_file)
         self._aliases = AliasFile(None if session_file is None else session_file.with_name(session_file.name + ".aliases"))
@@ -47,12 +54,19 @@ class EdgeNode:
         self._barrier_topic = barrier_topic
         self._lock = threading.Lock()
         self._on_command = on_command
+        self._on_sent = on_sent
+        self._last_will: Publish | None = None  # of the last attempt to connect
+        self._will: Publish | None = None  # that the broker publishes when it loses the present connection
         listener = Listener(
             self._connecting, self._bd_seq.give_back, self._connected, self._message, self._lost, self._tick, on_confirmed
         )
         addresses = (brokers,) if isinstance(brokers, BrokerAddress) else tuple(brokers)
         self._connection = MqttConnection(
-            addresses, f"{node.group}/{node.node}", listener, mqtt_version=mqtt_version or addresses[0].mqtt_version
+            addresses,
+            f"{node.group}/{node.node}",
+            listener,
+            mqtt_version=mqtt_version or addresses[0].mqtt_version,
+            loop=loop,
         )
 
     def start(self) -> None:
@@ -64,6 +78,7 @@ class EdgeNode:
         """Publish the node's death, disconnect and stop."""
         with self._lock:
             farewell = self._session.close(now_ms())
+            self._tell(farewell)
         self._connection.close(farewell, timeout_s)
 
     @property
@@ -104,12 +119,12 @@ class EdgeNode:
         with self._lock:
             actions = self._session.declare_device(device, metrics, now_ms())
             self._aliases.keep(self._session.aliases)
-            self._connection.send(actions)
+            self._send(actions)
 
     def remove_device(self, device: str) -> None:
         """Publish the death of a device and forget it."""
         with self._lock:
-            self._connection.send(self._session.remove_device(device, now_ms()))
+            self._send(self._session.remove_device(device, now_ms()))
 
     def publish(self, device: str | None, changes: Sequence[Change]) -> bool:
         """Send changes of a device (None: of the node) in one message, and keep them for the next birth.
@@ -123,7 +138,7 @@ class EdgeNode:
                 self._session.note(device, changes)
                 return False
             actions = self._session.publish(device, changes, now_ms())
-            self._connection.send(actions)
+            self._send(actions)
         return bool(actions)
 
     def barrier(self, token: int, session: int) -> bool:
@@ -142,20 +157,25 @@ class EdgeNode:
     def _connecting(self, server: int) -> Connect:
         with self._lock:
             self._number += 1
-            return self._session.connecting(self._bd_seq.next(), now_ms(), server)
+            connect = self._session.connecting(self._bd_seq.next(), now_ms(), server)
+            self._last_will = connect.will
+            return connect
 
     def _connected(self) -> None:
         with self._lock:
-            self._connection.send(self._session.connected(now_ms()))
+            self._will = self._last_will
+            self._send(self._session.connected(now_ms()))
 
     def _lost(self) -> None:
         with self._lock:
             self._session.lost()
+            if self._will is not None:
+                self._tell((self._will,))
+            self._will = None
 
     def _message(self, topic: str, payload: bytes) -> None:
         with self._lock:
-            actions: list[Action] = self._session.message(topic, payload, now_ms())
-            self._connection.send(actions)
+            self._send(self._session.message(topic, payload, now_ms()))
             commands, self._session.commands = self._session.commands, []
         if self._on_command is not None:
             for command in commands:
@@ -163,4 +183,16 @@ class EdgeNode:
 
     def _tick(self) -> None:
         with self._lock:
-            self._connection.send(self._session.tick(now_ms()))
+            self._send(self._session.tick(now_ms()))
+
+    def _send(self, actions: Sequence[Action]) -> None:
+        if actions:
+            self._connection.send(actions)
+            self._tell(actions)
+
+    def _tell(self, actions: Sequence[Action]) -> None:
+        for action in actions:
+            if isinstance(action, Disconnect | WalkToNextServer):
+                self._will = None  # the death has been sent before it
+            elif isinstance(action, Publish) and self._on_sent is not None:
+                self._on_sent(action.topic, action.payload)

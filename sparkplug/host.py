@@ -1,29 +1,35 @@
 """A host application on a real broker: the session and the connection put together.
 
 Whoever reads the socket only fills a bounded inbox; decoding, ordering and everything after that happen in the thread that
-calls `poll`. While that thread waits it reads the socket itself; while it computes, the connection's own thread does. What does
-not fit is dropped and counted, data first: a birth or a death is worth more than a value.
+calls `poll`. While that thread waits it drives the loop, and so reads the sockets itself; while it computes for long, the loop's
+own thread does. What does not fit, or has waited too long, is dropped and counted, data first: a birth or a death is worth more
+than a value.
 """
 
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from enum import Enum
 from random import Random
 
 from sparkplug.actions import Connect, Publish, Subscribe
 from sparkplug.broker import BrokerAddress
-from sparkplug.connection import Listener, MqttConnection, now_ms
+from sparkplug.clock import now_ms
+from sparkplug.errors import TopicError
 from sparkplug.host_session import EventKind, HostEvent, HostSession
 from sparkplug.metric import Change, NodeId
 from sparkplug.node_picture import NodePicture
-from sparkplug.topics import NAMESPACE, group_filter
+from sparkplug.topics import NAMESPACE, STATE_PREFIX, Topic, Verb, group_filter
+from sparkplug.transport.connection import MqttConnection
+from sparkplug.transport.listener import Listener
+from sparkplug.transport.loop import Loop
 
 __all__ = ["EventKind", "HostApplication", "HostEvent"]
 
 EVENTS_A_POLL = 1000
 TICK_S = 0.1
+STALE_S_MAX = 60.0
 _NOWHERE = NodeId("", "")
 
 
@@ -35,7 +41,11 @@ class _Mark(Enum):
 
 
 class HostApplication:
-    """Listens to edge nodes; `wanted` picks them, `topic_filters` tells the broker what to send."""
+    """Listens to edge nodes; `wanted` picks them, `topic_filters` tells the broker what to send.
+
+    `loop` serves the connection, which has a loop of its own otherwise. Messages of `local` nodes are read only where they come
+    by `hear`. Data that have waited for longer than `stale_s_max` are dropped.
+    """
 
     def __init__(
         self,
@@ -49,9 +59,14 @@ class HostApplication:
         mqtt_version: int | None = None,
         publish_state: bool = True,
         wanted: Callable[[NodeId], bool] = lambda _: True,
+        loop: Loop | None = None,
+        local: Collection[NodeId] = (),
+        stale_s_max: float = STALE_S_MAX,
     ) -> None:
         self.dropped = 0
         self._queue_max = queue_max
+        self._stale_s_max = stale_s_max
+        self._wanted, self._local = wanted, frozenset(local)
         self._session = HostSession(
             host_id,
             topic_filters,
@@ -62,12 +77,15 @@ class HostApplication:
             wanted=wanted,
         )
         self._plain_filters: list[str] = []
-        self._inbox: deque[tuple[str | _Mark, bytes]] = deque()
+        self._inbox: deque[tuple[str | _Mark, bytes, float]] = deque()  # with the time of time.monotonic
+        self._waits = False
         self._filled = threading.Event()
         self._ticked_s = 0.0
-        listener = Listener(self._connecting, lambda: None, self._connected, self._message, self._lost, lambda: None)
+        listener = Listener(
+            self._connecting, lambda: None, self._connected, self._message, self._lost, lambda: None, wanted=self._is_read
+        )
         self._connection = MqttConnection(
-            (broker,), f"host-{host_id}", listener, mqtt_version=mqtt_version or broker.mqtt_version
+            (broker,), f"host-{host_id}", listener, mqtt_version=mqtt_version or broker.mqtt_version, loop=loop
         )
 
     def start(self) -> None:
@@ -111,10 +129,16 @@ class HostApplication:
         """All nodes that were heard of."""
         return self._session.nodes()
 
-    def poll(self, timeout_s: float) -> list[HostEvent]:
-        """The events that have come, at the latest after `timeout_s`."""
+    def poll(self, timeout_s: float, gather_s: float = 0.0) -> list[HostEvent]:
+        """Return the events that have come, at the latest after `timeout_s`; drives the loop.
+
+        gather_s: see `Loop.turn`
+        """
         deadline_s = time.monotonic() + timeout_s
         while True:
+            wait_s = 0.0 if self._inbox else min(max(deadline_s - time.monotonic(), 0.0), TICK_S)
+            if not self._connection.loop.turn(wait_s, gather_s) and wait_s > 0.0:
+                self._await_message(wait_s)
             events = self._take()
             now_s = time.monotonic()
             if now_s - self._ticked_s >= TICK_S:
@@ -125,9 +149,11 @@ class HostApplication:
                 self._session.actions = []
             if events or now_s >= deadline_s:
                 return events
-            wait_s = min(deadline_s - now_s, TICK_S)
-            if not self._connection.drive(wait_s):
-                self._filled.wait(wait_s)
+
+    def hear(self, topic: str, payload: bytes) -> None:
+        """Take a message as if the broker had sent it. From any thread."""
+        self._message(topic, payload)
+        self._connection.loop.nudge()
 
     def publish_plain(self, topic: str, payload: bytes, *, qos: int = 0, retain: bool = False) -> bool:
         """Publish outside the Sparkplug namespace; False where the broker is gone or takes less than it is given."""
@@ -154,10 +180,12 @@ class HostApplication:
     def _take(self) -> list[HostEvent]:
         events: list[HostEvent] = []
         inbox, session = self._inbox, self._session
-        self._filled.clear()
+        stale_s = time.monotonic() - self._stale_s_max
         while inbox and len(events) < EVENTS_A_POLL:
-            topic, payload = inbox.popleft()
-            if topic is _Mark.CONNECTED:
+            topic, payload, came_s = inbox.popleft()
+            if came_s < stale_s and isinstance(topic, str) and topic.startswith(NAMESPACE) and "DATA/" in topic:
+                self.dropped += 1
+            elif topic is _Mark.CONNECTED:
                 events += session.connected(now_ms())
                 self._connection.send([*session.actions, *(Subscribe(plain) for plain in self._plain_filters)])
                 session.actions = []
@@ -169,10 +197,31 @@ class HostApplication:
                 events.append(HostEvent(EventKind.PLAIN, _NOWHERE, None, now_ms(), topic=topic, payload=payload))
         return events
 
+    def _await_message(self, wait_s: float) -> None:
+        """Wait where another thread turns the loop."""
+        self._filled.clear()
+        self._waits = True
+        if not self._inbox:
+            self._filled.wait(wait_s)
+        self._waits = False
+
     def _put(self, topic: str | _Mark, payload: bytes) -> None:
-        self._inbox.append((topic, payload))
-        if not self._filled.is_set():
+        self._inbox.append((topic, payload, time.monotonic()))
+        if self._waits:
             self._filled.set()
+
+    def _is_read(self, topic: str) -> bool:
+        """Return False for what the session would throw away unread: commands, states of other hosts, nodes nobody wants.
+
+        What the session counts as malformed is for it to count.
+        """
+        if topic.startswith(STATE_PREFIX):
+            return topic == self._session.state_topic
+        try:
+            verb, node, _ = Topic.parse(topic)
+        except TopicError:
+            return True
+        return verb not in (Verb.NCMD, Verb.DCMD) and node not in self._local and self._wanted(node)
 
     def _connecting(self, _server: int) -> Connect:
         return self._session.connecting(now_ms())

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from sparkplug.broker import BrokerAddress
+from sparkplug.clock import now_ms
 from sparkplug.codec import parse
-from sparkplug.connection import now_ms
 from sparkplug.datatype import DataType
 from sparkplug.edge_node import EdgeNode
 from sparkplug.host import HostApplication

@@ -13,7 +13,7 @@ from cnctwin.api.live.jobs import LiveJobs
 from cnctwin.api.live.plant import LivePlant
 from cnctwin.plant.watch import viewer
 from sparkplug.broker import BrokerAddress
-from sparkplug.connection import now_ms
+from sparkplug.clock import now_ms
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId
 from sparkplug.values import PropertySet

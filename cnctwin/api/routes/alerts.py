@@ -17,7 +17,7 @@ from cnctwin.api.live.plant import LivePlant
 from cnctwin.api.live.viewer import Viewer
 from cnctwin.plant.alert_desk import FRESH_S_MAX
 from cnctwin.processes import published_state
-from sparkplug.connection import now_ms
+from sparkplug.clock import now_ms
 from twin.vocabulary.topics import ALERT_COMMAND
 
 ANSWER_S_MAX = 5.0

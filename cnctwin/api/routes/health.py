@@ -17,7 +17,7 @@ from cnctwin.page import WEB
 from cnctwin.plant.alert_desk import FRESH_S_MAX
 from cnctwin.plant.doctor import COME_AND_GO
 from cnctwin.processes import published_state
-from sparkplug.connection import now_ms
+from sparkplug.clock import now_ms
 from twin.vocabulary.nodes import JOBS_NODE, TWIN_NODE_PREFIX, is_twin_node
 
 

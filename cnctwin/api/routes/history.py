@@ -16,7 +16,7 @@ from cnctwin.api.store_reader import StoreReader
 from cnctwin.api.value_object import QUALITY_NAMES, plain
 from cnctwin.memory.store.contract import Column, Store, StoreError
 from cnctwin.memory.store.contract import Query as StoreQuery
-from sparkplug.connection import now_ms
+from sparkplug.clock import now_ms
 
 SIGNALS_MAX = 60
 WINDOWS_MAX = 200_000  # over all signals

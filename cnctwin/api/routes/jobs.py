@@ -23,7 +23,7 @@ from cnctwin.api.routes.health import jobs_trouble
 from cnctwin.api.sources import Sources
 from cnctwin.jobs.kinds import KINDS
 from cnctwin.jobs.request import RequestError, is_id, read_request
-from sparkplug.connection import now_ms
+from sparkplug.clock import now_ms
 from twin.vocabulary.topics import JOB_CANCEL, JOB_REQUEST
 
 ANSWER_S_MAX = 8.0

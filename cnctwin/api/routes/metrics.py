@@ -9,7 +9,7 @@ from cnctwin.api.prometheus.text import PlantCollector, text
 from cnctwin.api.sources import Sources
 from cnctwin.errors import ApplicationError
 from cnctwin.memory.store.contract import Status
-from sparkplug.connection import now_ms
+from sparkplug.clock import now_ms
 
 MEDIA_TYPE = "text/plain; version=0.0.4; charset=utf-8"
 

@@ -18,7 +18,7 @@ from cnctwin.api.sources import Sources
 from cnctwin.api.value_object import plain
 from cnctwin.memory.store.contract import Query as StoreQuery
 from cnctwin.memory.store.contract import Store, StoreError
-from sparkplug.connection import now_ms
+from sparkplug.clock import now_ms
 from twin.vocabulary.twin_signals import PART_RECORD
 
 DAY_MS = 86_400_000

@@ -11,7 +11,7 @@ from cnctwin.api.live.batches import event
 from cnctwin.api.live.event_stream import EventStream
 from cnctwin.api.live.fan_out import FanOut
 from cnctwin.api.live.plant import LivePlant
-from sparkplug.connection import now_ms
+from sparkplug.clock import now_ms
 
 NAMES_SHOWN = 20
 Machine = Annotated[str, Path(description="Its name: the Sparkplug device", max_length=200, examples=["vmc"])]
