@@ -2,6 +2,7 @@
 
     streams ──readable──► the edge that watches it: frames → … → store → broker
     clock ────each tenth of a second──► each edge's turn: what is due in the store, the sensor, the health
+    brokers ◄── `loop`: the connections of all edges, once in each round
 
 Threads that hand the interpreter to each other cost more than the work that they do: fifty machines at 10 Hz in a hundred threads
 took a core where one thread takes a fifth. So a frame goes all its way in this thread. It waits `GATHER_S` after each look, and
@@ -21,9 +22,11 @@ from functools import partial
 from typing import Protocol
 
 from edge.adapter import Wait
+from sparkplug.transport.loop import DRIVEN_S, Loop
 
 TURN_S = 0.1
 GATHER_S = 0.01
+DRIVE_S_MAX = 0.8 * DRIVEN_S  # or the loop's own thread would take over
 STOP_S_MAX = 5.0
 _log = logging.getLogger(__name__)
 
@@ -43,7 +46,7 @@ class Watching(Protocol):
 
 
 class Driver:
-    """Between `start` and `stop` it serves whoever was added."""
+    """Between `start` and `stop` it serves whoever was added. `loop`: for the edges' connections to their brokers."""
 
     def __init__(self) -> None:
         self._asked: deque[Callable[[], None]] = deque()  # by other threads; done by ours, which alone touches the tables
@@ -55,6 +58,7 @@ class Driver:
         self._wake_reader.setblocking(False)
         self._wake_writer.setblocking(False)
         self._poll.register(self._wake_reader, select.EPOLLIN)
+        self.loop = Loop("edges mqtt")
         self._is_over = False
         self._thread = threading.Thread(target=self._run, name="edges", daemon=True)
 
@@ -103,6 +107,7 @@ class Driver:
             for descriptor, _ in events:
                 self._resume(descriptor)
             self._take_turns()
+            self.loop.turn(0.0)  # what was sent goes out, and what the brokers say is heard
             if events:
                 time.sleep(GATHER_S)
 

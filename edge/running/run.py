@@ -90,6 +90,7 @@ def edge_runtime(
         barrier_topic=edge_barrier(broker.group, config.node),
         on_confirmed=confirmed,
         on_command=commanded,
+        loop=None if driver is None else driver.loop,
     )
     runtime = EdgeRuntime(
         config,
