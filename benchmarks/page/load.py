@@ -3,6 +3,7 @@
     .venv/bin/python benchmarks/page/load.py [--machines 50] [--hz 10] [--signals 20] [--readers 4] [--seconds 20]
 
     .venv/bin/python benchmarks/page/load.py --fill      (no broker: memory when all traces are full, and what a value costs)
+    .venv/bin/python benchmarks/page/load.py --births --machines 1000 --signals 80
 
 Prints processor time and memory of the server, how late rows reach a reader, and how long /machines and /state take.
 """
@@ -43,7 +44,11 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=20.0)
     parser.add_argument("--publish", metavar="PORT", type=int, help=argparse.SUPPRESS)
     parser.add_argument("--fill", action="store_true", help="fill the traces of a live plant in this process")
+    parser.add_argument("--births", action="store_true", help="give a live plant in this process the births of all machines")
     given = parser.parse_args()
+    if given.births:
+        births(given)
+        return
     if given.fill:
         fill(given)
         return
@@ -52,6 +57,15 @@ def main() -> None:
         return
     with TemporaryDirectory(prefix="page-load-") as folder:
         measure(given, Path(folder))
+
+
+def births(given: argparse.Namespace) -> None:
+    """What a server takes for all machines at once when it starts, without a broker and a decoder."""
+    live, names = LivePlant(), [f"signal_{number}" for number in range(given.signals)]
+    nodes = [(NodeId("cnc", f"edge-m{number:03}"), f"m{number:03}") for number in range(given.machines)]
+    events, begun_s = [_event(EventKind.BIRTH, *node, names, 1) for node in nodes], time.process_time()
+    live.take(events, 1)
+    print(f"{given.machines} births of {given.signals} signals: {time.process_time() - begun_s:.2f} s of CPU")
 
 
 def fill(given: argparse.Namespace) -> None:
