@@ -7,11 +7,12 @@ cursor is a frozen value of plain fields, so it can be compared, kept as JSON an
 """
 
 import importlib
+import socket
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 from pydantic import BaseModel
 
@@ -39,6 +40,21 @@ class Connection(Protocol):
 
     def close(self) -> None:
         """End `frames`, from any thread."""
+
+
+class Wait(NamedTuple):
+    """Nothing comes until `sock` can be read, or `seconds` have passed. Without a socket: what follows blocks."""
+
+    sock: socket.socket | None
+    seconds: float = 0.0
+
+
+@runtime_checkable
+class SteppedConnection(Connection, Protocol):
+    """A connection that says where it would wait, so that one thread can serve many."""
+
+    def steps(self) -> Iterator[bytes | Wait]:
+        """`frames`, with the waits between them. It blocks only after a Wait without a socket, and at its beginning."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,6 +3,7 @@
     .venv/bin/python benchmarks/page/load.py [--machines 50] [--hz 10] [--signals 20] [--readers 4] [--seconds 20]
 
     .venv/bin/python benchmarks/page/load.py --fill      (no broker: memory when all traces are full, and what a value costs)
+    .venv/bin/python benchmarks/page/load.py --births --machines 1000 --signals 80
 
 Prints processor time and memory of the server, how late rows reach a reader, and how long /machines and /state take.
 """
@@ -43,7 +44,11 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=20.0)
     parser.add_argument("--publish", metavar="PORT", type=int, help=argparse.SUPPRESS)
     parser.add_argument("--fill", action="store_true", help="fill the traces of a live plant in this process")
+    parser.add_argument("--births", action="store_true", help="give a live plant in this process the births of all machines")
     given = parser.parse_args()
+    if given.births:
+        births(given)
+        return
     if given.fill:
         fill(given)
         return
@@ -52,6 +57,15 @@ def main() -> None:
         return
     with TemporaryDirectory(prefix="page-load-") as folder:
         measure(given, Path(folder))
+
+
+def births(given: argparse.Namespace) -> None:
+    """What a server takes for all machines at once when it starts, without a broker and a decoder."""
+    live, names = LivePlant(), [f"signal_{number}" for number in range(given.signals)]
+    nodes = [(NodeId("cnc", f"edge-m{number:03}"), f"m{number:03}") for number in range(given.machines)]
+    events, begun_s = [_event(EventKind.BIRTH, *node, names, 1) for node in nodes], time.process_time()
+    live.take(events, 1)
+    print(f"{given.machines} births of {given.signals} signals: {time.process_time() - begun_s:.2f} s of CPU")
 
 
 def fill(given: argparse.Namespace) -> None:
@@ -117,15 +131,16 @@ def measure(given: argparse.Namespace, folder: Path) -> None:
             thread.start()
         time.sleep(3.0)
         lags_ms.clear()
-        before_s, begun_s = cpu_s(pid), time.monotonic()
+        messages, before_s, begun_s = counted(url, "messages"), cpu_s(pid), time.monotonic()
         asked_ms = ask(url, given.seconds)
-        share = 100.0 * (cpu_s(pid) - before_s) / (time.monotonic() - begun_s)
+        used_s, messages = cpu_s(pid) - before_s, counted(url, "messages") - messages
+        share = 100.0 * used_s / (time.monotonic() - begun_s)
         stop.set()
         taken = list(lags_ms)
-        metrics = httpx.get(f"{url}/metrics").text
-        dropped = sum(float(line.split()[-1]) for line in metrics.splitlines() if line.startswith("twin_page_dropped_total"))
+        dropped = counted(url, "dropped")
         print(f"{given.machines} machines x {given.hz:g} Hz x {given.signals} signals, {len(names)} streams, {given.seconds:g} s")
-        print(f"server: {share:.1f} % of a core, {memory_mb(pid):.0f} MB resident, {dropped:.0f} messages dropped")
+        print(f"server: {share:.1f} % of a core, {1e6 * used_s / messages:.0f} us a message, with all that is asked")
+        print(f"{memory_mb(pid):.0f} MB resident, {dropped:.0f} messages dropped")
         cuts = statistics.quantiles(taken, n=100)
         print(f"event to reader: median {cuts[49]:.0f} ms, 95 % {cuts[94]:.0f} ms, {len(taken)} rows")
         for path, times_ms in asked_ms.items():
@@ -135,6 +150,12 @@ def measure(given: argparse.Namespace, folder: Path) -> None:
             child.terminate()
             child.wait(10)
         broker.stop()
+
+
+def counted(url: str, what: str) -> float:
+    """Return a count of the server."""
+    metrics = httpx.get(f"{url}/metrics").text.splitlines()
+    return sum(float(line.split()[-1]) for line in metrics if line.startswith(f"twin_page_{what}_total"))
 
 
 def ask(url: str, seconds: float) -> dict[str, list[float]]:

@@ -12,6 +12,7 @@ from cnctwin.processes.given_broker import broker_or_own
 from edge.config import EdgeConfig
 from edge.config_file import load
 from edge.errors import ConfigError
+from edge.running.driver import Driver
 from edge.running.gateway import Gateway
 from edge.running.run import broker_address, edge_runtime
 from edge.running.runtime import EdgeRuntime
@@ -35,13 +36,18 @@ def run(path: Path, given: BrokerAddress | None, stop: Event) -> dict[str, int]:
             named = given is None and "url" in config.broker.model_fields_set  # not by the file, which may be in pieces by now
             address = broker_address(config.broker, config.path) if named or broker is None else broker
             try:
-                runtime = edge_runtime(_with_session_file(config), address, restarts=restarts)
+                runtime = edge_runtime(_with_session_file(config), address, restarts=restarts, driver=driver)
             except SparkplugError as error:  # such as a certificate's file that is not there
                 raise ConfigError(f"{config.path}: {error}") from error
             print(f"{config.path}: the edge of {config.machine.name} begins, to {address.url}", file=sys.stderr, flush=True)
             return runtime
 
-        return Gateway(path, begin).run(stop)
+        driver = Driver()
+        driver.start()
+        try:
+            return Gateway(path, begin).run(stop)
+        finally:
+            driver.stop()
 
 
 def _with_session_file(config: EdgeConfig[Any]) -> EdgeConfig[Any]:

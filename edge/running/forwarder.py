@@ -18,8 +18,9 @@ With `await_receipt` what the broker has confirmed stays until a memory confirms
 import json
 import logging
 from collections import Counter, deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import NamedTuple, Protocol
 
 from edge.config import StoreSection
@@ -73,7 +74,10 @@ class Settled(NamedTuple):
     """Observations that have come to their end since the last time."""
 
     emitted: int
-    dropped: Counter[Drop]
+    dropped: Mapping[Drop, int]
+
+
+NOTHING_SETTLED = Settled(0, MappingProxyType({}))
 
 
 class Forwarder:
@@ -124,7 +128,7 @@ class Forwarder:
         self._place, self._memory = place or self._place, memory or self._memory
         if rows:
             self._store(rows)
-        return Settled(0, Counter())
+        return NOTHING_SETTLED
 
     def _store(self, rows: Sequence[Sequence[EdgeSample]]) -> None:
         try:
@@ -160,6 +164,8 @@ class Forwarder:
                 self._keep_bounds(now_s)
         except StoreError as error:
             self._fail(error)
+        if not self._emitted and not self._dropped:
+            return NOTHING_SETTLED
         settled = Settled(self._emitted, self._dropped)
         self._emitted, self._dropped = 0, Counter()
         return settled

@@ -1,4 +1,4 @@
-"""Many machines in one process: the edge of each configuration file in threads of its own, watched and taken up anew.
+"""Many machines in one process: the edge of each configuration file, watched and taken up anew.
 
     folder ──each second──► files ──► running edges: begun, ended, or begun anew with what the file says now
 

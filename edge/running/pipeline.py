@@ -18,13 +18,12 @@ from typing import Any, NamedTuple
 from pydantic import TypeAdapter, ValidationError
 
 from edge import tool_change
-from edge.config import EdgeConfig, SignalSection
-from edge.running import report_by_exception
+from edge.config import EdgeConfig
+from edge.running.report_by_exception import verdict
 from edge.sample import Drop, EdgeSample, SampleSet
 from twin.vocabulary.signals import DERIVED
 
 _log = logging.getLogger(__name__)
-_DEFAULT = SignalSection()
 _TAKEN_IN = ("tool_number", tool_change.CUE)  # signals that the state machine keeps, to hand on what it makes of them
 
 
@@ -56,7 +55,7 @@ class Pipeline:
         self._sections = config.signals
         self._interval_ms_max = round(config.report.interval_s_max * 1000)
         self._change = tool_change.State()
-        self._report = report_by_exception.State()
+        self._last: dict[str, EdgeSample] = {}  # published, of each signal
         self._heard: tuple[int, float] | None = None
         self._before = _remembered(memory)
         self._kept: Memory | None = None
@@ -79,53 +78,67 @@ class Pipeline:
 
     def _lasting(self) -> Memory:
         """The memory without its clock, which goes on with each frame."""
-        last = tuple(self._report.last[name] for name in _REMEMBERED if name in self._report.last)
+        last = tuple(self._last[name] for name in _REMEMBERED if name in self._last)
         change = self._change
         # A block that commands nothing changes nothing, and a program shows ten of them a second.
-        return Memory(replace(change, clock_ms=None, block=change.block if change.shows_change else None), last)
+        return Memory(change.changed(clock_ms=None, block=change.block if change.shows_change else None), last)
 
     @property
     def last(self) -> tuple[EdgeSample, ...]:
         """Return what was published last, of each signal."""
-        return tuple(self._report.last.values())
+        return tuple(self._last.values())
 
     def take(self, frame: SampleSet, arrival_s: float) -> Outcome:
         """The samples of one frame that arrived at this (monotonic) time."""
-        dropped: Counter[Drop] = Counter({Drop(reason): number for reason, number in frame.dropped.items()})
+        dropped: Counter[Drop] = Counter()
+        for reason, number in frame.dropped.items():
+            dropped[Drop(reason)] += number
         news: list[EdgeSample] = []
         continues = self._before is not None and any(sample.is_baseline for sample in frame.samples)
         if continues and self._before is not None:
-            news.extend(self._resumed(self._before, frame, dropped))
+            self._resume(self._before, frame, news, dropped)
             continues = not frame.gaps
         for sample in frame.samples:
             if continues and sample.is_baseline and sample.signal in _FED:  # the memory knows it, and better
                 if sample.signal in _TAKEN_IN:
                     dropped[Drop.DUPLICATE] += sample.observations
                 else:
-                    news.extend(self._reported((sample,), dropped))
+                    self._report(sample, news, dropped)
+                continue
+            if tool_change.tells_nothing(self._change, sample):
+                self._report(sample, news, dropped)
                 continue
             done = tool_change.step(self._tool_change, self._change, sample)
             self._change = done.state
-            dropped[Drop.DEBOUNCED] += done.debounced
-            candidates = done.samples if sample.signal in _TAKEN_IN else (sample, *done.samples)
-            dropped[Drop.EVIDENCE] += sample.observations if sample.signal == tool_change.CUE else 0
-            news.extend(self._reported(candidates, dropped))
-        news.extend(self._reported(self._time_passes(frame, arrival_s, dropped), dropped))
+            if done.debounced:
+                dropped[Drop.DEBOUNCED] += done.debounced
+            if sample.signal == tool_change.CUE:
+                dropped[Drop.EVIDENCE] += sample.observations
+            elif sample.signal not in _TAKEN_IN:
+                self._report(sample, news, dropped)
+            for candidate in done.samples:
+                self._report(candidate, news, dropped)
+        for sample in self._time_passes(frame, arrival_s, dropped):
+            self._report(sample, news, dropped)
         return Outcome(tuple(rows_of(news)), +dropped)
 
     def declare(self, samples: Iterable[EdgeSample]) -> Outcome:
         """Samples that come from no observation."""
         dropped: Counter[Drop] = Counter()
-        return Outcome(tuple(rows_of(self._reported(samples, dropped))), +dropped)
+        news: list[EdgeSample] = []
+        for sample in samples:
+            self._report(sample, news, dropped)
+        return Outcome(tuple(rows_of(news)), +dropped)
 
-    def _resumed(self, before: Memory, frame: SampleSet, dropped: Counter[Drop]) -> Iterator[EdgeSample]:
+    def _resume(self, before: Memory, frame: SampleSet, news: list[EdgeSample], dropped: Counter[Drop]) -> None:
         """The edge has rejoined: it goes on where it was, or after a hole begins anew."""
         self._before = None
         if frame.gaps:
             dropped[Drop.DEBOUNCED] += before.change.held
             return
         self._change = before.change
-        yield from self._reported((replace(sample, is_baseline=True, observations=0) for sample in before.last), dropped)
+        for sample in before.last:
+            self._report(replace(sample, is_baseline=True, observations=0), news, dropped)
 
     def _time_passes(self, frame: SampleSet, arrival_s: float, dropped: Counter[Drop]) -> tuple[EdgeSample, ...]:
         """A frame without news says that nothing happened until now; only then may the clock go further than the samples."""
@@ -140,14 +153,16 @@ class Pipeline:
         dropped[Drop.DEBOUNCED] += done.debounced
         return done.samples
 
-    def _reported(self, samples: Iterable[EdgeSample], dropped: Counter[Drop]) -> Iterator[EdgeSample]:
-        for sample in samples:
-            deadband = self._sections.get(sample.signal, _DEFAULT).deadband
-            self._report, drop = self._report.decide(sample, deadband=deadband, interval_ms_max=self._interval_ms_max)
-            if drop is None:
-                yield sample
-            else:
-                dropped[drop] += sample.observations
+    def _report(self, sample: EdgeSample, news: list[EdgeSample], dropped: Counter[Drop]) -> None:
+        """Add the sample to what is published, if it says something new."""
+        name = sample.signal
+        deadband = self._sections[name].deadband if name in self._sections else 0.0
+        drop = verdict(self._last.get(name), sample, deadband=deadband, interval_ms_max=self._interval_ms_max)
+        if drop is None:
+            self._last[name] = sample
+            news.append(sample)
+        else:
+            dropped[drop] += sample.observations
 
 
 def _remembered(text: str | None) -> Memory | None:

@@ -4,33 +4,17 @@ New is another value by more than the deadband, another quality or reason, or (w
 in the machine's own time. The deadband is measured from the value published last, so a slow drift is not lost: |x - x_published|
 > deadband.
 
->>> state = State()
->>> state, drop = state.decide(EdgeSample("spindle_load_pct", 20.0, 0), deadband=2.0)
->>> drop is None, state.decide(EdgeSample("spindle_load_pct", 21.5, 100), deadband=2.0)[1]
+>>> before = EdgeSample("spindle_load_pct", 20.0, 0)
+>>> verdict(None, before) is None, verdict(before, EdgeSample("spindle_load_pct", 21.5, 100), deadband=2.0)
 (True, <Drop.DEADBAND: 'deadband'>)
 """
-
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from types import MappingProxyType
 
 from edge.sample import Drop, EdgeSample
 from sparkplug.quality import Quality
 
 
-@dataclass(frozen=True, slots=True)
-class State:
-    """The last published sample of each signal."""
-
-    last: Mapping[str, EdgeSample] = field(default_factory=lambda: MappingProxyType({}))
-
-    def decide(self, sample: EdgeSample, *, deadband: float = 0.0, interval_ms_max: int = 0) -> tuple["State", Drop | None]:
-        """The state after, and why the sample is not published (None: it is)."""
-        drop = _verdict(self.last.get(sample.signal), sample, deadband, interval_ms_max)
-        return (self, drop) if drop is not None else (State({**self.last, sample.signal: sample}), None)
-
-
-def _verdict(last: EdgeSample | None, sample: EdgeSample, deadband: float, interval_ms_max: int) -> Drop | None:
+def verdict(last: EdgeSample | None, sample: EdgeSample, *, deadband: float = 0.0, interval_ms_max: int = 0) -> Drop | None:
+    """Return why the sample is not published after `last`, the one of its signal that was published last (None: it is)."""
     if last is None or last.quality is not sample.quality or last.reason != sample.reason:
         return None
     if interval_ms_max and abs(sample.timestamp_ms - last.timestamp_ms) >= interval_ms_max:

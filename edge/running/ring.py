@@ -32,13 +32,19 @@ CREATE TABLE IF NOT EXISTS kept(name TEXT PRIMARY KEY, value TEXT NOT NULL);
 CREATE TRIGGER IF NOT EXISTS number_once BEFORE INSERT ON rows
     WHEN NEW.sequence <= (SELECT seq FROM sqlite_sequence WHERE name = 'rows')
     BEGIN SELECT RAISE(ABORT, 'another edge writes this store too, and has given that number'); END;
-CREATE TRIGGER IF NOT EXISTS keep_place AFTER INSERT ON rows WHEN NEW.place IS NOT NULL
-    BEGIN INSERT OR REPLACE INTO kept VALUES ('place', NEW.place); END;
-CREATE TRIGGER IF NOT EXISTS keep_memory AFTER INSERT ON rows WHEN NEW.memory IS NOT NULL
-    BEGIN INSERT OR REPLACE INTO kept VALUES ('memory', NEW.memory); END;
+CREATE TRIGGER IF NOT EXISTS keep_place_of_gone BEFORE DELETE ON rows
+    WHEN OLD.place IS NOT NULL AND OLD.sequence > coalesce((SELECT CAST(value AS INTEGER) FROM kept WHERE name = 'place_of'), 0)
+    BEGIN REPLACE INTO kept VALUES ('place', OLD.place), ('place_of', OLD.sequence); END;
+CREATE TRIGGER IF NOT EXISTS keep_memory_of_gone BEFORE DELETE ON rows
+    WHEN OLD.memory IS NOT NULL AND OLD.sequence > coalesce((SELECT CAST(value AS INTEGER) FROM kept WHERE name = 'memory_of'), 0)
+    BEGIN REPLACE INTO kept VALUES ('memory', OLD.memory), ('memory_of', OLD.sequence); END;
+INSERT OR IGNORE INTO kept SELECT of.column1, seq FROM (VALUES ('place_of'), ('memory_of')) AS of, sqlite_sequence AS numbers
+    WHERE numbers.name = 'rows' AND EXISTS (SELECT 1 FROM sqlite_schema WHERE name = 'keep_place');
+DROP TRIGGER IF EXISTS keep_place;
+DROP TRIGGER IF EXISTS keep_memory;
 """
-# Each statement gives up the interpreter's lock and has to get it back, which with a hundred threads is what costs. So a frame is
-# one statement: the triggers keep place and memory in the same transaction.
+# A frame is one statement, and so one transaction, of one table: the place and the memory after it are in its last row. When that
+# row goes, the triggers keep them, unless they have those of a later row. Stores of before had them kept at each row.
 _ROWS_A_STATEMENT = 100
 _KEEP = "INSERT OR REPLACE INTO kept VALUES (?, ?)"
 _INSERT = "INSERT INTO rows VALUES (?, ?, ?, ?, ?, ?)"
@@ -148,9 +154,11 @@ class Ring:
 
     def keep(self, place: Place, memory: str | None) -> None:
         """Store a place, and a memory that belongs to it, without a row."""
+        values: dict[str, str | int] = {"place": json.dumps(place), "place_of": self.last}
+        if memory is not None:
+            values |= {"memory": memory, "memory_of": self.last}
         try:
-            values = {"place": json.dumps(place)} | ({} if memory is None else {"memory": memory})
-            pairs = [text for pair in values.items() for text in pair]
+            pairs = [part for pair in values.items() for part in pair]
             self._db.execute(_KEEP + ", (?, ?)" * (len(values) - 1), pairs)
         except sqlite3.Error as error:
             raise StoreError(f"{self.file}: cannot be written: {error}") from error
@@ -169,19 +177,25 @@ class Ring:
 
     def place(self) -> Place | None:
         """The place that was stored last."""
-        found = self._ask("SELECT value FROM kept WHERE name = 'place'")
-        if not found:
+        found = self._stored_last("place")
+        if found is None:
             return None
         try:
-            instance, next_sequence = json.loads(found[0][0])
+            instance, next_sequence = json.loads(found)
         except ValueError:
             return None
         return Place(instance, next_sequence) if isinstance(instance, str) and type(next_sequence) is int else None
 
     def memory(self) -> str | None:
         """The memory that was stored last."""
-        found = self._ask("SELECT value FROM kept WHERE name = 'memory'")
-        return str(found[0][0]) if found else None
+        return self._stored_last("memory")
+
+    def _stored_last(self, what: str) -> str | None:
+        """That of the last row that has one, or the one that was kept after that row."""
+        kept = dict(self._ask(f"SELECT name, value FROM kept WHERE name IN ('{what}', '{what}_of')"))  # noqa: S608  our own words
+        later = f"SELECT {what} FROM rows WHERE {what} IS NOT NULL AND sequence > ? ORDER BY sequence DESC LIMIT 1"  # noqa: S608
+        found = self._ask(later, (int(kept.get(f"{what}_of", 0)),))
+        return str(found[0][0]) if found else kept.get(what)
 
     def spans(self) -> list[tuple[int, int]]:
         """Return which numbers are stored, as spans from first to last."""

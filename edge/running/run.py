@@ -12,6 +12,7 @@ from edge.adapter import Adapter, find
 from edge.clock import offset as clock
 from edge.config import BrokerSection, EdgeConfig
 from edge.errors import ConfigError
+from edge.running.driver import Driver
 from edge.running.forwarder import Forwarder
 from edge.running.health import HEALTH
 from edge.running.ledger import Ledger
@@ -60,11 +61,17 @@ def _secret_in(file: Path, path: Path) -> str:
 
 
 def edge_runtime(
-    config: EdgeConfig[Any], address: BrokerAddress | None = None, *, adapter: Adapter | None = None, restarts: int = 0
+    config: EdgeConfig[Any],
+    address: BrokerAddress | None = None,
+    *,
+    adapter: Adapter | None = None,
+    restarts: int = 0,
+    driver: Driver | None = None,
 ) -> EdgeRuntime:
     """An edge that publishes to the configured broker, or to this one.
 
-    adapter: in place of the configured one, for a control that is no real one; restarts: how often the edge was begun again
+    adapter: in place of the configured one, for a control that is no real one; restarts: how often the edge was begun again;
+    driver: the one that edges share
     """
     broker, ledger = config.broker, Ledger()
 
@@ -83,6 +90,7 @@ def edge_runtime(
         barrier_topic=edge_barrier(broker.group, config.node),
         on_confirmed=confirmed,
         on_command=commanded,
+        loop=None if driver is None else driver.loop,
     )
     runtime = EdgeRuntime(
         config,
@@ -92,6 +100,7 @@ def edge_runtime(
         place_file=Path(broker.session_file + ".place") if broker.session_file else None,
         open_store=_opener(config),
         restarts=restarts,
+        driver=driver,
     )
     return runtime
 

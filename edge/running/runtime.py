@@ -1,12 +1,14 @@
 """The loop that runs one edge.
 
-    connection thread: control → frames → parse → tool change → report by exception → store → edge node → broker
-    main thread:       each tenth of a second: what is due in the store, the sensor, the health
+    reader: control → frames → parse → tool change → report by exception → store → edge node → broker
+    turns:  each tenth of a second: what is due in the store, the sensor, the health
 
-Both hold the edge's lock while they work. A frame goes all its way in the thread that read it: handing it to another one costs
-more, with many machines in one process, than the work itself. When that thread falls behind it reads no more, the agent's buffer
-is the next to fill, and what it drops is a hole that is counted. Nothing is dropped without a reason in the ledger. Without a
-store (`[store] enabled = false`) a row that finds no broker is dropped, and the next birth carries the values.
+Both are in the thread that all edges of the process share (`edge.running.driver`), but for a control that has to be waited for:
+its reader is a thread of its own. So both hold the edge's lock while they work. A frame goes all its way in the thread that read
+it: handing it to another one costs more, with many machines in one process, than the work itself. When that thread falls behind
+it reads no more, the agent's buffer is the next to fill, and what it drops is a hole that is counted. Nothing is dropped without
+a reason in the ledger. Without a store (`[store] enabled = false`) a row that finds no broker is dropped, and the next birth
+carries the values.
 """
 
 import logging
@@ -22,10 +24,12 @@ from edge.clock import offset as clock
 from edge.config import EdgeConfig
 from edge.place import Place, PlaceFile
 from edge.running.birth import device_metrics
+from edge.running.driver import TURN_S, Driver
 from edge.running.forwarder import Sender, Settled
 from edge.running.health import Health
 from edge.running.ledger import Ledger
 from edge.running.pipeline import Outcome, Pipeline
+from edge.running.reader import Reader
 from edge.running.receipts import RECEIPT
 from edge.running.sensor import sensor_of
 from edge.running.unstored import Unstored
@@ -34,7 +38,7 @@ from sparkplug.edge_session import Command
 from sparkplug.metric import Change, MetricSpec
 
 _log = logging.getLogger(__name__)
-TURN_S, HISTORY_TURN_S = 0.1, 0.02
+HISTORY_TURN_S = 0.02
 FAREWELL_S_MAX = 5.0
 REPORT_INTERVAL_S = 1.0
 
@@ -83,7 +87,7 @@ class Arrival(NamedTuple):
 
 
 class EdgeRuntime:
-    """One edge. `run` returns when `stop` is set."""
+    """One edge. `run` returns when `stop` is set. `driver`: the one that edges share; None: one of its own."""
 
     def __init__(
         self,
@@ -95,6 +99,7 @@ class EdgeRuntime:
         place_file: Path | None = None,
         open_store: Callable[[Publisher], Store] | None = None,
         restarts: int = 0,
+        driver: Driver | None = None,
         wall_s: Callable[[], float] = time.time,
         monotonic_s: Callable[[], float] = time.monotonic,
     ) -> None:
@@ -106,6 +111,8 @@ class EdgeRuntime:
         self._connection: Connection = adapter.connect(config)
         self._places = PlaceFile(place_file)
         self._restarts = restarts
+        self._driver = driver
+        self._cursor: Any = None
         self._sensor = sensor_of(config.accelerometer)
         self._store: Store = Unstored(node, config.machine.name, self._places)
         self._open_store = open_store or (lambda _: self._store)
@@ -120,30 +127,40 @@ class EdgeRuntime:
         self._is_reporting = True  # whether the control gives values, as far as its server knows
         self._was_available = False
         self._fault = 0, ""
-        self._reported_s = monotonic_s()
+        self._reported_s = self._due_s = monotonic_s()
         self.health = Health()
         self._crash: BaseException | None = None
 
     def run(self) -> None:
         """Read, fold and publish until stopped; then publish the last ledger and the death certificates."""
+        if self._driver is not None:
+            self._run(self._driver)
+            return
+        driver = Driver()
+        driver.start()
+        try:
+            self._run(driver)
+        finally:
+            driver.stop()
+
+    def _run(self, driver: Driver) -> None:
         place = self._places.read()
         self._store = self._open_store(self._node)
         self._pipeline = Pipeline(self.config, self._store.memory())
         self.ledger.recover(self._store.observations, self._pipeline.held)
         place = self._store.place() or place
-        reader = threading.Thread(target=self._read, args=(place,), name=f"{self._adapter.name}-reader", daemon=True)
+        self._cursor = self._adapter.start(self.config) if place is None else self._adapter.resume(self.config, place)
+        self._connection.follow(self._cursor)
+        reader = Reader(self._adapter.name, self._connection, driver, self._read, self._ended)
         self._node.start()
         reader.start()
         self._sensor.start()
-        due_s = self._clock()
+        driver.add(self)
         try:
-            while not self.stop.wait(self._pause_s):
-                self._turn()
-                if self._clock() >= due_s:
-                    due_s = self._clock() + REPORT_INTERVAL_S
-                    self._report()
+            self.stop.wait()
         finally:
             self.stop.set()
+            driver.remove(self)
             try:
                 self._connection.close()
                 self._sensor.close()
@@ -155,7 +172,18 @@ class EdgeRuntime:
         if self._crash is not None:
             raise self._crash
 
-    def _finish(self, reader: threading.Thread) -> None:
+    def turn(self) -> float:
+        """Do what is due; the seconds until the next turn. An error of ours ends the edge, loudly."""
+        try:
+            self._turn()
+            if self._clock() >= self._due_s:
+                self._due_s = self._clock() + REPORT_INTERVAL_S
+                self._report()
+        except BaseException as error:
+            self._ended(error)
+        return HISTORY_TURN_S if self._store.is_behind else TURN_S  # history goes out a little at a time
+
+    def _finish(self, reader: Reader) -> None:
         deadline_s = self._clock() + FAREWELL_S_MAX
         reader.join(FAREWELL_S_MAX)
         with self._lock:
@@ -175,27 +203,19 @@ class EdgeRuntime:
         if is_receipt and isinstance(command.value, str):
             self._store.receipt(command.value)
 
-    def _read(self, place: Place | None) -> None:
-        """The connection thread. Whatever ends it that was not asked for ends the edge, loudly."""
-        try:
-            cursor = self._adapter.start(self.config) if place is None else self._adapter.resume(self.config, place)
-            self._connection.follow(cursor)
-            for raw in self._connection.frames():
-                cursor, frame = self._adapter.parse(self.config, cursor, raw)
-                self._connection.follow(cursor)
-                self.ledger.queue(frame.received)
-                now = self._clock(), round(self._wall_s() * 1000)
-                with self._lock:
-                    self._take(Arrival(frame, *now, self._adapter.place(cursor)))
-        except BaseException as error:
-            self._crash = error
-        finally:
-            self.stop.set()
+    def _read(self, raw: bytes) -> None:
+        """One frame, all its way."""
+        self._cursor, frame = self._adapter.parse(self.config, self._cursor, raw)
+        self._connection.follow(self._cursor)
+        self.ledger.queue(frame.received)
+        now = self._clock(), round(self._wall_s() * 1000)
+        with self._lock:
+            self._take(Arrival(frame, *now, self._adapter.place(self._cursor)))
 
-    @property
-    def _pause_s(self) -> float:
-        """Until the next turn: short while history waits, which goes out a little at a time."""
-        return HISTORY_TURN_S if self._store.is_behind else TURN_S
+    def _ended(self, error: BaseException | None) -> None:
+        """Whatever ends the reader, or a turn, that was not asked for ends the edge."""
+        self._crash = self._crash or error
+        self.stop.set()
 
     def _turn(self) -> None:
         with self._lock:

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 
 from edge.place import Place, PlaceFile
-from edge.running.forwarder import Sender, Settled
+from edge.running.forwarder import NOTHING_SETTLED, Sender, Settled
 from edge.sample import Drop, EdgeSample, observations_of
 from sparkplug.metric import MetricSpec
 
@@ -56,7 +56,7 @@ class Unstored:
 
     def pump(self) -> Settled:
         """Nothing is due."""
-        return Settled(0, Counter())
+        return NOTHING_SETTLED
 
     def close(self) -> None:
         """Nothing to close."""

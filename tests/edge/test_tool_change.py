@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from edge.config import ToolChangeSection
 from edge.sample import EdgeSample
-from edge.tool_change import Phase, State, is_tool_change_block, not_observable, step, tick
+from edge.tool_change import Phase, State, is_tool_change_block, not_observable, step, tells_nothing, tick
 from sparkplug.quality import Quality
 
 CONFIG = ToolChangeSection()
@@ -339,6 +339,22 @@ _cues = st.sampled_from([True, False, None]).map(lambda v: ("cue", v))
 _events = st.tuples(
     st.floats(-20_000, 20_000) | st.floats(0, 3), st.one_of(_tools, _blocks, _states, _cues, st.just(("time", 0))), st.booleans()
 )
+
+
+@given(st.lists(_events, max_size=40), st.sampled_from([("time", 0), ("tool", 2), ("block", "M06"), ("cue", True)]))
+def test_what_tells_nothing_changes_nothing(
+    events: list[tuple[float, tuple[str, object], bool]], last: tuple[str, object]
+) -> None:
+    state, at_s = step(CONFIG, State(), sample(0.0, "time", 0)).state, 0.0
+    for step_s, (kind, value), is_baseline in events:
+        at_s += step_s
+        state = step(CONFIG, state, sample(at_s, kind, value, is_baseline=is_baseline)).state
+    assert state.clock_ms is not None
+    one = sample((state.clock_ms - T0) / 1000, *last)
+    assert tells_nothing(state, one) is (last[0] == "time" and state.phase is Phase.SETTLED)
+    if tells_nothing(state, one):
+        done = step(CONFIG, state, one)
+        assert (done.state, done.samples, done.debounced) == (state, (), 0)
 
 
 @given(st.lists(_events, max_size=40))

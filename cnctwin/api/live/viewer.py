@@ -21,6 +21,8 @@ from twin.vocabulary.topics import ALERT_STATE
 
 FLUSH_S = 0.1
 POLL_S = 0.05
+GATHER_S = 0.02
+"""Between two looks at the broker: to wake for each message costs more than the message."""
 ALERTS_BYTES_MAX = 4_000_000
 OUTBOX_MAX = 100
 _log = logging.getLogger(__name__)
@@ -84,7 +86,9 @@ class Viewer:
         flushed_s = time.monotonic()
         while not self._stop.is_set():
             try:
-                self._take(self._host.poll(POLL_S))
+                if events := self._host.poll(POLL_S):
+                    self._take(events)
+                    self._stop.wait(GATHER_S)
                 while self._outbox:
                     topic, payload = self._outbox.popleft()
                     self._host.publish_plain(topic, payload, qos=1)
@@ -100,8 +104,6 @@ class Viewer:
                 self._stop.wait(POLL_S)
 
     def _take(self, events: list[HostEvent]) -> None:
-        if not events:
-            return
         self._live.take(events, now_ms(), self._describe)
         for event in (one for one in events if one.kind is EventKind.PLAIN):
             if event.topic != ALERT_STATE:

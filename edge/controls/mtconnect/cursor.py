@@ -130,7 +130,7 @@ def parse(config: Config, cursor: Cursor, raw: bytes) -> tuple[Cursor, SampleSet
             after, given = _streams(cursor, document)
     except (DocumentError, ConfigError) as error:
         return _refused(cursor, str(error))
-    return after, replace(given, clock=_clock(document.header))
+    return after, given if given.clock is not None else replace(given, clock=_clock(document.header))
 
 
 def _clock(header: Header) -> ClockReading | None:
@@ -223,7 +223,9 @@ def _streams(cursor: Cursor, document: StreamsDocument) -> tuple[Cursor, SampleS
     if header.instance_id != cursor.instance_id:
         refused, samples = _refused(cursor, f"instance {header.instance_id} in place of {cursor.instance_id}")
         return _new_instance(replace(refused, phase=Phase.PROBE), cursor, header), samples
-    cursor = replace(cursor, attempt=0, buffer_size=header.buffer_size or cursor.buffer_size)
+    buffer_size = header.buffer_size or cursor.buffer_size
+    if (cursor.attempt, cursor.buffer_size) != (0, buffer_size):
+        cursor = replace(cursor, attempt=0, buffer_size=buffer_size)
     if cursor.phase is Phase.CURRENT:
         return _baseline(cursor, document, header.next_sequence)
     sequences = [o.sequence for o in document.observations if o.sequence is not None]
@@ -327,6 +329,7 @@ def _take(
         backlog=backlog,
         newest_ms=newest,
         available=available,
+        clock=_clock(document.header),
     )
 
 

@@ -8,15 +8,17 @@ condition's element is its level; a data set has entries in place of text; docum
 from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import lru_cache
 from typing import NamedTuple
 from xml.etree.ElementTree import Element
 
 from edge.controls.mtconnect.model import DeviceModel, devices_of
-from edge.controls.mtconnect.xml import local_name, parse_xml
+from edge.controls.mtconnect.xml import local_name, local_tag, parse_small, parse_xml
 from edge.errors import DocumentError
 
 UNAVAILABLE = "UNAVAILABLE"
 SEQUENCE_MAX = 2**63
+_SEVERAL = ("DataSet", "Table", "TimeSeries")  # the ends of names of elements with several values
 
 
 class Header(NamedTuple):
@@ -82,7 +84,9 @@ Document = DevicesDocument | StreamsDocument | ErrorDocument
 
 def parse_document(raw: bytes) -> Document:
     """The document in these bytes, or DocumentError."""
-    root = parse_xml(raw)
+    root = parse_small(raw)
+    if root is None or local_name(root) != "MTConnectStreams":  # of which no more than six levels are read
+        root = parse_xml(raw)
     kind = local_name(root)
     header = _header(root)
     if kind == "MTConnectDevices":
@@ -97,6 +101,7 @@ def parse_document(raw: bytes) -> Document:
     raise DocumentError(f"root element {kind!r} is none of MTConnectDevices, MTConnectStreams, MTConnectError")
 
 
+@lru_cache(maxsize=1024)  # the observations of a document have few different times
 def timestamp_ms(text: str) -> int | None:
     """Milliseconds since 1970 of an ISO 8601 time with any number of digits, UTC if it has no zone; None where it is no time.
 
@@ -155,19 +160,19 @@ def _observations(root: Element) -> Iterator[Observation]:
 
 
 def _observation(uuid: str, device_name: str, element: Element, is_condition: bool) -> Observation:
-    kind = local_name(element)
+    kind, get = local_tag(element.tag), element.get
     return Observation(
         uuid,
         device_name,
-        element.get("dataItemId", ""),
-        element.get("name", ""),
+        get("dataItemId", ""),
+        get("name", ""),
         kind,
         is_condition,
-        _sequence(element.get("sequence")),
-        timestamp_ms(element.get("timestamp", "")),
+        _sequence(get("sequence")),
+        timestamp_ms(get("timestamp", "")),
         (element.text or "").strip(),
-        element.get("nativeCode", ""),
-        len(element) > 0 or kind.endswith(("DataSet", "Table", "TimeSeries")),
+        get("nativeCode", ""),
+        len(element) > 0 or kind.endswith(_SEVERAL),
     )
 
 

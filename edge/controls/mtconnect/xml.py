@@ -6,12 +6,14 @@ in nothing else.
 """
 
 import re
+from functools import lru_cache
 from typing import Any
 from xml.etree import ElementTree as ET
 
 from edge.errors import DocumentError
 
 DOCUMENT_BYTES_MAX = 64 * 1024 * 1024
+SMALL_BYTES_MAX = 64 * 1024
 DEPTH_MAX = 64
 ELEMENTS_MAX = 200_000
 ATTRIBUTES_MAX = 100  # of one element
@@ -57,10 +59,29 @@ def parse_xml(raw: bytes) -> ET.Element:
     return root
 
 
+def parse_small(raw: bytes) -> ET.Element | None:
+    """The root element of a small document, by the C parser alone, which is three times as fast; None where it has to be careful.
+
+    Without `<!` there is no document type. That holds for all encodings but those with zero bytes: an encoding that expat takes
+    reads ASCII as ASCII. The nesting is not bounded, so the caller may not descend as far as a document goes.
+    """
+    if len(raw) > SMALL_BYTES_MAX or b"<!" in raw or b"\0" in raw:
+        return None
+    try:
+        return ET.fromstring(raw)  # noqa: S314
+    except (ET.ParseError, ValueError, LookupError):
+        return None
+
+
+@lru_cache(maxsize=4096)
+def local_tag(tag: str) -> str:
+    """Return a tag without its namespace."""
+    return tag.rpartition("}")[2]
+
+
 def local_name(element: ET.Element) -> str:
     """The name without its namespace."""
-    tag: str = element.tag
-    return tag.rpartition("}")[2]
+    return local_tag(element.tag)
 
 
 def schema_version(root: ET.Element) -> str:

@@ -67,6 +67,56 @@ def test_rows_come_back_in_order_with_what_they_hold(open_ring: OpenRing) -> Non
     assert (ring.rows, ring.observations, ring.spans()) == (1, 1, [(3, 3)])
 
 
+def test_the_place_and_the_memory_are_those_of_the_last_row_whatever_goes_first(open_ring: OpenRing) -> None:
+    ring = open_ring()
+    ring.append([(1, "a")], Place("x", 1), "one")
+    ring.append([(1, "b")], Place("x", 2))
+    ring.append([(1, "c")])
+    assert (ring.place(), ring.memory()) == (Place("x", 2), "one")
+    ring.delete(2, 2, 1)
+    ring.delete(1, 1, 1)
+    assert (ring.place(), ring.memory()) == (Place("x", 2), "one"), "an older row that goes later takes nothing back"
+    ring.keep(Place("x", 3), "two")
+    assert (ring.place(), ring.memory()) == (Place("x", 3), "two")
+    ring.delete(3, 3, 1)
+    ring.close()
+    again = open_ring()
+    assert (again.place(), again.memory()) == (Place("x", 3), "two")
+    again.append([(1, "d")], Place("x", 4))
+    assert (again.place(), again.memory()) == (Place("x", 4), "two")
+
+
+def test_a_place_without_a_row_is_later_than_that_of_the_last_row(open_ring: OpenRing) -> None:
+    ring = open_ring()
+    ring.append([(1, "a")], Place("x", 1), "one")
+    ring.keep(Place("x", 5), None)
+    assert (ring.place(), ring.memory()) == (Place("x", 5), "one")
+    ring.delete(1, 1, 1)
+    assert (ring.place(), ring.memory()) == (Place("x", 5), "one")
+
+
+def test_a_store_that_kept_the_place_at_each_row_goes_on_where_it_was(open_ring: OpenRing, tmp_path: Path) -> None:
+    open_ring().close()
+    older = sqlite3.connect(tmp_path / "edge.store", isolation_level=None)
+    older.executescript(
+        "DROP TRIGGER keep_place_of_gone; DROP TRIGGER keep_memory_of_gone;"
+        "CREATE TRIGGER keep_place AFTER INSERT ON rows WHEN NEW.place IS NOT NULL"
+        " BEGIN INSERT OR REPLACE INTO kept VALUES ('place', NEW.place); END;"
+        "CREATE TRIGGER keep_memory AFTER INSERT ON rows WHEN NEW.memory IS NOT NULL"
+        " BEGIN INSERT OR REPLACE INTO kept VALUES ('memory', NEW.memory); END;"
+        """INSERT INTO rows VALUES (1, 0, 1, 'a', '["x", 1]', 'one'), (2, 0, 1, 'b', '["x", 2]', NULL);"""
+        """INSERT OR REPLACE INTO kept VALUES ('place', '["x", 3]');"""  # after the last row, without one
+    )
+    older.close()
+    ring = open_ring()
+    assert (ring.place(), ring.memory(), ring.rows) == (Place("x", 3), "one", 2)
+    ring.delete(1, 2, 2)
+    assert (ring.place(), ring.memory()) == (Place("x", 3), "one")
+    ring.append([(1, "c")], Place("x", 4), "two")
+    ring.close()
+    assert (open_ring().place(), ring.file.name) == (Place("x", 4), "edge.store")
+
+
 def test_a_number_is_never_given_twice_not_even_when_its_row_is_gone(open_ring: OpenRing) -> None:
     ring = open_ring()
     ring.append([(1, "a"), (1, "b")])

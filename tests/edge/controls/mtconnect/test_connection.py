@@ -262,6 +262,32 @@ def test_a_stream_that_ends_or_breaks_is_taken_up_where_it_was() -> None:
         assert (reader.connection.reconnects, reader.gaps) == (2, [])
 
 
+def test_a_stream_says_where_it_waits_and_before_what_it_blocks() -> None:
+    def close_later(connection: socket.socket) -> None:
+        time.sleep(0.2)
+        connection.close()
+
+    stream = multipart(part(streams(11, [value("rpm", 10, "1")])), then=close_later)
+    with server(answer(probe()), BASELINE, stream) as url:
+        reader, told = Reader(url, heartbeat_ms=2000), list[str]()
+        reader.connection.follow(reader.cursor)
+        for step in reader.connection.steps():
+            if isinstance(step, bytes):
+                reader.cursor, _ = parse(reader.config, reader.cursor, step)
+                reader.connection.follow(reader.cursor)
+                told.append("frame")
+            else:
+                told.append("blocks" if step.sock is None else "waits")
+                if step.sock is not None:
+                    assert not step.sock.getblocking()
+                    time.sleep(0.01)
+            if told.count("blocks") == 3:
+                break
+        assert reader.connection.reconnects == 0, "it connects anew only when it is told to go on"
+    assert "waits" in told
+    assert [one for one in told if one != "waits"] == ["frame", "blocks"] * 3
+
+
 def test_a_corrupt_part_is_asked_for_again_and_not_skipped() -> None:
     corrupt = multipart(part(b"<MTConnectStreams><Header next"), part(streams(13, [value("rpm", 12, "9")])))
     whole = multipart(part(streams(13, [value("rpm", 10, "1"), value("rpm", 12, "9")])))

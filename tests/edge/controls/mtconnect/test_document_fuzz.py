@@ -2,14 +2,23 @@
 
 from contextlib import suppress
 from random import Random
+from xml.etree import ElementTree as ET
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from edge.controls.mtconnect.documents import parse_document
+from edge.controls.mtconnect.documents import StreamsDocument, parse_document
 from edge.controls.mtconnect.multipart import HEAD_BYTES_MAX, MultipartParser
-from edge.controls.mtconnect.xml import ATTRIBUTES_MAX, DEPTH_MAX, DOCUMENT_BYTES_MAX, ELEMENTS_MAX, parse_xml
+from edge.controls.mtconnect.xml import (
+    ATTRIBUTES_MAX,
+    DEPTH_MAX,
+    DOCUMENT_BYTES_MAX,
+    ELEMENTS_MAX,
+    SMALL_BYTES_MAX,
+    parse_small,
+    parse_xml,
+)
 from edge.errors import ConnectionLostError, DocumentError
 from tests.fuzz_depth import FUZZ, within
 
@@ -35,6 +44,32 @@ TYPED = {
 def test_whatever_a_document_type_could_do_it_is_refused_at_its_name(name: str) -> None:
     with within(1.0, 8.0), pytest.raises(DocumentError, match="document type 'a' refused"):
         parse_xml(TYPED[name].encode())
+
+
+@pytest.mark.parametrize("name", TYPED)
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16", "utf-16-le", "utf-16-be", "utf-32", "utf-8-sig", "cp037", "utf-7"])
+def test_the_short_way_takes_no_document_type_in_any_encoding(name: str, encoding: str) -> None:
+    for declared in ("", f'<?xml version="1.0" encoding="{encoding}"?>'):
+        assert parse_small((declared + TYPED[name]).encode(encoding)) is None
+        half = declared.encode() + TYPED[name].encode(encoding)  # declared in ASCII
+        assert parse_small(half) is None
+
+
+def test_the_short_way_is_for_small_documents_and_gives_the_same() -> None:
+    small, large = parse_small(STREAM), parse_small(STREAM.replace(b"overtravel", b"x" * SMALL_BYTES_MAX))
+    assert small is not None
+    assert ET.tostring(small) == ET.tostring(parse_xml(STREAM))
+    assert large is None
+    assert parse_small(STREAM[:-9]) is None, "and who is careful says what is wrong"
+
+
+def test_a_small_document_that_is_nested_deeply_is_read_no_deeper_than_observations_are() -> None:
+    deep = b"<Entry>" * 4_000 + b"</Entry>" * 4_000
+    document = parse_document(STREAM.replace(b"12.5", deep))
+    assert isinstance(document, StreamsDocument)
+    assert [o.has_entries for o in document.observations] == [True, False]
+    with pytest.raises(DocumentError, match="nested deeper"):
+        parse_document(STREAM.replace(b"12.5", deep).replace(b"MTConnectStreams", b"MTConnectDevices"))
 
 
 @pytest.mark.parametrize("encoding", ["utf-16", "utf-8-sig", "iso-8859-1"])

@@ -1,0 +1,123 @@
+"""One answer of an agent over plain HTTP/1.1, read as it comes and never waited for: RFC 9112, by h11, which does no I/O.
+
+The head is awaited, for it decides what the answer is. From then on `read` gives what has come, so that one thread reads the
+streams of many agents.
+"""
+
+import base64
+import socket
+import time
+from types import TracebackType
+from urllib.parse import SplitResult, urlencode
+
+import h11
+
+from edge.errors import ConnectionLostError
+
+READ_BYTES = 64 * 1024
+
+
+class Stream:
+    """The answer to one GET. Raises ConnectionLostError or OSError.
+
+    url: the agent's address; target: path and parameters below it; timeout_s: for connecting; head_s: for the head
+    """
+
+    def __init__(self, url: SplitResult, target: str, *, login: tuple[str, str] | None, timeout_s: float, head_s: float) -> None:
+        self._http = h11.Connection(h11.CLIENT)
+        self._is_over = False
+        self.socket = socket.create_connection((url.hostname or "", url.port or 80), timeout_s)
+        try:
+            self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            headers = [("Host", url.netloc), ("Accept", "multipart/*, text/xml, application/xml"), ("Connection", "close")]
+            if login is not None:
+                headers.append(("Authorization", "Basic " + base64.b64encode(":".join(login).encode()).decode()))
+            request = h11.Request(method="GET", target=url.path + target, headers=headers)
+            self.socket.sendall(self._sent(request) + self._sent(h11.EndOfMessage()))
+            self._head = self._awaited(time.monotonic() + head_s)
+            self.socket.setblocking(False)
+        except BaseException:
+            self.socket.close()
+            raise
+
+    def __enter__(self) -> "Stream":
+        return self
+
+    def __exit__(self, _kind: type[BaseException] | None, _error: BaseException | None, _at: TracebackType | None) -> None:
+        self.socket.close()
+
+    @property
+    def status(self) -> int:
+        """The status code."""
+        return self._head.status_code
+
+    @property
+    def reason(self) -> str:
+        """The words after the code."""
+        return bytes(self._head.reason).decode("latin-1")
+
+    @property
+    def content_type(self) -> str:
+        """The type of the content, "" where none is named."""
+        return next((value.decode("latin-1") for name, value in self._head.headers if name == b"content-type"), "")
+
+    def read(self) -> bytes | None:
+        """Return what has come of the body; None where nothing has, b"" at its end."""
+        body = self._body()
+        if body is None:
+            try:
+                self._receive(self.socket.recv(READ_BYTES))
+            except BlockingIOError:
+                return None
+            body = self._body()
+        return body
+
+    def _awaited(self, deadline_s: float) -> h11.Response:
+        while True:
+            event = self._event()
+            if isinstance(event, h11.Response):
+                return event
+            if event is h11.NEED_DATA:
+                if (left_s := deadline_s - time.monotonic()) <= 0:
+                    raise TimeoutError("timed out")
+                self.socket.settimeout(left_s)
+                self._receive(self.socket.recv(READ_BYTES))
+            elif not isinstance(event, h11.InformationalResponse):
+                raise ConnectionLostError("the agent sends no answer")
+
+    def _body(self) -> bytes | None:
+        """Return all of the body that was received and not given yet; None for nothing, b"" at the end."""
+        parts: list[bytes] = []
+        while not self._is_over:
+            event = self._event()
+            if isinstance(event, h11.Data):
+                parts.append(bytes(event.data))
+            elif event is h11.NEED_DATA:
+                return b"".join(parts) or None
+            else:
+                self._is_over = True
+        return b"".join(parts)
+
+    def _event(self) -> object:
+        try:
+            return self._http.next_event()
+        except h11.RemoteProtocolError as error:
+            raise ConnectionLostError(f"no HTTP: {error}") from error
+
+    def _receive(self, data: bytes) -> None:
+        try:
+            self._http.receive_data(data)
+        except h11.RemoteProtocolError as error:
+            raise ConnectionLostError(f"no HTTP: {error}") from error
+
+    def _sent(self, event: h11.Request | h11.EndOfMessage) -> bytes:
+        return self._http.send(event) or b""
+
+
+def target_of(path: str, parameters: tuple[tuple[str, str | int], ...]) -> str:
+    """Return path and parameters as a request names them.
+
+    >>> target_of("/vmc/sample", (("from", 11), ("count", 100)))
+    '/vmc/sample?from=11&count=100'
+    """
+    return f"{path}?{urlencode(parameters)}" if parameters else path
