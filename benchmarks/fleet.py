@@ -61,6 +61,8 @@ def line(name: str, result: dict[str, Any]) -> str:
     in_time = "–" if result["in_time_pct"] is None else f"{result['in_time_pct']:.1f}"
     invalid = "".join(f"  INVALID: {words}" for words in result["complaints"])
     each = [f"{part['us_a_message'] or 0:8.0f}" for part in (own, broker, load)]
+    if not holds.has_kept_up(result) and own["us_a_folded"]:
+        each[0] = f"{own['us_a_folded']:7.0f}*"
     return (
         f"{name:{NAME}.{NAME}} {result['machines']:5d} {each[0]} {own['cores']:6.2f} {each[1]} {broker['cores']:6.2f} {each[2]} "
         f"{ages} "
@@ -100,6 +102,8 @@ def many(options: argparse.Namespace) -> list[dict[str, Any]]:
                 for stage, share in result.get("stages", {}).items():
                     print(f"        {stage:28} {share['pct']:5.1f} %  {share['us_a_message']:7.1f} us", flush=True)
                 written(options, results)
+    if not all(holds.has_kept_up(result) for result in results) and not options.idle:
+        print("*: does not keep up; us of each message that it has dealt with")
     for result in results if options.idle else ():
         machine_us = result["used"]["processors"]["cores"] / result["machines"] * 1e6
         print(f"{result['tree']}: {result['machines']} idle machines, {machine_us:.0f} us of CPU time a machine and second")
@@ -156,6 +160,7 @@ def setup_of(options: argparse.Namespace, tree: Path, machines: int) -> Setup:
         outage_every_s=options.outage_every,
         is_idle=options.idle,
         everyone=options.storm,
+        is_preferred=options.prefer,
         config="" if options.config is None else options.config.read_text(),
     )
 
@@ -218,6 +223,7 @@ def options_of(given: Sequence[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--config", type=Path, help="TOML for the processors; the historian's table is added")
     parser.add_argument("--old", type=Path, help="folder of an older checkout, tried in turns under the same load")
     parser.add_argument("--outage-every", type=float, default=15.0, help="seconds between two lost connections; 0: none")
+    parser.add_argument("--prefer", action="store_true", help="give broker and processors precedence on a busy computer (root)")
     parser.add_argument("--json", type=Path, help="write all figures to this file")
     parser.add_argument(
         "--stages", action="store_true", help="where the time goes, by py-spy (pip install py-spy), after each trial"

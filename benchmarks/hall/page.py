@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks.hall import curves
+from benchmarks.hall import curves, holds
 from benchmarks.hall.trial import OWN
 
 FIGURES = OWN / "docs" / "figures" / "fleet.json"
@@ -65,7 +65,7 @@ def many(trials: Trials) -> str:
             [
                 str(trial["machines"]),
                 TREES[trial["tree"]],
-                f"{own['us_a_message']:,.0f}" + ("" if kept is None or kept >= 99.0 else " (does not keep up)"),
+                _cost(trial),
                 f"{100 * own['cores']:.0f} %",
                 f"{broker['us_a_message']:,.0f}",
                 *(_ms(age and age[quantile]) for quantile in ("p50", "p95", "p99")),
@@ -196,6 +196,14 @@ def filled(text: str, figures: dict[str, list[dict[str, Any]]]) -> str:
         return f"<!-- fleet {kind} -->\n{body}\n<!-- end -->"
 
     return re.sub(r"<!-- fleet (\w+) -->\n.*?<!-- end -->", written, text, flags=re.DOTALL)
+
+
+def _cost(trial: dict[str, Any]) -> str:
+    """Return what a message costs; where the processors fall behind, each of those that they have dealt with."""
+    own = trial["used"]["processors"]
+    if holds.has_kept_up(trial):
+        return f"{own['us_a_message']:,.0f}"
+    return f"{own['us_a_folded']:,.0f}, does not keep up" if own.get("us_a_folded") else "does not keep up"
 
 
 def _us(trial: dict[str, Any], stage: str) -> float:

@@ -70,7 +70,9 @@ def profiled(running: Running, folder: Path, spent: dict[str, float], program: s
     for index, child in enumerate(running.processors):
         file = folder / f"stacks-{index}.txt"
         sampling = ("-d", str(SECONDS), "-r", str(RATE_HZ), "--gil", "-f", "raw", "-F", "-o", str(file))
-        done = subprocess.run([spy, "record", "-p", str(child.pid), *sampling], capture_output=True, text=True, check=False)
+        done = subprocess.run(
+            [spy, "record", "-p", str(child.pid), *sampling], capture_output=True, text=True, check=False, timeout=300
+        )
         if done.returncode or not file.exists():
             raise SystemExit(f"py-spy failed: {' '.join(done.stderr.strip().splitlines()[-1:])}")
         for stack, _, count in (entry.rpartition(" ") for entry in file.read_text().splitlines()):

@@ -1,4 +1,4 @@
-"""The benchmark of a fleet: its load says what an edge says, its reader reads, and a slice of it runs through the real process."""
+"""The benchmark of a fleet: the load says what an edge says, the reader reads, and a slice runs through the real process."""
 
 import doctest
 from array import array
