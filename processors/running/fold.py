@@ -32,6 +32,7 @@ class Fold:
         "_config",
         "_counts",
         "_processor",
+        "_quiet",
         "_rows",
         "_step",
         "cell",
@@ -58,6 +59,7 @@ class Fold:
         self.wakes = processor.wakes
         self._config: Any = processor.given(configuration, name)
         self._rows: dict[str, Row] = {}
+        self._quiet: Outputs = ()  # the outputs that were news of nothing, and would be of nothing again
         self.cell: Mapping[str, Row] = MappingProxyType(self._rows if processor.is_of_cells else {})
 
     def join(self, machine: str) -> Emission:
@@ -81,7 +83,7 @@ class Fold:
         """Fold a sample."""
         try:
             state, outputs = self._step(self._config, self.state, sample)
-            actions = self._emitted(outputs, sample.machine, at_ms) if outputs else []
+            actions = [] if not outputs or outputs is self._quiet else self._emitted(outputs, sample.machine, at_ms)
         except Exception as error:  # whatever a step does, the stream goes on with the state before
             self._counts.dead_letters += 1
             letter = DeadLetter(sample.machine or self.name, dead_letter(self._processor.name, sample, error))
@@ -99,7 +101,10 @@ class Fold:
             return self._several_emitted(outputs, machine, at_ms)
         changes = emission.news(outputs, at_ms)  # type: ignore[arg-type]
         if not changes:
+            if type(outputs) is tuple and not self._processor.is_of_cells:
+                self._quiet = outputs
             return []
+        self._quiet = ()
         emission.published(changes)
         return [Publish(machine, tuple(changes))]
 

@@ -35,6 +35,7 @@ REPORT_S = 1.0
 RESTORE_S_MAX = 1.0  # to wait for the next snapshot, or for our own nodes
 STALL_S = 1.0  # a longer pause of this process is no silence of the machine
 WAITING_MAX = 100_000  # events, while the snapshots are awaited
+_DATA, _PLAIN = EventKind.DATA, EventKind.PLAIN
 _log = logging.getLogger(__name__)
 
 
@@ -158,7 +159,7 @@ class Runner:
     # What has come.
 
     def _take(self, event: HostEvent, now_s: float, *, has_waited: bool = False) -> None:
-        if event.kind is EventKind.PLAIN:
+        if event.kind is _PLAIN:
             for worker in self._workers:
                 worker.take_plain(event)
             return
@@ -171,7 +172,7 @@ class Runner:
         else:
             for worker in readers:
                 worker.take(event, now_s, has_waited=has_waited)
-        if event.kind is EventKind.DATA and not is_twin_node(node) and not _is_late(event):
+        if event.kind is _DATA and not is_twin_node(node) and not _is_late(event):
             self._lag.folded(node, event.timestamp_ms, time.monotonic())
 
     def _readers_of(self, event: HostEvent) -> tuple[Worker, ...]:

@@ -17,7 +17,7 @@ from processors.joint_anomaly.scoring import scorings
 from processors.running.engine import Engine
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId
-from tests.processors.streams import T0_MS, birth, data, death, event, fed, reading
+from tests.processors.streams import T0_MS, birth, data, death, event, fed, named, reading
 
 A_TENTH = 0.1
 
@@ -134,7 +134,9 @@ def test_a_tool_change_is_gated_and_its_tail_runs_from_its_end() -> None:
 
 
 def test_without_the_gate_the_same_tool_change_is_an_alarm() -> None:
-    actions = fed(cell("a", tail_s=0.0), *born("a"), *[one._replace(readings=one.readings[:1]) for one in change_of_15_s()])
+    actions = fed(
+        cell("a", tail_s=0.0), *born("a"), *[named(one._replace(readings=one.readings[:1])) for one in change_of_15_s()]
+    )
     assert True in [on for _, on in metric(actions, ALARM)]
 
 
