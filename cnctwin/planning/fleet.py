@@ -195,5 +195,5 @@ def _limits(cores: float, groups: int, computer: Computer) -> tuple[str, ...]:
     if cores > CORE_SHARE * computer.cores:
         found.append(f"{cores:.1f} cores are used and {computer.cores} are here")
     if groups > 1:
-        found.append(f"one broker and one set of processors are not either: it takes {groups}")
+        found.append(f"one broker with one set of processors does not do: it takes {groups} groups")
     return tuple(found)

@@ -56,7 +56,7 @@ def test_machines_that_no_process_can_take_together_are_split_into_groups() -> N
     made = plan_fleet(Fleet(4000, 10.0), ("mirror",), Computer(64, 10**12), measured=ROUND)
     assert made.groups == 7 and made.broker_cores == pytest.approx(4000 / 7 * 10 * 120 / 1e6)
     assert made.cores == pytest.approx(4000 * 10 * (40 + 50 + 20 + 100) / 1e6)
-    assert made.limits == ("one broker and one set of processors are not either: it takes 7",)
+    assert made.limits == ("one broker with one set of processors does not do: it takes 7 groups",)
 
 
 def test_a_slower_computer_needs_more_and_holds_less() -> None:
