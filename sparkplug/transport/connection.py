@@ -34,7 +34,7 @@ from sparkplug.transport.tls_failure import explained
 OUTBOX_MAX = 20_000
 OUTBOX_BYTES_MAX = 64 * 1024 * 1024
 GATHERED_MAX = 200  # actions that wait for the next turn
-SEND_BYTES_MAX = 256 * 1024  # that gather for one call
+SEND_BYTES_MAX = 128 * 1024  # that gather for one call
 READS_MAX = 32  # of one connection in a turn, so that it keeps no other waiting
 BACKOFF_S_MIN = 0.2
 BACKOFF_S_MAX = 15.0
@@ -112,12 +112,9 @@ class MqttConnection:
         """
         if not actions:
             return
-        for action in actions:
-            if isinstance(action, Publish):
-                self._taken_bytes += len(action.payload)
-        outbox = self._outbox
-        outbox.extend(actions)
-        self.loop.push(self, now=len(outbox) >= GATHERED_MAX)
+        self._taken_bytes += sum(len(action.payload) for action in actions if isinstance(action, Publish))
+        self._outbox.extend(actions)
+        self.loop.push(self, now=len(self._outbox) >= GATHERED_MAX)
 
     @property
     def full(self) -> bool:
@@ -152,7 +149,11 @@ class MqttConnection:
 
     def _dial(self) -> None:
         self._dial_s = None
-        threading.Thread(target=self._attempt, name=f"dial {self._client_id}", daemon=True).start()
+        try:
+            threading.Thread(target=self._attempt, name=f"dial {self._client_id}", daemon=True).start()
+        except RuntimeError as error:  # the system gives no more threads for now
+            self._note(str(error))
+            self._dial_s = time.monotonic() + BACKOFF_S_MAX
 
     def _attempt(self) -> None:
         self._began_s = time.monotonic()
@@ -206,7 +207,8 @@ class MqttConnection:
 
     def flush(self) -> None:
         """Write what is to be sent. Called by any thread that sends; it ends no connection."""
-        self._write()
+        if not self._writes_later:
+            self._write()
         stream = self._stream
         if self._reading or (stream is not None and (stream.has_ended or self._until_s is not None)):
             self.loop.due.add(self)
@@ -214,7 +216,7 @@ class MqttConnection:
     def serve(self) -> None:
         """Write what is to be sent, and see whether the connection goes on."""
         is_unread, self._is_unread = self._is_unread, False
-        self.ready(readable=is_unread, writable=True)
+        self.ready(readable=is_unread, writable=not self._writes_later)
 
     def tick(self, now_s: float) -> None:
         """Do what is due."""

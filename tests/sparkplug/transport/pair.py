@@ -26,6 +26,7 @@ def client_on(sock: socket.socket, version: int = 4) -> tuple[StreamClient, Stre
     """A client that seems to have dialled this socket."""
     protocol = MQTTProtocolVersion(version)
     client = StreamClient(CallbackAPIVersion.VERSION2, "test", protocol=protocol, reconnect_on_failure=False)
+    client.max_inflight_messages_set(65_535)
     sock.setblocking(False)
     stream = Stream(sock)
     client.stream = stream
