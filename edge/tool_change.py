@@ -25,10 +25,9 @@ What a control does not tell cannot be known: a change that is not in the number
 """
 
 import re
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from enum import Enum
 from functools import lru_cache
-from operator import attrgetter
 from typing import Any
 
 from edge.config import ToolChangeSection
@@ -40,7 +39,6 @@ CLOCK_AHEAD_MS_MAX = 300_000
 REJOIN_MS = 1_000
 CUE = "tool_change_cue"
 COMMANDED = "block commands a tool change"
-_EVIDENCE = frozenset({"tool_number", "nc_block", "exec_state", CUE})
 _IDLE_STATES = frozenset({"READY", "STOPPED", "PROGRAM_COMPLETED", "PROGRAM_STOPPED"})
 _COMMENT = re.compile(r"\([^)]*\)?|;.*")
 _pattern = lru_cache(maxsize=64)(re.compile)
@@ -86,11 +84,7 @@ class State:
 
     def changed(self, **changes: Any) -> "State":
         """As `dataclasses.replace`, which takes three times as long; each frame of a control tells the time."""
-        return State(**(dict(zip(_NAMES, _values(self), strict=True)) | changes))
-
-
-_NAMES = tuple(field.name for field in fields(State))
-_values = attrgetter(*_NAMES)
+        return State(**({name: getattr(self, name) for name in self.__slots__} | changes))
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,12 +98,6 @@ class Step:
     def then(self, after: "Step") -> "Step":
         """This step and the one after it as one."""
         return Step(after.state, self.samples + after.samples, self.debounced + after.debounced)
-
-
-def tells_nothing(state: State, sample: EdgeSample) -> bool:
-    """Return True if `step` would only hand this sample on: the time is known, nothing waits for it, it is no evidence."""
-    is_known = sample.timestamp_ms == state.clock_ms and state.phase is Phase.SETTLED
-    return is_known and not sample.is_baseline and sample.signal not in _EVIDENCE
 
 
 def step(config: ToolChangeSection, state: State, sample: EdgeSample) -> Step:
@@ -248,15 +236,13 @@ def _number(config: ToolChangeSection, state: State, sample: EdgeSample) -> Step
 
 def _found(state: State, sample: EdgeSample, tool: str) -> Step:
     """The number on (re)joining. An empty one may be the middle of a change, so it is in doubt; a number ends what was open."""
-    flaps = state.held
-    at_ms = sample.timestamp_ms
+    flaps, at_ms = state.held, sample.timestamp_ms
     if tool == "" and state.tool is None:
         doubt = replace(state, phase=Phase.DOUBT, tool="?", onset_ms=at_ms, blank=sample, blank_since_ms=at_ms)
         if state.shows_change and not state.is_idle:
             return _enter(doubt, at_ms, "tool number empty", "block shows a tool change")
         return Step(doubt, debounced=flaps)
-    known = "empty" if tool == "" else "known"
-    evidence = f"as found: tool number {known}"
+    evidence = f"as found: tool number {'known' if tool else 'empty'}"
     settled = replace(_settled(state, tool), is_announced=True)
     return Step(settled, (sample, *_active(False, at_ms, evidence, sample.is_baseline)), flaps)
 

@@ -105,7 +105,7 @@ class Pipeline:
                 else:
                     self._report(sample, news, dropped)
                 continue
-            if tool_change.tells_nothing(self._change, sample):
+            if tells_nothing(self._change, sample):
                 self._report(sample, news, dropped)
                 continue
             done = tool_change.step(self._tool_change, self._change, sample)
@@ -174,6 +174,12 @@ def _remembered(text: str | None) -> Memory | None:
     except ValidationError as error:
         _log.warning("the tool change's memory cannot be read and is left behind: %s", error.errors(include_url=False)[0]["msg"])
         return None
+
+
+def tells_nothing(state: tool_change.State, sample: EdgeSample) -> bool:
+    """Return True if the tool change would only hand this sample on: the time is known, nothing waits, it is no evidence."""
+    is_known = sample.timestamp_ms == state.clock_ms and state.phase is tool_change.Phase.SETTLED
+    return is_known and not sample.is_baseline and sample.signal not in _FED
 
 
 def rows_of(samples: Iterable[EdgeSample]) -> Iterator[tuple[EdgeSample, ...]]:

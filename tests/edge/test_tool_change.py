@@ -7,8 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from edge.config import ToolChangeSection
+from edge.running.pipeline import tells_nothing
 from edge.sample import EdgeSample
-from edge.tool_change import Phase, State, is_tool_change_block, not_observable, step, tells_nothing, tick
+from edge.tool_change import Phase, State, is_tool_change_block, not_observable, step, tick
 from sparkplug.quality import Quality
 
 CONFIG = ToolChangeSection()
