@@ -38,8 +38,8 @@ from processors.actions import Publish as PublishAction
 from processors.config import Configuration, ProcessorConfig
 from processors.contract import NoState, Output, OutputSpec, Processor, Provenance, Sample, SampleKind
 from processors.running.engine import Engine
-from processors.running.health import node_metrics
-from processors.running.worker import Worker
+from processors.running.runner import GATHER_S
+from processors.running.runtime import runner_of
 from sparkplug.actions import Publish
 from sparkplug.broker import BrokerAddress
 from sparkplug.datatype import DataType
@@ -55,7 +55,6 @@ SIGNALS = tuple(f"axis_{i}_pos_mm" for i in range(20))
 RESULTS = ("twin/mean_mm", "twin/low_mm", "twin/high_mm", "twin/spread_mm")
 SOURCE = NodeId("cnc", "edge-bench")
 START_MS = 1_790_000_000_000
-GATHER_S = 0.005  # what comes one by one is read together, at this pace at most
 
 
 def figures(values: list[float]) -> tuple[float, float, float, float]:
@@ -165,14 +164,12 @@ def _wait(condition: Callable[[], bool], complaint: str, seconds: float = 120.0)
 
 def ours(port: int, count: int, rate_hz: float) -> float:
     """The processor as it runs in production."""
-    broker = BrokerAddress(port=port)
-    host = HostApplication(broker, PROBE.node, (f"spBv1.0/{SOURCE.group}/+/{SOURCE.node}/#",))
-    edge = EdgeNode(broker, NodeId("cnc", PROBE.node), node_metrics())
-    worker = Worker(PROBE, Configuration(ProcessorConfig, {}), host, edge)
+    runner = runner_of([(PROBE, Configuration(ProcessorConfig, {}))], BrokerAddress(port=port))
+    (worker,) = runner.workers
     stop = threading.Event()
-    thread = threading.Thread(target=worker.run, args=(stop,), daemon=True)
+    thread = threading.Thread(target=runner.run, args=(stop,), daemon=True)
     thread.start()
-    _wait(lambda: host.online and edge.online, "the processor does not come online")
+    _wait(lambda: worker.online, "the processor does not come online")
     ledger = worker.engine.ledger
     already = 0
 

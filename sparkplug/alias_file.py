@@ -5,11 +5,13 @@ No rule asks for it (6.4.7: a birth tells the aliases anew), but who has recorde
 
 import json
 import logging
+import time
 from pathlib import Path
 
 from sparkplug.edge_session import Aliases
 
 ALIASES_MAX = 100_000
+SHARE_OF_TIME = 50  # one part of so many goes into writing
 _log = logging.getLogger(__name__)
 
 
@@ -19,6 +21,7 @@ class AliasFile:
     def __init__(self, file: Path | None) -> None:
         self._file = file
         self._kept = 0
+        self._busy_until_s = 0.0
 
     def read(self) -> Aliases:
         """The table that was kept last; empty where there is none that can be used."""
@@ -35,9 +38,11 @@ class AliasFile:
         self._kept = len(aliases)
         return aliases
 
-    def keep(self, aliases: Aliases) -> None:
-        """Keep the table where it has grown. The file is replaced as a whole."""
-        if self._file is None or len(aliases) == self._kept:
+    def keep(self, aliases: Aliases, *, at_once: bool = False) -> None:
+        """Keep the table where it has grown. The file is replaced as a whole; where that takes long, as while a thousand devices
+        are declared one after the other, later calls keep it, unless it is to be done `at_once`."""
+        began_s = time.monotonic()
+        if self._file is None or len(aliases) == self._kept or (began_s < self._busy_until_s and not at_once):
             return
         self._kept = len(aliases)
         fresh = self._file.with_name(self._file.name + ".new")
@@ -47,6 +52,8 @@ class AliasFile:
             fresh.replace(self._file)
         except OSError as error:
             _log.warning("%s: the aliases cannot be kept: %s", self._file, error)
+        done_s = time.monotonic()
+        self._busy_until_s = done_s + SHARE_OF_TIME * (done_s - began_s)
 
 
 def _key(row: object) -> tuple[str | None, str]:

@@ -78,6 +78,7 @@ class EdgeNode:
         """Publish the node's death, disconnect and stop."""
         with self._lock:
             farewell = self._session.close(now_ms())
+            self._aliases.keep(self._session.aliases, at_once=True)
             self._tell(farewell)
         self._connection.close(farewell, timeout_s)
 
@@ -183,6 +184,7 @@ class EdgeNode:
 
     def _tick(self) -> None:
         with self._lock:
+            self._aliases.keep(self._session.aliases)
             self._send(self._session.tick(now_ms()))
 
     def _send(self, actions: Sequence[Action]) -> None:

@@ -31,6 +31,7 @@ EVENTS_A_POLL = 1000
 TICK_S = 0.1
 STALE_S_MAX = 60.0
 _NOWHERE = NodeId("", "")
+_NAMESPACE_LEVEL = f"{NAMESPACE}/"
 
 
 class _Mark(Enum):
@@ -162,11 +163,16 @@ class HostApplication:
 
     def publish_plain(self, topic: str, payload: bytes, *, qos: int = 0, retain: bool = False) -> bool:
         """Publish outside the Sparkplug namespace; False where the broker is gone or takes less than it is given."""
-        if topic.startswith(f"{NAMESPACE}/"):
-            raise ValueError(f"{topic!r} lies in the Sparkplug namespace; a host writes there by commands only")
+        return self.publish_all((Publish(topic, payload, qos, retain),))
+
+    def publish_all(self, messages: Sequence[Publish]) -> bool:
+        """Publish several messages outside the Sparkplug namespace; False where none was sent, as in `publish_plain`."""
+        for message in messages:
+            if message[0].startswith(_NAMESPACE_LEVEL):
+                raise ValueError(f"{message.topic!r} lies in the Sparkplug namespace; a host writes there by commands only")
         if not self._session.online or self._connection.full:
             return False
-        self._connection.send((Publish(topic, payload, qos, retain),))
+        self._connection.send(messages)
         return True
 
     def subscribe_plain(self, topic_filter: str) -> None:

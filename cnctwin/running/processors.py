@@ -1,7 +1,6 @@
 """Processors at work: beside `alerts` the courier that sends what its receivers are to be told, and beside
 `historian` the store that it keeps."""
 
-import gc
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -17,9 +16,6 @@ ALERTS = "alerts"
 def process(pairs: Sequence[Configured], broker: BrokerAddress, stop: threading.Event, *, group: str, state_dir: Path) -> None:
     """Run configured processors until `stop` is set. Raises ConfigurationError where a secret is missing, StoreError where the
     store cannot be used."""
-    # What a message brings lives until the next one of its machine comes. To look for cycles after each 700 objects, as Python
-    # does by itself, would be a quarter of all work; there are hardly any.
-    gc.set_threshold(50_000, 20, 100)
     with ExitStack() as stack:
         recorder = stack.enter_context(_recorder(pairs, group))
         stack.enter_context(_courier(pairs, broker, group))

@@ -75,7 +75,8 @@ class Lane:
         self.is_awaited = False  # its silence is watched (processors/running/silences.py)
         self._view: Mapping[str, Reading] = MappingProxyType(self.row)
         self._fold_in, self._inputs, self._machine, self._wakes = fold.take, picks.inputs, machine, fold.wakes
-        self._picks, self._names, self._pick = picks, (), picks.of(())
+        self._picks, self._pick = picks, picks.of(())
+        self._names: tuple[str, ...] = ()  # of the last message, which the next one nearly always has too
         self._counts = counts
         self._tick_ms = max(1, round(config.tick_s * 1000))
         self._gap_ms = round(config.gap_s_max * 1000)

@@ -10,6 +10,7 @@ What a processor of this process publishes comes to the others of it without the
 come already: as the broker would have sent it, had it been quick.
 """
 
+import gc
 import logging
 import os
 import socket
@@ -30,8 +31,11 @@ from twin.vocabulary.nodes import is_twin_node
 
 PROCESS = f"{socket.gethostname()}:{os.getpid()}"
 POLL_S = 0.05
-GATHER_S = 0.01  # what comes within it is read together: at the rates of a cell it is waking up that costs most
+GATHER_S = 0.02  # what comes within it is read together: at the rates of a cell it is waking up that costs most
 REPORT_S = 1.0
+# What a message brings lives until the next one of its machine comes. To look for cycles after each 700 objects, as Python does
+# by itself, would be a quarter of all work; there are hardly any cycles.
+SELDOM = (50_000, 20, 100)
 RESTORE_S_MAX = 1.0  # to wait for the next snapshot, or for our own nodes
 STALL_S = 1.0  # a longer pause of this process is no silence of the machine
 WAITING_MAX = 100_000  # events, while the snapshots are awaited
@@ -44,9 +48,9 @@ class Runner:
 
     def __init__(self, host: HostPort, workers: Sequence[Worker]) -> None:
         self._host = host
-        self._workers = tuple(sorted(workers, key=lambda worker: worker.name))
-        self._names = ", ".join(worker.name for worker in self._workers)
-        self._marker_topic = topics.marker_of(self._workers[0].name)
+        self.workers = tuple(sorted(workers, key=lambda worker: worker.name))
+        self._names = ", ".join(worker.name for worker in self.workers)
+        self._marker_topic = topics.marker_of(self.workers[0].name)
         self._readers: dict[str, tuple[Worker, ...]] = {}  # by node
         self._waiting: deque[HostEvent] = deque()
         self._is_restored = False
@@ -59,12 +63,20 @@ class Runner:
 
     def run(self, stop: Event) -> None:
         """Work until `stop` is set, then save, say goodbye and disconnect."""
-        for worker in self._workers:
+        thresholds = gc.get_threshold()
+        gc.set_threshold(*SELDOM)
+        try:
+            self._run(stop)
+        finally:
+            gc.set_threshold(*thresholds)
+
+    def _run(self, stop: Event) -> None:
+        for worker in self.workers:
             for topic_filter in worker.plain_filters():
                 self._host.subscribe_plain(topic_filter)
         self._host.subscribe_plain(self._marker_topic)
         self._host.start()
-        for worker in self._workers:
+        for worker in self.workers:
             worker.start()
         try:
             if self._restore(stop):
@@ -79,7 +91,7 @@ class Runner:
         called_s = time.monotonic()
         events = self._host.poll(POLL_S, GATHER_S)
         now_s = time.monotonic()
-        if not (self._host.backlog or any(worker.backlog for worker in self._workers)):
+        if not (self._host.backlog or any(worker.backlog for worker in self.workers)):
             self._lag.published(now_s)  # all of the turns before
         for event in events:
             self._take(event, now_s)
@@ -89,11 +101,11 @@ class Runner:
             self._patient_until_s = now_s + STALL_S  # we slept: what came meanwhile is still on its way to the queue
         self._turned_s = now_s
         if self._host.online and not self._host.queue_depth and now_s >= self._patient_until_s:
-            for worker in self._workers:
+            for worker in self.workers:
                 worker.silence(now_s)
         if now_s - self._reported_s >= REPORT_S:
             self._report_due(now_s)
-        for worker in self._workers:
+        for worker in self.workers:
             worker.turn(now_s)
 
     # Start and end.
@@ -110,7 +122,7 @@ class Runner:
                     complete = marked_s is not None
                     continue
                 if event.kind is EventKind.PLAIN:
-                    for worker in self._workers:
+                    for worker in self.workers:
                         worker.restore(event)
                     marked_s = None if marked_s is None else time.monotonic()
                 self._wait_with(event)  # a snapshot too: a recorder may want it
@@ -126,7 +138,7 @@ class Runner:
         self._is_restored = True
         self._await_edges(stop)
         now_s = time.monotonic()
-        for worker in self._workers:
+        for worker in self.workers:
             worker.begin(now_s)
         while self._waiting:
             self._take(self._waiting.popleft(), now_s, has_waited=True)
@@ -134,7 +146,7 @@ class Runner:
     def _await_edges(self, stop: Event) -> None:
         """Results can go out once our own nodes are born; a moment's patience saves the first ones."""
         until_s = time.monotonic() + RESTORE_S_MAX
-        while not (all(worker.online for worker in self._workers) or stop.is_set() or time.monotonic() > until_s):
+        while not (all(worker.online for worker in self.workers) or stop.is_set() or time.monotonic() > until_s):
             for event in self._host.poll(POLL_S):
                 self._wait_with(event)
 
@@ -150,9 +162,9 @@ class Runner:
             self._note_dropped()
             now_s = time.monotonic()
             shared = self._report(now_s)
-            for worker in self._workers:
+            for worker in self.workers:
                 worker.finish(now_s, shared)
-        for worker in self._workers:
+        for worker in self.workers:
             worker.stop()
         self._host.stop()
 
@@ -160,7 +172,7 @@ class Runner:
 
     def _take(self, event: HostEvent, now_s: float, *, has_waited: bool = False) -> None:
         if event.kind is _PLAIN:
-            for worker in self._workers:
+            for worker in self.workers:
                 worker.take_plain(event)
             return
         node = event.node.node
@@ -180,7 +192,7 @@ class Runner:
         node = event.node.node
         readers = self._readers.get(node)
         if readers is None:
-            readers = tuple(worker for worker in self._workers if worker.listens_to(node))
+            readers = tuple(worker for worker in self.workers if worker.listens_to(node))
             self._readers[node] = readers
         return readers
 
@@ -188,7 +200,7 @@ class Runner:
         self._reported_s = now_s
         self._note_dropped()
         shared = self._report(now_s)
-        for worker in self._workers:
+        for worker in self.workers:
             worker.beat(now_s, shared)
 
     def _report(self, now_s: float) -> Shared:
@@ -196,15 +208,15 @@ class Runner:
         broker, on which it would come late."""
         self._lag.report(now_s, time.time(), time.process_time())
         at_ms = time.time_ns() // 1_000_000
-        machines = max(len(worker.engine.machines) for worker in self._workers)
-        names = tuple(worker.name for worker in self._workers)
+        machines = max(len(worker.engine.machines) for worker in self.workers)
+        names = tuple(worker.name for worker in self.workers)
         lag_s, busy_pct = round(self._lag.published_s, 3), round(self._lag.busy_pct, 1)
         speaks = lag_s >= SPOKEN_OF_S
         if speaks or self._speaks_of_lag:
             report = LagReport(names, PROCESS, at_ms, lag_s, machines, busy_pct)
             topic, payload = topic_of(names[0]), report.payload()
             self._host.publish_plain(topic, payload)
-            for worker in self._workers:
+            for worker in self.workers:
                 worker.take_plain(HostEvent(EventKind.PLAIN, NodeId("", ""), None, at_ms, topic=topic, payload=payload))
         self._speaks_of_lag = speaks
         return {
@@ -219,7 +231,7 @@ class Runner:
         """What the queue in front of us has lost, each of the processors has lost."""
         overflowed = self._host.dropped - self._dropped
         self._dropped += overflowed
-        for worker in self._workers:
+        for worker in self.workers:
             worker.engine.overflowed(overflowed)
 
 

@@ -37,6 +37,18 @@ def run(
     session_dir: keeps the birth/death sequence numbers over restarts; all other state is kept on the broker
     recorder: for the processor that `records`
     """
+    runner_of(pairs, broker, group=group, session_dir=session_dir, recorder=recorder).run(stop)
+
+
+def runner_of(
+    pairs: Sequence[Configured],
+    broker: BrokerAddress,
+    *,
+    group: str = "cnc",
+    session_dir: Path | None = None,
+    recorder: Recorder | None = None,
+) -> Runner:
+    """Return the loop of a process, not begun: one host session and an edge node for each processor, on one MQTT loop."""
     processors = [processor for processor, _ in pairs]
     loop = Loop("processors")
     host = HostApplication(
@@ -59,7 +71,7 @@ def run(
             on_sent=host.hear if is_heard else None,
         )
         workers.append(Worker(processor, configuration, host, edge, recorder if processor.records else None))
-    Runner(host, workers).run(stop)
+    return Runner(host, workers)
 
 
 def host_id(processors: Sequence[AnyProcessor]) -> str:

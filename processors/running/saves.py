@@ -11,7 +11,7 @@ from itertools import chain, islice, takewhile
 AGAIN_S = 1.0  # after which a change is saved; it is noted once a second
 BYTES_A_SECOND = 40_000  # of one processor: some 30 machines
 BYTES_AT_ONCE = 120_000
-AT_ONCE_MAX = 100
+BYTES_MIN = 500  # of a unit
 
 
 class Saves:
@@ -46,7 +46,8 @@ class Saves:
         if self._bytes_left <= 0.0:
             return
         waited = takewhile(lambda unit: now_s - self._since_s[unit] >= AGAIN_S, self._since_s)
-        for unit in list(dict.fromkeys(islice(chain(self._pressing, waited), AT_ONCE_MAX))):
+        at_most = 1 + int(self._bytes_left / BYTES_MIN)
+        for unit in list(dict.fromkeys(islice(chain(self._pressing, waited), at_most))):
             if self._bytes_left <= 0.0:
                 return
             yield unit

@@ -9,6 +9,7 @@ import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import lru_cache
 
 from paho.mqtt.client import topic_matches_sub
 
@@ -21,6 +22,7 @@ from processors.running.engine import Engine
 from processors.running.lane import Stream
 from processors.running.ports import EdgePort, HostPort, Recorder
 from processors.running.saves import Saves
+from sparkplug.actions import Publish as PlainMessage
 from sparkplug.errors import SparkplugError
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import Change, MetricSpec
@@ -155,9 +157,9 @@ class Worker:
 
     def take_plain(self, event: HostEvent) -> None:
         """Fold a plain message, where the processor listens to its topic; keep it, where the recorder wants it."""
-        if self._recorder is not None and topic_matches_sub(self._recorder.keeps_plain, event.topic):
+        if self._recorder is not None and _matches(self._recorder.keeps_plain, event.topic):
             self._recorder.keep(event, event.timestamp_ms)
-        elif event.payload and any(topic_matches_sub(wanted, event.topic) for wanted in self._listens):
+        elif event.payload and any(_matches(wanted, event.topic) for wanted in self._listens):
             self._apply(self.engine.plain(event.topic, event.payload, event.timestamp_ms))
 
     def silence(self, now_s: float) -> None:
@@ -168,11 +170,13 @@ class Worker:
     def _apply(self, actions: Sequence[Action]) -> bool:
         """Carry out what the engine asks; whether everything could be sent."""
         sent = True
+        plain: list[PlainMessage] = []
         for action in actions:
-            if isinstance(action, Publish):
+            if isinstance(action, PlainOutput):
+                topic, payload, retain, qos = action
+                plain.append(PlainMessage(topic, payload, qos, retain))
+            elif isinstance(action, Publish):
                 sent = self._publish(action) and sent
-            elif isinstance(action, PlainOutput):
-                sent = self._host.publish_plain(action.topic, action.payload, qos=action.qos, retain=action.retain) and sent
             elif isinstance(action, Declare):
                 self._edge.declare_device(action.machine, [_with_latest(spec, action.latest) for spec in self._specs])
                 self._declared.add(action.machine)
@@ -186,8 +190,8 @@ class Worker:
             elif self._letters_left > 0:
                 self._letters_left -= 1
                 _log.warning("%s: dead letter of %s: %s", self.name, action.machine, action.payload.decode())
-                self._host.publish_plain(self._letter_prefix + topic_level(action.machine), action.payload)
-        return sent
+                plain.append(PlainMessage(self._letter_prefix + topic_level(action.machine), action.payload))
+        return (not plain or self._host.publish_all(plain)) and sent
 
     def _publish(self, action: Publish) -> bool:
         if action.machine not in self._declared:
@@ -252,6 +256,11 @@ class Worker:
         for node, device, name, value in recorder.receipts():
             with suppress(SparkplugError):  # an edge that is gone, or does not ask for receipts
                 self._host.send_command(node, device, [Change(name, value, at_ms)])
+
+
+@lru_cache(maxsize=50_000)
+def _matches(topic_filter: str, topic: str) -> bool:
+    return topic_matches_sub(topic_filter, topic)
 
 
 def _with_latest(spec: MetricSpec, latest: Sequence[Change]) -> MetricSpec:

@@ -18,6 +18,7 @@ from processors.running.ledger import DropReason
 from processors.running.runner import Runner
 from processors.running.worker import Worker
 from processors.thermal import PROCESSOR as THERMAL
+from sparkplug.actions import Publish
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import Change, MetricSpec, NodeId
 from tests.processors.recorder import RECORDER
@@ -58,6 +59,9 @@ class FakeHost:
     def subscribe_plain(self, topic_filter: str) -> None:
         assert not self.started, "subscriptions come first"
         self.subscriptions.append(topic_filter)
+
+    def publish_all(self, messages: Sequence[Publish]) -> bool:
+        return all(self.publish_plain(topic, payload, qos=qos, retain=retain) for topic, payload, qos, retain in messages)
 
     def publish_plain(self, topic: str, payload: bytes, *, qos: int = 0, retain: bool = False) -> bool:
         if not self.online:
