@@ -26,6 +26,8 @@ from sparkplug.metric import NodeId, Reading
 from twin.vocabulary.nodes import is_twin_node
 
 MACHINES_MAX = 1000
+Way = Callable[[Stream, float], list[Action]]
+"""Takes a message at a time on the wall; what comes of it."""
 _IS_HISTORICAL: Callable[[Reading], bool] = itemgetter(Reading._fields.index("is_historical"))
 
 
@@ -112,26 +114,31 @@ class Engine:
             self._silences.watch(machine)
         return actions
 
-    def stream(self, device: str, message: Stream, wall_s: float) -> list[Action] | None:
-        """Take data of a device whose names are given, as `feed`, by the shortest way; None where it has to be fed.
+    def way_of(self, node: NodeId, device: str) -> Way | None:
+        """Return the shortest way for data of a device whose names are given: it does what `feed` does.
 
-        There is such a way once a message of the node was fed, until the next birth or death of the machine.
+        There is one once a message of the node was fed; it holds until a machine is born, dies or is forgotten.
         """
         machine = self._machines.get(device)
-        if machine is None or (way := machine.ways.get(message[0])) is None:
+        if machine is None or (take := machine.ways.get(node)) is None:
             return None
-        ledger = self.ledger
-        self._emitted_before = ledger.emitted
-        actions, fates = way(message, wall_s)
-        if fates is FOLDED:  # what nearly every message is
-            ledger.received += 1
-            ledger.emitted += 1
-        else:
-            ledger.count(fates)
-        self._changed[machine.unit_name] = None
-        if not machine.live.is_awaited:
-            self._silences.watch(machine)
-        return actions
+        ledger, changed, unit, lane, silences = self.ledger, self._changed, machine.unit.name, machine.live, self._silences
+
+        def way(message: Stream, wall_s: float) -> list[Action]:
+            actions, fates = take(message, wall_s)
+            if actions:
+                self._emitted_before = ledger.emitted
+            if fates is FOLDED:  # what nearly every message is
+                ledger.received += 1
+                ledger.emitted += 1
+            else:
+                ledger.count(fates)
+            changed[unit] = None
+            if not lane.is_awaited:
+                silences.watch(machine)
+            return actions
+
+        return way
 
     def overflowed(self, count: int) -> None:
         """A full queue in front of us has lost so many messages."""

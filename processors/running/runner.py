@@ -20,6 +20,7 @@ from collections.abc import Sequence
 from threading import Event
 
 from processors.lag_report import SPOKEN_OF_S, LagReport, topic_of
+from processors.running.engine import Way
 from processors.running.lag import Lag
 from processors.running.lane import stream_of
 from processors.running.ports import HostPort
@@ -52,6 +53,7 @@ class Runner:
         self._names = ", ".join(worker.name for worker in self.workers)
         self._marker_topic = topics.marker_of(self.workers[0].name)
         self._readers: dict[str, tuple[Worker, ...]] = {}  # by node
+        self._ways: dict[tuple[NodeId, str], list[tuple[Worker, Way | None]]] = {}
         self._waiting: deque[HostEvent] = deque()
         self._is_restored = False
         self._turned_s = time.monotonic()
@@ -106,7 +108,8 @@ class Runner:
         if now_s - self._reported_s >= REPORT_S:
             self._report_due(now_s)
         for worker in self.workers:
-            worker.turn(now_s)
+            if worker.turn(now_s):
+                self._ways.clear()
 
     # Start and end.
 
@@ -175,17 +178,33 @@ class Runner:
             for worker in self.workers:
                 worker.take_plain(event)
             return
-        node = event.node.node
-        readers = self._readers.get(node) or self._readers_of(event)
         if event.names and not has_waited:
-            message = stream_of(event)
-            for worker in readers:
-                worker.stream(event, message, now_s)
+            self._stream(event, now_s)
         else:
-            for worker in readers:
+            if event.kind is not _DATA:
+                self._ways.clear()
+            for worker in self._readers_of(event):
                 worker.take(event, now_s, has_waited=has_waited)
+        node = event.node.node
         if event.kind is _DATA and not is_twin_node(node) and not _is_late(event):
             self._lag.folded(node, event.timestamp_ms, time.monotonic())
+
+    def _stream(self, event: HostEvent, now_s: float) -> None:
+        """Data whose names are given take the shortest way through each processor, as long as nobody is born or dies."""
+        source, device = event.node, event.device or ""
+        ways = self._ways.get((source, device))
+        if ways is None:
+            ways = self._ways[source, device] = [(worker, None) for worker in self._readers_of(event)]
+        message = stream_of(event)
+        for place, (worker, way) in enumerate(ways):
+            if way is None:  # the first message shows the way
+                worker.take(event, now_s)
+                ways[place] = (worker, worker.engine.way_of(source, device))
+                continue
+            if worker.records:
+                worker.record(event)
+            if actions := way(message, now_s):
+                worker.send(actions)
 
     def _readers_of(self, event: HostEvent) -> tuple[Worker, ...]:
         """The processors that read the node of an event; they are found once for each node."""

@@ -41,10 +41,6 @@ class Machine:
     owner: dict[str, NodeId] = field(default_factory=dict)
     excluded: dict[NodeId, frozenset[str]] = field(default_factory=dict)
     ways: dict[NodeId, Callable[[Stream, float], Folded]] = field(default_factory=dict)
-    unit_name: str = ""
-
-    def __post_init__(self) -> None:
-        self.unit_name = self.unit.name
 
     @property
     def is_online(self) -> bool:

@@ -19,7 +19,6 @@ from processors.discovery import AnyProcessor
 from processors.errors import SnapshotError
 from processors.plain_topic import topic_level
 from processors.running.engine import Engine
-from processors.running.lane import Stream
 from processors.running.ports import EdgePort, HostPort, Recorder
 from processors.running.saves import Saves
 from sparkplug.actions import Publish as PlainMessage
@@ -89,12 +88,14 @@ class Worker:
         self._unborn_until_s = now_s + UNBORN_S_MAX
         self._reconnects = self._host.reconnects
 
-    def turn(self, now_s: float) -> None:
-        """Do what is due."""
-        if self._unborn_until_s is not None and now_s >= self._unborn_until_s:
+    def turn(self, now_s: float) -> bool:
+        """Do what is due; return True if machines have died of it."""
+        is_unborn_due = self._unborn_until_s is not None and now_s >= self._unborn_until_s
+        if is_unborn_due:
             self._unborn_until_s = None
             self._apply(self.engine.bury_unborn(time.time_ns() // 1_000_000))
         self._save(self._saves.due(now_s))
+        return is_unborn_due
 
     def beat(self, now_s: float, shared: Shared) -> None:
         """A second has passed: report, with the state that all processors of the process share."""
@@ -127,28 +128,26 @@ class Worker:
 
     # What it is given.
 
+    @property
+    def records(self) -> bool:
+        """True if what it reads is recorded."""
+        return self._recorder is not None
+
     def listens_to(self, node: str) -> bool:
         """Return True if the processor reads the node."""
         return self._processor.listens_to(node)
 
     def take(self, event: HostEvent, now_s: float, *, has_waited: bool = False) -> None:
         """Fold an event of a node that it reads, and send what comes of it."""
-        if self._recorder is not None:
-            self._recorder.keep(event, time.time_ns() // 1_000_000)
+        self.record(event)
         self.send(self.engine.feed(event, now_s, has_waited=has_waited))
         if event.kind is EventKind.BIRTH and event.device is not None:
             self._press(event.device, is_new=True)
 
-    def stream(self, event: HostEvent, message: Stream, now_s: float) -> None:
-        """Take data whose names are given: as `take`, by the shortest way."""
-        actions = self.engine.stream(event[2] or "", message, now_s)
-        if actions is None:
-            self.take(event, now_s)
-            return
+    def record(self, event: HostEvent) -> None:
+        """Have an event recorded, where the processor records."""
         if self._recorder is not None:
             self._recorder.keep(event, time.time_ns() // 1_000_000)
-        if actions:
-            self.send(actions)
 
     def send(self, actions: Sequence[Action]) -> None:
         """Send what came of the last event."""
