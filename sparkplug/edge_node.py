@@ -4,7 +4,7 @@ import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
-from sparkplug.actions import Action, Barrier, Connect, Disconnect, Publish, WalkToNextServer
+from sparkplug.actions import Barrier, Connect
 from sparkplug.alias_file import AliasFile
 from sparkplug.bdseq import BdSeq
 from sparkplug.broker import BrokerAddress
@@ -25,8 +25,7 @@ class EdgeNode:
     restarts, and a file beside it the aliases. `mqtt_version` (4 or 5) goes before that of the first address. `on_command` is
     called from the connection's thread for each value that a host wants written, `on_confirmed` for each `barrier` that the
     broker has acknowledged; they are published on `barrier_topic`. `loop` serves the connection, which has a loop of its own
-    otherwise. `on_sent` is called with the topic and the payload of each message of the session that is handed to a connected
-    broker, in their order, and with the death that the broker publishes when the connection is lost; it must not call this node.
+    otherwise.
     """
 
     def __init__(
@@ -43,7 +42,6 @@ class EdgeNode:
         barrier_topic: str = "",
         on_confirmed: Callable[[int], None] = lambda _: None,
         loop: Loop | None = None,
-        on_sent: Callable[[str, bytes], None] | None = None,
     ) -> None:
         self._bd_seq = BdSeq(session_file)
         self._aliases = AliasFile(None if session_file is None else session_file.with_name(session_file.name + ".aliases"))
@@ -54,9 +52,6 @@ class EdgeNode:
         self._barrier_topic = barrier_topic
         self._lock = threading.Lock()
         self._on_command = on_command
-        self._on_sent = on_sent
-        self._last_will: Publish | None = None  # of the last attempt to connect
-        self._will: Publish | None = None  # that the broker publishes when it loses the present connection
         listener = Listener(
             self._connecting, self._bd_seq.give_back, self._connected, self._message, self._lost, self._tick, on_confirmed
         )
@@ -79,7 +74,6 @@ class EdgeNode:
         with self._lock:
             farewell = self._session.close(now_ms())
             self._aliases.keep(self._session.aliases, at_once=True)
-            self._tell(farewell)
         self._connection.close(farewell, timeout_s)
 
     @property
@@ -120,12 +114,12 @@ class EdgeNode:
         with self._lock:
             actions = self._session.declare_device(device, metrics, now_ms())
             self._aliases.keep(self._session.aliases)
-            self._send(actions)
+            self._connection.send(actions)
 
     def remove_device(self, device: str) -> None:
         """Publish the death of a device and forget it."""
         with self._lock:
-            self._send(self._session.remove_device(device, now_ms()))
+            self._connection.send(self._session.remove_device(device, now_ms()))
 
     def publish(self, device: str | None, changes: Sequence[Change]) -> bool:
         """Send changes of a device (None: of the node) in one message, and keep them for the next birth.
@@ -139,7 +133,7 @@ class EdgeNode:
                 self._session.note(device, changes)
                 return False
             actions = self._session.publish(device, changes, now_ms())
-            self._send(actions)
+            self._connection.send(actions)
         return bool(actions)
 
     def barrier(self, token: int, session: int) -> bool:
@@ -158,25 +152,19 @@ class EdgeNode:
     def _connecting(self, server: int) -> Connect:
         with self._lock:
             self._number += 1
-            connect = self._session.connecting(self._bd_seq.next(), now_ms(), server)
-            self._last_will = connect.will
-            return connect
+            return self._session.connecting(self._bd_seq.next(), now_ms(), server)
 
     def _connected(self) -> None:
         with self._lock:
-            self._will = self._last_will
-            self._send(self._session.connected(now_ms()))
+            self._connection.send(self._session.connected(now_ms()))
 
     def _lost(self) -> None:
         with self._lock:
             self._session.lost()
-            if self._will is not None:
-                self._tell((self._will,))
-            self._will = None
 
     def _message(self, topic: str, payload: bytes) -> None:
         with self._lock:
-            self._send(self._session.message(topic, payload, now_ms()))
+            self._connection.send(self._session.message(topic, payload, now_ms()))
             commands, self._session.commands = self._session.commands, []
         if self._on_command is not None:
             for command in commands:
@@ -185,16 +173,4 @@ class EdgeNode:
     def _tick(self) -> None:
         with self._lock:
             self._aliases.keep(self._session.aliases)
-            self._send(self._session.tick(now_ms()))
-
-    def _send(self, actions: Sequence[Action]) -> None:
-        if actions:
-            self._connection.send(actions)
-            self._tell(actions)
-
-    def _tell(self, actions: Sequence[Action]) -> None:
-        for action in actions:
-            if isinstance(action, Disconnect | WalkToNextServer):
-                self._will = None  # the death has been sent before it
-            elif isinstance(action, Publish) and self._on_sent is not None:
-                self._on_sent(action.topic, action.payload)
+            self._connection.send(self._session.tick(now_ms()))

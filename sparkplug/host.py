@@ -9,7 +9,7 @@ than a value.
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from enum import Enum
 from random import Random
 
@@ -44,8 +44,8 @@ class _Mark(Enum):
 class HostApplication:
     """Listens to edge nodes; `wanted` picks them, `topic_filters` tells the broker what to send.
 
-    `loop` serves the connection, which has a loop of its own otherwise. Messages of `local` nodes are read only where they come
-    by `hear`. Data that have waited for longer than `stale_s_max` are dropped.
+    `loop` serves the connection, which has a loop of its own otherwise. Data that have waited for longer than `stale_s_max` are
+    dropped.
     """
 
     def __init__(
@@ -61,13 +61,12 @@ class HostApplication:
         publish_state: bool = True,
         wanted: Callable[[NodeId], bool] = lambda _: True,
         loop: Loop | None = None,
-        local: Collection[NodeId] = (),
         stale_s_max: float = STALE_S_MAX,
     ) -> None:
         self.dropped = 0
         self._queue_max = queue_max
         self._stale_s_max = stale_s_max
-        self._wanted, self._local = wanted, frozenset(local)
+        self._wanted = wanted
         self._session = HostSession(
             host_id,
             topic_filters,
@@ -156,11 +155,6 @@ class HostApplication:
             if events or now_s >= deadline_s:
                 return events
 
-    def hear(self, topic: str, payload: bytes) -> None:
-        """Take a message as if the broker had sent it. From any thread."""
-        self._message(topic, payload)
-        self._connection.loop.nudge()
-
     def publish_plain(self, topic: str, payload: bytes, *, qos: int = 0, retain: bool = False) -> bool:
         """Publish outside the Sparkplug namespace; False where the broker is gone or takes less than it is given."""
         return self.publish_all((Publish(topic, payload, qos, retain),))
@@ -232,7 +226,7 @@ class HostApplication:
             verb, node, _ = Topic.parse(topic)
         except TopicError:
             return True
-        return verb not in (Verb.NCMD, Verb.DCMD) and node not in self._local and self._wanted(node)
+        return verb not in (Verb.NCMD, Verb.DCMD) and self._wanted(node)
 
     def _connecting(self, _server: int) -> Connect:
         return self._session.connecting(now_ms())

@@ -5,9 +5,8 @@
 Start: subscribe to the snapshots, then publish a marker behind them: when it comes back, all retained snapshots have come. Only
 then is anything folded; what comes before waits.
 
-The order is that of arrival. A message is folded by its readers in the order of their names, before the next one is looked at.
-What a processor of this process publishes comes to the others of it without the way over the broker (`local`), behind what had
-come already: as the broker would have sent it, had it been quick.
+The order is the broker's, for what the processors of this process say of each other too: so all processes, and a historian among
+them, see one order. A message is folded by its readers in the order of their names, before the next one is looked at.
 """
 
 import gc

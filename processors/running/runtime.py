@@ -56,19 +56,16 @@ def runner_of(
         host_id(processors),
         (group_filter(group),),
         wanted=lambda node: any(processor.listens_to(node.node) for processor in processors),
-        local=[NodeId(group, processor.node) for processor in processors],
         loop=loop,
     )
     workers = []
     for processor, configuration in pairs:
-        is_heard = any(other.listens_to(processor.node) for other in processors)
         edge = EdgeNode(
             broker,
             NodeId(group, processor.node),
             node_metrics(records=processor.records),
             session_file=None if session_dir is None else session_dir / f"{processor.node}.json",
             loop=loop,
-            on_sent=host.hear if is_heard else None,
         )
         workers.append(Worker(processor, configuration, host, edge, recorder if processor.records else None))
     return Runner(host, workers)

@@ -1,4 +1,4 @@
-"""What a host application takes into its inbox, from the broker and from its own process, and what it drops."""
+"""What a host application takes into its inbox, and what it drops."""
 
 from __future__ import annotations
 
@@ -44,27 +44,6 @@ def unconnected(**options: object) -> HostApplication:
     return HostApplication(BrokerAddress(), "test", **options)  # type: ignore[arg-type]
 
 
-def test_what_is_heard_is_read_as_if_the_broker_had_sent_it() -> None:
-    host = unconnected(local=(NODE,))
-    for message in life(NODE, 3):
-        host.hear(message.topic, message.payload)
-    events = host.poll(0.0)
-    assert [event.kind for event in events] == [EventKind.BIRTH] * 2 + [EventKind.DATA] * 3
-    assert values_of(events) == [0.0, 1.0, 2.0]
-
-
-def test_who_waits_for_messages_is_woken_by_what_is_heard() -> None:
-    host = unconnected()
-    messages = life(NODE, 0)
-    later = threading.Timer(0.1, lambda: [host.hear(message.topic, message.payload) for message in messages])
-    later.start()
-    began_s = time.monotonic()
-    while not host.poll(PATIENCE_S):
-        pass
-    assert time.monotonic() - began_s < PATIENCE_S / 2
-    later.join()
-
-
 @pytest.mark.parametrize(
     ("topic", "is_read"),
     [
@@ -72,7 +51,6 @@ def test_who_waits_for_messages_is_woken_by_what_is_heard() -> None:
         ("spBv1.0/cnc/NDEATH/edge-okuma", True),
         ("spBv1.0/cnc/NCMD/edge-okuma", False),
         ("spBv1.0/cnc/DCMD/edge-okuma/okuma", False),
-        ("spBv1.0/cnc/DDATA/twin-thermal/okuma", False),  # comes by hear
         ("spBv1.0/cnc/NBIRTH/edge-nobody", False),  # not wanted
         ("spBv1.0/STATE/test", True),
         ("spBv1.0/STATE/another", False),
@@ -81,7 +59,7 @@ def test_who_waits_for_messages_is_woken_by_what_is_heard() -> None:
     ],
 )
 def test_what_nobody_would_read_is_thrown_away_by_its_topic(topic: str, is_read: bool) -> None:
-    host = unconnected(local=(NODE,), wanted=lambda node: node.node != "edge-nobody")
+    host = unconnected(wanted=lambda node: node.node != "edge-nobody")
     assert host._is_read(topic) is is_read
 
 
@@ -91,11 +69,11 @@ def test_data_that_have_waited_too_long_are_dropped_and_births_and_deaths_are_ke
     monkeypatch.setattr(host_module.time, "monotonic", lambda: now_s)
     birth, device, *data = life(NODE, 3)
     for message in (birth, device, *data):
-        host.hear(message.topic, message.payload)
-    host.hear("cnc/DATA/plain", b"of any age")
+        host._message(message.topic, message.payload)
+    host._message("cnc/DATA/plain", b"of any age")
     now_s += 61.0
     death = Publish("spBv1.0/cnc/DDEATH/twin-thermal/okuma", b"")
-    host.hear(death.topic, death.payload)
+    host._message(death.topic, death.payload)
     events = host.poll(0.0)
     assert [event.kind for event in events if event.kind is not EventKind.HOLE][:3] == [
         EventKind.BIRTH,
@@ -111,7 +89,7 @@ def test_data_of_any_age_below_the_bound_are_read(monkeypatch: pytest.MonkeyPatc
     now_s = time.monotonic()
     monkeypatch.setattr(host_module.time, "monotonic", lambda: now_s)
     for message in life(NODE, 3):
-        host.hear(message.topic, message.payload)
+        host._message(message.topic, message.payload)
     now_s += 59.0
     assert values_of(host.poll(0.0)) == [0.0, 1.0, 2.0]
     assert host.dropped == 0
@@ -119,15 +97,12 @@ def test_data_of_any_age_below_the_bound_are_read(monkeypatch: pytest.MonkeyPatc
 
 @pytest.mark.broker
 @pytest.mark.parametrize("version", [4, 5])
-def test_a_node_of_the_same_process_is_heard_without_the_way_over_the_broker(mosquitto: Mosquitto, version: int) -> None:
-    """Both share a loop. Everything that the node sends is heard once, its death too when its connection is cut."""
+def test_a_host_and_a_node_share_a_loop_and_all_of_the_node_is_read_once(mosquitto: Mosquitto, version: int) -> None:
     with Proxy(upstream=mosquitto.address) as proxy:
         loop = Loop()
-        host = HostApplication(BrokerAddress(*mosquitto.address), "test", mqtt_version=version, loop=loop, local=(NODE,))
-        node = EdgeNode(BrokerAddress(port=proxy.port), NODE, mqtt_version=version, loop=loop, on_sent=host.hear)
+        host = HostApplication(BrokerAddress(*mosquitto.address), "test", mqtt_version=version, loop=loop)
+        node = EdgeNode(BrokerAddress(port=proxy.port), NODE, mqtt_version=version, loop=loop)
         node.declare_device("okuma", [MetricSpec("load", DataType.DOUBLE)])
-        host.start()
-        node.start()
         events: list[HostEvent] = []
 
         def poll_until(kinds: list[EventKind]) -> None:
@@ -136,18 +111,20 @@ def test_a_node_of_the_same_process_is_heard_without_the_way_over_the_broker(mos
                 assert time.monotonic() < deadline_s, events
                 events.extend(host.poll(0.1))
 
-        births = [EventKind.BIRTH] * 2
+        host.start()
+        while not host.online:
+            host.poll(0.1)
+        node.start()
+        births, deaths = [EventKind.BIRTH] * 2, [EventKind.DEATH] * 2
         poll_until(births)
         for number in range(3):
             assert node.publish("okuma", [Change("load", float(number), number)])
+        poll_until([*births, *[EventKind.DATA] * 3])
         proxy.cut()
-        deaths = [EventKind.DEATH] * 2
         poll_until([*births, *[EventKind.DATA] * 3, *deaths, *births])
         assert values_of(events) == [0.0, 1.0, 2.0]
         assert not [thread for thread in threading.enumerate() if thread.name.startswith("mqtt cnc")], "one loop, one thread"
         node.stop()
         poll_until([*births, *[EventKind.DATA] * 3, *deaths, *births, *deaths])
         host.stop()
-        sent = [packet.topic for packet in proxy.packets("up", PublishPacket)]
-        assert sum("DDATA" in topic for topic in sent) <= 3
-        assert sent[-1] == "spBv1.0/cnc/NDEATH/twin-thermal"
+        assert proxy.packets("up", PublishPacket)[-1].topic == "spBv1.0/cnc/NDEATH/twin-thermal"
