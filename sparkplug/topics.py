@@ -112,3 +112,13 @@ def group_filter(group: str) -> str:
     'spBv1.0/cnc/#'
     """
     return f"{NAMESPACE}/{group}/#"
+
+
+def uncommanded_filters(group: str) -> tuple[str, ...]:
+    """The filters that hear all births, data and deaths of a group, and no commands.
+
+    >>> uncommanded_filters("cnc")[:2], len(uncommanded_filters("cnc"))
+    (('spBv1.0/cnc/NBIRTH/+', 'spBv1.0/cnc/NDEATH/+'), 6)
+    """
+    verbs = (verb for verb in Verb if verb not in (Verb.NCMD, Verb.DCMD))
+    return tuple(f"{NAMESPACE}/{group}/{verb.value}/{'+/+' if verb.of_device else '+'}" for verb in verbs)

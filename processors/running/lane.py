@@ -97,7 +97,7 @@ class Lane:
         _, readings, names, oldest_ms, newest_ms = message
         clock_ms, last_ms, fold = self.clock_ms, self.last_ms, self.fold
         if self._inputs is None:
-            self.row.update(zip(names, readings, strict=True))
+            self.row.update(zip(names, readings))  # noqa: B905 — as long as each other; `strict` is slower
             return self._fold(_DATA, newest_ms if clock_ms is None else clock_ms, names)
         if clock_ms is None or self._held or oldest_ms < last_ms or newest_ms > last_ms + self._gap_ms:
             return self.data(readings, wall_s)
@@ -113,7 +113,7 @@ class Lane:
         taken, get, wakes = self._pick
         if not taken:
             return actions or [], FOLDED  # nothing in it for this processor but the time
-        self.row.update(zip(taken, get(readings), strict=True))
+        self.row.update(zip(taken, get(readings)))  # noqa: B905
         if not wakes:
             return actions or [], FOLDED  # the next tick sees it
         sample = (self._machine, _DATA, clock_ms / 1000, self._view, taken, 0.0, "", fold.is_history, fold.cell, "")

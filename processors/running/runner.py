@@ -179,14 +179,11 @@ class Runner:
             return
         if event.names and not has_waited:
             self._stream(event, now_s)
-        else:
-            if event.kind is not _DATA:
-                self._ways.clear()
-            for worker in self._readers_of(event):
-                worker.take(event, now_s, has_waited=has_waited)
-        node = event.node.node
-        if event.kind is _DATA and not is_twin_node(node) and not _is_late(event):
-            self._lag.folded(node, event.timestamp_ms, time.monotonic())
+            return
+        if event.kind is not _DATA:
+            self._ways.clear()
+        for worker in self._readers_of(event):
+            worker.take(event, now_s, has_waited=has_waited)
 
     def _stream(self, event: HostEvent, now_s: float) -> None:
         """Data whose names are given take the shortest way through each processor, as long as nobody is born or dies."""
@@ -199,11 +196,13 @@ class Runner:
             if way is None:  # the first message shows the way
                 worker.take(event, now_s)
                 ways[place] = (worker, worker.engine.way_of(source, device))
-                continue
-            if worker.records:
-                worker.record(event)
-            if actions := way(message, now_s):
-                worker.send(actions)
+            else:
+                if worker.records:
+                    worker.record(event)
+                if actions := way(message, now_s):
+                    worker.send(actions)
+        if not is_twin_node(source.node):
+            self._lag.folded(source.node, event.timestamp_ms, time.monotonic())
 
     def _readers_of(self, event: HostEvent) -> tuple[Worker, ...]:
         """The processors that read the node of an event; they are found once for each node."""
@@ -251,8 +250,3 @@ class Runner:
         self._dropped += overflowed
         for worker in self.workers:
             worker.engine.overflowed(overflowed)
-
-
-def _is_late(event: HostEvent) -> bool:
-    """Return True if a message holds what its edge had buffered."""
-    return not event.names and any(reading.is_historical for reading in event.readings)

@@ -15,7 +15,7 @@ from sparkplug.broker import BrokerAddress
 from sparkplug.edge_node import EdgeNode
 from sparkplug.host import HostApplication
 from sparkplug.metric import NodeId
-from sparkplug.topics import group_filter
+from sparkplug.topics import uncommanded_filters
 from sparkplug.transport.loop import Loop
 
 OTHERS = ("validation",)  # tables of the same file that are for no processor
@@ -54,7 +54,7 @@ def runner_of(
     host = HostApplication(
         broker,
         host_id(processors),
-        (group_filter(group),),
+        uncommanded_filters(group),
         wanted=lambda node: any(processor.listens_to(node.node) for processor in processors),
         loop=loop,
     )

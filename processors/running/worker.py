@@ -46,6 +46,7 @@ class Worker:
         recorder: Recorder | None = None,
     ) -> None:
         self.name = processor.name
+        self.records = recorder is not None
         self.engine = Engine(processor, configuration)
         self._processor, self._host, self._edge, self._recorder = processor, host, edge, recorder
         self._specs: tuple[MetricSpec, ...] = tuple(spec.metric() for spec in processor.outputs)
@@ -127,11 +128,6 @@ class Worker:
         return self._edge.backlog
 
     # What it is given.
-
-    @property
-    def records(self) -> bool:
-        """True if what it reads is recorded."""
-        return self._recorder is not None
 
     def listens_to(self, node: str) -> bool:
         """Return True if the processor reads the node."""
