@@ -18,7 +18,8 @@ from sparkplug.metric import Change, Reading
 from sparkplug.quality import Quality
 
 FORMAT = 2
-PLAIN_TYPES = (bool, int, float, str)
+PLAIN_TYPES = (float, int, str, type(None))  # and bool, which is an int; the most frequent one first
+_to_json = json.JSONEncoder(separators=(",", ":"), ensure_ascii=False, check_circular=False).encode
 
 
 def encode_state(adapter: TypeAdapter[Any], state: Any) -> Any:
@@ -55,7 +56,7 @@ class SnapshotCodec:
             "live": self._part(live, lanes),
             "history": None if history is None else self._part(history, late),
         }
-        return json.dumps(document, separators=(",", ":"), ensure_ascii=False).encode()
+        return _to_json(document).encode()
 
     def unit(self, payload: bytes) -> tuple[str, dict[str, Any]]:
         """The unit's name and the document. Raises SnapshotError where it is none of ours."""
@@ -92,6 +93,11 @@ class SnapshotCodec:
         }
 
 
+# The fields that a snapshot holds of each, in their order; JSON writes a quality as its number, and a tuple as a list.
+_TOLD_OF_READING = slice(Reading._fields.index("value"), Reading._fields.index("reason") + 1)
+_TOLD_OF_CHANGE = slice(Change._fields.index("value"), Change._fields.index("reason") + 1)
+
+
 def _lane_document(lane: Lane) -> dict[str, Any]:
     return {
         "clock_ms": lane.clock_ms,
@@ -100,15 +106,8 @@ def _lane_document(lane: Lane) -> dict[str, Any]:
         "is_silent": lane.is_silent,
         "births": lane.births,
         # The broker gives tables, bytes and templates again with the next birth.
-        "row": {
-            name: [reading.value, reading.timestamp_ms, int(reading.quality), reading.unit, reading.reason]
-            for name, reading in lane.row.items()
-            if reading.value is None or isinstance(reading.value, PLAIN_TYPES)
-        },
-        "latest": {
-            name: [change.value, change.timestamp_ms, int(change.quality), change.reason]
-            for name, change in lane.emission.latest.items()
-        },
+        "row": {name: reading[_TOLD_OF_READING] for name, reading in lane.row.items() if isinstance(reading[1], PLAIN_TYPES)},
+        "latest": {name: change[_TOLD_OF_CHANGE] for name, change in lane.emission.latest.items()},
     }
 
 
