@@ -106,7 +106,7 @@ def _with_inputs(config: Config, state: State, sample: Sample) -> State:
         return replace(_advanced(config.network, state, sample.at_s), blind_since_s=since_s, why_blind=why_blind)
     if state.blind_since_s is not None and sample.at_s - state.blind_since_s > config.gap_s_max:
         state = State(why_not=state.why_blind)
-    ambient_c, _ = sample.number(AMBIENT)
+    ambient_c = sample.number(AMBIENT)[0] if AMBIENT in sample.row else None
     if ambient_c is None:
         ambient_c = config.ambient_temp_c
     if state.at_s is None:

@@ -74,4 +74,4 @@ def rise_after(network: ThermalNetwork, rise_k: float, heat_w: float, duration_s
     if duration_s < 0.0:
         raise ValueError(f"duration_s is {duration_s!r}; a step cannot be negative")
     final_k = heat_w * network.resistance_k_per_w
-    return final_k + (rise_k - final_k) * math.exp(-duration_s / network.time_constant_s)
+    return final_k + (rise_k - final_k) * math.exp(-duration_s / (network.resistance_k_per_w * network.capacity_j_per_k))

@@ -52,17 +52,18 @@ def execution(sample: Sample, feed_mm_min_min: float) -> Execution:
     >>> execution(Sample("vmc", SampleKind.TICK, 0.0, {}), 1.0)
     Execution(state=None, reason='exec_state is not offered', basis='told by the control')
     """
-    reading = sample.row.get(EXECUTION)
-    if reading is None and FEED in sample.row:
-        feed = sample.row[FEED]
+    row = sample.row
+    reading = row.get(EXECUTION)
+    if reading is None:
+        feed = row.get(FEED)
+        if feed is None:
+            return Execution(None, f"{EXECUTION} is not offered")
         if feed.quality is _STALE and feed.reason != "not offered any more":
             return Execution(OFFLINE, basis=BY_FEED)
         mm_min, unknown = sample.number(FEED)
         if mm_min is None:
             return Execution(None, unknown or "", BY_FEED)
         return _FED if mm_min >= feed_mm_min_min else _UNFED
-    if reading is None:
-        return Execution(None, f"{EXECUTION} is not offered")
     if reading.quality is _STALE and reading.reason != "not offered any more":
         return Execution(OFFLINE)
     if (reason := why_unknown(reading)) is not None:
@@ -96,6 +97,8 @@ def is_changing_tool(row: Mapping[str, Reading]) -> bool:
 
 def is_held_by_override(sample: Sample) -> bool:
     """Return True if the feed override stands at zero."""
+    if FEED_OVERRIDE not in sample.row:
+        return False
     percent, _ = sample.number(FEED_OVERRIDE)
     return percent is not None and percent <= 0.0
 
@@ -120,6 +123,6 @@ def stop_reason(state: str, sample: Sample) -> str:
     if state == COMPLETED:
         return "program completed"
     mode = text(row, MODE)
-    if mode is not None and mode not in {"AUTOMATIC", "SEMI_AUTOMATIC"}:
+    if mode is not None and mode not in ("AUTOMATIC", "SEMI_AUTOMATIC"):
         return f"mode {mode}"
     return NOT_TOLD

@@ -9,7 +9,7 @@ reconnects says everything again), is no event.
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
-from functools import cache
+from functools import cache, lru_cache
 from typing import NamedTuple
 
 from pydantic import Field
@@ -51,6 +51,7 @@ UTILISATION, TODAY = f"{TWIN_PREFIX}utilisation_pct", f"{TWIN_PREFIX}utilisation
 STOP, STOP_S, PART = STOP_REASON, f"{TWIN_PREFIX}stop_s", PART_RECORD
 WATCHED = frozenset({EXECUTION, PROGRAM, MODE, ALARM, CHANGING, FEED_OVERRIDE})
 TOLD_EVERY_S = 60.0
+REASONS_MAX = 1000  # whose outputs are remembered
 STAMP_MAX_S = 253_402_300_000.0
 _DATA, _TICK, _BIRTH, _HOLE = SampleKind.DATA, SampleKind.TICK, SampleKind.BIRTH, SampleKind.HOLE
 
@@ -115,6 +116,8 @@ def step(config: Config, state: State, sample: Sample) -> tuple[State, Sequence[
     if state.run is not None and not _at_once().isdisjoint(changed):
         state = replace(state, run=followed(state.run, sample))
     state = _moved(config, state, sample, now, outputs)
+    if kind is _DATA and not outputs and now.state is not None and _why(state, now.state, sample) == state.reason:
+        return state, _told_again(state.reason)  # what nearly every message brings: nothing but time has passed
     state = _stopped(state, sample, now, outputs)
     if kind in (_TICK, _BIRTH) and not 0.0 <= sample.at_s - state.told_s < TOLD_EVERY_S:
         state = replace(state, told_s=sample.at_s)
@@ -158,7 +161,6 @@ def _lasted(config: Config, state: State, sample: Sample) -> State:
 
 def _moved(config: Config, state: State, sample: Sample, now: Execution, outputs: list[Output]) -> State:
     """Follow the execution state; what comes back as it was has not changed."""
-    at_ms = round(sample.at_s * 1000)
     if now.state is None or now.state == OFFLINE:
         if state.is_known:
             unknown = Output(STATE, OFFLINE) if now.state else Output.null(STATE, now.reason or "unknown")
@@ -177,6 +179,7 @@ def _moved(config: Config, state: State, sample: Sample, now: Execution, outputs
     if now.state == before and not _is_another(state.run, program):
         return _named(state, program)  # said again after a while in which nothing was heard
     if now.state != before:
+        at_ms = round(sample.at_s * 1000)
         state = replace(state, execution=now.state, since_ms=at_ms)
         outputs.append(Output(SINCE, _utc(at_ms), reason=None if was_known else "at the latest: it was not heard before"))
     return _with_run(config, state, _Turn(sample, now.state, program, was_known and before is not None, outputs))
@@ -242,7 +245,15 @@ def _ended(config: Config, state: State, run: Run, turn: _Turn, ended_by: str) -
     return replace(state, number=number)
 
 
-_WORKS = Output(STOP, NO_STOP)
+@lru_cache(maxsize=REASONS_MAX)
+def _told_again(reason: str) -> tuple[Output, ...]:
+    """Return the output of a reason, always the same tuple: whoever sends it sees at a glance that it is not new."""
+    return (Output(STOP, reason),)
+
+
+def _why(state: State, now: str, sample: Sample) -> str:
+    """Return why the machine stands, or that it does not."""
+    return why_standing(now, sample, is_held=state.is_held) or NO_STOP
 
 
 def _stopped(state: State, sample: Sample, now: Execution, outputs: list[Output]) -> State:
@@ -250,17 +261,17 @@ def _stopped(state: State, sample: Sample, now: Execution, outputs: list[Output]
     if now.state is None:
         outputs.append(Output.null(STOP, now.reason or "unknown"))
         return state
-    reason = why_standing(now.state, sample, is_held=state.is_held) or NO_STOP
+    reason = _why(state, now.state, sample)
     if reason == NO_STOP:
         if state.reason != NO_STOP:
             outputs.append(Output(STOP_S, round(state.stop_s, 1)))
-        outputs.append(_WORKS)
+        outputs += _told_again(NO_STOP)
         return state if state.reason == NO_STOP else replace(state, reason=NO_STOP, stop_s=0.0)
     if reason != state.reason:
         if state.reason != NO_STOP and state.stop_s > 0.0:
             outputs.append(Output(STOP_S, round(state.stop_s, 1)))
         state = replace(state, reason=reason, stop_s=0.0)
-    outputs.append(Output(STOP, reason))
+    outputs += _told_again(reason)
     return state
 
 

@@ -30,7 +30,8 @@ BASES = (
     twin_signals.ANOMALY_BASIS,
     twin_signals.RESIDUAL_BASIS,
 )
-FIGURES = (TEMPERATURE, SCORE, *VIBRATION, *OVERRIDES, *GAPS)
+FIGURES_BESIDE = (SCORE, *VIBRATION, *OVERRIDES, *GAPS)
+FIGURES = (TEMPERATURE, *FIGURES_BESIDE)
 TOOLS_MAX, REASONS_MAX, FLAGS_MAX, PROFILE_MAX = 24, 12, 40, 240
 OTHER_TOOLS = -1
 MINUTE_S = 60.0
@@ -132,16 +133,17 @@ def lasted(run: Run, sample: Sample, state: str | None, reason: str, dt_s: float
         reasons = {**reasons, told: reasons.get(told, 0.0) + dt_s}
         interrupted_s += dt_s
     figures, row = dict(run.figures), sample.row
-    for name in FIGURES:
-        if name in row:
-            value = figure_of(sample, name)
-            if value is not None:
-                figures[name] = with_value(figures.get(name), value, dt_s)
+    temperature = figure_of(sample, TEMPERATURE)
+    if temperature is not None:
+        figures[TEMPERATURE] = with_value(figures.get(TEMPERATURE), temperature, dt_s)
+    for name in FIGURES_BESIDE:
+        if name in row and (value := figure_of(sample, name)) is not None:
+            figures[name] = with_value(figures.get(name), value, dt_s)
     return Run(
         run.program, run.mode, run.began_ms, run.is_begin_seen,
         active_s, interrupted_s, run.unknown_s, run.holes, run.interruptions, reasons,
         tools, run.tool, run.tool_changes, figures, run.raised, run.raised_more,
-        *_profiled(run, figure_of(sample, TEMPERATURE), dt_s),
+        *_profiled(run, temperature, dt_s),
     )  # fmt: skip
 
 
@@ -194,7 +196,9 @@ def with_value(known: Figure | None, value: float, dt_s: float) -> Figure:
     """
     if known is None:
         return Figure(value, value, value, dt_s, value * dt_s)
-    low, high = min(known.low, value), max(known.high, value)
+    low, high = known.low, known.high
+    if not low <= value <= high:
+        low, high = min(low, value), max(high, value)
     return Figure(low, high, value, known.seconds + dt_s, known.sum + value * dt_s)
 
 
@@ -211,12 +215,16 @@ def _with_change(tools: tuple[ToolUse, ...], number: int) -> tuple[ToolUse, ...]
 
 
 def _with_tool_time(run: Run, sample: Sample, dt_s: float) -> tuple[ToolUse, ...]:
-    force, number = figure_of(sample, FORCE), _kept_as(run)
+    force, number = figure_of(sample, FORCE) if FORCE in sample.row else None, _kept_as(run)
     return tuple(
-        ToolUse(use.number, use.changes, use.active_s + dt_s, use.force if force is None else with_value(use.force, force, dt_s))
-        if use.number == number
-        else use
-        for use in run.tools
+        [
+            ToolUse(
+                use.number, use.changes, use.active_s + dt_s, use.force if force is None else with_value(use.force, force, dt_s)
+            )
+            if use.number == number
+            else use
+            for use in run.tools
+        ]
     )
 
 

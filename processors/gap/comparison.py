@@ -117,18 +117,26 @@ def watched(watch: Watch, given: Given, sample: Sample) -> Watch:
     at_s = sample.at_s
     if sample.kind is _HOLE:  # what happened meanwhile is not known
         return replace(watch, rpm_since_s=at_s, feeding_since_s=at_s, change_since_s=at_s)
-    rpm, _ = sample.number(SPEED)
-    known = watch.rpm
-    if rpm != known and (rpm is None or known is None or abs(rpm - known) > max(SPEED_CHANGE * abs(known), TURNING_RPM_MIN / 2)):
-        watch = replace(watch, rpm=rpm, rpm_since_s=at_s)
+    (rpm, _), known = sample.number(SPEED), watch.rpm
+    is_same_speed = rpm == known or not (rpm is None or known is None or _is_another_speed(rpm, known))
     feeding, change = _feeding(given, sample), watch.change
     if sample.kind is not _DATA or not _CHANGES.isdisjoint(sample.changed):
         change = _change(sample)
-    if feeding is not watch.feeding:
-        watch = replace(watch, feeding=feeding, feeding_since_s=at_s)
-    if change is not watch.change:
-        watch = replace(watch, change=change, change_since_s=at_s)
-    return watch
+    is_same_feeding, is_same_change = feeding is watch.feeding, change is watch.change
+    if is_same_speed and is_same_feeding and is_same_change:
+        return watch
+    return Watch(
+        known if is_same_speed else rpm, watch.rpm_since_s if is_same_speed else at_s,
+        feeding, watch.feeding_since_s if is_same_feeding else at_s,
+        change, watch.change_since_s if is_same_change else at_s,
+        watch.rise_mean_k,
+    )  # fmt: skip
+
+
+def _is_another_speed(rpm: float, known: float) -> bool:
+    """Return True if the speed has changed by more than it wavers."""
+    step = abs(rpm - known)
+    return step > TURNING_RPM_MIN / 2 and step > SPEED_CHANGE * abs(known)
 
 
 def heated(watch: Watch, sample: Sample, seconds: float) -> Watch:

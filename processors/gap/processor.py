@@ -115,6 +115,10 @@ class State:
     left_out: float = 0.0
     cells: Mapping[str, Cell] = field(default_factory=dict)
 
+    def watching(self, watch: Watch) -> "State":
+        """Return the state with this watch. Spelled out, since `replace` looks up each field."""
+        return State(watch, self.healthy_from_s, self.block, self.minute, self.seconds, self.left_out, self.cells)
+
 
 def step(config: Config, state: State, sample: Sample) -> tuple[State, Sequence[Output]]:
     """Watch every sample; compare at ticks, each of which stands for tick_s; publish once a minute."""
@@ -122,10 +126,10 @@ def step(config: Config, state: State, sample: Sample) -> tuple[State, Sequence[
         return state, ()
     watch = watched(state.watch, config.given, sample)
     if sample.kind is not _TICK:
-        return (state if watch is state.watch else replace(state, watch=watch)), ()
+        return (state if watch is state.watch else state.watching(watch)), ()
     watch = heated(watch, sample, config.tick_s)
     if watch is not state.watch:
-        state = replace(state, watch=watch)
+        state = state.watching(watch)
     state = _begun(config, state, sample.at_s)
     state = _block_closed(config, state, sample.at_s)
     found = comparison(state.watch, config.given, sample)
