@@ -1,7 +1,8 @@
 """The actions that an engine asks its worker to carry out, in order."""
 
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
+from sparkplug.actions import Publish as PlainMessage
 from sparkplug.metric import Change
 
 
@@ -12,16 +13,17 @@ class Publish(NamedTuple):
     changes: tuple[Change, ...]
 
 
-class PlainOutput(NamedTuple):
+class PlainOutput(PlainMessage):
     """Send a plain message on a declared topic, outside Sparkplug; retained, so that whoever comes later reads it too.
 
-    qos: is filled in by the declaration of its topic
+    The connection takes it as it is. qos: is filled in by the declaration of its topic
     """
 
-    topic: str
-    payload: bytes
-    retain: bool = True
-    qos: int = 0
+    __slots__ = ()
+
+    def __new__(cls, topic: str, payload: bytes, qos: int = 0, retain: bool = True) -> Self:
+        """Retain the message if nothing else is asked."""
+        return super().__new__(cls, topic, payload, qos, retain)
 
 
 class Declare(NamedTuple):

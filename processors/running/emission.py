@@ -4,12 +4,15 @@ import math
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
 
+from processors.actions import Action, Pin
 from processors.contract import PYTHON_TYPES, Output, OutputSpec, PlainOutput, PlainSpec
 from processors.discovery import AnyProcessor
 from processors.errors import OutputError
 from sparkplug.metric import Change
 from sparkplug.quality import Quality
 from sparkplug.values import Value
+
+PLAIN_TOPICS_MAX = 50_000
 
 
 class Emission:
@@ -66,13 +69,41 @@ def _rules(outputs: tuple[OutputSpec, ...]) -> dict[str, tuple[OutputSpec, bool,
     return {spec.name: (spec, float in PYTHON_TYPES[spec.datatype], spec.deadband) for spec in outputs}
 
 
-def plain_message(processor_name: str, declared: Sequence[PlainSpec], output: PlainOutput) -> PlainOutput:
-    """A plain message as it is sent. Raises OutputError where its topic is not declared: our own bug."""
-    topic = output[0]
-    for spec in declared:
-        if topic.startswith(spec.prefix):
-            return output if output[3] == spec.qos else output._replace(qos=spec.qos)
-    raise OutputError(f"{processor_name} emits {topic!r}, which it does not declare")
+class PlainTopics:
+    """The topics on which a processor may publish plain messages. Those that were used are remembered with their QoS."""
+
+    __slots__ = ("_declared", "_known", "_processor_name")
+
+    def __init__(self, processor_name: str, declared: Sequence[PlainSpec]) -> None:
+        self._processor_name, self._declared = processor_name, declared
+        self._known: dict[str, int] = {}
+
+    def ready(self, outputs: Iterable[Output | PlainOutput | Pin]) -> list[Action] | None:
+        """Return outputs that can go as they are; None where one is no plain message, or its topic is not known yet."""
+        known = self._known
+        actions: list[Action] = []
+        for output in outputs:
+            if type(output) is not PlainOutput or known.get(output[0]) != output[2]:
+                return None
+            actions.append(output)
+        return actions
+
+    def message(self, output: PlainOutput) -> PlainOutput:
+        """Return a plain message as it is sent. Raises OutputError where its topic is not declared: our own bug."""
+        topic, _, qos, _ = output
+        for spec in self._declared:
+            if topic.startswith(spec.prefix):
+                if len(self._known) >= PLAIN_TOPICS_MAX:
+                    self._known.clear()
+                self._known[topic] = spec.qos
+                return output if qos == spec.qos else output._replace(qos=spec.qos)
+        raise OutputError(f"{self._processor_name} emits {topic!r}, which it does not declare")
+
+
+@lru_cache(maxsize=100)
+def plain_topics(processor_name: str, declared: tuple[PlainSpec, ...]) -> PlainTopics:
+    """Return the plain topics of a processor, which its machines share."""
+    return PlainTopics(processor_name, declared)
 
 
 def _checked(spec: OutputSpec, output: Output) -> tuple[Value, Quality, str | None]:

@@ -14,7 +14,7 @@ from processors.discovery import AnyProcessor
 from processors.errors import OutputError
 from processors.running.counts import Counts
 from processors.running.dead_letter import dead_letter
-from processors.running.emission import Emission, plain_message
+from processors.running.emission import Emission, plain_topics
 from processors.running.ledger import FOLDED, DropReason, Fates
 from processors.sample import Sample
 from sparkplug.metric import Reading
@@ -31,6 +31,7 @@ class Fold:
     __slots__ = (
         "_config",
         "_counts",
+        "_plain",
         "_processor",
         "_quiet",
         "_rows",
@@ -56,6 +57,7 @@ class Fold:
         self.state: Any = processor.initial(processor.config_of(configuration, name))
         self.emissions: dict[str, Emission] = {}
         self._processor, self._step, self._counts = processor, processor.step, counts
+        self._plain = plain_topics(processor.name, processor.plain)
         self.wakes = processor.wakes
         self._config: Any = processor.given(configuration, name)
         self._rows: dict[str, Row] = {}
@@ -110,11 +112,13 @@ class Fold:
 
     def _several_emitted(self, outputs: Outputs, machine: str, at_ms: int) -> list[Action]:
         """Outputs of several machines, or beside Sparkplug."""
+        if (ready := self._plain.ready(outputs)) is not None:
+            return ready
         by_machine: dict[str, list[Output]] = {}
         beside: list[Action] = []
         for output in outputs:
             if isinstance(output, PlainOutput):
-                beside.append(plain_message(self._processor.name, self._processor.plain, output))
+                beside.append(self._plain.message(output))
             elif isinstance(output, Pin):
                 beside.append(output)
             elif (own := by_machine.get(whose := output.machine or machine)) is None:

@@ -172,8 +172,7 @@ class Worker:
         plain: list[PlainMessage] = []
         for action in actions:
             if isinstance(action, PlainOutput):
-                topic, payload, retain, qos = action
-                plain.append(PlainMessage(topic, payload, qos, retain))
+                plain.append(action)
             elif isinstance(action, Publish):
                 sent = self._publish(action) and sent
             elif isinstance(action, Declare):

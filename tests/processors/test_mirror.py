@@ -121,3 +121,27 @@ def test_numbers_of_one_message_are_written_as_each_would_be_alone(values: list[
     for one, value in zip(readings, values, strict=True):
         if math.isfinite(value):
             assert f'"value":{value!r},'.encode() in mirrored(one)
+
+
+_plain_numbers = st.floats(-1e4, 1e4).map(lambda value: round(value, 3)) | st.sampled_from(
+    (0.0, -0.0, 1e-4, 9e-5, 10.00001, 1e15)
+)
+
+
+@given(
+    st.lists(st.tuples(_plain_numbers, st.sampled_from((None, "%", "°C", "mm/min", '"'))), min_size=1, max_size=20),
+    st.sampled_from((None, True, 1, "1", 1e16, math.nan)),
+    st.sampled_from((None, "", "why")),
+    st.sampled_from((Quality.GOOD, Quality.BAD)),
+)
+def test_a_message_of_good_numbers_is_written_as_each_would_be_alone(
+    numbers: list[tuple[float, str | None]], last: object, reason: str | None, quality: Quality
+) -> None:
+    readings = [
+        Reading(f"s{place}", value, T0_MS, Quality.GOOD, unit, None, False) for place, (value, unit) in enumerate(numbers)
+    ]
+    for others in ([], [Reading("last", last, T0_MS, quality, None, reason, False)]):
+        engine = engine_of(PROCESSOR)
+        fed(engine, birth(0.0, spindle_rpm=1.0))
+        shown = plain(fed(engine, event(EventKind.DATA, 0.0, *readings, *others)))
+        assert shown == {f"cnc/okuma/{one.name}": mirrored(one) for one in [*readings, *others]}
