@@ -40,7 +40,7 @@ def step(_: Config, state: NoState, sample: Sample) -> tuple[NoState, Sequence[P
     """Publish what changed; at a death, what turned stale."""
     if sample.is_history or sample.kind in (SampleKind.TICK, SampleKind.HOLE):
         return state, ()
-    machine, _, _, row, names, *_ = sample
+    row, names = sample.row, sample.changed
     readings = [row[name] for name in names]
     payloads = _numbers(readings)
     if payloads is None:
@@ -48,7 +48,7 @@ def step(_: Config, state: NoState, sample: Sample) -> tuple[NoState, Sequence[P
         names = tuple([one.name for one in readings])
         texts = _texts([one.value for one in readings if type(one.value) is float])
         payloads = [mirrored(one, texts) for one in readings]
-    topics_of = _topics(machine, names)
+    topics_of = _topics(sample.machine, names)
     return state, [_new(PlainOutput, (topic, payload, 0, True)) for topic, payload in zip(topics_of, payloads, strict=True)]
 
 

@@ -89,8 +89,7 @@ class MqttConnection:
         self._is_unread = False  # there was more to read than in one turn
         self._outbox: deque[Action] = deque()
         self._taken_bytes = self._sent_bytes = 0  # payloads that came into the outbox, and that left it
-        self._began_s = 0.0
-        self._pause_s = BACKOFF_S_MIN
+        self._began_s, self._pause_s = 0.0, BACKOFF_S_MIN
         self._dial_s: float | None = None  # when the next attempt is due; None while there is one or a connection
         self._until_s: float | None = None  # when leaving or lingering has lasted long enough
         self._stopping = False
@@ -112,7 +111,7 @@ class MqttConnection:
         """
         if not actions:
             return
-        self._taken_bytes += sum(len(action.payload) for action in actions if isinstance(action, Publish))
+        self._taken_bytes += sum([len(action[1]) for action in actions if isinstance(action, Publish)])
         self._outbox.extend(actions)
         self.loop.push(self, now=len(self._outbox) >= GATHERED_MAX)
 
@@ -284,8 +283,11 @@ class MqttConnection:
             client.loop_write()
         outbox = self._outbox
         while self._accepted and outbox:
+            self._sent_bytes += path.publish_unconfirmed(outbox, SEND_BYTES_MAX)
             if stream.size >= SEND_BYTES_MAX:
                 return True
+            if not outbox:
+                break
             action = outbox.popleft()
             if isinstance(action, Publish):
                 if not path.publish(action):

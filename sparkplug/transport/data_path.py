@@ -3,9 +3,10 @@
 Packet ids of ours are the upper half. paho numbers its own, which are those of SUBSCRIBE then, from 1.
 """
 
+from collections import deque
 from collections.abc import Callable
 
-from sparkplug.actions import Publish
+from sparkplug.actions import Action, Publish
 from sparkplug.transport.listener import Listener
 from sparkplug.transport.packets import PacketReader, PacketWriter, Reader, puback
 from sparkplug.transport.paho_client import StreamClient
@@ -33,15 +34,32 @@ class DataPath(PahoPath):
         """Read what has come."""
         self._reader.feed(data)
 
+    def publish_unconfirmed(self, outbox: deque[Action], bytes_max: int) -> int:
+        """Write messages of QoS 0 from the head of the outbox, until `bytes_max` wait; return the size of their payloads."""
+        stream, compose = self._stream, self._writer.publish
+        packets: list[bytes] = []
+        room, written = bytes_max - stream.size, 0
+        try:
+            while outbox and room > 0:
+                action = outbox[0]
+                if not isinstance(action, Publish):
+                    break
+                topic, payload, qos, retain = action
+                if qos:
+                    break
+                outbox.popleft()
+                packet = compose(topic, payload, retain)
+                packets.append(packet)
+                written += len(payload)
+                room -= len(packet)
+        finally:  # a topic that MQTT does not allow takes nobody else's message with it
+            stream.add_all(packets)
+        return written
+
     def publish(self, action: Publish) -> bool:
-        """Write a message; False where there are too many that the broker has not acknowledged."""
+        """Write a message that is confirmed; False where there are too many that the broker has not acknowledged."""
         topic, payload, qos, retain = action
-        if qos == 0:
-            self._stream.add(self._writer.publish(topic, payload, retain=retain))
-            return True
-        if qos == 1:
-            return self._confirmed_publish(topic, payload, None, retain=retain)
-        return super().publish(action)
+        return self._confirmed_publish(topic, payload, None, retain=retain) if qos == 1 else super().publish(action)
 
     def barrier(self, topic: str, token: int) -> bool:
         """Write a barrier; False as for a message."""

@@ -14,6 +14,8 @@ MQTT_5 = 5
 SUCCESS = 0
 _LENGTH_BYTES_MAX = 4
 _UNWANTED = ""
+_SHORT = tuple(tuple(bytes((0x30 | retain, length)) for length in range(128)) for retain in (0, 1))
+"""How a short PUBLISH of QoS 0 begins, by retain and length."""
 # The properties of a PUBLISH that say nothing to us (MQTT 5.0, 3.3.2.3), with the bytes of the value; -1: a string or binary
 # data, -2: two of them, -3: a variable byte integer. A topic alias (0x23) is not among them: we allow none.
 _PROPERTIES = {0x01: 1, 0x02: 4, 0x03: -1, 0x08: -1, 0x09: -1, 0x0B: -3, 0x26: -2}
@@ -194,25 +196,25 @@ class PacketWriter:
 
     def __init__(self, mqtt_version: int) -> None:
         self._properties = b"\0" if mqtt_version == MQTT_5 else b""
-        self._topics: dict[str, bytes] = {}
+        self._heads: dict[str, bytes] = {}
 
-    def publish(self, topic: str, payload: bytes, *, retain: bool = False) -> bytes:
+    def publish(self, topic: str, payload: bytes, retain: bool = False) -> bytes:
         """Return a PUBLISH of QoS 0; raises ValueError for a topic or a payload that MQTT does not allow.
 
         >>> PacketWriter(4).publish("a/b", b"hi").hex(" ")
         '30 07 00 03 61 2f 62 68 69'
         """
-        name = self._topics.get(topic) or self._written(topic)
-        length = len(name) + len(self._properties) + len(payload)
+        head = self._heads.get(topic) or self._head(topic)
+        length = len(head) + len(payload)
         if length < 128:
-            return bytes((0x30 | retain, length)) + name + self._properties + payload
+            return _SHORT[retain][length] + head + payload
         if length < 16_384:
-            return bytes((0x30 | retain, length & 0x7F | 0x80, length >> 7)) + name + self._properties + payload
-        return self._long(0x30 | retain, (name, self._properties, payload))
+            return bytes((0x30 | retain, length & 0x7F | 0x80, length >> 7)) + head + payload
+        return self._long(0x30 | retain, (head, payload))
 
     def publish_confirmed(self, topic: str, payload: bytes, packet_id: int, *, retain: bool = False) -> bytes:
         """Return a PUBLISH of QoS 1; raises ValueError for a topic or a payload that MQTT does not allow."""
-        name = self._topics.get(topic) or self._written(topic)
+        name = (self._heads.get(topic) or self._head(topic)).removesuffix(self._properties)
         return self._long(0x32 | retain, (name, packet_id.to_bytes(2), self._properties, payload))
 
     @staticmethod
@@ -222,14 +224,15 @@ class PacketWriter:
             raise ValueError(f"a message of {length} bytes is above what MQTT carries, {REMAINING_LENGTH_MAX}")
         return b"".join((bytes((first,)), _encoded_length(length), *parts))
 
-    def _written(self, topic: str) -> bytes:
+    def _head(self, topic: str) -> bytes:
+        """Return the topic, written out, and the properties behind it, of which there are none."""
         name = topic.encode()
         if not 0 < len(name) <= 65_535 or "+" in topic or "#" in topic:
             raise ValueError(f"nothing can be published on the topic {topic!r}: it is empty, too long, or holds a wildcard")
-        if len(self._topics) >= TOPICS_MAX:
-            self._topics.clear()
-        written = self._topics[topic] = len(name).to_bytes(2) + name
-        return written
+        if len(self._heads) >= TOPICS_MAX:
+            self._heads.clear()
+        head = self._heads[topic] = len(name).to_bytes(2) + name + self._properties
+        return head
 
 
 def puback(packet_id: int) -> bytes:

@@ -1,5 +1,6 @@
 """The way of messages through paho: all that comes is paho's to read, and all that goes out is paho's to write."""
 
+from collections import deque
 from collections.abc import Callable
 from typing import Any
 
@@ -8,7 +9,7 @@ from paho.mqtt.enums import MQTTErrorCode
 from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.reasoncodes import ReasonCode
 
-from sparkplug.actions import Publish
+from sparkplug.actions import Action, Publish
 from sparkplug.transport.listener import Listener
 from sparkplug.transport.paho_client import StreamClient
 from sparkplug.transport.stream import Stream
@@ -34,6 +35,10 @@ class PahoPath:
     def ended(self) -> None:
         """Have paho learn that the stream has ended."""
         self._client.loop_read()
+
+    def publish_unconfirmed(self, _outbox: deque[Action], _bytes_max: int) -> int:
+        """Write nothing: paho takes one message at a time."""
+        return 0
 
     def publish(self, action: Publish) -> bool:
         """Write a message; False where there are too many that the broker has not acknowledged."""

@@ -91,6 +91,11 @@ class Stream:
         self._pieces.append(packet)
         self.size += len(packet)
 
+    def add_all(self, packets: list[bytes]) -> None:
+        """Have these packets sent next."""
+        self._pieces += packets
+        self.size += sum(map(len, packets))
+
     def flush(self) -> bool:
         """Send what has gathered with one call; False where something is left."""
         pieces = self._pieces

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import socket
+from collections import deque
 from contextlib import suppress
 
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from sparkplug.actions import Action, Publish
 from sparkplug.transport import packets
 from sparkplug.transport.data_path import DataPath
 from sparkplug.transport.packets import PacketReader, PacketWriter, Reader, puback
@@ -194,6 +196,26 @@ def test_what_is_written_is_read_by_an_independent_reader(
 def test_a_topic_that_mqtt_does_not_allow_is_refused(topic: str) -> None:
     with pytest.raises(ValueError, match="nothing can be published"):
         PacketWriter(4).publish(topic, b"")
+
+
+def test_a_topic_that_is_refused_takes_no_other_message_with_it() -> None:
+    ours, theirs = socket.socketpair()
+    with ours, theirs:
+        client, stream = client_on(ours)
+        path = DataPath(client, stream, listener_of(), nothing)
+        confirmed = Publish("a", b"qos 1", 1)
+        outbox: deque[Action] = deque(
+            [Publish("a", b"1"), Publish("a/+", b"2"), Publish("a", b"3"), confirmed, Publish("a", b"4")]
+        )
+        with pytest.raises(ValueError, match="nothing can be published"):
+            path.publish_unconfirmed(outbox, 1000)
+        assert path.publish_unconfirmed(outbox, 1000) == 1
+        assert list(outbox) == [confirmed, Publish("a", b"4")]
+        outbox.popleft()
+        assert path.publish_unconfirmed(outbox, stream.size) == 0, "as much waits as may"
+        assert stream.unsent == 2
+        assert stream.flush()
+        assert theirs.recv(100).hex(" ") == "30 04 00 01 61 31 30 04 00 01 61 33"
 
 
 def outcome(kind: type[PahoPath], version: int, data: bytes, cuts: list[int]) -> tuple[object, ...]:
