@@ -14,13 +14,14 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 from processors.config import ProcessorConfig
 from processors.contract import NoState, Output, OutputSpec, Processor, Provenance, Sample, SampleKind
 from sparkplug.datatype import DataType
+from sparkplug.quality import Quality
 from twin.cutting import SpindleDrive, cutting_force
 from twin.vocabulary import twin_signals
 from twin.vocabulary.bounds import SPINDLE_LOAD_PCT_MAX, SPINDLE_RPM_MAX
 
 SPEED, LOAD, TOOL = "spindle_rpm", "spindle_load_pct", "tool_number"
 FORCE, BASIS = twin_signals.CUTTING_FORCE_N, twin_signals.CUTTING_FORCE_BASIS
-_TICK, _DEATH = SampleKind.TICK, SampleKind.DEATH
+_TICK, _DEATH, _GOOD = SampleKind.TICK, SampleKind.DEATH, Quality.GOOD
 DRIVE_FIELDS = {"rated power": "rated_power_kw", "efficiency": "efficiency"}
 
 
@@ -72,7 +73,7 @@ def step(config: Config, state: NoState, sample: Sample) -> tuple[NoState, Seque
     force_n, reason = cutting_force(config.drive, load_pct, rpm, diameter_mm)
     if force_n is None:
         return state, _unknown(reason or "", basis)
-    return state, (Output(FORCE, round(force_n, 1)), _basis(basis))
+    return state, (tuple.__new__(Output, (FORCE, round(force_n, 1), _GOOD, None, None, None)), _basis(basis))
 
 
 @lru_cache(maxsize=1000)

@@ -117,16 +117,16 @@ class Certificate:
         taken: list[_Slot] = []
         slots, before_ms, stamp = self._slots, 0, b""
         for name, value, timestamp_ms, quality, reason, is_historical in changes:
-            slot = slots.get(name)
-            if type(value) is not float or slot is None or not slot.template.head:
+            if type(value) is not float or quality is not _GOOD or reason is not None or is_historical:
                 return None
-            if quality is not _GOOD or reason is not None or is_historical or slot.quality is not _GOOD:
+            slot = slots.get(name)
+            if slot is None or slot.quality is not _GOOD or not (head := slot.template.head):
                 return None
             if timestamp_ms != before_ms:
                 if type(timestamp_ms) is not int or not before_ms <= timestamp_ms <= STAMP_MS_MAX or timestamp_ms < STAMP_MS_MIN:
                     return None
                 before_ms, stamp = timestamp_ms, written(timestamp_ms) + DOUBLE_TAG
-            parts += (slot.template.head, stamp, pack_double(value))
+            parts += (head, stamp, pack_double(value))
             taken.append(slot)
         for slot, change in zip(taken, changes):  # noqa: B905 — slower, and one was taken of each
             slot.value, slot.timestamp_ms, slot.reason = change[1], change[2], None

@@ -9,7 +9,7 @@ The transport tells it what happened (`connecting`, `connected`, `message`, `los
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from functools import lru_cache, partial
+from functools import partial
 
 from sparkplug.actions import Action, Connect, Disconnect, HostState, Publish, Subscribe, WalkToNextServer
 from sparkplug.certificate import Certificate, definition_metrics
@@ -84,6 +84,7 @@ class EdgeNodeSession:
         self._templates = dict(templates or {})
         self._certificate = Certificate(f"edge node {node}", metrics, partial(self._alias, None), now_ms, self._templates)
         self._devices: dict[str, Certificate] = {}
+        self._data_topics: dict[str | None, str] = {None: str(Topic(Verb.NDATA, node))}
         self._primary_topic = None if primary_host is None else state_topic(primary_host)
         self._server = 0
         self._state_timestamps_ms: dict[int, int] = {}
@@ -155,6 +156,7 @@ class EdgeNodeSession:
         if older is not None:
             certificate.keep_values(older)
         self._devices[device] = certificate
+        self._data_topics[device] = str(Topic(Verb.DDATA, self.node, device))
         if self.phase is Phase.OFFLINE:
             return []
         actions: list[Action] = [] if older is not None else [self._subscribe(device)]
@@ -164,6 +166,7 @@ class EdgeNodeSession:
         """The device is gone: its death is published."""
         if self._devices.pop(device, None) is None:
             raise UnknownMetricError(f"edge node {self.node} has no device {device!r}")
+        del self._data_topics[device]
         if self.phase is not Phase.BORN:
             return []
         return [Publish(str(Topic(Verb.DDEATH, self.node, device)), encode(Payload(self._stamp(now_ms), seq=self._next_seq())))]
@@ -180,7 +183,7 @@ class EdgeNodeSession:
             metrics = certificate.data(changes)
             certificate.note(changes)
         payload = b"\x08" + written(stamp_ms) + metrics + _SEQ_FIELDS[self._next_seq()]
-        return [tuple.__new__(Publish, (_data_topic(self.node, device), payload, 0, False))]
+        return [tuple.__new__(Publish, (self._data_topics[device], payload, 0, False))]
 
     def note(self, device: str | None, changes: Sequence[Change]) -> None:
         """Keep the changes for the next birth without sending them."""
@@ -273,8 +276,3 @@ class EdgeNodeSession:
         if rebirth and self.phase is Phase.BORN and self._rebirth.request(now_ms):
             return self._birth(now_ms)
         return []
-
-
-@lru_cache(maxsize=4096)
-def _data_topic(node: NodeId, device: str | None) -> str:
-    return str(Topic(Verb.NDATA if device is None else Verb.DDATA, node, device))

@@ -82,7 +82,7 @@ def cutting_force(
     if tool_diameter_mm is None or not math.isfinite(tool_diameter_mm) or tool_diameter_mm <= 0:
         return CuttingForce(None, "tool diameter is not known")
     power_kw = drive.efficiency * (spindle_load_pct / 100.0 * drive.rated_power_kw - drive.idle_power_kw)
-    force_n = 1000.0 * max(power_kw, 0.0) / cutting_speed_m_s(tool_diameter_mm, spindle_rpm)
+    force_n = 1000.0 * (0.0 if power_kw < 0.0 else power_kw) / cutting_speed_m_s(tool_diameter_mm, spindle_rpm)
     if not math.isfinite(force_n):
         return CuttingForce(None, "spindle load is beyond any drive")
-    return CuttingForce(force_n, None)
+    return tuple.__new__(CuttingForce, (force_n, None))

@@ -41,7 +41,7 @@ ANOMALY, RULE = twin_signals.ANOMALY_ALARM, twin_signals.RULE_PREFIX
 ZONE, SEVERITY, DETAIL = "twin/vibration_zone", twin_signals.SEVERITY, twin_signals.RULE_DETAIL
 NONE, MEDIUM, HIGH = "none", "medium", "high"
 NO_ANOMALY = f"{ANOMALY} is not offered"
-_HOLE, _GOOD, _UNKNOWN = SampleKind.HOLE, Quality.GOOD, LimitState.UNKNOWN
+_HOLE, _GOOD, _OVER, _UNKNOWN = SampleKind.HOLE, Quality.GOOD, LimitState.OVER, LimitState.UNKNOWN
 
 
 class Config(SpindleLimits, TemperatureLimits, VibrationLimits):
@@ -105,7 +105,7 @@ RULES = (
         "the spindle's temperature rises faster than it may",
         frozenset({TEMPERATURE}),
         lambda config: Timing(config.runaway_dwell_s, config.runaway_clear_s),
-        lambda given: thermal_runaway(given.config, given.trend, *given.temperature),
+        lambda given: thermal_runaway(given.config, given.trend, given.temperature),
     ),
     Rule(
         "load_without_feed",
@@ -136,14 +136,16 @@ def step(config: Config, state: State, sample: Sample) -> tuple[State, Sequence[
     temperature = sample.number(TEMPERATURE)
     trend = trend_followed(state.trend, config, temperature[0], at_s)
     zone, no_zone = _zone(config, state.zone, moves, speed_mm_s)
-    given = Given(config, sample, moves, load, temperature, trend, speed_mm_s, zone)
+    given = tuple.__new__(Given, (config, sample, moves, load, temperature, trend, speed_mm_s, zone))
     stands: list[Stand] = []
     for name, judge, timing in config.rules:
-        judgement, before = judge(given), latches.get(name, IDLE)
-        latch = latched(before, judgement, timing, at_s)
-        if latch is not before:
-            latches = {rule.name: latches.get(rule.name, IDLE) for rule in RULES} | {name: latch}
-        stands.append(judgement.reason if judgement.limit_state is _UNKNOWN else None if latch.alarm_s is None else latch)
+        judgement = judge(given)
+        limit_state, latch = judgement.limit_state, latches.get(name, IDLE)
+        if latch is not IDLE or limit_state is _OVER:  # an idle alarm stays idle otherwise, as nearly always
+            before, latch = latch, latched(latch, judgement, timing, at_s)
+            if latch is not before:
+                latches = {rule.name: latches.get(rule.name, IDLE) for rule in RULES} | {name: latch}
+        stands.append(judgement.reason if limit_state is _UNKNOWN else None if latch.alarm_s is None else latch)
     zone_name = no_zone if zone is None else zone.value
     return State(spindle, trend, zone, latches), _outputs(tuple(stands), zone is not None, zone_name, _anomaly(sample))
 

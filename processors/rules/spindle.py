@@ -82,27 +82,30 @@ def followed(spindle: Spindle, limits: SpindleLimits, sample: Sample) -> Spindle
     if rpm is None or abs(rpm) > SPINDLE_RPM_MAX:
         why_not = reason or f"{SPEED} is beyond any spindle"
         return spindle if spindle.rpm is None and spindle.why_not == why_not else Spindle(None, why_not, sample.at_s)
-    if spindle.rpm is None:
-        return Spindle(rpm, "", sample.at_s)
-    if rpm == spindle.rpm:
+    at_s, before_rpm = sample.at_s, spindle.rpm
+    if before_rpm is None:
+        return Spindle(rpm, "", at_s)
+    if rpm == before_rpm:
         if SPEED not in sample.changed:
             return spindle
-        return Spindle(spindle.rpm, spindle.why_not, sample.at_s, spindle.ramp_s, spindle.ramped_s)
-    report_s = min(max(sample.at_s - spindle.seen_s, REPORT_S_MIN), REPORT_S_MAX)
-    if abs(rpm - spindle.rpm) <= limits.ramp_rpm_per_s * report_s:
-        return Spindle(rpm, spindle.why_not, sample.at_s, spindle.ramp_s, spindle.ramped_s)
-    goes_on = spindle.ramped_s is not None and sample.at_s - spindle.ramped_s <= limits.ramp_settle_s
-    return Spindle(rpm, "", sample.at_s, spindle.ramp_s if goes_on else sample.at_s, sample.at_s)
+        return Spindle(before_rpm, spindle.why_not, at_s, spindle.ramp_s, spindle.ramped_s)
+    passed_s = at_s - spindle.seen_s
+    report_s = REPORT_S_MIN if passed_s < REPORT_S_MIN else REPORT_S_MAX if passed_s > REPORT_S_MAX else passed_s
+    if abs(rpm - before_rpm) <= limits.ramp_rpm_per_s * report_s:
+        return tuple.__new__(Spindle, (rpm, spindle.why_not, at_s, spindle.ramp_s, spindle.ramped_s))
+    goes_on = spindle.ramped_s is not None and at_s - spindle.ramped_s <= limits.ramp_settle_s
+    return Spindle(rpm, "", at_s, spindle.ramp_s if goes_on else at_s, at_s)
 
 
 def motion(spindle: Spindle, limits: SpindleLimits, at_s: float) -> Motion:
     """Return the motion of the spindle at `at_s`."""
-    if spindle.rpm is None:
+    rpm, ramp_s, ramped_s = spindle.rpm, spindle.ramp_s, spindle.ramped_s
+    if rpm is None:
         return Motion(None, spindle.why_not, False, False)
     ramping = False
-    if spindle.ramp_s is not None and spindle.ramped_s is not None:
-        ramping = at_s - spindle.ramped_s <= limits.ramp_settle_s and at_s - spindle.ramp_s <= limits.ramp_s_max
-    return Motion(spindle.rpm, "", abs(spindle.rpm) >= limits.spindle_rpm_min, ramping)
+    if ramp_s is not None and ramped_s is not None:
+        ramping = at_s - ramped_s <= limits.ramp_settle_s and at_s - ramp_s <= limits.ramp_s_max
+    return tuple.__new__(Motion, (rpm, "", abs(rpm) >= limits.spindle_rpm_min, ramping))
 
 
 def spindle_load(sample: Sample) -> Known:

@@ -21,6 +21,7 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from processors.config import ProcessorConfig
 from processors.rules.alarm import Judgement, over, unknown, within
+from processors.rules.spindle import Known
 
 TEMPERATURE = "spindle_temp_c"
 POINTS = 24
@@ -28,7 +29,7 @@ POINTS = 24
 KNOWN_PART = 0.75
 """The part of a window that has to be known."""
 STRAY_S = 10.0
-TEMPERATURES_C = (-60.0, 400.0)
+LOWEST_C, HIGHEST_C = -60.0, 400.0
 """The temperatures beyond which nothing is a spindle's."""
 
 
@@ -80,29 +81,30 @@ def slope_per_s(points: Sequence[tuple[float, float]]) -> float:
 
 def followed(trend: Trend, limits: TemperatureLimits, temperature_c: float | None, at_s: float) -> Trend:
     """The temperature's trend as of this moment."""
-    if temperature_c is None or not TEMPERATURES_C[0] <= temperature_c <= TEMPERATURES_C[1]:
+    if temperature_c is None or not LOWEST_C <= temperature_c <= HIGHEST_C:
         return trend
-    if trend.level_c is not None and abs(temperature_c - trend.level_c) > limits.temperature_step_k_max:
-        if trend.stray_s is None:
-            return Trend(trend.points, trend.slope_k_per_min, trend.level_c, at_s)
-        if at_s - trend.stray_s < STRAY_S:
+    points, slope, level_c, stray_s = trend
+    if level_c is not None and abs(temperature_c - level_c) > limits.temperature_step_k_max:
+        if stray_s is None:
+            return Trend(points, slope, level_c, at_s)
+        if at_s - stray_s < STRAY_S:
             return trend
-        trend = Trend()  # another level: what came before it says nothing of a slope
-    grid_s = limits.runaway_window_s / POINTS
-    if trend.points and at_s - trend.points[-1][0] < grid_s:
-        if temperature_c == trend.level_c and trend.stray_s is None:
+        points, slope, level_c, stray_s = Trend()  # another level: what came before it says nothing of a slope
+    if points and at_s - points[-1][0] < limits.runaway_window_s / POINTS:
+        if temperature_c == level_c and stray_s is None:
             return trend
-        return Trend(trend.points, trend.slope_k_per_min, temperature_c)
-    points = (*(point for point in trend.points if at_s - point[0] <= limits.runaway_window_s), (at_s, temperature_c))
+        return tuple.__new__(Trend, (points, slope, temperature_c, None))
+    points = (*(point for point in points if at_s - point[0] <= limits.runaway_window_s), (at_s, temperature_c))
     known = len(points) >= POINTS // 4 and points[-1][0] - points[0][0] >= KNOWN_PART * limits.runaway_window_s
     return Trend(points, 60.0 * slope_per_s(points) if known else None, temperature_c)
 
 
-def thermal_runaway(limits: TemperatureLimits, trend: Trend, temperature_c: float | None, why_not: str | None) -> Judgement:
+def thermal_runaway(limits: TemperatureLimits, trend: Trend, temperature: Known) -> Judgement:
     """Temperature rises faster than it may."""
+    temperature_c, why_not = temperature
     if temperature_c is None:
         return unknown(why_not or "")
-    if not TEMPERATURES_C[0] <= temperature_c <= TEMPERATURES_C[1]:
+    if not LOWEST_C <= temperature_c <= HIGHEST_C:
         return unknown(f"{TEMPERATURE} is beyond any spindle")
     slope = trend.slope_k_per_min
     if slope is None:

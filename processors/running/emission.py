@@ -44,11 +44,17 @@ class Emission:
             spec, takes_floats, deadband = rules[name]
             if not (takes_floats and type(value) is float and -math.inf < value < math.inf):
                 value, quality, reason = _checked(spec, output)
-            if known is not None and known[3] is quality and known[4] == reason and _is_near(known[1], value, deadband):
+            if (
+                known is not None
+                and (deadband or value is None)  # else it was compared above
+                and known[3] is quality
+                and known[4] == reason
+                and _is_near(known[1], value, deadband)
+            ):
                 continue
             if not (is_history and spec.is_alarm):
                 stamp_ms = at_ms if at_s is None else round(at_s * 1000)
-                told[name] = change = Change(name, value, stamp_ms, quality, reason, is_history)
+                told[name] = change = tuple.__new__(Change, (name, value, stamp_ms, quality, reason, is_history))
                 changes.append(change)
         return changes
 
@@ -60,7 +66,7 @@ class Emission:
     def published(self, changes: Sequence[Change]) -> None:
         """Remember what readers now know."""
         for change in changes:
-            self.latest[change.name] = change
+            self.latest[change[0]] = change
 
 
 @lru_cache(maxsize=100)

@@ -108,7 +108,7 @@ class Fold:
             return []
         self._quiet = ()
         emission.published(changes)
-        return [Publish(machine, tuple(changes))]
+        return [tuple.__new__(Publish, (machine, tuple(changes)))]
 
     def _several_emitted(self, outputs: Outputs, machine: str, at_ms: int) -> list[Action]:
         """Outputs of several machines, or beside Sparkplug."""
