@@ -23,8 +23,8 @@ from processors.actions import Pin
 from processors.historian import HistorianConfig
 from processors.running.ports import Receipt
 from sparkplug.host_session import EventKind, HostEvent
+from sparkplug.metric import Reading
 from sparkplug.topics import NodeId
-from sparkplug.values import Value
 from twin.vocabulary.nodes import HISTORIAN_NODE, TWIN_NODE_PREFIX
 from twin.vocabulary.topics import SNAPSHOT
 
@@ -42,6 +42,9 @@ HOUR_MS = 3_600_000
 MACHINES_MAX = 1_000  # that are given receipts
 UNITS_MAX = 20_000  # of processors, whose snapshots are kept
 SNAPSHOT_BYTES_MAX = 64_000_000  # of last snapshots; of a unit without one a replay begins with the first of its hour
+_TEXTS = (str, bytes)
+_DATA, _BIRTH, _PLAIN, _DEATH = EventKind.DATA, EventKind.BIRTH, EventKind.PLAIN, EventKind.DEATH
+_new = tuple.__new__  # the constructor of a named tuple takes twice as long
 _log = logging.getLogger(__name__)
 
 
@@ -51,11 +54,16 @@ def store_of(config: HistorianConfig) -> Store:
     return open_store(config.store or default_place(), writable=True, retention=retention)
 
 
-def _long_bytes(value: Value) -> int:
-    """The memory of a value that is no number, beyond that of a number."""
-    if isinstance(value, tuple):
-        return ELEMENT_BYTES * len(value)
-    return len(value) if isinstance(value, str | bytes) else 0
+def _long_bytes(readings: Sequence[Reading]) -> int:
+    """The memory of the values that are no numbers, beyond that of numbers."""
+    size = 0
+    for reading in readings:
+        value = reading[1]
+        if isinstance(value, _TEXTS):
+            size += len(value)
+        elif isinstance(value, tuple):
+            size += ELEMENT_BYTES * len(value)
+    return size
 
 
 class _Queue:
@@ -92,7 +100,7 @@ class _Queue:
         while self._items and samples < BATCH_MAX and pinned is None:
             item, received_ms, of_item, bytes_of_item = self._items[0]
             if isinstance(item, HostEvent):
-                messages.append(Message(received_ms, item))
+                messages.append(_new(Message, (received_ms, item)))
             elif isinstance(item, Snapshot):
                 snapshots.append(item)
             elif samples:
@@ -176,16 +184,16 @@ class StoreRecorder:
         if self._failure is not None:
             raise self._failure
         kind = event.kind
-        if kind is EventKind.PLAIN:
+        if kind is _PLAIN:
             self._hear_snapshot(event, received_ms)
             return
         readings, size = event.readings, 0
         samples = len(readings)
         if samples < WEIGHED_MAX or self._queue.samples > WEIGHED_FROM:
-            size = sum(_long_bytes(reading.value) for reading in readings)
+            size = _long_bytes(readings)
         if not self._queue.put(event, received_ms, samples, size):
             self._dropped += 1
-        if kind is EventKind.DEATH:
+        if kind is _DEATH:
             for snapshot in self._last_snapshots.take(event.node.node.removeprefix(TWIN_NODE_PREFIX)):
                 self._put(snapshot)
 
@@ -342,19 +350,19 @@ class StoreRecorder:
     def _note_kept(self, messages: Sequence[Message]) -> None:
         """Note which devices wait for receipts, and the numbers of their rows; a birth shows the state after a row, not it."""
         with self._receipts_lock:
+            awaited = self._receipts
             for _, event in messages:
-                if event.device is None:
-                    continue
-                if event.kind is EventKind.DATA:
-                    spans = self._receipts.get((event.node, event.device))
-                    number = (
-                        None if spans is None else next((one[1] for one in reversed(event.readings) if one[0] == SEQUENCE), None)
-                    )
-                    if spans is not None and isinstance(number, int):
+                kind, node, device, _, readings = event[:5]
+                if kind is _DATA:
+                    spans = awaited.get((node, device)) if awaited and device is not None else None
+                    if spans is None:
+                        continue
+                    number = next((one[1] for one in reversed(readings) if one[0] == SEQUENCE), None)
+                    if isinstance(number, int):
                         spans.discard(number, number)
                         spans.add(number, number)
-                elif event.kind is EventKind.BIRTH and any(reading.name == RECEIPT for reading in event.readings):
-                    self._receipts.setdefault((event.node, event.device), Spans())
+                elif kind is _BIRTH and device is not None and any(reading.name == RECEIPT for reading in readings):
+                    awaited.setdefault((node, device), Spans())
 
     def _tidy(self) -> bool:
         """Tidy; return True if hours were sealed."""

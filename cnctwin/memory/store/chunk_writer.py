@@ -78,7 +78,7 @@ class ChunkWriter:
     def take(self, source: Source, number: int, received_ms: int, event: HostEvent) -> bool:
         """Take a DATA message with readings, as the one with this number; False where it is not for a chunk."""
         names, values, stamps, qualities, units, reasons, history = zip(*event.readings, strict=True)
-        oldest_ms, newest_ms = min(stamps), max(stamps)
+        oldest_ms, newest_ms = (event.oldest_ms, event.newest_ms) if event.names else (min(stamps), max(stamps))
         key = (names, tuple(map(type, values)), qualities, units, reasons, history, oldest_ms == newest_ms)
         layout = source.last_layout
         if layout is None or key != layout.key:

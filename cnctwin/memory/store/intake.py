@@ -38,7 +38,8 @@ HOUR_MS = 3_600_000
 REPEATED, REFUSED = -1, -2
 EVENT_CODES = {EventKind.BIRTH: 0, EventKind.DATA: 1, EventKind.DEATH: 2, EventKind.HOLE: 3}
 EVENT_KINDS = {code: kind for kind, code in EVENT_CODES.items()}
-DATA_CODE = EVENT_CODES[EventKind.DATA]
+_DATA = EventKind.DATA
+DATA_CODE = EVENT_CODES[_DATA]
 MINUTES_READ = 16
 _EVENT = "INSERT INTO events VALUES"
 _SAMPLE = "INSERT INTO samples VALUES"
@@ -71,7 +72,7 @@ class Batch:
         self._chunks.write_all()
         self._flush()
         insert(self._db, _EVENT, self._events)
-        self._table.keep_latest([(signal, kept(signal.last)[1]) for signal in self._changed])
+        self._table.keep_latest(self._changed)
         self._db.execute("UPDATE meta SET value = ? WHERE name = 'number'", (self.number,))
         samples = self.rows + self._chunks.stored
         self._db.execute("UPDATE meta SET value = value + ? WHERE name = 'samples'", (samples,))
@@ -85,7 +86,8 @@ class Batch:
 
     def _message(self, received_ms: int, event: HostEvent) -> None:
         kind, node_id, device, stamp_ms, readings = event[:5]
-        code = EVENT_CODES.get(kind)
+        is_data = kind is _DATA
+        code = DATA_CODE if is_data else EVENT_CODES.get(kind)
         if code is None or (device is None and kind is not EventKind.HOLE):
             return
         if not -STAMP_MS_MAX <= stamp_ms <= STAMP_MS_MAX:
@@ -99,11 +101,10 @@ class Batch:
         else:
             source = self._table.source(node_id, device)
             machine, node = source.machine, source.node
-            is_data = kind is EventKind.DATA and readings and not event.detail
-            if is_data and self._chunks.take(source, self.number, received_ms, event):
+            if is_data and readings and not event.detail and self._chunks.take(source, self.number, received_ms, event):
                 return
             places = self._readings(source, event)
-            if kind is not EventKind.DATA:
+            if not is_data:
                 body = packed(readings)
             elif places:
                 order = order_of(places)

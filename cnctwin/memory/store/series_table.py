@@ -7,10 +7,11 @@ a series is of one type, and one for its nulls.
 import sqlite3
 from collections.abc import Iterable
 from enum import IntEnum
+from math import isfinite
 from typing import Any
 
 from cnctwin.memory.store.database import insert
-from cnctwin.memory.store.value_form import BLOCKS, Kind, given
+from cnctwin.memory.store.value_form import BLOCKS, Kept, Kind, given, kept
 from sparkplug.metric import NodeId
 from sparkplug.quality import Quality
 from sparkplug.values import Value
@@ -150,7 +151,11 @@ class SeriesTable:
             self.kinds[sid] = kind
         return sid
 
-    def keep_latest(self, signals: Iterable[tuple[Signal, Any]]) -> None:
-        """Write the last samples; with each its value as SQLite is given it."""
-        rows = [(s.id, s.last_sid, s.first_us, s.last_us, value, s.last_flag) for s, value in signals]
+    def keep_latest(self, signals: Iterable[Signal]) -> None:
+        """Write the last samples."""
+        rows: list[tuple[int, int, int, int, Kept, int]] = []
+        for s in signals:
+            value = s.last
+            form = value if type(value) is float and isfinite(value) else kept(value)[1]
+            rows.append((s.id, s.last_sid, s.first_us, s.last_us, form, s.last_flag))
         insert(self._db, "INSERT OR REPLACE INTO latest VALUES", rows)
