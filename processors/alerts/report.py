@@ -38,7 +38,7 @@ def machine_outputs(
     outputs: list[Output] = []
     shown = {}
     for machine in online:
-        phase, firing, summary = _of_machine(alerts.get(machine, []))
+        phase, firing, summary = _of_machine(alerts.get(machine, ()))
         shown[machine] = f"{phase}\n{firing}\n{summary}"
         if state.shown.get(machine) != shown[machine]:
             outputs += [
@@ -50,6 +50,8 @@ def machine_outputs(
 
 
 def _of_machine(alerts: Sequence[Alert]) -> tuple[str, int, str]:
+    if not alerts:  # of nearly every machine
+        return NONE, 0, NONE
     live = sorted(
         (a for a in alerts if a.phase is not Phase.RESOLVED), key=lambda a: (-_ORDER[a.phase], -a.severity.rank, a.name)
     )

@@ -21,6 +21,8 @@ RESOLVED_SHOWN_S = 3600.0
 MACHINES_MAX = 2000
 CONTEXT_MAX = 100
 OFFLINE = "the machine is offline"
+NOT_LOST = Condition(False, "", 0)
+_STALE = Quality.STALE
 
 Row = Mapping[str, Reading]
 
@@ -106,15 +108,18 @@ def _all(
     known: Set[tuple[str, str]],
 ) -> Iterator[Watched]:
     """Yield what stands, and what is an alert already: of a shop in order that is next to nothing."""
+    pulses = state.pulses
     for machine, last_s in machines.items():
         config, row = configuration.of(machine), cell.get(machine)
         for signal, rule in config.signals.items():
             reading = None if row is None else row.get(signal)
+            pulse_ms = pulses.get(f"{machine}\0{signal}") if pulses else None
+            is_up = pulse_ms is not None or (reading is not None and reading.value is True)
+            if not is_up and not known:
+                continue
             name = signal.removeprefix(TWIN_PREFIX)
-            is_up = (reading is not None and reading.value is True) or f"{machine}\0{signal}" in state.pulses
             if is_up or (machine, name) in known:
                 condition = condition_of(reading) if row is not None else Condition(None, OFFLINE, 0)
-                pulse_ms = state.pulses.get(f"{machine}\0{signal}")
                 if pulse_ms is not None and not condition.stands and rule.for_s == 0.0:
                     condition = Condition(True, "", pulse_ms)
                 if condition.stands or (machine, name) in known:
@@ -147,8 +152,9 @@ def _source(config: AlertsConfig, row: Row | None) -> Condition:
     is no good news."""
     if row is None:
         return Condition(None, OFFLINE, 0)
-    lost = [row[signal].timestamp_ms for signal in config.signals if signal in row and row[signal].quality is Quality.STALE]
-    return Condition(bool(lost), "", max(lost, default=0))
+    readings = map(row.get, config.signals)
+    lost = [reading.timestamp_ms for reading in readings if reading is not None and reading.quality is _STALE]
+    return Condition(True, "", max(lost)) if lost else NOT_LOST
 
 
 def _raised(
