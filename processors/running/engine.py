@@ -117,7 +117,7 @@ class Engine:
     def way_of(self, node: NodeId, device: str) -> Way | None:
         """Return the shortest way for data of a device whose names are given: it does what `feed` does.
 
-        There is one once a message of the node was fed; it holds until a machine is born, dies or is forgotten.
+        There is one once a message of the node was fed; it holds until the machine is born again or dies.
         """
         machine = self._machines.get(device)
         if machine is None or (take := machine.ways.get(node)) is None:

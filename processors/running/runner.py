@@ -52,7 +52,7 @@ class Runner:
         self._names = ", ".join(worker.name for worker in self.workers)
         self._marker_topic = topics.marker_of(self.workers[0].name)
         self._readers: dict[str, tuple[Worker, ...]] = {}  # by node
-        self._ways: dict[tuple[NodeId, str], list[tuple[Worker, Way | None]]] = {}
+        self._ways: dict[str, dict[NodeId, list[tuple[Worker, Way | None]]]] = {}  # by device and node
         self._waiting: deque[HostEvent] = deque()
         self._is_restored = False
         self._turned_s = time.monotonic()
@@ -180,17 +180,21 @@ class Runner:
         if event.names and not has_waited:
             self._stream(event, now_s)
             return
-        if event.kind is not _DATA:
-            self._ways.clear()
+        if event.kind is not _DATA and event.device is not None:
+            self._ways.pop(event.device, None)
         for worker in self._readers_of(event):
             worker.take(event, now_s, has_waited=has_waited)
 
     def _stream(self, event: HostEvent, now_s: float) -> None:
-        """Data whose names are given take the shortest way through each processor, as long as nobody is born or dies."""
+        """Data whose names are given take the shortest way through each processor, from one birth or death of the machine to the
+        next."""
         source, device = event.node, event.device or ""
-        ways = self._ways.get((source, device))
+        of_device = self._ways.get(device)
+        if of_device is None:
+            of_device = self._ways[device] = {}
+        ways = of_device.get(source)
         if ways is None:
-            ways = self._ways[source, device] = [(worker, None) for worker in self._readers_of(event)]
+            ways = of_device[source] = [(worker, None) for worker in self._readers_of(event)]
         message = stream_of(event)
         for place, (worker, way) in enumerate(ways):
             if way is None:  # the first message shows the way
