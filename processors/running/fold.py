@@ -114,6 +114,7 @@ class Fold:
         """Outputs of several machines, or beside Sparkplug."""
         if (ready := self._plain.ready(outputs)) is not None:
             return ready
+        self._quiet = ()
         by_machine: dict[str, list[Output]] = {}
         beside: list[Action] = []
         for output in outputs:
