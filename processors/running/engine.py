@@ -252,9 +252,7 @@ class Engine:
         """The processor stops: what its plain messages say of online machines is no longer kept up. (Its twin devices die with
         its edge node.) The state is not to be saved after this."""
         actions: list[Action] = []
-        if not self._processor.plain:
-            return []
-        for machine in self._machines.values():
+        for machine in self._machines.values() if self._processor.plain else ():
             if machine.is_online:
                 self.ledger.count(machine.live.drop_held(), 0)
                 actions += machine.live.death(list(machine.live.row), at_ms, "the processor was stopped", is_last=True)[0]
@@ -270,9 +268,7 @@ class Engine:
 
     def _unit(self, name: str) -> Unit:
         """The unit of that name, made where there is none."""
-        if name not in self._units:
-            self._units[name] = self._fresh_unit(name)
-        return self._units[name]
+        return self._units.get(name) or self._units.setdefault(name, self._fresh_unit(name))
 
     def _lane(self, fold: Fold, machine: str) -> Lane:
         config = self._processor.config_of(self._configuration, machine)
@@ -374,9 +370,7 @@ class Engine:
     def _node_event(self, event: HostEvent) -> list[Action]:
         """A hole of an edge node concerns each machine that it stands for. Its death comes as one death for each device."""
         actions: list[Action] = []
-        if event.kind is not EventKind.HOLE:
-            return actions
-        for machine in self._machines.values():
+        for machine in self._machines.values() if event.kind is EventKind.HOLE else ():
             if event.node in machine.online:
                 actions += machine.live.lost(event.detail)
                 self._changed[machine.unit.name] = None
@@ -388,11 +382,10 @@ class Engine:
 
     def _forget_one(self) -> bool:
         """Make room: the machine that has been offline longest by order of arrival goes."""
-        offline = itertools.islice((name for name, machine in self._machines.items() if not machine.online), 1)
-        for name in list(offline):
+        name = next((name for name, machine in self._machines.items() if not machine.online), None)
+        if name is not None:
             self._forget(name)
-            return True
-        return False
+        return name is not None
 
     def _forget(self, name: str) -> None:
         lost = self._machines.pop(name)
