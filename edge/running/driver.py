@@ -42,7 +42,7 @@ class Watching(Protocol):
     """A reader that goes on when its socket can be read. It raises nothing."""
 
     def resume(self) -> Wait | None:
-        """Go on; the next wait, None where the reader goes on by itself."""
+        """Go on; the next wait, of no seconds where there is more, None where the reader goes on by itself."""
 
 
 class Driver:
@@ -59,7 +59,7 @@ class Driver:
         self._wake_writer.setblocking(False)
         self._poll.register(self._wake_reader, select.EPOLLIN)
         self.loop = Loop("edges mqtt")
-        self._is_over = False
+        self._is_over = self._has_more = False
         self._thread = threading.Thread(target=self._run, name="edges", daemon=True)
 
     def start(self) -> None:
@@ -101,14 +101,15 @@ class Driver:
     def _run(self) -> None:
         while not self._is_over:
             now_s = time.monotonic()
-            events = self._poll.poll(min(max(self._next_s - now_s, 0.0), TURN_S))
+            events = self._poll.poll(0.0 if self._has_more else min(max(self._next_s - now_s, 0.0), TURN_S))
+            self._has_more = False
             while self._asked:
                 self._asked.popleft()()
             for descriptor, _ in events:
                 self._resume(descriptor)
             self._take_turns()
             self.loop.turn(0.0)  # what was sent goes out, and what the brokers say is heard
-            if events:
+            if events and not self._has_more:
                 time.sleep(GATHER_S)
 
     def _add(self, edge: Turning) -> None:
@@ -130,6 +131,7 @@ class Driver:
             return
         wait = watched[0].resume()
         if wait is not None:
+            self._has_more |= wait.seconds <= 0.0
             self._watched[descriptor] = watched[0], time.monotonic() + wait.seconds
             return
         del self._watched[descriptor]

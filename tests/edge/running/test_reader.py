@@ -133,3 +133,47 @@ def test_an_error_of_ours_in_the_drivers_thread_ends_this_reader_only(driver: Dr
         assert [str(error) for error in notes.errors] == ["a bug"]
         other, _ = read(Plain(b"a"), driver)
         assert other.is_over.wait(20)
+
+
+class Flood(Plain):
+    """A connection whose socket gives more than can be taken."""
+
+    def __init__(self, sock: socket.socket) -> None:
+        super().__init__()
+        self._sock, self.is_closed = sock, False
+
+    def steps(self) -> Iterator[bytes | Wait]:
+        yield Wait(self._sock, 60.0)
+        while not self.is_closed:
+            time.sleep(0.001)
+            yield b"more"
+
+
+def test_a_control_that_floods_does_not_keep_the_driver_from_the_others(driver: Driver) -> None:
+    """It goes on all the while, and its neighbour's messages are taken as they come."""
+    pairs = [socket.socketpair() for _ in range(2)]
+    (flooded, floods), (ours, theirs) = pairs
+    flood = Flood(flooded)
+    try:
+        floods.send(b"x")
+        flood_notes, flood_reader = read(flood, driver)
+        while len(flood_notes.frames) < 5:
+            time.sleep(0.01)
+        notes, reader = read(Stepped(ours), driver)
+        for number in range(1, 20):
+            before = len(flood_notes.frames)
+            theirs.send(b"part")
+            deadline_s = time.monotonic() + 20
+            while len(notes.frames) <= number or len(flood_notes.frames) == before:
+                assert time.monotonic() < deadline_s, "the neighbour waits for a flood that has no end"
+                time.sleep(0.001)
+        theirs.close()
+        flood.is_closed = True
+        assert notes.is_over.wait(20) and flood_notes.is_over.wait(20)
+        reader.join(20)
+        flood_reader.join(20)
+    finally:
+        flood.is_closed = True
+        for pair in pairs:
+            for sock in pair:
+                sock.close()
