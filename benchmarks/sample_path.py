@@ -16,6 +16,7 @@ and spread out.
 """
 
 import argparse
+import gc
 import json
 import multiprocessing
 import socket
@@ -38,7 +39,7 @@ from processors.actions import Publish as PublishAction
 from processors.config import Configuration, ProcessorConfig
 from processors.contract import NoState, Output, OutputSpec, Processor, Provenance, Sample, SampleKind
 from processors.running.engine import Engine
-from processors.running.runner import GATHER_S
+from processors.running.runner import GATHER_S, SELDOM
 from processors.running.runtime import runner_of
 from sparkplug.actions import Publish
 from sparkplug.broker import BrokerAddress
@@ -280,6 +281,8 @@ def timed(work: Callable[[], None], count: int) -> float:
 def stages(count: int) -> dict[str, float]:
     """Decode, fold and encode, each on its own."""
     births, data = source_messages(count)
+    usual = gc.get_threshold()
+    gc.set_threshold(*SELDOM)  # as a process of processors has it
     session = HostSession("bench", chance=Random(0))
     session.connected(START_MS)
     engine = Engine(PROBE, Configuration(ProcessorConfig, {}))
@@ -297,6 +300,7 @@ def stages(count: int) -> dict[str, float]:
     published = [action for action in actions if isinstance(action, PublishAction)]
     assert len(published) == count, "every message must bring a result"
     result["encode"] = timed(lambda: [out.publish(e.machine, e.changes, START_MS) for e in published] and None, count)
+    gc.set_threshold(*usual)
     return result
 
 
