@@ -21,7 +21,6 @@ import json
 import multiprocessing
 import socket
 import statistics
-import struct
 import tempfile
 import threading
 import time
@@ -33,6 +32,7 @@ from typing import Any
 import paho.mqtt.client as paho
 from paho.mqtt.enums import CallbackAPIVersion
 
+from benchmarks.hall.packets import publish
 from cnctwin.processes.port import free_port
 from cnctwin.processes.private_broker import PrivateBroker
 from processors.actions import Publish as PublishAction
@@ -102,27 +102,15 @@ def source_messages(count: int) -> tuple[list[Publish], list[Publish]]:
 # The load: another process, a bare socket, packets made beforehand.
 
 
-def packet(message: Publish) -> bytes:
-    """An MQTT 3.1.1 PUBLISH of QoS 0."""
-    topic = message.topic.encode()
-    body = struct.pack(">H", len(topic)) + topic + message.payload
-    length, size = len(body), bytearray()
-    while True:
-        length, digit = divmod(length, 128)
-        size.append(digit | (0x80 if length else 0))
-        if not length:
-            return b"\x30" + bytes(size) + body
-
-
 def load(port: int, births: list[Publish], data: list[Publish], rate_hz: float, go: Any) -> None:
     """Send the births, wait for the word, then the data: in bursts of 50, or one by one at `rate_hz`."""
     with socket.create_connection(("127.0.0.1", port)) as sock:
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         sock.sendall(b"\x10\x11\x00\x04MQTT\x04\x02\x00\x00\x00\x05bench")
         sock.recv(4)
-        sock.sendall(b"".join(map(packet, births)))
+        sock.sendall(b"".join(publish(message.topic, message.payload) for message in births))
         go.wait()
-        packets = [packet(message) for message in data]
+        packets = [publish(message.topic, message.payload) for message in data]
         size = 1 if rate_hz else 50
         started_s = time.monotonic()
         for first in range(0, len(packets), size):

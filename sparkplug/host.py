@@ -118,7 +118,7 @@ class HostApplication:
 
     @property
     def backlog(self) -> int:
-        """How many messages wait to be sent."""
+        """The number of messages that wait to be sent."""
         return self._connection.backlog
 
     @property

@@ -1,4 +1,4 @@
-"""What a host session tells its application."""
+"""The events that a host session hands to its application."""
 
 from enum import Enum
 from typing import NamedTuple
@@ -7,7 +7,7 @@ from sparkplug.metric import NodeId, Reading
 
 
 class EventKind(Enum):
-    """What an event says."""
+    """The kind of an event."""
 
     BIRTH = "birth"
     DATA = "data"

@@ -47,7 +47,7 @@ def _text(raw: bytes) -> bytes:
 
 
 class DataTemplate:
-    """What is constant in the bytes of a metric: alias, type, and whether it is transient.
+    """The constant bytes of a metric: its alias, its type, and whether it is transient.
 
     `head` is what goes before the time stamp where the metric is a plain double: with STAMP_BYTES bytes of time stamp, the tag
     and eight bytes of value its length is known; else it is empty.

@@ -217,7 +217,7 @@ class NodePicture:
 
 
 class _Told(NamedTuple):
-    """What the properties of a metric say."""
+    """The properties of a metric, and the quality and unit in them."""
 
     properties: PropertySet
     unit: str | None

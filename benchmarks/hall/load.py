@@ -17,18 +17,19 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.hall.machine import KEEP_ALIVE_S, POOL, Bodies, Machine, flags
-from benchmarks.hall.packets import PINGREQ, READ_BYTES, Stream, connected, varint
+from benchmarks.hall.packets import PINGREQ, READ_BYTES, Stream, connected
+from sparkplug.layouts.varint import written
 
 SLOT_S = 0.005
 ROUND_S = 120.0
-"""What a machine does repeats: a tool change at its begin, a stop in its middle."""
+"""Each machine repeats a round: a tool change at the beginning, a stop in the middle."""
 CHANGE_S, STOP_S, OUTAGE_S = 5.0, 6.0, 3.0
 ABRUPT = struct.pack("ii", 1, 0)  # SO_LINGER: the connection is reset, and the broker says the will
 
 
 @dataclass(slots=True)
 class Order:
-    """What a process of the load is to do. `steady`: machines, by number, that have no outage."""
+    """The task of one process of the load. `steady`: machines, by number, that have no outage."""
 
     port: int
     machines: Sequence[int]
@@ -40,7 +41,7 @@ class Order:
 
 @dataclass(slots=True)
 class Tally:
-    """What was sent while a window was open; `whole`: data messages with all that changes, by machine."""
+    """The messages sent while a window was open. `whole`: data messages in which all 11 values change, by machine."""
 
     sent: int = 0
     outages: int = 0
@@ -125,7 +126,7 @@ class Load:
             if is_open:
                 self.tally.late_ms.append((time.monotonic() - due_s) * 1000.0)
             if not idle:
-                stamp = varint(now_ms)
+                stamp = written(now_ms)
                 for one in slots[number % len(slots)]:
                     if one.sock is not None:
                         self._turn(one, stamp, now_ms, is_open)

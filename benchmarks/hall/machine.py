@@ -11,10 +11,12 @@ import struct
 from dataclasses import dataclass
 from typing import Any
 
-from benchmarks.hall.packets import PUBLISH, connect, publish, subscribe, text, varint
+from benchmarks.hall.packets import PUBLISH, connect, publish, subscribe, text
+from cnctwin.planning.calibration import SIGNALS as CHANGING
 from sparkplug.actions import Publish, Subscribe
 from sparkplug.datatype import DataType
 from sparkplug.edge_session import EdgeNodeSession
+from sparkplug.layouts.varint import written
 from sparkplug.metric import Change, MetricSpec, NodeId
 from sparkplug.schema import PayloadMessage
 from twin.vocabulary.nodes import edge_node
@@ -22,23 +24,10 @@ from twin.vocabulary.signals import SIGNALS, canonical
 
 GROUP = "cnc"
 KEEP_ALIVE_S = 60
-CHANGING = (
-    "spindle_rpm",
-    "spindle_load_pct",
-    "spindle_power_kw",
-    "feed_mm_min",
-    "axis_x_pos_mm",
-    "axis_y_pos_mm",
-    "axis_z_pos_mm",
-    "axis_x_load_pct",
-    "vibration_velocity_mm_s",
-    "spindle_temp_c",
-    "ambient_temp_c",
-)
 FLAGS = ("exec_state", "tool_change_active", "tool_number")
 ALIAS = {name: number for number, name in enumerate((*CHANGING, *FLAGS), start=1)}
 ROOM_MS = 0x155_5AA5_5AA5  # a stamp of six bytes on the wire, as all from 2005 to 2109 are
-ROOM = varint(ROOM_MS)
+ROOM = written(ROOM_MS)
 POOL = 256
 """Data messages that differ; each machine begins at another one."""
 
@@ -177,7 +166,7 @@ class Machine:
         head = self._heads.get(size)
         if head is None:
             topic = text(self._topic)
-            head = self._heads[size] = struct.pack("B", PUBLISH) + varint(len(topic) + size) + topic
+            head = self._heads[size] = struct.pack("B", PUBLISH) + written(len(topic) + size) + topic
         return head + made.replace(ROOM, stamp) + tail
 
     def _sent(self, actions: Any) -> bytes:
@@ -187,5 +176,5 @@ class Machine:
         return b"".join(publish(action.topic, action.payload) for action in births)
 
 
-SEQUENCE = tuple(b"\x18" + varint(number) for number in range(256))
+SEQUENCE = tuple(b"\x18" + written(number) for number in range(256))
 """The field `seq` of a payload, for each number."""

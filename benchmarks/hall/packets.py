@@ -7,22 +7,10 @@ import socket
 import struct
 from collections.abc import Sequence
 
+from sparkplug.layouts.varint import written
+
 CONNACK, PUBLISH, PUBACK, SUBSCRIBE, PINGREQ = 0x20, 0x30, 0x40, 0x82, b"\xc0\x00"
 READ_BYTES = 1 << 18
-
-
-def varint(number: int) -> bytes:
-    """Return an integer in groups of seven bits, lowest first, as MQTT and protobuf write it.
-
-    >>> varint(300).hex()
-    'ac02'
-    """
-    digits = bytearray()
-    while True:
-        number, digit = divmod(number, 128)
-        digits.append(digit | (0x80 if number else 0))
-        if not number:
-            return bytes(digits)
 
 
 def text(words: str | bytes) -> bytes:
@@ -33,7 +21,7 @@ def text(words: str | bytes) -> bytes:
 
 def packet(first: int, body: bytes) -> bytes:
     """Return a packet: its first byte, the length of the rest, the rest."""
-    return bytes((first,)) + varint(len(body)) + body
+    return bytes((first,)) + written(len(body)) + body
 
 
 def publish(topic: str, payload: bytes) -> bytes:
@@ -67,7 +55,7 @@ def connected(port: int, hello: bytes) -> socket.socket:
 
 
 class Stream:
-    """What a socket has brought, taken apart into packets."""
+    """A stream of bytes from a socket, taken apart into packets."""
 
     def __init__(self) -> None:
         self._rest = b""

@@ -26,7 +26,7 @@ _T = b'"t":"'
 
 @dataclass(slots=True)
 class Seen:
-    """What has come: ages of values by when they came, and how many stamped within the window came in time."""
+    """The values that have come: their ages by the time of arrival, and how many of the window came in time."""
 
     mirror_s: "array[float]" = field(default_factory=lambda: array("d"))
     results_s: "array[float]" = field(default_factory=lambda: array("d"))

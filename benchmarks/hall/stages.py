@@ -1,4 +1,4 @@
-"""Where the time goes: samples of the running processors by py-spy (MIT), put in stages by the files that they were in.
+"""The stages in which the time goes, from samples of the running processors by py-spy (MIT), sorted by the files they were in.
 
 Only the thread that holds the interpreter's lock is sampled, since one that waits for it looks busy too. The CPU time that is
 left, by the kernel's count, went into system calls and compiled code without the lock.

@@ -34,7 +34,7 @@ _SPAWN = multiprocessing.get_context("spawn")
 
 @dataclass(frozen=True, slots=True)
 class Setup:
-    """What is tried: a tree of the project, which processors, how many machines, how fast."""
+    """The setup of a trial: a tree of the project, which processors, how many machines, how fast."""
 
     tree: Path
     processors: Sequence[Sequence[str]]

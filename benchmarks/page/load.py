@@ -60,7 +60,7 @@ def main() -> None:
 
 
 def births(given: argparse.Namespace) -> None:
-    """What a server takes for all machines at once when it starts, without a broker and a decoder."""
+    """Measure what a server spends when all machines are born as it starts, without a broker and a decoder."""
     live, names = LivePlant(), [f"signal_{number}" for number in range(given.signals)]
     nodes = [(NodeId("cnc", f"edge-m{number:03}"), f"m{number:03}") for number in range(given.machines)]
     events, begun_s = [_event(EventKind.BIRTH, *node, names, 1) for node in nodes], time.process_time()

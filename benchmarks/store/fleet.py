@@ -1,4 +1,4 @@
-"""What the historian costs for a fleet: so many machines at 10 Hz, eleven readings a message, into the embedded store.
+"""The cost of the historian for a fleet: so many machines at 10 Hz, eleven readings a message, into the embedded store.
 
     python -m benchmarks.store.fleet                          # 200 machines, 20 s of them
     python -m benchmarks.store.fleet --machines 20 --seal      # and an hour of three machines, sealed

@@ -1,4 +1,4 @@
-"""How far processors are behind, as their nodes report it; the one judgement that doctor, page and interface share."""
+"""The lag of processors, as their nodes report it; the one judgement that doctor, page and interface share."""
 
 from collections.abc import Iterable, Mapping
 

@@ -191,7 +191,7 @@ class Ring:
         return self._stored_last("memory")
 
     def _stored_last(self, what: str) -> str | None:
-        """That of the last row that has one, or the one that was kept after that row."""
+        """Return the text of the last row that has one, or the one that was kept after that row."""
         kept = dict(self._ask(f"SELECT name, value FROM kept WHERE name IN ('{what}', '{what}_of')"))  # noqa: S608  our own words
         later = f"SELECT {what} FROM rows WHERE {what} IS NOT NULL AND sequence > ? ORDER BY sequence DESC LIMIT 1"  # noqa: S608
         found = self._ask(later, (int(kept.get(f"{what}_of", 0)),))

@@ -183,7 +183,7 @@ class CommandOutcome:
 
 @dataclass(frozen=True, slots=True)
 class HeardLag:
-    """What a processor reported of its lag, and when it was heard (UTC)."""
+    """A processor's report of its lag, and when it was heard (UTC)."""
 
     heard_s: float
     report: LagReport

@@ -10,7 +10,7 @@ LAYOUTS_MAX = 20_000  # that are remembered; then all are forgotten, and found a
 
 
 class Pick(NamedTuple):
-    """Which readings: their names, and how to get them out of the message, in its order.
+    """The readings that are taken: their names, and a function that gets them out of the message, in its order.
 
     wakes: one of them is a signal whose change is folded as it comes
     """
@@ -21,7 +21,7 @@ class Pick(NamedTuple):
 
 
 class Picks:
-    """What a processor takes of messages, by their names. `inputs` None takes everything."""
+    """Finds the readings that a processor takes, by the names in a message. `inputs` None takes everything."""
 
     def __init__(self, inputs: frozenset[str] | None, wakes: frozenset[str] | None) -> None:
         self.inputs, self._wakes = inputs, wakes
@@ -44,7 +44,7 @@ class Picks:
 
 
 def _getter(places: tuple[int, ...], count: int) -> Callable[[Sequence[Reading]], tuple[Reading, ...]]:
-    """What takes these places out of a sequence."""
+    """Return a function that takes these places out of a sequence."""
     if len(places) == count:
         return tuple
     if len(places) == 1:

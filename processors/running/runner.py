@@ -249,7 +249,7 @@ class Runner:
         }
 
     def _note_dropped(self) -> None:
-        """What the queue in front of us has lost, each of the processors has lost."""
+        """Count the messages that the shared queue has lost: each processor has lost them."""
         overflowed = self._host.dropped - self._dropped
         self._dropped += overflowed
         for worker in self.workers:

@@ -1,4 +1,4 @@
-"""Which units of a processor are saved next.
+"""The order in which the units of a processor are saved.
 
 What has changed is saved every two seconds while that is little; of much, so many bytes a second, the unit that has waited the
 longest first. Before its turn comes a unit that was never saved, since what its estimate was started from would be lost for

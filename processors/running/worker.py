@@ -124,7 +124,7 @@ class Worker:
 
     @property
     def backlog(self) -> int:
-        """How much waits in its edge node for the broker to take it."""
+        """The number of messages that wait in its edge node for the broker to take them."""
         return self._edge.backlog
 
     # What it is given.

@@ -23,7 +23,7 @@ _READING, _NEW, _number = repeat(Reading), tuple.__new__, int.from_bytes
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Layout:
-    """What is constant in the messages of one layout, and how the rest is read.
+    """The bytes that are constant in the messages of one layout, and the way to read the rest.
 
     The time stamps of the metrics: all equal, the first of them at `first_at` (`low_bits` masks its continuation bits away); or
     each for itself, then `stamps` takes them out; or the payload's, then there is neither. `convert` holds the places of values

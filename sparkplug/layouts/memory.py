@@ -13,7 +13,7 @@ MISSES_A_LAYOUT = 64
 
 @dataclass(slots=True)
 class Room:
-    """How much memory all layouts of a host may still take."""
+    """The memory that all layouts of a host may still take, bytes."""
 
     left: int = 64 * 1024 * 1024
 

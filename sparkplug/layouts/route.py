@@ -1,4 +1,4 @@
-"""Where the data messages of one topic go: an edge node's or device's picture, read by remembered layouts."""
+"""The way of the data messages of one topic: an edge node's or device's picture, read by remembered layouts."""
 
 from dataclasses import dataclass
 from typing import Any

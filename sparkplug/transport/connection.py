@@ -117,12 +117,12 @@ class MqttConnection:
 
     @property
     def full(self) -> bool:
-        """Whether the outbox holds so much that no more should be put into it: the broker takes less than we give."""
+        """True if no more should be put into the outbox: the broker takes less than it is given."""
         return len(self._outbox) >= OUTBOX_MAX or self._taken_bytes - self._sent_bytes >= OUTBOX_BYTES_MAX
 
     @property
     def backlog(self) -> int:
-        """How many actions wait to be sent."""
+        """The number of actions that wait to be sent."""
         return len(self._outbox)
 
     def close(self, farewell: Sequence[Action], timeout_s: float) -> None:

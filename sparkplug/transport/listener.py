@@ -1,4 +1,4 @@
-"""Who is told what happens to a connection."""
+"""The owner of a connection, who is told what happens to it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

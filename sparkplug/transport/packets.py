@@ -15,7 +15,7 @@ SUCCESS = 0
 _LENGTH_BYTES_MAX = 4
 _UNWANTED = ""
 _SHORT = tuple(tuple(bytes((0x30 | retain, length)) for length in range(128)) for retain in (0, 1))
-"""How a short PUBLISH of QoS 0 begins, by retain and length."""
+"""The first bytes of a short PUBLISH of QoS 0, by retain and length."""
 # The properties of a PUBLISH that say nothing to us (MQTT 5.0, 3.3.2.3), with the bytes of the value; -1: a string or binary
 # data, -2: two of them, -3: a variable byte integer. A topic alias (0x23) is not among them: we allow none.
 _PROPERTIES = {0x01: 1, 0x02: 4, 0x03: -1, 0x08: -1, 0x09: -1, 0x0B: -3, 0x26: -2}
@@ -23,7 +23,7 @@ _PROPERTIES = {0x01: 1, 0x02: 4, 0x03: -1, 0x08: -1, 0x09: -1, 0x0B: -3, 0x26: -
 
 @dataclass(frozen=True, slots=True)
 class Reader:
-    """Who is told what is read, in the order in which it came."""
+    """The receivers of what is read; they are called in the order in which it came."""
 
     message: Callable[[str, bytes], None]
     acknowledge: Callable[[int], None]  # a message of QoS 1 has been handed on: this packet id is owed a PUBACK

@@ -67,7 +67,7 @@ class Stream:
 
     @property
     def given(self) -> bool:
-        """Whether paho has bytes to read."""
+        """True if paho has bytes to read."""
         return self._start < len(self._for_paho)
 
     def receive(self) -> bytes:
@@ -135,7 +135,7 @@ class Stream:
 
     @property
     def unsent(self) -> int:
-        """How many messages of QoS 0 no byte was sent of."""
+        """The number of QoS 0 messages of which no byte was sent."""
         return sum(piece[0] & 0xF6 == 0x30 for piece in self._pieces[self._is_begun :])
 
     def finish(self) -> None:

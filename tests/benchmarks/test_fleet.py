@@ -12,11 +12,12 @@ from benchmarks.hall import curves, holds, machine, packets, soak, stages, trial
 from benchmarks.hall import page as page_of_fleet
 from benchmarks.hall.load import Load, Order
 from benchmarks.hall.machine import ALIAS, CHANGING, ROOM, Bodies, Machine, body, flags
-from benchmarks.hall.packets import Stream, publish, varint
+from benchmarks.hall.packets import Stream, publish
 from benchmarks.hall.reader import Seen
 from benchmarks.hall.trial import OWN, Setup
 from benchmarks.hall.usage import Usage
 from sparkplug.host_session import EventKind, HostSession
+from sparkplug.layouts.varint import written
 
 NOW_MS = 1_790_000_000_000
 
@@ -44,7 +45,7 @@ def test_a_host_takes_what_a_machine_of_the_load_says() -> None:
     bodies = Bodies.made()
     for number in range(300):  # over the turn of the sequence number
         extra = flags(tool_change_active=True, tool_number=7) if number == 150 else b""
-        data += one.data(bodies.cut[number % 256] + extra, varint(NOW_MS + 100 * (number + 1)))
+        data += one.data(bodies.cut[number % 256] + extra, written(NOW_MS + 100 * (number + 1)))
     events = [event for topic, payload in stream.published(data) for event in session.message(topic, payload, NOW_MS)]
     told = [event for event in events if event.device == "m0003"]
     assert told[0].kind is EventKind.BIRTH and {reading.name for reading in told[0].readings} == set(ALIAS)
@@ -73,7 +74,7 @@ def test_machines_change_their_tools_and_stand_still(monkeypatch: pytest.MonkeyP
     one = load.machines[0]
     one.sock = Wire()  # type: ignore[assignment]
     for tick in range(1200):
-        load._turn(one, varint(NOW_MS + 100 * tick), NOW_MS + 100 * tick, True)
+        load._turn(one, written(NOW_MS + 100 * tick), NOW_MS + 100 * tick, True)
     assert load.tally.sent == len(sent) == 1200 - 60 + 6, "six seconds of standing, a message a second"
     assert load.tally.whole == {"m0000": 1200 - 60}
     assert one.machine.tool == 2

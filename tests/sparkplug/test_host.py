@@ -1,4 +1,4 @@
-"""What a host application takes into its inbox, and what it drops."""
+"""A host application's inbox: what it takes, and what it drops."""
 
 from __future__ import annotations
 

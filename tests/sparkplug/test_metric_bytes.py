@@ -1,4 +1,4 @@
-"""What is written from kept parts is, byte for byte, what protobuf writes."""
+"""Metrics written from kept parts are, byte for byte, those that protobuf writes."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ PROPERTY = st.one_of(
 @QUICK
 @given(st.data())
 def test_a_birth_is_what_protobuf_writes(data: st.DataObject) -> None:
-    """Of the metrics one after another; the payload's own fields stand around them."""
+    """The metrics follow one another; the payload's own fields stand around them."""
     specs, expected = [], []
     for alias in range(1, 1 + data.draw(st.integers(1, 5), "metrics")):
         datatype = data.draw(st.sampled_from(TYPES), "type")

@@ -63,7 +63,7 @@ def form_of(letters: str, count: int, *, is_single: bool) -> Form:
 
 
 class Alike(NamedTuple):
-    """What the messages of a chunk have in common: of each column the letter of its type, its series and flag."""
+    """The form that the messages of a chunk share: for each column the letter of its type, its series and flag."""
 
     letters: str
     sids: Sequence[int]
@@ -107,7 +107,7 @@ class Chunk:
 
     @property
     def alike(self) -> bytes:
-        """What chunks of messages that are alike have in common, but for the number of messages."""
+        """The bytes that all chunks of such messages share, apart from the number of messages."""
         return self.body[:3] + self.body[_HEAD.size : self._form.offsets]
 
     def numbers(self) -> list[int]:
@@ -115,7 +115,7 @@ class Chunk:
         return [self.first + offset for offset in unpack_from(f"<{self.count}I", self.body, self._form.offsets)]
 
     def received_ms(self) -> tuple[int, ...]:
-        """When the messages came."""
+        """Return the times at which the messages were received, ms."""
         return unpack_from(f"<{self.count}q", self.body, self._form.received)
 
     def message_stamps(self) -> tuple[int, ...]:
@@ -138,7 +138,7 @@ class Chunk:
 
     @property
     def places(self) -> tuple[int, int, tuple[int, ...]]:
-        """Where the numbers begin in the body, where the stamps of samples do, and where each column does."""
+        """The offsets in the body of the numbers, of the stamps of samples, and of each column."""
         return self._form.offsets, self._form.sample_stamps, self._form.values
 
     @property

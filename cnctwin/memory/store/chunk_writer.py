@@ -16,7 +16,7 @@ from cnctwin.memory.store.value_form import INT_MAX
 from sparkplug.host_session import HostEvent
 
 LAYOUTS_MAX = 256
-"""Of one source; texts of reasons that carry figures make new ones all the time."""
+"""The most layouts of one source: reasons that carry figures make new ones all the time."""
 COLUMNS_MAX = 1_000
 STAMP_MS_MAX = 253_402_300_799_999
 """The end of the year 9999; a stamp beyond it, or before 1970, is none."""

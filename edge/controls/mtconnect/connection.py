@@ -138,7 +138,7 @@ class MtconnectConnection:
                 self._socket = None
 
     def _pieces(self, stream: Stream) -> Iterator[bytes | None]:
-        """What comes of the body; None where it has to be waited for."""
+        """Yield the pieces of the body; None where the next one has to be waited for."""
         alive_s, came_s = _alive_s(self._config), self._clock()
         while (data := stream.read()) != b"":
             if data is not None:

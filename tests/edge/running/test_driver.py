@@ -3,20 +3,10 @@
 import socket
 import threading
 import time
-from collections.abc import Callable, Iterator
-
-import pytest
+from collections.abc import Callable
 
 from edge.adapter import Wait
 from edge.running.driver import TURN_S, Driver
-
-
-@pytest.fixture
-def driver() -> Iterator[Driver]:
-    driver = Driver()
-    driver.start()
-    yield driver
-    driver.stop()
 
 
 def wait(condition: Callable[[], bool]) -> None:

@@ -6,8 +6,6 @@ import time
 from collections.abc import Iterator
 from typing import Any
 
-import pytest
-
 from edge.adapter import Connection, Wait
 from edge.running.driver import Driver
 from edge.running.reader import Reader
@@ -74,14 +72,6 @@ class Notes:
     def ended(self, error: BaseException | None) -> None:
         self.errors.append(error)
         self.is_over.set()
-
-
-@pytest.fixture
-def driver() -> Iterator[Driver]:
-    driver = Driver()
-    driver.start()
-    yield driver
-    driver.stop()
 
 
 def read(connection: Connection, driver: Driver) -> tuple[Notes, Reader]:

@@ -1,4 +1,4 @@
-"""What a processor takes of a message, found once for all messages that carry the same names."""
+"""The readings that a processor takes of a message are found once for all messages that carry the same names."""
 
 from hypothesis import given
 from hypothesis import strategies as st

@@ -1,4 +1,4 @@
-"""Which units are saved, and when."""
+"""The order in which units are saved, and the times."""
 
 from itertools import pairwise
 

@@ -159,7 +159,7 @@ def picture() -> NodePicture:
 
 
 def bits(readings: tuple[Reading, ...]) -> list[Any]:
-    """What two readings have to share: NaN with its bits, the sign of zero, and the type of each value."""
+    """Return what two readings have to share: NaN with its bits, the sign of zero, and the type of each value."""
     return [
         (type(r.value), struct.pack("<d", r.value) if isinstance(r.value, float) else r.value, r[:1] + r[2:]) for r in readings
     ]

@@ -1,4 +1,4 @@
-"""What is remembered is bounded, and learnt where it pays."""
+"""The memory of layouts is bounded; a layout is learnt where it pays."""
 
 from random import Random
 

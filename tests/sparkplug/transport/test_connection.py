@@ -1,4 +1,4 @@
-"""What a connection does at the moments that a broker does not bring about at will."""
+"""A connection at the moments that a broker does not bring about at will."""
 
 import socket
 import threading

@@ -219,7 +219,7 @@ def test_a_topic_that_is_refused_takes_no_other_message_with_it() -> None:
 
 
 def outcome(kind: type[PahoPath], version: int, data: bytes, cuts: list[int]) -> tuple[object, ...]:
-    """What comes of these bytes: messages, what is answered, whether the connection goes on, and the error, if any."""
+    """Return what comes of these bytes: messages, what is answered, whether the connection goes on, and the error, if any."""
     ours, theirs = socket.socketpair()
     with ours, theirs:
         client, stream = client_on(ours, version)

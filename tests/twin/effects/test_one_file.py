@@ -27,7 +27,7 @@ def sources() -> Iterator[Path]:
 
 
 def imported(node: ast.AST) -> Iterator[str]:
-    """What an import names, in full."""
+    """Yield the names that an import names, in full."""
     if isinstance(node, ast.Import):
         yield from (alias.name for alias in node.names)
     elif isinstance(node, ast.ImportFrom):

@@ -164,7 +164,7 @@ BEHIND = "processors are 18 s behind: 20 machines, one core, 105 % busy; `cnctwi
 
 
 def told(live: LivePlant, t_ms: int) -> list[object]:
-    """What the stream says of processors at a moment."""
+    """Return what the stream says of processors at a moment."""
     said = [batch.payload for batch in live.flush(t_ms) if batch.payload.startswith(b"event: processors")]
     return [json.loads(payload.split(b"data: ")[1])["behind"] for payload in said]
 

@@ -17,7 +17,7 @@ from tests.cnctwin.memory.store.told import BAD, HOUR_MS, T0_MS, reading, steady
 
 
 def rows(store: EmbeddedStore) -> tuple[int, int]:
-    """How many chunks and how many samples of their own there are."""
+    """Return the number of chunks, and of samples that stand in rows of their own."""
     with store._readers.snapshot() as db:
         return tuple(db.execute(f"SELECT count(*) FROM {name}").fetchone()[0] for name in ("chunks", "samples"))  # type: ignore[return-value]
 
