@@ -25,7 +25,11 @@ def packet(first: int, body: bytes) -> bytes:
 
 
 def publish(topic: str, payload: bytes) -> bytes:
-    """Return a PUBLISH of QoS 0."""
+    """Return a PUBLISH of QoS 0.
+
+    >>> publish("a/b", b"hi").hex(" ")
+    '30 07 00 03 61 2f 62 68 69'
+    """
     return packet(PUBLISH, text(topic) + payload)
 
 
