@@ -22,11 +22,10 @@ from functools import partial
 from typing import Protocol
 
 from edge.adapter import Wait
-from sparkplug.transport.loop import DRIVEN_S, Loop
+from sparkplug.transport.loop import Loop
 
 TURN_S = 0.1
 GATHER_S = 0.02
-DRIVE_S_MAX = 0.8 * DRIVEN_S  # or the loop's own thread would take over
 STOP_S_MAX = 5.0
 _log = logging.getLogger(__name__)
 
