@@ -107,8 +107,7 @@ class Runner:
         if now_s - self._reported_s >= REPORT_S:
             self._report_due(now_s)
         for worker in self.workers:
-            if worker.turn(now_s):
-                self._ways.clear()
+            worker.turn(now_s)
 
     # Start and end.
 

@@ -89,14 +89,12 @@ class Worker:
         self._unborn_until_s = now_s + UNBORN_S_MAX
         self._reconnects = self._host.reconnects
 
-    def turn(self, now_s: float) -> bool:
-        """Do what is due; return True if machines have died of it."""
-        is_unborn_due = self._unborn_until_s is not None and now_s >= self._unborn_until_s
-        if is_unborn_due:
+    def turn(self, now_s: float) -> None:
+        """Do what is due."""
+        if self._unborn_until_s is not None and now_s >= self._unborn_until_s:
             self._unborn_until_s = None
             self._apply(self.engine.bury_unborn(time.time_ns() // 1_000_000))
         self._save(self._saves.due(now_s))
-        return is_unborn_due
 
     def beat(self, now_s: float, shared: Shared) -> None:
         """A second has passed: report, with the state that all processors of the process share."""
