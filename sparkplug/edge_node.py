@@ -45,8 +45,15 @@ class EdgeNode:
     ) -> None:
         self._bd_seq = BdSeq(session_file)
         self._aliases = AliasFile(None if session_file is None else session_file.with_name(session_file.name + ".aliases"))
+        addresses = (brokers,) if isinstance(brokers, BrokerAddress) else tuple(brokers)
         self._session = EdgeNodeSession(
-            node, metrics, now_ms=now_ms(), primary_host=primary_host, templates=templates, aliases=self._aliases.read()
+            node,
+            metrics,
+            now_ms=now_ms(),
+            primary_host=primary_host,
+            servers=len(addresses),
+            templates=templates,
+            aliases=self._aliases.read(),
         )
         self._number = 0
         self._barrier_topic = barrier_topic
@@ -55,7 +62,6 @@ class EdgeNode:
         listener = Listener(
             self._connecting, self._bd_seq.give_back, self._connected, self._message, self._lost, self._tick, on_confirmed
         )
-        addresses = (brokers,) if isinstance(brokers, BrokerAddress) else tuple(brokers)
         self._connection = MqttConnection(
             addresses,
             f"{node.group}/{node.node}",
