@@ -20,7 +20,7 @@ from sparkplug.errors import TopicError
 from sparkplug.host_session import EventKind, HostEvent, HostSession
 from sparkplug.metric import Change, NodeId
 from sparkplug.node_picture import NodePicture
-from sparkplug.topics import NAMESPACE, STATE_PREFIX, Topic, Verb, group_filter
+from sparkplug.topics import NAMESPACE, STATE_PREFIX, Topic, Verb, check_id, group_filter
 from sparkplug.transport.connection import MqttConnection
 from sparkplug.transport.listener import Listener
 from sparkplug.transport.loop import Loop
@@ -180,6 +180,15 @@ class HostApplication:
         if not self._session.online:
             return False
         self._connection.send((self._session.command(node, device, changes, now_ms()),))
+        return True
+
+    def request_rebirth(self, node: NodeId) -> bool:
+        """Ask a node for its births, whether anything was heard of it or not; False where this host is offline."""
+        check_id(node.group, "group id")
+        check_id(node.node, "edge node id")
+        if not self._session.online:
+            return False
+        self._connection.send((self._session.rebirth_request(node, now_ms()),))
         return True
 
     def _take(self) -> list[HostEvent]:
