@@ -86,6 +86,9 @@ class EdgeNodeSession:
         self.malformed = 0
         self.aliases: Aliases = {} if aliases is None else dict(aliases)
         self._templates = dict(templates or {})
+        for taken in (BD_SEQ, REBIRTH, *self._templates):
+            if any(spec.name == taken for spec in metrics):
+                raise SparkplugError(f"edge node {node} declares {taken!r}, which its birth holds already; choose another name")
         self._certificate = Certificate(f"edge node {node}", metrics, partial(self._alias, None), now_ms, self._templates)
         self._devices: dict[str, Certificate] = {}
         self._data_topics: dict[str | None, str] = {None: str(Topic(Verb.NDATA, node))}
@@ -239,10 +242,10 @@ class EdgeNodeSession:
         self._seq = 0
         now_ms = self._stamp(max(now_ms, self._clock_ms + 1))  # no two births look alike
         control = (
-            Metric(BD_SEQ, self.bd_seq, DataType.INT64, now_ms),
+            Metric(BD_SEQ, self.bd_seq, DataType.INT64, now_ms, self._alias(None, BD_SEQ)),
             Metric(REBIRTH, False, DataType.BOOLEAN, now_ms),
         )
-        others = encode(Payload(None, definition_metrics(self._templates, now_ms) + control))
+        others = encode(Payload(None, definition_metrics(self._templates, partial(self._alias, None), now_ms) + control))
         payload = b"\x08" + written(now_ms) + self._certificate.birth() + others + _SEQ_FIELDS[0]
         node = Publish(str(Topic(Verb.NBIRTH, self.node)), payload)
         return [node, *(self._device_birth(device, now_ms) for device in self._devices)]
