@@ -6,7 +6,7 @@ The transport tells it what happened (`connecting`, `connected`, `message`, `los
     offline ──connecting──► waiting ──connected, primary host online──► born ──lost──► offline
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from functools import partial
@@ -58,7 +58,8 @@ class EdgeNodeSession:
     """One edge node on one broker at a time.
 
     `primary_host` is the id of the host without which nothing is published. `templates` maps names to definitions; `aliases` are
-    those of an earlier life, so that metrics keep theirs.
+    those of an earlier life, so that metrics keep theirs. `watched_hosts` are ids of hosts whose STATE is only noted in
+    `host_states`, for the application to take; None there: the retained STATE was removed.
     """
 
     def __init__(
@@ -68,6 +69,7 @@ class EdgeNodeSession:
         *,
         now_ms: int = 0,
         primary_host: str | None = None,
+        watched_hosts: Collection[str] = (),
         templates: Mapping[str, Template] | None = None,
         rebirth_interval_ms_min: int = REBIRTH_INTERVAL_MS_MIN,
         aliases: Aliases | None = None,
@@ -79,6 +81,7 @@ class EdgeNodeSession:
         self.bd_seq: int | None = None
         self.commands: list[Command] = []
         self.commands_dropped = 0
+        self.host_states: list[tuple[str, HostState | None]] = []
         self.malformed = 0
         self.aliases: Aliases = {} if aliases is None else dict(aliases)
         self._templates = dict(templates or {})
@@ -86,6 +89,7 @@ class EdgeNodeSession:
         self._devices: dict[str, Certificate] = {}
         self._data_topics: dict[str | None, str] = {None: str(Topic(Verb.NDATA, node))}
         self._primary_topic = None if primary_host is None else state_topic(primary_host)
+        self._watched = {state_topic(host): host for host in watched_hosts}
         self._server = 0
         self._state_timestamps_ms: dict[int, int] = {}
         self._rebirth = RebirthAnswer(rebirth_interval_ms_min)
@@ -106,6 +110,7 @@ class EdgeNodeSession:
         self.phase = Phase.WAITING
         actions: list[Action] = [Subscribe(str(Topic(Verb.NCMD, self.node)))]
         actions += [self._subscribe(device) for device in self._devices]
+        actions += [Subscribe(topic) for topic in self._watched if topic != self._primary_topic]
         if self._primary_topic is not None:
             actions.append(Subscribe(self._primary_topic))
         else:
@@ -121,8 +126,12 @@ class EdgeNodeSession:
         if self.phase is Phase.OFFLINE:
             return []
         try:
+            if topic in self._watched:
+                self.host_states.append((self._watched[topic], HostState.decode(payload) if payload else None))
             if topic == self._primary_topic:
                 return self._host_state(HostState.decode(payload), now_ms)
+            if topic in self._watched:
+                return []
             parsed = Topic.parse(topic)
             if parsed.node == self.node and parsed.verb in (Verb.NCMD, Verb.DCMD):
                 return self._command(parsed.device, payload, now_ms)
