@@ -4,6 +4,7 @@ import os
 import time
 from collections.abc import Callable
 from threading import Event
+from uuid import uuid4
 
 from rich.console import Console
 from rich.live import Live
@@ -19,7 +20,7 @@ PLAIN_LINE_S = 5.0
 
 def viewer(broker: BrokerAddress, group: str) -> HostApplication:
     """A host application that only looks: it publishes no STATE, so nobody waits for it."""
-    return HostApplication(broker, f"view-{os.getpid()}", (group_filter(group),), publish_state=False)
+    return HostApplication(broker, f"view-{os.getpid()}-{uuid4().hex[:8]}", (group_filter(group),), publish_state=False)
 
 
 def show(
