@@ -4,18 +4,19 @@ import threading
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 
-from sparkplug.actions import Barrier, Connect, HostState
+from sparkplug.actions import Barrier, Connect, HostState, Publish
 from sparkplug.alias_file import AliasFile
 from sparkplug.bdseq import BdSeq
 from sparkplug.broker import BrokerAddress
 from sparkplug.clock import now_ms
 from sparkplug.edge_session import Command, EdgeNodeSession, Phase
-from sparkplug.errors import SparkplugError
+from sparkplug.errors import SparkplugError, TopicError
 from sparkplug.metric import Change, MetricSpec, NodeId
 from sparkplug.session_lock import SessionLock
 from sparkplug.transport.connection import MqttConnection
 from sparkplug.transport.listener import Listener
 from sparkplug.transport.loop import Loop
+from sparkplug.transport.sendable import shortened, topic_fault
 from sparkplug.values import Template
 
 
@@ -124,7 +125,12 @@ class EdgeNode:
         return self._connection.backlog
 
     def declare_device(self, device: str, metrics: Iterable[MetricSpec]) -> None:
-        """Add a device (its birth is sent now if the node is born), or give one other metrics."""
+        """Add a device (its birth is sent now if the node is born), or give one other metrics.
+
+        Raises TopicError for a name on whose topics no broker takes a message.
+        """
+        if fault := topic_fault(device):
+            raise TopicError(f"device id {shortened(device)} can stand in no topic: {fault}; give it another name")
         with self._lock:
             actions = self._session.declare_device(device, metrics, now_ms())
             self._aliases.keep(self._session.aliases)
@@ -138,8 +144,9 @@ class EdgeNode:
     def publish(self, device: str | None, changes: Sequence[Change]) -> bool:
         """Send changes of a device (None: of the node) in one message, and keep them for the next birth.
 
-        False where they were not sent, because the node is offline or the broker takes less than it is given; then the next
-        birth carries the values. Raises UnknownMetricError or MetricValueError for what the birth does not declare.
+        False where they were not sent, because the node is offline, the broker takes less than it is given, or no message so
+        long; then the next birth carries the values. Raises UnknownMetricError or MetricValueError for what the birth does not
+        declare.
         """
         with self._lock:
             if self._connection.full:
@@ -148,7 +155,8 @@ class EdgeNode:
                 return False
             actions = self._session.publish(device, changes, now_ms())
             self._connection.send(actions)
-        return bool(actions)
+        message = actions[0] if actions else None
+        return isinstance(message, Publish) and len(message.payload) < self._connection.sendable.packet_bytes_max
 
     def barrier(self, token: int, session: int) -> bool:
         """Have `on_confirmed(token)` called when the broker has taken all that was published before in this session.

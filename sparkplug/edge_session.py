@@ -61,9 +61,8 @@ class EdgeNodeSession:
     `primary_host` is the id of the host without which nothing is published; it is looked for at each of `servers` brokers. Where
     there is one broker the node waits there, connected and unborn, and owes it no death. Where there are several it leaves one
     that says "offline" at once, until it has been to all of them, and after that looks at each for `VISIT_MS`. `templates` maps
-    names to definitions; `aliases` are those of an earlier life, so that metrics keep theirs.
-    `watched_hosts` are ids of hosts whose STATE is only noted in `host_states`, for the application to take; None there: the retained
-    STATE was removed.
+    names to definitions; `aliases` are those of an earlier life, so that metrics keep theirs. `watched_hosts` are ids of
+    hosts whose STATE is only noted in `host_states`, for the application to take; None there: the retained STATE was removed.
     """
 
     def __init__(

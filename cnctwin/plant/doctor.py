@@ -127,7 +127,8 @@ def of_edge_store(node_id: str, metrics: Mapping[str, Reading]) -> list[Finding]
 def of_awaited(node_id: str, metrics: Mapping[str, Reading]) -> list[Finding]:
     """Return the finding that the historian an edge waits for gives no receipts; nothing where it does."""
     silent_s, told = (metrics[name].value if name in metrics else None for name in ("awaited_s", "history"))
-    return [Finding(False, f"{node_id}: {told}")] if isinstance(silent_s, float) and silent_s >= LATE_S else []
+    is_late = isinstance(silent_s, float) and silent_s >= LATE_S
+    return [Finding(False, f"{node_id}: {told}")] if is_late and isinstance(told, str) else []
 
 
 def of_history(every: Iterable[Mapping[str, Reading]]) -> list[Finding]:

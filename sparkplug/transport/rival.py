@@ -1,7 +1,8 @@
 """Another connection with our client id, told by how sessions end: the broker knows one of a name, and ends the older one.
 
-MQTT 5 says so (3.14.2.1, reason 0x8E). A broker of 3.1.1 only closes the connection, so there it is told by sessions that are
-cut short again and again: two of a name throw each other out for as long as both go on.
+MQTT 5 says so (3.14.2.1, reason 0x8E). A broker of 3.1.1 only closes the connection, and Mosquitto 2.0.11 does no more with MQTT
+5, so there it is told by sessions that are cut short again and again: two of a name throw each other out for as long as both go
+on.
 """
 
 from typing import Any
