@@ -6,7 +6,7 @@ The transport tells it what happened (`connecting`, `connected`, `message`, `los
     offline ──connecting──► waiting ──connected, primary host online──► born ──lost──► offline
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from functools import partial
@@ -61,7 +61,8 @@ class EdgeNodeSession:
     `primary_host` is the id of the host without which nothing is published; it is looked for at each of `servers` brokers. Where
     there is one broker the node waits there, connected and unborn, and owes it no death. Where there are several it leaves one
     that says "offline" at once, until it has been to all of them, and after that looks at each for `VISIT_MS`. `templates` maps
-    names to definitions; `aliases` are those of an earlier life, so that metrics keep theirs.
+    names to definitions; `aliases` are those of an earlier life, so that metrics keep theirs. `watched_hosts` are ids of
+    hosts whose STATE is only noted in `host_states`, for the application to take; None there: the retained STATE was removed.
     """
 
     def __init__(
@@ -72,6 +73,7 @@ class EdgeNodeSession:
         now_ms: int = 0,
         primary_host: str | None = None,
         servers: int = 1,
+        watched_hosts: Collection[str] = (),
         templates: Mapping[str, Template] | None = None,
         rebirth_interval_ms_min: int = REBIRTH_INTERVAL_MS_MIN,
         aliases: Aliases | None = None,
@@ -83,6 +85,7 @@ class EdgeNodeSession:
         self.bd_seq: int | None = None
         self.commands: list[Command] = []
         self.commands_dropped = 0
+        self.host_states: list[tuple[str, HostState | None]] = []
         self.malformed = 0
         self.aliases: Aliases = {} if aliases is None else dict(aliases)
         self._templates = dict(templates or {})
@@ -96,6 +99,7 @@ class EdgeNodeSession:
         self._server, self._servers = 0, servers
         self._visits = 0  # brokers that were dialled since the primary host was last online
         self._waits_since_ms = 0
+        self._watched = {state_topic(host): host for host in watched_hosts}
         self._state_timestamps_ms: dict[int, int] = {}
         self._rebirth = RebirthAnswer(rebirth_interval_ms_min)
         self._seq = 255
@@ -116,6 +120,7 @@ class EdgeNodeSession:
         self.phase, self._waits_since_ms = Phase.WAITING, now_ms
         actions: list[Action] = [Subscribe(str(Topic(Verb.NCMD, self.node)))]
         actions += [self._subscribe(device) for device in self._devices]
+        actions += [Subscribe(topic) for topic in self._watched if topic != self._primary_topic]
         if self._primary_topic is not None:
             actions.append(Subscribe(self._primary_topic))
         else:
@@ -131,8 +136,12 @@ class EdgeNodeSession:
         if self.phase is Phase.OFFLINE:
             return []
         try:
+            if topic in self._watched:
+                self.host_states.append((self._watched[topic], HostState.decode(payload) if payload else None))
             if topic == self._primary_topic:
                 return self._host_state(HostState.decode(payload), now_ms)
+            if topic in self._watched:
+                return []
             parsed = Topic.parse(topic)
             if parsed.node == self.node and parsed.verb in (Verb.NCMD, Verb.DCMD):
                 return self._command(parsed.device, payload, now_ms)

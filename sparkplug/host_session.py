@@ -11,6 +11,8 @@ from random import Random
 from typing import Any, NamedTuple
 
 from sparkplug.actions import Action, Connect, Disconnect, HostState, Publish, Subscribe
+from sparkplug.admission.gate import Gate
+from sparkplug.admission.refusal import Quarantine
 from sparkplug.codec import encode, parse
 from sparkplug.datatype import DataType
 from sparkplug.edge_session import BD_SEQ, REBIRTH
@@ -71,11 +73,14 @@ class HostSession:
         rebirth_interval_ms_min: int = 5000,
         publish_state: bool = True,
         wanted: Callable[[NodeId], bool] = _anyone,
+        gate: Gate | None = None,
     ) -> None:
         self.state_topic = state_topic(host_id)
         self.actions: list[Action] = []
         self.counts: Counter[str] = Counter()
         self.online = False
+        self.quarantine = Quarantine()
+        self._gate = gate or Gate()
         self._topic_filters = tuple(topic_filters)
         self._reorder_timeout_ms = reorder_timeout_ms
         self._publish_state = publish_state
@@ -339,7 +344,7 @@ class HostSession:
         route = self._routes.get(name)
         if route is None:
             owner.layouts = Memory(self._room)
-            route = self._routes[name] = Route(watched.picture, watched.window, owner, topic.device, owner.layouts)
+            route = self._routes[name] = Route(watched.picture, watched.window, owner, topic.device, owner.layouts, self._gate)
         return route
 
     def _doubt(self, watched: _Watched, now_ms: int) -> None:

@@ -29,6 +29,7 @@ from sparkplug.transport.listener import Listener
 from sparkplug.transport.loop import TICK_S, Loop
 from sparkplug.transport.paho_client import CONNECT_TIMEOUT_S, StreamClient
 from sparkplug.transport.paho_path import PahoPath
+from sparkplug.transport.sendable import PACKET_BYTES_MAX, Sendable
 from sparkplug.transport.stream import Stream
 from sparkplug.transport.tls_failure import explained
 
@@ -69,6 +70,7 @@ class MqttConnection:
         self.last_error = ""
         self.connects = 0
         self.unsent = 0  # messages that were given to us for a connection that ended before it took them
+        self.sendable = Sendable(client_id)
         self.loop = loop or Loop(f"mqtt {client_id}")
         self._itinerary = Itinerary(brokers, chance or Random())  # noqa: S311 — spreads reconnects, keeps no secret
         self._client_id = client_id
@@ -152,7 +154,8 @@ class MqttConnection:
         self._reached = False
         client: StreamClient | None = None
         try:
-            self._clear_outbox()
+            while self._outbox:
+                self.unsent += isinstance(self._outbox.popleft(), Publish)
             connect = self._listener.connecting(self._itinerary.server)
             client = self._dialled(self._itinerary.broker, connect)
             self._reached = True
@@ -176,10 +179,6 @@ class MqttConnection:
             self._reached = error.is_listening
             self._listener.unsent()
             raise
-
-    def _clear_outbox(self) -> None:
-        while self._outbox:
-            self.unsent += isinstance(self._outbox.popleft(), Publish)
 
     # What the loop calls, and holds its lock meanwhile.
 
@@ -232,7 +231,7 @@ class MqttConnection:
     def _begin(self, client: StreamClient, stream: Stream) -> None:
         client.on_connect = self._on_connect
         client.on_disconnect = self._on_disconnect
-        self._path = (DataPath if self._has_data_path else PahoPath)(client, stream, self._listener, self._refused)
+        self._path = (DataPath if self._has_data_path else PahoPath)(client, stream, self._listener, self._refused, self.sendable)
         self._client, self._stream = client, stream
         self._accepted = self._writes_later = self._is_finished = self._is_unread = False
         self.loop.watch(stream.fileno(), self, for_writing=False)
@@ -361,13 +360,14 @@ class MqttConnection:
 
     # What paho calls.
 
-    def _on_connect(self, _client: Any, _userdata: Any, _flags: Any, reason: Any, _properties: Any) -> None:
+    def _on_connect(self, _client: Any, _userdata: Any, _flags: Any, reason: Any, properties: Any) -> None:
         if reason.is_failure:
             self._note(f"{self._itinerary.broker.url} refused the connection: {reason}")
             return
         self.connects += 1
         self.last_error = ""
         self._accepted = True
+        self.sendable.packet_bytes_max = getattr(properties, "MaximumPacketSize", PACKET_BYTES_MAX)
         self._itinerary.accepted(time.monotonic())
         self._listener.connected()
 
