@@ -137,7 +137,7 @@ class HostApplication:
     @property
     def quarantine(self) -> tuple[Quarantined, ...]:
         """The nodes and devices of which something is refused, oldest first; read it only in the thread that polls."""
-        return self._session.quarantine.table()
+        return self._session.admission.quarantine.table()
 
     def picture(self, node: NodeId) -> NodePicture | None:
         """What is known of a node; read it only in the thread that polls."""

@@ -11,16 +11,19 @@ from random import Random
 from typing import Any, NamedTuple
 
 from sparkplug.actions import Action, Connect, Disconnect, HostState, Publish, Subscribe
+from sparkplug.admission.admission import Admission
 from sparkplug.admission.gate import Gate
-from sparkplug.admission.refusal import Quarantine
+from sparkplug.admission.refusal import Refusal
 from sparkplug.codec import encode, parse
 from sparkplug.datatype import DataType
-from sparkplug.edge_session import BD_SEQ, REBIRTH
-from sparkplug.errors import PayloadError, TopicError, UnknownMetricError
+from sparkplug.edge_session import REBIRTH
+from sparkplug.errors import PayloadError, TopicError
+from sparkplug.host_command import command
 from sparkplug.host_event import EventKind, HostEvent
 from sparkplug.layouts.memory import Memory, Room
 from sparkplug.layouts.route import Route
-from sparkplug.metric import Change, NodeId, Reading
+from sparkplug.metric import Change, NodeId
+from sparkplug.node_birth import bd_seq_of, is_sloppy
 from sparkplug.node_picture import NodePicture, Owner, tells_quality
 from sparkplug.rebirth import RebirthRequests
 from sparkplug.sequence import Delivery, Numbered, SequenceWindow, Verdict
@@ -79,8 +82,8 @@ class HostSession:
         self.actions: list[Action] = []
         self.counts: Counter[str] = Counter()
         self.online = False
-        self.quarantine = Quarantine()
         self._gate = gate or Gate()
+        self.admission = Admission(self._gate, self.counts)
         self._topic_filters = tuple(topic_filters)
         self._reorder_timeout_ms = reorder_timeout_ms
         self._publish_state = publish_state
@@ -133,6 +136,7 @@ class HostSession:
         if route is not None and (event := route.take(payload)) is not None:
             self.counts["data"] += 1
             return [event]
+        self._gate.at(now_ms)
         try:
             if topic == self.state_topic:
                 return self._own_state(payload)
@@ -146,6 +150,8 @@ class HostSession:
     def tick(self, now_ms: int) -> list[HostEvent]:
         """Time has passed: reorder windows end, devices that were not born again go offline, rebirths are asked for."""
         events: list[HostEvent] = []
+        self._gate.at(now_ms)
+        self.admission.quarantine.sweep(now_ms)
         for watched in self._nodes.values():
             if (delivery := watched.window.expire(now_ms)) is not None:
                 events += self._deliver(watched, delivery, now_ms)
@@ -171,21 +177,7 @@ class HostSession:
 
     def command(self, node: NodeId, device: str | None, changes: Iterable[Change], now_ms: int) -> Publish:
         """The message that writes values to a node or device; raises UnknownMetricError where its birth does not declare one."""
-        picture = self.picture(node)
-        owner = None if picture is None else picture.owner(device)
-        if picture is None or owner is None:
-            raise UnknownMetricError(f"{_name(node, device)} was never born; nothing to command")
-        alias_of = {binding.name: alias for alias, (known, binding) in picture.aliases.items() if known is owner}
-        metrics = []
-        for change in changes:
-            binding = owner.bindings.get(change.name)
-            if binding is None:
-                raise UnknownMetricError(f"{_name(node, device)} has not declared {change.name!r}; nothing to command")
-            alias = alias_of.get(change.name)
-            name = change.name if alias is None else None
-            metrics.append(Metric(name, change.value, binding.datatype, change.timestamp_ms, alias))
-        verb = Verb.NCMD if device is None else Verb.DCMD
-        return Publish(str(Topic(verb, node, device)), encode(Payload(now_ms, tuple(metrics))))
+        return command(node, self.picture(node), device, changes, now_ms)
 
     # How it is done.
 
@@ -212,18 +204,22 @@ class HostSession:
             if len(self._nodes) >= NODES_MAX:
                 self.counts["nodes_over_limit"] += 1
                 return []
+            if (refused := self.admission.stranger(topic, now_ms)) is not None:
+                return [refused]
             watched = _Watched(NodePicture(node), SequenceWindow(self._reorder_timeout_ms))
             self._nodes[node] = watched
+        if verb not in (Verb.NBIRTH, Verb.NDEATH) and self.admission.quarantine.of(node, None) is not None:
+            return [held] if (held := self.admission.held(topic, now_ms)) is not None else []
         message = parse(payload)
         if verb is Verb.NBIRTH:
-            return self._node_birth(watched, message, now_ms)
+            return self._node_birth(watched, message, len(payload), now_ms)
         if verb is Verb.NDEATH:
             return self._node_death(watched, message, now_ms)
         if not watched.picture.online:
             self.counts["before_birth"] += 1
             self._requests.want(node, now_ms)
             return []
-        stamp = message.timestamp
+        stamp = self._gate.stamp(message)
         if stamp and stamp < watched.picture.own.birth_ms and now_ms - watched.received_ms < LATE_MS_MAX:
             self.counts["late"] += 1  # left over from before the birth; its number may look right all the same
             return []
@@ -233,24 +229,32 @@ class HostSession:
         delivery = watched.window.take(Numbered(message.seq, stamp, received), now_ms)
         return self._deliver(watched, delivery, now_ms)
 
-    def _node_birth(self, watched: _Watched, message: Any, now_ms: int) -> list[HostEvent]:
-        picture, stamp = watched.picture, message.timestamp
-        bd_seq = _bd_seq(message)
+    def _node_birth(self, watched: _Watched, message: Any, size: int, now_ms: int) -> list[HostEvent]:
+        picture, stamp = watched.picture, self._gate.stamp(message)
+        bd_seq = bd_seq_of(message)
         recent = now_ms - watched.received_ms < LATE_MS_MAX
         repeated = bd_seq == picture.bd_seq and stamp == picture.own.birth_ms
         if recent and stamp and (repeated or stamp < picture.own.birth_ms):
             # Also while the node is offline: the copy of an older birth would bring a dead node back for good.
             self.counts["late"] += 1
             return []
+        node = picture.node
+        if (fault := self.admission.birth_fault(node, None, message, size, 0)) is not None:
+            dead = self._wither(watched, now_ms, f"birth certificate refused: {fault.text}") if picture.online else []
+            self._requests.born(node)
+            return [*dead, self.admission.refuse(node, None, fault, now_ms, is_whole=True)]
         try:
             readings = picture.own.bear(message, stamp or now_ms, picture.aliases)
         except PayloadError as error:
             # What follows it would be read by the birth before it: better to know nothing until there is one that can be read.
             self.counts["malformed"] += 1
             return self._wither(watched, now_ms, f"birth certificate unreadable: {error}") if picture.online else []
+        self.admission.born(node, None, message, size)
+        readings, refused = self.admission.believed(node, None, readings, stamp or now_ms, now_ms)
+        picture.own.replace(readings if refused else ())
         lost = watched.window.begin(message.seq, stamp)
         picture.bd_seq, watched.received_ms = bd_seq, now_ms
-        self.counts["sloppy_births"] += _is_sloppy(message)
+        self.counts["sloppy_births"] += is_sloppy(message)
         picture.aliases = {alias: known for alias, known in picture.aliases.items() if known[0] is picture.own}
         for owner in picture.devices.values():
             owner.bindings = {}  # their aliases may mean something else now; DBIRTHs follow
@@ -259,10 +263,10 @@ class HostSession:
         self._requests.born(picture.node)
         self.counts["births"] += 1
         born = HostEvent(EventKind.BIRTH, picture.node, None, stamp or now_ms, readings)
-        return [*self._hole(watched, lost, now_ms, ask=False), born]
+        return [*self._hole(watched, lost, now_ms, ask=False), born, *refused]
 
     def _node_death(self, watched: _Watched, message: Any, now_ms: int) -> list[HostEvent]:
-        bd_seq, picture = _bd_seq(message), watched.picture
+        bd_seq, picture = bd_seq_of(message), watched.picture
         if not picture.online:
             return []
         if bd_seq is not None and picture.bd_seq is not None and bd_seq != picture.bd_seq:
@@ -300,20 +304,15 @@ class HostSession:
     def _in_order(self, watched: _Watched, received: _Received, now_ms: int) -> list[HostEvent]:
         topic, message, payload = received
         picture, device = watched.picture, topic.device
-        stamp = message.timestamp or now_ms
+        stamp = self._gate.stamp(message) or now_ms
         if topic.verb is Verb.DBIRTH and device is not None:
-            owner = picture.devices.setdefault(device, Owner())
-            try:
-                readings = owner.bear(message, stamp, picture.aliases)
-            except PayloadError as error:
-                self.counts["malformed"] += 1
-                return _death(picture.node, device, owner, stamp, f"birth certificate unreadable: {error}")
-            if watched.awaiting:
-                watched.awaiting.discard(device)
-            self.counts["births"] += 1
-            return [HostEvent(EventKind.BIRTH, picture.node, device, stamp, readings)]
+            return self._device_birth(watched, received, device, stamp, now_ms)
         known = picture.owner(device)
         if known is None or not known.online:
+            if (refused := self.admission.held(topic, now_ms)) is not None:
+                if topic.verb is Verb.DDEATH:
+                    self.admission.quarantine.release(picture.node, device)
+                return [refused]
             self.counts["before_birth"] += 1
             self._requests.want(picture.node, now_ms)
             return []
@@ -322,17 +321,50 @@ class HostSession:
             if watched.awaiting and device is not None:
                 watched.awaiting.discard(device)
             return _death(picture.node, device, known, stamp, "device offline")
-        data, complete = picture.read_data(known, message, stamp, may_tell_quality=tells_quality(payload))
-        readings = tuple(data)
+        trimmed = self._gate.trim(message, len(payload))
+        data, complete = picture.read_data(known, message, message.timestamp or now_ms, may_tell_quality=tells_quality(payload))
+        readings, refused_part = self.admission.kept(picture.node, device, data, trimmed, now_ms)
+        if refused_part and not readings:
+            return refused_part
         names = known.take(readings)
         if not complete:
             self.counts["unknown_metrics"] += 1
             self._requests.want(picture.node, now_ms)
-        elif readings:
+        elif readings and not refused_part:
             self._route(watched, topic, known).learn(payload, message, readings, names)
         self.counts["data"] += 1
-        oldest_ms, newest_ms = _span_ms(readings) if names else (0, 0)
-        return [HostEvent(_DATA, picture.node, device, stamp, readings, "", "", b"", names, oldest_ms, newest_ms)]
+        stamps_ms = [reading.timestamp_ms for reading in readings] if names else [0]
+        event = HostEvent(_DATA, picture.node, device, stamp, readings, "", "", b"", names, min(stamps_ms), max(stamps_ms))
+        return [event, *refused_part]
+
+    def _device_birth(self, watched: _Watched, received: _Received, device: str, stamp: int, now_ms: int) -> list[HostEvent]:
+        _, message, payload = received
+        picture, node = watched.picture, watched.picture.node
+        owner, size = picture.devices.get(device), len(payload)
+        if watched.awaiting:
+            watched.awaiting.discard(device)
+        devices = len(picture.devices) if owner is None else 0
+        fault = self.admission.birth_fault(node, device, message, size, devices)
+        if fault is not None and fault.refusal is Refusal.QUOTA and owner is None and (gone := picture.forget_one()) is not None:
+            self._routes.pop(str(Topic(Verb.DDATA, node, gone)), None)
+            self.admission.forget(node, gone)
+            fault = self.admission.birth_fault(node, device, message, size, devices - 1)
+        if fault is not None:
+            reason = f"birth certificate refused: {fault.text}"
+            dead = [] if owner is None else _death(node, device, owner, now_ms, reason)
+            return [*dead, self.admission.refuse(node, device, fault, now_ms, is_whole=True)]
+        owner = owner or Owner()
+        try:
+            readings = owner.bear(message, stamp, picture.aliases)
+        except PayloadError as error:
+            self.counts["malformed"] += 1
+            return _death(node, device, owner, stamp, f"birth certificate unreadable: {error}")
+        picture.devices[device] = owner
+        self.admission.born(node, device, message, size)
+        readings, refused = self.admission.believed(node, device, readings, stamp, now_ms)
+        owner.replace(readings if refused else ())
+        self.counts["births"] += 1
+        return [HostEvent(EventKind.BIRTH, node, device, stamp, readings), *refused]
 
     def _route(self, watched: _Watched, topic: Topic, owner: Owner) -> Route:
         """Return the route of a data topic whose owner was born."""
@@ -366,27 +398,3 @@ class HostSession:
 
 def _death(node: NodeId, device: str | None, owner: Owner, stamp: int, reason: str) -> list[HostEvent]:
     return [HostEvent(EventKind.DEATH, node, device, stamp, owner.wither(stamp, reason), reason)] if owner.online else []
-
-
-def _span_ms(readings: Sequence[Reading]) -> tuple[int, int]:
-    """The oldest and the newest time stamp."""
-    stamps_ms = [reading.timestamp_ms for reading in readings]
-    return min(stamps_ms), max(stamps_ms)
-
-
-def _is_sloppy(message: Any) -> bool:
-    """Whether an NBIRTH leaves out what the specification demands and we can do without: said, and accepted."""
-    types = {metric.name: metric.datatype for metric in message.metrics}
-    well_formed = types.get(BD_SEQ) == DataType.INT64 and types.get(REBIRTH) == DataType.BOOLEAN
-    return not well_formed or not all(metric.timestamp for metric in message.metrics)
-
-
-def _name(node: NodeId, device: str | None) -> str:
-    return str(node) if device is None else f"{node}/{device}"
-
-
-def _bd_seq(message: Any) -> int | None:
-    for metric in message.metrics:
-        if metric.name == BD_SEQ:
-            return int(metric.long_value or metric.int_value) % 256
-    return None

@@ -1,6 +1,6 @@
 """What a host application knows of one edge node and its devices."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -96,6 +96,10 @@ class Owner:
             self._names = names
         self._newest = readings
 
+    def replace(self, readings: Iterable[Reading]) -> None:
+        """Have other readings stand for those of the birth."""
+        self.readings.update({reading.name: reading for reading in readings})
+
     def take_history(self, readings: tuple[Reading, ...]) -> None:
         """Note readings of which some may be historical."""
         self.readings.update({reading.name: reading for reading in readings if not reading.is_historical})
@@ -115,10 +119,7 @@ class Owner:
         if len(message.metrics) > METRICS_MAX:
             raise PayloadError(f"birth declares {len(message.metrics)} metrics; the limit is {METRICS_MAX}")
         declared = [_declared(metric, timestamp_ms) for metric in message.metrics]
-        for old in self._aliases:
-            if old in aliases and aliases[old][0] is self:
-                del aliases[old]
-        self.forget_layouts()
+        self.leave(aliases)
         self.online, self.birth_ms = True, timestamp_ms
         self.properties, self.templates, self.bindings, self._aliases = {}, {}, {}, []
         readings: dict[str, Reading] = {}
@@ -137,6 +138,17 @@ class Owner:
                 self._aliases.append(alias)
         self._latest, self._names, self._newest, self._names_known = readings, (), (), {}
         return tuple(readings.values())
+
+    def aliases(self, table: dict[int, tuple["Owner", Binding]]) -> dict[str, int]:
+        """Return the alias of each of its metrics that has one; the table is not gone through."""
+        return {known[1].name: alias for alias in self._aliases if (known := table.get(alias)) is not None and known[0] is self}
+
+    def leave(self, aliases: dict[int, tuple["Owner", Binding]]) -> None:
+        """Take its aliases out of the table; what it says from now on is read anew."""
+        for old in self._aliases:
+            if old in aliases and aliases[old][0] is self:
+                del aliases[old]
+        self.forget_layouts()
 
     def wither(self, timestamp_ms: int, reason: str) -> tuple[Reading, ...]:
         """Go offline: every value becomes stale as of `timestamp_ms` (5.9)."""
@@ -172,6 +184,13 @@ class NodePicture:
         """The node itself, then its devices."""
         yield None, self.own
         yield from self.devices.items()
+
+    def forget_one(self) -> str | None:
+        """Make room for a device: the one that has been offline the longest is forgotten; None where all are online."""
+        device = next((device for device, owner in self.devices.items() if not owner.online), None)
+        if device is not None:
+            self.devices.pop(device).leave(self.aliases)
+        return device
 
     def read_data(
         self, owner: Owner, message: Any, timestamp_ms: int, *, may_tell_quality: bool = True
