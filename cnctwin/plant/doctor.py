@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from cnctwin.plant.lags import lag_reports
+from cnctwin.plant.quarantine import refused_lines
 from cnctwin.plant.view import StageLedger, health, ledgers, machines, own_values
 from cnctwin.plant.watch import viewer
 from processors.lag_report import BEHIND_S, LagReport
@@ -90,6 +91,7 @@ def diagnose(host: HostApplication, url: str) -> Report:
                 findings.append(Finding(True, f"{node_id}: {count} {name.replace('_', ' ')} so far, counted"))
         findings += of_store(node_id, metrics)
         findings += of_edge_store(node_id, metrics)
+    findings += [Finding(False, line) for line in refused_lines(host.quarantine, own_values(host))]
     findings += of_lags(lag_reports(own_values(host)))
     counts = host.counts
     order = f"{counts.get('lost', 0)} messages lost, {counts.get('malformed', 0)} malformed while listening"
