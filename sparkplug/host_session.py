@@ -4,21 +4,18 @@ The transport tells it what happened, with the time; it keeps a picture of every
 for the application and, in `actions`, what is to be sent. A value is good only while its node is online.
 """
 
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
 from random import Random
-from typing import Any, NamedTuple
+from typing import Any
 
 from sparkplug.actions import Action, Connect, Disconnect, HostState, Publish, Subscribe
 from sparkplug.admission.admission import Admission
 from sparkplug.admission.gate import Gate
 from sparkplug.admission.refusal import Refusal
-from sparkplug.codec import encode, parse
-from sparkplug.datatype import DataType
-from sparkplug.edge_session import REBIRTH
+from sparkplug.codec import parse
 from sparkplug.errors import PayloadError, TopicError
-from sparkplug.host_command import command
+from sparkplug.host_command import command, rebirth_request
 from sparkplug.host_event import EventKind, HostEvent
 from sparkplug.layouts.memory import Memory, Room
 from sparkplug.layouts.route import Route
@@ -28,35 +25,14 @@ from sparkplug.node_picture import NodePicture, Owner, tells_quality
 from sparkplug.rebirth import RebirthRequests
 from sparkplug.sequence import Delivery, Numbered, SequenceWindow, Verdict
 from sparkplug.topics import STATE_PREFIX, Topic, Verb, state_topic
-from sparkplug.values import Metric, Payload
+from sparkplug.watched import Received, Watched
 
 __all__ = ["EventKind", "HostEvent", "HostSession"]
 
 NODES_MAX = 10_000
 LATE_MS_MAX = 10_000
 DEVICE_BIRTH_MS_MAX = 2000
-DOUBTS_MAX = 3
-DOUBT_MS = 600_000
 _DATA = EventKind.DATA
-
-
-@dataclass(slots=True)
-class _Watched:
-    """A node's picture with what is needed to keep it in order."""
-
-    picture: NodePicture
-    window: SequenceWindow
-    received_ms: int = 0  # when its last birth or death came, by the host's clock
-    awaiting: set[str] | None = None  # devices that were known before the last NBIRTH and have not been born since
-    doubts_ms: deque[int] = field(default_factory=lambda: deque(maxlen=DOUBTS_MAX))  # when its numbers were last doubted
-
-
-class _Received(NamedTuple):
-    """A message and the bytes from which it was parsed."""
-
-    topic: Topic
-    message: Any
-    payload: bytes
 
 
 def _anyone(_: NodeId) -> bool:
@@ -88,7 +64,7 @@ class HostSession:
         self._reorder_timeout_ms = reorder_timeout_ms
         self._publish_state = publish_state
         self._wanted = wanted
-        self._nodes: dict[NodeId, _Watched] = {}
+        self._nodes: dict[NodeId, Watched] = {}
         self._routes: dict[str, Route] = {}
         self._room = Room()
         self._requests = RebirthRequests(chance, interval_ms_min=rebirth_interval_ms_min)
@@ -161,7 +137,7 @@ class HostSession:
                     events.append(HostEvent(EventKind.DEATH, watched.picture.node, device, now_ms, readings))
                 watched.awaiting = None
         if self.online:
-            self.actions += [self._rebirth_request(node, now_ms) for node in self._requests.due(now_ms)]
+            self.actions += [self.rebirth_request(node, now_ms) for node in self._requests.due(now_ms)]
         return events
 
     # What the application asks.
@@ -179,6 +155,11 @@ class HostSession:
         """The message that writes values to a node or device; raises UnknownMetricError where its birth does not declare one."""
         return command(node, self.picture(node), device, changes, now_ms)
 
+    def rebirth_request(self, node: NodeId, now_ms: int) -> Publish:
+        """The message that asks a node for its births, whether anything was heard of it or not."""
+        self.counts["rebirths_requested"] += 1
+        return rebirth_request(node, now_ms)
+
     # How it is done.
 
     def _state(self, *, online: bool, timestamp_ms: int) -> Publish:
@@ -189,11 +170,6 @@ class HostSession:
             # The late will of an earlier connection: say at once that this host lives.
             self.actions.append(self._state(online=True, timestamp_ms=self._connect_ms))
         return []
-
-    def _rebirth_request(self, node: NodeId, now_ms: int) -> Publish:
-        self.counts["rebirths_requested"] += 1
-        metric = Metric(REBIRTH, True, DataType.BOOLEAN, now_ms)
-        return Publish(str(Topic(Verb.NCMD, node)), encode(Payload(now_ms, (metric,))))
 
     def _node_message(self, topic: Topic, payload: bytes, now_ms: int) -> list[HostEvent]:
         verb, node, _ = topic
@@ -206,7 +182,7 @@ class HostSession:
                 return []
             if (refused := self.admission.stranger(topic, now_ms)) is not None:
                 return [refused]
-            watched = _Watched(NodePicture(node), SequenceWindow(self._reorder_timeout_ms))
+            watched = Watched(NodePicture(node), SequenceWindow(self._reorder_timeout_ms))
             self._nodes[node] = watched
         if verb not in (Verb.NBIRTH, Verb.NDEATH) and self.admission.quarantine.of(node, None) is not None:
             return [held] if (held := self.admission.held(topic, now_ms)) is not None else []
@@ -223,13 +199,13 @@ class HostSession:
         if stamp and stamp < watched.picture.own.birth_ms and now_ms - watched.received_ms < LATE_MS_MAX:
             self.counts["late"] += 1  # left over from before the birth; its number may look right all the same
             return []
-        received = _Received(topic, message, payload)
+        received = Received(topic, message, payload)
         if watched.window.is_next(message.seq, stamp):
             return self._in_order(watched, received, now_ms)
         delivery = watched.window.take(Numbered(message.seq, stamp, received), now_ms)
         return self._deliver(watched, delivery, now_ms)
 
-    def _node_birth(self, watched: _Watched, message: Any, size: int, now_ms: int) -> list[HostEvent]:
+    def _node_birth(self, watched: Watched, message: Any, size: int, now_ms: int) -> list[HostEvent]:
         picture, stamp = watched.picture, self._gate.stamp(message)
         bd_seq = bd_seq_of(message)
         recent = now_ms - watched.received_ms < LATE_MS_MAX
@@ -244,7 +220,7 @@ class HostSession:
             self._requests.born(node)
             return [*dead, self.admission.refuse(node, None, fault, now_ms, is_whole=True)]
         try:
-            readings = picture.own.bear(message, stamp or now_ms, picture.aliases)
+            readings = picture.own.bear(message, stamp or now_ms, picture.holders)
         except PayloadError as error:
             # What follows it would be read by the birth before it: better to know nothing until there is one that can be read.
             self.counts["malformed"] += 1
@@ -255,17 +231,16 @@ class HostSession:
         lost = watched.window.begin(message.seq, stamp)
         picture.bd_seq, watched.received_ms = bd_seq, now_ms
         self.counts["sloppy_births"] += is_sloppy(message)
-        picture.aliases = {alias: known for alias, known in picture.aliases.items() if known[0] is picture.own}
+        picture.holders = dict.fromkeys(picture.own.aliases, picture.own)
         for owner in picture.devices.values():
-            owner.bindings = {}  # their aliases may mean something else now; DBIRTHs follow
-            owner.forget_layouts()
+            owner.forget_birth()  # DBIRTHs follow
         watched.awaiting = {device for device, owner in picture.devices.items() if owner.online}
         self._requests.born(picture.node)
         self.counts["births"] += 1
         born = HostEvent(EventKind.BIRTH, picture.node, None, stamp or now_ms, readings)
         return [*self._hole(watched, lost, now_ms, ask=False), born, *refused]
 
-    def _node_death(self, watched: _Watched, message: Any, now_ms: int) -> list[HostEvent]:
+    def _node_death(self, watched: Watched, message: Any, now_ms: int) -> list[HostEvent]:
         bd_seq, picture = bd_seq_of(message), watched.picture
         if not picture.online:
             return []
@@ -276,7 +251,7 @@ class HostSession:
         self._requests.born(picture.node)  # a dead node has no birth to give
         return events + self._wither(watched, now_ms, "edge node offline")
 
-    def _wither(self, watched: _Watched, now_ms: int, reason: str) -> list[HostEvent]:
+    def _wither(self, watched: Watched, now_ms: int, reason: str) -> list[HostEvent]:
         """The node and all its devices go offline by the host's clock."""
         watched.received_ms, watched.awaiting = now_ms, None
         picture = watched.picture
@@ -287,12 +262,13 @@ class HostSession:
             if owner.online
         ]
 
-    def _deliver(self, watched: _Watched, delivery: Delivery, now_ms: int) -> list[HostEvent]:
+    def _deliver(self, watched: Watched, delivery: Delivery, now_ms: int) -> list[HostEvent]:
         if delivery.verdict is Verdict.LATE:
             self.counts["late"] += 1
         elif delivery.verdict is Verdict.SLOPPY:
             self.counts["sloppy_sequence"] += 1
-            self._doubt(watched, now_ms)
+            if watched.is_doubted(now_ms):
+                self._requests.want(watched.picture.node, now_ms)
         events = self._hole(watched, delivery.lost, now_ms, ask=True)
         for numbered in delivery.messages:
             try:
@@ -301,7 +277,7 @@ class HostSession:
                 self.counts["malformed"] += 1
         return events
 
-    def _in_order(self, watched: _Watched, received: _Received, now_ms: int) -> list[HostEvent]:
+    def _in_order(self, watched: Watched, received: Received, now_ms: int) -> list[HostEvent]:
         topic, message, payload = received
         picture, device = watched.picture, topic.device
         stamp = self._gate.stamp(message) or now_ms
@@ -337,7 +313,7 @@ class HostSession:
         event = HostEvent(_DATA, picture.node, device, stamp, readings, "", "", b"", names, min(stamps_ms), max(stamps_ms))
         return [event, *refused_part]
 
-    def _device_birth(self, watched: _Watched, received: _Received, device: str, stamp: int, now_ms: int) -> list[HostEvent]:
+    def _device_birth(self, watched: Watched, received: Received, device: str, stamp: int, now_ms: int) -> list[HostEvent]:
         _, message, payload = received
         picture, node = watched.picture, watched.picture.node
         owner, size = picture.devices.get(device), len(payload)
@@ -355,7 +331,7 @@ class HostSession:
             return [*dead, self.admission.refuse(node, device, fault, now_ms, is_whole=True)]
         owner = owner or Owner()
         try:
-            readings = owner.bear(message, stamp, picture.aliases)
+            readings = owner.bear(message, stamp, picture.holders)
         except PayloadError as error:
             self.counts["malformed"] += 1
             return _death(node, device, owner, stamp, f"birth certificate unreadable: {error}")
@@ -364,9 +340,10 @@ class HostSession:
         readings, refused = self.admission.believed(node, device, readings, stamp, now_ms)
         owner.replace(readings if refused else ())
         self.counts["births"] += 1
+        self.counts["sloppy_aliases"] += owner.aliases_shared
         return [HostEvent(EventKind.BIRTH, node, device, stamp, readings), *refused]
 
-    def _route(self, watched: _Watched, topic: Topic, owner: Owner) -> Route:
+    def _route(self, watched: Watched, topic: Topic, owner: Owner) -> Route:
         """Return the route of a data topic whose owner was born."""
         name = str(topic)
         route = self._routes.get(name)
@@ -375,17 +352,7 @@ class HostSession:
             route = self._routes[name] = Route(watched.picture, watched.window, owner, topic.device, owner.layouts, self._gate)
         return route
 
-    def _doubt(self, watched: _Watched, now_ms: int) -> None:
-        """A peer that counts sloppily is let be; but its numbers may also have begun again with a birth that was lost.
-
-        The birth is asked for, at most `DOUBTS_MAX` times in `DOUBT_MS`, so that a sloppy peer is not made to repeat it for ever.
-        """
-        doubts_ms = watched.doubts_ms
-        if len(doubts_ms) < DOUBTS_MAX or now_ms - doubts_ms[0] >= DOUBT_MS:
-            doubts_ms.append(now_ms)
-            self._requests.want(watched.picture.node, now_ms)
-
-    def _hole(self, watched: _Watched, lost: int, now_ms: int, *, ask: bool) -> list[HostEvent]:
+    def _hole(self, watched: Watched, lost: int, now_ms: int, *, ask: bool) -> list[HostEvent]:
         if not lost:
             return []
         self.counts["holes"] += 1

@@ -66,7 +66,7 @@ class Route:
         """
         datatypes = []
         for metric in message.metrics:
-            binding = self.picture.binding(self.owner, metric)
+            binding = self.owner.binding(metric)
             if binding is None:
                 return None
             if metric.HasField("properties"):

@@ -155,7 +155,7 @@ def payloads(draw: st.DrawFn) -> bytes:
 def picture() -> NodePicture:
     born = NodePicture(NODE)
     declared = [Metric(f"m{i}", None, t, START_MS, i if i < len(TYPES) - 1 else None) for i, t in enumerate(TYPES)]
-    born.own.bear(parse(encode(Payload(START_MS, tuple(declared)))), START_MS, born.aliases)
+    born.own.bear(parse(encode(Payload(START_MS, tuple(declared)))), START_MS, born.holders)
     return born
 
 
