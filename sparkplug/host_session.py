@@ -12,6 +12,7 @@ from typing import Any
 from sparkplug.actions import Action, Connect, Disconnect, HostState, Publish, Subscribe
 from sparkplug.admission.admission import Admission
 from sparkplug.admission.gate import Gate
+from sparkplug.admission.rates import Overrun
 from sparkplug.admission.refusal import Refusal
 from sparkplug.codec import parse
 from sparkplug.errors import PayloadError, TopicError
@@ -122,6 +123,23 @@ class HostSession:
         except (PayloadError, TopicError):
             self.counts["malformed"] += 1
             return []
+
+    def overrun(self, overrun: Overrun, now_ms: int) -> list[HostEvent]:
+        """From here on messages of a node were dropped at the door. Its next one begins a new count; where births or deaths are
+        among them, nothing that is known of it holds until it is born again."""
+        watched = self._nodes.get(overrun.node)
+        if watched is None or not watched.picture.online:
+            return []
+        events = self._deliver(watched, watched.window.flush(), now_ms)
+        if overrun.is_life:
+            self._requests.want(overrun.node, now_ms)
+            return events + self._wither(watched, now_ms, "more births than are let in")
+        watched.window.skip()
+        self.counts["holes"] += 1
+        return [
+            *events,
+            HostEvent(EventKind.HOLE, overrun.node, None, now_ms, detail=f"{overrun.node} sends more than is let in"),
+        ]
 
     def tick(self, now_ms: int) -> list[HostEvent]:
         """Time has passed: reorder windows end, devices that were not born again go offline, rebirths are asked for."""

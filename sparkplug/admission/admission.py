@@ -5,6 +5,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from sparkplug.admission.gate import Fault, Gate
+from sparkplug.admission.rates import Excess
 from sparkplug.admission.refusal import Quarantine, Refusal, shown
 from sparkplug.host_event import EventKind, HostEvent
 from sparkplug.metric import NodeId, Reading
@@ -68,6 +69,17 @@ class Admission:
             refusal = Refusal.QUOTA  # so many are refused that they are not told apart
         self.quarantine.again(node, device, now_ms)
         return self._event(node, topic.device, Fault(refusal, "in quarantine"), now_ms, 1 if topic.device is not None else 0)
+
+    def exceeded(self, excess: Excess, now_ms: int) -> HostEvent:
+        """Messages of a node were dropped since they were too many."""
+        limits = self.gate.limits
+        text = (
+            f"{excess.messages} messages dropped: above {limits.messages_a_second_max} messages or "
+            f"{limits.data_bytes_a_second_max} bytes a second, or {limits.births_a_second_max} births or "
+            f"{limits.birth_bytes_a_second_max} bytes of them"
+        )
+        self.quarantine.note(excess.node, None, Refusal.RATE, text, now_ms, count=excess.messages)
+        return self._event(excess.node, None, Fault(Refusal.RATE, text), now_ms, excess.of_devices)
 
     # Births.
 
