@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from cnctwin.plant.lags import lag_reports
+from cnctwin.plant.quarantine import refused_lines
 from cnctwin.plant.view import StageLedger, health, ledgers, machines, own_values
 from cnctwin.plant.watch import viewer
 from edge.running.awaited import LATE_S, NO_HISTORIAN
@@ -93,6 +94,7 @@ def diagnose(host: HostApplication, url: str) -> Report:
         findings += of_edge_store(node_id, metrics)
         findings += of_awaited(node_id, metrics)
     findings += of_history(health(host).values())
+    findings += [Finding(False, line) for line in refused_lines(host.quarantine, own_values(host))]
     findings += of_lags(lag_reports(own_values(host)))
     counts = host.counts
     order = f"{counts.get('lost', 0)} messages lost, {counts.get('malformed', 0)} malformed while listening"

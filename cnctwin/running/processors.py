@@ -8,18 +8,27 @@ from pathlib import Path
 
 from processors.running.ports import Recorder
 from processors.running.runtime import Configured, run
+from sparkplug.admission.limits import DEFAULTS, Limits
 from sparkplug.broker import BrokerAddress
 
 ALERTS = "alerts"
 
 
-def process(pairs: Sequence[Configured], broker: BrokerAddress, stop: threading.Event, *, group: str, state_dir: Path) -> None:
+def process(
+    pairs: Sequence[Configured],
+    broker: BrokerAddress,
+    stop: threading.Event,
+    *,
+    group: str,
+    state_dir: Path,
+    limits: Limits = DEFAULTS,
+) -> None:
     """Run configured processors until `stop` is set. Raises ConfigurationError where a secret is missing, StoreError where the
     store cannot be used."""
     with ExitStack() as stack:
         recorder = stack.enter_context(_recorder(pairs, group))
         stack.enter_context(_courier(pairs, broker, group))
-        run(pairs, broker, stop, group=group, session_dir=state_dir, recorder=recorder)
+        run(pairs, broker, stop, group=group, session_dir=state_dir, recorder=recorder, limits=limits)
 
 
 @contextmanager

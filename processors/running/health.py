@@ -21,6 +21,8 @@ HEALTH = (
     MetricSpec("health/ignored", DataType.INT64, properties={"meaning": "messages of nodes that this processor does not read"}),
     MetricSpec("health/snapshot_age_s", DataType.DOUBLE, unit="s", properties={"meaning": "age of the oldest unsaved state"}),
     MetricSpec("health/snapshots_rejected", DataType.INT64, properties={"meaning": "snapshots that could not be restored"}),
+    MetricSpec("health/quarantined", DataType.INT64, properties={"meaning": "devices and nodes of which something is refused"}),
+    MetricSpec("health/quarantine", DataType.STRING, properties={"meaning": "the first of them as JSON (running/quarantine.py)"}),
     MetricSpec("health/reconnects", DataType.INT64, properties={"meaning": "connections made again"}),
 )
 

@@ -23,6 +23,7 @@ from processors.running.engine import Way
 from processors.running.lag import Lag
 from processors.running.lane import stream_of
 from processors.running.ports import HostPort
+from processors.running.quarantine import quarantine_health
 from processors.running.worker import Shared, Worker
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId
@@ -39,7 +40,7 @@ SELDOM = (50_000, 20, 100)
 RESTORE_S_MAX = 1.0  # to wait for the next snapshot, or for our own nodes
 STALL_S = 1.0  # a longer pause of this process is no silence of the machine
 WAITING_MAX = 100_000  # events, while the snapshots are awaited
-_DATA, _PLAIN = EventKind.DATA, EventKind.PLAIN
+_DATA, _PLAIN, _REFUSED = EventKind.DATA, EventKind.PLAIN, EventKind.REFUSED
 _log = logging.getLogger(__name__)
 
 
@@ -179,7 +180,7 @@ class Runner:
         if event.names and not has_waited:
             self._stream(event, now_s)
             return
-        if event.kind is not _DATA and event.device is not None:
+        if event.kind not in (_DATA, _REFUSED) and event.device is not None:
             self._ways.pop(event.device, None)
         for worker in self._readers_of(event):
             worker.take(event, now_s, has_waited=has_waited)
@@ -245,6 +246,7 @@ class Runner:
             "busy_pct": busy_pct,
             "process": PROCESS,
             "processors": len(names),
+            **quarantine_health(self._host.quarantine),
         }
 
     def _note_dropped(self) -> None:

@@ -133,7 +133,8 @@ class Worker:
 
     def take(self, event: HostEvent, now_s: float, *, has_waited: bool = False) -> None:
         """Fold an event of a node that it reads, and send what comes of it."""
-        self.record(event)
+        if event.kind is not EventKind.REFUSED:
+            self.record(event)
         self.send(self.engine.feed(event, now_s, has_waited=has_waited))
         if event.kind is EventKind.BIRTH and event.device is not None:
             self._press(event.device, is_new=True)
