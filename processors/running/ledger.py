@@ -20,6 +20,8 @@ class DropReason(Enum):
     MACHINES_MAX = "machines_max"  # one machine too many
     DEAD_LETTER = "dead_letter"  # the step failed
     BROKER_OFFLINE = "broker_offline"  # folded, but its results could not be sent
+    OVERLOAD = "overload"  # passed over while more came than could be folded; a newer one of its device was
+    FAULT = "fault"  # handling it has failed, or its machine or the processor is set aside after faults
 
 
 Fates = tuple[DropReason | None, ...]
@@ -73,10 +75,10 @@ class Ledger:
         self.received += count
         self.dropped[DropReason.QUEUE_FULL] += count
 
-    def unsent(self) -> None:
+    def unsent(self, reason: DropReason = DropReason.BROKER_OFFLINE) -> None:
         """The message just emitted could not be sent after all."""
         self.emitted -= 1
-        self.dropped[DropReason.BROKER_OFFLINE] += 1
+        self.dropped[reason] += 1
 
     def metrics(self) -> dict[str, int]:
         """The ledger by metric name; every reason is there, also at 0."""

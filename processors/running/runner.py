@@ -18,6 +18,7 @@ from collections import deque
 from collections.abc import Sequence
 from threading import Event
 
+from processors.errors import ProcessorsFailedError
 from processors.lag_report import SPOKEN_OF_S, LagReport, topic_of
 from processors.running.engine import Way
 from processors.running.lag import Lag
@@ -49,10 +50,13 @@ class Runner:
     def __init__(self, host: HostPort, workers: Sequence[Worker]) -> None:
         self._host = host
         self.workers = tuple(sorted(workers, key=lambda worker: worker.name))
+        self._recorders = tuple(worker for worker in self.workers if worker.records)
         self._names = ", ".join(worker.name for worker in self.workers)
         self._marker_topic = topics.marker_of(self.workers[0].name)
         self._readers: dict[str, tuple[Worker, ...]] = {}  # by node
         self._ways: dict[str, dict[NodeId, list[tuple[Worker, Way | None]]]] = {}  # by device and node
+        for worker in self.workers:
+            worker.forget_ways = self._ways.clear
         self._waiting: deque[HostEvent] = deque()
         self._is_restored = False
         self._turned_s = time.monotonic()
@@ -92,6 +96,7 @@ class Runner:
         called_s = time.monotonic()
         events = self._host.poll(POLL_S, GATHER_S)
         now_s = time.monotonic()
+        self._record(events, now_s)
         if not (self._host.backlog or any(worker.backlog for worker in self.workers)):
             self._lag.published(now_s)  # all of the turns before
         for event in events:
@@ -152,6 +157,7 @@ class Runner:
                 self._wait_with(event)
 
     def _wait_with(self, event: HostEvent) -> None:
+        self._record((event,), time.monotonic())
         has_room = len(self._waiting) < WAITING_MAX
         for worker in self._readers_of(event):
             worker.engine.received(event, has_room=has_room)
@@ -171,10 +177,17 @@ class Runner:
 
     # What has come.
 
+    def _record(self, events: Sequence[HostEvent], now_s: float) -> None:
+        """Have what has come recorded, in the broker's order, before anything is folded."""
+        for worker in self._recorders:
+            for event in events:
+                if event.kind is _PLAIN or worker in self._readers_of(event):
+                    worker.record(event, now_s)
+
     def _take(self, event: HostEvent, now_s: float, *, has_waited: bool = False) -> None:
         if event.kind is _PLAIN:
             for worker in self.workers:
-                worker.take_plain(event)
+                worker.take_plain(event, now_s)
             return
         if event.names and not has_waited:
             self._stream(event, now_s)
@@ -198,12 +211,15 @@ class Runner:
         for place, (worker, way) in enumerate(ways):
             if way is None:  # the first message shows the way
                 worker.take(event, now_s)
-                ways[place] = (worker, worker.engine.way_of(source, device))
+                ways[place] = (worker, worker.way_of(source, device))
             else:
-                if worker.records:
-                    worker.record(event)
-                if actions := way(message, now_s):
-                    worker.send(actions)
+                try:
+                    actions = way(message, now_s)
+                except Exception as error:
+                    worker.failed(event, error, now_s)
+                else:
+                    if actions:
+                        worker.send(actions, event, now_s)
         if not is_twin_node(source.node):
             self._lag.folded(source.node, event.timestamp_ms, time.monotonic())
 
@@ -222,6 +238,9 @@ class Runner:
         shared = self._report(now_s)
         for worker in self.workers:
             worker.beat(now_s, shared)
+        if all(worker.is_hopeless for worker in self.workers):
+            told = "; ".join(f"{worker.name}: {worker.fault}" for worker in self.workers)
+            raise ProcessorsFailedError(f"all processors of this process go on failing; see the log, and start it again ({told})")
 
     def _report(self, now_s: float) -> Shared:
         """Work out the lag, and say it where somebody should know. The alerts of this process hear of it without the way over the
@@ -237,7 +256,7 @@ class Runner:
             topic, payload = topic_of(names[0]), report.payload()
             self._host.publish_plain(topic, payload)
             for worker in self.workers:
-                worker.take_plain(HostEvent(EventKind.PLAIN, NodeId("", ""), None, at_ms, topic=topic, payload=payload))
+                worker.take_plain(HostEvent(EventKind.PLAIN, NodeId("", ""), None, at_ms, topic=topic, payload=payload), now_s)
         self._speaks_of_lag = speaks
         return {
             "lag_s": round(self._lag.folded_s, 3),
