@@ -82,13 +82,8 @@ class Engine:
         """Return True if the ledger counts it: it is of a device, from a node that this processor reads."""
         return event.device is not None and event.kind is not EventKind.HOLE and self._processor.listens_to(event.node.node)
 
-    def received(self, event: HostEvent, *, has_room: bool) -> None:
-        """An event has come that cannot be fed yet: it waits outside, or is lost where there is no room."""
-        if self._is_message(event):
-            self.ledger.count(() if has_room else (DropReason.QUEUE_FULL,))
-
-    def feed(self, event: HostEvent, wall_s: float, *, has_waited: bool = False) -> list[Action]:
-        """Take one event; `wall_s` is any clock that only goes forward. `has_waited`: `received` has counted it."""
+    def feed(self, event: HostEvent, wall_s: float) -> list[Action]:
+        """Take one event; `wall_s` is any clock that only goes forward."""
         kind, node, device = event.kind, event.node, event.device
         self._emitted_before = self.ledger.emitted
         if not self._processor.listens_to(node.node):
@@ -106,7 +101,7 @@ class Engine:
                 actions, fates = self._birth(machine, event, wall_s)
             else:
                 actions, fates = self._death(machine, event)
-            self.ledger.count(fates, 0 if has_waited else 1)
+            self.ledger.count(fates)
         if machine is None:
             machine = self._machines.get(device)
         if machine is not None:
@@ -144,10 +139,10 @@ class Engine:
         """A full queue in front of us has lost so many messages."""
         self.ledger.overflowed(count)
 
-    def lost(self, event: HostEvent, reason: DropReason, *, has_waited: bool = False) -> None:
-        """An event is not fed, or feeding it has failed before it was counted."""
+    def lost(self, event: HostEvent, reason: DropReason) -> None:
+        """An event is lost before it is fed, or feeding it has failed before it was counted."""
         if self._is_message(event):
-            self.ledger.count((reason,), 0 if has_waited else 1)
+            self.ledger.count((reason,))
 
     def unsent(self, reason: DropReason = DropReason.BROKER_OFFLINE) -> None:
         """Note that the outcome of the last event could not be sent."""

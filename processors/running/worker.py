@@ -170,15 +170,15 @@ class Worker:
         """Return True if the processor reads the node."""
         return self._processor.listens_to(node)
 
-    def take(self, event: HostEvent, now_s: float, *, has_waited: bool = False) -> None:
+    def take(self, event: HostEvent, now_s: float) -> None:
         """Fold an event of a node that it reads, and send what comes of it."""
         if self._down is not None or (event.device or str(event.node)) in self._faults.aside:
-            self.engine.lost(event, DropReason.FAULT, has_waited=has_waited)
+            self.engine.lost(event, DropReason.FAULT)
             return
         try:
-            actions = self.engine.feed(event, now_s, has_waited=has_waited)
+            actions = self.engine.feed(event, now_s)
         except Exception as error:
-            self.failed(event, error, now_s, has_waited=has_waited)
+            self.failed(event, error, now_s)
             return
         self.send(actions, event, now_s)
         if event.kind is EventKind.BIRTH and event.device is not None:
@@ -245,9 +245,9 @@ class Worker:
 
     # Faults.
 
-    def failed(self, event: HostEvent, error: Exception, now_s: float, *, has_waited: bool = False) -> None:
+    def failed(self, event: HostEvent, error: Exception, now_s: float) -> None:
         """An event could not be folded; it is counted, and nothing but what it is about is set aside."""
-        self.engine.lost(event, DropReason.FAULT, has_waited=has_waited)
+        self.engine.lost(event, DropReason.FAULT)
         self._apply([DeadLetter(event.device or str(event.node), letter_of_message(self.name, event, error))], now_s)
         self._judge(event.device or str(event.node), str(event.node), error, now_s)
 

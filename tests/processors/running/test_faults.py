@@ -77,10 +77,10 @@ def test_a_fault_before_the_fold_is_counted_too_and_tells_the_message() -> None:
     (worker,) = workers_on(host, RECORDER)
     feed = worker.engine.feed
 
-    def failing(event: HostEvent, wall_s: float, *, has_waited: bool = False) -> Any:
+    def failing(event: HostEvent, wall_s: float) -> Any:
         if event.readings and event.readings[0].value == 100.0:
             raise RuntimeError("our own bug")
-        return feed(event, wall_s, has_waited=has_waited)
+        return feed(event, wall_s)
 
     worker.engine.feed = failing  # type: ignore[method-assign]
     Runner(host, [worker]).run(host.until_empty())

@@ -57,7 +57,7 @@ def test_each_message_is_folded_by_all_before_the_next_one_whatever_order_they_w
         workers = workers_on(host, *order)
         for worker in workers:
 
-            def noted(event: HostEvent, wall_s: float, *, has_waited: bool = False, worker: Worker = worker) -> Sequence[object]:
+            def noted(event: HostEvent, wall_s: float, worker: Worker = worker) -> Sequence[object]:
                 folded.append((worker.name, event.timestamp_ms % 60_000 / 1000))
                 return ()
 
