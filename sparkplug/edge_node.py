@@ -1,10 +1,10 @@
 """An edge node on a real broker: the session and the connection put together."""
 
 import threading
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 
-from sparkplug.actions import Barrier, Connect, Publish
+from sparkplug.actions import Barrier, Connect, HostState, Publish
 from sparkplug.alias_file import AliasFile
 from sparkplug.bdseq import BdSeq
 from sparkplug.broker import BrokerAddress
@@ -25,8 +25,9 @@ class EdgeNode:
     `brokers` is one address, or a list that is walked while the primary host is offline. `session_file` keeps bdSeq over
     restarts, and a file beside it the aliases. `mqtt_version` (4 or 5) goes before that of the first address. `on_command` is
     called from the connection's thread for each value that a host wants written, `on_confirmed` for each `barrier` that the
-    broker has acknowledged; they are published on `barrier_topic`. `loop` serves the connection, which has a loop of its own
-    otherwise.
+    broker has acknowledged; they are published on `barrier_topic`. `on_host_state` is called for each STATE of one of the
+    `watched_hosts` (None: the retained one was removed), which the node does not wait for. `loop` serves the connection,
+    which has a loop of its own otherwise.
     """
 
     def __init__(
@@ -37,26 +38,35 @@ class EdgeNode:
         *,
         session_file: Path | None = None,
         primary_host: str | None = None,
+        watched_hosts: Collection[str] = (),
         templates: Mapping[str, Template] | None = None,
         mqtt_version: int | None = None,
         on_command: Callable[[Command], None] | None = None,
         barrier_topic: str = "",
         on_confirmed: Callable[[int], None] = lambda _: None,
+        on_host_state: Callable[[str, HostState | None], None] = lambda _host, _state: None,
         loop: Loop | None = None,
     ) -> None:
         self._bd_seq = BdSeq(session_file)
         self._aliases = AliasFile(None if session_file is None else session_file.with_name(session_file.name + ".aliases"))
+        addresses = (brokers,) if isinstance(brokers, BrokerAddress) else tuple(brokers)
         self._session = EdgeNodeSession(
-            node, metrics, now_ms=now_ms(), primary_host=primary_host, templates=templates, aliases=self._aliases.read()
+            node,
+            metrics,
+            now_ms=now_ms(),
+            primary_host=primary_host,
+            servers=len(addresses),
+            watched_hosts=watched_hosts,
+            templates=templates,
+            aliases=self._aliases.read(),
         )
         self._number = 0
         self._barrier_topic = barrier_topic
         self._lock = threading.Lock()
-        self._on_command = on_command
+        self._on_command, self._on_host_state = on_command, on_host_state
         listener = Listener(
             self._connecting, self._bd_seq.give_back, self._connected, self._message, self._lost, self._tick, on_confirmed
         )
-        addresses = (brokers,) if isinstance(brokers, BrokerAddress) else tuple(brokers)
         self._connection = MqttConnection(
             addresses,
             f"{node.group}/{node.node}",
@@ -174,9 +184,12 @@ class EdgeNode:
         with self._lock:
             self._connection.send(self._session.message(topic, payload, now_ms()))
             commands, self._session.commands = self._session.commands, []
+            states, self._session.host_states = self._session.host_states, []
         if self._on_command is not None:
             for command in commands:
                 self._on_command(command)
+        for host, state in states:
+            self._on_host_state(host, state)
 
     def _tick(self) -> None:
         with self._lock:

@@ -10,18 +10,21 @@ import logging
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from enum import Enum
 from random import Random
 
 from sparkplug.actions import Connect, Publish, Subscribe
+from sparkplug.admission.gate import Gate
+from sparkplug.admission.limits import DEFAULTS, Limits
+from sparkplug.admission.refusal import Quarantined
 from sparkplug.broker import BrokerAddress
 from sparkplug.clock import now_ms
 from sparkplug.errors import TopicError
 from sparkplug.host_session import EventKind, HostEvent, HostSession
 from sparkplug.metric import Change, NodeId
 from sparkplug.node_picture import NodePicture
-from sparkplug.topics import NAMESPACE, STATE_PREFIX, Topic, Verb, group_filter
+from sparkplug.topics import NAMESPACE, STATE_PREFIX, Topic, Verb, check_id, group_filter
 from sparkplug.transport.connection import MqttConnection
 from sparkplug.transport.listener import Listener
 from sparkplug.transport.loop import Loop
@@ -51,7 +54,8 @@ class HostApplication:
     """Listens to edge nodes; `wanted` picks them, `topic_filters` tells the broker what to send.
 
     `loop` serves the connection, which has a loop of its own otherwise. Data that have waited for longer than `stale_s_max` are
-    dropped.
+    dropped. What is beyond `limits` is refused: so are devices with a `reserved` name. `trusted` nodes are free of the limits on
+    numbers and rates.
     """
 
     def __init__(
@@ -68,6 +72,9 @@ class HostApplication:
         wanted: Callable[[NodeId], bool] = lambda _: True,
         loop: Loop | None = None,
         stale_s_max: float = STALE_S_MAX,
+        limits: Limits = DEFAULTS,
+        reserved: Collection[str] = (),
+        trusted: Callable[[NodeId], bool] = lambda _: False,
     ) -> None:
         self.dropped = 0
         self.faults = 0  # messages that a bug of ours has lost
@@ -82,6 +89,7 @@ class HostApplication:
             rebirth_interval_ms_min=rebirth_interval_ms_min,
             publish_state=publish_state,
             wanted=wanted,
+            gate=Gate(limits, reserved, trusted),
         )
         self._plain_filters: list[str] = []
         self._plain_topics: set[str] = set()  # on which a message can be sent
@@ -134,6 +142,11 @@ class HostApplication:
     def counts(self) -> dict[str, int]:
         """What the session has counted: births, data, holes, lost, late, malformed, …"""
         return dict(self._session.counts)
+
+    @property
+    def quarantine(self) -> tuple[Quarantined, ...]:
+        """The nodes and devices of which something is refused, oldest first; read it only in the thread that polls."""
+        return self._session.quarantine.table()
 
     def picture(self, node: NodeId) -> NodePicture | None:
         """What is known of a node; read it only in the thread that polls."""
@@ -218,6 +231,15 @@ class HostApplication:
         if not self._session.online:
             return False
         self._connection.send((self._session.command(node, device, changes, now_ms()),))
+        return True
+
+    def request_rebirth(self, node: NodeId) -> bool:
+        """Ask a node for its births, whether anything was heard of it or not; False where this host is offline."""
+        check_id(node.group, "group id")
+        check_id(node.node, "edge node id")
+        if not self._session.online:
+            return False
+        self._connection.send((self._session.rebirth_request(node, now_ms()),))
         return True
 
     def _take(self) -> list[HostEvent]:
