@@ -6,6 +6,7 @@ own thread does. What does not fit, or has waited too long, is dropped and count
 than a value.
 """
 
+import logging
 import threading
 import time
 from collections import deque
@@ -28,6 +29,7 @@ from sparkplug.topics import NAMESPACE, STATE_PREFIX, Topic, Verb, check_id, gro
 from sparkplug.transport.connection import MqttConnection
 from sparkplug.transport.listener import Listener
 from sparkplug.transport.loop import Loop
+from sparkplug.transport.sendable import shortened
 
 __all__ = ["EventKind", "HostApplication", "HostEvent"]
 
@@ -37,8 +39,10 @@ EXCESS_S = 1.0
 PLAIN_TOPICS_MAX = 20_000
 PLAIN_BYTES_MAX = 1000  # every broker takes a message of that size
 STALE_S_MAX = 60.0
+FAILURE_TOLD_S = 10.0
 _NOWHERE = NodeId("", "")
 _NAMESPACE_LEVEL = f"{NAMESPACE}/"
+_log = logging.getLogger(__name__)
 
 
 class _Mark(Enum):
@@ -75,6 +79,7 @@ class HostApplication:
         trusted: Callable[[NodeId], bool] = lambda _: False,
     ) -> None:
         self.dropped = 0
+        self.faults = 0  # messages that a bug of ours has lost
         self._queue_max = queue_max
         self._stale_s_max = stale_s_max
         self._wanted = wanted
@@ -96,6 +101,7 @@ class HostApplication:
         self._ticked_s = self._told_s = 0.0
         self._rates = Rates(limits, trusted)
         self._plain_bytes_max = limits.plain_bytes_max
+        self._failure_told_s = -FAILURE_TOLD_S
         listener = Listener(
             self._connecting, lambda: None, self._connected, self._message, self._lost, lambda: None, wanted=self._is_read
         )
@@ -154,6 +160,15 @@ class HostApplication:
         """All nodes that were heard of."""
         return self._session.nodes()
 
+    def births(self) -> list[HostEvent]:
+        """Return a birth of each device that is online, with what is known of it by now; call it in the thread that polls."""
+        return [
+            HostEvent(EventKind.BIRTH, picture.node, device, owner.birth_ms, tuple(owner.readings.values()))
+            for picture in filter(None, map(self._session.picture, self._session.nodes()))
+            for device, owner in picture.devices.items()
+            if picture.online and owner.online
+        ]
+
     def poll(self, timeout_s: float, gather_s: float = 0.0) -> list[HostEvent]:
         """Return the events that have come, at the latest after `timeout_s`; drives the loop.
 
@@ -168,7 +183,10 @@ class HostApplication:
             now_s = time.monotonic()
             if now_s - self._ticked_s >= TICK_S:
                 self._ticked_s = now_s
-                events += self._session.tick(now_ms())
+                try:
+                    events += self._session.tick(now_ms())
+                except Exception:
+                    self._fail("a tick of the session failed")
                 events += self._refused_by_rate(now_s)
             if self._session.actions:
                 self._connection.send(self._session.actions)
@@ -251,7 +269,10 @@ class HostApplication:
             elif topic is _Mark.LOST:
                 events += session.lost(now_ms())
             elif isinstance(topic, str) and topic.startswith(NAMESPACE):
-                events += session.message(topic, payload, now_ms())
+                try:
+                    events += session.message(topic, payload, now_ms())
+                except Exception:
+                    self._fail(f"a message on {shortened(topic)} could not be taken")
             elif isinstance(topic, Overrun):
                 events += session.overrun(topic, now_ms())
             elif len(payload) > self._plain_bytes_max:
@@ -259,6 +280,13 @@ class HostApplication:
             elif isinstance(topic, str):
                 events.append(HostEvent(EventKind.PLAIN, _NOWHERE, None, now_ms(), topic=topic, payload=payload))
         return events
+
+    def _fail(self, what: str) -> None:
+        """Count a bug of ours: it costs this message, and no other."""
+        self.faults += 1
+        if (now_s := time.monotonic()) - self._failure_told_s >= FAILURE_TOLD_S:
+            self._failure_told_s = now_s
+            _log.exception("%s, %d such faults so far", what, self.faults)
 
     def _await_message(self, wait_s: float) -> None:
         """Wait where another thread turns the loop."""

@@ -26,6 +26,8 @@ class DropReason(Enum):
     REFUSED_SIZE = "refused_size"  # not let in: a value that is too long
     REFUSED_QUOTA = "refused_quota"  # not let in: too many metrics, devices or nodes
     REFUSED_RATE = "refused_rate"  # not let in: too many messages a second
+    OVERLOAD = "overload"  # passed over while more came than could be folded; a newer one of its device was
+    FAULT = "fault"  # handling it has failed, or its machine or the processor is set aside after faults
 
 
 _REFUSED = {
@@ -93,10 +95,10 @@ class Ledger:
             self.received += count
             self.dropped[_REFUSED[refusal]] += count
 
-    def unsent(self) -> None:
+    def unsent(self, reason: DropReason = DropReason.BROKER_OFFLINE) -> None:
         """The message just emitted could not be sent after all."""
         self.emitted -= 1
-        self.dropped[DropReason.BROKER_OFFLINE] += 1
+        self.dropped[reason] += 1
 
     def metrics(self) -> dict[str, int]:
         """The ledger by metric name; every reason is there, also at 0."""

@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 from processors.config import Configuration, ProcessorConfig, read_tables
@@ -35,8 +36,9 @@ def run(
     recorder: Recorder | None = None,
     limits: Limits = DEFAULTS,
 ) -> None:
-    """Run processors whose configuration has been checked until `stop` is set, or one of them fails, which ends all: half a set
-    of processors is worse than none, and a supervisor can start anew.
+    """Run processors whose configuration has been checked until `stop` is set. A processor that fails is restarted by itself
+    (processors/running/containment.py); raises ProcessorsFailedError where all of them go on failing, so that a supervisor can
+    start the process anew.
 
     session_dir: keeps the birth/death sequence numbers over restarts; all other state is kept on the broker
     recorder: for the processor that `records`
@@ -68,14 +70,16 @@ def runner_of(
     )
     workers = []
     for processor, configuration in pairs:
-        edge = EdgeNode(
+        new_edge = partial(
+            EdgeNode,
             broker,
             NodeId(group, processor.node),
             node_metrics(records=processor.records),
             session_file=None if session_dir is None else session_dir / f"{processor.node}.json",
             loop=loop,
         )
-        workers.append(Worker(processor, configuration, host, edge, recorder if processor.records else None))
+        given = recorder if processor.records else None
+        workers.append(Worker(processor, configuration, host, new_edge(), given, new_edge=new_edge))
     return Runner(host, workers)
 
 
