@@ -4,6 +4,7 @@ import os
 import time
 from collections.abc import Callable
 from threading import Event
+from uuid import uuid4
 
 from rich.console import Console
 from rich.live import Live
@@ -24,7 +25,7 @@ def viewer(broker: BrokerAddress, group: str, limits: Limits = DEFAULTS) -> Host
     """A host application that only looks: it publishes no STATE, so nobody waits for it."""
     return HostApplication(
         broker,
-        f"view-{os.getpid()}",
+        f"view-{os.getpid()}-{uuid4().hex[:8]}",
         (group_filter(group),),
         publish_state=False,
         limits=limits,
