@@ -16,6 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from cnctwin.api.answers import Answer, Problem
 from cnctwin.api.errors import ApiError
+from cnctwin.api.live.documents import JobInShort
 from cnctwin.api.live.jobs import LiveJobs
 from cnctwin.api.live.viewer import Viewer
 from cnctwin.api.routes.gap import REPORT_POLICY
@@ -51,22 +52,6 @@ class JobAnswer(Answer):
     answer: str = Field(description="accepted, known (it was asked for before) or cancelled", examples=["accepted"])
     state: str = Field(examples=["queued"])
     place: int | None = Field(None, description="0 = running, 1 = next; null = over")
-
-
-class JobInShort(Answer):
-    """A job; times are ms since 1970, UTC."""
-
-    id: str
-    kind: str = Field(examples=["optimise"])
-    machine: str = ""
-    state: str = Field(examples=["running"])
-    attempt: int = 0
-    progress_pct: float = 0.0
-    doing: str = ""
-    reason: str = ""
-    caution: str = Field(
-        "", description="what its result exceeds; empty = nothing that is known", examples=["2 lines are above a limit"]
-    )
 
 
 class JobInFull(JobInShort):
