@@ -48,11 +48,12 @@ def health_routes(sources: Sources) -> APIRouter:
             _plant(sources.live),
             _processors(sources.live),
             _refused(sources.live),
+            _input(sources.live),
             await _store(sources),
             _constants(sources),
         ]
         parts += [await sources.store.work(lambda: models_part(sources.models))]
-        parts += [_alerts(sources.live), _jobs(sources), _diagnoses(sources), _page()]
+        parts += [_alerts(sources.live), _jobs(sources), _diagnoses(sources), _audit(sources), _page()]
         degraded = any(part.state in ("degraded", "missing") for part in parts)
         return Health(status="degraded" if degraded else "ok", now=now_ms(), parts=parts)
 
@@ -71,6 +72,17 @@ def _broker(sources: Sources) -> Part:
             part="broker", state="degraded", reason=f"{lost} messages came too fast to be read", do="give it more processor"
         )
     return Part(part="broker", state="ok", reason=f"{viewer.url}, group {viewer.group}")
+
+
+def _input(live: LivePlant) -> Part:
+    """What came from the broker and could not be taken over."""
+    counts = live.counts
+    words = {"readings_refused": "readings", "documents_refused": "documents", "failures": "messages"}
+    kept_out = ", ".join(f"{counts[name]} {word}" for name, word in words.items() if counts[name])
+    if not kept_out:
+        return Part(part="input", state="ok")
+    newest = f"; the newest: {live.refused}" if live.refused else ""
+    return Part(part="input", state="degraded", reason=f"{kept_out} kept out{newest}", do="look at who sends it")
 
 
 def _processors(live: LivePlant) -> Part:
@@ -172,6 +184,13 @@ def _diagnoses(sources: Sources) -> Part:
         line = f"{folder} is no folder"
         return Part(part="diagnoses", state="missing", reason=line, do="cnctwin gap diagnose CASE --out DIR/<machine>")
     return Part(part="diagnoses", state="ok", reason=str(folder))
+
+
+def _audit(sources: Sources) -> Part:
+    audit = sources.audit
+    if audit.trouble:
+        return Part(part="audit", state="degraded", reason=audit.trouble, do="cnctwin serve --audit FILE")
+    return Part(part="audit", state="ok", reason="in memory only" if audit.file is None else str(audit.file))
 
 
 def _page() -> Part:
