@@ -146,7 +146,7 @@ class Sealer:
         """Move a stretch. Raises StoreError, and then nothing has changed."""
         kinds, classes, about = self._series(job.machine)
         done = Done(0, 0, ())
-        with transaction(self._db, self._file, is_durable=True):
+        with transaction(self._db, self._file):
             chunks = read_chunks(self._db, *job)
             for stored_class in (StoredClass.RAW, StoredClass.BLOCK, StoredClass.TWIN):
                 of_chunks = columns_of(chunk for chunk in chunks if chunk.stored_class == stored_class)
