@@ -49,7 +49,7 @@ def _recorder(pairs: Sequence[Configured], group: str) -> Iterator[Recorder | No
     from processors.historian import HistorianConfig  # noqa: PLC0415
 
     assert isinstance(config, HistorianConfig)
-    recorder = StoreRecorder(store_of(config), group)
+    recorder = StoreRecorder(store_of(config), group, config.hole_s)
     recorder.start()
     try:
         yield recorder

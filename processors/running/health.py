@@ -41,6 +41,8 @@ STORE = (
     MetricSpec("health/store_bytes", DataType.INT64, unit="bytes", properties={"meaning": "on the disk"}),
     MetricSpec("health/store_days_left", DataType.DOUBLE, unit="d", properties={"meaning": "that the disk lasts at this rate"}),
     MetricSpec("health/store_pins", DataType.INT64, properties={"meaning": "stretches that no sweep may take"}),
+    MetricSpec("health/sequence_holes", DataType.INT64, properties={"meaning": "stretches of rows of edges that stay missing"}),
+    MetricSpec("health/sequence_hole", DataType.STRING, properties={"meaning": "the newest of them; empty: none"}),
     MetricSpec("health/store_trouble", DataType.STRING, properties={"meaning": "what is wrong with the store; empty: nothing"}),
 )
 
