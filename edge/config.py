@@ -72,7 +72,8 @@ class ReportSection(Section):
 class StoreSection(Section):
     """Store and forward: what no broker has confirmed is kept on the disk. Empty `file`: beside the session file.
 
-    `await_receipt`: kept until a memory (the processor `historian`) says that it has it, too.
+    `await_receipt`: kept until a memory (the processor `historian`) says that it has it, too; "auto": as soon as one has been
+    heard of on the broker, and from then on.
 
     What is too old or too much goes, oldest first, and is counted; less than `free_bytes_min` is never left on the disk.
     `synchronous = "full"` also outlives a power cut, at the price of an fsync for each frame.
@@ -84,7 +85,7 @@ class StoreSection(Section):
     bytes_max: int = Field(default=1_000_000_000, ge=1_000_000)
     free_bytes_min: int = Field(default=500_000_000, ge=0)
     synchronous: Literal["normal", "full"] = "normal"
-    await_receipt: bool = False
+    await_receipt: Literal["auto"] | bool = "auto"
     history_rows_per_s: float = Field(default=1_000.0, ge=1, le=100_000)  # how fast what was stored follows what is live
 
 

@@ -9,18 +9,21 @@ than a value.
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from enum import Enum
 from random import Random
 
 from sparkplug.actions import Connect, Publish, Subscribe
+from sparkplug.admission.gate import Gate
+from sparkplug.admission.limits import DEFAULTS, Limits
+from sparkplug.admission.refusal import Quarantined
 from sparkplug.broker import BrokerAddress
 from sparkplug.clock import now_ms
 from sparkplug.errors import TopicError
 from sparkplug.host_session import EventKind, HostEvent, HostSession
 from sparkplug.metric import Change, NodeId
 from sparkplug.node_picture import NodePicture
-from sparkplug.topics import NAMESPACE, STATE_PREFIX, Topic, Verb, group_filter
+from sparkplug.topics import NAMESPACE, STATE_PREFIX, Topic, Verb, check_id, group_filter
 from sparkplug.transport.connection import MqttConnection
 from sparkplug.transport.listener import Listener
 from sparkplug.transport.loop import Loop
@@ -29,6 +32,8 @@ __all__ = ["EventKind", "HostApplication", "HostEvent"]
 
 EVENTS_A_POLL = 1000
 TICK_S = 0.1
+PLAIN_TOPICS_MAX = 20_000
+PLAIN_BYTES_MAX = 1000  # every broker takes a message of that size
 STALE_S_MAX = 60.0
 _NOWHERE = NodeId("", "")
 _NAMESPACE_LEVEL = f"{NAMESPACE}/"
@@ -45,7 +50,8 @@ class HostApplication:
     """Listens to edge nodes; `wanted` picks them, `topic_filters` tells the broker what to send.
 
     `loop` serves the connection, which has a loop of its own otherwise. Data that have waited for longer than `stale_s_max` are
-    dropped.
+    dropped. What is beyond `limits` is refused: so are devices with a `reserved` name. `trusted` nodes are free of the limits on
+    numbers and rates.
     """
 
     def __init__(
@@ -62,6 +68,9 @@ class HostApplication:
         wanted: Callable[[NodeId], bool] = lambda _: True,
         loop: Loop | None = None,
         stale_s_max: float = STALE_S_MAX,
+        limits: Limits = DEFAULTS,
+        reserved: Collection[str] = (),
+        trusted: Callable[[NodeId], bool] = lambda _: False,
     ) -> None:
         self.dropped = 0
         self._queue_max = queue_max
@@ -75,8 +84,10 @@ class HostApplication:
             rebirth_interval_ms_min=rebirth_interval_ms_min,
             publish_state=publish_state,
             wanted=wanted,
+            gate=Gate(limits, reserved, trusted),
         )
         self._plain_filters: list[str] = []
+        self._plain_topics: set[str] = set()  # on which a message can be sent
         self._inbox: deque[tuple[str | _Mark, bytes, float]] = deque()  # with the time of time.monotonic
         self._waits = False
         self._filled = threading.Event()
@@ -126,6 +137,11 @@ class HostApplication:
         """What the session has counted: births, data, holes, lost, late, malformed, …"""
         return dict(self._session.counts)
 
+    @property
+    def quarantine(self) -> tuple[Quarantined, ...]:
+        """The nodes and devices of which something is refused, oldest first; read it only in the thread that polls."""
+        return self._session.quarantine.table()
+
     def picture(self, node: NodeId) -> NodePicture | None:
         """What is known of a node; read it only in the thread that polls."""
         return self._session.picture(node)
@@ -156,18 +172,35 @@ class HostApplication:
                 return events
 
     def publish_plain(self, topic: str, payload: bytes, *, qos: int = 0, retain: bool = False) -> bool:
-        """Publish outside the Sparkplug namespace; False where the broker is gone or takes less than it is given."""
+        """Publish outside the Sparkplug namespace; False where the broker is gone or takes less than it is given, or where the
+        message cannot be sent at all."""
         return self.publish_all((Publish(topic, payload, qos, retain),))
 
     def publish_all(self, messages: Sequence[Publish]) -> bool:
-        """Publish several messages outside the Sparkplug namespace; False where none was sent, as in `publish_plain`."""
+        """Publish several messages outside the Sparkplug namespace; False where not all were sent, as in `publish_plain`."""
+        topics = self._plain_topics
+        can_all = True
         for message in messages:
-            if message[0].startswith(_NAMESPACE_LEVEL):
-                raise ValueError(f"{message.topic!r} lies in the Sparkplug namespace; a host writes there by commands only")
+            if message[0] not in topics or len(message[1]) > PLAIN_BYTES_MAX:
+                can_all = self._may_publish(message) and can_all
         if not self._session.online or self._connection.full:
             return False
-        self._connection.send(messages)
-        return True
+        self._connection.send(messages if can_all else [one for one in messages if one[0] in topics])
+        return can_all
+
+    def _may_publish(self, message: Publish) -> bool:
+        """Look at a topic that is new, or at a long message. Raises ValueError for what a host writes by commands only."""
+        topic = message.topic
+        if topic.startswith(_NAMESPACE_LEVEL):
+            raise ValueError(f"{topic!r} lies in the Sparkplug namespace; a host writes there by commands only")
+        if len(self._plain_topics) >= PLAIN_TOPICS_MAX:
+            self._plain_topics.clear()
+        can_be_sent = self._connection.sendable.takes(message)
+        if can_be_sent:
+            self._plain_topics.add(topic)
+        else:
+            self._plain_topics.discard(topic)
+        return can_be_sent
 
     def subscribe_plain(self, topic_filter: str) -> None:
         """Have messages outside the Sparkplug namespace come out of `poll` as PLAIN; kept over reconnects."""
@@ -180,6 +213,15 @@ class HostApplication:
         if not self._session.online:
             return False
         self._connection.send((self._session.command(node, device, changes, now_ms()),))
+        return True
+
+    def request_rebirth(self, node: NodeId) -> bool:
+        """Ask a node for its births, whether anything was heard of it or not; False where this host is offline."""
+        check_id(node.group, "group id")
+        check_id(node.node, "edge node id")
+        if not self._session.online:
+            return False
+        self._connection.send((self._session.rebirth_request(node, now_ms()),))
         return True
 
     def _take(self) -> list[HostEvent]:

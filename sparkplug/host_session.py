@@ -11,6 +11,8 @@ from random import Random
 from typing import Any, NamedTuple
 
 from sparkplug.actions import Action, Connect, Disconnect, HostState, Publish, Subscribe
+from sparkplug.admission.gate import Gate
+from sparkplug.admission.refusal import Quarantine
 from sparkplug.codec import encode, parse
 from sparkplug.datatype import DataType
 from sparkplug.edge_session import BD_SEQ, REBIRTH
@@ -71,11 +73,14 @@ class HostSession:
         rebirth_interval_ms_min: int = 5000,
         publish_state: bool = True,
         wanted: Callable[[NodeId], bool] = _anyone,
+        gate: Gate | None = None,
     ) -> None:
         self.state_topic = state_topic(host_id)
         self.actions: list[Action] = []
         self.counts: Counter[str] = Counter()
         self.online = False
+        self.quarantine = Quarantine()
+        self._gate = gate or Gate()
         self._topic_filters = tuple(topic_filters)
         self._reorder_timeout_ms = reorder_timeout_ms
         self._publish_state = publish_state
@@ -150,7 +155,7 @@ class HostSession:
                     events.append(HostEvent(EventKind.DEATH, watched.picture.node, device, now_ms, readings))
                 watched.awaiting = None
         if self.online:
-            self.actions += [self._rebirth_request(node, now_ms) for node in self._requests.due(now_ms)]
+            self.actions += [self.rebirth_request(node, now_ms) for node in self._requests.due(now_ms)]
         return events
 
     # What the application asks.
@@ -170,9 +175,12 @@ class HostSession:
         owner = None if picture is None else picture.owner(device)
         if picture is None or owner is None:
             raise UnknownMetricError(f"{_name(node, device)} was never born; nothing to command")
-        alias_of = {binding.name: alias for alias, (known, binding) in picture.aliases.items() if known is owner}
+        alias_of = {binding.name: alias for alias, binding in owner.aliases.items()}
         metrics = []
         for change in changes:
+            if change.name == REBIRTH and owner.offers_rebirth:
+                metrics.append(Metric(REBIRTH, change.value, DataType.BOOLEAN, change.timestamp_ms))
+                continue
             binding = owner.bindings.get(change.name)
             if binding is None:
                 raise UnknownMetricError(f"{_name(node, device)} has not declared {change.name!r}; nothing to command")
@@ -181,6 +189,12 @@ class HostSession:
             metrics.append(Metric(name, change.value, binding.datatype, change.timestamp_ms, alias))
         verb = Verb.NCMD if device is None else Verb.DCMD
         return Publish(str(Topic(verb, node, device)), encode(Payload(now_ms, tuple(metrics))))
+
+    def rebirth_request(self, node: NodeId, now_ms: int) -> Publish:
+        """The message that asks a node for its births, whether anything was heard of it or not."""
+        self.counts["rebirths_requested"] += 1
+        metric = Metric(REBIRTH, True, DataType.BOOLEAN, now_ms)
+        return Publish(str(Topic(Verb.NCMD, node)), encode(Payload(now_ms, (metric,))))
 
     # How it is done.
 
@@ -192,11 +206,6 @@ class HostSession:
             # The late will of an earlier connection: say at once that this host lives.
             self.actions.append(self._state(online=True, timestamp_ms=self._connect_ms))
         return []
-
-    def _rebirth_request(self, node: NodeId, now_ms: int) -> Publish:
-        self.counts["rebirths_requested"] += 1
-        metric = Metric(REBIRTH, True, DataType.BOOLEAN, now_ms)
-        return Publish(str(Topic(Verb.NCMD, node)), encode(Payload(now_ms, (metric,))))
 
     def _node_message(self, topic: Topic, payload: bytes, now_ms: int) -> list[HostEvent]:
         verb, node, _ = topic
@@ -238,7 +247,7 @@ class HostSession:
             self.counts["late"] += 1
             return []
         try:
-            readings = picture.own.bear(message, stamp or now_ms, picture.aliases)
+            readings = picture.own.bear(message, stamp or now_ms, picture.holders)
         except PayloadError as error:
             # What follows it would be read by the birth before it: better to know nothing until there is one that can be read.
             self.counts["malformed"] += 1
@@ -246,10 +255,9 @@ class HostSession:
         lost = watched.window.begin(message.seq, stamp)
         picture.bd_seq, watched.received_ms = bd_seq, now_ms
         self.counts["sloppy_births"] += _is_sloppy(message)
-        picture.aliases = {alias: known for alias, known in picture.aliases.items() if known[0] is picture.own}
+        picture.holders = dict.fromkeys(picture.own.aliases, picture.own)
         for owner in picture.devices.values():
-            owner.bindings = {}  # their aliases may mean something else now; DBIRTHs follow
-            owner.forget_layouts()
+            owner.forget_birth()  # DBIRTHs follow
         watched.awaiting = {device for device, owner in picture.devices.items() if owner.online}
         self._requests.born(picture.node)
         self.counts["births"] += 1
@@ -299,13 +307,14 @@ class HostSession:
         if topic.verb is Verb.DBIRTH and device is not None:
             owner = picture.devices.setdefault(device, Owner())
             try:
-                readings = owner.bear(message, stamp, picture.aliases)
+                readings = owner.bear(message, stamp, picture.holders)
             except PayloadError as error:
                 self.counts["malformed"] += 1
                 return _death(picture.node, device, owner, stamp, f"birth certificate unreadable: {error}")
             if watched.awaiting:
                 watched.awaiting.discard(device)
             self.counts["births"] += 1
+            self.counts["sloppy_aliases"] += owner.aliases_shared
             return [HostEvent(EventKind.BIRTH, picture.node, device, stamp, readings)]
         known = picture.owner(device)
         if known is None or not known.online:
@@ -335,7 +344,7 @@ class HostSession:
         route = self._routes.get(name)
         if route is None:
             owner.layouts = Memory(self._room)
-            route = self._routes[name] = Route(watched.picture, watched.window, owner, topic.device, owner.layouts)
+            route = self._routes[name] = Route(watched.picture, watched.window, owner, topic.device, owner.layouts, self._gate)
         return route
 
     def _doubt(self, watched: _Watched, now_ms: int) -> None:

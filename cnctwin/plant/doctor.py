@@ -1,13 +1,14 @@
 """`cnctwin doctor`: is everything connected, in order and accounted for?"""
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
 from cnctwin.plant.lags import lag_reports
 from cnctwin.plant.view import StageLedger, health, ledgers, machines, own_values
 from cnctwin.plant.watch import viewer
+from edge.running.awaited import LATE_S, NO_HISTORIAN
 from processors.lag_report import BEHIND_S, LagReport
 from sparkplug.broker import BrokerAddress
 from sparkplug.host import HostApplication
@@ -90,6 +91,8 @@ def diagnose(host: HostApplication, url: str) -> Report:
                 findings.append(Finding(True, f"{node_id}: {count} {name.replace('_', ' ')} so far, counted"))
         findings += of_store(node_id, metrics)
         findings += of_edge_store(node_id, metrics)
+        findings += of_awaited(node_id, metrics)
+    findings += of_history(health(host).values())
     findings += of_lags(lag_reports(own_values(host)))
     counts = host.counts
     order = f"{counts.get('lost', 0)} messages lost, {counts.get('malformed', 0)} malformed while listening"
@@ -119,6 +122,20 @@ def of_edge_store(node_id: str, metrics: Mapping[str, Reading]) -> list[Finding]
     return [
         Finding(False, f"{node_id} is {age:.0f} s behind: {waiting} rows of its store are not sent yet; they follow as history")
     ]
+
+
+def of_awaited(node_id: str, metrics: Mapping[str, Reading]) -> list[Finding]:
+    """Return the finding that the historian an edge waits for gives no receipts; nothing where it does."""
+    silent_s, told = (metrics[name].value if name in metrics else None for name in ("awaited_s", "history"))
+    is_late = isinstance(silent_s, float) and silent_s >= LATE_S
+    return [Finding(False, f"{node_id}: {told}")] if is_late and isinstance(told, str) else []
+
+
+def of_history(every: Iterable[Mapping[str, Reading]]) -> list[Finding]:
+    """Return the finding that edges have heard of no historian; nothing where each has."""
+    without = sum(metrics["history"].value == NO_HISTORIAN for metrics in every if "history" in metrics)
+    how = "start `cnctwin process historian` to keep it"
+    return [Finding(True, f"{without} edge{'s' if without > 1 else ''}: {NO_HISTORIAN}; {how}")] if without else []
 
 
 def of_store(node_id: str, metrics: Mapping[str, Reading]) -> list[Finding]:

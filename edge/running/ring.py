@@ -190,6 +190,18 @@ class Ring:
         """The memory that was stored last."""
         return self._stored_last("memory")
 
+    def historian(self) -> str:
+        """The host whose receipts are waited for, as kept; empty where there is none."""
+        found = self._ask("SELECT value FROM kept WHERE name = 'historian'")
+        return str(found[0][0]) if found else ""
+
+    def keep_historian(self, host: str) -> None:
+        """Keep over restarts whose receipts are waited for."""
+        try:
+            self._db.execute(_KEEP, ("historian", host))
+        except sqlite3.Error as error:
+            raise StoreError(f"{self.file}: cannot be written: {error}") from error
+
     def _stored_last(self, what: str) -> str | None:
         """Return the text of the last row that has one, or the one that was kept after that row."""
         kept = dict(self._ask(f"SELECT name, value FROM kept WHERE name IN ('{what}', '{what}_of')"))  # noqa: S608  our own words

@@ -18,11 +18,13 @@ from edge.running.health import HEALTH
 from edge.running.ledger import Ledger
 from edge.running.ring import Ring
 from edge.running.runtime import EdgeRuntime, Publisher
+from sparkplug.actions import HostState
 from sparkplug.broker import BrokerAddress
 from sparkplug.edge_node import EdgeNode
 from sparkplug.edge_session import Command
 from sparkplug.errors import SparkplugError
 from sparkplug.metric import NodeId
+from twin.vocabulary.nodes import HISTORIAN_NODE
 from twin.vocabulary.topics import edge_barrier
 
 
@@ -81,6 +83,9 @@ def edge_runtime(
     def commanded(command: Command) -> None:
         runtime.commanded(command)
 
+    def host_state(host: str, state: HostState | None) -> None:
+        runtime.host_state(host, state)
+
     node = EdgeNode(
         address or broker_address(broker, config.path),
         NodeId(broker.group, config.node),
@@ -90,6 +95,8 @@ def edge_runtime(
         barrier_topic=edge_barrier(broker.group, config.node),
         on_confirmed=confirmed,
         on_command=commanded,
+        watched_hosts=[HISTORIAN_NODE] if config.store.await_receipt == "auto" else [],
+        on_host_state=host_state,
         loop=None if driver is None else driver.loop,
     )
     runtime = EdgeRuntime(

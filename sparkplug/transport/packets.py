@@ -7,6 +7,8 @@ order, to whoever knows all of MQTT.
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from sparkplug.transport.sendable import topic_fault
+
 PACKET_BYTES_MAX = 1024 * 1024  # a longer one is not held here until it is whole
 TOPICS_MAX = 20_000
 REMAINING_LENGTH_MAX = 268_435_455
@@ -226,9 +228,9 @@ class PacketWriter:
 
     def _head(self, topic: str) -> bytes:
         """Return the topic, written out, and the properties behind it, of which there are none."""
+        if fault := topic_fault(topic):
+            raise ValueError(fault)
         name = topic.encode()
-        if not 0 < len(name) <= 65_535 or "+" in topic or "#" in topic:
-            raise ValueError(f"nothing can be published on the topic {topic!r}: it is empty, too long, or holds a wildcard")
         if len(self._heads) >= TOPICS_MAX:
             self._heads.clear()
         head = self._heads[topic] = len(name).to_bytes(2) + name + self._properties
