@@ -156,7 +156,7 @@ class StoreRecorder:
     """A `processors.running.ports.Recorder` on a store. The store is written by its thread only; `stop` writes what waits, and
     closes it.
 
-    A failure of the thread that is no StoreError is our own bug: the next `keep` raises it, and ends the processor.
+    A failure of the thread that is no StoreError is our own bug: the next `keep` raises it, and has the historian restarted.
     """
 
     keeps_plain = SNAPSHOT + "#"
@@ -248,6 +248,16 @@ class StoreRecorder:
                 self._queue.put(HostEvent(EventKind.HOLE, node, machine, now_ms, detail=detail), now_ms, 1, 0)
         self._restore_numbers()
         self._thread.start()
+
+    def begin_again(self) -> None:
+        """Have another thread write, where the last one has failed: what it had in hand is lost, and counted as dropped."""
+        if self._failure is not None:
+            self._thread.join()
+            self._dropped += self._writing
+            self._writing = 0
+            self._failure = None
+            self._thread = threading.Thread(target=self._run, name="store", daemon=True)
+            self._thread.start()
 
     def stop(self) -> None:
         """Write what waits, and close the store."""

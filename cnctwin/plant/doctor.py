@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from cnctwin.plant.lags import lag_reports
+from cnctwin.plant.quarantine import refused_lines
 from cnctwin.plant.view import StageLedger, health, ledgers, machines, own_values
 from cnctwin.plant.watch import viewer
 from edge.running.awaited import LATE_S, NO_HISTORIAN
@@ -94,6 +95,7 @@ def diagnose(host: HostApplication, url: str) -> Report:
         findings += of_awaited(node_id, metrics)
         findings += of_sequence_holes(node_id, metrics)
     findings += of_history(health(host).values())
+    findings += [Finding(False, line) for line in refused_lines(host.quarantine, own_values(host))]
     findings += of_lags(lag_reports(own_values(host)))
     counts = host.counts
     order = f"{counts.get('lost', 0)} messages lost, {counts.get('malformed', 0)} malformed while listening"
@@ -128,7 +130,8 @@ def of_edge_store(node_id: str, metrics: Mapping[str, Reading]) -> list[Finding]
 def of_awaited(node_id: str, metrics: Mapping[str, Reading]) -> list[Finding]:
     """Return the finding that the historian an edge waits for gives no receipts; nothing where it does."""
     silent_s, told = (metrics[name].value if name in metrics else None for name in ("awaited_s", "history"))
-    return [Finding(False, f"{node_id}: {told!s}")] if isinstance(silent_s, float) and silent_s >= LATE_S else []
+    is_late = isinstance(silent_s, float) and silent_s >= LATE_S
+    return [Finding(False, f"{node_id}: {told}")] if is_late and isinstance(told, str) else []
 
 
 def of_history(every: Iterable[Mapping[str, Reading]]) -> list[Finding]:

@@ -21,7 +21,14 @@ HEALTH = (
     MetricSpec("health/ignored", DataType.INT64, properties={"meaning": "messages of nodes that this processor does not read"}),
     MetricSpec("health/snapshot_age_s", DataType.DOUBLE, unit="s", properties={"meaning": "age of the oldest unsaved state"}),
     MetricSpec("health/snapshots_rejected", DataType.INT64, properties={"meaning": "snapshots that could not be restored"}),
+    MetricSpec("health/quarantined", DataType.INT64, properties={"meaning": "devices and nodes of which something is refused"}),
+    MetricSpec("health/quarantine", DataType.STRING, properties={"meaning": "the first of them as JSON (running/quarantine.py)"}),
     MetricSpec("health/reconnects", DataType.INT64, properties={"meaning": "connections made again"}),
+    MetricSpec("health/overload", DataType.INT64, properties={"meaning": "messages passed over: more came than could be folded"}),
+    MetricSpec("health/overloaded_by", DataType.STRING, properties={"meaning": "node with most of them lately; empty: none"}),
+    MetricSpec("health/faults", DataType.INT64, properties={"meaning": "faults in this processor that were contained"}),
+    MetricSpec("health/fault", DataType.STRING, properties={"meaning": "the last of them, in one line; empty: none"}),
+    MetricSpec("health/restarts", DataType.INT64, properties={"meaning": "times that a fault has restarted this processor"}),
 )
 
 STORE = (

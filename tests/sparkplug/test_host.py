@@ -13,6 +13,7 @@ from sparkplug.broker import BrokerAddress
 from sparkplug.datatype import DataType
 from sparkplug.edge_node import EdgeNode
 from sparkplug.edge_session import EdgeNodeSession
+from sparkplug.errors import TopicError
 from sparkplug.host import EventKind, HostApplication, HostEvent
 from sparkplug.metric import Change, MetricSpec, NodeId
 from sparkplug.transport.loop import Loop
@@ -128,3 +129,33 @@ def test_a_host_and_a_node_share_a_loop_and_all_of_the_node_is_read_once(mosquit
         poll_until([*births, *[EventKind.DATA] * 3, *deaths, *births, *deaths])
         host.stop()
         assert proxy.packets("up", PublishPacket)[-1].topic == "spBv1.0/cnc/NDEATH/twin-thermal"
+
+
+@pytest.mark.broker
+def test_a_host_asks_a_node_of_which_it_has_heard_nothing_for_its_births(mosquitto: Mosquitto) -> None:
+    node = EdgeNode(BrokerAddress(*mosquitto.address), OTHER)
+    node.declare_device("okuma", [MetricSpec("load", DataType.DOUBLE)])
+    host = HostApplication(BrokerAddress(*mosquitto.address), "test")
+    assert not host.request_rebirth(OTHER), "offline"
+    node.start()
+    deadline_s = time.monotonic() + PATIENCE_S
+    while not node.online:
+        assert time.monotonic() < deadline_s
+        time.sleep(0.01)
+    host.start()
+    events: list[HostEvent] = []
+    asked = False
+    while len(events) < 2:
+        assert time.monotonic() < deadline_s
+        events += host.poll(0.1)
+        asked = asked or host.request_rebirth(OTHER)
+    assert [(event.kind, event.device) for event in events[:2]] == [(EventKind.BIRTH, None), (EventKind.BIRTH, "okuma")]
+    assert host.counts["rebirths_requested"] == 1
+    host.stop()
+    node.stop()
+
+
+@pytest.mark.parametrize("node", [NodeId("cnc", "+"), NodeId("#", "edge"), NodeId("cnc", "a/b")])
+def test_a_rebirth_is_asked_of_one_node_only(node: NodeId) -> None:
+    with pytest.raises(TopicError):
+        unconnected().request_rebirth(node)

@@ -26,7 +26,7 @@ _FINGERPRINT = re.compile(r"[0-9a-f]{4,64}")
 
 
 class Acknowledgement(BaseModel):
-    """The person who takes care, and why. Behind a proxy that names its users, `by` is the user, whatever stands here."""
+    """The person who takes care, and why. Of a user who is known by name `by` is that name, whatever stands here."""
 
     model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"by": "ada", "comment": "on my way"}]})
     by: str = Field("", max_length=100)

@@ -35,12 +35,15 @@ KILLS = 3
 class NumberedEdge:
     """An edge whose row n says n, as quickly as a fast machine; it forgets what a memory has given a receipt for."""
 
-    def __init__(self, folder: Path, address: BrokerAddress, limits: StoreSection = LIMITS) -> None:
+    def __init__(
+        self, folder: Path, *brokers: BrokerAddress, limits: StoreSection = LIMITS, primary_host: str | None = None
+    ) -> None:
         self.rows = 0
         self._node = EdgeNode(
-            address,
+            brokers,
             NodeId("cnc", "edge-vmc"),
             [MetricSpec("health/rows", DataType.INT64)],
+            primary_host=primary_host,
             session_file=folder / "session",
             barrier_topic="cnctwin/barrier/cnc/edge-vmc",
             on_confirmed=self._confirmed,

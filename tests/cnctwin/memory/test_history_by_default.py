@@ -58,7 +58,7 @@ def status(folder: Path) -> dict[str, Any]:
 
 def test_by_default_no_row_is_missing(tmp_path: Path, mosquitto: Mosquitto) -> None:
     with historian(tmp_path, mosquitto.port) as memory:
-        with NumberedEdge(tmp_path, BrokerAddress(*mosquitto.address), DEFAULTS).running() as edge:
+        with NumberedEdge(tmp_path, BrokerAddress(*mosquitto.address), limits=DEFAULTS).running() as edge:
             outage(tmp_path, mosquitto, edge, memory)
             edge.enough()
             until(lambda: edge.forwarder.observations == 0, "a receipt for every row", 180.0)
@@ -72,7 +72,7 @@ def test_by_default_no_row_is_missing(tmp_path: Path, mosquitto: Mosquitto) -> N
 
 def test_without_receipts_the_rows_that_are_missing_are_named(tmp_path: Path, mosquitto: Mosquitto) -> None:
     with historian(tmp_path, mosquitto.port) as memory:
-        with NumberedEdge(tmp_path, BrokerAddress(*mosquitto.address), WITHOUT).running() as edge:
+        with NumberedEdge(tmp_path, BrokerAddress(*mosquitto.address), limits=WITHOUT).running() as edge:
             outage(tmp_path, mosquitto, edge, memory)
             lines: list[str] = []
 
