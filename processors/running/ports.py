@@ -5,6 +5,7 @@ from typing import NamedTuple, Protocol
 
 from processors.actions import Pin
 from sparkplug.actions import Publish
+from sparkplug.admission.refusal import Quarantined
 from sparkplug.host_session import HostEvent
 from sparkplug.metric import Change, MetricSpec, NodeId
 
@@ -17,6 +18,7 @@ class HostPort(Protocol):
     def start(self) -> None: ...
     def stop(self) -> None: ...
     def poll(self, timeout_s: float, gather_s: float = 0.0) -> list[HostEvent]: ...
+    def births(self) -> list[HostEvent]: ...
     def publish_plain(self, topic: str, payload: bytes, *, qos: int = 0, retain: bool = False) -> bool: ...
     def publish_all(self, messages: Sequence[Publish]) -> bool: ...
     def subscribe_plain(self, topic_filter: str) -> None: ...
@@ -29,6 +31,8 @@ class HostPort(Protocol):
     def queue_depth(self) -> int: ...
     @property
     def backlog(self) -> int: ...
+    @property
+    def quarantine(self) -> Sequence[Quarantined]: ...
 
 
 class EdgePort(Protocol):
@@ -69,6 +73,9 @@ class Recorder(Protocol):
 
     def receipts(self) -> Iterable[Receipt]:
         """Return what has been kept since the last call, for those who wait for it."""
+
+    def begin_again(self) -> None:
+        """Go on after a failure, as well as that goes; whatever was lost is counted as dropped."""
 
     def health(self) -> Mapping[str, int | float | str]:
         """Return the recorder's state by name: published as `health/<name>` of the processor's node."""
