@@ -17,6 +17,7 @@ from random import Random
 from sparkplug.actions import Connect, Publish, Subscribe
 from sparkplug.admission.gate import Gate
 from sparkplug.admission.limits import DEFAULTS, Limits
+from sparkplug.admission.rates import Overrun, Rates
 from sparkplug.admission.refusal import Quarantined
 from sparkplug.broker import BrokerAddress
 from sparkplug.clock import now_ms
@@ -34,6 +35,7 @@ __all__ = ["EventKind", "HostApplication", "HostEvent"]
 
 EVENTS_A_POLL = 1000
 TICK_S = 0.1
+EXCESS_S = 1.0
 PLAIN_TOPICS_MAX = 20_000
 PLAIN_BYTES_MAX = 1000  # every broker takes a message of that size
 STALE_S_MAX = 60.0
@@ -93,10 +95,12 @@ class HostApplication:
         )
         self._plain_filters: list[str] = []
         self._plain_topics: set[str] = set()  # on which a message can be sent
-        self._inbox: deque[tuple[str | _Mark, bytes, float]] = deque()  # with the time of time.monotonic
+        self._inbox: deque[tuple[str | _Mark | Overrun, bytes, float]] = deque()  # with the time of time.monotonic
         self._waits = False
         self._filled = threading.Event()
-        self._ticked_s = 0.0
+        self._ticked_s = self._told_s = 0.0
+        self._rates = Rates(limits, trusted)
+        self._plain_bytes_max = limits.plain_bytes_max
         self._failure_told_s = -FAILURE_TOLD_S
         listener = Listener(
             self._connecting, lambda: None, self._connected, self._message, self._lost, lambda: None, wanted=self._is_read
@@ -146,7 +150,7 @@ class HostApplication:
     @property
     def quarantine(self) -> tuple[Quarantined, ...]:
         """The nodes and devices of which something is refused, oldest first; read it only in the thread that polls."""
-        return self._session.quarantine.table()
+        return self._session.admission.quarantine.table()
 
     def picture(self, node: NodeId) -> NodePicture | None:
         """What is known of a node; read it only in the thread that polls."""
@@ -183,11 +187,19 @@ class HostApplication:
                     events += self._session.tick(now_ms())
                 except Exception:
                     self._fail("a tick of the session failed")
+                events += self._refused_by_rate(now_s)
             if self._session.actions:
                 self._connection.send(self._session.actions)
                 self._session.actions = []
             if events or now_s >= deadline_s:
                 return events
+
+    def _refused_by_rate(self, now_s: float) -> list[HostEvent]:
+        """Return an event for each node of which messages were dropped at the door, once a second."""
+        if now_s - self._told_s < EXCESS_S:
+            return []
+        self._told_s = now_s
+        return [self._session.admission.exceeded(excess, now_ms()) for excess in self._rates.excess()]
 
     def publish_plain(self, topic: str, payload: bytes, *, qos: int = 0, retain: bool = False) -> bool:
         """Publish outside the Sparkplug namespace; False where the broker is gone or takes less than it is given, or where the
@@ -261,6 +273,10 @@ class HostApplication:
                     events += session.message(topic, payload, now_ms())
                 except Exception:
                     self._fail(f"a message on {shortened(topic)} could not be taken")
+            elif isinstance(topic, Overrun):
+                events += session.overrun(topic, now_ms())
+            elif len(payload) > self._plain_bytes_max:
+                self.dropped += 1
             elif isinstance(topic, str):
                 events.append(HostEvent(EventKind.PLAIN, _NOWHERE, None, now_ms(), topic=topic, payload=payload))
         return events
@@ -280,8 +296,8 @@ class HostApplication:
             self._filled.wait(wait_s)
         self._waits = False
 
-    def _put(self, topic: str | _Mark, payload: bytes) -> None:
-        self._inbox.append((topic, payload, time.monotonic()))
+    def _put(self, topic: str | _Mark | Overrun, payload: bytes, now_s: float) -> None:
+        self._inbox.append((topic, payload, now_s))
         if self._waits:
             self._filled.set()
 
@@ -302,14 +318,20 @@ class HostApplication:
         return self._session.connecting(now_ms())
 
     def _connected(self) -> None:
-        self._put(_Mark.CONNECTED, b"")
+        self._put(_Mark.CONNECTED, b"", time.monotonic())
 
     def _lost(self) -> None:
-        self._put(_Mark.LOST, b"")
+        self._put(_Mark.LOST, b"", time.monotonic())
 
     def _message(self, topic: str, payload: bytes) -> None:
+        now_s = time.monotonic()
+        if not self._rates.admits(topic, len(payload), now_s):
+            if (overrun := self._rates.overrun) is not None:
+                self._rates.overrun = None
+                self._put(overrun, b"", now_s)
+            return
         depth = len(self._inbox)
         if depth >= self._queue_max and (depth >= 2 * self._queue_max or "DATA/" in topic):
             self.dropped += 1
             return
-        self._put(topic, payload)
+        self._put(topic, payload, now_s)

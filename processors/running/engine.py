@@ -28,6 +28,7 @@ from twin.vocabulary.nodes import is_twin_node
 MACHINES_MAX = 1000
 Way = Callable[[Stream, float], list[Action]]
 """Takes a message at a time on the wall; what comes of it."""
+_NO_MESSAGES = (EventKind.HOLE, EventKind.REFUSED)  # of a device, as they come; REFUSED says itself how many it stands for
 _IS_HISTORICAL: Callable[[Reading], bool] = itemgetter(Reading._fields.index("is_historical"))
 
 
@@ -80,7 +81,7 @@ class Engine:
 
     def _is_message(self, event: HostEvent) -> bool:
         """Return True if the ledger counts it: it is of a device, from a node that this processor reads."""
-        return event.device is not None and event.kind is not EventKind.HOLE and self._processor.listens_to(event.node.node)
+        return event.device is not None and event.kind not in _NO_MESSAGES and self._processor.listens_to(event.node.node)
 
     def feed(self, event: HostEvent, wall_s: float) -> list[Action]:
         """Take one event; `wall_s` is any clock that only goes forward."""
@@ -89,7 +90,7 @@ class Engine:
         if not self._processor.listens_to(node.node):
             self.counts.ignored += 1
             return []
-        if device is None:
+        if device is None or kind is EventKind.REFUSED:
             return self._node_event(event)
         machine = self._machines.get(device)
         if kind is EventKind.HOLE:  # no message
@@ -351,6 +352,7 @@ class Engine:
     def _node_event(self, event: HostEvent) -> list[Action]:
         """A hole of an edge node concerns each machine that it stands for. Its death comes as one death for each device."""
         actions: list[Action] = []
+        self.ledger.refused(event.refusal, event.refused)
         for machine in self._machines.values() if event.kind is EventKind.HOLE else ():
             if event.node in machine.online:
                 actions += machine.live.lost(event.detail)

@@ -5,6 +5,7 @@ from typing import NamedTuple, Protocol
 
 from processors.actions import Pin
 from sparkplug.actions import Publish
+from sparkplug.admission.refusal import Quarantined
 from sparkplug.host_session import HostEvent
 from sparkplug.metric import Change, MetricSpec, NodeId
 
@@ -30,6 +31,8 @@ class HostPort(Protocol):
     def queue_depth(self) -> int: ...
     @property
     def backlog(self) -> int: ...
+    @property
+    def quarantine(self) -> Sequence[Quarantined]: ...
 
 
 class EdgePort(Protocol):

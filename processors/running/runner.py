@@ -30,6 +30,7 @@ from processors.running.lane import stream_of
 from processors.running.ledger import DropReason
 from processors.running.overload import Overload
 from processors.running.ports import HostPort
+from processors.running.quarantine import quarantine_health
 from processors.running.worker import Shared, Worker
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId
@@ -51,7 +52,7 @@ RESTORE_S_MAX = 1.0  # to wait for the next snapshot, or for our own nodes
 FINISH_S_MAX = 5.0  # to fold what waits, before the end
 STALL_S = 1.0  # a longer pause of this process is no silence of the machine
 WAITING_MAX = 100_000  # events, while the snapshots are awaited
-_DATA, _PLAIN = EventKind.DATA, EventKind.PLAIN
+_DATA, _PLAIN, _REFUSED = EventKind.DATA, EventKind.PLAIN, EventKind.REFUSED
 _log = logging.getLogger(__name__)
 
 
@@ -239,7 +240,7 @@ class Runner:
         """Have what has come recorded, in the broker's order, before anything is folded."""
         for worker in self._recorders:
             for event in events:
-                if event.kind is _PLAIN or worker in self._readers_of(event):
+                if event.kind is not _REFUSED and (event.kind is _PLAIN or worker in self._readers_of(event)):
                     worker.record(event, now_s)
 
     def _take(self, event: HostEvent, now_s: float) -> None:
@@ -250,7 +251,7 @@ class Runner:
         if event.names:
             self._stream(event, now_s)
             return
-        if event.kind is not _DATA and event.device is not None:
+        if event.kind not in (_DATA, _REFUSED) and event.device is not None:
             self._ways.pop(event.device, None)
         for worker in self._readers_of(event):
             worker.take(event, now_s)
@@ -322,6 +323,7 @@ class Runner:
             "busy_pct": busy_pct,
             "process": PROCESS,
             "processors": len(names),
+            **quarantine_health(self._host.quarantine),
             "overloaded_by": self._overload.report(now_s),
         }
 

@@ -12,14 +12,17 @@ from processors.running.health import node_metrics
 from processors.running.ports import Recorder
 from processors.running.runner import Runner
 from processors.running.worker import Worker
+from sparkplug.admission.limits import DEFAULTS, Limits
 from sparkplug.broker import BrokerAddress
 from sparkplug.edge_node import EdgeNode
 from sparkplug.host import HostApplication
 from sparkplug.metric import NodeId
 from sparkplug.topics import uncommanded_filters
 from sparkplug.transport.loop import Loop
+from twin.vocabulary.nodes import is_twin_node
+from twin.vocabulary.topics import RESERVED_MACHINES
 
-OTHERS = ("validation",)  # tables of the same file that are for no processor
+OTHERS = ("validation", "limits")  # tables of the same file that are for no processor
 Configured = tuple[AnyProcessor, Configuration[ProcessorConfig]]
 
 
@@ -31,6 +34,7 @@ def run(
     group: str = "cnc",
     session_dir: Path | None = None,
     recorder: Recorder | None = None,
+    limits: Limits = DEFAULTS,
 ) -> None:
     """Run processors whose configuration has been checked until `stop` is set. A processor that fails is restarted by itself
     (processors/running/containment.py); raises ProcessorsFailedError where all of them go on failing, so that a supervisor can
@@ -39,7 +43,7 @@ def run(
     session_dir: keeps the birth/death sequence numbers over restarts; all other state is kept on the broker
     recorder: for the processor that `records`
     """
-    runner_of(pairs, broker, group=group, session_dir=session_dir, recorder=recorder).run(stop)
+    runner_of(pairs, broker, group=group, session_dir=session_dir, recorder=recorder, limits=limits).run(stop)
 
 
 def runner_of(
@@ -49,6 +53,7 @@ def runner_of(
     group: str = "cnc",
     session_dir: Path | None = None,
     recorder: Recorder | None = None,
+    limits: Limits = DEFAULTS,
 ) -> Runner:
     """Return the loop of a process, not begun: one host session and an edge node for each processor, on one MQTT loop."""
     processors = [processor for processor, _ in pairs]
@@ -59,6 +64,9 @@ def runner_of(
         uncommanded_filters(group),
         wanted=lambda node: any(processor.listens_to(node.node) for processor in processors),
         loop=loop,
+        limits=limits,
+        reserved=RESERVED_MACHINES,
+        trusted=lambda node: is_twin_node(node.node),
     )
     workers = []
     for processor, configuration in pairs:

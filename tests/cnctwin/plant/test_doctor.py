@@ -10,7 +10,17 @@ from contextlib import contextmanager
 import pytest
 
 from cnctwin.cli import main
-from cnctwin.plant.doctor import Finding, Report, examine, of_awaited, of_edge_store, of_history, of_lags, of_store
+from cnctwin.plant.doctor import (
+    Finding,
+    Report,
+    examine,
+    of_awaited,
+    of_edge_store,
+    of_history,
+    of_lags,
+    of_sequence_holes,
+    of_store,
+)
 from cnctwin.plant.lags import behind, lag_reports
 from cnctwin.plant.view import own_values
 from edge.running.awaited import LATE_S, NO_HISTORIAN
@@ -213,3 +223,11 @@ def test_a_plant_without_a_historian_is_told_that_nothing_keeps_history() -> Non
     assert finding.good
     assert finding.text.startswith("2 edges: no historian has been heard of on this broker: nothing keeps history; start")
     assert of_history([told(history="rows are held until twin-historian has them"), told()]) == []
+
+
+def test_rows_that_the_historian_misses_are_bad_news() -> None:
+    named = "okuma: 372–441 missing since 2026-03-02 08:00 UTC"
+    (finding,) = of_sequence_holes("twin-historian", told(sequence_holes=1, sequence_hole=named))
+    assert (finding.good, finding.text) == (False, f"twin-historian: rows of edges are missing: {named}")
+    assert of_sequence_holes("twin-historian", told(sequence_holes=0, sequence_hole="")) == []
+    assert of_sequence_holes("edge-vmc", {}) == []

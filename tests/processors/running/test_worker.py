@@ -19,6 +19,7 @@ from processors.running.runner import Runner
 from processors.running.worker import Worker
 from processors.thermal import PROCESSOR as THERMAL
 from sparkplug.actions import Publish
+from sparkplug.admission.refusal import Quarantined
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import Change, MetricSpec, NodeId
 from tests.processors.recorder import RECORDER
@@ -35,6 +36,7 @@ class FakeHost:
         self.online = True
         self.reconnects = 0
         self.started = self.stopped = False
+        self.quarantine: tuple[Quarantined, ...] = ()
         self.retained = retained or {}
         self.plain: list[tuple[str, bytes, bool]] = []
         self.subscriptions: list[str] = []

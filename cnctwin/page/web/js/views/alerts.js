@@ -4,11 +4,14 @@ import { part, post } from "../api.js";
 import { serverNow } from "../clock.js";
 import { openSigned } from "../dialogs.js";
 import { el, say, setText, symbol, table } from "../dom.js";
+import { lookup } from "../lookup.js";
+import { may, whyNot } from "../me.js";
 import { age, moment, words } from "../text.js";
 
-const RANK = { high: 0, medium: 1, low: 2 },
-  PHASE = { firing: 0, acknowledged: 1, pending: 2, resolved: 3 };
-const SIGNS = { firing: "s-alert", acknowledged: "s-ack", pending: "s-pending", resolved: "s-ack" };
+const RANK = lookup({ high: 0, medium: 1, low: 2 }),
+  PHASE = lookup({ firing: 0, acknowledged: 1, pending: 2, resolved: 3 });
+const SIGNS = lookup({ firing: "s-alert", acknowledged: "s-ack", pending: "s-pending", resolved: "s-ack" });
+const LAST = 9; // of a phase or a severity that nobody knows
 const AROUND_MS = 300000;
 const RESOLVED_MAX = 20;
 
@@ -87,7 +90,7 @@ export function open(app) {
         "div",
         { class: "acts" },
         alert.phase === "firing"
-          ? el("button", { type: "button", class: "button main", onclick: () => acknowledge(alert) }, "Acknowledge")
+          ? el("button", { type: "button", class: "button main", disabled: !may("operator"), onclick: () => acknowledge(alert) }, "Acknowledge")
           : null,
         machine && Number.isFinite(start)
           ? el(
@@ -189,7 +192,10 @@ export function open(app) {
       ? (document.activeElement.closest("[data-fingerprint]")?.dataset.fingerprint ?? null)
       : null;
     const all = [...(given.alerts ?? [])].sort(
-      (a, b) => PHASE[a.phase] - PHASE[b.phase] || RANK[a.severity] - RANK[b.severity] || began(b) - began(a),
+      (a, b) =>
+        (PHASE[a.phase] ?? LAST) - (PHASE[b.phase] ?? LAST) ||
+        (RANK[a.severity] ?? LAST) - (RANK[b.severity] ?? LAST) ||
+        began(b) - began(a),
     );
     const of = (...phases) => all.filter((one) => phases.includes(one.phase));
     const firing = of("firing");
@@ -200,6 +206,7 @@ export function open(app) {
     const known = given.available !== false || all.length;
     body.replaceChildren(
       ...[
+        may("operator") ? null : el("p", { class: "note role" }, whyNot("operator", "acknowledging")),
         !known
           ? el(
               "div",
@@ -251,6 +258,7 @@ export function open(app) {
       ],
     ],
     onAlerts: write,
+    onMe: write,
     onLink: (state) => {
       if (state === "live") app.askAlerts();
     },
