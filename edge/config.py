@@ -6,9 +6,9 @@ Checked before any I/O. Secrets do not stand in the file: it names the environme
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Generic, Literal, TypeVar
+from typing import Annotated, Generic, Literal, Self, TypeVar
 
-from pydantic import AfterValidator, BaseModel, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, Field, ValidationError, model_validator
 
 from edge.accelerometer.section import AccelerometerSection
 from edge.errors import ConfigError
@@ -19,6 +19,7 @@ from sparkplug.shown_address import shown_address
 from twin.vocabulary.nodes import edge_node
 from twin.vocabulary.signals import DERIVED, Kind
 
+BROKERS_MAX = 10
 BLOCK_PATTERN = r'(?<![A-Z_])M0*6(?![\d.])|\bTOOL CALL (?:\d|"|QS?\d)'
 
 
@@ -39,10 +40,14 @@ class MachineSection(Section):
 
 
 class BrokerSection(Section):
-    """The broker to publish to. Empty `node` means `edge-<machine>`; `session_file` keeps bdSeq and,
-    beside it, the place in the control's stream; empty, the program keeps them in its state folder."""
+    """The broker to publish to, or several in `urls`, of which the edge is on one at a time.
+
+    Empty `node` means `edge-<machine>`; `session_file` keeps bdSeq and, beside it, the place in the control's stream; empty, the
+    program keeps them in its state folder.
+    """
 
     url: str = "mqtt://127.0.0.1:1883"
+    urls: tuple[str, ...] = Field(default=(), max_length=BROKERS_MAX)
     group: str = "cnc"
     node: str = ""
     session_file: str = ""
@@ -50,6 +55,14 @@ class BrokerSection(Section):
     username: str = ""
     password_env: str = ""
     password_file: str = ""
+
+    @model_validator(mode="after")
+    def _names_its_brokers_once(self) -> Self:
+        if self.urls and "url" in self.model_fields_set:
+            raise ValueError("has url and urls; put all brokers into urls")
+        if len(set(self.urls)) < len(self.urls):
+            raise ValueError("urls names a broker twice; name each once")
+        return self
 
 
 class SignalSection(Section):

@@ -9,6 +9,7 @@ from pathlib import Path
 from cnctwin.processes.look_around import refuse_second
 from processors.running.ports import Recorder
 from processors.running.runtime import Configured, run
+from sparkplug.admission.limits import DEFAULTS, Limits
 from sparkplug.broker import BrokerAddress
 from sparkplug.metric import NodeId
 from sparkplug.session_lock import SessionLock
@@ -16,7 +17,15 @@ from sparkplug.session_lock import SessionLock
 ALERTS = "alerts"
 
 
-def process(pairs: Sequence[Configured], broker: BrokerAddress, stop: threading.Event, *, group: str, state_dir: Path) -> None:
+def process(
+    pairs: Sequence[Configured],
+    broker: BrokerAddress,
+    stop: threading.Event,
+    *,
+    group: str,
+    state_dir: Path,
+    limits: Limits = DEFAULTS,
+) -> None:
     """Run configured processors until `stop` is set. Raises ConfigurationError where a secret is missing, StoreError where the
     store cannot be used, AnotherRunsError where another process has one of them."""
     nodes = [NodeId(group, processor.node) for processor, _ in pairs]
@@ -26,7 +35,7 @@ def process(pairs: Sequence[Configured], broker: BrokerAddress, stop: threading.
         refuse_second(broker, nodes, "end that one first, or give this one other processors or another --group")
         recorder = stack.enter_context(_recorder(pairs, group))
         stack.enter_context(_courier(pairs, broker, group))
-        run(pairs, broker, stop, group=group, session_dir=state_dir, recorder=recorder)
+        run(pairs, broker, stop, group=group, session_dir=state_dir, recorder=recorder, limits=limits)
 
 
 @contextmanager
@@ -40,7 +49,7 @@ def _recorder(pairs: Sequence[Configured], group: str) -> Iterator[Recorder | No
     from processors.historian import HistorianConfig  # noqa: PLC0415
 
     assert isinstance(config, HistorianConfig)
-    recorder = StoreRecorder(store_of(config), group)
+    recorder = StoreRecorder(store_of(config), group, config.hole_s)
     recorder.start()
     try:
         yield recorder
