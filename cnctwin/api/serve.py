@@ -56,11 +56,12 @@ def serve(options: ServeOptions, broker: BrokerAddress, stop: Event) -> None:
     from cnctwin.api.nights import Nights  # noqa: PLC0415
     from cnctwin.api.residual import Models  # noqa: PLC0415
     from cnctwin.api.store_reader import StoreReader  # noqa: PLC0415
+    from processors.running.limits import limits_of  # noqa: PLC0415
 
     access = access_of(options, os.environ.get(TOKEN_VARIABLE))
     constants = Constants(options.config)
     live = LivePlant()
-    viewer = Viewer(broker, options.group, live)
+    viewer = Viewer(broker, options.group, live, limits_of(options.config))
     store = StoreReader(options.store)
     audit = AuditLog(options.audit or state_dir() / "audit" / "page.jsonl")
     told = (options.diagnoses, Nights(), options.jobs, access, audit, options.registry)

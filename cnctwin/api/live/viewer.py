@@ -11,6 +11,7 @@ from cnctwin.api.live.documents import AlertsState, DocumentError, read_document
 from cnctwin.api.live.jobs import LiveJobs
 from cnctwin.api.live.plant import LivePlant
 from cnctwin.plant.watch import viewer
+from sparkplug.admission.limits import DEFAULTS, Limits
 from sparkplug.broker import BrokerAddress
 from sparkplug.clock import now_ms
 from sparkplug.host_session import EventKind, HostEvent
@@ -29,13 +30,13 @@ _log = logging.getLogger(__name__)
 class Viewer:
     """Between `start` and `stop` the plant and the jobs are kept up to date. `on_batches` is called from the thread."""
 
-    def __init__(self, broker: BrokerAddress, group: str, live: LivePlant) -> None:
+    def __init__(self, broker: BrokerAddress, group: str, live: LivePlant, limits: Limits = DEFAULTS) -> None:
         self.url = broker.url
         self.group = group
         self.on_batches: Callable[[list[Batch]], None] = lambda _: None
         self.jobs = LiveJobs()
         self._live = live
-        self._host = viewer(broker, group)
+        self._host = viewer(broker, group, limits)
         for topic in (ALERT_STATE, *LiveJobs.filters):
             self._host.subscribe_plain(topic)
         self._outbox: deque[tuple[str, bytes]] = deque(maxlen=OUTBOX_MAX)

@@ -25,8 +25,11 @@ NODE_GAUGES = {
     "twin_processor_lag_events": ("health/queue_depth", "messages behind the network thread"),
     "twin_processor_queue_depth": ("health/queue_depth", "messages behind the network thread"),
     "twin_state_checkpoint_age_seconds": ("health/snapshot_age_s", "age of the oldest unsaved state"),
-    "twin_buffer_oldest_age_seconds": ("health/store_age_s", "age of the oldest row that no broker has confirmed"),
-    "twin_buffer_rows": ("health/store_rows", "rows that no broker has confirmed"),
+    "twin_buffer_oldest_age_seconds": (
+        "health/store_age_s",
+        "age of the oldest row that no broker, or no historian, has confirmed",
+    ),
+    "twin_buffer_rows": ("health/store_rows", "rows that no broker, or no historian, has confirmed"),
     "twin_buffer_bytes": ("health/store_bytes", "size of the edge's ring"),
     "twin_control_online": ("health/control_online", "whether the edge has its control"),
 }

@@ -16,6 +16,7 @@ from cnctwin.jobs.client import FRESH_S_MAX as JOBS_FRESH_S_MAX
 from cnctwin.page import WEB
 from cnctwin.plant.alert_desk import FRESH_S_MAX
 from cnctwin.plant.doctor import COME_AND_GO
+from cnctwin.plant.quarantine import SHOWN_MAX, refused_lines
 from cnctwin.processes import published_state
 from sparkplug.clock import now_ms
 from twin.vocabulary.nodes import JOBS_NODE, TWIN_NODE_PREFIX, is_twin_node
@@ -45,8 +46,9 @@ def health_routes(sources: Sources) -> APIRouter:
         parts = [
             _broker(sources),
             _plant(sources.live),
-            _input(sources.live),
             _processors(sources.live),
+            _refused(sources.live),
+            _input(sources.live),
             await _store(sources),
             _constants(sources),
         ]
@@ -96,6 +98,16 @@ def _processors(live: LivePlant) -> Part:
     if (behind := live.behind()) is not None:
         return Part(part="processors", state="degraded", reason=behind, do="cnctwin plan fleet")
     return Part(part="processors", state="ok", reason=f"{len(known)} online")
+
+
+def _refused(live: LivePlant) -> Part:
+    """What the processors do not let in."""
+    own = [(view.node, view.values) for view in live.nodes() if view.online and is_twin_node(view.node)]
+    lines = refused_lines((), own)
+    if not lines:
+        return Part(part="admission", state="ok", reason="nothing is refused")
+    line = "; ".join(lines[:SHOWN_MAX]) + (f"; and {len(lines) - SHOWN_MAX} more" if len(lines) > SHOWN_MAX else "")
+    return Part(part="admission", state="degraded", reason=line, do="correct what these edges send, or raise [limits]")
 
 
 def _plant(live: LivePlant) -> Part:
