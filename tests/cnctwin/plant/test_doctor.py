@@ -10,7 +10,17 @@ from contextlib import contextmanager
 import pytest
 
 from cnctwin.cli import main
-from cnctwin.plant.doctor import Finding, Report, examine, of_awaited, of_edge_store, of_history, of_lags, of_store
+from cnctwin.plant.doctor import (
+    Finding,
+    Report,
+    examine,
+    of_awaited,
+    of_edge_store,
+    of_history,
+    of_lags,
+    of_sloppy_peers,
+    of_store,
+)
 from cnctwin.plant.lags import behind, lag_reports
 from cnctwin.plant.view import own_values
 from edge.running.awaited import LATE_S, NO_HISTORIAN
@@ -213,3 +223,12 @@ def test_a_plant_without_a_historian_is_told_that_nothing_keeps_history() -> Non
     assert finding.good
     assert finding.text.startswith("2 edges: no historian has been heard of on this broker: nothing keeps history; start")
     assert of_history([told(history="rows are held until twin-historian has them"), told()]) == []
+
+
+def test_a_peer_that_does_not_keep_a_rule_is_told_and_is_no_bad_news() -> None:
+    assert of_sloppy_peers({"sloppy_aliases": 3, "sloppy_births": 0, "births": 9}) == [
+        Finding(
+            True,
+            "3 aliases stood for a metric of a node and one of its device (as Tahu Java gives them); read all the same",
+        )
+    ]
