@@ -15,6 +15,7 @@ from edge.errors import ConfigError
 from edge.section import Section
 from edge.signals import signal
 from edge.units import conversion
+from sparkplug.shown_address import shown_address
 from twin.vocabulary.nodes import edge_node
 from twin.vocabulary.signals import DERIVED, Kind
 
@@ -157,14 +158,5 @@ def one_line(path: Path, table: str, error: ValidationError) -> str:
     key = ".".join(str(part) for part in (*filter(None, [table]), *first["loc"]))
     if first["type"] == "extra_forbidden":
         return f"{path}: {key}: no such key; remove it, or see the sample configuration beside the adapter for the right name"
-    shown = without_secret(repr(first["input"]))
+    shown = shown_address(repr(first["input"]))
     return f"{path}: {key} = {shown}: {first['msg'].removeprefix('Value error, ')}"
-
-
-def without_secret(text: str) -> str:
-    """A text with the password of any address in it left out.
-
-    >>> without_secret("http://maintenance:hunter2@agent:5000")
-    'http://maintenance:…@agent:5000'
-    """
-    return re.sub(r"(//[^/@:\s]*):[^/\s]*@", r"\1:…@", text)

@@ -12,6 +12,7 @@ from sparkplug.clock import now_ms
 from sparkplug.edge_session import Command, EdgeNodeSession, Phase
 from sparkplug.errors import SparkplugError, TopicError
 from sparkplug.metric import Change, MetricSpec, NodeId
+from sparkplug.session_lock import SessionLock
 from sparkplug.transport.connection import MqttConnection
 from sparkplug.transport.listener import Listener
 from sparkplug.transport.loop import Loop
@@ -47,6 +48,7 @@ class EdgeNode:
         on_host_state: Callable[[str, HostState | None], None] = lambda _host, _state: None,
         loop: Loop | None = None,
     ) -> None:
+        self._own = None if session_file is None else SessionLock(session_file, f"{node.group}/{node.node}")
         self._bd_seq = BdSeq(session_file)
         self._aliases = AliasFile(None if session_file is None else session_file.with_name(session_file.name + ".aliases"))
         addresses = (brokers,) if isinstance(brokers, BrokerAddress) else tuple(brokers)
@@ -84,8 +86,10 @@ class EdgeNode:
         """Publish the node's death, disconnect and stop."""
         with self._lock:
             farewell = self._session.close(now_ms())
-            self._aliases.keep(self._session.aliases, at_once=True)
+            self._aliases.keep(self._session.aliases)
         self._connection.close(farewell, timeout_s)
+        if self._own is not None:
+            self._own.release()
 
     @property
     def online(self) -> bool:

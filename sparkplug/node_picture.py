@@ -1,6 +1,6 @@
 """What a host application knows of one edge node and its devices."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -105,6 +105,10 @@ class Owner:
             self._names = names
         self._newest = readings
 
+    def replace(self, readings: Iterable[Reading]) -> None:
+        """Have other readings stand for those of the birth."""
+        self.readings.update({reading.name: reading for reading in readings})
+
     def take_history(self, readings: tuple[Reading, ...]) -> None:
         """Note readings of which some may be historical."""
         self.readings.update({reading.name: reading for reading in readings if not reading.is_historical})
@@ -127,10 +131,7 @@ class Owner:
         if len(message.metrics) > METRICS_MAX:
             raise PayloadError(f"birth declares {len(message.metrics)} metrics; the limit is {METRICS_MAX}")
         declared = [_declared(metric, timestamp_ms) for metric in message.metrics]
-        for old in self.aliases:
-            if holders.get(old) is self:
-                del holders[old]
-        self.forget_layouts()
+        self.leave(holders)
         self.online, self.birth_ms = True, timestamp_ms
         self.properties, self.templates, self.bindings, self.aliases = {}, {}, {}, {}
         self.aliases_shared, self.offers_rebirth = 0, False
@@ -150,6 +151,13 @@ class Owner:
                 self.aliases_shared += holder is not self and holder.online
         self._latest, self._names, self._newest, self._names_known = readings, (), (), {}
         return tuple(readings.values())
+
+    def leave(self, holders: dict[int, "Owner"]) -> None:
+        """Take its aliases out of the table; what it says from now on is read anew."""
+        for old in self.aliases:
+            if holders.get(old) is self:
+                del holders[old]
+        self.forget_layouts()
 
     def binding(self, metric: Any) -> Binding | None:
         """Return what the birth said of a data metric: by its alias, else by its name."""
@@ -198,6 +206,13 @@ class NodePicture:
         """The node itself, then its devices."""
         yield None, self.own
         yield from self.devices.items()
+
+    def forget_one(self) -> str | None:
+        """Make room for a device: the one that has been offline the longest is forgotten; None where all are online."""
+        device = next((device for device, owner in self.devices.items() if not owner.online), None)
+        if device is not None:
+            self.devices.pop(device).leave(self.holders)
+        return device
 
     def read_data(
         self, owner: Owner, message: Any, timestamp_ms: int, *, may_tell_quality: bool = True

@@ -16,6 +16,7 @@ import httpx
 
 from cnctwin.errors import UsageError
 from cnctwin.models.card import CARD, MANIFEST, Card
+from sparkplug.shown_address import shown_address
 
 API = "/api/2.0/mlflow"
 ARTIFACTS = "/api/2.0/mlflow-artifacts/artifacts"
@@ -117,10 +118,11 @@ class _Answer(NamedTuple):
 def _sent(client: httpx.Client, method: str, path: str, **given: Any) -> _Answer:
     """Return the answer, which is read within bounds and never decoded."""
     body, until_s = bytearray(), time.monotonic() + TIMEOUT_S
+    where = f"MLflow at {shown_address(str(client.base_url))}"
     try:
         with client.stream(method, path, **given) as response:
             if (encoding := response.headers.get("content-encoding", "identity")) != "identity":
-                raise UsageError(f"MLflow at {client.base_url} sends Content-Encoding {encoding[:40]!r}, which was not asked for")
+                raise UsageError(f"{where} sends Content-Encoding {encoding[:40]!r}, which was not asked for")
             for piece in response.iter_bytes():  # which decodes nothing of this encoding
                 body += piece
                 if len(body) > ANSWER_BYTES_MAX or time.monotonic() > until_s:
@@ -130,7 +132,7 @@ def _sent(client: httpx.Client, method: str, path: str, **given: Any) -> _Answer
                     )
             return _Answer(response.status_code, body.decode(errors="replace"), response.request.url)
     except (httpx.HTTPError, httpx.InvalidURL) as error:
-        raise UsageError(f"MLflow at {client.base_url}: {error or type(error).__name__}; does it run?") from None
+        raise UsageError(f"{where}: {error or type(error).__name__}; does it run?") from None
 
 
 def _answer(response: _Answer) -> dict[str, Any]:

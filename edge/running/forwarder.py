@@ -103,7 +103,7 @@ class Forwarder:
         self._emitted, self._dropped = 0, Counter[Drop]()
         self.history_rows = 0
         self.evicted_rows = 0
-        self.evicted = ""
+        self._evicted_first, self.evicted = 0, ""
         self.error = ""
 
     # What the loop has.
@@ -344,7 +344,8 @@ class Forwarder:
             self._receipts.cut(gone.last)
             self._dropped[_DROPS[gone.reason]] += gone.observations
             self.evicted_rows += gone.rows
-            self.evicted = f"{gone.last - gone.rows + 1}-{gone.last} {gone.reason}"
+            self._evicted_first = self._evicted_first or gone.first
+            self.evicted = f"{self._evicted_first}-{gone.last} {gone.reason}"
             if self._clock() - now_s > EVICTION_S_MAX:
                 self._kept_s -= HOUSEKEEPING_S  # goes on at the next turn
                 break

@@ -64,10 +64,11 @@ class StoredRow(NamedTuple):
 
 
 class Evicted(NamedTuple):
-    """Rows that had to go: how many, up to which number, and how many observations they were."""
+    """Rows that had to go: how many, from and up to which number, and how many observations they were."""
 
     reason: Eviction
     rows: int
+    first: int
     last: int
     observations: int
 
@@ -260,7 +261,7 @@ class Ring:
         if reason is Eviction.DISK:
             self._give_back(RETURNED_AT_ONCE)
         self.look()
-        return Evicted(reason, len(oldest), last, observations)
+        return Evicted(reason, len(oldest), int(oldest[0][0]), last, observations)
 
     def _give_back(self, pages: int) -> None:
         """Make the file shorter by so many pages at most."""

@@ -1,7 +1,7 @@
 """The gate of a host session: what may be let in of what was decoded, and why not. It keeps nothing but the present."""
 
 import re
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -50,6 +50,11 @@ class Gate:
         """Return True for a time stamp in the window."""
         return self.oldest_ms <= stamp_ms <= self.newest_ms
 
+    def stamp(self, message: Any) -> int:
+        """Return the time stamp of a payload; 0 where it has none that is believed."""
+        stamp_ms: int = message.timestamp
+        return stamp_ms if self.oldest_ms <= stamp_ms <= self.newest_ms else 0
+
     # Names.
 
     def node_fault(self, node: NodeId) -> Fault | None:
@@ -77,18 +82,12 @@ class Gate:
                     return Fault(Refusal.SIZE, f"metric {shown(metric.name)!r}: {text}")
         return None
 
-    def believed(self, readings: Sequence[Reading], stamp_ms: int) -> tuple[tuple[Reading, ...], int]:
-        """Return the readings of a birth, without a value where no clock has their time stamp, and how many those are."""
-        count = 0
-        checked: list[Reading] = []
-        for reading in readings:
-            if self.believes(reading.timestamp_ms):
-                checked.append(reading)
-            else:
-                count += 1
-                reason = f"kept out: {self.stamp_text(reading.timestamp_ms)}"
-                checked.append(Reading(reading.name, None, stamp_ms, Quality.BAD, reading.unit, reason, False))
-        return tuple(checked), count
+    def believed(self, reading: Reading, stamp_ms: int) -> Reading:
+        """Return a reading of a birth: without its value, as of `stamp_ms`, where no clock has its time stamp."""
+        if self.believes(reading.timestamp_ms):
+            return reading
+        reason = f"kept out: {self.stamp_text(reading.timestamp_ms)}"
+        return Reading(reading.name, None, stamp_ms, Quality.BAD, reading.unit, reason, False)
 
     # Data.
 

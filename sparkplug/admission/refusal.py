@@ -10,6 +10,7 @@ ROWS_MAX = 4096
 ROWS_A_NODE_MAX = 64
 FORGET_MS = 3_600_000
 SHOWN_MAX = 60
+_KEY_MAX = 255
 
 
 class Refusal(Enum):
@@ -63,14 +64,15 @@ class Quarantine:
         """The rows, oldest first."""
         rows = sorted(self._rows.items(), key=lambda item: item[1].since_ms)
         return tuple(
-            Quarantined(node, device, row.reason, row.text, row.since_ms, row.count, row.is_whole) for (node, device), row in rows
+            Quarantined(
+                node, None if device is None else shown(device), row.reason, row.text, row.since_ms, row.count, row.is_whole
+            )
+            for (node, device), row in rows
         )
 
     def of(self, node: NodeId, device: str | None) -> Refusal | None:
         """Return why all that a node or device says is refused; None where it is not."""
-        if not self._rows:
-            return None
-        row = self._rows.get((node, device))
+        row = self._rows.get(_key(node, device))
         return row.reason if row is not None and row.is_whole else None
 
     def is_full(self, node: NodeId) -> bool:
@@ -81,7 +83,7 @@ class Quarantine:
         self, node: NodeId, device: str | None, reason: Refusal, text: str, now_ms: int, *, is_whole: bool = False, count: int = 1
     ) -> None:
         """Note that something was refused."""
-        key = (node, device)
+        key = _key(node, device)
         row = self._rows.get(key)
         if row is None:
             if self.is_full(node) and device is not None:
@@ -99,15 +101,15 @@ class Quarantine:
 
     def again(self, node: NodeId, device: str | None, now_ms: int) -> None:
         """Count a message of what is refused as a whole."""
-        row = self._rows.get((node, device))
+        row = self._rows.get(_key(node, device))
         if row is not None:
             row.count += 1
             row.last_ms = now_ms
 
     def release(self, node: NodeId, device: str | None) -> None:
         """A good birth has come, or a death: let it in again."""
-        if self._rows and (node, device) in self._rows:
-            self._drop((node, device))
+        if self._rows and (key := _key(node, device)) in self._rows:
+            self._drop(key)
 
     def sweep(self, now_ms: int) -> None:
         """Forget the rows to which nothing was added for long."""
@@ -121,6 +123,11 @@ class Quarantine:
             self._of_node[key[0]] = left
         else:
             del self._of_node[key[0]]
+
+
+def _key(node: NodeId, device: str | None) -> tuple[NodeId, str | None]:
+    """Return the key of a row. A name that is longer is refused in any case, and nobody is to fill the memory with it."""
+    return node, None if device is None else device[:_KEY_MAX]
 
 
 def shown(text: str) -> str:

@@ -29,6 +29,7 @@ from sparkplug.transport.listener import Listener
 from sparkplug.transport.loop import TICK_S, Loop
 from sparkplug.transport.paho_client import CONNECT_TIMEOUT_S, StreamClient
 from sparkplug.transport.paho_path import PahoPath
+from sparkplug.transport.rival import Rival
 from sparkplug.transport.sendable import PACKET_BYTES_MAX, Sendable
 from sparkplug.transport.stream import Stream
 from sparkplug.transport.tls_failure import explained
@@ -81,6 +82,7 @@ class MqttConnection:
         self._stream: Stream | None = None
         self._path: PahoPath | None = None
         self._accepted = self._reached = self._reading = False
+        self._rival = Rival(client_id)
         self._writes_later = False  # the socket takes no more for now
         self._is_finished = False  # nothing more is sent on this socket
         self._is_unread = False  # there was more to read than in one turn
@@ -367,6 +369,7 @@ class MqttConnection:
         self.connects += 1
         self.last_error = ""
         self._accepted = True
+        self._rival.began(time.monotonic())
         self.sendable.packet_bytes_max = getattr(properties, "MaximumPacketSize", PACKET_BYTES_MAX)
         self._itinerary.accepted(time.monotonic())
         self._listener.connected()
@@ -376,7 +379,7 @@ class MqttConnection:
         if reason.is_failure and isinstance(failure, ssl.SSLError):
             self._note(f"the connection to {broker.url} ended: {explained(failure, broker)}")
         elif reason.is_failure and not self.last_error:
-            self._note(f"the connection to {broker.url} ended: {reason}")
+            self._note(f"the connection to {broker.url} ended: {self._rival.ended(time.monotonic(), reason)}")
 
     def _refused(self, reason: str) -> None:
         self._note(f"{self._itinerary.broker.url} refuses the barrier that shows what has arrived: {reason}")

@@ -92,6 +92,11 @@ class PlantCollector(Collector):
         yield GaugeMetricFamily("twin_page_streams", "open streams", self._streams)
         yield CounterMetricFamily("twin_page_streams_dropped", "streams let go because they did not keep up", self._dropped)
         yield CounterMetricFamily("twin_page_messages", "messages of machines that this server has heard", counts["messages"])
+        refused = CounterMetricFamily("twin_page_refused", "what this server could not take over", labels=["what"])
+        for what in ("readings", "documents"):
+            refused.add_metric([what], counts[f"{what}_refused"])
+        refused.add_metric(["messages"], counts["failures"])
+        yield refused
         latency = CounterMetricFamily("twin_page_latency_seconds_sum", "sum of event time to arrival, over twin_page_messages")
         latency.add_metric([], counts["latency_ms"] / 1000.0)
         yield latency

@@ -16,8 +16,11 @@ from cnctwin.plant.doctor import (
     examine,
     of_awaited,
     of_edge_store,
+    of_faults,
     of_history,
     of_lags,
+    of_overload,
+    of_sequence_holes,
     of_sloppy_peers,
     of_store,
 )
@@ -232,3 +235,25 @@ def test_a_peer_that_does_not_keep_a_rule_is_told_and_is_no_bad_news() -> None:
             "3 aliases stood for a metric of a node and one of its device (as Tahu Java gives them); read all the same",
         )
     ]
+
+
+def test_rows_that_the_historian_misses_are_bad_news() -> None:
+    named = "okuma: 372–441 missing since 2026-03-02 08:00 UTC"
+    (finding,) = of_sequence_holes("twin-historian", told(sequence_holes=1, sequence_hole=named))
+    assert (finding.good, finding.text) == (False, f"twin-historian: rows of edges are missing: {named}")
+    assert of_sequence_holes("twin-historian", told(sequence_holes=0, sequence_hole="")) == []
+    assert of_sequence_holes("edge-vmc", {}) == []
+
+
+def test_contained_faults_are_counted_and_the_last_one_is_told() -> None:
+    text = "a beat failed; restarted after 1 s, 2 times so far: OSError: disk full"
+    (finding,) = of_faults("twin-alerts", told(faults=3, restarts=2, fault=text))
+    assert finding == Finding(True, f"twin-alerts: 3 faults contained, restarted 2 times; the last: {text}")
+    assert of_faults("twin-alerts", told(faults=0, restarts=0, fault="")) == of_faults("edge-okuma", {}) == []
+
+
+def test_who_floods_a_process_is_named_once() -> None:
+    text = "cnc/edge-flood: 812 messages passed over in a second"
+    every = [told(overloaded_by=text), told(overloaded_by=text), told(overloaded_by=""), told(lag_s=0.0)]
+    assert of_overload(every) == [Finding(False, f"more comes than can be folded, the newest values win: {text}")]
+    assert of_overload([told(overloaded_by=""), {}]) == []
