@@ -42,6 +42,7 @@ from processors.running.engine import Engine
 from processors.running.runner import GATHER_S, SELDOM
 from processors.running.runtime import runner_of
 from sparkplug.actions import Publish
+from sparkplug.admission.limits import Limits
 from sparkplug.broker import BrokerAddress
 from sparkplug.datatype import DataType
 from sparkplug.edge_node import EdgeNode
@@ -54,6 +55,8 @@ from sparkplug.transport.loop import Loop
 
 SIGNALS = tuple(f"axis_{i}_pos_mm" for i in range(20))
 RESULTS = ("twin/mean_mm", "twin/low_mm", "twin/high_mm", "twin/spread_mm")
+# The source sends more than a node of a plant may.
+FLAT_OUT = Limits(messages_a_second_max=1_000_000, messages_at_once_max=10_000_000, data_bytes_at_once_max=1 << 40)
 SOURCE = NodeId("cnc", "edge-bench")
 START_MS = 1_790_000_000_000
 
@@ -153,7 +156,7 @@ def _wait(condition: Callable[[], bool], complaint: str, seconds: float = 120.0)
 
 def ours(port: int, count: int, rate_hz: float) -> float:
     """The processor as it runs in production."""
-    runner = runner_of([(PROBE, Configuration(ProcessorConfig, {}))], BrokerAddress(port=port))
+    runner = runner_of([(PROBE, Configuration(ProcessorConfig, {}))], BrokerAddress(port=port), limits=FLAT_OUT)
     (worker,) = runner.workers
     stop = threading.Event()
     thread = threading.Thread(target=runner.run, args=(stop,), daemon=True)
@@ -207,7 +210,7 @@ def transport(port: int, count: int, rate_hz: float) -> float:
     seen = 0
     broker = BrokerAddress(port=port)
     loop = Loop()
-    host = HostApplication(broker, "transport", (f"spBv1.0/{SOURCE.group}/+/{SOURCE.node}/#",), loop=loop)
+    host = HostApplication(broker, "transport", (f"spBv1.0/{SOURCE.group}/+/{SOURCE.node}/#",), loop=loop, limits=FLAT_OUT)
     edge = EdgeNode(broker, NodeId("cnc", "twin-transport"), loop=loop)
     answer = (Publish("spBv1.0/cnc/DDATA/twin-transport/vmc", b"x" * 90),)
     stop = threading.Event()

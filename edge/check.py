@@ -3,9 +3,9 @@
 from pathlib import Path
 
 from edge.adapter import Row, adapters, find
-from edge.config import without_secret
 from edge.config_file import load
 from edge.errors import ConfigError
+from sparkplug.shown_address import shown_address
 
 
 def check(config_path: Path) -> list[Row]:
@@ -21,4 +21,4 @@ def discover(url: str, *, device: str = "") -> str:
         if "://" in url and scheme in adapter.schemes:
             return adapter.draft(url, device)
     known = ", ".join(f"{scheme}:// ({adapter.name})" for adapter in adapters().values() for scheme in adapter.schemes)
-    raise ConfigError(f"{without_secret(url)}: no adapter speaks to such an address; there are {known}")
+    raise ConfigError(f"{shown_address(url)}: no adapter speaks to such an address; there are {known}")

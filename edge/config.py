@@ -6,18 +6,20 @@ Checked before any I/O. Secrets do not stand in the file: it names the environme
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Generic, Literal, TypeVar
+from typing import Annotated, Generic, Literal, Self, TypeVar
 
-from pydantic import AfterValidator, BaseModel, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, Field, ValidationError, model_validator
 
 from edge.accelerometer.section import AccelerometerSection
 from edge.errors import ConfigError
 from edge.section import Section
 from edge.signals import signal
 from edge.units import conversion
+from sparkplug.shown_address import shown_address
 from twin.vocabulary.nodes import edge_node
 from twin.vocabulary.signals import DERIVED, Kind
 
+BROKERS_MAX = 10
 BLOCK_PATTERN = r'(?<![A-Z_])M0*6(?![\d.])|\bTOOL CALL (?:\d|"|QS?\d)'
 
 
@@ -38,10 +40,14 @@ class MachineSection(Section):
 
 
 class BrokerSection(Section):
-    """The broker to publish to. Empty `node` means `edge-<machine>`; `session_file` keeps bdSeq and,
-    beside it, the place in the control's stream; empty, the program keeps them in its state folder."""
+    """The broker to publish to, or several in `urls`, of which the edge is on one at a time.
+
+    Empty `node` means `edge-<machine>`; `session_file` keeps bdSeq and, beside it, the place in the control's stream; empty, the
+    program keeps them in its state folder.
+    """
 
     url: str = "mqtt://127.0.0.1:1883"
+    urls: tuple[str, ...] = Field(default=(), max_length=BROKERS_MAX)
     group: str = "cnc"
     node: str = ""
     session_file: str = ""
@@ -49,6 +55,14 @@ class BrokerSection(Section):
     username: str = ""
     password_env: str = ""
     password_file: str = ""
+
+    @model_validator(mode="after")
+    def _names_its_brokers_once(self) -> Self:
+        if self.urls and "url" in self.model_fields_set:
+            raise ValueError("has url and urls; put all brokers into urls")
+        if len(set(self.urls)) < len(self.urls):
+            raise ValueError("urls names a broker twice; name each once")
+        return self
 
 
 class SignalSection(Section):
@@ -72,7 +86,8 @@ class ReportSection(Section):
 class StoreSection(Section):
     """Store and forward: what no broker has confirmed is kept on the disk. Empty `file`: beside the session file.
 
-    `await_receipt`: kept until a memory (the processor `historian`) says that it has it, too.
+    `await_receipt`: kept until a memory (the processor `historian`) says that it has it, too; "auto": as soon as one has been
+    heard of on the broker, and from then on.
 
     What is too old or too much goes, oldest first, and is counted; less than `free_bytes_min` is never left on the disk.
     `synchronous = "full"` also outlives a power cut, at the price of an fsync for each frame.
@@ -84,7 +99,7 @@ class StoreSection(Section):
     bytes_max: int = Field(default=1_000_000_000, ge=1_000_000)
     free_bytes_min: int = Field(default=500_000_000, ge=0)
     synchronous: Literal["normal", "full"] = "normal"
-    await_receipt: bool = False
+    await_receipt: Literal["auto"] | bool = "auto"
     history_rows_per_s: float = Field(default=1_000.0, ge=1, le=100_000)  # how fast what was stored follows what is live
 
 
@@ -143,14 +158,5 @@ def one_line(path: Path, table: str, error: ValidationError) -> str:
     key = ".".join(str(part) for part in (*filter(None, [table]), *first["loc"]))
     if first["type"] == "extra_forbidden":
         return f"{path}: {key}: no such key; remove it, or see the sample configuration beside the adapter for the right name"
-    shown = without_secret(repr(first["input"]))
+    shown = shown_address(repr(first["input"]))
     return f"{path}: {key} = {shown}: {first['msg'].removeprefix('Value error, ')}"
-
-
-def without_secret(text: str) -> str:
-    """A text with the password of any address in it left out.
-
-    >>> without_secret("http://maintenance:hunter2@agent:5000")
-    'http://maintenance:…@agent:5000'
-    """
-    return re.sub(r"(//[^/@:\s]*):[^/\s]*@", r"\1:…@", text)

@@ -17,6 +17,7 @@ from typing import Any, ClassVar, Generic, Self, TypeVar
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from processors.errors import ConfigurationError
+from sparkplug.shown_address import shown_address
 
 MACHINES = "machines"
 TICKS_MAX = 100_000  # that one jump of event time may bring
@@ -126,7 +127,7 @@ def _validated(model: type[C_co], table: Mapping[str, Any], where: str) -> C_co:
         known = ", ".join(model.model_fields)
         said = first["msg"].removeprefix("Value error, ")
         raise ConfigurationError(
-            f"[{where}] {key} = {first['input']!r}: {said} (known: {known})" if key else f"[{where}] {said}"
+            f"[{where}] {key} = {shown_address(repr(first['input']))}: {said} (known: {known})" if key else f"[{where}] {said}"
         ) from error
 
 

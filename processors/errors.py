@@ -5,7 +5,8 @@ ProcessorError
 ├── UnknownProcessorError no file of that name declares a processor
 ├── ConfigurationError    a configuration file that cannot be read, or holds what the model does not allow
 ├── OutputError           a step returned what its processor does not declare: our own bug
-└── SnapshotError         a snapshot that cannot be restored
+├── SnapshotError         a snapshot that cannot be restored
+└── ProcessorsFailedError all processors of a process go on failing
 """
 
 
@@ -31,3 +32,7 @@ class OutputError(ProcessorError):
 
 class SnapshotError(ProcessorError):
     """A snapshot that cannot be restored."""
+
+
+class ProcessorsFailedError(ProcessorError):
+    """All processors of a process go on failing."""

@@ -37,6 +37,7 @@ class HistorianConfig(ProcessorConfig):
     raw_days: float = Field(default=365.0, gt=0.0, le=36_500.0)
     block_days: float = Field(default=7.0, gt=0.0, le=36_500.0)
     disk_gb: float = Field(default=0.0, ge=0.0, le=1e6)
+    hole_s: float = Field(default=60.0, gt=0.0, le=86_400.0)
 
     @cached_property
     def watched(self) -> frozenset[str]:

@@ -1,11 +1,11 @@
 """Where a broker is and how to get in."""
 
-import re
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from urllib.parse import parse_qsl, quote, unquote, urlencode, urlsplit
 
 from sparkplug.errors import BrokerAddressError
+from sparkplug.shown_address import shown_address
 
 _PORTS = {"mqtt": 1883, "mqtts": 8883}
 _VERSIONS = {"3.1.1": 4, "5": 5}
@@ -39,15 +39,16 @@ class BrokerAddress:
         authorities, no client certificate). A password is refused here, since an address is shown and logged; give it with
         `with_password`.
         """
-        shown = re.sub(r"(//[^/@]*?:)[^/]*@", r"\1…@", text)
+        shown = shown_address(text, _OPTIONS.union(_FILES))
         try:
             parts = urlsplit(text)
             port = parts.port
             options = dict(parse_qsl(parts.query, keep_blank_values=True, strict_parsing=bool(parts.query)))
-        except ValueError as error:
-            reason = str(error).replace(text, shown)
-            raise BrokerAddressError(f"broker address {shown!r}: {reason}") from None
-        if parts.password is not None:
+        except ValueError:  # whose text repeats what it cannot read, and that may be a password
+            raise BrokerAddressError(
+                f"broker address {shown!r}: host, port or options cannot be read; write mqtt://[user@]host[:port][?option=value]"
+            ) from None
+        if parts.password is not None or "password" in options:
             raise BrokerAddressError("a broker address must hold no password; put it into an environment variable or a file")
         if parts.scheme not in _PORTS or not parts.hostname or parts.path.strip("/") or parts.fragment:
             raise BrokerAddressError(f"broker address {shown!r} is not mqtt://[user@]host[:port] or mqtts://[user@]host[:port]")

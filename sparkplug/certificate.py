@@ -277,6 +277,6 @@ def _time(change: Change) -> int:
     return change.timestamp_ms
 
 
-def definition_metrics(definitions: Definitions, now_ms: int) -> tuple[Metric, ...]:
+def definition_metrics(definitions: Definitions, alias_of: Callable[[str], int], now_ms: int) -> tuple[Metric, ...]:
     """The template definitions of an NBIRTH, the only message that may carry them (6.4.15)."""
-    return tuple(Metric(name, template, DataType.TEMPLATE, now_ms) for name, template in definitions.items())
+    return tuple(Metric(name, template, DataType.TEMPLATE, now_ms, alias_of(name)) for name, template in definitions.items())

@@ -6,7 +6,7 @@ The transport tells it what happened (`connecting`, `connected`, `message`, `los
     offline ──connecting──► waiting ──connected, primary host online──► born ──lost──► offline
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from functools import partial
@@ -25,6 +25,7 @@ from sparkplug.values import Metric, Payload, Template, Value
 BD_SEQ = "bdSeq"
 REBIRTH = "Node Control/Rebirth"
 REBIRTH_INTERVAL_MS_MIN = 1000
+VISIT_MS = 5000
 COMMANDS_PENDING_MAX = 1000
 _SEQ_FIELDS = tuple(b"\x18" + written(seq) for seq in range(256))  # as the last field of a payload
 
@@ -57,8 +58,11 @@ class Command:
 class EdgeNodeSession:
     """One edge node on one broker at a time.
 
-    `primary_host` is the id of the host without which nothing is published. `templates` maps names to definitions; `aliases` are
-    those of an earlier life, so that metrics keep theirs.
+    `primary_host` is the id of the host without which nothing is published; it is looked for at each of `servers` brokers. Where
+    there is one broker the node waits there, connected and unborn, and owes it no death. Where there are several it leaves one
+    that says "offline" at once, until it has been to all of them, and after that looks at each for `VISIT_MS`. `templates` maps
+    names to definitions; `aliases` are those of an earlier life, so that metrics keep theirs. `watched_hosts` are ids of
+    hosts whose STATE is only noted in `host_states`, for the application to take; None there: the retained STATE was removed.
     """
 
     def __init__(
@@ -68,6 +72,8 @@ class EdgeNodeSession:
         *,
         now_ms: int = 0,
         primary_host: str | None = None,
+        servers: int = 1,
+        watched_hosts: Collection[str] = (),
         templates: Mapping[str, Template] | None = None,
         rebirth_interval_ms_min: int = REBIRTH_INTERVAL_MS_MIN,
         aliases: Aliases | None = None,
@@ -79,14 +85,22 @@ class EdgeNodeSession:
         self.bd_seq: int | None = None
         self.commands: list[Command] = []
         self.commands_dropped = 0
+        self.host_states: list[tuple[str, HostState | None]] = []
         self.malformed = 0
         self.aliases: Aliases = {} if aliases is None else dict(aliases)
         self._templates = dict(templates or {})
+        for taken in (BD_SEQ, REBIRTH, *self._templates):
+            if any(spec.name == taken for spec in metrics):
+                raise SparkplugError(f"edge node {node} declares {taken!r}, which its birth holds already; choose another name")
         self._certificate = Certificate(f"edge node {node}", metrics, partial(self._alias, None), now_ms, self._templates)
         self._devices: dict[str, Certificate] = {}
+        self._folded: dict[str, str] = {}  # the devices, by their names in one case
         self._data_topics: dict[str | None, str] = {None: str(Topic(Verb.NDATA, node))}
         self._primary_topic = None if primary_host is None else state_topic(primary_host)
-        self._server = 0
+        self._server, self._servers = 0, servers
+        self._visits = 0  # brokers that were dialled since the primary host was last online
+        self._waits_since_ms = 0
+        self._watched = {state_topic(host): host for host in watched_hosts}
         self._state_timestamps_ms: dict[int, int] = {}
         self._rebirth = RebirthAnswer(rebirth_interval_ms_min)
         self._seq = 255
@@ -99,13 +113,15 @@ class EdgeNodeSession:
         if self.phase is not Phase.OFFLINE:
             raise SparkplugError(f"edge node {self.node} is connected already; one broker at a time")
         self.bd_seq, self._server = bd_seq, server
+        self._visits += 1
         return Connect(will=self._death(now_ms))
 
     def connected(self, now_ms: int) -> list[Action]:
         """The broker has accepted the connection."""
-        self.phase = Phase.WAITING
+        self.phase, self._waits_since_ms = Phase.WAITING, now_ms
         actions: list[Action] = [Subscribe(str(Topic(Verb.NCMD, self.node)))]
         actions += [self._subscribe(device) for device in self._devices]
+        actions += [Subscribe(topic) for topic in self._watched if topic != self._primary_topic]
         if self._primary_topic is not None:
             actions.append(Subscribe(self._primary_topic))
         else:
@@ -121,8 +137,12 @@ class EdgeNodeSession:
         if self.phase is Phase.OFFLINE:
             return []
         try:
+            if topic in self._watched:
+                self.host_states.append((self._watched[topic], HostState.decode(payload) if payload else None))
             if topic == self._primary_topic:
                 return self._host_state(HostState.decode(payload), now_ms)
+            if topic in self._watched:
+                return []
             parsed = Topic.parse(topic)
             if parsed.node == self.node and parsed.verb in (Verb.NCMD, Verb.DCMD):
                 return self._command(parsed.device, payload, now_ms)
@@ -131,7 +151,9 @@ class EdgeNodeSession:
         return []
 
     def tick(self, now_ms: int) -> list[Action]:
-        """Time has passed: a rebirth that had to wait for its window is sent."""
+        """Time has passed: a rebirth that had to wait for its window is sent, and a visit without the primary host ends."""
+        if self._servers > 1 and self.phase is Phase.WAITING and abs(now_ms - self._waits_since_ms) >= VISIT_MS:
+            return self._walk(now_ms)
         return self._birth(now_ms) if self.phase is Phase.BORN and self._rebirth.due(now_ms) else []
 
     def close(self, now_ms: int) -> list[Action]:
@@ -147,8 +169,8 @@ class EdgeNodeSession:
     def declare_device(self, device: str, metrics: Iterable[MetricSpec], now_ms: int) -> list[Action]:
         """Add a device, or declare other metrics of one; values of metrics that stay are kept."""
         check_id(device, "device id")
-        alike = next((other for other in self._devices if other != device and other.casefold() == device.casefold()), None)
-        if alike is not None:
+        alike = self._folded.get(device.casefold(), device)
+        if alike != device:
             raise SparkplugError(f"edge node {self.node} has the device {alike!r}; {device!r} has to differ in more than case")
         owner = f"device {device} of {self.node}"
         certificate = Certificate(owner, metrics, partial(self._alias, device), now_ms, self._templates)
@@ -156,6 +178,7 @@ class EdgeNodeSession:
         if older is not None:
             certificate.keep_values(older)
         self._devices[device] = certificate
+        self._folded[device.casefold()] = device
         self._data_topics[device] = str(Topic(Verb.DDATA, self.node, device))
         if self.phase is Phase.OFFLINE:
             return []
@@ -166,7 +189,7 @@ class EdgeNodeSession:
         """The device is gone: its death is published."""
         if self._devices.pop(device, None) is None:
             raise UnknownMetricError(f"edge node {self.node} has no device {device!r}")
-        del self._data_topics[device]
+        del self._data_topics[device], self._folded[device.casefold()]
         if self.phase is not Phase.BORN:
             return []
         return [Publish(str(Topic(Verb.DDEATH, self.node, device)), encode(Payload(self._stamp(now_ms), seq=self._next_seq())))]
@@ -230,10 +253,10 @@ class EdgeNodeSession:
         self._seq = 0
         now_ms = self._stamp(max(now_ms, self._clock_ms + 1))  # no two births look alike
         control = (
-            Metric(BD_SEQ, self.bd_seq, DataType.INT64, now_ms),
+            Metric(BD_SEQ, self.bd_seq, DataType.INT64, now_ms, self._alias(None, BD_SEQ)),
             Metric(REBIRTH, False, DataType.BOOLEAN, now_ms),
         )
-        others = encode(Payload(None, definition_metrics(self._templates, now_ms) + control))
+        others = encode(Payload(None, definition_metrics(self._templates, partial(self._alias, None), now_ms) + control))
         payload = b"\x08" + written(now_ms) + self._certificate.birth() + others + _SEQ_FIELDS[0]
         node = Publish(str(Topic(Verb.NBIRTH, self.node)), payload)
         return [node, *(self._device_birth(device, now_ms) for device in self._devices)]
@@ -247,8 +270,15 @@ class EdgeNodeSession:
             return []
         self._state_timestamps_ms[self._server] = state.timestamp_ms
         if state.online:
+            self._visits = 0
             return self._birth(now_ms) if self.phase is Phase.WAITING else []
-        return [self._death(now_ms), WalkToNextServer()]
+        return self._walk(now_ms) if self.phase is Phase.BORN or self._visits < self._servers else []
+
+    def _walk(self, now_ms: int) -> list[Action]:
+        """Leave for the next broker; MQTT 3.1.1 wants a death before each DISCONNECT, born or not."""
+        actions: list[Action] = [self._death(now_ms), WalkToNextServer()]
+        self.lost()
+        return actions
 
     def _command(self, device: str | None, payload: bytes, now_ms: int) -> list[Action]:
         if device is not None and device not in self._devices:

@@ -5,7 +5,8 @@ SparkplugError
 ├── PayloadError          bytes that are no Sparkplug payload, or a payload that breaks a rule
 │   └── MetricValueError  a value that its datatype cannot carry
 ├── UnknownMetricError    a metric that the birth certificate does not declare
-└── BrokerAddressError    an address of a broker that cannot be used
+├── BrokerAddressError    an address of a broker that cannot be used
+└── AnotherRunsError      another process has the name that this one wants
 """
 
 
@@ -31,3 +32,7 @@ class UnknownMetricError(SparkplugError):
 
 class BrokerAddressError(SparkplugError):
     """An address of a broker that cannot be used."""
+
+
+class AnotherRunsError(SparkplugError):
+    """Another process has the name that this one wants."""

@@ -6,32 +6,44 @@ own thread does. What does not fit, or has waited too long, is dropped and count
 than a value.
 """
 
+import logging
 import threading
 import time
-from collections import deque
-from collections.abc import Callable, Sequence
+from collections import Counter, deque
+from collections.abc import Callable, Collection, Sequence
 from enum import Enum
 from random import Random
 
 from sparkplug.actions import Connect, Publish, Subscribe
+from sparkplug.admission.gate import Gate
+from sparkplug.admission.limits import DEFAULTS, Limits
+from sparkplug.admission.rates import Overrun, Rates
+from sparkplug.admission.refusal import Quarantined
+from sparkplug.admission.thinning import Lateness, of_devices, thinned
 from sparkplug.broker import BrokerAddress
 from sparkplug.clock import now_ms
 from sparkplug.errors import TopicError
 from sparkplug.host_session import EventKind, HostEvent, HostSession
 from sparkplug.metric import Change, NodeId
 from sparkplug.node_picture import NodePicture
-from sparkplug.topics import NAMESPACE, STATE_PREFIX, Topic, Verb, group_filter
+from sparkplug.topics import NAMESPACE, STATE_PREFIX, Topic, Verb, check_id, group_filter
 from sparkplug.transport.connection import MqttConnection
 from sparkplug.transport.listener import Listener
 from sparkplug.transport.loop import Loop
+from sparkplug.transport.sendable import shortened
 
 __all__ = ["EventKind", "HostApplication", "HostEvent"]
 
 EVENTS_A_POLL = 1000
 TICK_S = 0.1
+EXCESS_S = 1.0
+PLAIN_TOPICS_MAX = 20_000
+PLAIN_BYTES_MAX = 1000  # every broker takes a message of that size
 STALE_S_MAX = 60.0
+FAILURE_TOLD_S = 10.0
 _NOWHERE = NodeId("", "")
 _NAMESPACE_LEVEL = f"{NAMESPACE}/"
+_log = logging.getLogger(__name__)
 
 
 class _Mark(Enum):
@@ -45,7 +57,8 @@ class HostApplication:
     """Listens to edge nodes; `wanted` picks them, `topic_filters` tells the broker what to send.
 
     `loop` serves the connection, which has a loop of its own otherwise. Data that have waited for longer than `stale_s_max` are
-    dropped.
+    dropped. What is beyond `limits` is refused: so are devices with a `reserved` name. `trusted` nodes are free of the limits on
+    numbers and rates.
     """
 
     def __init__(
@@ -62,8 +75,12 @@ class HostApplication:
         wanted: Callable[[NodeId], bool] = lambda _: True,
         loop: Loop | None = None,
         stale_s_max: float = STALE_S_MAX,
+        limits: Limits = DEFAULTS,
+        reserved: Collection[str] = (),
+        trusted: Callable[[NodeId], bool] = lambda _: False,
     ) -> None:
         self.dropped = 0
+        self.faults = 0  # messages that a bug of ours has lost
         self._queue_max = queue_max
         self._stale_s_max = stale_s_max
         self._wanted = wanted
@@ -75,12 +92,20 @@ class HostApplication:
             rebirth_interval_ms_min=rebirth_interval_ms_min,
             publish_state=publish_state,
             wanted=wanted,
+            gate=Gate(limits, reserved, trusted),
         )
         self._plain_filters: list[str] = []
-        self._inbox: deque[tuple[str | _Mark, bytes, float]] = deque()  # with the time of time.monotonic
+        self._plain_topics: set[str] = set()  # on which a message can be sent
+        self._inbox: deque[tuple[str | _Mark | Overrun, bytes, float]] = deque()  # with the time of time.monotonic
         self._waits = False
         self._filled = threading.Event()
-        self._ticked_s = 0.0
+        self._ticked_s = self._told_s = 0.0
+        self._rates = Rates(limits, trusted)
+        self._trusted = trusted
+        self._lateness = Lateness()
+        self._thinned: Counter[tuple[NodeId, bool]] = Counter()
+        self._plain_bytes_max = limits.plain_bytes_max
+        self._failure_told_s = -FAILURE_TOLD_S
         listener = Listener(
             self._connecting, lambda: None, self._connected, self._message, self._lost, lambda: None, wanted=self._is_read
         )
@@ -126,6 +151,11 @@ class HostApplication:
         """What the session has counted: births, data, holes, lost, late, malformed, …"""
         return dict(self._session.counts)
 
+    @property
+    def quarantine(self) -> tuple[Quarantined, ...]:
+        """The nodes and devices of which something is refused, oldest first; read it only in the thread that polls."""
+        return self._session.admission.quarantine.table()
+
     def picture(self, node: NodeId) -> NodePicture | None:
         """What is known of a node; read it only in the thread that polls."""
         return self._session.picture(node)
@@ -133,6 +163,15 @@ class HostApplication:
     def nodes(self) -> tuple[NodeId, ...]:
         """All nodes that were heard of."""
         return self._session.nodes()
+
+    def births(self) -> list[HostEvent]:
+        """Return a birth of each device that is online, with what is known of it by now; call it in the thread that polls."""
+        return [
+            HostEvent(EventKind.BIRTH, picture.node, device, owner.birth_ms, tuple(owner.readings.values()))
+            for picture in filter(None, map(self._session.picture, self._session.nodes()))
+            for device, owner in picture.devices.items()
+            if picture.online and owner.online
+        ]
 
     def poll(self, timeout_s: float, gather_s: float = 0.0) -> list[HostEvent]:
         """Return the events that have come, at the latest after `timeout_s`; drives the loop.
@@ -148,26 +187,70 @@ class HostApplication:
             now_s = time.monotonic()
             if now_s - self._ticked_s >= TICK_S:
                 self._ticked_s = now_s
-                events += self._session.tick(now_ms())
+                try:
+                    events += self._session.tick(now_ms())
+                except Exception:
+                    self._fail("a tick of the session failed")
+                events += self._refused_by_rate(now_s)
+                if self._lateness.is_lasting(now_s - self._inbox[0][2] if self._inbox else 0.0, now_s):
+                    self._thin()
             if self._session.actions:
                 self._connection.send(self._session.actions)
                 self._session.actions = []
             if events or now_s >= deadline_s:
                 return events
 
+    def take_thinned(self) -> dict[NodeId, int]:
+        """Return the messages of devices, by node, that were left out since the last call: more came than can be read."""
+        if not self._thinned:
+            return {}
+        thinned, self._thinned = self._thinned, Counter()
+        return of_devices(thinned.items())
+
+    def _thin(self) -> None:
+        """Leave out data of the nodes with most of them; who reads the socket only appends meanwhile."""
+        inbox = self._inbox
+        kept, gone = thinned([inbox.popleft() for _ in range(len(inbox))], self._trusted)
+        inbox.extendleft(reversed(kept))
+        self._thinned += gone
+
+    def _refused_by_rate(self, now_s: float) -> list[HostEvent]:
+        """Return an event for each node of which messages were dropped at the door, once a second."""
+        if now_s - self._told_s < EXCESS_S:
+            return []
+        self._told_s = now_s
+        return [self._session.admission.exceeded(excess, now_ms()) for excess in self._rates.excess()]
+
     def publish_plain(self, topic: str, payload: bytes, *, qos: int = 0, retain: bool = False) -> bool:
-        """Publish outside the Sparkplug namespace; False where the broker is gone or takes less than it is given."""
+        """Publish outside the Sparkplug namespace; False where the broker is gone or takes less than it is given, or where the
+        message cannot be sent at all."""
         return self.publish_all((Publish(topic, payload, qos, retain),))
 
     def publish_all(self, messages: Sequence[Publish]) -> bool:
-        """Publish several messages outside the Sparkplug namespace; False where none was sent, as in `publish_plain`."""
+        """Publish several messages outside the Sparkplug namespace; False where not all were sent, as in `publish_plain`."""
+        topics = self._plain_topics
+        can_all = True
         for message in messages:
-            if message[0].startswith(_NAMESPACE_LEVEL):
-                raise ValueError(f"{message.topic!r} lies in the Sparkplug namespace; a host writes there by commands only")
+            if message[0] not in topics or len(message[1]) > PLAIN_BYTES_MAX:
+                can_all = self._may_publish(message) and can_all
         if not self._session.online or self._connection.full:
             return False
-        self._connection.send(messages)
-        return True
+        self._connection.send(messages if can_all else [one for one in messages if one[0] in topics])
+        return can_all
+
+    def _may_publish(self, message: Publish) -> bool:
+        """Look at a topic that is new, or at a long message. Raises ValueError for what a host writes by commands only."""
+        topic = message.topic
+        if topic.startswith(_NAMESPACE_LEVEL):
+            raise ValueError(f"{topic!r} lies in the Sparkplug namespace; a host writes there by commands only")
+        if len(self._plain_topics) >= PLAIN_TOPICS_MAX:
+            self._plain_topics.clear()
+        can_be_sent = self._connection.sendable.takes(message)
+        if can_be_sent:
+            self._plain_topics.add(topic)
+        else:
+            self._plain_topics.discard(topic)
+        return can_be_sent
 
     def subscribe_plain(self, topic_filter: str) -> None:
         """Have messages outside the Sparkplug namespace come out of `poll` as PLAIN; kept over reconnects."""
@@ -180,6 +263,15 @@ class HostApplication:
         if not self._session.online:
             return False
         self._connection.send((self._session.command(node, device, changes, now_ms()),))
+        return True
+
+    def request_rebirth(self, node: NodeId) -> bool:
+        """Ask a node for its births, whether anything was heard of it or not; False where this host is offline."""
+        check_id(node.group, "group id")
+        check_id(node.node, "edge node id")
+        if not self._session.online:
+            return False
+        self._connection.send((self._session.rebirth_request(node, now_ms()),))
         return True
 
     def _take(self) -> list[HostEvent]:
@@ -197,10 +289,24 @@ class HostApplication:
             elif topic is _Mark.LOST:
                 events += session.lost(now_ms())
             elif isinstance(topic, str) and topic.startswith(NAMESPACE):
-                events += session.message(topic, payload, now_ms())
+                try:
+                    events += session.message(topic, payload, now_ms())
+                except Exception:
+                    self._fail(f"a message on {shortened(topic)} could not be taken")
+            elif isinstance(topic, Overrun):
+                events += session.overrun(topic, now_ms())
+            elif len(payload) > self._plain_bytes_max:
+                self.dropped += 1
             elif isinstance(topic, str):
                 events.append(HostEvent(EventKind.PLAIN, _NOWHERE, None, now_ms(), topic=topic, payload=payload))
         return events
+
+    def _fail(self, what: str) -> None:
+        """Count a bug of ours: it costs this message, and no other."""
+        self.faults += 1
+        if (now_s := time.monotonic()) - self._failure_told_s >= FAILURE_TOLD_S:
+            self._failure_told_s = now_s
+            _log.exception("%s, %d such faults so far", what, self.faults)
 
     def _await_message(self, wait_s: float) -> None:
         """Wait where another thread turns the loop."""
@@ -210,8 +316,8 @@ class HostApplication:
             self._filled.wait(wait_s)
         self._waits = False
 
-    def _put(self, topic: str | _Mark, payload: bytes) -> None:
-        self._inbox.append((topic, payload, time.monotonic()))
+    def _put(self, topic: str | _Mark | Overrun, payload: bytes, now_s: float) -> None:
+        self._inbox.append((topic, payload, now_s))
         if self._waits:
             self._filled.set()
 
@@ -232,14 +338,20 @@ class HostApplication:
         return self._session.connecting(now_ms())
 
     def _connected(self) -> None:
-        self._put(_Mark.CONNECTED, b"")
+        self._put(_Mark.CONNECTED, b"", time.monotonic())
 
     def _lost(self) -> None:
-        self._put(_Mark.LOST, b"")
+        self._put(_Mark.LOST, b"", time.monotonic())
 
     def _message(self, topic: str, payload: bytes) -> None:
+        now_s = time.monotonic()
+        if not self._rates.admits(topic, len(payload), now_s):
+            if (overrun := self._rates.overrun) is not None:
+                self._rates.overrun = None
+                self._put(overrun, b"", now_s)
+            return
         depth = len(self._inbox)
         if depth >= self._queue_max and (depth >= 2 * self._queue_max or "DATA/" in topic):
             self.dropped += 1
             return
-        self._put(topic, payload)
+        self._put(topic, payload, now_s)

@@ -3,6 +3,7 @@
 from enum import Enum
 from typing import NamedTuple
 
+from sparkplug.admission.refusal import Refusal
 from sparkplug.metric import NodeId, Reading
 
 
@@ -14,13 +15,16 @@ class EventKind(Enum):
     DEATH = "death"
     HOLE = "hole"
     PLAIN = "plain"
+    REFUSED = "refused"
 
 
 class HostEvent(NamedTuple):
     """Something that an application should know; `device` None means the edge node itself.
 
     BIRTH carries all readings, DATA what changed, DEATH what became stale; HOLE says in `detail` how many messages are lost
-    for good; PLAIN is a message outside Sparkplug, with `topic` and `payload`.
+    for good; PLAIN is a message outside Sparkplug, with `topic` and `payload`. REFUSED says in `detail` what was not let in,
+    and in `refusal` why; its `device` is a printable, shortened name, and `refused` the number of messages of devices that it
+    stands for. Where a part of a message is refused, the rest comes as an event of its own.
 
     `names` are those of a DATA event's readings: the same tuple for all messages of one layout, so that it can be recognised by
     identity. It is () where it is not given, and where a reading is historical. Where it is given, `oldest_ms` and `newest_ms`
@@ -38,3 +42,5 @@ class HostEvent(NamedTuple):
     names: tuple[str, ...] = ()
     oldest_ms: int = 0
     newest_ms: int = 0
+    refused: int = 0
+    refusal: Refusal | None = None

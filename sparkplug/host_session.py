@@ -4,54 +4,36 @@ The transport tells it what happened, with the time; it keeps a picture of every
 for the application and, in `actions`, what is to be sent. A value is good only while its node is online.
 """
 
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
 from random import Random
-from typing import Any, NamedTuple
+from typing import Any
 
 from sparkplug.actions import Action, Connect, Disconnect, HostState, Publish, Subscribe
-from sparkplug.codec import encode, parse
-from sparkplug.datatype import DataType
-from sparkplug.edge_session import BD_SEQ, REBIRTH
-from sparkplug.errors import PayloadError, TopicError, UnknownMetricError
+from sparkplug.admission.admission import Admission
+from sparkplug.admission.gate import Gate
+from sparkplug.admission.rates import Overrun
+from sparkplug.admission.refusal import Refusal
+from sparkplug.codec import parse
+from sparkplug.errors import PayloadError, TopicError
+from sparkplug.host_command import command, rebirth_request
 from sparkplug.host_event import EventKind, HostEvent
 from sparkplug.layouts.memory import Memory, Room
 from sparkplug.layouts.route import Route
-from sparkplug.metric import Change, NodeId, Reading
+from sparkplug.metric import Change, NodeId
+from sparkplug.node_birth import bd_seq_of, is_sloppy
 from sparkplug.node_picture import NodePicture, Owner, tells_quality
 from sparkplug.rebirth import RebirthRequests
 from sparkplug.sequence import Delivery, Numbered, SequenceWindow, Verdict
 from sparkplug.topics import STATE_PREFIX, Topic, Verb, state_topic
-from sparkplug.values import Metric, Payload
+from sparkplug.watched import Received, Watched
 
 __all__ = ["EventKind", "HostEvent", "HostSession"]
 
 NODES_MAX = 10_000
 LATE_MS_MAX = 10_000
 DEVICE_BIRTH_MS_MAX = 2000
-DOUBTS_MAX = 3
-DOUBT_MS = 600_000
 _DATA = EventKind.DATA
-
-
-@dataclass(slots=True)
-class _Watched:
-    """A node's picture with what is needed to keep it in order."""
-
-    picture: NodePicture
-    window: SequenceWindow
-    received_ms: int = 0  # when its last birth or death came, by the host's clock
-    awaiting: set[str] | None = None  # devices that were known before the last NBIRTH and have not been born since
-    doubts_ms: deque[int] = field(default_factory=lambda: deque(maxlen=DOUBTS_MAX))  # when its numbers were last doubted
-
-
-class _Received(NamedTuple):
-    """A message and the bytes from which it was parsed."""
-
-    topic: Topic
-    message: Any
-    payload: bytes
 
 
 def _anyone(_: NodeId) -> bool:
@@ -71,16 +53,19 @@ class HostSession:
         rebirth_interval_ms_min: int = 5000,
         publish_state: bool = True,
         wanted: Callable[[NodeId], bool] = _anyone,
+        gate: Gate | None = None,
     ) -> None:
         self.state_topic = state_topic(host_id)
         self.actions: list[Action] = []
         self.counts: Counter[str] = Counter()
         self.online = False
+        self._gate = gate or Gate()
+        self.admission = Admission(self._gate, self.counts)
         self._topic_filters = tuple(topic_filters)
         self._reorder_timeout_ms = reorder_timeout_ms
         self._publish_state = publish_state
         self._wanted = wanted
-        self._nodes: dict[NodeId, _Watched] = {}
+        self._nodes: dict[NodeId, Watched] = {}
         self._routes: dict[str, Route] = {}
         self._room = Room()
         self._requests = RebirthRequests(chance, interval_ms_min=rebirth_interval_ms_min)
@@ -128,6 +113,7 @@ class HostSession:
         if route is not None and (event := route.take(payload)) is not None:
             self.counts["data"] += 1
             return [event]
+        self._gate.at(now_ms)
         try:
             if topic == self.state_topic:
                 return self._own_state(payload)
@@ -138,9 +124,28 @@ class HostSession:
             self.counts["malformed"] += 1
             return []
 
+    def overrun(self, overrun: Overrun, now_ms: int) -> list[HostEvent]:
+        """From here on messages of a node were dropped at the door. Its next one begins a new count; where births or deaths are
+        among them, nothing that is known of it holds until it is born again."""
+        watched = self._nodes.get(overrun.node)
+        if watched is None or not watched.picture.online:
+            return []
+        events = self._deliver(watched, watched.window.flush(), now_ms)
+        if overrun.is_life:
+            self._requests.want(overrun.node, now_ms)
+            return events + self._wither(watched, now_ms, "more births than are let in")
+        watched.window.skip()
+        self.counts["holes"] += 1
+        return [
+            *events,
+            HostEvent(EventKind.HOLE, overrun.node, None, now_ms, detail=f"{overrun.node} sends more than is let in"),
+        ]
+
     def tick(self, now_ms: int) -> list[HostEvent]:
         """Time has passed: reorder windows end, devices that were not born again go offline, rebirths are asked for."""
         events: list[HostEvent] = []
+        self._gate.at(now_ms)
+        self.admission.quarantine.sweep(now_ms)
         for watched in self._nodes.values():
             if (delivery := watched.window.expire(now_ms)) is not None:
                 events += self._deliver(watched, delivery, now_ms)
@@ -150,7 +155,7 @@ class HostSession:
                     events.append(HostEvent(EventKind.DEATH, watched.picture.node, device, now_ms, readings))
                 watched.awaiting = None
         if self.online:
-            self.actions += [self._rebirth_request(node, now_ms) for node in self._requests.due(now_ms)]
+            self.actions += [self.rebirth_request(node, now_ms) for node in self._requests.due(now_ms)]
         return events
 
     # What the application asks.
@@ -166,21 +171,12 @@ class HostSession:
 
     def command(self, node: NodeId, device: str | None, changes: Iterable[Change], now_ms: int) -> Publish:
         """The message that writes values to a node or device; raises UnknownMetricError where its birth does not declare one."""
-        picture = self.picture(node)
-        owner = None if picture is None else picture.owner(device)
-        if picture is None or owner is None:
-            raise UnknownMetricError(f"{_name(node, device)} was never born; nothing to command")
-        alias_of = {binding.name: alias for alias, (known, binding) in picture.aliases.items() if known is owner}
-        metrics = []
-        for change in changes:
-            binding = owner.bindings.get(change.name)
-            if binding is None:
-                raise UnknownMetricError(f"{_name(node, device)} has not declared {change.name!r}; nothing to command")
-            alias = alias_of.get(change.name)
-            name = change.name if alias is None else None
-            metrics.append(Metric(name, change.value, binding.datatype, change.timestamp_ms, alias))
-        verb = Verb.NCMD if device is None else Verb.DCMD
-        return Publish(str(Topic(verb, node, device)), encode(Payload(now_ms, tuple(metrics))))
+        return command(node, self.picture(node), device, changes, now_ms)
+
+    def rebirth_request(self, node: NodeId, now_ms: int) -> Publish:
+        """The message that asks a node for its births, whether anything was heard of it or not."""
+        self.counts["rebirths_requested"] += 1
+        return rebirth_request(node, now_ms)
 
     # How it is done.
 
@@ -193,11 +189,6 @@ class HostSession:
             self.actions.append(self._state(online=True, timestamp_ms=self._connect_ms))
         return []
 
-    def _rebirth_request(self, node: NodeId, now_ms: int) -> Publish:
-        self.counts["rebirths_requested"] += 1
-        metric = Metric(REBIRTH, True, DataType.BOOLEAN, now_ms)
-        return Publish(str(Topic(Verb.NCMD, node)), encode(Payload(now_ms, (metric,))))
-
     def _node_message(self, topic: Topic, payload: bytes, now_ms: int) -> list[HostEvent]:
         verb, node, _ = topic
         if verb is Verb.NCMD or verb is Verb.DCMD or not self._wanted(node):
@@ -207,57 +198,68 @@ class HostSession:
             if len(self._nodes) >= NODES_MAX:
                 self.counts["nodes_over_limit"] += 1
                 return []
-            watched = _Watched(NodePicture(node), SequenceWindow(self._reorder_timeout_ms))
+            if (refused := self.admission.stranger(topic, now_ms)) is not None:
+                return [refused]
+            watched = Watched(NodePicture(node), SequenceWindow(self._reorder_timeout_ms))
             self._nodes[node] = watched
+        if verb not in (Verb.NBIRTH, Verb.NDEATH) and self.admission.quarantine.of(node, None) is not None:
+            return [held] if (held := self.admission.held(topic, now_ms)) is not None else []
         message = parse(payload)
         if verb is Verb.NBIRTH:
-            return self._node_birth(watched, message, now_ms)
+            return self._node_birth(watched, message, len(payload), now_ms)
         if verb is Verb.NDEATH:
             return self._node_death(watched, message, now_ms)
         if not watched.picture.online:
             self.counts["before_birth"] += 1
             self._requests.want(node, now_ms)
             return []
-        stamp = message.timestamp
+        stamp = self._gate.stamp(message)
         if stamp and stamp < watched.picture.own.birth_ms and now_ms - watched.received_ms < LATE_MS_MAX:
             self.counts["late"] += 1  # left over from before the birth; its number may look right all the same
             return []
-        received = _Received(topic, message, payload)
+        received = Received(topic, message, payload)
         if watched.window.is_next(message.seq, stamp):
             return self._in_order(watched, received, now_ms)
         delivery = watched.window.take(Numbered(message.seq, stamp, received), now_ms)
         return self._deliver(watched, delivery, now_ms)
 
-    def _node_birth(self, watched: _Watched, message: Any, now_ms: int) -> list[HostEvent]:
-        picture, stamp = watched.picture, message.timestamp
-        bd_seq = _bd_seq(message)
+    def _node_birth(self, watched: Watched, message: Any, size: int, now_ms: int) -> list[HostEvent]:
+        picture, stamp = watched.picture, self._gate.stamp(message)
+        bd_seq = bd_seq_of(message)
         recent = now_ms - watched.received_ms < LATE_MS_MAX
         repeated = bd_seq == picture.bd_seq and stamp == picture.own.birth_ms
         if recent and stamp and (repeated or stamp < picture.own.birth_ms):
             # Also while the node is offline: the copy of an older birth would bring a dead node back for good.
             self.counts["late"] += 1
             return []
+        node = picture.node
+        if (fault := self.admission.birth_fault(node, None, message, size, 0)) is not None:
+            dead = self._wither(watched, now_ms, f"birth certificate refused: {fault.text}") if picture.online else []
+            self._requests.born(node)
+            return [*dead, self.admission.refuse(node, None, fault, now_ms, is_whole=True)]
         try:
-            readings = picture.own.bear(message, stamp or now_ms, picture.aliases)
+            readings = picture.own.bear(message, stamp or now_ms, picture.holders)
         except PayloadError as error:
             # What follows it would be read by the birth before it: better to know nothing until there is one that can be read.
             self.counts["malformed"] += 1
             return self._wither(watched, now_ms, f"birth certificate unreadable: {error}") if picture.online else []
+        self.admission.born(node, None, message, size)
+        readings, refused = self.admission.believed(node, None, readings, stamp or now_ms, now_ms)
+        picture.own.replace(readings if refused else ())
         lost = watched.window.begin(message.seq, stamp)
         picture.bd_seq, watched.received_ms = bd_seq, now_ms
-        self.counts["sloppy_births"] += _is_sloppy(message)
-        picture.aliases = {alias: known for alias, known in picture.aliases.items() if known[0] is picture.own}
+        self.counts["sloppy_births"] += is_sloppy(message)
+        picture.holders = dict.fromkeys(picture.own.aliases, picture.own)
         for owner in picture.devices.values():
-            owner.bindings = {}  # their aliases may mean something else now; DBIRTHs follow
-            owner.forget_layouts()
+            owner.forget_birth()  # DBIRTHs follow
         watched.awaiting = {device for device, owner in picture.devices.items() if owner.online}
         self._requests.born(picture.node)
         self.counts["births"] += 1
         born = HostEvent(EventKind.BIRTH, picture.node, None, stamp or now_ms, readings)
-        return [*self._hole(watched, lost, now_ms, ask=False), born]
+        return [*self._hole(watched, lost, now_ms, ask=False), born, *refused]
 
-    def _node_death(self, watched: _Watched, message: Any, now_ms: int) -> list[HostEvent]:
-        bd_seq, picture = _bd_seq(message), watched.picture
+    def _node_death(self, watched: Watched, message: Any, now_ms: int) -> list[HostEvent]:
+        bd_seq, picture = bd_seq_of(message), watched.picture
         if not picture.online:
             return []
         if bd_seq is not None and picture.bd_seq is not None and bd_seq != picture.bd_seq:
@@ -267,7 +269,7 @@ class HostSession:
         self._requests.born(picture.node)  # a dead node has no birth to give
         return events + self._wither(watched, now_ms, "edge node offline")
 
-    def _wither(self, watched: _Watched, now_ms: int, reason: str) -> list[HostEvent]:
+    def _wither(self, watched: Watched, now_ms: int, reason: str) -> list[HostEvent]:
         """The node and all its devices go offline by the host's clock."""
         watched.received_ms, watched.awaiting = now_ms, None
         picture = watched.picture
@@ -278,12 +280,13 @@ class HostSession:
             if owner.online
         ]
 
-    def _deliver(self, watched: _Watched, delivery: Delivery, now_ms: int) -> list[HostEvent]:
+    def _deliver(self, watched: Watched, delivery: Delivery, now_ms: int) -> list[HostEvent]:
         if delivery.verdict is Verdict.LATE:
             self.counts["late"] += 1
         elif delivery.verdict is Verdict.SLOPPY:
             self.counts["sloppy_sequence"] += 1
-            self._doubt(watched, now_ms)
+            if watched.is_doubted(now_ms):
+                self._requests.want(watched.picture.node, now_ms)
         events = self._hole(watched, delivery.lost, now_ms, ask=True)
         for numbered in delivery.messages:
             try:
@@ -292,23 +295,18 @@ class HostSession:
                 self.counts["malformed"] += 1
         return events
 
-    def _in_order(self, watched: _Watched, received: _Received, now_ms: int) -> list[HostEvent]:
+    def _in_order(self, watched: Watched, received: Received, now_ms: int) -> list[HostEvent]:
         topic, message, payload = received
         picture, device = watched.picture, topic.device
-        stamp = message.timestamp or now_ms
+        stamp = self._gate.stamp(message) or now_ms
         if topic.verb is Verb.DBIRTH and device is not None:
-            owner = picture.devices.setdefault(device, Owner())
-            try:
-                readings = owner.bear(message, stamp, picture.aliases)
-            except PayloadError as error:
-                self.counts["malformed"] += 1
-                return _death(picture.node, device, owner, stamp, f"birth certificate unreadable: {error}")
-            if watched.awaiting:
-                watched.awaiting.discard(device)
-            self.counts["births"] += 1
-            return [HostEvent(EventKind.BIRTH, picture.node, device, stamp, readings)]
+            return self._device_birth(watched, received, device, stamp, now_ms)
         known = picture.owner(device)
         if known is None or not known.online:
+            if (refused := self.admission.held(topic, now_ms)) is not None:
+                if topic.verb is Verb.DDEATH:
+                    self.admission.quarantine.release(picture.node, device)
+                return [refused]
             self.counts["before_birth"] += 1
             self._requests.want(picture.node, now_ms)
             return []
@@ -317,38 +315,62 @@ class HostSession:
             if watched.awaiting and device is not None:
                 watched.awaiting.discard(device)
             return _death(picture.node, device, known, stamp, "device offline")
-        data, complete = picture.read_data(known, message, stamp, may_tell_quality=tells_quality(payload))
-        readings = tuple(data)
+        trimmed = self._gate.trim(message, len(payload))
+        data, complete = picture.read_data(known, message, message.timestamp or now_ms, may_tell_quality=tells_quality(payload))
+        readings, refused_part = self.admission.kept(picture.node, device, data, trimmed, now_ms)
+        if refused_part and not readings:
+            return refused_part
         names = known.take(readings)
         if not complete:
             self.counts["unknown_metrics"] += 1
             self._requests.want(picture.node, now_ms)
-        elif readings:
+        elif readings and not refused_part:
             self._route(watched, topic, known).learn(payload, message, readings, names)
         self.counts["data"] += 1
-        oldest_ms, newest_ms = _span_ms(readings) if names else (0, 0)
-        return [HostEvent(_DATA, picture.node, device, stamp, readings, "", "", b"", names, oldest_ms, newest_ms)]
+        stamps_ms = [reading.timestamp_ms for reading in readings] if names else [0]
+        event = HostEvent(_DATA, picture.node, device, stamp, readings, "", "", b"", names, min(stamps_ms), max(stamps_ms))
+        return [event, *refused_part]
 
-    def _route(self, watched: _Watched, topic: Topic, owner: Owner) -> Route:
+    def _device_birth(self, watched: Watched, received: Received, device: str, stamp: int, now_ms: int) -> list[HostEvent]:
+        _, message, payload = received
+        picture, node = watched.picture, watched.picture.node
+        owner, size = picture.devices.get(device), len(payload)
+        if watched.awaiting:
+            watched.awaiting.discard(device)
+        devices = len(picture.devices) if owner is None else 0
+        fault = self.admission.birth_fault(node, device, message, size, devices)
+        if fault is not None and fault.refusal is Refusal.QUOTA and owner is None and (gone := picture.forget_one()) is not None:
+            self._routes.pop(str(Topic(Verb.DDATA, node, gone)), None)
+            self.admission.forget(node, gone)
+            fault = self.admission.birth_fault(node, device, message, size, devices - 1)
+        if fault is not None:
+            reason = f"birth certificate refused: {fault.text}"
+            dead = [] if owner is None else _death(node, device, owner, now_ms, reason)
+            return [*dead, self.admission.refuse(node, device, fault, now_ms, is_whole=True)]
+        owner = owner or Owner()
+        try:
+            readings = owner.bear(message, stamp, picture.holders)
+        except PayloadError as error:
+            self.counts["malformed"] += 1
+            return _death(node, device, owner, stamp, f"birth certificate unreadable: {error}")
+        picture.devices[device] = owner
+        self.admission.born(node, device, message, size)
+        readings, refused = self.admission.believed(node, device, readings, stamp, now_ms)
+        owner.replace(readings if refused else ())
+        self.counts["births"] += 1
+        self.counts["sloppy_aliases"] += owner.aliases_shared
+        return [HostEvent(EventKind.BIRTH, node, device, stamp, readings), *refused]
+
+    def _route(self, watched: Watched, topic: Topic, owner: Owner) -> Route:
         """Return the route of a data topic whose owner was born."""
         name = str(topic)
         route = self._routes.get(name)
         if route is None:
             owner.layouts = Memory(self._room)
-            route = self._routes[name] = Route(watched.picture, watched.window, owner, topic.device, owner.layouts)
+            route = self._routes[name] = Route(watched.picture, watched.window, owner, topic.device, owner.layouts, self._gate)
         return route
 
-    def _doubt(self, watched: _Watched, now_ms: int) -> None:
-        """A peer that counts sloppily is let be; but its numbers may also have begun again with a birth that was lost.
-
-        The birth is asked for, at most `DOUBTS_MAX` times in `DOUBT_MS`, so that a sloppy peer is not made to repeat it for ever.
-        """
-        doubts_ms = watched.doubts_ms
-        if len(doubts_ms) < DOUBTS_MAX or now_ms - doubts_ms[0] >= DOUBT_MS:
-            doubts_ms.append(now_ms)
-            self._requests.want(watched.picture.node, now_ms)
-
-    def _hole(self, watched: _Watched, lost: int, now_ms: int, *, ask: bool) -> list[HostEvent]:
+    def _hole(self, watched: Watched, lost: int, now_ms: int, *, ask: bool) -> list[HostEvent]:
         if not lost:
             return []
         self.counts["holes"] += 1
@@ -361,27 +383,3 @@ class HostSession:
 
 def _death(node: NodeId, device: str | None, owner: Owner, stamp: int, reason: str) -> list[HostEvent]:
     return [HostEvent(EventKind.DEATH, node, device, stamp, owner.wither(stamp, reason), reason)] if owner.online else []
-
-
-def _span_ms(readings: Sequence[Reading]) -> tuple[int, int]:
-    """The oldest and the newest time stamp."""
-    stamps_ms = [reading.timestamp_ms for reading in readings]
-    return min(stamps_ms), max(stamps_ms)
-
-
-def _is_sloppy(message: Any) -> bool:
-    """Whether an NBIRTH leaves out what the specification demands and we can do without: said, and accepted."""
-    types = {metric.name: metric.datatype for metric in message.metrics}
-    well_formed = types.get(BD_SEQ) == DataType.INT64 and types.get(REBIRTH) == DataType.BOOLEAN
-    return not well_formed or not all(metric.timestamp for metric in message.metrics)
-
-
-def _name(node: NodeId, device: str | None) -> str:
-    return str(node) if device is None else f"{node}/{device}"
-
-
-def _bd_seq(message: Any) -> int | None:
-    for metric in message.metrics:
-        if metric.name == BD_SEQ:
-            return int(metric.long_value or metric.int_value) % 256
-    return None

@@ -1,6 +1,6 @@
 """What a host application knows of one edge node and its devices."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -23,7 +23,8 @@ TOLD_MAX = 4096
 TOLD_BYTES_MAX = 1024
 _QUALITY_BYTES = QUALITY_PROPERTY.encode()
 _REASON_BYTES = REASON_PROPERTY.encode()
-_HOST_BUILT = frozenset({"bdSeq", "Node Control/Rebirth"})
+_REBIRTH = "Node Control/Rebirth"
+_HOST_BUILT = frozenset({"bdSeq", _REBIRTH})
 _PLAIN_FIELDS = frozenset({DataType.DOUBLE, DataType.BOOLEAN})
 
 
@@ -38,17 +39,23 @@ class Binding(NamedTuple):
 
 
 class Owner:
-    """An edge node's own metrics, or those of one device."""
+    """An edge node's own metrics, or those of one device.
+
+    An alias means what the owner's own birth says. The specification has it unique over the node and its devices; Tahu Java gives
+    one to metrics of the same name on a node and its device, and then the topic tells which is meant.
+    """
 
     __slots__ = (
-        "_aliases",
         "_latest",
         "_names",
         "_names_known",
         "_newest",
+        "aliases",
+        "aliases_shared",
         "bindings",
         "birth_ms",
         "layouts",
+        "offers_rebirth",
         "online",
         "properties",
         "templates",
@@ -60,8 +67,10 @@ class Owner:
         self.properties: dict[str, PropertySet] = {}
         self.templates: dict[str, Template] = {}
         self.bindings: dict[str, Binding] = {}
+        self.aliases: dict[int, Binding] = {}
+        self.aliases_shared = 0  # aliases of the last birth that another owner of the same node has, too
+        self.offers_rebirth = False
         self.layouts: Memory | None = None  # of its data messages; None until one came
-        self._aliases: list[int] = []
         self._latest = readings or {}
         self._names: tuple[str, ...] = ()
         self._newest: tuple[Reading, ...] = ()
@@ -96,6 +105,10 @@ class Owner:
             self._names = names
         self._newest = readings
 
+    def replace(self, readings: Iterable[Reading]) -> None:
+        """Have other readings stand for those of the birth."""
+        self.readings.update({reading.name: reading for reading in readings})
+
     def take_history(self, readings: tuple[Reading, ...]) -> None:
         """Note readings of which some may be historical."""
         self.readings.update({reading.name: reading for reading in readings if not reading.is_historical})
@@ -110,20 +123,22 @@ class Owner:
             self._latest.update(zip(self._names, self._newest, strict=True))
             self._names = self._newest = ()
 
-    def bear(self, message: Any, timestamp_ms: int, aliases: dict[int, tuple["Owner", Binding]]) -> tuple[Reading, ...]:
-        """Take a birth certificate; everything known before is forgotten. Raises PayloadError before anything changes."""
+    def bear(self, message: Any, timestamp_ms: int, holders: dict[int, "Owner"]) -> tuple[Reading, ...]:
+        """Take a birth certificate; everything known before is forgotten. Raises PayloadError before anything changes.
+
+        holders: of each alias of the node, who has it
+        """
         if len(message.metrics) > METRICS_MAX:
             raise PayloadError(f"birth declares {len(message.metrics)} metrics; the limit is {METRICS_MAX}")
         declared = [_declared(metric, timestamp_ms) for metric in message.metrics]
-        for old in self._aliases:
-            if old in aliases and aliases[old][0] is self:
-                del aliases[old]
-        self.forget_layouts()
+        self.leave(holders)
         self.online, self.birth_ms = True, timestamp_ms
-        self.properties, self.templates, self.bindings, self._aliases = {}, {}, {}, []
+        self.properties, self.templates, self.bindings, self.aliases = {}, {}, {}, {}
+        self.aliases_shared, self.offers_rebirth = 0, False
         readings: dict[str, Reading] = {}
         for alias, binding, properties, reading in declared:
             if binding is None:
+                self.offers_rebirth = self.offers_rebirth or reading.name == _REBIRTH
                 continue
             name = binding.name
             if isinstance(reading.value, Template) and reading.value.is_definition:
@@ -131,12 +146,31 @@ class Owner:
                 continue
             self.bindings[name], self.properties[name], readings[name] = binding, properties, reading
             if alias is not None:
-                if alias in aliases and aliases[alias][0] is not self:
-                    aliases[alias][0].forget_layouts()
-                aliases[alias] = (self, binding)
-                self._aliases.append(alias)
+                self.aliases[alias] = binding
+                holder = holders.setdefault(alias, self)
+                self.aliases_shared += holder is not self and holder.online
         self._latest, self._names, self._newest, self._names_known = readings, (), (), {}
         return tuple(readings.values())
+
+    def leave(self, holders: dict[int, "Owner"]) -> None:
+        """Take its aliases out of the table; what it says from now on is read anew."""
+        for old in self.aliases:
+            if holders.get(old) is self:
+                del holders[old]
+        self.forget_layouts()
+
+    def binding(self, metric: Any) -> Binding | None:
+        """Return what the birth said of a data metric: by its alias, else by its name."""
+        alias = metric.alias
+        known = self.aliases.get(alias) if alias or metric.HasField("alias") else None  # 0 is an alias, too, if it is there
+        if known is not None:
+            return known
+        return self.bindings.get(metric.name) if metric.name else None
+
+    def forget_birth(self) -> None:
+        """What the birth said holds no longer, since the node was born again; another birth follows."""
+        self.bindings, self.aliases = {}, {}
+        self.forget_layouts()
 
     def wither(self, timestamp_ms: int, reason: str) -> tuple[Reading, ...]:
         """Go offline: every value becomes stale as of `timestamp_ms` (5.9)."""
@@ -151,13 +185,13 @@ class Owner:
 
 @dataclass(slots=True)
 class NodePicture:
-    """One edge node: its own metrics, its devices, and the alias table that they share."""
+    """One edge node: its own metrics, its devices, and who has which alias."""
 
     node: NodeId
     bd_seq: int | None = None
     own: Owner = field(default_factory=Owner)
     devices: dict[str, Owner] = field(default_factory=dict)
-    aliases: dict[int, tuple[Owner, Binding]] = field(default_factory=dict)
+    holders: dict[int, Owner] = field(default_factory=dict)
 
     @property
     def online(self) -> bool:
@@ -173,6 +207,13 @@ class NodePicture:
         yield None, self.own
         yield from self.devices.items()
 
+    def forget_one(self) -> str | None:
+        """Make room for a device: the one that has been offline the longest is forgotten; None where all are online."""
+        device = next((device for device, owner in self.devices.items() if not owner.online), None)
+        if device is not None:
+            self.devices.pop(device).leave(self.holders)
+        return device
+
     def read_data(
         self, owner: Owner, message: Any, timestamp_ms: int, *, may_tell_quality: bool = True
     ) -> tuple[list[Reading], bool]:
@@ -184,9 +225,9 @@ class NodePicture:
         """
         readings: list[Reading] = []
         complete = True
-        binding_of, new = self.binding, tuple.__new__
+        binding_of, new = owner.binding, tuple.__new__
         for metric in message.metrics:
-            binding = binding_of(owner, metric)
+            binding = binding_of(metric)
             if binding is None:
                 complete = False
                 continue
@@ -206,14 +247,6 @@ class NodePicture:
             stamp_ms = metric.timestamp or timestamp_ms
             readings.append(new(Reading, (name, value, stamp_ms, quality, unit, reason, metric.is_historical)))
         return readings, complete
-
-    def binding(self, owner: Owner, metric: Any) -> Binding | None:
-        """Return what the birth said of a data metric: by its alias, else by its name."""
-        alias = metric.alias
-        known = self.aliases.get(alias) if alias or metric.HasField("alias") else None  # 0 is an alias, too, if it is there
-        if known is not None and known[0] is owner:
-            return known[1]
-        return owner.bindings.get(metric.name) if metric.name else None
 
 
 class _Told(NamedTuple):

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 _AHEAD_MAX = 127
 _REPEAT_MAX = 16
+_ANY = -1
 
 
 class Numbered(NamedTuple):
@@ -64,8 +65,16 @@ class SequenceWindow:
         self._newest_ms = max(self._newest_ms, timestamp_ms)
         return True
 
+    def skip(self) -> None:
+        """Messages were left out on purpose: the next one, whatever its number, begins a new count."""
+        self._held.clear()
+        self._waiting_since_ms = None
+        self._expected = _ANY
+
     def take(self, numbered: Numbered, now_ms: int) -> Delivery:
         """Take a message; what is in order comes back at once."""
+        if self._expected == _ANY:
+            self._expected = numbered.seq % 256
         ahead = (numbered.seq - self._expected) % 256
         if ahead == 0:
             return self._run((numbered,), 0, Verdict.TAKEN)

@@ -14,6 +14,7 @@ from sparkplug.errors import TopicError
 
 NAMESPACE = "spBv1.0"
 STATE_PREFIX = f"{NAMESPACE}/STATE/"
+REMEMBERED_MAX = 1024  # a longer topic is split anew each time
 _FORBIDDEN = ("+", "/", "#")
 
 
@@ -62,22 +63,28 @@ class Topic(NamedTuple):
         return base if self.device is None else f"{base}/{self.device}"
 
     @staticmethod
-    @lru_cache(maxsize=4096)
     def parse(text: str) -> "Topic":
         """Split a topic; raises TopicError where it is none of an edge node or device."""
-        parts = text.split("/")
-        if parts[0] != NAMESPACE:
-            raise TopicError(f"topic {text!r} does not begin with {NAMESPACE}/")
-        if not 4 <= len(parts) <= 5:
-            raise TopicError(f"topic {text!r} has {len(parts)} levels; 4 name a node, 5 a device")
-        try:
-            verb = Verb(parts[2])
-        except ValueError:
-            raise TopicError(f"topic {text!r}: {parts[2]!r} is no message type of Sparkplug 3.0.0") from None
-        if verb.of_device != (len(parts) == 5):
-            raise TopicError(f"topic {text!r}: {verb.value} {'needs' if verb.of_device else 'has no'} device id")
-        device = check_id(parts[4], "device id") if len(parts) == 5 else None
-        return Topic(verb, NodeId(check_id(parts[1], "group id"), check_id(parts[3], "edge node id")), device)
+        return _remembered(text) if len(text) <= REMEMBERED_MAX else _parsed(text)
+
+
+def _parsed(text: str) -> Topic:
+    parts = text.split("/")
+    if parts[0] != NAMESPACE:
+        raise TopicError(f"topic {text!r} does not begin with {NAMESPACE}/")
+    if not 4 <= len(parts) <= 5:
+        raise TopicError(f"topic {text!r} has {len(parts)} levels; 4 name a node, 5 a device")
+    try:
+        verb = Verb(parts[2])
+    except ValueError:
+        raise TopicError(f"topic {text!r}: {parts[2]!r} is no message type of Sparkplug 3.0.0") from None
+    if verb.of_device != (len(parts) == 5):
+        raise TopicError(f"topic {text!r}: {verb.value} {'needs' if verb.of_device else 'has no'} device id")
+    device = check_id(parts[4], "device id") if len(parts) == 5 else None
+    return Topic(verb, NodeId(check_id(parts[1], "group id"), check_id(parts[3], "edge node id")), device)
+
+
+_remembered = lru_cache(maxsize=4096)(_parsed)
 
 
 def check_id(text: str, what: str) -> str:

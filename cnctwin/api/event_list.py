@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
+from cnctwin.api.live.documents import DocumentError, read_object
 from cnctwin.api.live.trace import Sample
 from processors.alarms import alarm_signals
 from sparkplug.quality import Quality
@@ -124,7 +125,6 @@ def _parsed(value: object) -> dict[str, Any] | None:
     if not isinstance(value, str):
         return None
     try:
-        found = json.loads(value)
-    except (ValueError, RecursionError):
+        return read_object(value.encode("utf-8", "replace"))
+    except DocumentError:
         return None
-    return found if isinstance(found, dict) else None

@@ -1,28 +1,29 @@
-"""Recent wrong tokens: guessing is made slow, for each address and for all together."""
+"""Recent wrong tokens: who guesses is made to wait, and nobody else. The right token is never asked to."""
 
-from collections import deque
+from collections import OrderedDict, deque
 
 WINDOW_S = 60.0
 OF_ONE_MAX = 5
-OF_ALL_MAX = 50
 ADDRESSES_MAX = 10_000
+DELAY_S = 0.2
 
 
 class Failures:
-    """Wrong tokens of the last minute. Time is an argument."""
+    """Wrong tokens of the last minute, by address. Time is an argument."""
 
     def __init__(self) -> None:
-        self._of_all: deque[tuple[float, str]] = deque(maxlen=ADDRESSES_MAX)
+        self._by_address: OrderedDict[str, deque[float]] = OrderedDict()
 
-    def add(self, peer: str, now_s: float) -> None:
-        """One more."""
-        self._of_all.append((now_s, peer))
+    def add(self, address: str, now_s: float) -> float:
+        """Count a wrong token; return how long the address has to wait before the next one is looked at, 0 = not at all.
 
-    def wait_s(self, peer: str, now_s: float) -> float:
-        """Return how long this address has to wait before it may try again; 0 = not at all."""
-        while self._of_all and now_s - self._of_all[0][0] >= WINDOW_S:
-            self._of_all.popleft()
-        of_one = [at_s for at_s, one in self._of_all if one == peer]
-        waits = [of_one[-OF_ONE_MAX] + WINDOW_S - now_s] if len(of_one) >= OF_ONE_MAX else []
-        waits += [self._of_all[-OF_ALL_MAX][0] + WINDOW_S - now_s] if len(self._of_all) >= OF_ALL_MAX else []
-        return max(waits, default=0.0)
+        One that comes before that is not counted, so the wait ends however often somebody tries.
+        """
+        times = self._by_address.setdefault(address, deque(maxlen=OF_ONE_MAX))
+        if len(times) == OF_ONE_MAX and (wait_s := times[0] + WINDOW_S - now_s) > 0.0:
+            return wait_s
+        times.append(now_s)
+        self._by_address.move_to_end(address)
+        if len(self._by_address) > ADDRESSES_MAX:
+            self._by_address.popitem(last=False)
+        return 0.0

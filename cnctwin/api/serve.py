@@ -2,7 +2,6 @@
 
 import logging
 import os
-import stat
 import webbrowser
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 
 from cnctwin.errors import UsageError
 from cnctwin.processes.state_file import STATE_S, keep
+from edge.state_dir import state_dir
 from sparkplug.broker import BrokerAddress
 
 TOKEN_VARIABLE = "CNCTWIN_PAGE_TOKEN"  # noqa: S105  the name of the variable, not a secret
@@ -31,6 +31,9 @@ class ServeOptions:
     host: str = "127.0.0.1"
     port: int = DEFAULT_PORT
     token_file: Path | None = None
+    users: Path | None = None
+    audit: Path | None = None
+    registry: Path | None = None
     proxy_header: str | None = None
     proxy: str | None = None
     allow_hosts: tuple[str, ...] = ()
@@ -49,16 +52,20 @@ def serve(options: ServeOptions, broker: BrokerAddress, stop: Event) -> None:
     except ModuleNotFoundError as missing:
         raise UsageError(f"the page needs the package {missing.name}; {EXTRA}") from None
     from cnctwin.api.constants import Constants  # noqa: PLC0415
+    from cnctwin.api.door.audit import AuditLog  # noqa: PLC0415
     from cnctwin.api.nights import Nights  # noqa: PLC0415
     from cnctwin.api.residual import Models  # noqa: PLC0415
     from cnctwin.api.store_reader import StoreReader  # noqa: PLC0415
+    from processors.running.limits import limits_of  # noqa: PLC0415
 
     access = access_of(options, os.environ.get(TOKEN_VARIABLE))
     constants = Constants(options.config)
     live = LivePlant()
-    viewer = Viewer(broker, options.group, live)
+    viewer = Viewer(broker, options.group, live, limits_of(options.config))
     store = StoreReader(options.store)
-    sources = Sources(live, viewer, store, constants, Models(options.models), options.diagnoses, Nights(), options.jobs, access)
+    audit = AuditLog(options.audit or state_dir() / "audit" / "page.jsonl")
+    told = (options.diagnoses, Nights(), options.jobs, access, audit, options.registry)
+    sources = Sources(live, viewer, store, constants, Models(options.models), *told)
     app = create_app(sources)
     server = Server(app, options.host, options.port)
     logging.getLogger("sparkplug").setLevel(logging.ERROR)  # what is wrong with the connection stands in /health
@@ -81,9 +88,10 @@ def serve(options: ServeOptions, broker: BrokerAddress, stop: Event) -> None:
 
 def access_of(options: ServeOptions, variable: str | None) -> Any:
     """Return who may ask, by the options. Raises UsageError where they would leave the plant open to a network."""
-    from cnctwin.api.access import TOKEN_CHARACTERS_MIN, Access, is_loopback  # noqa: PLC0415
+    from cnctwin.api.access import Access, is_loopback  # noqa: PLC0415
+    from cnctwin.api.door.users import TOKEN_CHARACTERS_MIN, private_text, read_users  # noqa: PLC0415
 
-    token = variable if options.token_file is None else _token(options.token_file)
+    token = variable if options.token_file is None else private_text(options.token_file, "--token-file")
     if token is not None and len(token) < TOKEN_CHARACTERS_MIN:
         where = TOKEN_VARIABLE if options.token_file is None else str(options.token_file)
         raise UsageError(
@@ -93,25 +101,19 @@ def access_of(options: ServeOptions, variable: str | None) -> Any:
         raise UsageError("--proxy-header and --proxy go together: the header that names the user, and the proxy's address")
     if options.proxy is not None and not _is_address(options.proxy):
         raise UsageError(f"--proxy {options.proxy} is no address; name the one that the proxy connects from, as 10.0.0.5")
-    if not is_loopback(options.host) and token is None and options.proxy_header is None:
+    users = () if options.users is None else read_users(options.users)
+    hosts = frozenset(name.lower() for name in (*options.allow_hosts, options.host))
+    access = Access(token, options.proxy_header, options.proxy, hosts, users)
+    if options.users is not None and not access.has_tokens and options.proxy_header is None:
         raise UsageError(
-            f"--host {options.host} is open to the network; give a token ({TOKEN_VARIABLE} or --token-file), "
+            f"--users {options.users}: nobody has a token; give each one, or name a proxy (--proxy-header and --proxy)"
+        )
+    if not is_loopback(options.host) and not access.has_tokens and options.proxy_header is None:
+        raise UsageError(
+            f"--host {options.host} is open to the network; give a token ({TOKEN_VARIABLE}, --token-file or --users), "
             "or a reverse proxy (--proxy-header and --proxy)"
         )
-    hosts = frozenset(name.lower() for name in (*options.allow_hosts, options.host))
-    return Access(token, options.proxy_header, options.proxy, hosts)
-
-
-def _token(path: Path) -> str:
-    """The token of a file that only its owner can use. Raises UsageError, without repeating what stands in it."""
-    try:
-        mode = stat.S_IMODE(path.stat().st_mode)
-        text = path.read_text(encoding="utf-8").strip()
-    except (OSError, UnicodeDecodeError) as error:
-        raise UsageError(f"--token-file {path}: {getattr(error, 'strerror', None) or 'no text'}; give a readable file") from None
-    if mode & 0o077:
-        raise UsageError(f"--token-file {path} has mode {mode:o}; chmod 600 it, so that only its owner can read it")
-    return text
+    return access
 
 
 def _is_address(text: str) -> bool:

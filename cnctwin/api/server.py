@@ -9,10 +9,10 @@ from typing import Self
 import uvicorn
 from fastapi import FastAPI
 
+from cnctwin.api.door.connection import Connection
 from cnctwin.api.live.fan_out import FanOut
 from cnctwin.errors import ApplicationError, UsageError
 
-CONNECTIONS_MAX = 300
 KEEP_ALIVE_S = 20
 STOP_S_MAX = 3
 START_S_MAX = 10.0
@@ -39,15 +39,19 @@ class Server:
 
     def __init__(self, app: FastAPI, host: str = "127.0.0.1", port: int = 0) -> None:
         self._socket = _bound(host, port)
+
+        class OfThisServer(Connection):
+            proxy = app.state.sources.access.proxy
+
         self.host, self.port = host, self._socket.getsockname()[1]
         config = uvicorn.Config(
             app,
+            http=OfThisServer,
             access_log=False,  # an address may hold what is nobody's business
             log_level="warning",
             proxy_headers=False,  # who asks is who connects; the proxy is named, not believed
             server_header=False,
             ws="none",
-            limit_concurrency=CONNECTIONS_MAX,
             timeout_keep_alive=KEEP_ALIVE_S,
             timeout_graceful_shutdown=STOP_S_MAX,
         )

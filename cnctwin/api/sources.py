@@ -5,6 +5,7 @@ from pathlib import Path
 
 from cnctwin.api.access import Access
 from cnctwin.api.constants import Constants
+from cnctwin.api.door.audit import AuditLog
 from cnctwin.api.live.plant import LivePlant
 from cnctwin.api.live.viewer import Viewer
 from cnctwin.api.nights import Nights
@@ -24,6 +25,8 @@ class Sources:
     nights: in which the twin was judged
     jobs: the batch consumer's folder, for the files of results
     access: who may ask
+    audit: the record of who did what
+    registry: the folder of models that `cnctwin model` keeps
     """
 
     live: LivePlant
@@ -35,3 +38,5 @@ class Sources:
     nights: Nights = field(default_factory=Nights)
     jobs: Path | None = None
     access: Access = field(default_factory=Access)
+    audit: AuditLog = field(default_factory=AuditLog)
+    registry: Path | None = None

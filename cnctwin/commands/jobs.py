@@ -24,11 +24,13 @@ from cnctwin.jobs.consumer import Consumer, Setting
 from cnctwin.jobs.dask_cluster import DaskCluster
 from cnctwin.jobs.job_queue import Limits
 from cnctwin.processes.given_broker import address, broker_or_own
+from cnctwin.processes.look_around import refuse_second
 from cnctwin.processes.stopping import stopped_by_signals
 from cnctwin.terminal.console import standard_output
 from cnctwin.terminal.table import text_table
 from edge.state_dir import state_dir
 from sparkplug.broker import BrokerAddress
+from sparkplug.metric import NodeId
 from twin.vocabulary.nodes import JOBS_NODE
 
 jobs_app = typer.Typer(
@@ -72,7 +74,8 @@ def run(
     limits = Limits(queued_max=queued_max, kept_max=kept_max, kept_days=kept_days, seconds_max=3600.0 * hours_max)
     setting = Setting(files, group, kept / f"{JOBS_NODE}.json", workers, dask, limits)
     with stopped_by_signals() as stop, broker_or_own(address(broker)) as at:
-        consumer = Consumer(kept, at, setting)
+        consumer = Consumer(kept, at, setting)  # which holds the folder and the name on this machine
+        refuse_second(at, [NodeId(group, JOBS_NODE)], "end that one first, or give this one another --group")
         below = "no files" if files is None else f"files below {files}"
         print(f"jobs of {at.url} are done here: {below}, results in {kept}", file=sys.stderr)
         consumer.run(stop)

@@ -22,8 +22,9 @@ def process(
 ) -> None:
     """Run processors until SIGTERM or Ctrl-C; beside alerts the courier that sends, beside historian the store that it keeps."""
     from cnctwin.running.processors import process as run_processors
+    from processors.running.limits import limits_of
     from processors.running.runtime import configured
 
-    pairs = configured(names, config)
+    pairs, limits = configured(names, config), limits_of(config)
     with stopped_by_signals() as stop, broker_or_own(address(broker)) as where:
-        run_processors(pairs, where, stop, group=group, state_dir=folder_for_state(state_dir))
+        run_processors(pairs, where, stop, group=group, state_dir=folder_for_state(state_dir), limits=limits)

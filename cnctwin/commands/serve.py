@@ -23,6 +23,14 @@ def serve(
     host: Annotated[str, typer.Option(help="Address to listen on; another than loopback needs a token or a proxy")] = "127.0.0.1",
     port: Annotated[int, typer.Option(help="TCP port; 0 = a free one", min=0, max=65535)] = 8080,
     token_file: Annotated[Path | None, typer.Option(help="File of mode 600 with the token; else $CNCTWIN_PAGE_TOKEN")] = None,
+    users: Annotated[Path | None, typer.Option(help="File of mode 600 with users, their roles and tokens (docs/api.md)")] = None,
+    audit: Annotated[
+        Path | None,
+        typer.Option(help="The record of who did what; else audit/page.jsonl in the state folder", show_default=False),
+    ] = None,
+    registry: Annotated[
+        Path | None, typer.Option(help="Folder that `cnctwin model` keeps, for administrators to promote")
+    ] = None,
     proxy_header: Annotated[str | None, typer.Option(help="Header in which the reverse proxy names the user")] = None,
     proxy: Annotated[str | None, typer.Option(help="Address that the proxy connects from")] = None,
     allow_host: Annotated[list[str] | None, typer.Option(help="One more name that this server is asked by")] = None,
@@ -44,6 +52,9 @@ def serve(
         host=host,
         port=port,
         token_file=token_file,
+        users=users,
+        audit=audit,
+        registry=registry,
         proxy_header=proxy_header,
         proxy=proxy,
         allow_hosts=tuple(allow_host or ()),

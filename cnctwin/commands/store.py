@@ -22,6 +22,7 @@ from cnctwin.commands.extras import needed_by
 from cnctwin.commands.moment import moment_ms, moment_text
 from cnctwin.commands.options import AsJson, StorePlace
 from cnctwin.errors import UsageError
+from cnctwin.memory.row_numbers import holes_text, saved_holes
 from cnctwin.memory.store.contract import Column, Query, Store, StoreError
 from cnctwin.memory.store.opening import default_place, open_store
 from cnctwin.memory.store.plan import Load, Plan, load_of, plan
@@ -68,9 +69,12 @@ def status_command(where: StorePlace = None, as_json: AsJson = False) -> None:
         status = store.status()
         machines = {name: _about(store, name) for name in store.machines()}
         pins = [pinned._asdict() for pinned in store.pins()]
+        holes = saved_holes(store, _now_ms())
     if as_json:
         told = {name: getattr(status, name) for name in status.__slots__}
-        sys.stdout.write(json.dumps(told | {"machines": machines, "pins": pins}) + "\n")
+        sys.stdout.write(
+            json.dumps(told | {"machines": machines, "pins": pins, "sequence_holes": [hole._asdict() for hole in holes]}) + "\n"
+        )
     else:
         console = Console()
         table = Table(title=f"{where or default_place()}", title_justify="left")
@@ -85,6 +89,8 @@ def status_command(where: StorePlace = None, as_json: AsJson = False) -> None:
         kept = f"{status.samples} samples in {status.bytes / 1e6:.1f} MB{a_sample}"
         pinned = f"{len(pins)} pin" + "s" * (len(pins) != 1)
         console.print(f"{kept}; nothing goes before its time for {left}; {pinned}", highlight=False, soft_wrap=True)
+        if holes:
+            console.print(f"rows of edges are missing: {holes_text(holes)}", markup=False, highlight=False, soft_wrap=True)
         if status.trouble:
             console.print(f"trouble: {status.trouble}", markup=False, highlight=False, soft_wrap=True)
     raise typer.Exit(1 if status.trouble else 0)

@@ -175,12 +175,12 @@ class Consumer:
 
     def _cancel_asked(self, payload: bytes) -> tuple[Answer, str]:
         try:
-            job_id, topic = read_cancel(payload)
+            job_id, topic, by = read_cancel(payload)
         except RequestError as error:
             return Answer(error.job_id, "refused", str(error)), error.reply_topic
-        return self._cancel(job_id), topic
+        return self._cancel(job_id, by), topic
 
-    def _cancel(self, job_id: str) -> Answer:
+    def _cancel(self, job_id: str, by: str = "") -> Answer:
         if not is_id(job_id) or job_id not in self.queue:
             return Answer(job_id[:64], "refused", f"there is no job {job_id[:64]!r}")
         job = self.queue[job_id]
@@ -189,7 +189,7 @@ class Consumer:
         if job_id == self._running and self._attempt is not None:
             self._attempt.kill()
             self._attempt = None
-        self._over(job, JobState.CANCELLED, reason="cancelled by request")
+        self._over(job, JobState.CANCELLED, reason=f"cancelled by {by or 'request'}")
         return Answer(job_id, "cancelled", "", str(JobState.CANCELLED))
 
     # The job that runs.

@@ -16,6 +16,7 @@ from urllib.parse import parse_qsl, urlsplit
 
 from cnctwin.errors import SpreadError, UsageError
 from cnctwin.jobs.piece import name_of, opened, run_piece
+from sparkplug.shown_address import shown_address
 
 _FILES = ("ca_file", "certificate_file", "key_file")
 _PORT = 8786
@@ -69,18 +70,19 @@ class DaskCluster:
     def from_text(cls, text: str) -> "DaskCluster":
         """Read `tcp://host[:port][?insecure=yes]` or `tls://host[:port]?ca_file=…&certificate_file=…&key_file=…`."""
         wanted = "tcp://host:8786 or tls://host:8786?ca_file=…&certificate_file=…&key_file=…"
+        shown = shown_address(text, {*_FILES, "insecure"})
         try:
             parts = urlsplit(text)
             port = parts.port or _PORT
             options = dict(parse_qsl(parts.query, keep_blank_values=True, strict_parsing=bool(parts.query)))
-        except ValueError as error:
-            raise UsageError(f"Dask address {text!r}: {error}; write {wanted}") from None
+        except ValueError:
+            raise UsageError(f"Dask address {shown!r}: host, port or options cannot be read; write {wanted}") from None
         tls = parts.scheme == "tls"
         if parts.scheme not in {"tcp", "tls"} or not parts.hostname or "@" in parts.netloc or parts.path.strip("/"):
-            raise UsageError(f"Dask address {text!r} is not {wanted}")
+            raise UsageError(f"Dask address {shown!r} is not {wanted}")
         if (unknown := options.keys() - {*_FILES, "insecure"}) or options.get("insecure", "yes") != "yes":
             raise UsageError(
-                f"Dask address {text!r}: {next(iter(unknown), 'insecure')} is not of {', '.join(_FILES)}, insecure=yes"
+                f"Dask address {shown!r}: {next(iter(unknown), 'insecure')} is not of {', '.join(_FILES)}, insecure=yes"
             )
         ca_file, certificate_file, key_file = (Path(options[name]) if name in options else None for name in _FILES)
         return cls(parts.hostname, port, tls, ca_file, certificate_file, key_file, "insecure" in options)

@@ -26,6 +26,7 @@ class Job(BaseModel):
 
     number: the order of acceptance; attempt: how often it was started; machine: empty where the request states none
     doing: what it is at; reason: why it failed, was cancelled or was started again; result: a summary with the names of its files
+    by: who asked for it, as the request says; empty where it does not
     ran_s: of the attempts that are over; is_told: whether its end went to who asked
     """
 
@@ -38,6 +39,7 @@ class Job(BaseModel):
     accepted_ms: int
     changed_ms: int
     machine: str = ""
+    by: str = ""
     reply_topic: str = ""
     state: JobState = JobState.QUEUED
     attempt: int = 0

@@ -104,6 +104,7 @@ class JobQueue:
             "kind": request.kind.name,
             "digest": request.digest,
             "reply_topic": request.reply_topic,
+            "by": request.by,
         }
         try:
             named = "".join(filter(str.isprintable, request.parameters.machine_of(self.files)))

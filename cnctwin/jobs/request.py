@@ -20,6 +20,7 @@ from twin.vocabulary.topics import JOB_REPLY, MIRROR, OWN
 
 REQUEST_BYTES_MAX = 4_000_000
 SHOWN_MAX = 60
+NAME_MAX = 100
 TOPIC_BYTES_MAX = 200
 _ID = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 _TAKEN = ("reply", "state", "request", "cancel")
@@ -49,17 +50,18 @@ class Request:
     kind: Kind
     parameters: Parameters
     reply_to: str
+    by: str = ""
 
     @property
     def document(self) -> dict[str, Any]:
         """As JSON has it, defaults written out."""
-        head = {"job": self.kind.name, "id": self.id, "reply_to": self.reply_to}
+        head = {"job": self.kind.name, "id": self.id, "reply_to": self.reply_to} | ({"by": self.by} if self.by else {})
         return head | self.parameters.model_dump(mode="json", exclude_none=True)
 
     @property
     def digest(self) -> str:
         """The same for the same request, however its keys are ordered."""
-        asked = {key: value for key, value in self.document.items() if key != "reply_to"}
+        asked = {key: value for key, value in self.document.items() if key not in ("reply_to", "by")}
         return hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()
 
     @property
@@ -76,7 +78,7 @@ def read_request(payload: bytes) -> Request:
     cnctwin.jobs.request.RequestError: request: id = '../x': 1 to 64 letters, digits, '.', '_' and '-', the first no sign
     """
     document = _object(payload)
-    known_id, known_topic = _head(document)
+    known_id, known_topic, by = _head(document)
 
     def refuse(reason: str) -> NoReturn:
         raise RequestError(f"request: {reason}", known_id, known_topic)
@@ -94,20 +96,21 @@ def read_request(payload: bytes) -> Request:
             refuse(f"{_shown(key)}: no such key for {name}; there are {', '.join(kind.parameters.model_fields)}")
         value = f"{key} = {_shown(repr(first['input']))}: " if key else ""
         refuse(f"{value}{first['msg'].removeprefix('Value error, ')}")
-    return Request(known_id or f"{kind.name}-{uuid4().hex[:12]}", kind, parameters, known_topic)
+    return Request(known_id or f"{kind.name}-{uuid4().hex[:12]}", kind, parameters, known_topic, by)
 
 
-def read_cancel(payload: bytes) -> tuple[str, str]:
-    """The id of the job that is to be cancelled, and where the answer goes. Raises RequestError.
+def read_cancel(payload: bytes) -> tuple[str, str, str]:
+    """The id of the job that is to be cancelled, where the answer goes, and who asks, empty = not said. Raises RequestError.
 
     >>> read_cancel(b'{"id": "night-7"}')
-    ('night-7', 'cnc/jobs/reply/night-7')
+    ('night-7', 'cnc/jobs/reply/night-7', '')
     """
     document = _object(payload)
-    known_id, known_topic = _head(document)
+    known_id, known_topic, by = _head(document)
     if not known_id or document:
-        raise RequestError("request: to cancel a job takes its id, and nothing but reply_to beside it", known_id, known_topic)
-    return known_id, known_topic or JOB_REPLY + known_id
+        line = "request: to cancel a job takes its id, and nothing but reply_to and by beside it"
+        raise RequestError(line, known_id, known_topic)
+    return known_id, known_topic or JOB_REPLY + known_id, by
 
 
 def _object(payload: bytes) -> dict[str, Any]:
@@ -123,8 +126,9 @@ def _object(payload: bytes) -> dict[str, Any]:
     return document
 
 
-def _head(document: dict[str, Any]) -> tuple[str, str]:
-    """Take whose it is and where the answer goes out of it; empty where it does not say."""
+def _head(document: dict[str, Any]) -> tuple[str, str, str]:
+    """Take its id, where the answer goes and who asks out of it; empty where it does not say."""
+    by = document.pop("by", "")
     job_id, reply_to = document.pop("id", None), document.pop("reply_to", None)
     known_id = job_id if isinstance(job_id, str) and is_id(job_id) else ""
     fault = _topic_fault(reply_to) if isinstance(reply_to, str) else "is no text"
@@ -134,7 +138,10 @@ def _head(document: dict[str, Any]) -> tuple[str, str]:
         raise RequestError(f"request: id = {_shown(repr(job_id))}: {wanted}", "", known_topic)
     if reply_to not in (None, "") and fault:
         raise RequestError(f"request: reply_to = {_shown(repr(reply_to))}: {fault}", known_id)
-    return known_id, known_topic
+    if not isinstance(by, str) or len(by) > NAME_MAX or not by.isprintable():
+        line = f"request: by = {_shown(repr(by))}: a name of at most {NAME_MAX} printable characters is wanted"
+        raise RequestError(line, known_id, known_topic)
+    return known_id, known_topic, by
 
 
 def is_id(text: str) -> bool:

@@ -11,14 +11,14 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
+from itertools import islice
 from typing import NamedTuple
 
+from cnctwin.memory.row_numbers import HOLE_S, SAVED_AS, RowNumbers, holes_text
 from cnctwin.memory.store.contract import Message, Pinned, Snapshot, Store, StoreError
 from cnctwin.memory.store.opening import default_place, open_store
 from cnctwin.memory.store.retention import Retention
-from edge.running.forwarder import SEQUENCE
 from edge.running.receipts import RECEIPT, REPEAT_S
-from edge.running.spans import Spans
 from processors.actions import Pin
 from processors.historian import HistorianConfig
 from processors.running.ports import Receipt
@@ -39,7 +39,7 @@ AGAIN_S = 1.0  # after a `tidy` that sealed something
 RETRY_S_MAX = 10.0
 BEHIND_S, BEHIND_S_MAX = 1.0, REPEAT_S - 1.0  # from when on nobody is told that we are here; nor anything else
 HOUR_MS = 3_600_000
-MACHINES_MAX = 1_000  # that are given receipts
+REREAD_MAX = 100_000  # messages that a kill kept from the saved numbers of rows
 UNITS_MAX = 20_000  # of processors, whose snapshots are kept
 SNAPSHOT_BYTES_MAX = 64_000_000  # of last snapshots; of a unit without one a replay begins with the first of its hour
 _TEXTS = (str, bytes)
@@ -156,12 +156,12 @@ class StoreRecorder:
     """A `processors.running.ports.Recorder` on a store. The store is written by its thread only; `stop` writes what waits, and
     closes it.
 
-    A failure of the thread that is no StoreError is our own bug: the next `keep` raises it, and ends the processor.
+    A failure of the thread that is no StoreError is our own bug: the next `keep` raises it, and has the historian restarted.
     """
 
     keeps_plain = SNAPSHOT + "#"
 
-    def __init__(self, store: Store, group: str = "cnc") -> None:
+    def __init__(self, store: Store, group: str = "cnc", hole_s: float = HOLE_S) -> None:
         self._store, self._group = store, group
         self._queue = _Queue()
         self._thread = threading.Thread(target=self._run, name="store", daemon=True)
@@ -174,8 +174,7 @@ class StoreRecorder:
         self._bytes, self._store_waiting, self._trouble = 0, 0, ""
         self._days_left: float | None = None
         self._failure: BaseException | None = None
-        self._receipts: dict[tuple[NodeId, str], Spans] = {}
-        self._receipts_lock = threading.Lock()
+        self._numbers = RowNumbers(hole_s)
 
     # What the worker calls.
 
@@ -204,6 +203,7 @@ class StoreRecorder:
     def health(self) -> Mapping[str, int | float | str]:
         """Return its state, by the names that `processors.running.health` declares."""
         behind_s = self._behind_s()
+        holes = self._numbers.holes(time.time_ns() // 1_000_000)
         health: dict[str, int | float | str] = {
             "store_samples": self._stored,
             "store_repeated": self._repeated,
@@ -213,6 +213,8 @@ class StoreRecorder:
             "store_behind_s": round(behind_s, 1),
             "store_bytes": self._bytes,
             "store_pins": self._pins,
+            "sequence_holes": len(holes),
+            "sequence_hole": holes_text(holes),
             "store_trouble": self._trouble or (f"what was heard waits for {behind_s:.0f} s" if behind_s > LATE_S else ""),
         }
         if self._days_left is not None:
@@ -225,13 +227,8 @@ class StoreRecorder:
         behind_s = self._behind_s()
         if behind_s > BEHIND_S_MAX:
             return []
-        with self._receipts_lock:
-            kept, self._receipts = self._receipts, {key: Spans() for key in list(self._receipts)[-MACHINES_MAX:]}
-        return [
-            Receipt(node, device, RECEIPT, " ".join(f"{a}-{b}" for a, b in spans))
-            for (node, device), spans in kept.items()
-            if spans or behind_s <= BEHIND_S
-        ]
+        told = self._numbers.receipts(with_silent=behind_s <= BEHIND_S)
+        return [Receipt(node, device, RECEIPT, text) for node, device, text in told]
 
     def _behind_s(self) -> float:
         """For how long something may have waited for the store; 0 where nothing does."""
@@ -249,12 +246,24 @@ class StoreRecorder:
             node = NodeId(self._group, HISTORIAN_NODE)
             for machine in self._store.machines():
                 self._queue.put(HostEvent(EventKind.HOLE, node, machine, now_ms, detail=detail), now_ms, 1, 0)
+        self._restore_numbers()
         self._thread.start()
+
+    def begin_again(self) -> None:
+        """Have another thread write, where the last one has failed: what it had in hand is lost, and counted as dropped."""
+        if self._failure is not None:
+            self._thread.join()
+            self._dropped += self._writing
+            self._writing = 0
+            self._failure = None
+            self._thread = threading.Thread(target=self._run, name="store", daemon=True)
+            self._thread.start()
 
     def stop(self) -> None:
         """Write what waits, and close the store."""
         self._stopping.set()
         self._thread.join()
+        self._save_numbers()
         self._store.close()
 
     def _put(self, item: Pinned | Snapshot) -> None:
@@ -273,6 +282,31 @@ class StoreRecorder:
             self._kept_hours[key] = hour
             self._put(snapshot)
         self._last_snapshots.put(snapshot)
+
+    def _restore_numbers(self) -> None:
+        """Take up the numbers of rows as they were saved, and what was stored after that."""
+        saved = self._store.snapshot_before(*SAVED_AS, 1 << 62)
+        if saved is None:
+            return
+        self._numbers.restore(saved.payload)
+        from_ms = self._numbers.noted_ms
+        for machine in self._store.machines():
+            try:
+                later = list(islice(self._store.messages(machine, from_ms, 1 << 62), REREAD_MAX))
+            except StoreError as error:
+                _log.warning("%s: the numbers of its rows are begun anew: %s", machine, error)
+                self._numbers.forget(machine)
+            else:
+                self._numbers.note(later)
+
+    def _save_numbers(self) -> None:
+        if not self._numbers.is_changed:
+            return
+        hour_ms = time.time_ns() // 1_000_000 // HOUR_MS * HOUR_MS
+        try:
+            self._store.keep_snapshot(Snapshot(*SAVED_AS, hour_ms, self._numbers.saved()))
+        except StoreError as error:
+            _log.warning("the numbers of rows are not saved: %s", error)
 
     # The thread.
 
@@ -308,6 +342,7 @@ class StoreRecorder:
             if now_s - status_s >= STATUS_S:
                 status_s = now_s
                 self._look()
+                self._save_numbers()
 
     def _write(self, batch: _Batch) -> bool:
         """Write a batch; False where we are to stop and the store cannot take it."""
@@ -336,7 +371,7 @@ class StoreRecorder:
             self._stored += appended.stored
             self._repeated += appended.repeated
             self._refused += appended.refused
-            self._note_kept(batch.messages)
+            self._numbers.note(batch.messages)
 
     def _pin(self, batch: _Batch) -> None:
         if batch.pinned is not None:
@@ -346,23 +381,6 @@ class StoreRecorder:
     def _keep_snapshots(self, batch: _Batch) -> None:
         if batch.snapshots:
             self._store.keep_snapshot(*batch.snapshots)
-
-    def _note_kept(self, messages: Sequence[Message]) -> None:
-        """Note which devices wait for receipts, and the numbers of their rows; a birth shows the state after a row, not it."""
-        with self._receipts_lock:
-            awaited = self._receipts
-            for _, event in messages:
-                kind, node, device, _, readings = event[:5]
-                if kind is _DATA:
-                    spans = awaited.get((node, device)) if awaited and device is not None else None
-                    if spans is None:
-                        continue
-                    number = next((one[1] for one in reversed(readings) if one[0] == SEQUENCE), None)
-                    if isinstance(number, int):
-                        spans.discard(number, number)
-                        spans.add(number, number)
-                elif kind is _BIRTH and device is not None and any(reading.name == RECEIPT for reading in readings):
-                    awaited.setdefault((node, device), Spans())
 
     def _tidy(self) -> bool:
         """Tidy; return True if hours were sealed."""

@@ -4,16 +4,19 @@ experiments/get-by-name, experiments/create, runs/create, runs/log-batch, runs/u
 server takes them (`mlflow-artifacts:`, what `mlflow server` serves by default); else it is said that it does not.
 """
 
+import json
 import math
+import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from urllib.parse import quote, urlsplit
 
 import httpx
 
 from cnctwin.errors import UsageError
 from cnctwin.models.card import CARD, MANIFEST, Card
+from sparkplug.shown_address import shown_address
 
 API = "/api/2.0/mlflow"
 ARTIFACTS = "/api/2.0/mlflow-artifacts/artifacts"
@@ -22,11 +25,13 @@ BATCH_MAX = 100
 METRICS_MAX = 500
 TEXT_MAX = 500
 TIMEOUT_S = 20.0
+ANSWER_BYTES_MAX = 1024 * 1024
 
 
 def export(card: Card, folder: Path, url: str, at_ms: int, transport: httpx.BaseTransport | None = None) -> dict[str, Any]:
     """Make the run; its ids, and what became of the artifacts. Raises UsageError naming the request that was refused."""
-    with httpx.Client(base_url=url.rstrip("/"), timeout=TIMEOUT_S, transport=transport) as client:
+    headers = {"Accept-Encoding": "identity"}
+    with httpx.Client(base_url=url.rstrip("/"), headers=headers, timeout=TIMEOUT_S, transport=transport) as client:
         experiment = _experiment(client, f"cnctwin/{card.kind}/{card.machine}")
         name = f"{card.kind} {card.machine} {card.version}"
         tags = _pairs(_tags(card))
@@ -104,20 +109,39 @@ def _post(client: httpx.Client, what: str, body: dict[str, Any]) -> dict[str, An
     return _answer(_sent(client, "POST", f"{API}/{what}", json=body))
 
 
-def _sent(client: httpx.Client, method: str, path: str, **given: Any) -> httpx.Response:
+class _Answer(NamedTuple):
+    status_code: int
+    text: str
+    url: httpx.URL
+
+
+def _sent(client: httpx.Client, method: str, path: str, **given: Any) -> _Answer:
+    """Return the answer, which is read within bounds and never decoded."""
+    body, until_s = bytearray(), time.monotonic() + TIMEOUT_S
+    where = f"MLflow at {shown_address(str(client.base_url))}"
     try:
-        return client.request(method, path, **given)
+        with client.stream(method, path, **given) as response:
+            if (encoding := response.headers.get("content-encoding", "identity")) != "identity":
+                raise UsageError(f"{where} sends Content-Encoding {encoding[:40]!r}, which was not asked for")
+            for piece in response.iter_bytes():  # which decodes nothing of this encoding
+                body += piece
+                if len(body) > ANSWER_BYTES_MAX or time.monotonic() > until_s:
+                    raise UsageError(
+                        f"MLflow's answer to {path} has more than {ANSWER_BYTES_MAX} bytes or takes longer than {TIMEOUT_S:g} s; "
+                        f"is {client.base_url.host} an MLflow server?"
+                    )
+            return _Answer(response.status_code, body.decode(errors="replace"), response.request.url)
     except (httpx.HTTPError, httpx.InvalidURL) as error:
-        raise UsageError(f"MLflow at {client.base_url}: {error or type(error).__name__}; does it run?") from None
+        raise UsageError(f"{where}: {error or type(error).__name__}; does it run?") from None
 
 
-def _answer(response: httpx.Response) -> dict[str, Any]:
-    path = response.request.url.path
+def _answer(response: _Answer) -> dict[str, Any]:
+    path = response.url.path
     if response.status_code >= 400:
         text = " ".join(response.text.split())[:300]
         raise UsageError(f"MLflow refused {path}: {response.status_code} {text}")
     try:
-        found = response.json() if response.content else {}
-    except ValueError:
-        raise UsageError(f"MLflow's answer to {path} is no JSON; is {response.request.url.host} an MLflow server?") from None
+        found = json.loads(response.text) if response.text else {}
+    except (ValueError, RecursionError):
+        raise UsageError(f"MLflow's answer to {path} is no JSON; is {response.url.host} an MLflow server?") from None
     return found if isinstance(found, dict) else {}

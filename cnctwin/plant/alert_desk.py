@@ -62,7 +62,7 @@ class Desk:
 def alert_desk(given: BrokerAddress | None, wait_s: float) -> Iterator[Desk]:
     """Connect and wait for the state. Raises UsageError where there is none, or one that is not kept up."""
     where = given or BrokerAddress()
-    host = HostApplication(where, f"alerts-{os.getpid()}", (), publish_state=False)
+    host = HostApplication(where, f"alerts-{os.getpid()}-{uuid4().hex[:8]}", (), publish_state=False)
     host.subscribe_plain(ALERT_STATE)
     host.start()
     try:

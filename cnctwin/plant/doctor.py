@@ -1,13 +1,15 @@
 """`cnctwin doctor`: is everything connected, in order and accounted for?"""
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
 from cnctwin.plant.lags import lag_reports
+from cnctwin.plant.quarantine import refused_lines
 from cnctwin.plant.view import StageLedger, health, ledgers, machines, own_values
 from cnctwin.plant.watch import viewer
+from edge.running.awaited import LATE_S, NO_HISTORIAN
 from processors.lag_report import BEHIND_S, LagReport
 from sparkplug.broker import BrokerAddress
 from sparkplug.host import HostApplication
@@ -90,6 +92,12 @@ def diagnose(host: HostApplication, url: str) -> Report:
                 findings.append(Finding(True, f"{node_id}: {count} {name.replace('_', ' ')} so far, counted"))
         findings += of_store(node_id, metrics)
         findings += of_edge_store(node_id, metrics)
+        findings += of_awaited(node_id, metrics)
+        findings += of_sequence_holes(node_id, metrics)
+        findings += of_faults(node_id, metrics)
+    findings += of_history(health(host).values())
+    findings += [Finding(False, line) for line in refused_lines(host.quarantine, own_values(host))]
+    findings += of_overload(health(host).values())
     findings += of_lags(lag_reports(own_values(host)))
     counts = host.counts
     order = f"{counts.get('lost', 0)} messages lost, {counts.get('malformed', 0)} malformed while listening"
@@ -119,6 +127,41 @@ def of_edge_store(node_id: str, metrics: Mapping[str, Reading]) -> list[Finding]
     return [
         Finding(False, f"{node_id} is {age:.0f} s behind: {waiting} rows of its store are not sent yet; they follow as history")
     ]
+
+
+def of_awaited(node_id: str, metrics: Mapping[str, Reading]) -> list[Finding]:
+    """Return the finding that the historian an edge waits for gives no receipts; nothing where it does."""
+    silent_s, told = (metrics[name].value if name in metrics else None for name in ("awaited_s", "history"))
+    is_late = isinstance(silent_s, float) and silent_s >= LATE_S
+    return [Finding(False, f"{node_id}: {told}")] if is_late and isinstance(told, str) else []
+
+
+def of_history(every: Iterable[Mapping[str, Reading]]) -> list[Finding]:
+    """Return the finding that edges have heard of no historian; nothing where each has."""
+    without = sum(metrics["history"].value == NO_HISTORIAN for metrics in every if "history" in metrics)
+    how = "start `cnctwin process historian` to keep it"
+    return [Finding(True, f"{without} edge{'s' if without > 1 else ''}: {NO_HISTORIAN}; {how}")] if without else []
+
+
+def of_sequence_holes(node_id: str, metrics: Mapping[str, Reading]) -> list[Finding]:
+    """Return a historian's finding that rows of edges are missing in its store; nothing where none are."""
+    count, named = (metrics[name].value if name in metrics else None for name in ("sequence_holes", "sequence_hole"))
+    return [Finding(False, f"{node_id}: rows of edges are missing: {named!s}")] if isinstance(count, int) and count else []
+
+
+def of_faults(node_id: str, metrics: Mapping[str, Reading]) -> list[Finding]:
+    """Return the finding that a processor has contained faults; nothing where there were none."""
+    faults, restarts, last = (metrics[name].value if name in metrics else None for name in ("faults", "restarts", "fault"))
+    if not isinstance(faults, int) or not faults:
+        return []
+    times = f", restarted {restarts} times" if restarts else ""
+    return [Finding(True, f"{node_id}: {faults} faults contained{times}; the last: {last}")]
+
+
+def of_overload(every: Iterable[Mapping[str, Reading]]) -> list[Finding]:
+    """Return a finding for each process that more comes to than it can fold; nothing where all keep up."""
+    told = {str(metrics["overloaded_by"].value) for metrics in every if "overloaded_by" in metrics}
+    return [Finding(False, f"more comes than can be folded, the newest values win: {who}") for who in sorted(told - {"", "None"})]
 
 
 def of_store(node_id: str, metrics: Mapping[str, Reading]) -> list[Finding]:

@@ -4,22 +4,34 @@ import os
 import time
 from collections.abc import Callable
 from threading import Event
+from uuid import uuid4
 
 from rich.console import Console
 from rich.live import Live
 
 from cnctwin.plant.screen import line, screen
 from cnctwin.plant.view import MachineView, ledgers, machines
+from sparkplug.admission.limits import DEFAULTS, Limits
 from sparkplug.broker import BrokerAddress
 from sparkplug.host import HostApplication, HostEvent
 from sparkplug.topics import group_filter
+from twin.vocabulary.nodes import is_twin_node
+from twin.vocabulary.topics import RESERVED_MACHINES
 
 PLAIN_LINE_S = 5.0
 
 
-def viewer(broker: BrokerAddress, group: str) -> HostApplication:
+def viewer(broker: BrokerAddress, group: str, limits: Limits = DEFAULTS) -> HostApplication:
     """A host application that only looks: it publishes no STATE, so nobody waits for it."""
-    return HostApplication(broker, f"view-{os.getpid()}", (group_filter(group),), publish_state=False)
+    return HostApplication(
+        broker,
+        f"view-{os.getpid()}-{uuid4().hex[:8]}",
+        (group_filter(group),),
+        publish_state=False,
+        limits=limits,
+        reserved=RESERVED_MACHINES,
+        trusted=lambda node: is_twin_node(node.node),
+    )
 
 
 def show(

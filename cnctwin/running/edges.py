@@ -14,7 +14,7 @@ from edge.config_file import load
 from edge.errors import ConfigError
 from edge.running.driver import Driver
 from edge.running.gateway import Gateway
-from edge.running.run import broker_address, edge_runtime
+from edge.running.run import broker_addresses, edge_runtime
 from edge.running.runtime import EdgeRuntime
 from edge.state_dir import state_dir
 from sparkplug.broker import BrokerAddress
@@ -33,13 +33,14 @@ def run(path: Path, given: BrokerAddress | None, stop: Event) -> dict[str, int]:
     with broker_or_own(given) if needs_own or given is not None else nullcontext() as broker:
 
         def begin(config: EdgeConfig[Any], restarts: int) -> EdgeRuntime:
-            named = given is None and "url" in config.broker.model_fields_set  # not by the file, which may be in pieces by now
-            address = broker_address(config.broker, config.path) if named or broker is None else broker
+            named = given is None and {"url", "urls"} & config.broker.model_fields_set  # the file may be in pieces by now
+            brokers = broker_addresses(config.broker, config.path) if named or broker is None else (broker,)
             try:
-                runtime = edge_runtime(_with_session_file(config), address, restarts=restarts, driver=driver)
+                runtime = edge_runtime(_with_session_file(config), brokers, restarts=restarts, driver=driver)
             except SparkplugError as error:  # such as a certificate's file that is not there
                 raise ConfigError(f"{config.path}: {error}") from error
-            print(f"{config.path}: the edge of {config.machine.name} begins, to {address.url}", file=sys.stderr, flush=True)
+            urls = ", ".join(address.url for address in brokers)
+            print(f"{config.path}: the edge of {config.machine.name} begins, to {urls}", file=sys.stderr, flush=True)
             return runtime
 
         driver = Driver()
@@ -59,5 +60,5 @@ def _with_session_file(config: EdgeConfig[Any]) -> EdgeConfig[Any]:
 
 def _names_broker(path: Path) -> bool:
     with suppress(OSError, ValueError, AttributeError):
-        return "url" in tomllib.loads(path.read_text()).get("broker", {})
+        return bool({"url", "urls"} & tomllib.loads(path.read_text()).get("broker", {}).keys())
     return False

@@ -6,20 +6,36 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
+from cnctwin.processes.look_around import refuse_second
 from processors.running.ports import Recorder
 from processors.running.runtime import Configured, run
+from sparkplug.admission.limits import DEFAULTS, Limits
 from sparkplug.broker import BrokerAddress
+from sparkplug.metric import NodeId
+from sparkplug.session_lock import SessionLock
 
 ALERTS = "alerts"
 
 
-def process(pairs: Sequence[Configured], broker: BrokerAddress, stop: threading.Event, *, group: str, state_dir: Path) -> None:
+def process(
+    pairs: Sequence[Configured],
+    broker: BrokerAddress,
+    stop: threading.Event,
+    *,
+    group: str,
+    state_dir: Path,
+    limits: Limits = DEFAULTS,
+) -> None:
     """Run configured processors until `stop` is set. Raises ConfigurationError where a secret is missing, StoreError where the
-    store cannot be used."""
+    store cannot be used, AnotherRunsError where another process has one of them."""
+    nodes = [NodeId(group, processor.node) for processor, _ in pairs]
     with ExitStack() as stack:
+        for node in nodes:  # before anything connects under a name that may be another's
+            stack.callback(SessionLock(state_dir / f"{node.node}.json", f"{node.group}/{node.node}").release)
+        refuse_second(broker, nodes, "end that one first, or give this one other processors or another --group")
         recorder = stack.enter_context(_recorder(pairs, group))
         stack.enter_context(_courier(pairs, broker, group))
-        run(pairs, broker, stop, group=group, session_dir=state_dir, recorder=recorder)
+        run(pairs, broker, stop, group=group, session_dir=state_dir, recorder=recorder, limits=limits)
 
 
 @contextmanager
@@ -33,7 +49,7 @@ def _recorder(pairs: Sequence[Configured], group: str) -> Iterator[Recorder | No
     from processors.historian import HistorianConfig  # noqa: PLC0415
 
     assert isinstance(config, HistorianConfig)
-    recorder = StoreRecorder(store_of(config), group)
+    recorder = StoreRecorder(store_of(config), group, config.hole_s)
     recorder.start()
     try:
         yield recorder

@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
+from uuid import uuid4
 
 from cnctwin.errors import UsageError
 from cnctwin.validation.figure import Verdict
@@ -85,7 +86,7 @@ def publish(told: Mapping[str, Any], broker: BrokerAddress, group: str, session_
 
 
 def _publish_plain(told: Mapping[str, Any], broker: BrokerAddress) -> None:
-    host = HostApplication(broker, "validation-plain", (), publish_state=False)
+    host = HostApplication(broker, f"validation-{uuid4().hex[:12]}", (), publish_state=False)
     topic = VALIDATION + str(told["machine"]).translate({ord(letter): "_" for letter in "/+#"})
     payload = json.dumps(told, ensure_ascii=False, allow_nan=False).encode()
     heard: list[bytes] = []

@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 from edge.accelerometer.filter import HIGH_HZ, RATE_BANDS_MIN
 from edge.accelerometer.frame import RATE_HZ_MAX
 from edge.section import Section
+from sparkplug.shown_address import shown_address
 
 SUFFIXES = (".wav", ".csv", ".acb")
 RATE_HZ_MIN = RATE_BANDS_MIN * HIGH_HZ
@@ -58,18 +59,19 @@ class AccelerometerSection(Section):
     def _can_be_opened(self) -> Self:
         if not self.url:
             return self
-        scheme = self.url.partition(":")[0]
+        shown, scheme = shown_address(self.url), self.url.partition(":")[0]
         if scheme not in {"tcp", "file"}:
-            raise ValueError(f"url {self.url!r}: use tcp://host:port or file:///folder/name.wav")
+            raise ValueError(f"url {shown!r}: use tcp://host:port or file:///folder/name.wav")
         try:
             host, port = self.address
-        except ValueError as error:
-            raise ValueError(f"url {self.url!r}: {error}; use tcp://host:port") from error
-        if scheme == "tcp" and not (host and port):
-            raise ValueError(f"url {self.url!r}: use tcp://host:port, for instance tcp://127.0.0.1:9500")
+            has_user = scheme == "tcp" and "@" in urlsplit(self.url).netloc
+        except ValueError:
+            raise ValueError(f"url {shown!r}: its host or port cannot be read; use tcp://host:port") from None
+        if scheme == "tcp" and (has_user or not (host and port)):
+            raise ValueError(f"url {shown!r}: use tcp://host:port, for instance tcp://127.0.0.1:9500")
         suffix = PurePosixPath(self.file).suffix.lower()
         if scheme == "file" and suffix not in SUFFIXES:
-            raise ValueError(f"url {self.url!r}: the file has to be one of {', '.join(SUFFIXES)}")
+            raise ValueError(f"url {shown!r}: the file has to be one of {', '.join(SUFFIXES)}")
         if suffix == ".csv" and scheme == "file" and not self.sample_rate_hz:
             raise ValueError("sample_rate_hz: a CSV does not say it; set it")
         if self.sample_rate_hz and self.sample_rate_hz < RATE_HZ_MIN:

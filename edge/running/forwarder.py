@@ -12,7 +12,8 @@ sent on a connection that ended before its barrier came back may have arrived or
 Live rows go out at once, whatever waits. History follows in the order of its numbers, no faster than the configured rate, with
 its own time stamps and `is_historical`, and only as far ahead of its confirmation as one second of that rate.
 
-With `await_receipt` what the broker has confirmed stays until a memory confirms it too (`edge.running.receipts`).
+Where a historian is part of the plant (`edge.running.awaited`), what the broker has confirmed stays until it confirms it too
+(`edge.running.receipts`).
 """
 
 import json
@@ -26,11 +27,13 @@ from typing import NamedTuple, Protocol
 from edge.config import StoreSection
 from edge.errors import StoreError
 from edge.place import Place
+from edge.running.awaited import Awaited
 from edge.running.receipts import RECEIPT, Receipts
 from edge.running.ring import Ring, StoredRow
 from edge.running.ring_file import Eviction
 from edge.running.spans import Spans
 from edge.sample import Drop, EdgeSample, observations_of
+from sparkplug.actions import HostState
 from sparkplug.datatype import DataType
 from sparkplug.errors import SparkplugError
 from sparkplug.metric import Change, MetricSpec
@@ -88,7 +91,8 @@ class Forwarder:
         self._waiting = Spans(ring.spans())
         self._flights: deque[_Flight] = deque()
         self._confirmed: deque[int] = deque(maxlen=1_000)
-        self._receipts = Receipts() if limits.await_receipt else None
+        self._receipts = Receipts()
+        self._awaited = Awaited(limits.await_receipt, ring.historian(), clock())
         self._kept: deque[tuple[int, int]] = deque()  # by a memory, and to be deleted
         self._token = self._landed = 0
         self._declared: frozenset[str] = frozenset()
@@ -99,6 +103,7 @@ class Forwarder:
         self._emitted, self._dropped = 0, Counter[Drop]()
         self.history_rows = 0
         self.evicted_rows = 0
+        self._evicted_first, self.evicted = 0, ""
         self.error = ""
 
     # What the loop has.
@@ -114,7 +119,7 @@ class Forwarder:
     def metrics(self) -> Sequence[MetricSpec]:
         """The metrics of its own that a birth has to declare."""
         sequence = MetricSpec(SEQUENCE, DataType.INT64)
-        return (sequence, MetricSpec(RECEIPT, DataType.STRING)) if self._limits.await_receipt else (sequence,)
+        return (sequence, MetricSpec(RECEIPT, DataType.STRING)) if self._awaited.is_possible else (sequence,)
 
     def declare(self, names: Iterable[str]) -> None:
         """Note what the present birth declares: history of anything else can't be told any more. Empty: the device is dead."""
@@ -149,13 +154,18 @@ class Forwarder:
 
     def receipt(self, text: str) -> None:
         """A memory has written which rows it keeps. From any thread."""
-        if self._receipts is not None:
+        if self._awaited.is_possible:
             self._receipts.hear(text)
+
+    def host_state(self, host: str, state: HostState | None) -> None:
+        """A historian has said whether it is there; None: it is no part of the plant any more. From any thread."""
+        self._awaited.hear(host, state)
 
     def pump(self) -> Settled:
         """Do what is due: take confirmations, send history, set a barrier, keep the ring in its bounds."""
         now_s = self._clock()
         try:
+            self._attend()
             self._land(now_s)
             self._history(now_s)
             self._bar(now_s)
@@ -204,7 +214,9 @@ class Forwarder:
             "health/store_age_s": self._ring.age_s,
             "health/store_history_rows": self.history_rows,
             "health/store_evicted_rows": self.evicted_rows,
+            "health/store_evicted": self.evicted,
             "health/store_error": self.error,
+            **self._awaited.health(self._receipts, self._clock()),
         }
 
     # How it is done.
@@ -225,13 +237,20 @@ class Forwarder:
         flight.observations += observations
         return True
 
+    def _attend(self) -> None:
+        """Note whether there is a historian to wait for; what waited for one that is none any more has come to its end."""
+        if self._awaited.settle(self._receipts.heard_s):
+            self._ring.keep_historian(self._awaited.host)
+        if not self._awaited.host:
+            self._kept.extend(self._receipts.release())
+
     def _land(self, now_s: float) -> None:
         """Finish what was confirmed. Where the disk fails the flight stays, and lands with a later pump."""
         while self._confirmed:
             self._landed = max(self._landed, self._confirmed.popleft())
         while self._flights and 0 < self._flights[0].token <= self._landed:
             flight = self._flights[0]
-            if self._receipts is None:
+            if not self._awaited.host:
                 *others, final = flight.spans
                 for span in others:
                     self._ring.delete(*span, 0)
@@ -242,12 +261,11 @@ class Forwarder:
             self._flights.popleft()
             self.error = ""
         self._strand(self._node.session)
-        if self._receipts is not None:
-            self._receive(self._receipts, now_s)
+        self._receive(now_s)
 
-    def _receive(self, receipts: Receipts, now_s: float) -> None:
+    def _receive(self, now_s: float) -> None:
         """Finish what a memory keeps; send again what it has missed."""
-        kept, missed = receipts.settle(now_s)
+        kept, missed = self._receipts.settle(now_s)
         for span in missed:
             self._waiting.add(*span)
         self._kept.extend(kept)
@@ -323,10 +341,11 @@ class Forwarder:
         upto = min(flying, default=self._ring.last + 1) - 1
         while (gone := self._ring.evict(upto)) is not None:
             self._waiting.cut(gone.last)
-            if self._receipts is not None:
-                self._receipts.cut(gone.last)
+            self._receipts.cut(gone.last)
             self._dropped[_DROPS[gone.reason]] += gone.observations
             self.evicted_rows += gone.rows
+            self._evicted_first = self._evicted_first or gone.first
+            self.evicted = f"{self._evicted_first}-{gone.last} {gone.reason}"
             if self._clock() - now_s > EVICTION_S_MAX:
                 self._kept_s -= HOUSEKEEPING_S  # goes on at the next turn
                 break

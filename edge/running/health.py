@@ -20,12 +20,16 @@ HEALTH = (
     MetricSpec("health/broker_reconnects", DataType.INT64, value=0),
     # They count as emitted, and went down with a connection to the broker before they were on the wire; a birth followed.
     MetricSpec("health/unsent_messages", DataType.INT64, "messages", value=0),
-    MetricSpec("health/store_rows", DataType.INT64, "rows", value=0),  # that no broker has confirmed yet
+    MetricSpec("health/store_rows", DataType.INT64, "rows", value=0),  # that no broker, or no historian, has confirmed yet
     MetricSpec("health/store_waiting_rows", DataType.INT64, "rows", value=0),  # of these: not sent, they follow as history
     MetricSpec("health/store_bytes", DataType.INT64, "B", value=0),
     MetricSpec("health/store_age_s", DataType.DOUBLE, "s", value=0.0),  # of the oldest row
     MetricSpec("health/store_history_rows", DataType.INT64, "rows", value=0),  # sent as history since the edge began
     MetricSpec("health/store_evicted_rows", DataType.INT64, "rows", value=0),  # lost to a limit since the edge began
+    MetricSpec("health/awaited_rows", DataType.INT64, "rows", value=0),  # that the broker has, and a historian has not confirmed
+    MetricSpec("health/awaited_s", DataType.DOUBLE, "s", value=0.0),  # since the last receipt, while rows wait for one
+    MetricSpec("health/history", DataType.STRING, value=""),  # who keeps history, or that nothing does
+    MetricSpec("health/store_evicted", DataType.STRING, value=""),  # the rows among which some were lost to a limit, and why
     MetricSpec("health/store_error", DataType.STRING, value=""),
     MetricSpec("health/restarts", DataType.INT64, value=0),  # of this edge in its gateway, after it had ended by itself
     MetricSpec("health/ledger_difference", DataType.INT64, "observations", value=0),

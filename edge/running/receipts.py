@@ -1,7 +1,8 @@
 """Rows that the broker has taken, until a memory says that it keeps them.
 
-A broker's acknowledgement says that the broker has a row; who was not subscribed at that moment has missed it. Where an edge is
-told to wait for receipts, it forgets a row only when a host has written the row's number to the device's metric `RECEIPT`:
+A broker's acknowledgement says that the broker has a row; who was not subscribed at that moment has missed it. Where an edge
+waits for receipts (`edge.running.awaited`), it forgets a row only when a host has written the row's number to the device's
+metric `RECEIPT`:
 
 >>> spans_of("1-40 43 45-46")
 [(1, 40), (43, 43), (45, 46)]
@@ -60,6 +61,22 @@ class Receipts:
         self._early.cut(upto)
         for _, spans in self._waiting:
             spans.cut(upto)
+
+    def release(self) -> list[tuple[int, int]]:
+        """Nobody is waited for any more: return all that the broker has, and forget it."""
+        released = [span for _, spans in self._waiting for span in spans]
+        self._waiting.clear()
+        return released
+
+    @property
+    def rows(self) -> int:
+        """Return how many rows wait."""
+        return sum(len(spans) for _, spans in self._waiting)
+
+    @property
+    def heard_s(self) -> float:
+        """Return when the last receipt came; minus infinity where none has."""
+        return self._heard_s
 
     def settle(self, now_s: float) -> Settled:
         """Return what has come to its end since the last time."""

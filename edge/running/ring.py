@@ -64,10 +64,11 @@ class StoredRow(NamedTuple):
 
 
 class Evicted(NamedTuple):
-    """Rows that had to go: how many, up to which number, and how many observations they were."""
+    """Rows that had to go: how many, from and up to which number, and how many observations they were."""
 
     reason: Eviction
     rows: int
+    first: int
     last: int
     observations: int
 
@@ -190,6 +191,18 @@ class Ring:
         """The memory that was stored last."""
         return self._stored_last("memory")
 
+    def historian(self) -> str:
+        """The host whose receipts are waited for, as kept; empty where there is none."""
+        found = self._ask("SELECT value FROM kept WHERE name = 'historian'")
+        return str(found[0][0]) if found else ""
+
+    def keep_historian(self, host: str) -> None:
+        """Keep over restarts whose receipts are waited for."""
+        try:
+            self._db.execute(_KEEP, ("historian", host))
+        except sqlite3.Error as error:
+            raise StoreError(f"{self.file}: cannot be written: {error}") from error
+
     def _stored_last(self, what: str) -> str | None:
         """Return the text of the last row that has one, or the one that was kept after that row."""
         kept = dict(self._ask(f"SELECT name, value FROM kept WHERE name IN ('{what}', '{what}_of')"))  # noqa: S608  our own words
@@ -248,7 +261,7 @@ class Ring:
         if reason is Eviction.DISK:
             self._give_back(RETURNED_AT_ONCE)
         self.look()
-        return Evicted(reason, len(oldest), last, observations)
+        return Evicted(reason, len(oldest), int(oldest[0][0]), last, observations)
 
     def _give_back(self, pages: int) -> None:
         """Make the file shorter by so many pages at most."""

@@ -2,7 +2,7 @@
 
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,20 +18,30 @@ from edge.running.health import HEALTH
 from edge.running.ledger import Ledger
 from edge.running.ring import Ring
 from edge.running.runtime import EdgeRuntime, Publisher
+from sparkplug.actions import HostState
 from sparkplug.broker import BrokerAddress
 from sparkplug.edge_node import EdgeNode
 from sparkplug.edge_session import Command
 from sparkplug.errors import SparkplugError
 from sparkplug.metric import NodeId
+from twin.vocabulary.nodes import HISTORIAN_NODE
 from twin.vocabulary.topics import edge_barrier
 
 
-def broker_address(section: BrokerSection, path: Path) -> BrokerAddress:
-    """The broker with the secret that the environment holds."""
+def broker_addresses(section: BrokerSection, path: Path) -> tuple[BrokerAddress, ...]:
+    """The brokers in their order, with the secret that the environment holds."""
+    urls = section.urls or (section.url,)
+    addresses = tuple(_address(url, "urls" if section.urls else "url", section, path) for url in urls)
+    if len({address.mqtt_version for address in addresses}) > 1:
+        raise ConfigError(f"{path}: broker.urls: one edge speaks one version of MQTT; give all addresses version=5, or none")
+    return addresses
+
+
+def _address(url: str, key: str, section: BrokerSection, path: Path) -> BrokerAddress:
     try:
-        address = BrokerAddress.from_url(section.url)
+        address = BrokerAddress.from_url(url)
     except SparkplugError as error:
-        raise ConfigError(f"{path}: broker.url: {error}") from error
+        raise ConfigError(f"{path}: broker.{key}: {error}") from error
     if section.username:
         address = replace(address, username=section.username)
     if section.password_env and section.password_file:
@@ -62,13 +72,13 @@ def _secret_in(file: Path, path: Path) -> str:
 
 def edge_runtime(
     config: EdgeConfig[Any],
-    address: BrokerAddress | None = None,
+    brokers: Sequence[BrokerAddress] = (),
     *,
     adapter: Adapter | None = None,
     restarts: int = 0,
     driver: Driver | None = None,
 ) -> EdgeRuntime:
-    """An edge that publishes to the configured broker, or to this one.
+    """An edge that publishes to the configured brokers, or to these.
 
     adapter: in place of the configured one, for a control that is no real one; restarts: how often the edge was begun again;
     driver: the one that edges share
@@ -81,8 +91,11 @@ def edge_runtime(
     def commanded(command: Command) -> None:
         runtime.commanded(command)
 
+    def host_state(host: str, state: HostState | None) -> None:
+        runtime.host_state(host, state)
+
     node = EdgeNode(
-        address or broker_address(broker, config.path),
+        brokers or broker_addresses(broker, config.path),
         NodeId(broker.group, config.node),
         [*HEALTH, *clock.HEALTH, *(accelerometer.HEALTH if config.accelerometer.url else ()), *ledger.metrics()],
         session_file=Path(broker.session_file) if broker.session_file else None,
@@ -90,6 +103,8 @@ def edge_runtime(
         barrier_topic=edge_barrier(broker.group, config.node),
         on_confirmed=confirmed,
         on_command=commanded,
+        watched_hosts=[HISTORIAN_NODE] if config.store.await_receipt == "auto" else [],
+        on_host_state=host_state,
         loop=None if driver is None else driver.loop,
     )
     runtime = EdgeRuntime(

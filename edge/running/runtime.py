@@ -34,6 +34,7 @@ from edge.running.receipts import RECEIPT
 from edge.running.sensor import sensor_of
 from edge.running.unstored import Unstored
 from edge.sample import UNAVAILABLE, Drop, EdgeSample, Offer, SampleSet, observations_of
+from sparkplug.actions import HostState
 from sparkplug.edge_session import Command
 from sparkplug.metric import Change, MetricSpec
 
@@ -66,6 +67,7 @@ class Store(Protocol):
     def put(self, rows: Sequence[Sequence[EdgeSample]], place: Place | None, memory: str | None = None) -> Settled: ...
     def confirmed(self, token: int) -> None: ...
     def receipt(self, text: str) -> None: ...
+    def host_state(self, host: str, state: HostState | None) -> None: ...
     def pump(self) -> Settled: ...
     def close(self) -> None: ...
     @property
@@ -202,6 +204,10 @@ class EdgeRuntime:
         is_receipt = command.name == RECEIPT and command.device == self.config.machine.name
         if is_receipt and isinstance(command.value, str):
             self._store.receipt(command.value)
+
+    def host_state(self, host: str, state: HostState | None) -> None:
+        """A historian has said whether it is there. From any thread."""
+        self._store.host_state(host, state)
 
     def _read(self, raw: bytes) -> None:
         """One frame, all its way."""

@@ -9,7 +9,8 @@ A day of rows is one span, not a million numbers.
 ((1, 2), [(3, 6)], 4)
 """
 
-from bisect import bisect_left, insort
+import math
+from bisect import bisect_left, bisect_right, insort
 from collections.abc import Iterable, Iterator
 
 
@@ -30,6 +31,10 @@ class Spans:
     def __bool__(self) -> bool:
         return bool(self._spans)
 
+    def __contains__(self, number: int) -> bool:
+        at = bisect_right(self._spans, (number, math.inf)) - 1
+        return at >= 0 and number <= self._spans[at][1]
+
     def add(self, first: int, last: int) -> None:
         """Put in `first` to `last`, of which none may be in it; neighbours become one span."""
         if self._spans and self._spans[-1][1] == first - 1:  # the usual case
@@ -40,6 +45,19 @@ class Spans:
         for left in (at, at - 1):
             if 0 <= left < len(self._spans) - 1 and self._spans[left][1] + 1 == self._spans[left + 1][0]:
                 self._spans[left : left + 2] = [(self._spans[left][0], self._spans[left + 1][1])]
+
+    def include(self, first: int, last: int) -> None:
+        """Put in what of `first` to `last` is not in it yet.
+
+        >>> spans = Spans([(1, 4), (7, 9)])
+        >>> spans.include(3, 6), list(spans)
+        (None, [(1, 9)])
+        """
+        if not self._spans or self._spans[-1][1] < first:
+            self.add(first, last)
+            return
+        self.discard(first, last)
+        self.add(first, last)
 
     def cut(self, upto: int) -> None:
         """Take out all numbers up to this one."""

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from edge.place import Place, PlaceFile
 from edge.running.forwarder import NOTHING_SETTLED, Sender, Settled
 from edge.sample import Drop, EdgeSample, observations_of
+from sparkplug.actions import HostState
 from sparkplug.metric import MetricSpec
 
 
@@ -53,6 +54,9 @@ class Unstored:
 
     def receipt(self, text: str) -> None:
         """Nothing waits for a receipt."""
+
+    def host_state(self, host: str, state: HostState | None) -> None:
+        """Nothing waits for a historian."""
 
     def pump(self) -> Settled:
         """Nothing is due."""

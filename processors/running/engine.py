@@ -4,7 +4,6 @@ It keeps a live lane and, once history comes, a history lane for each machine; d
 where two offer it; and keeps the ledger. What has a state, and is saved as one, is a unit: a machine, or a cell of them.
 """
 
-import itertools
 from collections.abc import Callable, Collection, Mapping
 from operator import itemgetter
 
@@ -13,13 +12,14 @@ from processors.config import Configuration, ProcessorConfig
 from processors.discovery import AnyProcessor
 from processors.errors import SnapshotError
 from processors.running.counts import Counts
-from processors.running.fold import Fold, Folded
+from processors.running.fold import Folded
 from processors.running.lane import Lane, Stream, stream_of
 from processors.running.ledger import FOLDED, DropReason, Ledger
 from processors.running.picks import Picks
+from processors.running.roster import Roster
 from processors.running.silences import Silences
 from processors.running.snapshot import SnapshotCodec
-from processors.running.unit import SIGNALS_MAX, Machine, Unit
+from processors.running.unit import SIGNALS_MAX, Machine
 from processors.sample import Sample, SampleKind
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId, Reading
@@ -28,6 +28,7 @@ from twin.vocabulary.nodes import is_twin_node
 MACHINES_MAX = 1000
 Way = Callable[[Stream, float], list[Action]]
 """Takes a message at a time on the wall; what comes of it."""
+_NO_MESSAGES = (EventKind.HOLE, EventKind.REFUSED)  # of a device, as they come; REFUSED says itself how many it stands for
 _IS_HISTORICAL: Callable[[Reading], bool] = itemgetter(Reading._fields.index("is_historical"))
 
 
@@ -44,22 +45,22 @@ class Engine:
         *,
         lateness_margin_s: float = 2.0,
         machines_max: int = MACHINES_MAX,
+        before: "Engine | None" = None,
     ) -> None:
-        self.ledger = Ledger()
-        self.counts = Counts()
+        """`before`: the engine that this one replaces, whose ledger and counts it goes on with."""
+        self.ledger: Ledger = Ledger() if before is None else before.ledger
+        self.counts: Counts = Counts() if before is None else before.counts
         self._processor, self._configuration = processor, configuration
         self._picks = Picks(processor.signals, processor.wakes)
         self._inputs = self._picks.inputs
-        self._machines_max = machines_max
-        self._machines: dict[str, Machine] = {}
-        self._numbers = itertools.count()
+        self._roster = Roster(processor, configuration, self._picks, self.counts, self.ledger, machines_max=machines_max)
+        self._machines, self._units = self._roster.machines, self._roster.units
         self._silences = Silences(lateness_margin_s)
-        self._units: dict[str, Unit] = {}
         self._changed: dict[str, None] = {}
         self._codec = SnapshotCodec(processor)
         self._emitted_before = 0
         for unit in processor.units_at_start(configuration):
-            self._unit(unit)
+            self._roster.unit(unit)
 
     @property
     def machines(self) -> tuple[str, ...]:
@@ -80,21 +81,16 @@ class Engine:
 
     def _is_message(self, event: HostEvent) -> bool:
         """Return True if the ledger counts it: it is of a device, from a node that this processor reads."""
-        return event.device is not None and event.kind is not EventKind.HOLE and self._processor.listens_to(event.node.node)
+        return event.device is not None and event.kind not in _NO_MESSAGES and self._processor.listens_to(event.node.node)
 
-    def received(self, event: HostEvent, *, has_room: bool) -> None:
-        """An event has come that cannot be fed yet: it waits outside, or is lost where there is no room."""
-        if self._is_message(event):
-            self.ledger.count(() if has_room else (DropReason.QUEUE_FULL,))
-
-    def feed(self, event: HostEvent, wall_s: float, *, has_waited: bool = False) -> list[Action]:
-        """Take one event; `wall_s` is any clock that only goes forward. `has_waited`: `received` has counted it."""
+    def feed(self, event: HostEvent, wall_s: float) -> list[Action]:
+        """Take one event; `wall_s` is any clock that only goes forward."""
         kind, node, device = event.kind, event.node, event.device
         self._emitted_before = self.ledger.emitted
         if not self._processor.listens_to(node.node):
             self.counts.ignored += 1
             return []
-        if device is None:
+        if device is None or kind is EventKind.REFUSED:
             return self._node_event(event)
         machine = self._machines.get(device)
         if kind is EventKind.HOLE:  # no message
@@ -106,7 +102,7 @@ class Engine:
                 actions, fates = self._birth(machine, event, wall_s)
             else:
                 actions, fates = self._death(machine, event)
-            self.ledger.count(fates, 0 if has_waited else 1)
+            self.ledger.count(fates)
         if machine is None:
             machine = self._machines.get(device)
         if machine is not None:
@@ -140,14 +136,36 @@ class Engine:
 
         return way
 
-    def overflowed(self, count: int) -> None:
-        """A full queue in front of us has lost so many messages."""
-        self.ledger.overflowed(count)
+    def overflowed(self, count: int, reason: DropReason = DropReason.QUEUE_FULL) -> None:
+        """A queue in front of us has lost so many messages."""
+        self.ledger.overflowed(count, reason)
 
-    def unsent(self) -> None:
+    def lost(self, event: HostEvent, reason: DropReason) -> None:
+        """An event is lost before it is fed, or feeding it has failed before it was counted."""
+        if self._is_message(event):
+            self.ledger.count((reason,))
+
+    def unsent(self, reason: DropReason = DropReason.BROKER_OFFLINE) -> None:
         """Note that the outcome of the last event could not be sent."""
         if self.ledger.emitted > self._emitted_before:
-            self.ledger.unsent()
+            self.ledger.unsent(reason)
+
+    def abandon(self, name: str, at_ms: int) -> list[Action]:
+        """Forget a machine that a fault has set aside, state and all; what is to be said of it."""
+        machine = self._machines.get(name)
+        if machine is None:
+            return []
+        removed: list[Action] = [Remove(name)] if self._processor.outputs else []
+        try:
+            return self._die(machine, list(machine.live.row), at_ms, "set aside after faults", is_last=True)[0]
+        except Exception:  # what made it fail may make this fail too
+            return removed
+        finally:
+            self._roster.forget(name)
+
+    def close(self) -> None:
+        """Another engine takes over: what is held back is dropped."""
+        self._roster.drop_held()
 
     def plain(self, topic: str, payload: bytes, at_ms: int) -> list[Action]:
         """A plain message that the processor listens to; every cell is given it."""
@@ -184,20 +202,20 @@ class Engine:
         """Take the snapshot of a unit, before any event of it; its name. Raises SnapshotError, and counts it."""
         try:
             name, document = self._codec.unit(payload)
-            unit = self._fresh_unit(name)
-            self._codec.restore(document.get("live"), unit.live, lambda machine: self._restored(unit, machine).live)
+            unit = self._roster.fresh_unit(name)
+            self._codec.restore(document.get("live"), unit.live, lambda machine: self._roster.member(unit, machine).live)
             if document.get("history") is not None:
-                unit.history = self._fold(name, is_history=True)
-                self._codec.restore(document["history"], unit.history, lambda machine: self._history_of(unit, machine))
-            if len(self._machines) + len(unit.machines) > self._machines_max:
-                raise SnapshotError(f"{name}: more than {self._machines_max} machines")
+                unit.history = self._roster.fold(name, is_history=True)
+                self._codec.restore(document["history"], unit.history, lambda machine: self._roster.history_of(unit, machine))
+            if len(self._machines) + len(unit.machines) > self._roster.machines_max:
+                raise SnapshotError(f"{name}: more than {self._roster.machines_max} machines")
         except SnapshotError:
             self.counts.snapshots_rejected += 1
             raise
         self._units[name] = unit
         self._machines.update(unit.machines)
-        for machine in [one for one in unit.machines if self._unit_name(one) != name]:
-            self._forget(machine)  # it has been given to another cell since
+        for machine in [one for one in unit.machines if self._roster.unit_name(one) != name]:
+            self._roster.forget(machine)  # it has been given to another cell since
         return name
 
     def resume(self, payload: bytes, offers: Mapping[str, Mapping[NodeId, Collection[str]]]) -> str:
@@ -260,42 +278,6 @@ class Engine:
 
     # How it is done.
 
-    def _fold(self, name: str, *, is_history: bool) -> Fold:
-        return Fold(self._processor, self._configuration, name, self.counts, is_history=is_history)
-
-    def _fresh_unit(self, name: str) -> Unit:
-        return Unit(name, self._fold(name, is_history=False))
-
-    def _unit(self, name: str) -> Unit:
-        """The unit of that name, made where there is none."""
-        return self._units.get(name) or self._units.setdefault(name, self._fresh_unit(name))
-
-    def _lane(self, fold: Fold, machine: str) -> Lane:
-        config = self._processor.config_of(self._configuration, machine)
-        return Lane(fold, self._picks, config, machine, self.counts)
-
-    def _unit_name(self, machine: str) -> str:
-        return self._processor.unit_of(self._configuration, machine)
-
-    def _joined(self, name: str) -> Machine:
-        """A machine that is new here, in the unit that it belongs to."""
-        machine = self._machines[name] = self._restored(self._unit(self._unit_name(name)), name)
-        return machine
-
-    def _restored(self, unit: Unit, name: str) -> Machine:
-        """The machine of a unit, made where there is none; only the unit knows of it."""
-        if name not in unit.machines:
-            unit.machines[name] = Machine(name, next(self._numbers), unit, self._lane(unit.live, name))
-        return unit.machines[name]
-
-    def _history_of(self, unit: Unit, name: str) -> Lane:
-        machine = self._restored(unit, name)
-        if unit.history is None:
-            unit.history = self._fold(unit.name, is_history=True)
-        if machine.history is None:
-            machine.history = self._lane(unit.history, name)
-        return machine.history
-
     def _is_of_twin(self, node: NodeId) -> bool:
         """Return True if the node is another processor's, whose word a reader of signals of its choice takes for no clock."""
         return self._inputs is not None and is_twin_node(node.node)
@@ -328,7 +310,7 @@ class Engine:
         if live:  # a message with both goes through both lanes, and counts as two
             actions, fates = machine.live.data(live, wall_s, is_of_twin=is_of_twin)
             self.ledger.count(fates)
-        history = self._history_of(machine.unit, machine.name)
+        history = self._roster.history_of(machine.unit, machine.name)
         late, fates = history.data([reading for reading in readings if reading.is_historical], wall_s)
         return actions + late, fates
 
@@ -336,9 +318,9 @@ class Engine:
         if len(event.readings) > SIGNALS_MAX:
             return [], (DropReason.SIGNALS_MAX,)
         if machine is None:
-            if len(self._machines) >= self._machines_max and not self._forget_one():
+            if not self._roster.has_room():
                 return [], (DropReason.MACHINES_MAX,)
-            machine = self._joined(event.device or "")
+            machine = self._roster.joined(event.device or "")
         is_of_twin = self._is_of_twin(event.node)
         was_online = machine.is_online
         machine.ways.clear()
@@ -370,6 +352,7 @@ class Engine:
     def _node_event(self, event: HostEvent) -> list[Action]:
         """A hole of an edge node concerns each machine that it stands for. Its death comes as one death for each device."""
         actions: list[Action] = []
+        self.ledger.refused(event.refusal, event.refused)
         for machine in self._machines.values() if event.kind is EventKind.HOLE else ():
             if event.node in machine.online:
                 actions += machine.live.lost(event.detail)
@@ -379,20 +362,3 @@ class Engine:
     def _die(self, machine: Machine, names: list[str], at_ms: int, reason: str, *, is_last: bool) -> Folded:
         actions, fates = machine.live.death(names, at_ms, reason, is_last=is_last)
         return ([*actions, Remove(machine.name)] if is_last and self._processor.outputs else actions), fates
-
-    def _forget_one(self) -> bool:
-        """Make room: the machine that has been offline longest by order of arrival goes."""
-        name = next((name for name, machine in self._machines.items() if not machine.online), None)
-        if name is not None:
-            self._forget(name)
-        return name is not None
-
-    def _forget(self, name: str) -> None:
-        lost = self._machines.pop(name)
-        for lane in (lost.live, lost.history):
-            if lane is not None:
-                self.ledger.count(lane.drop_held(), 0)
-                lane.fold.leave(name)
-        del lost.unit.machines[name]
-        if not self._processor.is_of_cells:
-            del self._units[name]

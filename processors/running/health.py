@@ -21,7 +21,14 @@ HEALTH = (
     MetricSpec("health/ignored", DataType.INT64, properties={"meaning": "messages of nodes that this processor does not read"}),
     MetricSpec("health/snapshot_age_s", DataType.DOUBLE, unit="s", properties={"meaning": "age of the oldest unsaved state"}),
     MetricSpec("health/snapshots_rejected", DataType.INT64, properties={"meaning": "snapshots that could not be restored"}),
+    MetricSpec("health/quarantined", DataType.INT64, properties={"meaning": "devices and nodes of which something is refused"}),
+    MetricSpec("health/quarantine", DataType.STRING, properties={"meaning": "the first of them as JSON (running/quarantine.py)"}),
     MetricSpec("health/reconnects", DataType.INT64, properties={"meaning": "connections made again"}),
+    MetricSpec("health/overload", DataType.INT64, properties={"meaning": "messages passed over: more came than could be folded"}),
+    MetricSpec("health/overloaded_by", DataType.STRING, properties={"meaning": "node with most of them lately; empty: none"}),
+    MetricSpec("health/faults", DataType.INT64, properties={"meaning": "faults in this processor that were contained"}),
+    MetricSpec("health/fault", DataType.STRING, properties={"meaning": "the last of them, in one line; empty: none"}),
+    MetricSpec("health/restarts", DataType.INT64, properties={"meaning": "times that a fault has restarted this processor"}),
 )
 
 STORE = (
@@ -34,6 +41,8 @@ STORE = (
     MetricSpec("health/store_bytes", DataType.INT64, unit="bytes", properties={"meaning": "on the disk"}),
     MetricSpec("health/store_days_left", DataType.DOUBLE, unit="d", properties={"meaning": "that the disk lasts at this rate"}),
     MetricSpec("health/store_pins", DataType.INT64, properties={"meaning": "stretches that no sweep may take"}),
+    MetricSpec("health/sequence_holes", DataType.INT64, properties={"meaning": "stretches of rows of edges that stay missing"}),
+    MetricSpec("health/sequence_hole", DataType.STRING, properties={"meaning": "the newest of them; empty: none"}),
     MetricSpec("health/store_trouble", DataType.STRING, properties={"meaning": "what is wrong with the store; empty: nothing"}),
 )
 

@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Sequence
 from enum import Enum
 
+from sparkplug.admission.refusal import Refusal
 from twin.vocabulary.node_ledger import BUFFERED, DROPPED, DROPPED_PREFIX, EMITTED, RECEIVED
 
 
@@ -20,8 +21,23 @@ class DropReason(Enum):
     MACHINES_MAX = "machines_max"  # one machine too many
     DEAD_LETTER = "dead_letter"  # the step failed
     BROKER_OFFLINE = "broker_offline"  # folded, but its results could not be sent
+    REFUSED_NAME = "refused_name"  # not let in: a name that no topic can hold, or one of the host's own
+    REFUSED_STAMP = "refused_stamp"  # not let in: a time stamp that no clock has
+    REFUSED_SIZE = "refused_size"  # not let in: a value that is too long
+    REFUSED_QUOTA = "refused_quota"  # not let in: too many metrics, devices or nodes
+    REFUSED_RATE = "refused_rate"  # not let in: too many messages a second
+    OVERLOAD = "overload"  # passed over while more came than could be folded; a newer one of its device was
+    FAULT = "fault"  # handling it has failed, or its machine or the processor is set aside after faults
 
 
+_REFUSED = {
+    Refusal.NAME: DropReason.REFUSED_NAME,
+    Refusal.RESERVED: DropReason.REFUSED_NAME,
+    Refusal.STAMP: DropReason.REFUSED_STAMP,
+    Refusal.SIZE: DropReason.REFUSED_SIZE,
+    Refusal.QUOTA: DropReason.REFUSED_QUOTA,
+    Refusal.RATE: DropReason.REFUSED_RATE,
+}
 Fates = tuple[DropReason | None, ...]
 """The fates of messages; None = it was folded."""
 FOLDED: Fates = (None,)
@@ -68,15 +84,21 @@ class Ledger:
             else:
                 self.dropped[fate] += 1
 
-    def overflowed(self, count: int) -> None:
-        """Count messages that a full queue has lost."""
+    def overflowed(self, count: int, reason: DropReason = DropReason.QUEUE_FULL) -> None:
+        """Count messages that a queue has lost."""
         self.received += count
-        self.dropped[DropReason.QUEUE_FULL] += count
+        self.dropped[reason] += count
 
-    def unsent(self) -> None:
+    def refused(self, refusal: Refusal | None, count: int) -> None:
+        """Count messages that the host session did not let in. One of which only a part was let in counts as two."""
+        if refusal is not None:
+            self.received += count
+            self.dropped[_REFUSED[refusal]] += count
+
+    def unsent(self, reason: DropReason = DropReason.BROKER_OFFLINE) -> None:
         """The message just emitted could not be sent after all."""
         self.emitted -= 1
-        self.dropped[DropReason.BROKER_OFFLINE] += 1
+        self.dropped[reason] += 1
 
     def metrics(self) -> dict[str, int]:
         """The ledger by metric name; every reason is there, also at 0."""

@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 from processors.config import Configuration, ProcessorConfig, read_tables
@@ -11,14 +12,17 @@ from processors.running.health import node_metrics
 from processors.running.ports import Recorder
 from processors.running.runner import Runner
 from processors.running.worker import Worker
+from sparkplug.admission.limits import DEFAULTS, Limits
 from sparkplug.broker import BrokerAddress
 from sparkplug.edge_node import EdgeNode
 from sparkplug.host import HostApplication
 from sparkplug.metric import NodeId
 from sparkplug.topics import uncommanded_filters
 from sparkplug.transport.loop import Loop
+from twin.vocabulary.nodes import is_twin_node
+from twin.vocabulary.topics import RESERVED_MACHINES
 
-OTHERS = ("validation",)  # tables of the same file that are for no processor
+OTHERS = ("validation", "limits")  # tables of the same file that are for no processor
 Configured = tuple[AnyProcessor, Configuration[ProcessorConfig]]
 
 
@@ -30,14 +34,16 @@ def run(
     group: str = "cnc",
     session_dir: Path | None = None,
     recorder: Recorder | None = None,
+    limits: Limits = DEFAULTS,
 ) -> None:
-    """Run processors whose configuration has been checked until `stop` is set, or one of them fails, which ends all: half a set
-    of processors is worse than none, and a supervisor can start anew.
+    """Run processors whose configuration has been checked until `stop` is set. A processor that fails is restarted by itself
+    (processors/running/containment.py); raises ProcessorsFailedError where all of them go on failing, so that a supervisor can
+    start the process anew.
 
     session_dir: keeps the birth/death sequence numbers over restarts; all other state is kept on the broker
     recorder: for the processor that `records`
     """
-    runner_of(pairs, broker, group=group, session_dir=session_dir, recorder=recorder).run(stop)
+    runner_of(pairs, broker, group=group, session_dir=session_dir, recorder=recorder, limits=limits).run(stop)
 
 
 def runner_of(
@@ -47,6 +53,7 @@ def runner_of(
     group: str = "cnc",
     session_dir: Path | None = None,
     recorder: Recorder | None = None,
+    limits: Limits = DEFAULTS,
 ) -> Runner:
     """Return the loop of a process, not begun: one host session and an edge node for each processor, on one MQTT loop."""
     processors = [processor for processor, _ in pairs]
@@ -57,17 +64,22 @@ def runner_of(
         uncommanded_filters(group),
         wanted=lambda node: any(processor.listens_to(node.node) for processor in processors),
         loop=loop,
+        limits=limits,
+        reserved=RESERVED_MACHINES,
+        trusted=lambda node: is_twin_node(node.node),
     )
     workers = []
     for processor, configuration in pairs:
-        edge = EdgeNode(
+        new_edge = partial(
+            EdgeNode,
             broker,
             NodeId(group, processor.node),
             node_metrics(records=processor.records),
             session_file=None if session_dir is None else session_dir / f"{processor.node}.json",
             loop=loop,
         )
-        workers.append(Worker(processor, configuration, host, edge, recorder if processor.records else None))
+        given = recorder if processor.records else None
+        workers.append(Worker(processor, configuration, host, new_edge(), given, new_edge=new_edge))
     return Runner(host, workers)
 
 

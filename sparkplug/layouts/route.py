@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
+from sparkplug.admission.gate import Gate
 from sparkplug.codec import read_properties
 from sparkplug.datatype import DataType
 from sparkplug.errors import PayloadError
@@ -25,6 +26,7 @@ class Route:
     owner: Owner
     device: str | None
     layouts: Memory
+    gate: Gate
 
     def take(self, payload: bytes) -> HostEvent | None:
         """Take a data message of a known layout; None, and nothing has changed, where it has to go the long way."""
@@ -32,7 +34,9 @@ class Route:
         if found is None:
             return None
         layout, (stamp_ms, seq, values, stamps_ms, oldest_ms, newest_ms) = found
-        picture, owner = self.picture, self.owner
+        picture, owner, gate = self.picture, self.owner, self.gate
+        if stamp_ms > gate.newest_ms or newest_ms > gate.newest_ms or oldest_ms < gate.oldest_ms or stamp_ms < gate.oldest_ms:
+            return None
         if not (picture.own.online and owner.online) or stamp_ms < picture.own.birth_ms:
             return None
         if not self.window.is_next(seq, stamp_ms):
@@ -43,7 +47,7 @@ class Route:
             names, oldest_ms, newest_ms = (), 0, 0
         else:
             owner.take_present(names, readings)
-        event = (_DATA, picture.node, self.device, stamp_ms, readings, "", "", b"", names, oldest_ms, newest_ms)
+        event = (_DATA, picture.node, self.device, stamp_ms, readings, "", "", b"", names, oldest_ms, newest_ms, 0, None)
         return _NEW(HostEvent, event)
 
     def learn(self, payload: bytes, message: Any, readings: tuple[Reading, ...], names: tuple[str, ...]) -> None:
@@ -62,7 +66,7 @@ class Route:
         """
         datatypes = []
         for metric in message.metrics:
-            binding = self.picture.binding(self.owner, metric)
+            binding = self.owner.binding(metric)
             if binding is None:
                 return None
             if metric.HasField("properties"):

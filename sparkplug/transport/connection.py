@@ -24,10 +24,13 @@ from sparkplug.broker import BrokerAddress
 from sparkplug.errors import BrokerAddressError
 from sparkplug.transport.data_path import DataPath
 from sparkplug.transport.dialling import UnreachableError, dialled
+from sparkplug.transport.itinerary import PAUSE_S_MAX, Itinerary
 from sparkplug.transport.listener import Listener
 from sparkplug.transport.loop import TICK_S, Loop
 from sparkplug.transport.paho_client import CONNECT_TIMEOUT_S, StreamClient
 from sparkplug.transport.paho_path import PahoPath
+from sparkplug.transport.rival import Rival
+from sparkplug.transport.sendable import PACKET_BYTES_MAX, Sendable
 from sparkplug.transport.stream import Stream
 from sparkplug.transport.tls_failure import explained
 
@@ -36,10 +39,6 @@ OUTBOX_BYTES_MAX = 64 * 1024 * 1024
 GATHERED_MAX = 200  # actions that wait for the next turn
 SEND_BYTES_MAX = 128 * 1024  # that gather for one call
 READS_MAX = 32  # of one connection in a turn, so that it keeps no other waiting
-BACKOFF_S_MIN = 0.2
-BACKOFF_S_MAX = 15.0
-ABSENT_S_MAX = 0.5  # where nobody listens: knocking costs nobody anything, and live values are wanted soon after its return
-STABLE_S = 5.0
 LINGER_S_MAX = 0.5
 _log = logging.getLogger(__name__)
 
@@ -72,24 +71,23 @@ class MqttConnection:
         self.last_error = ""
         self.connects = 0
         self.unsent = 0  # messages that were given to us for a connection that ended before it took them
+        self.sendable = Sendable(client_id)
         self.loop = loop or Loop(f"mqtt {client_id}")
-        self._brokers = tuple(brokers)
+        self._itinerary = Itinerary(brokers, chance or Random())  # noqa: S311 — spreads reconnects, keeps no secret
         self._client_id = client_id
         self._listener = listener
         self._version = MQTTProtocolVersion.MQTTv5 if mqtt_version == 5 else MQTTProtocolVersion.MQTTv311
-        self._chance = chance or Random()  # noqa: S311 — spreads reconnects, keeps no secret
         self._has_data_path = data_path
-        self._server = 0
         self._client: StreamClient | None = None
         self._stream: Stream | None = None
         self._path: PahoPath | None = None
         self._accepted = self._reached = self._reading = False
+        self._rival = Rival(client_id)
         self._writes_later = False  # the socket takes no more for now
         self._is_finished = False  # nothing more is sent on this socket
         self._is_unread = False  # there was more to read than in one turn
         self._outbox: deque[Action] = deque()
         self._taken_bytes = self._sent_bytes = 0  # payloads that came into the outbox, and that left it
-        self._began_s, self._pause_s = 0.0, BACKOFF_S_MIN
         self._dial_s: float | None = None  # when the next attempt is due; None while there is one or a connection
         self._until_s: float | None = None  # when leaving or lingering has lasted long enough
         self._stopping = False
@@ -152,16 +150,16 @@ class MqttConnection:
             threading.Thread(target=self._attempt, name=f"dial {self._client_id}", daemon=True).start()
         except RuntimeError as error:  # the system gives no more threads for now
             self._note(str(error))
-            self._dial_s = time.monotonic() + BACKOFF_S_MAX
+            self._dial_s = time.monotonic() + PAUSE_S_MAX
 
     def _attempt(self) -> None:
-        self._began_s = time.monotonic()
         self._reached = False
         client: StreamClient | None = None
         try:
-            self._clear_outbox()
-            connect = self._listener.connecting(self._server)
-            client = self._dialled(self._brokers[self._server], connect)
+            while self._outbox:
+                self.unsent += isinstance(self._outbox.popleft(), Publish)
+            connect = self._listener.connecting(self._itinerary.server)
+            client = self._dialled(self._itinerary.broker, connect)
             self._reached = True
         except (OSError, ValueError) as error:
             self._note(str(error))
@@ -183,10 +181,6 @@ class MqttConnection:
             self._reached = error.is_listening
             self._listener.unsent()
             raise
-
-    def _clear_outbox(self) -> None:
-        while self._outbox:
-            self.unsent += isinstance(self._outbox.popleft(), Publish)
 
     # What the loop calls, and holds its lock meanwhile.
 
@@ -239,7 +233,7 @@ class MqttConnection:
     def _begin(self, client: StreamClient, stream: Stream) -> None:
         client.on_connect = self._on_connect
         client.on_disconnect = self._on_disconnect
-        self._path = (DataPath if self._has_data_path else PahoPath)(client, stream, self._listener, self._refused)
+        self._path = (DataPath if self._has_data_path else PahoPath)(client, stream, self._listener, self._refused, self.sendable)
         self._client, self._stream = client, stream
         self._accepted = self._writes_later = self._is_finished = self._is_unread = False
         self.loop.watch(stream.fileno(), self, for_writing=False)
@@ -303,7 +297,7 @@ class MqttConnection:
             else:
                 self._leave(client, with_will=not isinstance(action, Disconnect) or action.with_will)
                 if not isinstance(action, Disconnect):
-                    self._server = (self._server + 1) % len(self._brokers)
+                    self._itinerary.walk()
         if not outbox:
             self._sent_bytes = self._taken_bytes
         return False
@@ -349,11 +343,8 @@ class MqttConnection:
         if self._stopping:
             self._leave_the_loop()
             return
-        # Only a connection that lasted was a good one: two nodes with one id throw each other out again and again.
         now_s = time.monotonic()
-        longest_s = BACKOFF_S_MAX if self._reached else ABSENT_S_MAX
-        self._pause_s = BACKOFF_S_MIN if now_s - self._began_s > STABLE_S else min(2 * self._pause_s, longest_s)
-        self._dial_s = now_s + self._pause_s * self._chance.uniform(0.8, 1.2)
+        self._dial_s = now_s + self._itinerary.ended(now_s, somebody_listens=self._reached)
         self.loop.at(self._dial_s)
 
     def _leave_the_loop(self) -> None:
@@ -371,24 +362,27 @@ class MqttConnection:
 
     # What paho calls.
 
-    def _on_connect(self, _client: Any, _userdata: Any, _flags: Any, reason: Any, _properties: Any) -> None:
+    def _on_connect(self, _client: Any, _userdata: Any, _flags: Any, reason: Any, properties: Any) -> None:
         if reason.is_failure:
-            self._note(f"{self._brokers[self._server].url} refused the connection: {reason}")
+            self._note(f"{self._itinerary.broker.url} refused the connection: {reason}")
             return
         self.connects += 1
         self.last_error = ""
         self._accepted = True
+        self._rival.began(time.monotonic())
+        self.sendable.packet_bytes_max = getattr(properties, "MaximumPacketSize", PACKET_BYTES_MAX)
+        self._itinerary.accepted(time.monotonic())
         self._listener.connected()
 
     def _on_disconnect(self, _client: Any, _userdata: Any, _flags: Any, reason: Any, _properties: Any) -> None:
-        broker, failure = self._brokers[self._server], None if self._stream is None else self._stream.failure
+        broker, failure = self._itinerary.broker, None if self._stream is None else self._stream.failure
         if reason.is_failure and isinstance(failure, ssl.SSLError):
             self._note(f"the connection to {broker.url} ended: {explained(failure, broker)}")
         elif reason.is_failure and not self.last_error:
-            self._note(f"the connection to {broker.url} ended: {reason}")
+            self._note(f"the connection to {broker.url} ended: {self._rival.ended(time.monotonic(), reason)}")
 
     def _refused(self, reason: str) -> None:
-        self._note(f"{self._brokers[self._server].url} refuses the barrier that shows what has arrived: {reason}")
+        self._note(f"{self._itinerary.broker.url} refuses the barrier that shows what has arrived: {reason}")
 
     def _note(self, error: str) -> None:
         if error != self.last_error:

@@ -11,6 +11,7 @@ from sparkplug.transport.listener import Listener
 from sparkplug.transport.packets import PacketReader, PacketWriter, Reader, puback
 from sparkplug.transport.paho_client import StreamClient
 from sparkplug.transport.paho_path import PahoPath, puback_reason
+from sparkplug.transport.sendable import Sendable
 from sparkplug.transport.stream import Stream
 
 PACKET_ID_MIN = 32_768
@@ -21,8 +22,15 @@ UNACKNOWLEDGED_MAX = 30_000
 class DataPath(PahoPath):
     """As PahoPath, in a fraction of the time."""
 
-    def __init__(self, client: StreamClient, stream: Stream, listener: Listener, refused: Callable[[str], None]) -> None:
-        super().__init__(client, stream, listener, refused)
+    def __init__(
+        self,
+        client: StreamClient,
+        stream: Stream,
+        listener: Listener,
+        refused: Callable[[str], None],
+        sendable: Sendable,
+    ) -> None:
+        super().__init__(client, stream, listener, refused, sendable)
         version = int(client.protocol)
         reader = Reader(listener.message, self._acknowledge, self._acknowledged, self._let_paho_read, listener.wanted)
         self._reader = PacketReader(version, reader)
@@ -36,24 +44,29 @@ class DataPath(PahoPath):
 
     def publish_unconfirmed(self, outbox: deque[Action], bytes_max: int) -> int:
         """Write messages of QoS 0 from the head of the outbox, until `bytes_max` wait; return the size of their payloads."""
-        stream, compose = self._stream, self._writer.publish
+        stream, compose, sendable = self._stream, self._writer.publish, self._sendable
+        packet_bytes_max = sendable.packet_bytes_max
         packets: list[bytes] = []
         room, written = bytes_max - stream.size, 0
-        try:
-            while outbox and room > 0:
-                action = outbox[0]
-                if not isinstance(action, Publish):
-                    break
-                topic, payload, qos, retain = action
-                if qos:
-                    break
-                outbox.popleft()
+        while outbox and room > 0:
+            action = outbox[0]
+            if not isinstance(action, Publish):
+                break
+            topic, payload, qos, retain = action
+            if qos:
+                break
+            outbox.popleft()
+            written += len(payload)
+            try:
                 packet = compose(topic, payload, retain)
-                packets.append(packet)
-                written += len(payload)
-                room -= len(packet)
-        finally:  # a topic that MQTT does not allow takes nobody else's message with it
-            stream.add_all(packets)
+            except ValueError as error:
+                sendable.drop(topic, str(error))
+                continue
+            if (size := len(packet)) > packet_bytes_max and not sendable.holds(topic, size):
+                continue
+            packets.append(packet)
+            room -= size
+        stream.add_all(packets)
         return written
 
     def publish(self, action: Publish) -> bool:
@@ -71,7 +84,14 @@ class DataPath(PahoPath):
         packet_id = self._packet_id
         while packet_id == self._packet_id or packet_id in self._unacknowledged:
             packet_id = packet_id + 1 if packet_id < PACKET_ID_MAX else PACKET_ID_MIN
-        self._stream.add(self._writer.publish_confirmed(topic, payload, packet_id, retain=retain))
+        try:
+            packet = self._writer.publish_confirmed(topic, payload, packet_id, retain=retain)
+        except ValueError as error:
+            self._sendable.drop(topic, str(error))
+            return True
+        if not self._sendable.holds(topic, len(packet)):
+            return True
+        self._stream.add(packet)
         self._packet_id = packet_id
         self._unacknowledged[packet_id] = token
         return True

@@ -7,8 +7,11 @@ order, to whoever knows all of MQTT.
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from sparkplug.transport.sendable import topic_fault
+
 PACKET_BYTES_MAX = 1024 * 1024  # a longer one is not held here until it is whole
 TOPICS_MAX = 20_000
+TOPIC_BYTES_KEPT = 1024  # a longer one is read anew each time
 REMAINING_LENGTH_MAX = 268_435_455
 MQTT_5 = 5
 SUCCESS = 0
@@ -133,9 +136,10 @@ class PacketReader:
                 return None
             if not self._reader.wanted(known):
                 known = _UNWANTED
-            if len(self._topics) >= TOPICS_MAX:
-                self._topics.clear()
-            self._topics[name] = known
+            if len(name) <= TOPIC_BYTES_KEPT:
+                if len(self._topics) >= TOPICS_MAX:
+                    self._topics.clear()
+                self._topics[name] = known
         return known
 
     @staticmethod
@@ -226,9 +230,9 @@ class PacketWriter:
 
     def _head(self, topic: str) -> bytes:
         """Return the topic, written out, and the properties behind it, of which there are none."""
+        if fault := topic_fault(topic):
+            raise ValueError(fault)
         name = topic.encode()
-        if not 0 < len(name) <= 65_535 or "+" in topic or "#" in topic:
-            raise ValueError(f"nothing can be published on the topic {topic!r}: it is empty, too long, or holds a wildcard")
         if len(self._heads) >= TOPICS_MAX:
             self._heads.clear()
         head = self._heads[topic] = len(name).to_bytes(2) + name + self._properties

@@ -12,18 +12,26 @@ from paho.mqtt.reasoncodes import ReasonCode
 from sparkplug.actions import Action, Publish
 from sparkplug.transport.listener import Listener
 from sparkplug.transport.paho_client import StreamClient
+from sparkplug.transport.sendable import Sendable
 from sparkplug.transport.stream import Stream
 
 
 class PahoPath:
     """Serves one connection, once its socket is connected. Its methods are called by one thread at a time.
 
-    `refused` is called with the reason for which the broker has not taken a barrier.
+    `refused` is called with the reason for which the broker has not taken a barrier. A message that is not `sendable` is dropped.
     """
 
-    def __init__(self, client: StreamClient, stream: Stream, listener: Listener, refused: Callable[[str], None]) -> None:
+    def __init__(
+        self,
+        client: StreamClient,
+        stream: Stream,
+        listener: Listener,
+        refused: Callable[[str], None],
+        sendable: Sendable,
+    ) -> None:
         self._client, self._stream = client, stream
-        self._listener, self._refused = listener, refused
+        self._listener, self._refused, self._sendable = listener, refused, sendable
         self._barriers: dict[int, int] = {}  # packet id → token
         self._reading = False
         client.on_message = self._on_message
@@ -42,7 +50,8 @@ class PahoPath:
 
     def publish(self, action: Publish) -> bool:
         """Write a message; False where there are too many that the broker has not acknowledged."""
-        self._client.publish(action.topic, action.payload, action.qos, action.retain)
+        if self._sendable.takes(action):
+            self._client.publish(action.topic, action.payload, action.qos, action.retain)
         return True
 
     def barrier(self, topic: str, token: int) -> bool:

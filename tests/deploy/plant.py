@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import getpass
+import os
 import re
 import shutil
 import socket
@@ -22,6 +23,8 @@ EDGES, PROCESSORS, PEOPLE, PASSWORD_EDGES, EAR = 8883, 8884, 8885, 8886, 0
 BY_CERTIFICATE = ("edge-okuma", "edge-other")
 BY_PASSWORD = {"people": ("viewer", "operator", "edge-okuma"), "edges": ("edge-mill", "edge-okuma")}
 STARTUP_S_MAX = 60.0
+FOR_2_0, FOR_2_1 = "mosquitto.conf", "mosquitto-2.1.conf"
+PLUGINS = "/usr/lib/x86_64-linux-gnu/mosquitto"
 
 
 def certificates(*arguments: object) -> str:
@@ -35,11 +38,18 @@ def password_of(user: str) -> str:
     return f"pass word of {user}"
 
 
+def plugin_folder() -> Path | None:
+    """Where the plugins of Mosquitto 2.1 lie, by MOSQUITTO_PLUGINS or Debian's habit; None where there are none."""
+    folder = Path(os.environ.get("MOSQUITTO_PLUGINS", PLUGINS))
+    return folder if (folder / "mosquitto_acl_file.so").exists() else None
+
+
 class Plant:
     """The authority, the broker, and the addresses of all who may come in. Ports are those of the file, mapped to free ones."""
 
-    def __init__(self, home: Path) -> None:
+    def __init__(self, home: Path, shipped: str = FOR_2_0) -> None:
         self.home, self.authority = home, home / "authority"
+        self.shipped = DEPLOY / "mosquitto" / shipped
         self.ports = {port: free_port() for port in (EDGES, PROCESSORS, PEOPLE, PASSWORD_EDGES, EAR)}
         self._process: subprocess.Popen[bytes] | None = None
 
@@ -70,7 +80,7 @@ class Plant:
     def _configuration(self) -> str:
         """The file as shipped: only where things lie and which ports are free here differ. Last, a listener for the test to
         hear with what really got through."""
-        text = (DEPLOY / "mosquitto" / "mosquitto.conf").read_text()
+        text = self.shipped.read_text().replace(PLUGINS, str(plugin_folder()))
         text = text.replace("/etc/mosquitto/", f"{self.home}/etc/").replace("/var/lib/mosquitto/", f"{self.home}/")
         text, mapped = re.subn(
             r"^listener (\d+)$", lambda found: f"listener {self.ports[int(found[1])]} 127.0.0.1", text, flags=re.M

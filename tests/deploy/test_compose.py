@@ -24,7 +24,7 @@ from cnctwin.jobs.client import JobsClient
 from cnctwin.memory.store.influx.address import parse
 from cnctwin.memory.store.opening import default_place
 from edge.config_file import load
-from edge.running.run import broker_address
+from edge.running.run import broker_addresses
 from processors.discovery import discover
 from processors.running.runtime import configured
 from sparkplug.broker import BrokerAddress
@@ -228,7 +228,7 @@ def test_what_the_configuration_names_is_mounted_where_it_says(prepared: Prepare
     inside = {target: source for source, target in mounts(edge, prepared)}
     folder = inside["/etc/cnctwin"] / parsed(command(edge))["config"].relative_to("/etc/cnctwin")
     config = load(folder / f"{MACHINE}.toml")
-    address = broker_address(config.broker, folder / f"{MACHINE}.toml")
+    (address,) = broker_addresses(config.broker, folder / f"{MACHINE}.toml")
     assert (config.node, address.host, address.port, config.store.await_receipt) == (f"edge-{MACHINE}", "broker", 8883, True)
     for file in (address.ca_file, address.certificate_file, address.key_file):
         assert file is not None

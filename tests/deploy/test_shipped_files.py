@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from edge.config_file import load
-from edge.running.run import broker_address
+from edge.running.run import broker_addresses
 from tests.deploy.plant import DEPLOY
 
 UNITS = sorted((DEPLOY / "systemd").glob("*.service"))
@@ -17,7 +17,7 @@ EXPOSURE_MAX = 2.0  # of 10, by systemd's own measure
 @pytest.mark.parametrize("path", sorted((DEPLOY / "edges").glob("*.toml")), ids=lambda path: path.stem)
 def test_an_edge_of_the_plant_is_configured_as_its_certificate_says(path: Path) -> None:
     config = load(path)
-    address = broker_address(config.broker, path)
+    (address,) = broker_addresses(config.broker, path)
     assert (config.node, address.port, address.tls, address.mqtt_version) == (f"edge-{path.stem}", 8883, True, 5)
     assert str(address.key_file) == f"/run/credentials/cnctwin-edge@{path.stem}.service/key"
     assert "LoadCredential=key:" in (DEPLOY / "systemd" / "cnctwin-edge@.service").read_text()

@@ -1,14 +1,14 @@
 """Who may publish and read what on a broker with the files of deploy/mosquitto: every user on every topic, on the wire."""
 
 from dataclasses import replace
-from itertools import product
+from itertools import pairwise, product
 from pathlib import Path
 
 import pytest
 
 from processors.discovery import discover
 from tests.deploy.permissions import ALL, DEVICE_VERBS, MAY_READ, MAY_WRITE, NODE_VERBS, STATES, USERS, barrier, said_by
-from tests.deploy.plant import DEPLOY, EAR, EDGES, PROCESSORS, Plant, with_version
+from tests.deploy.plant import DEPLOY, EAR, EDGES, FOR_2_0, FOR_2_1, PROCESSORS, Plant, with_version
 from tests.deploy.wire_client import PATIENCE_S, WireClient
 
 pytestmark = pytest.mark.broker
@@ -135,8 +135,41 @@ def test_a_reader_that_hangs_for_a_while_loses_nothing(plant: Plant, qos: int, c
     assert [int(payload.split()[0]) for _, payload in viewer.received] == list(range(count + 1))
 
 
-def test_the_ear_of_the_test_is_no_part_of_what_is_shipped() -> None:
-    shipped = (DEPLOY / "mosquitto" / "mosquitto.conf").read_text()
+@pytest.mark.parametrize("file", [FOR_2_0, FOR_2_1])
+def test_the_ear_of_the_test_is_no_part_of_what_is_shipped(file: str) -> None:
+    shipped = (DEPLOY / "mosquitto" / file).read_text()
     assert "allow_anonymous true" not in shipped
     assert shipped.count("allow_anonymous false") == shipped.count("\nlistener ") == 4
     assert str(EAR) not in [line.split()[1] for line in shipped.split("\n") if line.startswith("listener ")]
+
+
+def _settings(file: str) -> list[str]:
+    return [line for line in (DEPLOY / "mosquitto" / file).read_text().split("\n") if line and not line.startswith("#")]
+
+
+def test_the_configurations_for_2_0_and_2_1_say_the_same_and_the_newer_one_uses_nothing_deprecated() -> None:
+    older, newer = _settings(FOR_2_0), _settings(FOR_2_1)
+    plugins = {file: name for name, file in _plugins(newer)}
+    expected = []
+    for line in older[1:]:
+        option, value = line.split(" ", 1)
+        if option in ("acl_file", "password_file"):
+            expected.append(f"plugin_use {plugins[value]}")
+        elif option == "allow_anonymous":
+            expected.append(f"listener_allow_anonymous {value}")
+        elif option != "allow_zero_length_clientid":
+            expected.append(line)
+    assert older[0] == "per_listener_settings true"
+    assert newer[2 * len(plugins) :] == ["allow_zero_length_clientid false", *expected]
+
+
+def _plugins(settings: list[str]) -> list[tuple[str, str]]:
+    """The name of each plugin and the file that it reads, one for each: listeners of one plugin would share the last file."""
+    found = []
+    for load, option in pairwise(settings):
+        if load.startswith("plugin_load "):
+            _, name, program = load.split(" ")
+            assert option.split(" ")[0] == f"plugin_opt_{Path(program).stem.removeprefix('mosquitto_')}"
+            found.append((name, option.split(" ")[1]))
+    assert len({name for name, _ in found}) == len({file for _, file in found}) == len(found) == 5
+    return found

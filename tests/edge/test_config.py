@@ -10,7 +10,7 @@ from edge.config_file import load, parse
 from edge.controls.mtconnect.adapter import ADAPTER
 from edge.controls.mtconnect.config import MtconnectConfig
 from edge.errors import ConfigError
-from edge.running.run import broker_address
+from edge.running.run import broker_addresses
 
 FILE = Path("vmc.toml")
 
@@ -54,6 +54,14 @@ def test_the_example_of_a_signal_in_the_sample_is_valid() -> None:
         ("[signals.feed_mm_min]\nscale = nan", "vmc.toml: signals.feed_mm_min.scale = nan: Input should be a finite number"),
         ("[tool_change]\nblock_pattern = '('", "vmc.toml: tool_change.block_pattern = '(': is no regular expression: missing )"),
         ("[opcua]", "vmc.toml: [opcua]: no such table; there are machine, broker, signals, report, "),
+        (
+            "[broker]\nurl = 'mqtt://a'\nurls = ['mqtt://b']",
+            "vmc.toml: broker = {'url': 'mqtt://a', 'urls': ['mqtt://b']}: has url and",
+        ),
+        (
+            "[broker]\nurls = ['mqtt://b', 'mqtt://b']",
+            "vmc.toml: broker = {'urls': ['mqtt://b', 'mqtt://b']}: urls names a broker",
+        ),
         ("machine = 3", "vmc.toml: machine = 3: Input should be a valid dictionary"),
         ("[machine", "vmc.toml: is no TOML: "),
     ],
@@ -76,11 +84,31 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
 def test_secrets_come_from_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
     section = parse("[broker]\nusername = 'edge'\npassword_env = 'EDGE_SECRET'", FILE).broker
     with pytest.raises(ConfigError, match=r"broker\.password_env = 'EDGE_SECRET': no such environment variable"):
-        broker_address(section, FILE)
+        broker_addresses(section, FILE)
     monkeypatch.setenv("EDGE_SECRET", "s3cret")
-    address = broker_address(section, FILE)
+    (address,) = broker_addresses(section, FILE)
     assert (address.username, address.password) == ("edge", "s3cret")
     assert "s3cret" not in repr(address) + address.url
+
+
+def test_several_brokers_share_the_user_and_keep_their_order(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("EDGE_SECRET", "s3cret")
+    text = "[broker]\nurls = ['mqtt://one', 'mqtts://two:8884']\nusername = 'edge'\npassword_env = 'EDGE_SECRET'"
+    addresses = broker_addresses(parse(text, FILE).broker, FILE)
+    assert [address.url for address in addresses] == ["mqtt://edge@one:1883", "mqtts://edge@two:8884"]
+    assert [address.password for address in addresses] == ["s3cret", "s3cret"]
+
+
+def test_one_edge_speaks_one_version_of_mqtt_to_all_its_brokers() -> None:
+    section = BrokerSection(urls=("mqtt://one", "mqtt://two?version=5"))
+    with pytest.raises(ConfigError, match="give all addresses version=5, or none"):
+        broker_addresses(section, FILE)
+
+
+def test_a_mistake_in_one_of_several_addresses_names_the_key() -> None:
+    section = parse("[broker]\nurls = ['mqtt://one', 'http://two']", FILE).broker
+    with pytest.raises(ConfigError, match=r"broker\.urls: broker address 'http://two'"):
+        broker_addresses(section, FILE)
 
 
 def test_an_address_with_a_password_is_refused_without_showing_it(tmp_path: Path) -> None:
@@ -108,7 +136,7 @@ def test_a_password_comes_from_a_file_that_only_its_owner_can_read(tmp_path: Pat
     secret.chmod(mode)
     section = BrokerSection(username="edge", password_file=str(secret))
     if expected == "secret":
-        assert broker_address(section, FILE).password == expected
+        assert broker_addresses(section, FILE)[0].password == expected
         return
     with pytest.raises(ConfigError, match=expected):
-        broker_address(section, FILE)
+        broker_addresses(section, FILE)

@@ -166,7 +166,8 @@ def test_a_wrong_first_value_is_refused_when_it_is_declared(datatype: DataType, 
 def test_an_instance_of_a_template_may_be_declared_a_definition_stands_apart() -> None:
     (metric,) = declared_by(certificate(MetricSpec("x", DataType.TEMPLATE, value=INSTANCE)))
     assert metric.value == INSTANCE
-    assert definition_metrics({"Axis": DEFINITION}, 5) == (Metric("Axis", DEFINITION, DataType.TEMPLATE, 5),)
+    metric = Metric("Axis", DEFINITION, DataType.TEMPLATE, 5, alias=7)
+    assert definition_metrics({"Axis": DEFINITION}, {"Axis": 7}.__getitem__, 5) == (metric,)
 
 
 def test_an_undeclared_metric_is_refused_with_those_that_are() -> None:

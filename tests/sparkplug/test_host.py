@@ -13,6 +13,7 @@ from sparkplug.broker import BrokerAddress
 from sparkplug.datatype import DataType
 from sparkplug.edge_node import EdgeNode
 from sparkplug.edge_session import EdgeNodeSession
+from sparkplug.errors import TopicError
 from sparkplug.host import EventKind, HostApplication, HostEvent
 from sparkplug.metric import Change, MetricSpec, NodeId
 from sparkplug.transport.loop import Loop
@@ -84,6 +85,35 @@ def test_data_that_have_waited_too_long_are_dropped_and_births_and_deaths_are_ke
     assert host.dropped == 3
 
 
+def test_an_inbox_that_cannot_be_read_in_time_loses_data_of_who_floods_and_the_rest_is_read_in_order(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    host, clock = unconnected(), [1000.0]
+    monkeypatch.setattr("sparkplug.host.time.monotonic", lambda: clock[0])
+    for flooding, quiet in zip(life(NODE, 1000), [*life(OTHER, 20), *[None] * 1000], strict=False):
+        for message in filter(None, (flooding, quiet)):
+            host._message(message.topic, message.payload)
+    monkeypatch.setattr(host_module, "EVENTS_A_POLL", 1)
+    events = []
+    for _ in range(20):
+        clock[0] += 0.1
+        events += host.poll(0.0)
+    monkeypatch.setattr(host_module, "EVENTS_A_POLL", 10_000)
+    events += host.poll(0.0)
+    left_out = host.take_thinned()
+    assert set(left_out) == {NODE}
+    assert host.take_thinned() == {}
+    flood = [event.readings[0].value for event in events if event.node == NODE and event.kind is EventKind.DATA]
+    assert flood == sorted(flood)  # type: ignore[type-var]
+    assert flood[-1] == 999.0
+    assert len(flood) + left_out[NODE] == 1000
+    assert len(flood) < 500
+    assert [event.readings[0].value for event in events if event.node == OTHER and event.kind is EventKind.DATA] == [
+        float(number) for number in range(20)
+    ]
+    assert host._session.actions == [], "nobody is asked for a rebirth"
+
+
 def test_data_of_any_age_below_the_bound_are_read(monkeypatch: pytest.MonkeyPatch) -> None:
     host = unconnected(stale_s_max=60.0)
     now_s = time.monotonic()
@@ -128,3 +158,33 @@ def test_a_host_and_a_node_share_a_loop_and_all_of_the_node_is_read_once(mosquit
         poll_until([*births, *[EventKind.DATA] * 3, *deaths, *births, *deaths])
         host.stop()
         assert proxy.packets("up", PublishPacket)[-1].topic == "spBv1.0/cnc/NDEATH/twin-thermal"
+
+
+@pytest.mark.broker
+def test_a_host_asks_a_node_of_which_it_has_heard_nothing_for_its_births(mosquitto: Mosquitto) -> None:
+    node = EdgeNode(BrokerAddress(*mosquitto.address), OTHER)
+    node.declare_device("okuma", [MetricSpec("load", DataType.DOUBLE)])
+    host = HostApplication(BrokerAddress(*mosquitto.address), "test")
+    assert not host.request_rebirth(OTHER), "offline"
+    node.start()
+    deadline_s = time.monotonic() + PATIENCE_S
+    while not node.online:
+        assert time.monotonic() < deadline_s
+        time.sleep(0.01)
+    host.start()
+    events: list[HostEvent] = []
+    asked = False
+    while len(events) < 2:
+        assert time.monotonic() < deadline_s
+        events += host.poll(0.1)
+        asked = asked or host.request_rebirth(OTHER)
+    assert [(event.kind, event.device) for event in events[:2]] == [(EventKind.BIRTH, None), (EventKind.BIRTH, "okuma")]
+    assert host.counts["rebirths_requested"] == 1
+    host.stop()
+    node.stop()
+
+
+@pytest.mark.parametrize("node", [NodeId("cnc", "+"), NodeId("#", "edge"), NodeId("cnc", "a/b")])
+def test_a_rebirth_is_asked_of_one_node_only(node: NodeId) -> None:
+    with pytest.raises(TopicError):
+        unconnected().request_rebirth(node)

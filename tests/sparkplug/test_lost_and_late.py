@@ -7,12 +7,12 @@ import pytest
 from sparkplug.actions import Publish
 from sparkplug.codec import encode
 from sparkplug.datatype import DataType
-from sparkplug.host_session import DOUBT_MS, DOUBTS_MAX
 from sparkplug.metric import Change, MetricSpec
 from sparkplug.node_picture import NodePicture
 from sparkplug.quality import Quality
 from sparkplug.schema import PayloadMessage
 from sparkplug.values import Metric, Payload
+from sparkplug.watched import DOUBT_MS, DOUBTS_MAX
 from tests.sparkplug.simulated_edge import Edge
 from tests.sparkplug.world import World
 

@@ -22,7 +22,7 @@ def test_the_hot_path_reads_what_the_codec_reads(data: st.DataObject) -> None:
     picture = NodePicture(NodeId("cnc", "edge"))
     aliases = data.draw(st.permutations([None, *range(4)]), "aliases")[: len(types)]
     birth = tuple(Metric(f"m{i}", None, t, 1, aliases[i]) for i, t in enumerate(types))
-    picture.own.bear(parse(encode(Payload(1, birth))), 1, picture.aliases)
+    picture.own.bear(parse(encode(Payload(1, birth))), 1, picture.holders)
     sent = []
     for _ in range(data.draw(st.integers(0, 6), "count")):
         i = data.draw(st.integers(0, len(types) - 1), "metric")
@@ -59,7 +59,7 @@ def test_the_hot_path_reads_what_the_codec_reads(data: st.DataObject) -> None:
 def test_alias_0_is_not_the_alias_of_metrics_without_one() -> None:
     picture = NodePicture(NodeId("cnc", "edge"))
     birth = (Metric("zero", 1.0, DataType.DOUBLE, 1, alias=0), Metric("named", 2.0, DataType.DOUBLE, 1))
-    picture.own.bear(parse(encode(Payload(1, birth))), 1, picture.aliases)
+    picture.own.bear(parse(encode(Payload(1, birth))), 1, picture.holders)
     data = parse(encode(Payload(2, (Metric("named", 3.0, DataType.DOUBLE, 2), Metric(None, 4.0, DataType.DOUBLE, 2, alias=0)))))
     readings, complete = picture.read_data(picture.own, data, 2)
     assert complete and [(r.name, r.value) for r in readings] == [("named", 3.0), ("zero", 4.0)]

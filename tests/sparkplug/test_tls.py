@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from sparkplug.admission.limits import Limits
 from sparkplug.broker import BrokerAddress
 from sparkplug.datatype import DataType
 from sparkplug.edge_node import EdgeNode
@@ -86,7 +87,7 @@ def secured(tmp_path_factory: pytest.TempPathFactory, mosquitto_program: str) ->
 @pytest.mark.parametrize("version", [4, 5])
 def test_births_and_long_data_pass_through_tls(secured: BrokerAddress, version: int) -> None:
     address = replace(secured, mqtt_version=version)
-    host, edge = HostApplication(address, "tls"), EdgeNode(address, NODE)
+    host, edge = HostApplication(address, "tls", limits=Limits(text_bytes_max=200_000)), EdgeNode(address, NODE)
     edge.declare_device("vmc", [MetricSpec("nc_block", DataType.STRING)])
     host.start()
     deadline_s = time.monotonic() + PATIENCE_S

@@ -36,6 +36,8 @@ MIRROR = "cnc/"
 
 JOBS = f"{MIRROR}jobs/"
 """Beside the metrics of the node `twin-jobs`."""
+RESERVED_MACHINES = (JOBS.removeprefix(MIRROR).rstrip("/"),)
+"""The names that no machine may have: the mirror would write where others do."""
 JOB_REQUEST = f"{JOBS}request"
 """JSON: a request (cnctwin/jobs/request.py)."""
 JOB_CANCEL = f"{JOBS}cancel"

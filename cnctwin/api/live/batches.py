@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from cnctwin.api.value_object import QUALITY_NAMES, Plain
@@ -15,6 +16,17 @@ class Batch(NamedTuple):
 
     machine: str | None
     payload: bytes
+
+
+@dataclass(slots=True)
+class Waiting:
+    """Changes of a machine that its readers have not been sent yet."""
+
+    rows: list[Row] = field(default_factory=list)
+    left_out: int = 0
+    is_anew: bool = False
+    told_ms: int = 0
+    readers: int = 0
 
 
 def event(name: str, value: Any) -> bytes:

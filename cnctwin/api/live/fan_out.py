@@ -11,14 +11,16 @@ from cnctwin.api.live.batches import ALL, Batch
 from cnctwin.api.live.plant import LivePlant
 
 READERS_MAX = 64
+OF_ONE_MAX = 32
 BEHIND_MAX = 50  # messages, so 5 s at ten a second
 
 
 class Reader:
-    """One open stream: of a machine, or of the fleet (None)."""
+    """One open stream: of a machine, or of the fleet (None), for a client."""
 
-    def __init__(self, machine: str | None) -> None:
+    def __init__(self, machine: str | None, client: str = "") -> None:
         self.machine = machine
+        self.client = client
         self.messages: asyncio.Queue[bytes | None] = asyncio.Queue(BEHIND_MAX + 1)
         self.is_over = False
 
@@ -61,11 +63,15 @@ class FanOut:
         if self._loop is not None and not self._loop.is_closed():
             self._loop.call_soon_threadsafe(self._deliver, batches)
 
-    def open(self, machine: str | None) -> Reader:
-        """One more stream. Raises ApiError where there are too many."""
+    def open(self, machine: str | None, client: str = "") -> Reader:
+        """One more stream. Raises ApiError where there are too many, or too many of this client."""
         if len(self) >= self._readers_max:
             raise ApiError(503, f"{self._readers_max} streams are open, which is the limit; close a page", {"Retry-After": "10"})
-        reader = Reader(machine)
+        if client and sum(one.client == client for group in self._readers.values() for one in group) >= OF_ONE_MAX:
+            raise ApiError(
+                503, f"{OF_ONE_MAX} streams of {client} are open, which is the limit; close a page", {"Retry-After": "10"}
+            )
+        reader = Reader(machine, client)
         self._readers.setdefault(machine, set()).add(reader)
         self._live.watch(machine)
         if self._is_over:

@@ -1,16 +1,15 @@
 """The batch consumer's jobs as last heard: all in short, each in full, and answers to what we asked."""
 
-import json
 import re
 import threading
 from typing import Any
 from uuid import uuid4
 
+from cnctwin.api.live.documents import JobReply, JobsState, JobState, read_document
 from twin.vocabulary.topics import JOB_REPLY, JOBS_STATE, state_of_job
 
 JOBS_MAX = 1000
 WAITING_MAX = 100
-BYTES_MAX = 4_000_000
 _OWN = f"{JOB_REPLY}page-{uuid4().hex[:8]}/"
 _ONE = re.compile(state_of_job("([^/]+)"))
 
@@ -27,13 +26,17 @@ class LiveJobs:
         self._answers: dict[str, dict[str, Any] | None] = {}
 
     def take(self, topic: str, payload: bytes) -> None:
-        """A message of those topics; of others, nothing happens."""
-        document = _parsed(payload)
+        """A message of those topics; of others, nothing happens. Raises DocumentError, and what was known stays so."""
+        one = _ONE.fullmatch(topic)
+        if topic != JOBS_STATE and one is None and topic not in self._answers:
+            return
+        shape = JobsState if topic == JOBS_STATE else JobState if one else JobReply
+        document = read_document(payload, shape) if payload else None  # empty is one that was taken away
         with self._lock:
             if topic == JOBS_STATE:
                 self._all = document
-            elif found := _ONE.fullmatch(topic):
-                self._take_one(found[1], document)
+            elif one is not None:
+                self._take_one(one[1], document)
             elif document is not None and self._answers.get(topic, document) is None:
                 self._answers[topic] = document
 
@@ -71,14 +74,3 @@ class LiveJobs:
         """No answer is awaited there any more."""
         with self._lock:
             self._answers.pop(topic, None)
-
-
-def _parsed(payload: bytes) -> dict[str, Any] | None:
-    """A document; None for an empty payload, by which a retained one is taken away, and for what is none."""
-    if not payload or len(payload) > BYTES_MAX:
-        return None
-    try:
-        document = json.loads(payload)
-    except (ValueError, RecursionError):
-        return None
-    return document if isinstance(document, dict) else None

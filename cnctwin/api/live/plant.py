@@ -4,16 +4,18 @@ One thread feeds it (`take`, `flush`); any thread may ask. A lock is held for as
 over an encoding or a wait. Readings that an edge sends late, as history, are not in it: they are in the store.
 """
 
+import logging
 import threading
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
 from math import isfinite
 from typing import Any, NamedTuple
 
-from cnctwin.api.fleet import fleet_item, is_key_signal
-from cnctwin.api.live.batches import Batch, Row, alerts_batch, behind_batch, fleet_rows, machine_rows, state_batch
-from cnctwin.api.live.trace import Sample, Trace
+from cnctwin.api.fleet import fleet_item
+from cnctwin.api.live.batches import Batch, Row, Waiting, alerts_batch, behind_batch, fleet_rows, machine_rows, state_batch
+from cnctwin.api.live.owner import Owner, Signal
+from cnctwin.api.live.stamp import STAMP_MS_MAX, is_time, without_time
+from cnctwin.api.live.trace import Sample
 from cnctwin.api.value_object import plain, value_object
 from cnctwin.plant.lags import behind, lag_reports
 from sparkplug.host_session import EventKind, HostEvent
@@ -29,33 +31,11 @@ ROWS_MAX = 5000  # that wait for one flush, of one machine
 EVENTS_A_LOCK = 50  # so that who asks waits a millisecond or two
 SILENCE_MS_MAX = 2000  # readers hear something at least so often
 LAG_MS = 1000  # between two looks at what the processors report of their lag
+LINE_MAX = 300
 MEASURED = "measured"
+_log = logging.getLogger(__name__)
 _UNSHOWN = (tuple, bytes, DataSet, Template)  # NaN is kept as a null
 Describe = Callable[[NodeId, str | None], Mapping[str, PropertySet]]
-
-
-class Signal:
-    """One metric of one owner: its last reading, its trace, and what the birth says of it."""
-
-    __slots__ = ("is_key", "live_ms", "meaning", "provenance", "reading", "trace", "whole_ms")
-
-    def __init__(self, reading: Reading, provenance: str, meaning: str | None) -> None:
-        self.reading = reading
-        self.provenance = provenance
-        self.meaning = meaning
-        self.trace = Trace()
-        self.is_key = is_key_signal(reading.name)
-        self.live_ms = reading.timestamp_ms  # of the last value that was told, and not only marked stale
-        self.whole_ms = reading.timestamp_ms  # nothing is missing in the trace since then
-
-
-@dataclass(slots=True)
-class Owner:
-    """The metrics of a device, or of a node itself, as one node tells them."""
-
-    online: bool = False
-    is_control: bool = False  # it tells measured values, not only the twin's
-    signals: dict[str, Signal] = field(default_factory=dict)
 
 
 class NodeView(NamedTuple):
@@ -66,26 +46,16 @@ class NodeView(NamedTuple):
     values: dict[str, Any]
 
 
-@dataclass(slots=True)
-class _Waiting:
-    """Changes of a machine that its readers have not been sent yet."""
-
-    rows: list[Row] = field(default_factory=list)
-    left_out: int = 0
-    is_anew: bool = False
-    told_ms: int = 0
-    readers: int = 0
-
-
 class LivePlant:
     """The plant as it is now. `take` and `flush` belong to one thread."""
 
     def __init__(self) -> None:
         self.counts: Counter[str] = Counter()
+        self.refused = ""  # what was kept out last, in words
         self._lock = threading.Lock()
         self._machines: dict[str, dict[NodeId, Owner]] = {}
         self._nodes: dict[NodeId, Owner] = {}
-        self._waiting: dict[str, _Waiting] = {}
+        self._waiting: dict[str, Waiting] = {}
         self._fleet: dict[tuple[str, str], Row] = {}
         self._fleet_readers = 0
         self._fleet_told_ms = 0
@@ -97,25 +67,27 @@ class LivePlant:
     # What the feeding thread tells.
 
     def take(self, events: Sequence[HostEvent], now_ms: int, describe: Describe = lambda _node, _device: {}) -> None:
-        """Take over what a host application has heard."""
+        """Take over what a host application has heard. What goes wrong at one event is counted, and keeps no other out."""
         for start in range(0, len(events), EVENTS_A_LOCK):
             with self._lock:
                 for event in events[start : start + EVENTS_A_LOCK]:
                     if event.device is not None and event.node.node == JOBS_NODE:
                         continue  # a job is no machine, nor is each machine that a job is about one of the plant
-                    if event.kind is EventKind.DATA:
-                        self._data(event, now_ms)
-                    elif event.kind is EventKind.BIRTH:
-                        self._birth(event, describe(event.node, event.device))
-                    elif event.kind is EventKind.DEATH:
-                        self._death(event)
-                    elif event.kind is EventKind.HOLE:
-                        self._hole(event)
+                    try:
+                        self._take(event, now_ms, describe)
+                    except Exception:
+                        _log.exception("the view failed at a message of %s; it goes on with the next", event.node)
+                        self.counts["failures"] += 1
 
     def take_alerts(self, state: dict[str, Any]) -> None:
         """The alerts processor's state, as it publishes it."""
         with self._lock:
             self._alerts, self._alerts_are_new = state, True
+
+    def refuse(self, count: str, line: str) -> None:
+        """Count something that was kept out."""
+        self.counts[count] += 1
+        self.refused = "".join(sign if sign.isprintable() else "?" for sign in line[:LINE_MAX])
 
     def flush(self, now_ms: int) -> list[Batch]:
         """Return what is to be sent to readers now: each message is encoded once, however many read it."""
@@ -206,7 +178,7 @@ class LivePlant:
             if machine is None:
                 self._fleet_readers += 1
             else:
-                self._waiting.setdefault(machine, _Waiting()).readers += 1
+                self._waiting.setdefault(machine, Waiting()).readers += 1
 
     def unwatch(self, machine: str | None) -> None:
         """Somebody does no longer."""
@@ -219,6 +191,25 @@ class LivePlant:
                     del self._waiting[machine]
 
     # How it is done; the lock is held.
+
+    def _take(self, event: HostEvent, now_ms: int, describe: Describe) -> None:
+        if not is_time(event.timestamp_ms):
+            event = event._replace(timestamp_ms=now_ms)
+        if event.kind is EventKind.DATA:
+            self._data(event, now_ms)
+        elif event.kind is EventKind.BIRTH:
+            self._birth(event, now_ms, describe(event.node, event.device))
+        elif event.kind is EventKind.DEATH:
+            self._death(event, now_ms)
+        elif event.kind is EventKind.HOLE:
+            self._hole(event)
+
+    def _timed(self, reading: Reading, event: HostEvent, now_ms: int) -> Reading:
+        if is_time(reading.timestamp_ms):
+            return reading
+        kept_out = without_time(reading, now_ms)
+        self.refuse("readings_refused", f"{reading.name} of {event.device or event.node.node}: {kept_out.reason}")
+        return kept_out
 
     def _sentence(self) -> str | None:
         own = ((node.node, owner) for node, owner in self._nodes.items() if owner.online and is_twin_node(node.node))
@@ -235,17 +226,18 @@ class LivePlant:
             owners = self._machines[event.device] = {}
         return owners.setdefault(event.node, Owner())
 
-    def _birth(self, event: HostEvent, properties: Mapping[str, PropertySet]) -> None:
+    def _birth(self, event: HostEvent, now_ms: int, properties: Mapping[str, PropertySet]) -> None:
         owner = self._owner(event)
         if owner is None:
             return
         before, owner.online, owner.signals = owner.signals, True, {}
-        for reading in event.readings:
+        for told in event.readings:
+            reading = self._timed(told, event, now_ms)
             if len(owner.signals) >= SIGNALS_MAX:
                 self.counts["signals_over_limit"] += 1
                 continue
-            told = properties.get(reading.name, {})
-            signal = Signal(reading, _text(told, "provenance") or MEASURED, _text(told, "meaning"))
+            said = properties.get(reading.name, {})
+            signal = Signal(reading, _text(said, "provenance") or MEASURED, _text(said, "meaning"))
             owner.signals[reading.name] = signal
             if event.device is None:
                 continue
@@ -270,6 +262,9 @@ class LivePlant:
             signal = signals.get(name)
             if signal is None or is_historical:
                 continue
+            if not 0 <= t_ms <= STAMP_MS_MAX:
+                reading = self._timed(reading, event, now_ms)  # noqa: PLW2901
+                name, value, t_ms, quality, _, reason, _ = reading
             signal.reading = reading
             newest_ms = max(newest_ms, t_ms)
             if device is None:
@@ -291,11 +286,12 @@ class LivePlant:
             self.counts["messages"] += 1
             self.counts["latency_ms"] += max(now_ms - newest_ms, 0)
 
-    def _death(self, event: HostEvent) -> None:
+    def _death(self, event: HostEvent, now_ms: int) -> None:
         owner = self._owner(event)
         if owner is None:
             return
-        for reading in event.readings:
+        for told in event.readings:
+            reading = self._timed(told, event, now_ms)
             signal = owner.signals.get(reading.name)
             if signal is not None:
                 if owner.online:
@@ -347,7 +343,7 @@ class LivePlant:
                     self._fleet[device, name] = _row(signal.reading)
             self._fleet[device, "online"] = (event.timestamp_ms, "online", self._online(device), Quality.GOOD, None)
 
-    def _job(self, machine: str, waiting: _Waiting, now_ms: int) -> Callable[[], Batch] | None:
+    def _job(self, machine: str, waiting: Waiting, now_ms: int) -> Callable[[], Batch] | None:
         if not (waiting.rows or waiting.is_anew or now_ms - waiting.told_ms >= SILENCE_MS_MAX):
             return None
         waiting.told_ms = now_ms

@@ -1,17 +1,17 @@
 """The interface's ear on the broker: a thread that feeds the live plant and hands on what its readers are to be told."""
 
-import json
 import logging
 import threading
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
-from typing import Any
 
 from cnctwin.api.live.batches import Batch
+from cnctwin.api.live.documents import AlertsState, DocumentError, read_document
 from cnctwin.api.live.jobs import LiveJobs
 from cnctwin.api.live.plant import LivePlant
 from cnctwin.plant.watch import viewer
+from sparkplug.admission.limits import DEFAULTS, Limits
 from sparkplug.broker import BrokerAddress
 from sparkplug.clock import now_ms
 from sparkplug.host_session import EventKind, HostEvent
@@ -23,7 +23,6 @@ FLUSH_S = 0.1
 POLL_S = 0.05
 GATHER_S = 0.02
 """Between two looks at the broker: to wake for each message costs more than the message."""
-ALERTS_BYTES_MAX = 4_000_000
 OUTBOX_MAX = 100
 _log = logging.getLogger(__name__)
 
@@ -31,13 +30,13 @@ _log = logging.getLogger(__name__)
 class Viewer:
     """Between `start` and `stop` the plant and the jobs are kept up to date. `on_batches` is called from the thread."""
 
-    def __init__(self, broker: BrokerAddress, group: str, live: LivePlant) -> None:
+    def __init__(self, broker: BrokerAddress, group: str, live: LivePlant, limits: Limits = DEFAULTS) -> None:
         self.url = broker.url
         self.group = group
         self.on_batches: Callable[[list[Batch]], None] = lambda _: None
         self.jobs = LiveJobs()
         self._live = live
-        self._host = viewer(broker, group)
+        self._host = viewer(broker, group, limits)
         for topic in (ALERT_STATE, *LiveJobs.filters):
             self._host.subscribe_plain(topic)
         self._outbox: deque[tuple[str, bytes]] = deque(maxlen=OUTBOX_MAX)
@@ -106,22 +105,18 @@ class Viewer:
     def _take(self, events: list[HostEvent]) -> None:
         self._live.take(events, now_ms(), self._describe)
         for event in (one for one in events if one.kind is EventKind.PLAIN):
-            if event.topic != ALERT_STATE:
-                self.jobs.take(event.topic, event.payload)
-            elif (state := _parsed(event.payload)) is not None:
-                self._live.take_alerts(state)
+            try:
+                self._take_document(event)
+            except DocumentError as error:
+                self._live.refuse("documents_refused", f"{event.topic}: {error}")
+
+    def _take_document(self, event: HostEvent) -> None:
+        if event.topic != ALERT_STATE:
+            self.jobs.take(event.topic, event.payload)
+        elif event.payload:
+            self._live.take_alerts(read_document(event.payload, AlertsState))
 
     def _describe(self, node: NodeId, device: str | None) -> Mapping[str, PropertySet]:
         picture = self._host.picture(node)
         owner = None if picture is None else picture.owner(device)
         return {} if owner is None else owner.properties
-
-
-def _parsed(payload: bytes) -> dict[str, Any] | None:
-    if len(payload) > ALERTS_BYTES_MAX:
-        return None
-    try:
-        state = json.loads(payload)
-    except (ValueError, RecursionError):
-        return None
-    return state if isinstance(state, dict) else None

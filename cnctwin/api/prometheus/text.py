@@ -25,8 +25,11 @@ NODE_GAUGES = {
     "twin_processor_lag_events": ("health/queue_depth", "messages behind the network thread"),
     "twin_processor_queue_depth": ("health/queue_depth", "messages behind the network thread"),
     "twin_state_checkpoint_age_seconds": ("health/snapshot_age_s", "age of the oldest unsaved state"),
-    "twin_buffer_oldest_age_seconds": ("health/store_age_s", "age of the oldest row that no broker has confirmed"),
-    "twin_buffer_rows": ("health/store_rows", "rows that no broker has confirmed"),
+    "twin_buffer_oldest_age_seconds": (
+        "health/store_age_s",
+        "age of the oldest row that no broker, or no historian, has confirmed",
+    ),
+    "twin_buffer_rows": ("health/store_rows", "rows that no broker, or no historian, has confirmed"),
     "twin_buffer_bytes": ("health/store_bytes", "size of the edge's ring"),
     "twin_control_online": ("health/control_online", "whether the edge has its control"),
 }
@@ -89,6 +92,11 @@ class PlantCollector(Collector):
         yield GaugeMetricFamily("twin_page_streams", "open streams", self._streams)
         yield CounterMetricFamily("twin_page_streams_dropped", "streams let go because they did not keep up", self._dropped)
         yield CounterMetricFamily("twin_page_messages", "messages of machines that this server has heard", counts["messages"])
+        refused = CounterMetricFamily("twin_page_refused", "what this server could not take over", labels=["what"])
+        for what in ("readings", "documents"):
+            refused.add_metric([what], counts[f"{what}_refused"])
+        refused.add_metric(["messages"], counts["failures"])
+        yield refused
         latency = CounterMetricFamily("twin_page_latency_seconds_sum", "sum of event time to arrival, over twin_page_messages")
         latency.add_metric([], counts["latency_ms"] / 1000.0)
         yield latency

@@ -16,6 +16,7 @@ from cnctwin.jobs.client import FRESH_S_MAX as JOBS_FRESH_S_MAX
 from cnctwin.page import WEB
 from cnctwin.plant.alert_desk import FRESH_S_MAX
 from cnctwin.plant.doctor import COME_AND_GO
+from cnctwin.plant.quarantine import SHOWN_MAX, refused_lines
 from cnctwin.processes import published_state
 from sparkplug.clock import now_ms
 from twin.vocabulary.nodes import JOBS_NODE, TWIN_NODE_PREFIX, is_twin_node
@@ -42,9 +43,17 @@ def health_routes(sources: Sources) -> APIRouter:
     @router.get("/health", response_model=Health)
     async def health() -> Any:
         """Each part with its state, the reason and what to do; 200 also where some are missing."""
-        parts = [_broker(sources), _plant(sources.live), _processors(sources.live), await _store(sources), _constants(sources)]
+        parts = [
+            _broker(sources),
+            _plant(sources.live),
+            _processors(sources.live),
+            _refused(sources.live),
+            _input(sources.live),
+            await _store(sources),
+            _constants(sources),
+        ]
         parts += [await sources.store.work(lambda: models_part(sources.models))]
-        parts += [_alerts(sources.live), _jobs(sources), _diagnoses(sources), _page()]
+        parts += [_alerts(sources.live), _jobs(sources), _diagnoses(sources), _audit(sources), _page()]
         degraded = any(part.state in ("degraded", "missing") for part in parts)
         return Health(status="degraded" if degraded else "ok", now=now_ms(), parts=parts)
 
@@ -65,6 +74,17 @@ def _broker(sources: Sources) -> Part:
     return Part(part="broker", state="ok", reason=f"{viewer.url}, group {viewer.group}")
 
 
+def _input(live: LivePlant) -> Part:
+    """What came from the broker and could not be taken over."""
+    counts = live.counts
+    words = {"readings_refused": "readings", "documents_refused": "documents", "failures": "messages"}
+    kept_out = ", ".join(f"{counts[name]} {word}" for name, word in words.items() if counts[name])
+    if not kept_out:
+        return Part(part="input", state="ok")
+    newest = f"; the newest: {live.refused}" if live.refused else ""
+    return Part(part="input", state="degraded", reason=f"{kept_out} kept out{newest}", do="look at who sends it")
+
+
 def _processors(live: LivePlant) -> Part:
     """Those that were heard of since the server began; one that ends in its own time, as a nightly check, is not missed."""
     others = (*COME_AND_GO, JOBS_NODE)
@@ -78,6 +98,16 @@ def _processors(live: LivePlant) -> Part:
     if (behind := live.behind()) is not None:
         return Part(part="processors", state="degraded", reason=behind, do="cnctwin plan fleet")
     return Part(part="processors", state="ok", reason=f"{len(known)} online")
+
+
+def _refused(live: LivePlant) -> Part:
+    """What the processors do not let in."""
+    own = [(view.node, view.values) for view in live.nodes() if view.online and is_twin_node(view.node)]
+    lines = refused_lines((), own)
+    if not lines:
+        return Part(part="admission", state="ok", reason="nothing is refused")
+    line = "; ".join(lines[:SHOWN_MAX]) + (f"; and {len(lines) - SHOWN_MAX} more" if len(lines) > SHOWN_MAX else "")
+    return Part(part="admission", state="degraded", reason=line, do="correct what these edges send, or raise [limits]")
 
 
 def _plant(live: LivePlant) -> Part:
@@ -154,6 +184,13 @@ def _diagnoses(sources: Sources) -> Part:
         line = f"{folder} is no folder"
         return Part(part="diagnoses", state="missing", reason=line, do="cnctwin gap diagnose CASE --out DIR/<machine>")
     return Part(part="diagnoses", state="ok", reason=str(folder))
+
+
+def _audit(sources: Sources) -> Part:
+    audit = sources.audit
+    if audit.trouble:
+        return Part(part="audit", state="degraded", reason=audit.trouble, do="cnctwin serve --audit FILE")
+    return Part(part="audit", state="ok", reason="in memory only" if audit.file is None else str(audit.file))
 
 
 def _page() -> Part:

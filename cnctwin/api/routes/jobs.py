@@ -10,12 +10,13 @@ from pathlib import Path as FilePath
 from typing import Annotated, Any
 from uuid import uuid4
 
-from fastapi import APIRouter, Path
+from fastapi import APIRouter, Path, Request
 from fastapi.responses import Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from cnctwin.api.answers import Answer, Problem
 from cnctwin.api.errors import ApiError
+from cnctwin.api.live.documents import JobInShort
 from cnctwin.api.live.jobs import LiveJobs
 from cnctwin.api.live.viewer import Viewer
 from cnctwin.api.routes.gap import REPORT_POLICY
@@ -42,6 +43,9 @@ class JobRequest(BaseModel):
     )
     job: str = Field(max_length=40, json_schema_extra={"enum": list(KINDS)})
     id: str | None = Field(None, max_length=64, description="the caller's own, if any; the same id twice is the same job")
+    by: str | None = Field(
+        None, max_length=100, description="who asks; of a user who is known by name, that name, whatever stands here"
+    )
 
 
 class JobAnswer(Answer):
@@ -51,22 +55,6 @@ class JobAnswer(Answer):
     answer: str = Field(description="accepted, known (it was asked for before) or cancelled", examples=["accepted"])
     state: str = Field(examples=["queued"])
     place: int | None = Field(None, description="0 = running, 1 = next; null = over")
-
-
-class JobInShort(Answer):
-    """A job; times are ms since 1970, UTC."""
-
-    id: str
-    kind: str = Field(examples=["optimise"])
-    machine: str = ""
-    state: str = Field(examples=["running"])
-    attempt: int = 0
-    progress_pct: float = 0.0
-    doing: str = ""
-    reason: str = ""
-    caution: str = Field(
-        "", description="what its result exceeds; empty = nothing that is known", examples=["2 lines are above a limit"]
-    )
 
 
 class JobInFull(JobInShort):
@@ -124,12 +112,13 @@ def job_routes(sources: Sources) -> APIRouter:
         return Response(content, media_type="application/octet-stream", headers=headers)
 
     @router.post("/jobs", response_model=JobAnswer, responses=refusals)
-    async def ask(body: JobRequest) -> Any:
+    async def ask(body: JobRequest, request: Request) -> Any:
         """Have something computed. It is accepted when this is answered, and is not lost from then on."""
-        document = body.model_dump(exclude_none=True)
+        document = body.model_dump(exclude_none=True) | _signed(request)
         document.setdefault("id", f"{body.job}-{uuid4().hex[:12]}")
         if "reply_to" in document:
             raise ApiError(400, "reply_to is for requests over the broker; the answer to this one comes here")
+        request.state.object = document["id"]
         try:
             read_request(json.dumps(document).encode())
         except RequestError as error:
@@ -137,10 +126,10 @@ def job_routes(sources: Sources) -> APIRouter:
         return await _answer(viewer, JOB_REQUEST, document)
 
     @router.post("/jobs/{job_id}/cancel", response_model=JobAnswer, responses={**missing, **refusals})
-    async def cancel(job_id: JobId) -> Any:
+    async def cancel(job_id: JobId, request: Request) -> Any:
         """Cancel a job that waits or runs."""
         _known(viewer, job_id)
-        return await _answer(viewer, JOB_CANCEL, {"id": job_id})
+        return await _answer(viewer, JOB_CANCEL, {"id": job_id, **_signed(request)})
 
     return router
 
@@ -164,6 +153,11 @@ def caution_of(job: dict[str, Any]) -> str:
 def _cautioned(viewer: Viewer, job: dict[str, Any]) -> dict[str, Any]:
     """A job in short, with what only the one in full tells."""
     return {**job, "caution": caution_of(viewer.jobs.one(str(job.get("id"))) or {})}
+
+
+def _signed(request: Request) -> dict[str, str]:
+    """`by`, where the server knows who asks: then it is that name, whatever the request says."""
+    return {"by": request.state.user} if request.state.user else {}
 
 
 def _known(viewer: Viewer | None, job_id: str) -> dict[str, Any]:

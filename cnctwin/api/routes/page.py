@@ -1,5 +1,6 @@
 """The page, its log-in, and a list of the routes that needs no network: the usual one loads its parts from elsewhere."""
 
+import asyncio
 import html
 import time
 from typing import Any
@@ -9,10 +10,11 @@ from fastapi.responses import HTMLResponse, Response
 from pydantic import BaseModel, ConfigDict, Field
 from starlette.staticfiles import StaticFiles
 
-from cnctwin.api.access import COOKIE, SESSION_S, Access, same_address
+from cnctwin.api.access import COOKIE, SESSION_S, Access
 from cnctwin.api.answers import Problem
 from cnctwin.api.errors import ApiError
-from cnctwin.api.failures import Failures
+from cnctwin.api.failures import DELAY_S, Failures
+from cnctwin.api.guard import too_many
 from cnctwin.page import WEB
 
 FRESH = "no-cache"  # kept, but asked for each time whether it is still so
@@ -43,15 +45,18 @@ def page_routes(access: Access, failures: Failures) -> APIRouter:
     @router.post("/login", status_code=204, responses={401: {"model": Problem}, 429: {"model": Problem}})
     async def login(body: Token, request: Request) -> Response:
         """Give the token once; the answer sets a cookie that no script can read, for twelve hours."""
-        if access.token is None:
+        if not access.has_tokens:
             raise ApiError(404, "this server has no token; nobody has to log in")
-        peer = request.client.host if request.client else ""
-        if not access.is_token(body.token):
-            failures.add(peer, time.monotonic())
+        user = access.bearer(body.token)
+        if user is None:
+            if wait_s := failures.add(request.state.client, time.monotonic()):
+                await asyncio.sleep(DELAY_S)
+                raise ApiError(429, *too_many(request.state.client, wait_s))
             raise ApiError(401, "that is not the token of this server")
+        request.state.user, request.state.role = user.name or None, user.role
         response = Response(status_code=204)
-        secure = _is_secure(request, access, peer)
-        value = access.session(time.time())
+        secure = _is_secure(request, access, request.client.host if request.client else "")
+        value = access.session(time.time(), user)
         response.set_cookie(COOKIE, value, max_age=SESSION_S, httponly=True, samesite="strict", secure=secure, path="/")
         return response
 
@@ -96,5 +101,6 @@ def routes_page(document: dict[str, Any]) -> str:
 
 
 def _is_secure(request: Request, access: Access, peer: str) -> bool:
-    by_proxy = access.proxy is not None and same_address(peer, access.proxy)
-    return request.url.scheme == "https" or (by_proxy and request.headers.get("x-forwarded-proto", "").lower() == "https")
+    return request.url.scheme == "https" or (
+        access.is_proxy(peer) and request.headers.get("x-forwarded-proto", "").lower() == "https"
+    )

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Path, Query
+from fastapi import APIRouter, Path, Query, Request
 from fastapi.responses import Response
 
 from cnctwin.api.answers import FleetItem, Problem, State
@@ -35,6 +35,7 @@ def plant_routes(live: LivePlant, fan_out: FanOut) -> APIRouter:
 
     @router.get("/stream", responses={200: {"content": {"text/event-stream": {}}}, **UNKNOWN, **BUSY}, response_class=Response)
     async def stream(
+        request: Request,
         machine: Annotated[str | None, Query(description="One machine; without it, the fleet", max_length=200)] = None,
     ) -> Response:
         """Server-sent events, at most ten a second.
@@ -46,7 +47,7 @@ def plant_routes(live: LivePlant, fan_out: FanOut) -> APIRouter:
         """
         if machine is not None:
             known_state(live, machine)
-        reader = fan_out.open(machine)
+        reader = fan_out.open(machine, request.state.client)
         if machine is None:
             first = event("fleet", {"now": now_ms(), "behind": live.behind(), "machines": live.fleet()})
         else:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from cnctwin.errors import UsageError
+from cnctwin.files.synced import make_folder, sync_folder
 
 IDS_MAX = 5000
 
@@ -48,10 +49,11 @@ class Journal:
         self._write()
 
     def _write(self) -> None:
-        self.file.parent.mkdir(parents=True, exist_ok=True)
+        make_folder(self.file.parent)
         beside = self.file.with_suffix(".new")
         with beside.open("w", encoding="utf-8") as out:
             json.dump({"since_ms": self.since_ms, "until_ms": self.until_ms, "ids": self.ids}, out)
             out.flush()
             os.fsync(out.fileno())
         beside.replace(self.file)
+        sync_folder(self.file.parent)

@@ -20,6 +20,8 @@ LAYOUTS_MAX = 256
 COLUMNS_MAX = 1_000
 STAMP_MS_MAX = 253_402_300_799_999
 """The end of the year 9999; a stamp beyond it, or before 1970, is none."""
+AHEAD_MS_MAX = 10 * 366 * 86_400_000
+"""A control's clock may be years ahead, not centuries."""
 FLAG_MAX = 2**32 - 1
 _CHUNK = "INSERT INTO chunks VALUES"
 
@@ -64,6 +66,11 @@ class Layout:
                 signal.first_us = stamp_ms * 1000
 
 
+def stamp_ms_max(received_ms: int) -> int:
+    """Return the latest stamp that is kept of what was received then: a later one would be its signal's newest for ever."""
+    return min(received_ms + AHEAD_MS_MAX, STAMP_MS_MAX)
+
+
 class ChunkWriter:
     """The chunks of one batch, within one transaction. stored: samples in them; changed: signals with new last samples."""
 
@@ -84,7 +91,7 @@ class ChunkWriter:
         if layout is None or key != layout.key:
             layout = source.last_layout = source.layouts.get(key) or self._layout(source, key)
         minute = oldest_ms // CHUNK_MS
-        if not layout.letters or newest_ms // CHUNK_MS != minute or not 0 <= oldest_ms <= newest_ms <= STAMP_MS_MAX:
+        if not layout.letters or newest_ms // CHUNK_MS != minute or not 0 <= oldest_ms <= newest_ms <= stamp_ms_max(received_ms):
             return False
         if oldest_ms <= source.newest_ms:
             self.settle(source)

@@ -158,7 +158,7 @@ class Store(Protocol):
     """One thread at a time for `append`, `pin`, `keep_snapshot` and `tidy`; questions from any thread or process beside it."""
 
     def append(self, messages: Sequence[Message]) -> Appended:
-        """Keep messages; when this returns, a kill -9 loses none of them. Raises StoreError."""
+        """Keep messages; when this returns, neither a kill -9 nor the loss of power loses any of them. Raises StoreError."""
 
     def pin(self, pinned: Pinned) -> None:
         """Keep a stretch from being swept, in whole, also what of it is still to come. Twice the same is once."""

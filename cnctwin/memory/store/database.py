@@ -5,8 +5,8 @@ readings of such a one said lies in `samples`, by series and time, and a BIRTH o
 that. All are numbered in the order of arrival. `files` is the manifest of the sealed hours. A reader who takes the manifest and
 the hot rows in one transaction sees each sample once.
 
-WAL with synchronous=NORMAL (https://sqlite.org/wal.html): a commit survives a kill -9; what the power takes is at most the last
-moments, never the file.
+WAL with synchronous=FULL (https://sqlite.org/wal.html): each commit is forced to the disk, so what was committed survives a kill
+-9 and the loss of power. That is one fsync a batch, whatever its size.
 """
 
 import sqlite3
@@ -89,7 +89,7 @@ def connect(file: Path, *, writable: bool) -> sqlite3.Connection:
         if writable:
             db.execute("PRAGMA auto_vacuum = INCREMENTAL")
             db.execute("PRAGMA journal_mode = WAL")
-            db.execute("PRAGMA synchronous = NORMAL")
+            db.execute("PRAGMA synchronous = FULL")
             db.execute("PRAGMA journal_size_limit = 16777216")
             db.execute("PRAGMA cache_size = -16384")
         else:
@@ -100,8 +100,7 @@ def connect(file: Path, *, writable: bool) -> sqlite3.Connection:
                 f"{file}: is a store of version {found}, this program knows {VERSION}; use the program that wrote it"
             )
         if writable:
-            db.executescript(SCHEMA)
-            db.execute(f"PRAGMA user_version = {VERSION}")
+            db.executescript(f"BEGIN; {SCHEMA} PRAGMA user_version = {VERSION}; COMMIT")
         else:
             if found == 1:
                 db.executescript(_NO_CHUNKS)
@@ -128,14 +127,9 @@ def insert(db: sqlite3.Connection, what: str, rows: Sequence[tuple[Any, ...]]) -
 
 
 @contextmanager
-def transaction(db: sqlite3.Connection, file: Path, *, is_durable: bool = False) -> Iterator[sqlite3.Connection]:
-    """All of it or nothing. Raises StoreError where it cannot be written.
-
-    is_durable: also the loss of power does not undo it, as where files are removed after it
-    """
+def transaction(db: sqlite3.Connection, file: Path) -> Iterator[sqlite3.Connection]:
+    """All of it or nothing; the loss of power does not undo it either. Raises StoreError where it cannot be written."""
     try:
-        if is_durable:
-            db.execute("PRAGMA synchronous = FULL")
         db.execute("BEGIN IMMEDIATE")
         try:
             yield db
@@ -144,9 +138,6 @@ def transaction(db: sqlite3.Connection, file: Path, *, is_durable: bool = False)
             with suppress(sqlite3.Error):
                 db.execute("ROLLBACK")
             raise
-        finally:
-            if is_durable:
-                db.execute("PRAGMA synchronous = NORMAL")
     except sqlite3.Error as error:
         raise StoreError(f"{file}: cannot be written: {error}") from error
 

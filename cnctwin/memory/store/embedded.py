@@ -68,7 +68,7 @@ class EmbeddedStore:
         return self._writing
 
     def append(self, messages: Sequence[Message]) -> Appended:
-        """Keep messages; when this returns, a kill -9 loses none of them."""
+        """Keep messages; when this returns, neither a kill -9 nor the loss of power loses any."""
         return self._writer.append(messages)
 
     def pin(self, pinned: Pinned) -> None:

@@ -14,7 +14,7 @@ from typing import Any
 
 from cnctwin.memory.store.birth_body import packed
 from cnctwin.memory.store.chunk import CHUNK_MS, ChunkSamples, read_chunks
-from cnctwin.memory.store.chunk_writer import STAMP_MS_MAX, ChunkWriter
+from cnctwin.memory.store.chunk_writer import STAMP_MS_MAX, ChunkWriter, stamp_ms_max
 from cnctwin.memory.store.contract import Appended, Message
 from cnctwin.memory.store.database import insert
 from cnctwin.memory.store.series_table import (
@@ -90,7 +90,8 @@ class Batch:
         code = DATA_CODE if is_data else EVENT_CODES.get(kind)
         if code is None or (device is None and kind is not EventKind.HOLE):
             return
-        if not -STAMP_MS_MAX <= stamp_ms <= STAMP_MS_MAX:
+        latest_ms = stamp_ms_max(received_ms)
+        if not -STAMP_MS_MAX <= stamp_ms <= latest_ms:
             self.refused += len(readings)
             return
         self.number += 1
@@ -103,7 +104,7 @@ class Batch:
             machine, node = source.machine, source.node
             if is_data and readings and not event.detail and self._chunks.take(source, self.number, received_ms, event):
                 return
-            places = self._readings(source, event)
+            places = self._readings(source, event, latest_ms)
             if not is_data:
                 body = packed(readings)
             elif places:
@@ -116,8 +117,8 @@ class Batch:
             (self.number, received_ms, machine, node, code, stamp_ms, event.detail or None, body, order, from_ms, to_ms)
         )
 
-    def _readings(self, source: Source, event: HostEvent) -> list[tuple[int, int]]:
-        """Take the readings of a message; time and series of those that were stored, in their order."""
+    def _readings(self, source: Source, event: HostEvent, latest_ms: int) -> list[tuple[int, int]]:
+        """Take the readings of a message that are no later than `latest_ms`; time and series of those stored, in their order."""
         self._chunks.settle(source)
         table, known = self._table, source.signals
         reasons, places = table.reasons, list[tuple[int, int]]()
@@ -126,8 +127,8 @@ class Batch:
             name, value, stamp_ms, quality, unit, reason, is_historical = reading
             try:
                 kind, form = kept(value)
-                if not 0 <= stamp_ms <= STAMP_MS_MAX:
-                    raise CannotKeepError("a stamp that is none")
+                if not 0 <= stamp_ms <= latest_ms:
+                    raise CannotKeepError("a stamp that is none, or far ahead")
                 signal = known.get(name) or table.signal(source, name)
                 sid = signal.sids.get((unit, kind)) or table.series(signal, unit, kind)
                 flag = RANK[quality] + HISTORY_BIT * is_historical

@@ -9,6 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from cnctwin.files.synced import make_folder
 from cnctwin.memory.store.contract import Appended, Message, Pinned, Snapshot, StoreError, Tidied
 from cnctwin.memory.store.database import FILE_NAME, connect, insert, transaction
 from cnctwin.memory.store.extra import MISSING, extra_is_there
@@ -41,7 +42,7 @@ class Writer:
         self._wall_ms, self._free_bytes = wall_ms, free_bytes
         self._is_damaged = self._must_load = False
         try:
-            folder.mkdir(parents=True, exist_ok=True)
+            make_folder(folder)
             self._lock = WriterLock(folder, wall_ms())
         except OSError as error:
             raise StoreError(f"{folder}: cannot be a store: {error.strerror or error}") from None

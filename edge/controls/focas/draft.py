@@ -4,12 +4,13 @@ from urllib.parse import urlsplit
 
 from pydantic import ValidationError
 
-from edge.config import EdgeConfig, without_secret
+from edge.config import EdgeConfig
 from edge.controls.focas.check import look
 from edge.controls.focas.config import FocasConfig
 from edge.errors import ConfigError
 from edge.sample import SampleSet
 from edge.sweep import Sweep
+from sparkplug.shown_address import shown_address
 
 PORT = 8193
 
@@ -22,15 +23,20 @@ def draft(url: str, device: str = "") -> str:
 
 
 def _source(url: str) -> FocasConfig:
+    fault = ConfigError(
+        f"address {shown_address(repr(url))} is no address of a FANUC control; write it as focas://192.168.1.10:{PORT}"
+    )
     try:
         parts = urlsplit(url)
-        if parts.scheme != "focas" or not parts.hostname or parts.path.strip("/"):
-            raise ValueError("is no address of a FANUC control")
-        return FocasConfig(host=parts.hostname, port=parts.port or PORT)
+        port = parts.port or PORT
+    except ValueError:
+        raise fault from None
+    if parts.scheme != "focas" or not parts.hostname or "@" in parts.netloc or parts.path.strip("/") or parts.query:
+        raise fault
+    try:
+        return FocasConfig(host=parts.hostname, port=port)
     except ValidationError as error:
-        raise ConfigError(f"address {without_secret(repr(url))}: {error.errors()[0]['msg']}") from None
-    except ValueError as error:
-        raise ConfigError(f"address {without_secret(repr(url))} {error}; write it as focas://192.168.1.10:{PORT}") from None
+        raise ConfigError(f"address {shown_address(repr(url))}: {error.errors()[0]['msg']}") from None
 
 
 def text_of(source: FocasConfig, device: str, sweep: Sweep, frame: SampleSet) -> str:

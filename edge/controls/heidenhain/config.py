@@ -45,11 +45,11 @@ def address_of(url: str) -> tuple[str, int]:
     try:
         parts = urlsplit(url)
         host, port = parts.hostname, parts.port or PORT
-    except ValueError as error:
-        raise ConfigError(f"is no address: {error}; write it as lsv2://tnc640:19000") from error
+    except ValueError:
+        raise ConfigError("is no address: its host or port cannot be read; write it as lsv2://tnc640:19000") from None
     if parts.scheme != "lsv2" or not host:
         raise ConfigError("is no lsv2:// address, such as lsv2://tnc640:19000")
-    if parts.username or parts.password or parts.path.strip("/") or parts.query:
+    if "@" in url or parts.path.strip("/") or parts.query or parts.fragment:
         raise ConfigError("must be lsv2://host:port and nothing more; a PLC password is named by plc_password_env")
     return host, port
 

@@ -2,11 +2,12 @@
 
 from pydantic import ValidationError
 
-from edge.config import EdgeConfig, without_secret
+from edge.config import EdgeConfig
 from edge.controls.heidenhain.check import first_look, looked_at_frame
 from edge.controls.heidenhain.config import HeidenhainConfig
 from edge.errors import ConfigError
 from edge.sweep import Sweep
+from sparkplug.shown_address import shown_address
 
 QUARTER_MS = 900_000
 
@@ -17,7 +18,7 @@ def draft(url: str, device: str = "") -> str:
         config = EdgeConfig(source=HeidenhainConfig(url=url))
     except ValidationError as error:
         why = error.errors()[0]["msg"].removeprefix("Value error, ")
-        raise ConfigError(f"address {without_secret(repr(url))} {why}") from None
+        raise ConfigError(f"address {shown_address(repr(url))} {why}") from None
     frame = first_look(config)
     sweep = Sweep.decode(frame)
     offers, last = looked_at_frame(config, frame)

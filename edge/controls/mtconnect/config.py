@@ -1,5 +1,6 @@
 """The table [mtconnect] of an edge's configuration."""
 
+import re
 from typing import Annotated
 
 from pydantic import AfterValidator, Field
@@ -8,10 +9,12 @@ from edge.section import Section
 
 
 def _http(url: str) -> str:
-    if "@" in url.partition("//")[2].partition("/")[0]:
+    if "@" in url:
         raise ValueError("must hold no user or password, since addresses are logged and published; use username and password_env")
     if not url.startswith(("http://", "https://")):
         raise ValueError("is no http:// or https:// address")
+    if not re.fullmatch(r"https?://(\[[^/\s?#\]]+\]|[^/\s?#:]+)(:\d{1,5})?(/[^\s?#]*)?", url):
+        raise ValueError("is not http://host[:port][/path] and nothing more")
     return url.rstrip("/")
 
 

@@ -5,8 +5,10 @@ document the same request is polled. The agent's heartbeat is the liveness timer
 connection is made again. After a failure it waits, longer each time, with jitter, so that a plant's edges do not come back in
 step. No call blocks for longer than the configured timeout, and `close` wakes a blocked read.
 
-A stream over plain HTTP waits where its caller can see it (`steps`, `edge.controls.mtconnect.stream`). All else is httpx, and
-blocks: descriptions, single documents, and streams over TLS.
+The agent is not trusted. Its answer is read as it comes (`edge.controls.mtconnect.stream`), and where it is waited for, the
+caller can see it (`steps`). A single document is whole after ANSWER_TIMEOUTS_MAX timeouts and has at most DOCUMENT_BYTES_MAX
+bytes; an agent that drips a byte a second is left like one that hangs, and one that sends us back to the start again and again
+is asked less and less often.
 """
 
 import os
@@ -19,8 +21,6 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from urllib.parse import urlsplit
 
-import httpx
-
 from edge.adapter import Wait
 from edge.controls.mtconnect.cursor import Config, Cursor, Phase, Request, next_request
 from edge.controls.mtconnect.multipart import MultipartParser
@@ -31,6 +31,8 @@ from edge.errors import ConfigError, ConnectionLostError
 BACKOFF_S = 0.25
 BACKOFF_S_MAX = 30.0
 HEARTBEATS_MAX = 3
+ANSWER_TIMEOUTS_MAX = 6
+SETBACKS_MAX = 2  # in a row; an agent that was restarted needs one
 _ERROR_ROOT, _STREAMS_ROOT = b"MTConnectError", b"MTConnectStreams"
 
 
@@ -54,7 +56,7 @@ class MtconnectConnection:
         self._socket: socket.socket | None = None
         self._streams = True
         self._heard_s = clock()
-        self._failures = 0
+        self._failures = self._setbacks = 0
         self.reconnects = 0
         self.last_error = ""
 
@@ -72,7 +74,7 @@ class MtconnectConnection:
         open_socket = self._socket
         if open_socket is not None:
             try:
-                open_socket.shutdown(socket.SHUT_RDWR)
+                socket.socket.shutdown(open_socket, socket.SHUT_RDWR)  # TLS is not asked: another thread reads
             except OSError:
                 return  # closed already
 
@@ -85,22 +87,32 @@ class MtconnectConnection:
                 _await(step.sock, step.seconds)
 
     def steps(self) -> Iterator[bytes | Wait]:
-        """Documents, and the waits between those of a stream over plain HTTP."""
-        with client_of(self._config) as client:
-            while not self._closed.is_set():
-                asked = self._cursor
-                try:
-                    yield from self._answer(client, next_request(self._config, asked, streams=self._streams))
-                except (httpx.HTTPError, httpx.InvalidURL, httpx.StreamError, ConnectionLostError, OSError) as error:
-                    yield Wait(None)  # what comes next connects anew
-                    if not self._closed.is_set():
-                        self._lost(error)
-                    continue
-                yield Wait(None)
-                if self._cursor.attempt:
-                    self._wait(self._backoff_s(self._cursor.attempt))
-                elif asked.phase is Phase.SAMPLE and self._cursor == asked:
-                    self._wait(self._config.source.poll_ms / 1000)
+        """Documents, and the waits between the pieces of those that are on their way."""
+        agent = Agent(self._config)
+        while not self._closed.is_set():
+            asked = self._cursor
+            try:
+                yield from self._answer(agent, next_request(self._config, asked, streams=self._streams))
+            except (ConnectionLostError, OSError) as error:
+                yield Wait(None)  # what comes next connects anew
+                if not self._closed.is_set():
+                    self._lost(error)
+                continue
+            yield Wait(None)
+            self._setbacks = self._setbacks_after(asked)
+            if self._cursor.attempt:
+                self._wait(self._backoff_s(self._cursor.attempt))
+            elif self._setbacks > SETBACKS_MAX:
+                self._wait(self._backoff_s(self._setbacks - SETBACKS_MAX))
+            elif asked.phase is Phase.SAMPLE and self._cursor == asked:
+                self._wait(self._config.source.poll_ms / 1000)
+
+    def _setbacks_after(self, asked: Cursor) -> int:
+        """Return how often in a row the agent has sent us back, as one does that is another instance in each document."""
+        phase = self._cursor.phase
+        if asked.phase is Phase.SAMPLE and phase is Phase.SAMPLE:
+            return 0
+        return self._setbacks + (list(Phase).index(phase) < list(Phase).index(asked.phase))
 
     def _lost(self, error: Exception) -> None:
         self.reconnects += 1
@@ -112,25 +124,8 @@ class MtconnectConnection:
         longest = min(BACKOFF_S_MAX, BACKOFF_S * 2.0 ** min(failures, 16))
         return longest * self._chance.uniform(0.5, 1.0)
 
-    def _answer(self, client: httpx.Client, request: Request) -> Iterator[bytes | Wait]:
-        streams = any(name == "interval" for name, _ in request.parameters)
-        if streams and self._config.source.url.startswith("http://"):
-            yield from self._streamed(request)
-            return
-        with client.stream("GET", request.path, params=list(request.parameters)) as response:
-            self._socket = response.extensions["network_stream"].get_extra_info("socket")
-            try:
-                content_type = response.headers.get("content-type", "")
-                status = response.status_code, response.reason_phrase
-                yield from self._content(request, status, content_type, response.iter_bytes())
-            finally:
-                self._socket = None
-
-    def _streamed(self, request: Request) -> Iterator[bytes | Wait]:
-        source = self._config.source
-        url, target = urlsplit(source.url), target_of(request.path, request.parameters)
-        login = (source.username, _password(self._config)) if source.username else None
-        with Stream(url, target, login=login, timeout_s=source.timeout_s, head_s=_alive_s(self._config)) as stream:
+    def _answer(self, agent: "Agent", request: Request) -> Iterator[bytes | Wait]:
+        with agent.asked(request) as stream:
             self._socket = stream.socket
             try:
                 yield from self._content(request, (stream.status, stream.reason), stream.content_type, self._pieces(stream))
@@ -153,20 +148,17 @@ class MtconnectConnection:
         if content_type.lower().startswith("multipart/"):
             yield from self._parts(pieces, content_type)
             return
-        body = bytearray()
+        body = Body(self._config, self._clock)
         for data in pieces:
+            body.take(data)
             if data is None:
                 yield self._pause()
-                continue
-            body += data
-            if len(body) > DOCUMENT_BYTES_MAX:
-                raise ConnectionLostError(f"document of more than {DOCUMENT_BYTES_MAX} bytes")
-        if _ERROR_ROOT not in body[:4096]:
+        if _ERROR_ROOT not in body.data[:4096]:
             if status[0] >= 400:
                 raise ConnectionLostError(f"HTTP {status[0]} {status[1]} for {request.path}")
-            if request.path.endswith("/sample") and _STREAMS_ROOT in body[:4096]:
+            if request.path.endswith("/sample") and _STREAMS_ROOT in body.data[:4096]:
                 self._streams = False  # anything else is somebody who stands between us and the agent
-        yield self._heard(bytes(body))
+        yield self._heard(bytes(body.data))
 
     def _parts(self, pieces: Iterable[bytes | None], content_type: str) -> Iterator[bytes | Wait]:
         parser = MultipartParser(content_type)
@@ -208,53 +200,65 @@ def _alive_s(config: Config) -> float:
     return max(config.source.timeout_s, HEARTBEATS_MAX * config.source.heartbeat_ms / 1000)
 
 
-def client_of(config: Config) -> httpx.Client:
-    """An HTTP client for the configured agent. Proxies of the environment are not used: the agent is in the plant."""
-    source = config.source
-    authentication = httpx.BasicAuth(source.username, _password(config)) if source.username else None
-    verify: ssl.SSLContext | bool = True
-    if source.ca_file:
+class Body:
+    """The body of a single document, bounded in bytes and in time."""
+
+    def __init__(self, config: Config, clock: Callable[[], float] = time.monotonic) -> None:
+        self.data = bytearray()
+        self._clock = clock
+        self._seconds_max = ANSWER_TIMEOUTS_MAX * config.source.timeout_s
+        self._until_s = clock() + self._seconds_max
+
+    def take(self, data: bytes | None) -> None:
+        """Take what has come, or None for nothing. Raises ConnectionLostError where that is too much, or too late."""
+        self.data += data or b""
+        if len(self.data) > DOCUMENT_BYTES_MAX:
+            raise ConnectionLostError(f"document of more than {DOCUMENT_BYTES_MAX} bytes")
+        if self._clock() > self._until_s:
+            raise ConnectionLostError(f"no whole document within {self._seconds_max:g} s, {len(self.data)} bytes of one")
+
+
+class Agent:
+    """The address of the configured agent, and how it lets us in. Proxies of the environment are not used: it is in the plant."""
+
+    def __init__(self, config: Config) -> None:
+        self._config, source = config, config.source
+        self._url = urlsplit(source.url)
+        self._login = (source.username, _password(config)) if source.username else None
         try:
-            verify = ssl.create_default_context(cafile=source.ca_file)
+            trusted = ssl.create_default_context(cafile=source.ca_file or None)
         except OSError as error:
             raise ConfigError(f"{config.path}: mtconnect.ca_file = {source.ca_file!r}: cannot be used: {error}") from error
-    return httpx.Client(
-        base_url=source.url,
-        auth=authentication,
-        verify=verify,
-        timeout=httpx.Timeout(source.timeout_s, read=_alive_s(config)),
-        trust_env=False,
-        headers={"Accept": "text/xml, application/xml, multipart/*"},
-    )
+        self._tls = trusted if self._url.scheme == "https" else None
+
+    def asked(self, request: Request) -> Stream:
+        """Return the answer to a request, of which the head has come. Raises ConnectionLostError or OSError."""
+        target, timeout_s = target_of(request.path, request.parameters), self._config.source.timeout_s
+        alive_s = _alive_s(self._config)
+        return Stream(self._url, target, login=self._login, timeout_s=timeout_s, head_s=alive_s, tls=self._tls)
 
 
 def fetch(config: Config, request: Request) -> bytes:
     """One document, for `check` and `discover`; ConnectionLostError where the agent has none."""
-    with client_of(config) as client:
-        try:
-            with client.stream("GET", request.path, params=list(request.parameters)) as response:
-                body = _body(response)
-                if response.status_code >= 400 and _ERROR_ROOT not in body[:4096]:
-                    refusal = f"HTTP {response.status_code} {response.reason_phrase}"
-                    raise ConnectionLostError(f"{config.source.url}{request.path}: {refusal}; {_way_out(response.status_code)}")
-                return body
-        except (httpx.HTTPError, httpx.InvalidURL, OSError) as error:
-            raise ConnectionLostError(
-                f"{config.source.url}{request.path}: {error}; is the agent running, and the address right?"
-            ) from error
+    where = f"{config.source.url}{request.path}"
+    try:
+        with Agent(config).asked(request) as stream:
+            body = Body(config)
+            while (data := stream.read()) != b"":
+                body.take(data)
+                if data is None:
+                    _await(stream.socket, 1.0)
+    except ConnectionLostError as error:
+        raise ConnectionLostError(f"{where}: {error}") from error
+    except OSError as error:
+        raise ConnectionLostError(f"{where}: {error}; is the agent running, and the address right?") from error
+    if stream.status >= 400 and _ERROR_ROOT not in body.data[:4096]:
+        raise ConnectionLostError(f"{where}: HTTP {stream.status} {stream.reason}; {_way_out(stream.status)}")
+    return bytes(body.data)
 
 
 def _way_out(status: int) -> str:
     return "it wants mtconnect.username and password_env" if status == 401 else "is this the address of an MTConnect agent?"
-
-
-def _body(response: httpx.Response) -> bytes:
-    body = bytearray()
-    for data in response.iter_bytes():
-        body += data
-        if len(body) > DOCUMENT_BYTES_MAX:
-            raise ConnectionLostError(f"document of more than {DOCUMENT_BYTES_MAX} bytes")
-    return bytes(body)
 
 
 def _password(config: Config) -> str:

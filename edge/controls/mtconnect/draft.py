@@ -2,7 +2,7 @@
 
 from pydantic import ValidationError
 
-from edge.config import EdgeConfig, without_secret
+from edge.config import EdgeConfig
 from edge.controls.mtconnect.config import MtconnectConfig
 from edge.controls.mtconnect.connection import fetch
 from edge.controls.mtconnect.cursor import Request, choose_device
@@ -12,6 +12,7 @@ from edge.controls.mtconnect.model import DataItem, DeviceModel
 from edge.errors import ConfigError, ConnectionLostError, DocumentError
 from edge.sample import Offer
 from edge.signals import signal
+from sparkplug.shown_address import shown_address
 
 
 def draft(url: str, device: str = "") -> str:
@@ -20,7 +21,7 @@ def draft(url: str, device: str = "") -> str:
         config = EdgeConfig(source=MtconnectConfig(url=url))
     except ValidationError as error:
         why = error.errors()[0]["msg"].removeprefix("Value error, ")
-        raise ConfigError(f"address {without_secret(repr(url))} {why}, such as http://agent:5000") from None
+        raise ConfigError(f"address {shown_address(repr(url))} {why}, such as http://agent:5000") from None
     try:
         document = parse_document(fetch(config, Request("/probe")))
     except DocumentError as error:

@@ -1,11 +1,13 @@
-"""One answer of an agent over plain HTTP/1.1, read as it comes and never waited for: RFC 9112, by h11, which does no I/O.
+"""One answer of an agent over HTTP/1.1, read as it comes and never waited for: RFC 9112, by h11, which does no I/O.
 
 The head is awaited, for it decides what the answer is. From then on `read` gives what has come, so that one thread reads the
-streams of many agents.
+streams of many agents. The agent is not trusted: the head has a deadline and at most HEAD_BYTES_MAX bytes, and a body that is
+compressed is refused unread, since 5 kB of it can unfold into gigabytes.
 """
 
 import base64
 import socket
+import ssl
 import time
 from types import TracebackType
 from urllib.parse import SplitResult, urlencode
@@ -15,26 +17,41 @@ import h11
 from edge.errors import ConnectionLostError
 
 READ_BYTES = 64 * 1024
+HEAD_BYTES_MAX = 16 * 1024
 
 
 class Stream:
     """The answer to one GET. Raises ConnectionLostError or OSError.
 
-    url: the agent's address; target: path and parameters below it; timeout_s: for connecting; head_s: for the head
+    url: the agent's address; target: path and parameters below it; tls: for https
+    timeout_s: for connecting; head_s: for the head
     """
 
-    def __init__(self, url: SplitResult, target: str, *, login: tuple[str, str] | None, timeout_s: float, head_s: float) -> None:
-        self._http = h11.Connection(h11.CLIENT)
+    def __init__(
+        self,
+        url: SplitResult,
+        target: str,
+        *,
+        login: tuple[str, str] | None,
+        timeout_s: float,
+        head_s: float,
+        tls: ssl.SSLContext | None = None,
+    ) -> None:
+        self._http = h11.Connection(h11.CLIENT, max_incomplete_event_size=HEAD_BYTES_MAX)
         self._is_over = False
-        self.socket = socket.create_connection((url.hostname or "", url.port or 80), timeout_s)
+        self.socket = socket.create_connection((url.hostname or "", url.port or (80 if tls is None else 443)), timeout_s)
         try:
             self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            if tls is not None:
+                self.socket = tls.wrap_socket(self.socket, server_hostname=url.hostname)
             headers = [("Host", url.netloc), ("Accept", "multipart/*, text/xml, application/xml"), ("Connection", "close")]
+            headers.append(("Accept-Encoding", "identity"))
             if login is not None:
                 headers.append(("Authorization", "Basic " + base64.b64encode(":".join(login).encode()).decode()))
             request = h11.Request(method="GET", target=url.path + target, headers=headers)
             self.socket.sendall(self._sent(request) + self._sent(h11.EndOfMessage()))
             self._head = self._awaited(time.monotonic() + head_s)
+            self._refuse_encoded()
             self.socket.setblocking(False)
         except BaseException:
             self.socket.close()
@@ -59,7 +76,7 @@ class Stream:
     @property
     def content_type(self) -> str:
         """The type of the content, "" where none is named."""
-        return next((value.decode("latin-1") for name, value in self._head.headers if name == b"content-type"), "")
+        return self._header(b"content-type")
 
     def read(self) -> bytes | None:
         """Return what has come of the body; None where nothing has, b"" at its end."""
@@ -67,10 +84,21 @@ class Stream:
         if body is None:
             try:
                 self._receive(self.socket.recv(READ_BYTES))
-            except BlockingIOError:
+            except (BlockingIOError, ssl.SSLWantReadError, ssl.SSLWantWriteError):
                 return None
             body = self._body()
         return body
+
+    def _header(self, wanted: bytes) -> str:
+        return ", ".join(value.decode("latin-1") for name, value in self._head.headers if name == wanted)
+
+    def _refuse_encoded(self) -> None:
+        encoding = self._header(b"content-encoding")
+        if encoding.strip().lower() not in ("", "identity"):
+            raise ConnectionLostError(
+                f"the agent sends Content-Encoding: {encoding[:40]!r}, which was not asked for and is not decoded; "
+                "have it, or the proxy before it, send plain XML"
+            )
 
     def _awaited(self, deadline_s: float) -> h11.Response:
         while True:

@@ -16,9 +16,9 @@ MODES = ("SignAndEncrypt", "Sign")
 
 
 def _address(url: str) -> str:
-    if "@" in url.partition("//")[2].partition("/")[0]:
+    if "@" in url:
         raise ValueError("must hold no user or password, since addresses are logged and published; use username and password_env")
-    if not re.fullmatch(r"opc\.tcp://[^/\s?#]+(/[^\s?#]*)?", url):
+    if not re.fullmatch(r"opc\.tcp://(\[[^/\s?#\]]+\]|[^/\s?#:]+)(:\d{1,5})?(/[^\s?#]*)?", url):
         raise ValueError("is no opc.tcp://host:port address")
     return url
 

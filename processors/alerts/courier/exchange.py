@@ -1,7 +1,9 @@
 """One HTTP request, within limits of time and size, and what its end says about whether it was taken.
 
 A connection is made for each: one that lay idle may be closed by the server just when a notification goes into it, and then
-nobody knows whether it arrived. Redirects are not followed: a secret goes nowhere but to the address that was configured.
+nobody knows whether it arrived. Redirects are not followed: a secret goes nowhere but to the address that was configured. The
+whole exchange has one deadline, and nothing that comes back is decoded: an answer that is compressed, which nobody asked for, is
+judged by its status and left unread.
 """
 
 import asyncio
@@ -37,8 +39,9 @@ class Request:
     json: Any = None
     content: bytes | None = None
     form: Mapping[str, str] | None = None
-    query: Mapping[str, str] | None = None
+    query: Mapping[str, str | list[str]] | None = None
     secrets: Sequence[str] = ()
+    authorities: ssl.SSLContext | None = None  # None: those of the system
 
     @property
     def host(self) -> str:
@@ -47,17 +50,18 @@ class Request:
 
 
 class Answer:
-    """An answer; `body` is cut at ANSWER_BYTES_MAX, or where the connection ended."""
+    """An answer. `body` is cut at the most bytes, or where the connection ended, and empty where it is compressed; then `wrong`
+    says so."""
 
-    __slots__ = ("body", "headers", "status")
+    __slots__ = ("body", "headers", "status", "wrong")
 
-    def __init__(self, status: int, headers: Mapping[str, str], body: bytes) -> None:
-        self.status, self.headers, self.body = status, headers, body
+    def __init__(self, status: int, headers: Mapping[str, str], body: bytes, wrong: str = "") -> None:
+        self.status, self.headers, self.body, self.wrong = status, headers, body, wrong
 
 
-def exchanged(request: Request, timeout_s: float) -> Answer | Outcome:
+def exchanged(request: Request, timeout_s: float, bytes_max: int = ANSWER_BYTES_MAX) -> Answer | Outcome:
     """The answer, or the outcome where there is none."""
-    return asyncio.run(_limited(request, timeout_s))
+    return asyncio.run(_limited(request, timeout_s, bytes_max))
 
 
 def judged(answer: Answer, request: Request) -> Outcome:
@@ -88,11 +92,11 @@ def _authorities() -> ssl.SSLContext:
     return httpx.create_ssl_context()
 
 
-async def _limited(request: Request, timeout_s: float) -> Answer | Outcome:
+async def _limited(request: Request, timeout_s: float, bytes_max: int) -> Answer | Outcome:
     begun: list[str] = []
     try:
         async with asyncio.timeout(timeout_s + CONNECT_S_MAX):
-            return await _exchange(request, timeout_s, begun)
+            return await _exchange(request, timeout_s, bytes_max, begun)
     except TimeoutError:
         return _without_answer(request, f"no answer within {timeout_s:g} s", begun)
     except httpx.TimeoutException as error:
@@ -108,7 +112,7 @@ def _without_answer(request: Request, error: str, begun: list[str]) -> Outcome:
     return Outcome(Verdict.NOT_TAKEN, reason)
 
 
-async def _exchange(request: Request, timeout_s: float, begun: list[str]) -> Answer:
+async def _exchange(request: Request, timeout_s: float, bytes_max: int, begun: list[str]) -> Answer:
     async def watch(event: str, _: Any) -> None:
         if event.endswith("send_request_headers.started"):
             begun.append(event)
@@ -117,11 +121,13 @@ async def _exchange(request: Request, timeout_s: float, begun: list[str]) -> Ans
     # The proxies of the environment are for what is outside; nothing of this computer goes through them.
     is_outside = request.host not in LOOPBACK
     async with (
-        httpx.AsyncClient(timeout=limits, follow_redirects=False, trust_env=is_outside, verify=_authorities()) as client,
+        httpx.AsyncClient(
+            timeout=limits, follow_redirects=False, trust_env=is_outside, verify=request.authorities or _authorities()
+        ) as client,
         client.stream(
             request.method,
             request.url,
-            headers=dict(request.headers),
+            headers={"Accept-Encoding": "identity", **request.headers},
             json=request.json,
             content=request.content,
             data=None if request.form is None else dict(request.form),
@@ -129,10 +135,16 @@ async def _exchange(request: Request, timeout_s: float, begun: list[str]) -> Ans
             extensions={"trace": watch},
         ) as response,
     ):
-        body = b""
+        encoding = response.headers.get("content-encoding", "identity").strip().lower()
+        if encoding != "identity":
+            return Answer(
+                response.status_code, response.headers, b"", f"is compressed ({encoding[:40]!r}), which was not asked for"
+            )
+        body, wrong = bytearray(), "did not come to its end in time"
         with suppress(httpx.HTTPError, TimeoutError, asyncio.CancelledError):  # the status has come, and says it
-            async for piece in response.aiter_bytes():
+            async for piece in response.aiter_raw():
                 body += piece
-                if len(body) >= ANSWER_BYTES_MAX:
+                if len(body) > bytes_max:
                     break
-        return Answer(response.status_code, response.headers, body[:ANSWER_BYTES_MAX])
+            wrong = f"is longer than {bytes_max} bytes" if len(body) > bytes_max else ""
+        return Answer(response.status_code, response.headers, bytes(body[:bytes_max]), wrong)

@@ -96,7 +96,7 @@ def test_with_certificates_and_not_without(tmp_path: Path) -> None:
         ("tls://dask.plant.example", "needs ca_file, certificate_file, key_file"),
         ("tls://dask?ca_file=/no&certificate_file=/no&key_file=/no", "there is no file /no"),
         ("mqtt://127.0.0.1", "is not tcp://host:8786 or tls://host:8786"),
-        ("tcp://127.0.0.1:x", "Port could not be cast"),
+        ("tcp://127.0.0.1:x", "host, port or options cannot be read"),
     ],
 )
 def test_an_address_that_is_not_to_be_used(text: str, said: str) -> None:

@@ -135,3 +135,15 @@ def test_a_machine_that_nothing_can_be_chosen_on_is_refused_before_it_waits_in_t
 def test_a_machine_that_can_is_called_by_its_name() -> None:
     request = read_request(json.dumps(GOOD | {"machine_toml": LIMITED}).encode())
     assert request.parameters.machine_of(FilesRoot()) == "vmc"
+
+
+def test_a_request_says_who_asks_and_is_the_same_whoever_does() -> None:
+    ada, grace = (
+        read_request(b'{"job": "diagnose", "case": "vmc", "id": "n", "by": "%s"}' % name) for name in (b"ada", b"grace")
+    )
+    assert (ada.by, ada.document["by"], ada.digest) == ("ada", "ada", grace.digest)
+    assert read_request(json.dumps(ada.document).encode()).by == "ada"
+    assert read_cancel(b'{"id": "n", "by": "ada"}') == ("n", "cnc/jobs/reply/n", "ada")
+    for by in ('"a\\u001b[31m"', f'"{"x" * 101}"', "5", "null"):
+        with pytest.raises(RequestError, match=r"by = .*printable characters"):
+            read_request(b'{"job": "diagnose", "case": "vmc", "by": %s}' % by.encode())

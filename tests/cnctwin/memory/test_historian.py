@@ -43,6 +43,13 @@ class Memory:
     def keep_snapshot(self, *snapshots: Snapshot) -> None:
         self.told += snapshots
 
+    def snapshot_before(self, processor: str, unit: str, at_ms: int) -> Snapshot | None:
+        told = [one for one in self.told if isinstance(one, Snapshot) and (one.processor, one.unit) == (processor, unit)]
+        return told[-1] if told else None
+
+    def messages(self, machine: str, from_ms: int, to_ms: int) -> Iterator[Message]:
+        return (one for one in self.told if isinstance(one, Message) and from_ms <= one.received_ms < to_ms)
+
     def machines(self) -> list[str]:
         return ["vmc"]
 

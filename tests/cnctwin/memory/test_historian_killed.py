@@ -12,10 +12,11 @@ import pytest
 from cnctwin.memory.store.contract import Query, StoreError
 from cnctwin.memory.store.opening import open_store
 from edge.config import StoreSection
-from edge.running.forwarder import SEQUENCE, Forwarder
+from edge.running.forwarder import Forwarder
 from edge.running.receipts import RECEIPT
 from edge.running.ring import Ring
 from edge.sample import EdgeSample
+from sparkplug.actions import HostState
 from sparkplug.broker import BrokerAddress
 from sparkplug.datatype import DataType
 from sparkplug.edge_node import EdgeNode
@@ -23,6 +24,7 @@ from sparkplug.edge_session import Command
 from sparkplug.metric import Change, MetricSpec, NodeId
 from tests.cnctwin.program import Program, until
 from tests.wire.mosquitto import Mosquitto
+from twin.vocabulary.nodes import HISTORIAN_NODE
 
 pytestmark = pytest.mark.broker
 LIMITS = StoreSection(free_bytes_min=0, history_rows_per_s=5_000, await_receipt=True)
@@ -33,21 +35,25 @@ KILLS = 3
 class NumberedEdge:
     """An edge whose row n says n, as quickly as a fast machine; it forgets what a memory has given a receipt for."""
 
-    def __init__(self, folder: Path, address: BrokerAddress) -> None:
+    def __init__(
+        self, folder: Path, *brokers: BrokerAddress, limits: StoreSection = LIMITS, primary_host: str | None = None
+    ) -> None:
         self.rows = 0
         self._node = EdgeNode(
-            address,
+            brokers,
             NodeId("cnc", "edge-vmc"),
             [MetricSpec("health/rows", DataType.INT64)],
+            primary_host=primary_host,
             session_file=folder / "session",
             barrier_topic="cnctwin/barrier/cnc/edge-vmc",
             on_confirmed=self._confirmed,
             on_command=self._commanded,
+            watched_hosts=[HISTORIAN_NODE],
+            on_host_state=self._host_state,
         )
-        ring = Ring(folder / "ring", LIMITS, wall_ms=lambda: time.time_ns() // 1_000_000, clock=time.monotonic)
-        self.forwarder = Forwarder(ring, self._node, "vmc", LIMITS, time.monotonic)
-        metrics = [MetricSpec(name, kind) for name, kind in (("row", DataType.INT64), (SEQUENCE, DataType.INT64))]
-        metrics.append(MetricSpec(RECEIPT, DataType.STRING))
+        ring = Ring(folder / "ring", limits, wall_ms=lambda: time.time_ns() // 1_000_000, clock=time.monotonic)
+        self.forwarder = Forwarder(ring, self._node, "vmc", limits, time.monotonic)
+        metrics = [MetricSpec("row", DataType.INT64), *self.forwarder.metrics()]
         self._node.declare_device("vmc", metrics)
         self.forwarder.declare(metric.name for metric in metrics)
         self._ends, self._is_told = threading.Event(), threading.Event()
@@ -55,6 +61,9 @@ class NumberedEdge:
 
     def _confirmed(self, token: int) -> None:
         self.forwarder.confirmed(token)
+
+    def _host_state(self, host: str, state: HostState | None) -> None:
+        self.forwarder.host_state(host, state)
 
     def _commanded(self, command: Command) -> None:
         if command.name == RECEIPT and isinstance(command.value, str):

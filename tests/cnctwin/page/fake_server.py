@@ -40,6 +40,7 @@ class Shop:
         self.other: dict[str, dict[str, SignalValue]] = {}
         self.answers: dict[str, Callable[[str, dict[str, Any] | None], Answer]] = {}
         self.token: str | None = None
+        self.me: dict[str, Any] = {"user": None, "role": "administrator", "logs_out": False}
         self.broker = True
         self.behind: str | None = None
         self.posted: list[tuple[str, Any]] = []
@@ -191,6 +192,8 @@ class _Handler(BaseHTTPRequestHandler):
             return 200, shop.fleet()["machines"]
         if path == "/livez":
             return 200, {"alive": True}
+        if path == "/whoami":
+            return 200, shop.me
         if path == "/health":
             parts = [
                 {"part": "broker", "state": "ok" if shop.broker else "missing", "reason": "mqtt://127.0.0.1:1883", "do": ""},

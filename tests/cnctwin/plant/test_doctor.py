@@ -10,9 +10,22 @@ from contextlib import contextmanager
 import pytest
 
 from cnctwin.cli import main
-from cnctwin.plant.doctor import Report, examine, of_edge_store, of_lags, of_store
+from cnctwin.plant.doctor import (
+    Finding,
+    Report,
+    examine,
+    of_awaited,
+    of_edge_store,
+    of_faults,
+    of_history,
+    of_lags,
+    of_overload,
+    of_sequence_holes,
+    of_store,
+)
 from cnctwin.plant.lags import behind, lag_reports
 from cnctwin.plant.view import own_values
+from edge.running.awaited import LATE_S, NO_HISTORIAN
 from sparkplug.broker import BrokerAddress
 from sparkplug.datatype import DataType
 from sparkplug.edge_node import EdgeNode
@@ -193,3 +206,44 @@ def test_an_edge_with_old_rows_to_send_is_behind(waiting: int, age_s: float, is_
     found = of_edge_store("edge-vmc", metrics)
     assert [finding.good for finding in found] == [False] * is_told
     assert all("edge-vmc is 80 s behind: 30 rows" in finding.text for finding in found)
+
+
+def told(**values: Value) -> dict[str, Reading]:
+    """The health of a node."""
+    return {name: Reading(name, value, 0, Quality.GOOD, None, None, False) for name, value in values.items()}
+
+
+def test_an_edge_whose_historian_is_silent_is_bad_news_with_the_way_out() -> None:
+    text = "twin-historian has given no receipt for 2 min: …"
+    assert of_awaited("edge-vmc", told(awaited_s=LATE_S, history=text)) == [Finding(False, f"edge-vmc: {text}")]
+    assert of_awaited("edge-vmc", told(awaited_s=1.0, history="rows are held until twin-historian has them")) == []
+    assert of_awaited("twin-thermal", {}) == []
+
+
+def test_a_plant_without_a_historian_is_told_that_nothing_keeps_history() -> None:
+    (finding,) = of_history([told(history=NO_HISTORIAN), told(history=NO_HISTORIAN), told(lag_s=0.0)])
+    assert finding.good
+    assert finding.text.startswith("2 edges: no historian has been heard of on this broker: nothing keeps history; start")
+    assert of_history([told(history="rows are held until twin-historian has them"), told()]) == []
+
+
+def test_rows_that_the_historian_misses_are_bad_news() -> None:
+    named = "okuma: 372–441 missing since 2026-03-02 08:00 UTC"
+    (finding,) = of_sequence_holes("twin-historian", told(sequence_holes=1, sequence_hole=named))
+    assert (finding.good, finding.text) == (False, f"twin-historian: rows of edges are missing: {named}")
+    assert of_sequence_holes("twin-historian", told(sequence_holes=0, sequence_hole="")) == []
+    assert of_sequence_holes("edge-vmc", {}) == []
+
+
+def test_contained_faults_are_counted_and_the_last_one_is_told() -> None:
+    text = "a beat failed; restarted after 1 s, 2 times so far: OSError: disk full"
+    (finding,) = of_faults("twin-alerts", told(faults=3, restarts=2, fault=text))
+    assert finding == Finding(True, f"twin-alerts: 3 faults contained, restarted 2 times; the last: {text}")
+    assert of_faults("twin-alerts", told(faults=0, restarts=0, fault="")) == of_faults("edge-okuma", {}) == []
+
+
+def test_who_floods_a_process_is_named_once() -> None:
+    text = "cnc/edge-flood: 812 messages passed over in a second"
+    every = [told(overloaded_by=text), told(overloaded_by=text), told(overloaded_by=""), told(lag_s=0.0)]
+    assert of_overload(every) == [Finding(False, f"more comes than can be folded, the newest values win: {text}")]
+    assert of_overload([told(overloaded_by=""), {}]) == []

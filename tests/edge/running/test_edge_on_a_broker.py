@@ -24,7 +24,7 @@ from sparkplug.host_session import HostEvent
 from sparkplug.metric import Reading
 from tests.edge.host_watch import HostWatch, wait
 from tests.recordings import PROJECT, recording
-from tests.wire.mosquitto import Mosquitto
+from tests.wire.mosquitto import Mosquitto, free_port
 
 pytestmark = pytest.mark.broker
 
@@ -176,3 +176,14 @@ def test_a_killed_edge_that_is_started_again_changes_nothing_in_the_end_state(mo
         assert second.wait(60) == 0, "SIGTERM is a clean end"
         wait(lambda: onlooker.count("health/ledger_difference") == 0, "a ledger that balances")
         assert replace(config).node == "edge-okuma"
+
+
+def test_of_several_brokers_the_one_that_answers_is_taken(mosquitto: Mosquitto, tmp_path: Path) -> None:
+    host, port = mosquitto.address
+    with okuma() as agent, Onlooker(BrokerAddress(host, port)) as onlooker:
+        section = BrokerSection(
+            urls=(f"mqtt://{host}:{free_port()}", f"mqtt://{host}:{port}"), session_file=str(tmp_path / "session")
+        )
+        agent.step(2)
+        with running(replace(config_for(agent, mosquitto, tmp_path / "unused"), broker=section)):
+            wait(lambda: onlooker.births > 0, "the birth of the machine")

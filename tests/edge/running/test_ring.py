@@ -193,7 +193,7 @@ def test_what_is_too_old_goes_and_nothing_else(open_ring: OpenRing, clock: Clock
     assert ring.evict(ring.last) is None
     clock.seconds = 61.0
     ring.look()
-    assert ring.evict(ring.last) == (Eviction.AGE, 2, 2, 3)
+    assert ring.evict(ring.last) == (Eviction.AGE, 2, 1, 2, 3)
     assert ring.evict(ring.last) is None
     assert [row.body for row in ring.read(1, 3)] == ["new"]
 
@@ -224,7 +224,7 @@ def test_rows_that_are_on_their_way_are_not_evicted(open_ring: OpenRing, clock: 
     ring = open_ring()
     ring.append([(1, "x")] * 5)
     clock.free = 0
-    assert ring.evict(3) == (Eviction.DISK, 3, 3, 3)
+    assert ring.evict(3) == (Eviction.DISK, 3, 1, 3, 3)
     assert ring.evict(3) is None
 
 

@@ -1,10 +1,13 @@
 """The ledger's law: received = emitted + dropped(reason) + buffered, after every single event."""
 
+import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from processors.running.ledger import DropReason, Ledger
+from sparkplug.admission.refusal import Refusal
 from sparkplug.host_session import EventKind, HostEvent
+from sparkplug.topics import NodeId
 from tests.processors.recorder import RECORDER
 from tests.processors.streams import engine_of, wild_streams
 
@@ -41,3 +44,16 @@ def test_what_could_not_be_sent_is_no_longer_emitted() -> None:
     ledger.received = ledger.emitted = 1
     ledger.unsent()
     assert (ledger.emitted, ledger.dropped[DropReason.BROKER_OFFLINE], ledger.balance) == (0, 1, 0)
+
+
+@pytest.mark.parametrize("refusal", list(Refusal))
+def test_what_is_refused_is_received_and_dropped_under_its_reason(refusal: Refusal) -> None:
+    engine = engine_of(RECORDER)
+    event = HostEvent(EventKind.REFUSED, NodeId("cnc", "edge"), "vmc", 0, detail="why", refused=3, refusal=refusal)
+    assert engine.feed(event, 0.0) == []
+    engine.received(event, has_room=True)  # one that waits for the snapshots counts when it is fed
+    engine.feed(event._replace(device=None, refused=0), 0.0)
+    assert (engine.ledger.received, engine.ledger.dropped_total, engine.ledger.balance) == (3, 3, 0)
+    (reason,) = [reason for reason, count in engine.ledger.dropped.items() if count]
+    assert reason.value.startswith("refused_")
+    assert engine.machines == ()

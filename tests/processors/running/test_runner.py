@@ -2,9 +2,6 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from threading import Event
-
-import pytest
 
 from processors.actions import Pin
 from processors.config import Configuration
@@ -35,6 +32,8 @@ class Kept:
 
     def pin(self, pin: Pin) -> None: ...
 
+    def begin_again(self) -> None: ...
+
     def receipts(self) -> Iterable[Receipt]:
         return ()
 
@@ -58,7 +57,7 @@ def test_each_message_is_folded_by_all_before_the_next_one_whatever_order_they_w
         workers = workers_on(host, *order)
         for worker in workers:
 
-            def noted(event: HostEvent, wall_s: float, *, has_waited: bool = False, worker: Worker = worker) -> Sequence[object]:
+            def noted(event: HostEvent, wall_s: float, worker: Worker = worker) -> Sequence[object]:
                 folded.append((worker.name, event.timestamp_ms % 60_000 / 1000))
                 return ()
 
@@ -139,17 +138,3 @@ def test_a_plain_message_reaches_those_who_listen_to_its_topic() -> None:
     Runner(host, [alerts, thermal]).run(host.until_empty())
     assert heard == [("alerts", topic)]
     assert set(find("alerts").listens) <= set(host.subscriptions)
-
-
-def test_one_that_fails_ends_all_and_all_say_goodbye() -> None:
-    host = FakeHost(birth(0.0, spindle_rpm=1.0))
-    one, other = workers_on(host, RECORDER, find("thermal"))
-
-    def failing(*_: object, **__: object) -> list[object]:
-        raise RuntimeError("our own bug")
-
-    one.engine.feed = failing  # type: ignore[method-assign,assignment]
-    with pytest.raises(RuntimeError, match="our own bug"):
-        Runner(host, [one, other]).run(Event())
-    assert host.stopped
-    assert all(worker._edge.stopped for worker in (one, other))  # type: ignore[attr-defined]

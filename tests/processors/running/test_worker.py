@@ -19,6 +19,7 @@ from processors.running.runner import Runner
 from processors.running.worker import Worker
 from processors.thermal import PROCESSOR as THERMAL
 from sparkplug.actions import Publish
+from sparkplug.admission.refusal import Quarantined
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import Change, MetricSpec, NodeId
 from tests.processors.recorder import RECORDER
@@ -35,9 +36,12 @@ class FakeHost:
         self.online = True
         self.reconnects = 0
         self.started = self.stopped = False
+        self.quarantine: tuple[Quarantined, ...] = ()
         self.retained = retained or {}
+        self.thinned: dict[NodeId, int] = {}
         self.plain: list[tuple[str, bytes, bool]] = []
         self.subscriptions: list[str] = []
+        self.born: dict[tuple[NodeId, str | None], HostEvent] = {}  # a birth of each device that is online
         self._marker = marker
         self._events: deque[HostEvent] = deque(live)
         self._stop_when_empty: Event | None = None
@@ -60,6 +64,13 @@ class FakeHost:
         assert not self.started, "subscriptions come first"
         self.subscriptions.append(topic_filter)
 
+    def take_thinned(self) -> dict[NodeId, int]:
+        thinned, self.thinned = self.thinned, {}
+        return thinned
+
+    def births(self) -> list[HostEvent]:
+        return list(self.born.values())
+
     def publish_all(self, messages: Sequence[Publish]) -> bool:
         return all(self.publish_plain(topic, payload, qos=qos, retain=retain) for topic, payload, qos, retain in messages)
 
@@ -77,6 +88,11 @@ class FakeHost:
         self._events.clear()
         if not events and self._stop_when_empty is not None:
             self._stop_when_empty.set()
+        for event in events:
+            if event.kind is EventKind.BIRTH:
+                self.born[event.node, event.device] = event
+            elif event.kind is EventKind.DEATH:
+                self.born.pop((event.node, event.device), None)
         return events
 
     def give(self, *events: HostEvent) -> None:
@@ -93,6 +109,7 @@ class FakeEdge:
 
     def __init__(self) -> None:
         self.online = True
+        self.starts = 0
         self.backlog = 0
         self.devices: dict[str, tuple[MetricSpec, ...]] = {}
         self.removed: list[str] = []
@@ -100,7 +117,8 @@ class FakeEdge:
         self.stopped = False
 
     def start(self) -> None:
-        pass
+        self.devices.clear()
+        self.starts += 1
 
     def stop(self, timeout_s: float = 5.0) -> None:
         self.stopped = True

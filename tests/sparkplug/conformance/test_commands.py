@@ -3,11 +3,13 @@
 import pytest
 
 from sparkplug.actions import Publish, Subscribe
-from sparkplug.codec import parse
+from sparkplug.codec import encode, parse
 from sparkplug.datatype import DataType
+from sparkplug.edge_session import REBIRTH, EdgeNodeSession
 from sparkplug.errors import MetricValueError, UnknownMetricError
-from sparkplug.metric import Change
-from sparkplug.values import Metric
+from sparkplug.metric import Change, MetricSpec
+from sparkplug.topics import Verb
+from sparkplug.values import Metric, Payload
 from tests.sparkplug.conformance.life import EPOCH_MS, NODE, PROBE_METRICS, EdgeLife, HostLife, change
 
 
@@ -119,6 +121,43 @@ def test_a_value_that_the_declared_type_cannot_carry_is_not_commanded(commander:
         _ncmd(commander, Change("health/lag", value, EPOCH_MS))  # type: ignore[arg-type]
     with pytest.raises(MetricValueError):
         _dcmd(commander, Change("tool_number", value, EPOCH_MS))  # type: ignore[arg-type]
+
+
+@pytest.mark.tck("tck-id-operational-behavior-data-commands-rebirth-name")
+def test_a_rebirth_is_commanded_by_name_as_any_other_metric_that_the_birth_declares(commander: HostLife, edge: EdgeLife) -> None:
+    command = _ncmd(commander, change(REBIRTH, True, EPOCH_MS), change("health/lag", 3, EPOCH_MS))
+    rebirth, lag = parse(command.payload).metrics
+    assert (rebirth.name, rebirth.boolean_value, rebirth.HasField("alias")) == (REBIRTH, True, False)
+    assert lag.HasField("alias")
+    edge.wait(10_000)
+    assert edge.receive(command.topic, command.payload)[0].verb is Verb.NBIRTH
+
+
+def test_other_controls_that_a_birth_declares_are_commanded_too(host: HostLife) -> None:
+    host.connect()
+    controls = (MetricSpec("Node Control/Reboot", DataType.BOOLEAN, value=False),)
+    edge = EdgeLife(EdgeNodeSession(NODE, controls, now_ms=EPOCH_MS))
+    host.receive(*edge.connect(bd_seq=0))
+    command = _ncmd(host, change("Node Control/Reboot", True, EPOCH_MS))
+    edge.receive(command.topic, command.payload)
+    assert [(c.name, c.value) for c in edge.session.commands] == [("Node Control/Reboot", True)]
+
+
+@pytest.mark.parametrize(("device", "name"), [("okuma", REBIRTH), (None, "bdSeq")])
+def test_no_birth_declares_the_rebirth_of_a_device_or_a_bdseq_to_write(
+    commander: HostLife, device: str | None, name: str
+) -> None:
+    with pytest.raises(UnknownMetricError):
+        commander.session.command(NODE, device, [change(name, True, EPOCH_MS)], EPOCH_MS)
+
+
+def test_a_node_whose_birth_offers_no_rebirth_is_not_commanded_to_give_one_but_can_be_asked(host: HostLife) -> None:
+    host.connect()
+    birth = encode(Payload(EPOCH_MS, (Metric("bdSeq", 0, DataType.INT64, EPOCH_MS),), seq=0))
+    host.session.message("spBv1.0/cnc/NBIRTH/edge-okuma", birth, EPOCH_MS)
+    with pytest.raises(UnknownMetricError):
+        _ncmd(host, change(REBIRTH, True, EPOCH_MS))
+    assert host.session.rebirth_request(NODE, EPOCH_MS).topic == "spBv1.0/cnc/NCMD/edge-okuma"
 
 
 @pytest.mark.tck("tck-id-message-flow-edge-node-ncmd-subscribe")

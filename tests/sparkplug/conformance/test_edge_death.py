@@ -72,7 +72,7 @@ def test_a_node_that_was_not_born_yet_publishes_its_death_too_before_it_disconne
 
 @pytest.mark.tck("tck-id-payloads-ndeath-will-message-publisher-disconnect-mqtt311")
 def test_a_node_that_walks_on_before_its_birth_publishes_its_death() -> None:
-    edge = EdgeLife(EdgeNodeSession(NODE, NODE_METRICS, primary_host="scada"))
+    edge = EdgeLife(EdgeNodeSession(NODE, NODE_METRICS, primary_host="scada", servers=2))
     edge.connect(bd_seq=0)
     actions = edge.session.message(STATE_TOPIC, HostState(False, 5).encode(), edge.now_ms)
     assert [type(action) for action in actions] == [Publish, WalkToNextServer]

@@ -302,6 +302,35 @@ def test_different_nodes_and_hosts_have_different_client_ids(proxy: Proxy) -> No
     assert len(set(names)) == len(clients)
 
 
+@both
+@pytest.mark.tck(
+    "tck-id-message-flow-edge-node-birth-publish-phid-wait",
+    "tck-id-message-flow-edge-node-birth-publish-phid-offline",
+    "tck-id-operational-behavior-edge-node-birth-sequence-wait",
+    "tck-id-operational-behavior-edge-node-termination-host-offline-reconnect",
+)
+def test_a_node_waits_connected_and_dies_once_for_each_time_that_its_host_goes(
+    mosquitto: Mosquitto, proxy: Proxy, version: int
+) -> None:
+    _say(mosquitto, STATE, HostState(False, 1000).encode(), retain=True)
+    edge = _edge(proxy, version=version, primary_host=HOST_ID)
+    edge.start()
+    for number in range(3):
+        stamp_ms = 1000 + 10 * number
+        proxy.wait_for(lambda packet: isinstance(packet, Publish) and packet.topic == STATE and packet.retain, count=number + 1)
+        for later_ms in range(1, 5):
+            _say(mosquitto, STATE, HostState(False, stamp_ms + later_ms).encode(), retain=True)
+        _say(mosquitto, STATE, HostState(True, stamp_ms + 5).encode(), retain=True)
+        proxy.wait_for(_on("DBIRTH"), count=number + 1)
+        _say(mosquitto, STATE, HostState(False, stamp_ms + 10).encode(), retain=True)
+        proxy.wait_for(lambda packet: isinstance(packet, Connect), count=number + 2)
+    edge.stop()
+    for number in range(3):
+        published = [p.topic.split("/")[2] for p in proxy.packets("up", Publish, connection=number)]
+        assert published == ["NBIRTH", "DBIRTH", "NDEATH"]
+    assert len(proxy.packets("up", Connect)) == 4
+
+
 @pytest.fixture
 def brokers() -> Iterator[tuple[tuple[Mosquitto, Proxy], tuple[Mosquitto, Proxy]]]:
     """Two brokers that know nothing of each other, each behind a proxy."""

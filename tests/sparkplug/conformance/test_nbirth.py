@@ -3,10 +3,12 @@
 import pytest
 
 from sparkplug.codec import parse
+from sparkplug.datatype import DataType
 from sparkplug.edge_session import EdgeNodeSession
-from sparkplug.errors import UnknownMetricError
+from sparkplug.errors import SparkplugError, UnknownMetricError
+from sparkplug.metric import MetricSpec
 from sparkplug.topics import Verb
-from tests.sparkplug.conformance.life import EPOCH_MS, NODE, NODE_METRICS, PROBE_METRICS, EdgeLife, change
+from tests.sparkplug.conformance.life import AXIS, EPOCH_MS, NODE, NODE_METRICS, PROBE_METRICS, EdgeLife, change
 
 CONTROL = {"bdSeq", "Node Control/Rebirth"}
 
@@ -144,3 +146,9 @@ def test_a_device_that_comes_before_the_nbirth_waits_for_it() -> None:
         (Verb.DBIRTH, "early"),
         (Verb.DBIRTH, "probe"),
     ]
+
+
+@pytest.mark.parametrize("name", ["bdSeq", "Node Control/Rebirth", "Axis"])
+def test_a_metric_with_the_name_of_what_the_birth_holds_already_is_refused(name: str) -> None:
+    with pytest.raises(SparkplugError, match=name):
+        EdgeNodeSession(NODE, [MetricSpec(name, DataType.INT64)], templates={"Axis": AXIS})

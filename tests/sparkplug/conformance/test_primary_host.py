@@ -3,7 +3,7 @@
 import pytest
 
 from sparkplug.actions import HostState, Publish, Subscribe, WalkToNextServer
-from sparkplug.edge_session import EdgeNodeSession, Phase
+from sparkplug.edge_session import VISIT_MS, EdgeNodeSession, Phase
 from sparkplug.errors import SparkplugError
 from sparkplug.topics import Verb
 from tests.sparkplug.conformance.life import (
@@ -23,10 +23,27 @@ from tests.sparkplug.conformance.life import (
 @pytest.fixture
 def waiting() -> EdgeLife:
     """An edge node with one device that is connected and waits for its primary host."""
-    edge = EdgeLife(EdgeNodeSession(NODE, NODE_METRICS, now_ms=EPOCH_MS, primary_host=HOST_ID))
+    return _waiting(servers=1)
+
+
+@pytest.fixture
+def walking() -> EdgeLife:
+    """The same with two brokers."""
+    return _waiting(servers=2)
+
+
+def _waiting(servers: int) -> EdgeLife:
+    edge = EdgeLife(EdgeNodeSession(NODE, NODE_METRICS, now_ms=EPOCH_MS, primary_host=HOST_ID, servers=servers))
     edge.session.declare_device("probe", PROBE_METRICS, EPOCH_MS)
     assert edge.connect(bd_seq=0) == []
     return edge
+
+
+def _goes_on(edge: EdgeLife) -> None:
+    """The transport ends the connection and opens the next one, at the next broker."""
+    edge.lose()
+    number = len(edge.connects)
+    assert edge.connect(bd_seq=number, server=number % 2) == []
 
 
 def _says(edge: EdgeLife, online: bool, timestamp_ms: int, topic: str = STATE_TOPIC) -> list[Sent]:
@@ -72,7 +89,7 @@ def test_another_host_does_not_stand_in_for_the_primary_one(waiting: EdgeLife, t
     ],
 )
 def test_only_a_boolean_true_is_online(waiting: EdgeLife, payload: bytes) -> None:
-    assert not [sent for sent in waiting.receive(STATE_TOPIC, payload) if sent.verb is not Verb.NDEATH]
+    assert waiting.receive(STATE_TOPIC, payload) == []
     assert waiting.session.phase is Phase.WAITING
 
 
@@ -117,10 +134,57 @@ def test_an_offline_that_is_older_than_the_last_online_is_ignored(waiting: EdgeL
     assert _verbs(waiting.publish(None, change("health/lag", 1, waiting.now_ms))) == [Verb.NDATA]
 
 
-@pytest.mark.tck("tck-id-operational-behavior-primary-application-state-with-multiple-servers-walk")
-def test_a_node_that_finds_its_primary_host_offline_walks_to_the_next_broker(waiting: EdgeLife) -> None:
-    assert [sent.verb for sent in _says(waiting, False, 1000)] == [Verb.NDEATH]
+def test_a_node_with_one_broker_waits_there_for_its_primary_host_and_owes_it_no_death(waiting: EdgeLife) -> None:
+    for number in range(10):
+        assert _says(waiting, False, 1000 + number) == []
+        assert waiting.wait(60_000) == []
+    assert waiting.endings() == []
+    assert _verbs(_says(waiting, True, 2000)) == [Verb.NBIRTH, Verb.DBIRTH]
+
+
+def test_nothing_is_published_between_the_death_and_the_next_connection(waiting: EdgeLife) -> None:
+    _says(waiting, True, 1000)
+    assert _verbs(_says(waiting, False, 1001)) == [Verb.NDEATH]
+    assert _says(waiting, False, 1002) == []
+    assert waiting.publish(None, change("health/lag", 1, waiting.now_ms)) == []
+    assert waiting.rebirth() == []
     assert waiting.endings() == [WalkToNextServer()]
+
+
+@pytest.mark.tck("tck-id-operational-behavior-primary-application-state-with-multiple-servers-walk")
+def test_a_node_that_finds_its_primary_host_offline_walks_to_the_next_broker(walking: EdgeLife) -> None:
+    assert _verbs(_says(walking, False, 1000)) == [Verb.NDEATH]
+    assert walking.endings() == [WalkToNextServer()]
+
+
+@pytest.mark.tck("tck-id-operational-behavior-primary-application-state-with-multiple-servers-walk")
+def test_a_node_that_was_at_all_brokers_looks_at_each_for_a_while(walking: EdgeLife) -> None:
+    _says(walking, False, 1000)
+    for _ in range(3):
+        _goes_on(walking)
+        assert _says(walking, False, 1000) == []
+        assert walking.wait(VISIT_MS - 500) == []
+        assert _verbs(walking.wait(500)) == [Verb.NDEATH]
+    assert walking.endings() == [WalkToNextServer()] * 4
+    _goes_on(walking)
+    assert _verbs(_says(walking, True, 1001)) == [Verb.NBIRTH, Verb.DBIRTH]
+    assert walking.wait(10 * VISIT_MS) == []
+
+
+@pytest.mark.tck("tck-id-operational-behavior-primary-application-state-with-multiple-servers-walk")
+def test_a_node_whose_host_goes_offline_at_once_looks_at_all_the_others(walking: EdgeLife) -> None:
+    _says(walking, True, 1000)
+    assert _verbs(_says(walking, False, 1001)) == [Verb.NDEATH]
+    _goes_on(walking)
+    assert _verbs(_says(walking, False, 1001)) == [Verb.NDEATH]
+    _goes_on(walking)
+    assert _says(walking, False, 1001) == []
+
+
+@pytest.mark.parametrize("step_ms", [VISIT_MS, -VISIT_MS])
+def test_a_broker_that_knows_nothing_of_the_primary_host_is_left_too(walking: EdgeLife, step_ms: int) -> None:
+    assert _verbs(walking.wait(step_ms)) == [Verb.NDEATH]
+    assert walking.endings() == [WalkToNextServer()]
 
 
 @pytest.mark.tck("tck-id-operational-behavior-primary-application-state-with-multiple-servers-single-server")

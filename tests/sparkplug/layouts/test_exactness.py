@@ -9,6 +9,7 @@ from typing import Any
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from sparkplug.admission.gate import Gate
 from sparkplug.codec import encode, parse
 from sparkplug.datatype import DataType
 from sparkplug.errors import PayloadError
@@ -154,7 +155,7 @@ def payloads(draw: st.DrawFn) -> bytes:
 def picture() -> NodePicture:
     born = NodePicture(NODE)
     declared = [Metric(f"m{i}", None, t, START_MS, i if i < len(TYPES) - 1 else None) for i, t in enumerate(TYPES)]
-    born.own.bear(parse(encode(Payload(START_MS, tuple(declared)))), START_MS, born.aliases)
+    born.own.bear(parse(encode(Payload(START_MS, tuple(declared)))), START_MS, born.holders)
     return born
 
 
@@ -181,7 +182,7 @@ def learnt(born: NodePicture, payload: bytes) -> tuple[Layout, Memory] | None:
     if not complete or not readings:
         return None
     memory = Memory(Room())
-    route = Route(born, SequenceWindow(1000), born.own, None, memory)
+    route = Route(born, SequenceWindow(1000), born.own, None, memory, Gate())
     names = () if any(reading.is_historical for reading in readings) else tuple(reading.name for reading in readings)
     route.learn(payload, message, readings, names)
     found = memory.read(payload)

@@ -22,6 +22,7 @@ from sparkplug.transport.loop import Loop
 from sparkplug.transport.packets import puback
 from sparkplug.transport.paho_client import StreamClient
 from sparkplug.transport.paho_path import PahoPath
+from sparkplug.transport.sendable import Sendable
 from tests.sparkplug.transport.pair import client_on, listener_of, nothing
 from tests.wire import mqtt_packets
 
@@ -35,15 +36,16 @@ class FakeBroker:
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.ends: list[socket.socket] = []
         self.is_mute = False
+        self.connack, self.mqtt_version = CONNACK, 4
         monkeypatch.setattr(connection_module, "dialled", self._dialled)
 
     def _dialled(self, *_: object) -> StreamClient:
         ours, theirs = socket.socketpair()
         theirs.settimeout(5.0)
         if not self.is_mute:
-            theirs.sendall(CONNACK)
+            theirs.sendall(self.connack)
         self.ends.append(theirs)
-        return client_on(ours)[0]
+        return client_on(ours, self.mqtt_version)[0]
 
     def close(self) -> None:
         for end in self.ends:
@@ -120,7 +122,7 @@ def test_a_message_with_the_packet_id_of_a_barrier_confirms_nothing(monkeypatch:
     ours, theirs = socket.socketpair()
     with ours, theirs:
         client, stream = client_on(ours)
-        path = PahoPath(client, stream, listener_of(confirmed=confirmed.append), nothing)
+        path = PahoPath(client, stream, listener_of(confirmed=confirmed.append), nothing, Sendable("test"))
         path._barriers[7] = 1
         reason = ReasonCode(PacketTypes.PUBACK)
         path._on_publish(client, None, 7, reason, None)  # as paho does when it has written a QoS 0 message
@@ -256,4 +258,43 @@ def test_no_more_messages_are_out_than_the_broker_may_leave_unacknowledged(
     assert isinstance(path, DataPath)
     broker.ends[0].sendall(b"".join(puback(packet_id) for packet_id in path._unacknowledged))
     wait_until(lambda: connection.loop.turn(0.05) and connection.backlog == 0)
+    connection.close((), PATIENCE_S)
+
+
+@pytest.mark.parametrize("qos", [0, 1])
+@pytest.mark.parametrize("data_path", [True, False], ids=["data path", "paho"])
+def test_a_message_that_cannot_be_sent_is_dropped_and_counted_and_the_others_go_out(
+    data_path: bool, qos: int, broker: FakeBroker, caplog: pytest.LogCaptureFixture
+) -> None:
+    connection = MqttConnection((BrokerAddress(),), "test", listener_of(), data_path=data_path)
+    connection.start()
+    wait_until(lambda: connection.loop.turn(0.05) and connection.connects == 1)
+    connection.sendable.packet_bytes_max = 100
+    for topic, payload in (("cnc/" + "%25" * 30_000, b""), ("cnc/a\x07", b""), ("a/+", b""), ("a\ud800", b""), ("a", bytes(101))):
+        assert not connection.sendable.takes(Publish(topic, payload, qos))
+        connection.send((Publish("a", b"before", qos), Publish(topic, payload, qos), Publish("a", b"after", qos)))
+    connected = mqtt_packets.PacketReader()
+    got: list[bytes] = []
+    broker.ends[0].settimeout(0.0)
+    deadline_s = time.monotonic() + PATIENCE_S
+    while len(got) < 10 and time.monotonic() < deadline_s:
+        assert connection.loop.turn(0.05)
+        with suppress(BlockingIOError):
+            packets = connected.feed(broker.ends[0].recv(65_536))
+            got += [packet.payload for packet in packets if isinstance(packet, mqtt_packets.Publish)]
+    assert got == [b"before", b"after"] * 5
+    assert (connection.sendable.unsendable, connection.connects, connection.unsent) == (10, 1, 0)
+    assert "'cnc/%25%25%25%25%25%25%25%25%25%25%25%25%25%25%25%25%25%25%2…' (90004 characters) cannot be sent" in caplog.text
+    connection.close((), PATIENCE_S)
+
+
+def test_the_largest_packet_that_a_broker_of_mqtt_5_takes_is_kept_to(broker: FakeBroker) -> None:
+    broker.connack = bytes.fromhex("20 08 00 00 05 27 00 00 00 64")
+    connection = MqttConnection((BrokerAddress(),), "test", listener_of(), mqtt_version=5)
+    broker.mqtt_version = 5
+    connection.start()
+    wait_until(lambda: connection.loop.turn(0.05) and connection.connects == 1)
+    assert connection.sendable.packet_bytes_max == 100
+    assert connection.sendable.takes(Publish("a", bytes(80)))
+    assert not connection.sendable.takes(Publish("a", bytes(100)))
     connection.close((), PATIENCE_S)

@@ -12,6 +12,7 @@ from pathlib import Path
 from urllib.parse import parse_qsl, urlsplit
 
 from cnctwin.memory.store.contract import StoreError
+from sparkplug.shown_address import shown_address
 
 PINNED = "cnc_pinned"
 """The bucket, without an end, that holds copies of what was pinned, beside those named by measurement."""
@@ -50,7 +51,16 @@ class Address:
 
 def parse(url: str, environment: Mapping[str, str] = os.environ) -> Address:
     """The address of a URL; StoreError says what is wrong with it, without repeating a secret."""
-    parts = urlsplit(url)
+    try:
+        parts = urlsplit(url)
+        query = parts.query.strip("&")
+        options = dict(parse_qsl(query, keep_blank_values=True, strict_parsing=bool(query)))
+        if parts.port == 0 or parts.fragment:
+            raise ValueError
+    except ValueError:
+        raise StoreError(
+            f"store {shown_address(url)}: host, port or options cannot be read; use one of {', '.join(SCHEMES)}"
+        ) from None
     if parts.scheme not in SCHEMES:
         raise StoreError(f"store {parts.scheme}://…: use one of {', '.join(SCHEMES)}, or a folder")
     kind, scheme = parts.scheme.split("+")
@@ -60,8 +70,7 @@ def parse(url: str, environment: Mapping[str, str] = os.environ) -> Address:
         )
     if not parts.hostname:
         raise StoreError(f"store {parts.scheme}://: names no host; write {parts.scheme}://host:8086")
-    options = dict(parse_qsl(parts.query, keep_blank_values=True))
-    if "token" in options or "p" in options:
+    if options.keys() & {"token", "p", "password"}:
         raise StoreError(
             f"store {parts.scheme}://{parts.netloc}: no secrets in the URL; put the token into {TOKEN} or {TOKEN_FILE}"
         )

@@ -35,9 +35,9 @@ class Influx1:
 
     def _make(self, database: str) -> None:
         try:
-            told = self._http.get("/query", {"q": f"CREATE DATABASE {identifier(database)}"}, method="POST").json()
+            told = self._http.get_json("/query", {"q": f"CREATE DATABASE {identifier(database)}"}, method="POST")
             trouble = next((result["error"] for result in told.get("results", []) if "error" in result), "")
-        except (StoreError, ValueError) as error:
+        except (StoreError, AttributeError, TypeError) as error:
             trouble = str(error)
         if trouble:
             raise ServerAwayError(f"database {database!r} is missing and cannot be made: {trouble}; make it, see docs/influx.md")
@@ -47,5 +47,4 @@ class Influx1:
         return ""
 
     def close(self) -> None:
-        """Close the connections."""
-        self._http.close()
+        """Nothing stays open."""

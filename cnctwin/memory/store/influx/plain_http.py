@@ -1,20 +1,26 @@
-"""Requests to InfluxDB 1.x and VictoriaMetrics, and the questions in InfluxQL to all of InfluxDB: one client, plain HTTP."""
+"""Requests to InfluxDB 1.x and VictoriaMetrics, and the questions in InfluxQL to all of InfluxDB: plain HTTP, within bounds.
+
+Each request has one deadline for all of it, an answer has at most ANSWER_BYTES_MAX bytes, and one that is compressed is refused
+(`processors.alerts.courier.exchange`): the server may be anybody who stands at its address.
+"""
 
 import base64
 import gzip
+import json
 import ssl
 import time
 from collections.abc import Mapping
-
-import httpx
+from typing import Any
 
 from cnctwin.memory.store.contract import StoreError
 from cnctwin.memory.store.influx.address import INFLUX2, VICTORIA, Address
 from cnctwin.memory.store.influx.http_answer import answer, message, one_line
 from cnctwin.memory.store.influx.server import ServerAwayError
+from processors.alerts.courier.exchange import Answer, Request, exchanged
+from processors.alerts.courier.outcome import Outcome
 
 GZIP_LEVEL = 1
-CONNECT_S_MAX = 5.0
+ANSWER_BYTES_MAX = 128 * 1024 * 1024
 
 
 class PlainHttp:
@@ -22,47 +28,52 @@ class PlainHttp:
 
     def __init__(self, address: Address, *, timeout_s: float | None = None) -> None:
         self.address = address
-        verify: ssl.SSLContext | bool = address.base.startswith("https:")
-        if address.ca is not None:
-            verify = ssl.create_default_context(cafile=str(address.ca))
-        timeout = httpx.Timeout(timeout_s or address.timeout_s, connect=min(CONNECT_S_MAX, address.timeout_s))
-        self._client = httpx.Client(base_url=address.base, headers=authorization(address), timeout=timeout, verify=verify)
-
-    def close(self) -> None:
-        """Close the connections."""
-        self._client.close()
+        self._timeout_s = timeout_s or address.timeout_s
+        self._authorities = None if address.ca is None else ssl.create_default_context(cafile=str(address.ca))
 
     def post_lines(self, path: str, lines: bytes, parameters: Mapping[str, str]) -> None:
         """Write lines; raises a ServerAnswer where they were not taken."""
-        try:
-            done = self._client.post(
-                path,
-                params=parameters,
-                content=gzip.compress(lines, GZIP_LEVEL),
-                headers={"Content-Encoding": "gzip", "Content-Type": "text/plain; charset=utf-8"},
-            )
-        except httpx.HTTPError as error:
-            raise ServerAwayError(self._trouble(error)) from None
-        token = self.address.token
+        headers = {"Content-Encoding": "gzip", "Content-Type": "text/plain; charset=utf-8"}
+        done = self._asked("POST", path, headers, query=parameters, content=gzip.compress(lines, GZIP_LEVEL))
+        if isinstance(done, Outcome):
+            raise ServerAwayError(self._trouble(done.reason))
+        token, said = self.address.token, done.body.decode(errors="replace")
         if refusal := answer(
-            self.address.base, done.status_code, done.text, done.headers.get("Retry-After"), now_s=time.time(), token=token
+            self.address.base, done.status, said, done.headers.get("Retry-After"), now_s=time.time(), token=token
         ):
             raise refusal
 
-    def get(self, path: str, parameters: Mapping[str, str | list[str]], *, method: str = "GET") -> httpx.Response:
-        """Ask; StoreError where there is no good answer."""
-        try:
-            done = self._client.get(path, params=parameters) if method == "GET" else self._client.post(path, data=parameters)
-        except httpx.HTTPError as error:
-            raise StoreError(self._trouble(error)) from None
-        if done.status_code >= 300:
-            said = one_line(message(done.text), self.address.token)
-            raise StoreError(f"{self.address.base}{path} says {done.status_code}: {said}")
-        return done
+    def get(self, path: str, parameters: Mapping[str, str | list[str]], *, method: str = "GET") -> str:
+        """Ask, and return the text of the answer; StoreError where there is no good one."""
+        form = None if method == "GET" else {name: str(value) for name, value in parameters.items()}
+        done = self._asked(method, path, {}, query=parameters if form is None else None, form=form)
+        if isinstance(done, Outcome):
+            raise StoreError(self._trouble(done.reason))
+        said = done.body.decode(errors="replace")
+        if done.status >= 300:
+            raise StoreError(f"{self.address.base}{path} says {done.status}: {one_line(message(said), self.address.token)}")
+        if done.wrong:
+            raise StoreError(
+                f"{self.address.base}{path}: the answer {done.wrong}; ask for less at once, or look who answers there"
+            )
+        return said
 
-    def _trouble(self, error: httpx.HTTPError) -> str:
-        said = one_line(str(error) or type(error).__name__, self.address.token)
-        return f"{self.address.base} does not answer: {said}; is the server up?"
+    def get_json(self, path: str, parameters: Mapping[str, str | list[str]], *, method: str = "GET") -> Any:
+        """Ask, and return the document of the answer; StoreError where there is no good one."""
+        try:
+            return json.loads(self.get(path, parameters, method=method))
+        except (ValueError, RecursionError):
+            server = "a VictoriaMetrics" if self.address.kind == VICTORIA else "an InfluxDB"
+            raise StoreError(f"{self.address.base}{path}: the answer is no JSON; is that {server}?") from None
+
+    def _asked(self, method: str, path: str, headers: dict[str, str], **given: Any) -> Answer | Outcome:
+        address = self.address
+        headers |= authorization(address)
+        request = Request(method, address.base + path, headers, secrets=(address.token,), authorities=self._authorities, **given)
+        return exchanged(request, self._timeout_s, ANSWER_BYTES_MAX)
+
+    def _trouble(self, reason: str) -> str:
+        return f"{self.address.base} does not answer: {one_line(reason, self.address.token)}; is the server up?"
 
 
 def authorization(address: Address) -> dict[str, str]:

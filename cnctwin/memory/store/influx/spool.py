@@ -1,8 +1,9 @@
 """The ring on the disk before the server: batches of lines that it has not taken yet, and what has to be remembered of them.
 
-One SQLite file (`edge.running.ring_file`; a commit outlives a kill -9). In one transaction go: the batches, the stamps by which a
-sample is known that comes again, and the account `taken = sent + refused + evicted + held`, of samples. What is too old or too
-much goes oldest first and is counted by reason. Two writers cannot share a folder: a lock file sees to that.
+One SQLite file (`edge.running.ring_file`; a commit outlives a kill -9 and the loss of power). In one transaction go: the
+batches, the stamps by which a sample is known that comes again, and the account `taken = sent + refused + evicted + held`, of
+samples. What is too old or too much goes oldest first and is counted by reason. Two writers cannot share a folder: a lock file
+sees to that.
 """
 
 import fcntl
@@ -17,6 +18,7 @@ from pathlib import Path
 from threading import RLock
 from typing import Any, NamedTuple
 
+from cnctwin.files.synced import make_folder
 from cnctwin.memory.store.contract import Pinned, StoreError
 from edge.running.ring_file import EVICTED_AT_ONCE, Eviction, open_ring, passed_limit, transaction
 
@@ -83,14 +85,14 @@ class Spool:
         self.folder, self._limits, self._wall_ms, self._free_bytes = folder, limits, wall_ms, free_bytes
         self._lock = RLock()
         try:
-            folder.mkdir(parents=True, exist_ok=True)
+            make_folder(folder)
             self._owner = (folder / LOCK).open("w")
             try:
                 fcntl.flock(self._owner, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError as error:
                 self._owner.close()
                 raise StoreError(f"{folder}: another process writes to this ring; stop it or name another folder") from error
-            self._db = open_ring(folder / FILE, _SCHEMA, synchronous="normal", timeout_s=5.0)
+            self._db = open_ring(folder / FILE, _SCHEMA, synchronous="full", timeout_s=5.0)
             sums = "SELECT coalesce(sum(samples), 0), coalesce(sum(bytes), 0) FROM rows"
             held, size = self._db.execute(sums).fetchone()
             self.held, self.bytes = int(held), int(size)

@@ -45,13 +45,12 @@ class Victoria:
 
     def _metrics(self) -> str:
         try:
-            return self._http.get("/metrics", {}).text
+            return self._http.get("/metrics", {})
         except StoreError as error:
             raise ServerAwayError(str(error)) from None
 
     def close(self) -> None:
-        """Close the connections."""
-        self._http.close()
+        """Nothing stays open."""
 
 
 def deduplicates(metrics: str) -> bool:

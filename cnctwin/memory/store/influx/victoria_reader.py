@@ -114,13 +114,12 @@ class VictoriaReader:
         self._base, self._wall_s = address.base, wall_s
 
     def close(self) -> None:
-        """Close the connections."""
-        self._http.close()
+        """Nothing stays open."""
 
     def machines(self) -> list[str]:
         """All machines, by name."""
         match = f'{{__name__=~"({RAW}|{DERIVED})_quality"}}'
-        told = self._http.get("/api/v1/label/machine/values", {"match[]": match, "start": _EVER}).json()
+        told = self._http.get_json("/api/v1/label/machine/values", {"match[]": match, "start": _EVER})
         return sorted(told.get("data") or [])
 
     def series(self, machine: str) -> list[Series]:
@@ -137,7 +136,7 @@ class VictoriaReader:
     def latest(self, machine: str) -> dict[str, Sample]:
         """The last sample of each signal, of the last 400 days."""
         match = f'{{__name__=~"({RAW}|{DERIVED})_quality",machine={_quoted(machine)}}}'
-        known = self._http.get("/api/v1/series", {"match[]": match, "start": _EVER}).json()["data"]
+        known = self._http.get_json("/api/v1/series", {"match[]": match, "start": _EVER})["data"]
         missing, found = {labels["signal"] for labels in known}, dict[str, Sample]()
         for lookback in _LOOKBACKS:
             if missing:
@@ -197,7 +196,7 @@ class VictoriaReader:
 
     def _units(self, query: Query) -> dict[str, str | None]:
         match = _match(query.machine, query.signals, (RAW, DERIVED), "quality")
-        known = self._http.get("/api/v1/series", {"match[]": match, "start": _EVER}).json()["data"]
+        known = self._http.get_json("/api/v1/series", {"match[]": match, "start": _EVER})["data"]
         by_signal: dict[str, set[str | None]] = defaultdict(set)
         for labels in known:
             by_signal[labels["signal"]].add(labels.get("unit"))
@@ -215,7 +214,7 @@ class VictoriaReader:
             "end": f"{(to_ms - 1) / 1000:.3f}",
         }
         moments: dict[tuple[_Place, int], _Moment] = defaultdict(_Moment)
-        for line in self._http.get("/api/v1/export", asked).text.splitlines():
+        for line in self._http.get("/api/v1/export", asked).splitlines():
             told = json.loads(line)
             labels = told["metric"]
             place, name = _place(labels), _field(labels["__name__"])
@@ -248,9 +247,8 @@ class VictoriaReader:
 
     def _results(self, path: str, asked: dict[str, str]) -> list[dict[str, Any]]:
         try:
-            told = self._http.get(path, asked, method="POST").json()
-            results: list[dict[str, Any]] = told["data"]["result"]
-        except (ValueError, KeyError, TypeError):
+            results: list[dict[str, Any]] = self._http.get_json(path, asked, method="POST")["data"]["result"]
+        except (KeyError, TypeError):
             raise StoreError(f"{self._base}{path}: the answer is not that of a VictoriaMetrics; is that one?") from None
         return results
 

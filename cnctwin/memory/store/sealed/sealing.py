@@ -29,6 +29,8 @@ from cnctwin.memory.store.value_form import Kind
 
 SAMPLES_MIN = 20_000
 """The samples that a file is worth; a quiet machine's hours wait for one another up to the end of the day."""
+DAY_SAMPLES_MIN = 64
+"""A day with fewer samples stays in SQLite: its file would be larger than they are, and one message could make hundreds."""
 MINUTES = HOUR_MS // CHUNK_MS
 AHEAD_MS = DAY_MS
 """An hour that is still to come (of a machine whose clock is ahead) is due when nothing came into it for so long."""
@@ -119,6 +121,8 @@ class Sealer:
             there = {
                 (f.from_ms, f.to_ms) for f in files(self._db, machine, from_ms, to_ms) if f.stored_class != StoredClass.ROLLUP
             }
+            if not there and sum(count for hour, count in counts.items() if hour // 24 == day) < DAY_SAMPLES_MIN:
+                continue
             is_over = all(hour in ripe for hour in counts if hour // 24 == day) and (
                 to_ms <= horizon_ms or any(day * 24 <= hour < day * 24 + 24 and hour * HOUR_MS >= horizon_ms for hour in ripe)
             )
@@ -146,7 +150,7 @@ class Sealer:
         """Move a stretch. Raises StoreError, and then nothing has changed."""
         kinds, classes, about = self._series(job.machine)
         done = Done(0, 0, ())
-        with transaction(self._db, self._file, is_durable=True):
+        with transaction(self._db, self._file):
             chunks = read_chunks(self._db, *job)
             for stored_class in (StoredClass.RAW, StoredClass.BLOCK, StoredClass.TWIN):
                 of_chunks = columns_of(chunk for chunk in chunks if chunk.stored_class == stored_class)

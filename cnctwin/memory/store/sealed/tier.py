@@ -85,7 +85,7 @@ class SealedTier:
         names = {number: name for name, number in self._table.machines.items()}
         left_over: list[str] = []
         for machine, day in ready[:at_once]:
-            with transaction(self._db, self._file, is_durable=True):
+            with transaction(self._db, self._file):
                 left_over += roll_up(self._db, self._answers, self.checked, (machine, names[machine]), day)
             self._dirty.discard((machine, day))
         return left_over
@@ -104,7 +104,7 @@ class SealedTier:
             return 0, 0, pinned
         days = {(file.machine, file.from_ms // DAY_MS) for file in chosen if file.stored_class == StoredClass.RAW}
         left_over += self._roll_up(now_ms, at_once=len(days), only=days & self._dirty)
-        with transaction(self._db, self._file, is_durable=True):
+        with transaction(self._db, self._file):
             freed = sweep(self._db, chosen)
         left_over += [file.name for file in chosen]
         return len(chosen), freed, pinned

@@ -5,6 +5,8 @@ import { openHelp, openLink, openLogin } from "./dialogs.js";
 import { el, say, setHidden, setText } from "./dom.js";
 import { serverNow } from "./clock.js";
 import { painted } from "./lag.js";
+import { lookup } from "./lookup.js";
+import { askMe, me } from "./me.js";
 import { onFrame } from "./frame.js";
 import { Plant } from "./plant.js";
 import { Stream } from "./stream.js";
@@ -17,7 +19,7 @@ import * as machine from "./views/machine.js";
 import * as replay from "./views/replay.js";
 import * as validation from "./views/validation.js";
 
-const VIEWS = { fleet, machine, gap, alerts, replay, validation, jobs };
+const VIEWS = lookup({ fleet, machine, gap, alerts, replay, validation, jobs });
 const TABS = [
   ["fleet", "Fleet", "f"],
   ["machine", "Machine", "m"],
@@ -32,6 +34,7 @@ const ALERTS_MS = 5000;
 const main = document.getElementById("main"),
   banner = document.getElementById("banner");
 const behindBanner = document.getElementById("behind");
+const whom = document.getElementById("me");
 const pill = document.getElementById("link"),
   pillWord = pill.querySelector(".word");
 
@@ -217,6 +220,14 @@ setInterval(() => {
   if (!document.hidden && performance.now() - alertsHeard > 60000 && app.stream.link !== "lost") app.askAlerts();
 }, ALERTS_MS);
 
+/** Who looks, and what the role may: asked at the start and after each log-in. */
+app.askMe = async () => {
+  await askMe();
+  setHidden(whom, !me.user && me.role !== "reader");
+  setText(whom, me.user ?? me.role ?? "");
+  onFrame(() => app.view?.onMe?.());
+};
+
 /** The fleet's names where its stream is not open: they are needed to go from machine to machine. */
 async function askMachines() {
   if (document.hidden || (app.view?.stream === "stream" && app.plant.machines.size)) return;
@@ -295,5 +306,6 @@ addEventListener("error", (event) => say(`The page has an error: ${event.message
 tabs();
 route();
 link();
+app.askMe();
 app.askAlerts();
 askMachines();

@@ -2,9 +2,10 @@
 
 import { get, post } from "./api.js";
 import { clockOffset } from "./clock.js";
-import { el, symbol } from "./dom.js";
+import { el, symbol, table } from "./dom.js";
 import { lag } from "./lag.js";
-import { age, execution, words } from "./text.js";
+import { may, me } from "./me.js";
+import { age, execution, moment, words } from "./text.js";
 
 const dialog = () => document.getElementById("dialog");
 
@@ -85,6 +86,7 @@ export function openLink(app) {
     const { stream } = app,
       behind = lag();
     const rows = [
+      ["You", me.role === null ? "not known" : [me.user, me.role].filter(Boolean).join(", ")],
       ["State", document.getElementById("link").textContent.trim()],
       [
         "Last heard",
@@ -117,6 +119,10 @@ export function openLink(app) {
     el(
       "div",
       { class: "actions" },
+      me.role !== null && may("administrator")
+        ? el("button", { type: "button", class: "button", onclick: openDeeds }, "Who did what")
+        : null,
+      me.logsOut ? el("button", { type: "button", class: "button", onclick: () => logOut(app) }, "Log out") : null,
       el("button", { type: "button", class: "button", onclick: () => app.stream.restart() }, "Connect anew"),
     ),
   );
@@ -126,6 +132,37 @@ export function openLink(app) {
     (health) => parts.replaceChildren(...healthRows(health)),
     (error) => parts.replaceChildren(el("li", {}, error.message)),
   );
+}
+
+/** The newest lines of the record, for administrators. */
+async function openDeeds() {
+  const where = el("div", {}, el("p", { class: "waiting" }, "Loading …"));
+  show("Who did what", where);
+  try {
+    const { deeds, file, trouble } = await get("audit?limit=50");
+    const rows = deeds.map((one) => [
+      moment(Date.parse(one.at)),
+      [one.user, one.user === one.role ? "" : one.role].filter(Boolean).join(", "),
+      one.address,
+      [one.action, one.object].filter(Boolean).join(" "),
+      one.outcome,
+    ]);
+    where.replaceChildren(
+      ...(trouble ? [el("p", { class: "trouble" }, trouble)] : []),
+      rows.length
+        ? table(["When", "Who", "From", "What", "Outcome"], rows, { label: "Who did what", className: "deeds" })
+        : el("p", { class: "quiet" }, "Nobody has done anything yet."),
+      el("p", { class: "note" }, file ? `Older lines: ${file}` : "Kept in memory only, until the server ends."),
+    );
+  } catch (error) {
+    where.replaceChildren(el("p", { class: "trouble" }, `The record cannot be shown: ${error.message}.`));
+  }
+}
+
+async function logOut(app) {
+  await post("logout", {}).catch(() => {});
+  app.stream.restart();
+  await app.askMe();
 }
 
 function healthRows(health) {
@@ -156,10 +193,11 @@ export function openLogin(app) {
       field.select();
       throw error.status === 401 || error.status === 403 ? new Error("This is not the token.") : error;
     }
+    await app.askMe();
     app.stream.restart();
     app.reopen();
   };
-  const where = "Whoever runs it has it: the variable CNCTWIN_PAGE_TOKEN, or the file named in its place.";
+  const where = "Yours is in the server's file of users, or there is one for all: whoever runs the server has it.";
   const about = el("p", {}, `This page asks for a token. ${where}`);
   openAsked("Log in", [about, el("label", { class: "named" }, "Token", field)], "Log in", act, null);
   field.focus();
@@ -191,7 +229,7 @@ export function openAsked(title, content, word, act, back = "Cancel") {
   const open = show(title, el("form", { onsubmit: submit }, content, told, el("div", { class: "actions" }, leave, button)));
 }
 
-/** Asks for a name and a comment; `act(by, comment)` does it and gives what to say, or throws. */
+/** Asks for a name, where the server does not know it, and a comment; `act(by, comment)` does it and gives what to say, or throws. */
 export function openSigned(title, about, word, act) {
   const by = el("input", {
     class: "field",
@@ -202,12 +240,13 @@ export function openSigned(title, about, word, act) {
     value: remembered(),
   });
   const comment = el("textarea", { class: "field", name: "comment", maxlength: "500" });
-  const content = [about, el("label", { class: "named" }, "Your name", by), el("label", { class: "named" }, "Comment", comment)];
+  const name = me.user ? el("p", { class: "note" }, `As ${me.user}.`) : el("label", { class: "named" }, "Your name", by);
+  const content = [about, name, el("label", { class: "named" }, "Comment", comment)];
   openAsked(title, content, word, async () => {
-    remember(by.value.trim());
-    await act(by.value.trim(), comment.value.trim());
+    if (!me.user) remember(by.value.trim());
+    await act(me.user ?? by.value.trim(), comment.value.trim());
   });
-  (by.value ? comment : by).focus();
+  (me.user || by.value ? comment : by).focus();
 }
 
 const KEY = "cnctwin-name";

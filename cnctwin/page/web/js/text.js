@@ -1,5 +1,6 @@
 // Figures, ages and names as a person reads them.
 
+import { lookup } from "./lookup.js";
 import {
   ADJUSTED_SCORE,
   ALERT_STATE,
@@ -21,7 +22,7 @@ import {
   VIBRATION_VELOCITY_MM_S,
 } from "./vocabulary.js";
 
-const TITLES = {
+const TITLES = lookup({
   spindle_rpm: "Spindle speed",
   spindle_rpm_cmd: "Commanded speed",
   spindle_load_pct: "Spindle load",
@@ -65,8 +66,8 @@ const TITLES = {
   [SPINDLE_TEMP_CORRECTED_C]: "Spindle temperature, twin with what was learned",
   [SPINDLE_TEMP_CORRECTION_K]: "Temperature, learned correction",
   [SPINDLE_TEMP_CORRECTED_RESIDUAL_K]: "Temperature, measured − corrected twin",
-};
-const STATES = {
+});
+const STATES = lookup({
   ACTIVE: ["Active", "s-active", "active"],
   READY: ["Ready", "s-ready", "idle"],
   INTERRUPTED: ["Interrupted", "s-held", "held"],
@@ -77,8 +78,8 @@ const STATES = {
   PROGRAM_STOPPED: ["Program stop", "s-stopped", "stopped"],
   PROGRAM_COMPLETED: ["Completed", "s-ready", "idle"],
   PROGRAM_OPTIONAL_STOP: ["Optional stop", "s-held", "held"],
-};
-const ACRONYMS = {
+});
+const ACRONYMS = lookup({
   nc: "NC",
   rpm: "speed",
   pct: "",
@@ -96,7 +97,7 @@ const ACRONYMS = {
   a: "",
   rms: "rms",
   cmd: "commanded",
-};
+});
 
 const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 

@@ -21,6 +21,7 @@ from tests.until_stopped import until_stopped
 from tests.wire.mosquitto import Mosquitto
 from twin.vocabulary.topics import JOBS_STATE
 
+NAMED = {"X-Remote-User": "grace"}
 PROXIED = Access(proxy_header="X-Remote-User", proxy="127.0.0.1")
 
 
@@ -91,6 +92,23 @@ def test_a_job_is_cancelled_and_what_is_wrong_is_refused(mosquitto: Mosquitto, f
             assert (refused.status_code, said in refused.json()["error"]) == (status, True), refused.text
         foreign = post(f"{server.url}/jobs", json={"job": "count", "to": 1}, headers={"Origin": "http://elsewhere.example"})
         assert foreign.status_code == 403
+
+
+@pytest.mark.broker
+def test_a_job_is_in_the_name_of_the_proxy_s_user_and_so_is_its_end(mosquitto: Mosquitto, folder: Path) -> None:
+    with served(mosquitto, access=PROXIED) as server:
+        wait(lambda: get(f"{server.url}/jobs", headers=NAMED).json()["available"], "the consumer")
+        asked = {"job": "count", "to": 10_000, "pause_s": 0.05, "id": "mine", "by": "mallory"}
+        assert post(f"{server.url}/jobs", json=asked, headers=NAMED).status_code == 200
+        wait(lambda: get(f"{server.url}/jobs/mine", headers=NAMED).status_code == 200, "the job")
+        assert get(f"{server.url}/jobs/mine", headers=NAMED).json()["by"] == "grace"
+        assert post(f"{server.url}/jobs/mine/cancel", headers=NAMED).status_code == 200
+        wait(lambda: get(f"{server.url}/jobs/mine", headers=NAMED).json()["reason"] == "cancelled by grace", "its end")
+        deeds = get(f"{server.url}/audit", headers=NAMED).json()["deeds"]
+        assert [(one["user"], one["action"], one["object"], one["outcome"]) for one in reversed(deeds)] == [
+            ("grace", "ask for job", "mine", "done"),
+            ("grace", "cancel job", "mine", "done"),
+        ]
 
 
 @pytest.mark.broker

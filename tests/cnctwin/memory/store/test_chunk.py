@@ -71,6 +71,7 @@ def test_a_value_comes_back_bit_for_bit(tmp_path: Path, value: Any, chunks: int)
 )
 def test_a_message_comes_back_in_its_order(tmp_path: Path, readings: list[Any], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("cnctwin.memory.store.sealed.sealing.SAMPLES_MIN", 1)
+    monkeypatch.setattr("cnctwin.memory.store.sealed.sealing.DAY_SAMPLES_MIN", 1)
     store = EmbeddedStore(tmp_path, writable=True)
     before = told([reading("x_mm", 0.0, -9), reading("y", "b", -8), reading("z", 0, -7)], -9)
     said = [before, told(readings, 4)]
@@ -134,7 +135,8 @@ def old_store(place: Path) -> None:
     db.close()
 
 
-def test_a_store_of_before_there_were_chunks_is_read_and_goes_on(tmp_path: Path) -> None:
+def test_a_store_of_before_there_were_chunks_is_read_and_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("cnctwin.memory.store.sealed.sealing.DAY_SAMPLES_MIN", 1)
     old_store(tmp_path)
     reader = EmbeddedStore(tmp_path)
     assert list(reader.messages("vmc", 0, T0_MS + HOUR_MS)) == steady(0, 3)

@@ -73,7 +73,7 @@ def test_a_birth_that_is_past_its_time_does_not_stand_in_the_way_of_its_samples(
     monkeypatch.setattr("cnctwin.memory.store.sealed.sealing.SAMPLES_MIN", 20_000)
     store = EmbeddedStore(tmp_path, writable=True, retention=Retention(raw_days=1.0))
     at_ms = MIDNIGHT_MS - T0_MS + 60_000
-    store.append([told([reading("x_mm", 1.0, at_ms)], at_ms, kind=EventKind.BIRTH), *steady(at_ms + 1000, 20)])
+    store.append([told([reading("x_mm", 1.0, at_ms)], at_ms, kind=EventKind.BIRTH), *steady(at_ms + 1000, 30)])
     store.tidy(MIDNIGHT_MS + DAY_MS + 120_000)  # the birth is a day old, and its hour not sealed yet
     assert store.tidy(MIDNIGHT_MS + DAY_MS + 30 * 60_000).sealed == 1
 

@@ -5,13 +5,14 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 
 import pytest
 
 from cnctwin.standins.mtconnect_agent.replay_agent import ReplayAgent
 from edge.config import EdgeConfig
 from edge.controls.mtconnect.config import MtconnectConfig
-from edge.controls.mtconnect.connection import MtconnectConnection, client_of, fetch
+from edge.controls.mtconnect.connection import Agent, MtconnectConnection, fetch
 from edge.controls.mtconnect.cursor import Config, Phase, Request, parse, start
 from edge.controls.mtconnect.draft import draft
 from edge.errors import ConfigError, ConnectionLostError
@@ -375,9 +376,11 @@ def test_a_page_in_the_agents_place_does_not_end_the_streaming() -> None:
 def test_the_password_comes_from_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
     config = EdgeConfig(source=MtconnectConfig(username="edge", password_env="AGENT_SECRET"))
     with pytest.raises(ConfigError, match="no such environment variable"):
-        client_of(config)
+        Agent(config)
     monkeypatch.setenv("AGENT_SECRET", "s3cret")
-    with client_of(config) as client:
-        assert client.auth is not None
+    asked = list[bytes]()
+    with server(answer(probe()), asked=asked) as url:
+        fetch(replace(config, source=config.source.model_copy(update={"url": url})), Request("/probe"))
+    assert b"Authorization: Basic ZWRnZTpzM2NyZXQ=" in asked[0].split(b"\r\n")
     with pytest.raises(ConfigError, match=r"ca_file = '/none\.pem'"):
-        client_of(EdgeConfig(source=MtconnectConfig(ca_file="/none.pem")))
+        Agent(EdgeConfig(source=MtconnectConfig(ca_file="/none.pem")))

@@ -4,11 +4,14 @@ import { part, post } from "../api.js";
 import { serverNow } from "../clock.js";
 import { openSigned } from "../dialogs.js";
 import { el, say, setText, symbol, table } from "../dom.js";
+import { lookup } from "../lookup.js";
+import { may, whyNot } from "../me.js";
 import { age, moment, words } from "../text.js";
 
-const RANK = { high: 0, medium: 1, low: 2 },
-  PHASE = { firing: 0, acknowledged: 1, pending: 2, resolved: 3 };
-const SIGNS = { firing: "s-alert", acknowledged: "s-ack", pending: "s-pending", resolved: "s-ack" };
+const RANK = lookup({ high: 0, medium: 1, low: 2 }),
+  PHASE = lookup({ firing: 0, acknowledged: 1, pending: 2, resolved: 3 });
+const SIGNS = lookup({ firing: "s-alert", acknowledged: "s-ack", pending: "s-pending", resolved: "s-ack" });
+const LAST = 9; // of a phase or a severity that nobody knows
 const AROUND_MS = 300000;
 const RESOLVED_MAX = 20;
 
@@ -43,6 +46,20 @@ export function open(app) {
       const outcome = await post(`alerts/${part(alert.fingerprint)}/acknowledge`, { by, comment, episode: alert.episode });
       if (outcome && outcome.done === false) throw new Error(outcome.text);
       say("Acknowledged");
+      app.askAlerts();
+    });
+  }
+
+  function silence(alert) {
+    const { machine = "", alertname = "" } = alert.labels ?? {};
+    const hours = el("input", { class: "field", name: "hours", type: "number", min: "0.1", max: "720", step: "any", value: "2" });
+    const about = [
+      el("p", {}, el("strong", {}, machine), `: ${words(alertname)} is told to nobody for a while. It stays on this page.`),
+      el("label", { class: "named" }, "For how many hours", hours),
+    ];
+    openSigned("Silence", about, "Silence", async (by, comment) => {
+      await post("silences", { machine, alertname, for_s: Number(hours.value) * 3600, by, comment });
+      say("Silenced");
       app.askAlerts();
     });
   }
@@ -87,7 +104,10 @@ export function open(app) {
         "div",
         { class: "acts" },
         alert.phase === "firing"
-          ? el("button", { type: "button", class: "button main", onclick: () => acknowledge(alert) }, "Acknowledge")
+          ? el("button", { type: "button", class: "button main", disabled: !may("operator"), onclick: () => acknowledge(alert) }, "Acknowledge")
+          : null,
+        alert.phase === "firing" && !alert.silenced_by
+          ? el("button", { type: "button", class: "button", disabled: !may("operator"), onclick: () => silence(alert) }, "Silence")
           : null,
         machine && Number.isFinite(start)
           ? el(
@@ -117,6 +137,15 @@ export function open(app) {
         )
       : null;
 
+  function endSilence(one) {
+    const about = el("p", {}, `${one.comment || "It"}: alerts that it keeps quiet are told to people again.`);
+    openSigned("End this silence?", about, "End it", async (by) => {
+      await post(`silences/${part(one.id ?? "")}/end`, { by });
+      say("Ended");
+      app.askAlerts();
+    });
+  }
+
   function silences(given) {
     if (!given.length) return null;
     const matchers = (one) => Object.entries(one.matchers ?? {}).map(([label, pattern]) => `${label} = ${pattern}`);
@@ -125,14 +154,13 @@ export function open(app) {
       `${moment(Date.parse(one.starts))} to ${moment(Date.parse(one.ends))}`,
       one.by ?? "",
       one.comment ?? "",
-      el("code", {}, one.id ?? ""),
+      el("button", { type: "button", class: "button", disabled: !may("operator"), onclick: () => endSilence(one) }, "End"),
     ]);
     return el(
       "section",
       {},
       el("h2", {}, "Silenced"),
-      table(["What", "When", "By", "Why", "Id"], rows, { label: "Silenced" }),
-      el("p", { class: "note" }, "cnctwin alerts unsilence ID --by YOU ends one."),
+      table(["What", "When", "By", "Why", ""], rows, { label: "Silenced" }),
     );
   }
 
@@ -189,7 +217,10 @@ export function open(app) {
       ? (document.activeElement.closest("[data-fingerprint]")?.dataset.fingerprint ?? null)
       : null;
     const all = [...(given.alerts ?? [])].sort(
-      (a, b) => PHASE[a.phase] - PHASE[b.phase] || RANK[a.severity] - RANK[b.severity] || began(b) - began(a),
+      (a, b) =>
+        (PHASE[a.phase] ?? LAST) - (PHASE[b.phase] ?? LAST) ||
+        (RANK[a.severity] ?? LAST) - (RANK[b.severity] ?? LAST) ||
+        began(b) - began(a),
     );
     const of = (...phases) => all.filter((one) => phases.includes(one.phase));
     const firing = of("firing");
@@ -200,6 +231,7 @@ export function open(app) {
     const known = given.available !== false || all.length;
     body.replaceChildren(
       ...[
+        may("operator") ? null : el("p", { class: "note role" }, whyNot("operator", "acknowledging, or silencing,")),
         !known
           ? el(
               "div",
@@ -251,6 +283,7 @@ export function open(app) {
       ],
     ],
     onAlerts: write,
+    onMe: write,
     onLink: (state) => {
       if (state === "live") app.askAlerts();
     },

@@ -1,15 +1,16 @@
 // A diagnosis.json in sections: the verdict, how far the gap shrank, where it lies, the causes, what cannot be told, what next.
 
 import { drawn, el, say, symbol } from "../dom.js";
+import { lookup } from "../lookup.js";
 import { number, recorded, sentence, share, words } from "../text.js";
 import { shade } from "./gap_shade.js";
 
-const VERDICTS = {
+const VERDICTS = lookup({
   healthy: ["Healthy", "s-ack"],
   explained: ["Explained", "s-ack"],
   partly_explained: ["Partly explained", "s-pending"],
   unknown: ["Cause unknown", "s-alert"],
-};
+});
 const CELLS_MAX = 8;
 
 const on = (one) =>

@@ -2,12 +2,13 @@
 
 import { get, part, query } from "../api.js";
 import { el, table } from "../dom.js";
+import { lookup } from "../lookup.js";
 import { Steps } from "../ring.js";
 import { duration, execution, moment } from "../text.js";
 
 const EVENTS_MAX = 500;
 const QUIET_MAX = 60;
-const KINDS = { hole: "hole", alarm: "high", alert: "high", stop: "high", pin: "event" };
+const KINDS = lookup({ hole: "hole", alarm: "high", alert: "high", stop: "high", pin: "event" });
 
 export class Happenings {
   /** seek: is called with the time of an event that was chosen */

@@ -4,11 +4,13 @@ import { get, part, post } from "../api.js";
 import { serverNow } from "../clock.js";
 import { openAsked } from "../dialogs.js";
 import { el, say, setData, setHidden, setSymbol, setText, symbol } from "../dom.js";
+import { lookup } from "../lookup.js";
+import { may, whyNot } from "../me.js";
 import { age, duration, moment, plain, words } from "../text.js";
 import { openNewJob } from "./job_form.js";
 
 const ASK_MS = 2000;
-const SIGNS = { queued: "s-pending", running: "s-active", done: "s-ack", failed: "s-alert", cancelled: "s-stopped" };
+const SIGNS = lookup({ queued: "s-pending", running: "s-active", done: "s-ack", failed: "s-alert", cancelled: "s-stopped" });
 const isOver = (job) => !["queued", "running"].includes(job.state);
 
 export function open(app) {
@@ -16,6 +18,7 @@ export function open(app) {
     counts = el("span", { class: "quiet" }),
     trouble = el("p", { class: "trouble", role: "alert", hidden: true }),
     nothing = el("div", { class: "empty", hidden: true }),
+    role = el("p", { class: "note role", hidden: true }),
     cards = new Map(),
     stop = new AbortController();
   const ask = el("button", { type: "button", class: "button main", onclick: () => openNewJob(accepted) }, "New job");
@@ -24,6 +27,7 @@ export function open(app) {
     { class: "view jobs-view" },
     el("div", { class: "head" }, el("h1", {}, "Jobs"), counts, el("div", { class: "after" }, ask)),
     trouble,
+    role,
     nothing,
     list,
   );
@@ -59,7 +63,9 @@ export function open(app) {
       given.disk_trouble ? `The consumer cannot write: ${given.disk_trouble}.` : "",
     ];
     complain(troubles.filter(Boolean).join(" "));
-    ask.disabled = given.available === false;
+    ask.disabled = given.available === false || !may("operator");
+    setHidden(role, may("operator"));
+    setText(role, may("operator") ? "" : whyNot("operator", "asking for a job, or cancelling one,"));
     setHidden(nothing, jobs.length > 0);
     const waiting = jobs.filter((job) => job.state === "queued").length;
     setText(counts, jobs.length ? `${jobs.some((job) => job.state === "running") ? 1 : 0} running, ${waiting} waiting` : "");
@@ -83,6 +89,7 @@ export function open(app) {
     element,
     stream: "stream",
     machine: null,
+    onMe: load,
     keys: [[["n"], "a new job", () => ask.click()]],
     close: () => {
       clearInterval(timer);
@@ -115,6 +122,7 @@ class Card {
 
   show(job, given) {
     this.offersFiles = given.offers_files;
+    this.button.disabled = !may("operator");
     const key = JSON.stringify([job, Math.floor(serverNow() / 10000)]);
     if (key === this.shown) return;
     this.shown = key;
@@ -133,6 +141,7 @@ class Card {
       job.state === "running" ? `running, ${plain(Math.round(job.progress_pct ?? 0))} %` : job.state,
       job.state === "queued" && job.place > 1 ? `${job.place - 1} before it` : "",
       `asked for at ${moment(job.accepted_ms)} (${age(serverNow() - job.accepted_ms)} ago)`,
+      job.by ? `by ${job.by}` : "",
       job.attempt > 1 ? `attempt ${job.attempt}` : "",
       took,
       job.id,

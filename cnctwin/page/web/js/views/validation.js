@@ -4,12 +4,13 @@ import { get, part } from "../api.js";
 import { serverNow } from "../clock.js";
 import { openDocument } from "../dialogs.js";
 import { el, symbol } from "../dom.js";
+import { lookup } from "../lookup.js";
 import { age, coarse, duration, moment, number, plain, words } from "../text.js";
 import { machineHead } from "./machine_head.js";
 import { noMachine } from "./no_machine.js";
 
-const VERDICTS = { within: "s-ack", over: "s-alert", "not enough data": "s-pending", "not observable": "s-unknown" };
-const MEASURES = {
+const VERDICTS = lookup({ within: "s-ack", over: "s-alert", "not enough data": "s-pending", "not observable": "s-unknown" });
+const MEASURES = lookup({
   mae: "MAE",
   rmse: "RMSE",
   mae_worst_hour: "MAE, worst hour",
@@ -18,7 +19,7 @@ const MEASURES = {
   r: "correlation r",
   rms_pct: "rms",
   error_pct: "error",
-};
+});
 const PARTS_MAX = 50;
 const list = (value) => (Array.isArray(value) ? value : []);
 const time = (value) => (typeof value === "number" ? value : Date.parse(value));

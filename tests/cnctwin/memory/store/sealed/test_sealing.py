@@ -69,7 +69,7 @@ def test_figures_of_few_decimals_take_little(tmp_path: Path) -> None:
 def test_an_hour_into_which_something_came_of_late_waits(tmp_path: Path) -> None:
     store = EmbeddedStore(tmp_path, writable=True)
     came_ms = T0_MS + 40 * HOUR_MS
-    store.append([Message(came_ms, m.event) for m in steady(0, 10)])
+    store.append([Message(came_ms, m.event) for m in steady(0, 30)])
     assert store.tidy(came_ms + 599_000) == Tidied(0, 0, 0, 0)
     assert store.tidy(came_ms + 600_000).sealed == 1
     store.close()
@@ -77,7 +77,7 @@ def test_an_hour_into_which_something_came_of_late_waits(tmp_path: Path) -> None
 
 def test_quiet_hours_wait_for_the_end_of_their_day(tmp_path: Path) -> None:
     store = EmbeddedStore(tmp_path, writable=True)
-    store.append(steady(0, 10) + steady(5 * HOUR_MS, 10))
+    store.append(steady(0, 20) + steady(5 * HOUR_MS, 20))
     assert store.tidy(T0_MS + 10 * HOUR_MS).sealed == 0
     assert store.tidy(T0_MS + 18 * HOUR_MS + 600_000).sealed == 6
     assert sealed(tmp_path)[0].endswith("/06-12.1.parquet")
@@ -226,4 +226,30 @@ def test_a_full_disk_is_said_and_nothing_is_taken(tmp_path: Path) -> None:
     assert "nothing more is kept until there is room" in store.status().trouble
     free[0] = 10**12
     assert store.append(steady(1000, 10)).stored == 30
+    store.close()
+
+
+def test_a_message_whose_metrics_are_of_many_days_makes_no_files_for_them(tmp_path: Path) -> None:
+    store = EmbeddedStore(tmp_path, writable=True, margin_ms=0)
+    days = [reading(f"signal_{n}", float(n), -n * 12 * HOUR_MS) for n in range(360)]
+    store.append([told(days, 0, kind=EventKind.BIRTH), *steady(0, 50)])
+    for _ in range(400):
+        store.tidy(T0_MS + 5 * 24 * HOUR_MS)
+    assert len(sealed(tmp_path)) <= 4, "only the day of the machine itself is worth files: what it said, and minutes of it"
+    span = (T0_MS - 200 * 24 * HOUR_MS, T0_MS + HOUR_MS)
+    for n, column in enumerate(store.query(Query("vmc", tuple(f"signal_{n}" for n in range(360)), *span))):
+        assert column.value == [float(n)], "and all are there"
+    store.close()
+
+
+def test_a_stamp_far_ahead_is_refused_and_costs_what_follows_nothing(tmp_path: Path) -> None:
+    store = EmbeddedStore(tmp_path, writable=True)
+    ahead_ms = 900 * 365 * 24 * HOUR_MS
+    done = store.append([told([reading("x_mm", 1.0, 0), reading("y_mm", 2.0, ahead_ms)], 0), *steady(1000, 50)])
+    assert (done.stored, done.refused) == (1 + 150, 1)
+    whole = store.append([told([reading("x_mm", 1.0, ahead_ms)], ahead_ms, lag_ms=-ahead_ms), *steady(10_000, 50)])
+    assert (whole.stored, whole.refused) == (150, 1)
+    assert store.status().newest_ms == T0_MS + 10_000 + 49 * 100
+    with store._readers.snapshot() as db:
+        assert db.execute("SELECT sum(samples) FROM chunks").fetchone() == (300,), "what follows goes the short way"
     store.close()
