@@ -9,7 +9,7 @@ than a value.
 import logging
 import threading
 import time
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Collection, Sequence
 from enum import Enum
 from random import Random
@@ -19,6 +19,7 @@ from sparkplug.admission.gate import Gate
 from sparkplug.admission.limits import DEFAULTS, Limits
 from sparkplug.admission.rates import Overrun, Rates
 from sparkplug.admission.refusal import Quarantined
+from sparkplug.admission.thinning import Lateness, of_devices, thinned
 from sparkplug.broker import BrokerAddress
 from sparkplug.clock import now_ms
 from sparkplug.errors import TopicError
@@ -100,6 +101,9 @@ class HostApplication:
         self._filled = threading.Event()
         self._ticked_s = self._told_s = 0.0
         self._rates = Rates(limits, trusted)
+        self._trusted = trusted
+        self._lateness = Lateness()
+        self._thinned: Counter[tuple[NodeId, bool]] = Counter()
         self._plain_bytes_max = limits.plain_bytes_max
         self._failure_told_s = -FAILURE_TOLD_S
         listener = Listener(
@@ -188,11 +192,27 @@ class HostApplication:
                 except Exception:
                     self._fail("a tick of the session failed")
                 events += self._refused_by_rate(now_s)
+                if self._lateness.is_lasting(now_s - self._inbox[0][2] if self._inbox else 0.0, now_s):
+                    self._thin()
             if self._session.actions:
                 self._connection.send(self._session.actions)
                 self._session.actions = []
             if events or now_s >= deadline_s:
                 return events
+
+    def take_thinned(self) -> dict[NodeId, int]:
+        """Return the messages of devices, by node, that were left out since the last call: more came than can be read."""
+        if not self._thinned:
+            return {}
+        thinned, self._thinned = self._thinned, Counter()
+        return of_devices(thinned.items())
+
+    def _thin(self) -> None:
+        """Leave out data of the nodes with most of them; who reads the socket only appends meanwhile."""
+        inbox = self._inbox
+        kept, gone = thinned([inbox.popleft() for _ in range(len(inbox))], self._trusted)
+        inbox.extendleft(reversed(kept))
+        self._thinned += gone
 
     def _refused_by_rate(self, now_s: float) -> list[HostEvent]:
         """Return an event for each node of which messages were dropped at the door, once a second."""

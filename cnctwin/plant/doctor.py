@@ -94,8 +94,10 @@ def diagnose(host: HostApplication, url: str) -> Report:
         findings += of_edge_store(node_id, metrics)
         findings += of_awaited(node_id, metrics)
         findings += of_sequence_holes(node_id, metrics)
+        findings += of_faults(node_id, metrics)
     findings += of_history(health(host).values())
     findings += [Finding(False, line) for line in refused_lines(host.quarantine, own_values(host))]
+    findings += of_overload(health(host).values())
     findings += of_lags(lag_reports(own_values(host)))
     counts = host.counts
     order = f"{counts.get('lost', 0)} messages lost, {counts.get('malformed', 0)} malformed while listening"
@@ -145,6 +147,21 @@ def of_sequence_holes(node_id: str, metrics: Mapping[str, Reading]) -> list[Find
     """Return a historian's finding that rows of edges are missing in its store; nothing where none are."""
     count, named = (metrics[name].value if name in metrics else None for name in ("sequence_holes", "sequence_hole"))
     return [Finding(False, f"{node_id}: rows of edges are missing: {named!s}")] if isinstance(count, int) and count else []
+
+
+def of_faults(node_id: str, metrics: Mapping[str, Reading]) -> list[Finding]:
+    """Return the finding that a processor has contained faults; nothing where there were none."""
+    faults, restarts, last = (metrics[name].value if name in metrics else None for name in ("faults", "restarts", "fault"))
+    if not isinstance(faults, int) or not faults:
+        return []
+    times = f", restarted {restarts} times" if restarts else ""
+    return [Finding(True, f"{node_id}: {faults} faults contained{times}; the last: {last}")]
+
+
+def of_overload(every: Iterable[Mapping[str, Reading]]) -> list[Finding]:
+    """Return a finding for each process that more comes to than it can fold; nothing where all keep up."""
+    told = {str(metrics["overloaded_by"].value) for metrics in every if "overloaded_by" in metrics}
+    return [Finding(False, f"more comes than can be folded, the newest values win: {who}") for who in sorted(told - {"", "None"})]
 
 
 def of_store(node_id: str, metrics: Mapping[str, Reading]) -> list[Finding]:

@@ -136,9 +136,9 @@ class Engine:
 
         return way
 
-    def overflowed(self, count: int) -> None:
-        """A full queue in front of us has lost so many messages."""
-        self.ledger.overflowed(count)
+    def overflowed(self, count: int, reason: DropReason = DropReason.QUEUE_FULL) -> None:
+        """A queue in front of us has lost so many messages."""
+        self.ledger.overflowed(count, reason)
 
     def lost(self, event: HostEvent, reason: DropReason) -> None:
         """An event is lost before it is fed, or feeding it has failed before it was counted."""

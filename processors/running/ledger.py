@@ -84,10 +84,10 @@ class Ledger:
             else:
                 self.dropped[fate] += 1
 
-    def overflowed(self, count: int) -> None:
-        """Count messages that a full queue has lost."""
+    def overflowed(self, count: int, reason: DropReason = DropReason.QUEUE_FULL) -> None:
+        """Count messages that a queue has lost."""
         self.received += count
-        self.dropped[DropReason.QUEUE_FULL] += count
+        self.dropped[reason] += count
 
     def refused(self, refusal: Refusal | None, count: int) -> None:
         """Count messages that the host session did not let in. One of which only a part was let in counts as two."""

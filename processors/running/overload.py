@@ -2,7 +2,7 @@
 
 from collections import Counter
 
-from sparkplug.host_event import HostEvent
+from sparkplug.metric import NodeId
 
 TOLD_S = 60.0
 NODES_MAX = 1000
@@ -15,11 +15,11 @@ class Overload:
         self._counts: Counter[str] = Counter()
         self._text, self._told_s = "", 0.0
 
-    def passed_over(self, event: HostEvent) -> None:
-        """Note a message that was passed over."""
-        node = str(event.node)
-        if node in self._counts or len(self._counts) < NODES_MAX:
-            self._counts[node] += 1
+    def passed_over(self, node: NodeId, count: int = 1) -> None:
+        """Note messages that were passed over."""
+        name = str(node)
+        if name in self._counts or len(self._counts) < NODES_MAX:
+            self._counts[name] += count
 
     def report(self, now_s: float) -> str:
         """Return who has flooded most since the last report, or within the last minute; empty where nobody did.

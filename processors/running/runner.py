@@ -169,7 +169,7 @@ class Runner:
         """Have events wait; those that are passed over for them are counted by each processor that would have read them."""
         for event in events:
             for passed_over in self._backlog.put(event):
-                self._overload.passed_over(passed_over)
+                self._overload.passed_over(passed_over.node)
                 for worker in self._readers_of(passed_over):
                     worker.engine.lost(passed_over, DropReason.OVERLOAD)
 
@@ -328,8 +328,13 @@ class Runner:
         }
 
     def _note_dropped(self) -> None:
-        """Count the messages that the shared queue has lost: each processor has lost them."""
+        """Count the messages that the shared queue has lost: each processor that reads them has lost them."""
         overflowed = self._host.dropped - self._dropped
         self._dropped += overflowed
         for worker in self.workers:
             worker.engine.overflowed(overflowed)
+        for node, count in self._host.take_thinned().items():
+            self._overload.passed_over(node, count)
+            for worker in self.workers:
+                if worker.listens_to(node.node):
+                    worker.engine.overflowed(count, DropReason.OVERLOAD)

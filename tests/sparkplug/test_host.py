@@ -85,6 +85,35 @@ def test_data_that_have_waited_too_long_are_dropped_and_births_and_deaths_are_ke
     assert host.dropped == 3
 
 
+def test_an_inbox_that_cannot_be_read_in_time_loses_data_of_who_floods_and_the_rest_is_read_in_order(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    host, clock = unconnected(), [1000.0]
+    monkeypatch.setattr("sparkplug.host.time.monotonic", lambda: clock[0])
+    for flooding, quiet in zip(life(NODE, 1000), [*life(OTHER, 20), *[None] * 1000], strict=False):
+        for message in filter(None, (flooding, quiet)):
+            host._message(message.topic, message.payload)
+    monkeypatch.setattr(host_module, "EVENTS_A_POLL", 1)
+    events = []
+    for _ in range(20):
+        clock[0] += 0.1
+        events += host.poll(0.0)
+    monkeypatch.setattr(host_module, "EVENTS_A_POLL", 10_000)
+    events += host.poll(0.0)
+    left_out = host.take_thinned()
+    assert set(left_out) == {NODE}
+    assert host.take_thinned() == {}
+    flood = [event.readings[0].value for event in events if event.node == NODE and event.kind is EventKind.DATA]
+    assert flood == sorted(flood)  # type: ignore[type-var]
+    assert flood[-1] == 999.0
+    assert len(flood) + left_out[NODE] == 1000
+    assert len(flood) < 500
+    assert [event.readings[0].value for event in events if event.node == OTHER and event.kind is EventKind.DATA] == [
+        float(number) for number in range(20)
+    ]
+    assert host._session.actions == [], "nobody is asked for a rebirth"
+
+
 def test_data_of_any_age_below_the_bound_are_read(monkeypatch: pytest.MonkeyPatch) -> None:
     host = unconnected(stale_s_max=60.0)
     now_s = time.monotonic()

@@ -16,8 +16,10 @@ from cnctwin.plant.doctor import (
     examine,
     of_awaited,
     of_edge_store,
+    of_faults,
     of_history,
     of_lags,
+    of_overload,
     of_sequence_holes,
     of_store,
 )
@@ -231,3 +233,17 @@ def test_rows_that_the_historian_misses_are_bad_news() -> None:
     assert (finding.good, finding.text) == (False, f"twin-historian: rows of edges are missing: {named}")
     assert of_sequence_holes("twin-historian", told(sequence_holes=0, sequence_hole="")) == []
     assert of_sequence_holes("edge-vmc", {}) == []
+
+
+def test_contained_faults_are_counted_and_the_last_one_is_told() -> None:
+    text = "a beat failed; restarted after 1 s, 2 times so far: OSError: disk full"
+    (finding,) = of_faults("twin-alerts", told(faults=3, restarts=2, fault=text))
+    assert finding == Finding(True, f"twin-alerts: 3 faults contained, restarted 2 times; the last: {text}")
+    assert of_faults("twin-alerts", told(faults=0, restarts=0, fault="")) == of_faults("edge-okuma", {}) == []
+
+
+def test_who_floods_a_process_is_named_once() -> None:
+    text = "cnc/edge-flood: 812 messages passed over in a second"
+    every = [told(overloaded_by=text), told(overloaded_by=text), told(overloaded_by=""), told(lag_s=0.0)]
+    assert of_overload(every) == [Finding(False, f"more comes than can be folded, the newest values win: {text}")]
+    assert of_overload([told(overloaded_by=""), {}]) == []

@@ -73,11 +73,11 @@ def test_a_recorder_has_every_message_as_it_came() -> None:
 def test_the_one_who_floods_is_named_for_a_minute() -> None:
     overload = Overload()
     for event in FLOODING[:10]:
-        overload.passed_over(event)
-    overload.passed_over(QUIET[1])
+        overload.passed_over(event.node)
+    overload.passed_over(QUIET[1].node)
     assert overload.report(100.0) == "cnc/edge-flood: 10 messages passed over in a second, and 1 others with fewer"
     assert overload.report(159.0) == "cnc/edge-flood: 10 messages passed over in a second, and 1 others with fewer"
     assert overload.report(161.0) == ""
     for number in range(2 * NODES_MAX):
-        overload.passed_over(QUIET[1]._replace(node=NodeId("cnc", f"edge-{number}")))
+        overload.passed_over(NodeId("cnc", f"edge-{number}"))
     assert len(overload._counts) == NODES_MAX

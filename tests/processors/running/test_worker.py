@@ -38,6 +38,7 @@ class FakeHost:
         self.started = self.stopped = False
         self.quarantine: tuple[Quarantined, ...] = ()
         self.retained = retained or {}
+        self.thinned: dict[NodeId, int] = {}
         self.plain: list[tuple[str, bytes, bool]] = []
         self.subscriptions: list[str] = []
         self.born: dict[tuple[NodeId, str | None], HostEvent] = {}  # a birth of each device that is online
@@ -62,6 +63,10 @@ class FakeHost:
     def subscribe_plain(self, topic_filter: str) -> None:
         assert not self.started, "subscriptions come first"
         self.subscriptions.append(topic_filter)
+
+    def take_thinned(self) -> dict[NodeId, int]:
+        thinned, self.thinned = self.thinned, {}
+        return thinned
 
     def births(self) -> list[HostEvent]:
         return list(self.born.values())
