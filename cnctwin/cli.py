@@ -35,6 +35,7 @@ from cnctwin.commands.train.residual import train_residual
 from cnctwin.commands.validate import validate
 from cnctwin.commands.watch import watch
 from cnctwin.errors import ApplicationError, BrokerStartError
+from cnctwin.files.modes import restrict
 from edge.errors import EdgeError
 from processors.errors import ProcessorError
 from sparkplug.errors import SparkplugError
@@ -70,6 +71,7 @@ app.command()(validate)
 
 def main() -> None:
     """Run the command; every expected error is one line on stderr."""
+    restrict(sys.argv[1:])
     logging.basicConfig(level=logging.WARNING, format="%(asctime)s %(levelname)s %(message)s")
     try:
         # Standalone, typer would report a wrong option in a box of several lines.

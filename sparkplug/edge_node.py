@@ -86,7 +86,7 @@ class EdgeNode:
         """Publish the node's death, disconnect and stop."""
         with self._lock:
             farewell = self._session.close(now_ms())
-            self._aliases.keep(self._session.aliases, at_once=True)
+            self._aliases.keep(self._session.aliases)
         self._connection.close(farewell, timeout_s)
         if self._own is not None:
             self._own.release()

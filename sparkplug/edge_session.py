@@ -94,6 +94,7 @@ class EdgeNodeSession:
                 raise SparkplugError(f"edge node {node} declares {taken!r}, which its birth holds already; choose another name")
         self._certificate = Certificate(f"edge node {node}", metrics, partial(self._alias, None), now_ms, self._templates)
         self._devices: dict[str, Certificate] = {}
+        self._folded: dict[str, str] = {}  # the devices, by their names in one case
         self._data_topics: dict[str | None, str] = {None: str(Topic(Verb.NDATA, node))}
         self._primary_topic = None if primary_host is None else state_topic(primary_host)
         self._server, self._servers = 0, servers
@@ -168,8 +169,8 @@ class EdgeNodeSession:
     def declare_device(self, device: str, metrics: Iterable[MetricSpec], now_ms: int) -> list[Action]:
         """Add a device, or declare other metrics of one; values of metrics that stay are kept."""
         check_id(device, "device id")
-        alike = next((other for other in self._devices if other != device and other.casefold() == device.casefold()), None)
-        if alike is not None:
+        alike = self._folded.get(device.casefold(), device)
+        if alike != device:
             raise SparkplugError(f"edge node {self.node} has the device {alike!r}; {device!r} has to differ in more than case")
         owner = f"device {device} of {self.node}"
         certificate = Certificate(owner, metrics, partial(self._alias, device), now_ms, self._templates)
@@ -177,6 +178,7 @@ class EdgeNodeSession:
         if older is not None:
             certificate.keep_values(older)
         self._devices[device] = certificate
+        self._folded[device.casefold()] = device
         self._data_topics[device] = str(Topic(Verb.DDATA, self.node, device))
         if self.phase is Phase.OFFLINE:
             return []
@@ -187,7 +189,7 @@ class EdgeNodeSession:
         """The device is gone: its death is published."""
         if self._devices.pop(device, None) is None:
             raise UnknownMetricError(f"edge node {self.node} has no device {device!r}")
-        del self._data_topics[device]
+        del self._data_topics[device], self._folded[device.casefold()]
         if self.phase is not Phase.BORN:
             return []
         return [Publish(str(Topic(Verb.DDEATH, self.node, device)), encode(Payload(self._stamp(now_ms), seq=self._next_seq())))]

@@ -17,6 +17,7 @@ from cnctwin.api.routes.health import health_routes
 from cnctwin.api.routes.history import history_routes
 from cnctwin.api.routes.jobs import job_routes
 from cnctwin.api.routes.metrics import metrics_routes
+from cnctwin.api.routes.models import models_routes
 from cnctwin.api.routes.page import page_routes, serve_page
 from cnctwin.api.routes.past import past_routes
 from cnctwin.api.routes.people import people_routes
@@ -60,6 +61,7 @@ def create_app(sources: Sources) -> FastAPI:
         history_routes(sources.live, sources.store),
         past_routes(sources),
         metrics_routes(sources, fan_out),
+        models_routes(sources),
         people_routes(sources.access, sources.audit),
         page_routes(sources.access, failures),
     ):

@@ -33,6 +33,7 @@ class ServeOptions:
     token_file: Path | None = None
     users: Path | None = None
     audit: Path | None = None
+    registry: Path | None = None
     proxy_header: str | None = None
     proxy: str | None = None
     allow_hosts: tuple[str, ...] = ()
@@ -63,7 +64,7 @@ def serve(options: ServeOptions, broker: BrokerAddress, stop: Event) -> None:
     viewer = Viewer(broker, options.group, live, limits_of(options.config))
     store = StoreReader(options.store)
     audit = AuditLog(options.audit or state_dir() / "audit" / "page.jsonl")
-    told = (options.diagnoses, Nights(), options.jobs, access, audit)
+    told = (options.diagnoses, Nights(), options.jobs, access, audit, options.registry)
     sources = Sources(live, viewer, store, constants, Models(options.models), *told)
     app = create_app(sources)
     server = Server(app, options.host, options.port)

@@ -26,6 +26,7 @@ class Sources:
     jobs: the batch consumer's folder, for the files of results
     access: who may ask
     audit: the record of who did what
+    registry: the folder of models that `cnctwin model` keeps
     """
 
     live: LivePlant
@@ -38,3 +39,4 @@ class Sources:
     jobs: Path | None = None
     access: Access = field(default_factory=Access)
     audit: AuditLog = field(default_factory=AuditLog)
+    registry: Path | None = None

@@ -28,6 +28,9 @@ def serve(
         Path | None,
         typer.Option(help="The record of who did what; else audit/page.jsonl in the state folder", show_default=False),
     ] = None,
+    registry: Annotated[
+        Path | None, typer.Option(help="Folder that `cnctwin model` keeps, for administrators to promote")
+    ] = None,
     proxy_header: Annotated[str | None, typer.Option(help="Header in which the reverse proxy names the user")] = None,
     proxy: Annotated[str | None, typer.Option(help="Address that the proxy connects from")] = None,
     allow_host: Annotated[list[str] | None, typer.Option(help="One more name that this server is asked by")] = None,
@@ -51,6 +54,7 @@ def serve(
         token_file=token_file,
         users=users,
         audit=audit,
+        registry=registry,
         proxy_header=proxy_header,
         proxy=proxy,
         allow_hosts=tuple(allow_host or ()),

@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from cnctwin.errors import UsageError
+from cnctwin.files.modes import PRODUCT_FILE, PRODUCT_FOLDER
 from cnctwin.models.card import CARD, MANIFEST, Card, card_of, faults_of, registered, version_of
 from twin.models.errors import PointerError
 from twin.models.pointer import LINK, POINTER, Pointer, pointer_of, warm
@@ -183,7 +184,7 @@ def write_whole(path: Path, text: str) -> None:
             file.write(text)
             file.flush()
             os.fsync(file.fileno())
-        Path(file.name).chmod(0o644)
+        Path(file.name).chmod(PRODUCT_FILE)
         os.replace(file.name, path)  # noqa: PTH105  Path.replace would do the same
     except OSError as error:
         raise UsageError(f"{path}: cannot be written: {error.strerror}") from None
@@ -216,7 +217,7 @@ def _copied(source: Path, place: Path) -> None:
             for path in sorted(source.iterdir()):
                 if path.is_file() and path.name != CARD:
                     shutil.copyfile(path, part / path.name)
-            part.chmod(0o755)
+            part.chmod(PRODUCT_FOLDER)
             part.rename(place)
         finally:
             shutil.rmtree(part, ignore_errors=True)

@@ -55,12 +55,12 @@ class Machine:
         clashing = {r.name for r in offered if owner.get(r.name, node) != node and owner[r.name] in self.online}
         self.excluded[node] = frozenset(clashing)
         taken = [reading for reading in offered if reading.name not in clashing]
-        names = {reading.name for reading in taken}
+        names = {reading.name: node for reading in taken}  # in the birth's order, in which a death names them too
         gone = [name for name, source in owner.items() if source == node and name not in names]
         self.live.withdraw([name for name in gone if name in row])
         for name in gone:
             del owner[name]
-        owner.update(dict.fromkeys(names, node))
+        owner.update(names)
         if len(row) > SIGNALS_MAX:
             for name in [name for name in row if name not in owner]:
                 del row[name]

@@ -92,7 +92,7 @@ def check_sessions(proxy: Proxy) -> None:
 
 
 def last_packets(proxy: Proxy) -> dict[str, list[Any]]:
-    """What each client sent last."""
+    """What each client sent last, but for those that only looked whether another process has their names."""
     last: dict[str, list[Any]] = {}
     client_of: dict[int, str] = {}
     for recorded in proxy.recorded:
@@ -100,7 +100,7 @@ def last_packets(proxy: Proxy) -> dict[str, list[Any]]:
             client_of[recorded.connection] = recorded.packet.client_id
         elif recorded.direction == "up" and isinstance(recorded.packet, Publish | Disconnect):
             last.setdefault(client_of[recorded.connection], []).append(recorded.packet)
-    return {client: packets[-2:] for client, packets in last.items()}
+    return {client: packets[-2:] for client, packets in last.items() if not client.startswith("host-look-")}
 
 
 def check_farewells(plant: Plant) -> None:

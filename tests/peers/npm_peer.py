@@ -5,22 +5,20 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import queue
 import shutil
 import subprocess
 import tempfile
-import threading
 from functools import lru_cache
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import pytest
 
+from tests.peers.process import PeerProcess
+
 HERE = Path(__file__).parent
 CACHE = HERE.parents[1] / ".cache" / "peers"
 INSTALL_S_MAX = 180.0
-ANSWER_S_MAX = 90.0  # Node itself needs seconds to start beside other tests
 
 
 @lru_cache(maxsize=1)
@@ -63,60 +61,16 @@ def _number(digits: str) -> int | float:
     return int(digits) if abs(int(digits)) < 1 << 53 else float(digits)
 
 
-class NodeProcess:
-    """A script that runs in Node; its lines are read by a thread, so that waiting for one can end."""
+class NodeProcess(PeerProcess):
+    """A script that runs in Node."""
 
     def __init__(self, script: str, *arguments: str) -> None:
-        self._script = script
-        self._process = subprocess.Popen(
-            ["node", script, *arguments],
-            cwd=installed_peers(),
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-            bufsize=1,
-        )
-        self._lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()
-        self._reader = threading.Thread(target=self._read, daemon=True)
-        self._reader.start()
+        super().__init__(["node", script, *arguments], installed_peers())
 
     def __enter__(self) -> NodeProcess:
         return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        self.kill()
-
-    def _read(self) -> None:
-        assert self._process.stdout is not None
-        for line in self._process.stdout:
-            self._lines.put(line.strip())
-        self._lines.put(None)  # it has ended: who waits is told at once
-
-    def tell(self, line: str) -> None:
-        """Write a line to the script."""
-        assert self._process.stdin is not None
-        self._process.stdin.write(line + "\n")
-
-    def hear(self, timeout_s: float = ANSWER_S_MAX) -> str:
-        """The next line of the script."""
-        try:
-            line = self._lines.get(timeout=timeout_s)
-        except queue.Empty:
-            raise TimeoutError(f"{self._script} said nothing for {timeout_s} s, and runs") from None
-        if line is None:
-            raise EOFError(f"{self._script} has ended with exit code {self._process.wait()}")
-        return line
 
     def ask(self, line: str) -> Any:
         """Write a line and read its answer."""
         self.tell(line)
         return json.loads(self.hear(), parse_int=_number)
-
-    def kill(self) -> None:
-        """End it as a power cut does (-9)."""
-        self._process.kill()
-        self._process.wait()
-        self._reader.join()
-        for pipe in (self._process.stdin, self._process.stdout):
-            assert pipe is not None
-            pipe.close()

@@ -60,7 +60,7 @@ def write_folder(folder: Path, files: Mapping[str, bytes]) -> None:
         try:
             for name, data in files.items():
                 (part / name).write_bytes(data)
-            part.chmod(0o755)
+            part.chmod(0o750)
             if folder.exists():
                 shutil.rmtree(folder)
             part.rename(folder)

@@ -1,4 +1,4 @@
-"""GET /alerts and POST /alerts/{fingerprint}/acknowledge: what fires, and who takes care of it."""
+"""GET /alerts, POST /alerts/{fingerprint}/acknowledge, /silences and /silences/{id}/end: what fires, and who takes care of it."""
 
 import asyncio
 import json
@@ -34,6 +34,27 @@ class Acknowledgement(BaseModel):
     episode: int | None = Field(
         None, description="of the alert as it was shown; one that has begun anew since is not acknowledged"
     )
+
+
+class NewSilence(BaseModel):
+    """Send no notifications for a while, of alerts that match all that is named; `*` and `?` stand for any characters."""
+
+    model_config = ConfigDict(
+        extra="forbid", json_schema_extra={"examples": [{"machine": "vmc", "for_s": 7200, "by": "ada", "comment": "service"}]}
+    )
+    machine: str = Field("", max_length=200)
+    alertname: str = Field("", max_length=200)
+    severity: str = Field("", max_length=20)
+    for_s: float = Field(gt=0.0, le=30 * 86_400.0)
+    by: str = Field("", max_length=100)
+    comment: str = Field("", max_length=1000)
+
+
+class EndOfSilence(BaseModel):
+    """The person who ends it."""
+
+    model_config = ConfigDict(extra="forbid")
+    by: str = Field("", max_length=100)
 
 
 class Outcome(Answer):
@@ -80,23 +101,61 @@ def alert_routes(live: LivePlant, viewer: Viewer | None) -> APIRouter:
         request: Request,
     ) -> Any:
         """Say that somebody takes care of an alert: it is not repeated and goes to nobody else."""
-        by = getattr(request.state, "user", None) or body.by.strip()
-        if not by:
-            raise ApiError(400, "by is empty; say who takes care of it")
-        state = live.alerts()
-        if (reason := _trouble(state)) is not None or state is None or viewer is None:
-            raise ApiError(503, reason or "no broker is listened to; nothing can be acknowledged")
+        by = _signed(request, body.by)
+        state = _kept_up(live)
         alert = _one(state, fingerprint)
         if body.episode is not None and body.episode != alert.get("episode"):
             raise ApiError(409, f"alert {fingerprint} has begun anew since (episode {alert.get('episode')}); look at it again")
         fields = {"fingerprint": alert["fingerprint"], "episode": alert.get("episode"), "by": by, "comment": body.comment}
         return await _command(live, viewer, "ack", fields)
 
+    @router.post("/silences", response_model=Outcome, responses=refusals)
+    async def silence(body: NewSilence, request: Request) -> Any:
+        """Begin a silence."""
+        by = _signed(request, body.by)
+        matchers = {name: text for name in ("machine", "alertname", "severity") if (text := getattr(body, name).strip())}
+        if not matchers:
+            raise ApiError(400, "a silence needs machine, alertname or severity; machine '*' is all of them")
+        request.state.object = ", ".join(f"{name} = {text}" for name, text in matchers.items())
+        _kept_up(live)
+        fields = {"by": by, "comment": body.comment, "matchers": matchers, "for_s": body.for_s}
+        return await _command(live, viewer, "silence", fields)
+
+    @router.post("/silences/{silence_id}/end", response_model=Outcome, responses=refusals)
+    async def end_silence(
+        silence_id: Annotated[str, Path(description="As GET /alerts has it", max_length=64, examples=["9f31c2"])],
+        body: EndOfSilence,
+        request: Request,
+    ) -> Any:
+        """End a silence now."""
+        by = _signed(request, body.by)
+        if silence_id not in [one.get("id") for one in _kept_up(live).get("silences", ())]:
+            raise ApiError(404, f"there is no silence {silence_id[:64]!r}; GET /alerts lists them")
+        return await _command(live, viewer, "unsilence", {"by": by, "silence": silence_id})
+
     return router
 
 
-async def _command(live: LivePlant, viewer: Viewer, name: str, fields: Mapping[str, Any]) -> dict[str, Any]:
+def _signed(request: Request, given: str) -> str:
+    """Who does it: the user, where the server knows one by name, else whoever is given. Raises ApiError where nobody is."""
+    by = request.state.user or given.strip()
+    if not by:
+        raise ApiError(400, "by is empty; say who does it")
+    return str(by)
+
+
+def _kept_up(live: LivePlant) -> Mapping[str, Any]:
+    """The state of alerts. Raises ApiError where nobody keeps it up."""
+    state = live.alerts()
+    if (reason := _trouble(state)) is not None or state is None:
+        raise ApiError(503, reason or "nothing was heard of alerts")
+    return state
+
+
+async def _command(live: LivePlant, viewer: Viewer | None, name: str, fields: Mapping[str, Any]) -> dict[str, Any]:
     """Give a command, and wait for what becomes of it."""
+    if viewer is None:
+        raise ApiError(503, "no broker is listened to; nothing can be commanded")
     key = uuid4().hex[:16]
     if not viewer.publish(ALERT_COMMAND + name, json.dumps({"id": key, **fields}).encode()):
         raise ApiError(503, f"{viewer.trouble or 'too much waits for the broker'}; try again")

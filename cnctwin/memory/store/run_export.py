@@ -1,7 +1,7 @@
 """A stretch of a store as a run log (formats, section 3), for gap diagnosis, identification and training."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 from cnctwin.errors import UsageError
 from cnctwin.files.output import check_suffix
 from cnctwin.memory.store.contract import Column, Query, Store, StoreError
+from cnctwin.memory.store.known_before import known_before
 from cnctwin.memory.store.opening import open_store
 from sparkplug.quality import Quality
+from sparkplug.values import Value
 from twin.errors import RunLogError
 from twin.runlog import AXIS_COLUMN, COLUMNS, TEXT_COLUMNS, RunLog, run_log, write_run
 
@@ -50,6 +52,8 @@ def export(
 def run_of(store: Store, machine: str, from_ms: int, to_ms: int, *, every_ms: int | None = None, held: bool = False) -> RunLog:
     """The run log of a machine in [from_ms, to_ms): a row for each time at which a signal said something.
 
+    The first row also has what was known before: of each signal that says nothing in it the last value, where that was good.
+
     every_ms: windows, with the mean of each. held: a signal that says nothing keeps what it said last (controls report what
     changes); a value that is not good ends that. Raises StoreError where there is nothing.
     """
@@ -62,14 +66,29 @@ def run_of(store: Store, machine: str, from_ms: int, to_ms: int, *, every_ms: in
         raise StoreError(f"{machine}: the store has nothing from {from_ms} to {to_ms}; ask `cnctwin store status` what it has")
     t_us = np.unique(np.concatenate([np.array(c.t_us, dtype=np.int64) for c in columns]))
     told: dict[str, NDArray[np.generic]] = {"t_s": (t_us - t_us[0]) / 1e6}
-    for column in columns:
-        told[names[column.signal]] = _spread(column, t_us, is_text=names[column.signal] in TEXT_COLUMNS, held=held)
+    silent = names.keys() - {column.signal for column in columns if column.t_us[0] == t_us[0]}
+    before = known_before(store, machine, silent, from_ms)
+    said = {column.signal: column for column in columns}
+    for signal in sorted(said.keys() | before.keys()):
+        at_us, good = _good(said.get(signal))
+        if signal in before:
+            at_us, good = [int(t_us[0]), *at_us], [before[signal].value, *good]
+        told[names[signal]] = _spread(at_us, good, t_us, is_text=names[signal] in TEXT_COLUMNS, held=held)
     return run_log(_merged(told), f"{machine} from the store")
 
 
-def _spread(column: Column, t_us: NDArray[np.int64], *, is_text: bool, held: bool) -> NDArray[np.generic]:
-    good = [value if quality is Quality.GOOD else None for value, quality in zip(column.value, column.quality, strict=True)]
-    at = np.searchsorted(t_us, np.array(column.t_us, dtype=np.int64))
+def _good(column: Column | None) -> tuple[list[int], list[Value]]:
+    """The times of a column, and its values, None where one is not good."""
+    if column is None:
+        return [], []
+    pairs = zip(column.value, column.quality, strict=True)
+    return column.t_us, [value if quality is Quality.GOOD else None for value, quality in pairs]
+
+
+def _spread(
+    at_us: Sequence[int], good: Sequence[object], t_us: NDArray[np.int64], *, is_text: bool, held: bool
+) -> NDArray[np.generic]:
+    at = np.searchsorted(t_us, np.array(at_us, dtype=np.int64))
     values = np.array([_text(v) if is_text else _number(v) for v in good], dtype=object if is_text else np.float64)
     spread = np.full(len(t_us), None if is_text else np.nan, dtype=values.dtype)
     if not held:

@@ -39,7 +39,7 @@ def is_now(shop: Shop, role: str, user: str | None = "ada") -> None:
 def test_a_reader_sees_what_fires_and_why_it_cannot_be_acknowledged(visit: Visit, shop: Shop) -> None:
     is_now(shop, "reader")
     page = visit.open("#/alerts")
-    expect(page.locator(".note.role")).to_have_text("You are a reader (ada): acknowledging takes an operator.")
+    expect(page.locator(".note.role")).to_have_text("You are a reader (ada): acknowledging, or silencing, takes an operator.")
     buttons = page.get_by_role("button", name="Acknowledge")
     expect(buttons.first).to_be_visible()
     assert all(button.is_disabled() for button in buttons.all())
@@ -94,3 +94,24 @@ def test_only_an_administrator_is_offered_the_record(visit: Visit, shop: Shop) -
     page.locator("#link").click()
     expect(page.get_by_role("dialog")).to_contain_text("ada, operator")
     expect(page.get_by_role("button", name="Who did what")).to_have_count(0)
+
+
+def test_an_operator_silences_an_alert_and_ends_a_silence(visit: Visit, shop: Shop) -> None:
+    is_now(shop, "operator", None)
+    shop.answers["/silences.*"] = lambda _path, _body: (200, {"done": True, "text": "done"})
+    page = visit.open("#/alerts")
+    page.get_by_role("button", name="Silence").first.click()
+    dialog = page.get_by_role("dialog")
+    dialog.get_by_label("For how many hours").fill("0.5")
+    dialog.get_by_label("Your name").fill("ada")
+    dialog.get_by_label("Comment").fill("service")
+    dialog.get_by_role("button", name="Silence").click()
+    expect(dialog).to_be_hidden()
+    page.get_by_role("button", name="End").first.click()
+    expect(dialog.get_by_label("Your name")).to_have_value("ada")
+    dialog.get_by_role("button", name="End it").click()
+    expect(dialog).to_be_hidden()
+    (begun, body), (ended, by) = shop.posted
+    silence = {"machine": "vmc", "alertname": "rule_spindle_overload", "for_s": 1800, "by": "ada", "comment": "service"}
+    assert (begun, body) == ("/silences", silence)
+    assert (ended.startswith("/silences/"), ended.endswith("/end"), by) == (True, True, {"by": "ada"})

@@ -1,7 +1,8 @@
 """What stands for `sparkplug.transport`: a connection and its loop with the same surface, on the model of a broker.
 
-The life of a connection is that of `MqttConnection`: an attempt in a task of its own, pauses that grow, an outbox that goes down
-with the connection, listeners called by whoever turns the loop. The bytes of MQTT, paho and sockets are not modelled.
+The life of a connection is that of `MqttConnection`: an attempt in a task of its own, the real itinerary with its pauses, the
+real bounds of what can be sent, an outbox that goes down with the connection, listeners called by whoever turns the loop. The
+bytes of MQTT, paho and sockets are not modelled.
 """
 
 from collections import deque
@@ -10,8 +11,10 @@ from typing import Any, ClassVar
 
 from sparkplug.actions import Action, Barrier, Disconnect, Publish, Subscribe
 from sparkplug.broker import BrokerAddress
-from sparkplug.transport.connection import ABSENT_S_MAX, BACKOFF_S_MAX, BACKOFF_S_MIN, OUTBOX_BYTES_MAX, OUTBOX_MAX, STABLE_S
+from sparkplug.transport.connection import OUTBOX_BYTES_MAX, OUTBOX_MAX
+from sparkplug.transport.itinerary import Itinerary
 from sparkplug.transport.listener import Listener
+from sparkplug.transport.sendable import Sendable
 from tests.plant.simulation.broker import CONNACK, ENDED, MESSAGE, PUBACK, Broker, Link
 from tests.plant.simulation.kernel import Kernel, Process, Signal
 
@@ -74,11 +77,11 @@ class SimulatedConnection:
         self._broker = SimulatedLoop.broker
         self._process: Process = self.kernel.me().process
         self._client_id, self._listener, self._is_5 = client_id, listener, mqtt_version == MQTT_5
-        self._servers, self._server = len(brokers), 0
+        self.sendable = Sendable(client_id)
+        self._itinerary = Itinerary(brokers, self.kernel.chance)
         self._link: Link | None = None
         self._outbox: deque[Action] = deque()
         self._accepted = self._stopping = self._is_leaving = False
-        self._began_s, self._pause_s = 0.0, BACKOFF_S_MIN
         self._dial_s: float | None = None
         self._process.at_death.append(self._died)
 
@@ -124,8 +127,8 @@ class SimulatedConnection:
         while link is not None and self._accepted and self._outbox:
             action = self._outbox.popleft()
             if isinstance(action, Publish):
-                self._check(action)
-                self._broker.publish(link, action)
+                if self.sendable.takes(action):
+                    self._broker.publish(link, action)
             elif isinstance(action, Barrier):
                 self._broker.publish(link, Publish(action.topic, str(action.token).encode(), 1), action.token)
             elif isinstance(action, Subscribe):
@@ -136,7 +139,7 @@ class SimulatedConnection:
                 with_will = self._is_5 and (not isinstance(action, Disconnect) or action.with_will)
                 self._broker.disconnect(link, with_will=with_will)
                 if not isinstance(action, Disconnect):
-                    self._server = (self._server + 1) % self._servers
+                    self._itinerary.walk()
                 if self._stopping:
                     self._over()
 
@@ -152,6 +155,7 @@ class SimulatedConnection:
                 self.connects += 1
                 self.last_error = ""
                 self._accepted = True
+                self._itinerary.accepted(self.kernel.now_s)
                 self._listener.connected()
                 self.flush()
             elif self._is_leaving:
@@ -172,21 +176,14 @@ class SimulatedConnection:
 
     # How it is done.
 
-    @staticmethod
-    def _check(message: Publish) -> None:
-        """The packet has room for 65,535 bytes of topic, as the real one."""
-        if len(message.topic.encode("utf-8", "surrogatepass")) > 65_535:
-            raise ValueError("Publish topic is too long.")
-
     def _dial(self) -> None:
         self._dial_s = None
         self._process.spawn(self._attempt, f"dial {self._client_id}")
 
     def _attempt(self) -> None:
-        self._began_s = self.kernel.now_s
         while self._outbox:
             self.unsent += isinstance(self._outbox.popleft(), Publish)
-        connect = self._listener.connecting(self._server)
+        connect = self._listener.connecting(self._itinerary.server)
         self.kernel.sleep(0.001)
         self._is_leaving = False
         self._link = self._broker.dial(self._client_id, connect.will, self._receive(object()))
@@ -213,10 +210,8 @@ class SimulatedConnection:
         if self._stopping:
             self.loop.connections.remove(self)
             return
-        longest_s = BACKOFF_S_MAX if was_reached else ABSENT_S_MAX
         now_s = self.kernel.now_s
-        self._pause_s = BACKOFF_S_MIN if now_s - self._began_s > STABLE_S else min(2 * self._pause_s, longest_s)
-        self._dial_s = now_s + self._pause_s * self.kernel.chance.uniform(0.8, 1.2)
+        self._dial_s = now_s + self._itinerary.ended(now_s, somebody_listens=was_reached)
 
     def _died(self) -> None:
         if self._link is not None:

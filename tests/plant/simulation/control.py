@@ -1,4 +1,4 @@
-"""A machine of the plant, and the edge's adapter for it: a program of values that the seed draws, kept in a buffer like an agent's.
+"""A machine of the plant, and the edge's adapter for it: values that the seed draws, in a buffer like an agent's.
 
 The numbers of a machine are its own: spindle speeds of machine i lie in [1000 (i + 1), 1000 (i + 1) + 999], so that a value which
 somebody else was given is seen at once. Each observation has a number and a stamp that no other one has.
@@ -76,12 +76,12 @@ def machine(name: str, number: int, end_s: float, chance: Random) -> Machine:
     day = [Observed(0.0, LOAD, 20.0), Observed(0.0, SPEED, float(base)), Observed(0.0, FEED, 0.0)]
     day += [Observed(0.0, STATE, "READY"), Observed(0.0, TOOL, 1)]
     high_s = []
-    begin_s = chance.uniform(4.0, end_s / 2)
-    while begin_s < end_s - 12.0:
-        high_s.append((begin_s, begin_s + chance.uniform(7.0, 12.0)))
-        begin_s = high_s[-1][1] + chance.uniform(15.0, 40.0)
+    begin_s = chance.uniform(3.0, end_s / 3)
+    while begin_s < end_s - 8.0:
+        high_s.append((begin_s, begin_s + chance.uniform(6.0, 8.0)))
+        begin_s = high_s[-1][1] + chance.uniform(8.0, 20.0)
     at_s, count, tool = 0.3, 0, 1
-    step_s = chance.choice((0.1, 0.25, 0.5))
+    step_s = chance.choice((0.15, 0.3, 0.6))
     while at_s < end_s:
         is_high = any(a <= at_s < b for a, b in high_s)
         count += 1
@@ -159,7 +159,9 @@ def parse(_: EdgeConfig[Any], cursor: Told, raw: bytes) -> tuple[Told, SampleSet
             dropped += 1
             continue
         next_sequence = number + 1
-        samples.append(EdgeSample(signal, value, round((EPOCH_S + at_s) * 1000), sequence=number, is_baseline=not cursor.is_begun))
+        samples.append(
+            EdgeSample(signal, value, round((EPOCH_S + at_s) * 1000), sequence=number, is_baseline=not cursor.is_begun)
+        )
     found = SampleSet(
         samples=tuple(samples),
         gaps=gaps,

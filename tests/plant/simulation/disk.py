@@ -6,8 +6,8 @@ committed, and how many are copied. What is surely on the platter is read from t
     synchronous=FULL      every committed frame
     synchronous=NORMAL    the frames that a checkpoint has copied, and those that somebody has synced with os.fsync
 
-A kill -9 keeps every committed frame. A power cut keeps those that are synced, and of the others as many as the seed draws, the last
-one perhaps torn. Other files keep their content where they were synced; else they may be empty or cut short.
+A kill -9 keeps every committed frame. A power cut keeps those that are synced, and of the others as many as the seed draws, the
+last one perhaps torn. Other files keep their content where they were synced; else they may be empty or cut short.
 
 Not modelled: pages that reach the platter in another order than they were written, renames that are lost, sealed hours (a run is
 shorter than an hour), bits that rot.

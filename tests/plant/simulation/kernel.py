@@ -1,8 +1,8 @@
 """One thread and one clock for a whole plant: every thread of every process is a greenlet, and time passes only while all wait.
 
-Our code blocks where it always does (`sleep`, `Event.wait`, `poll`); `seams` has that end up here. The task that is due first runs
-until it blocks again. What is due at the same moment comes in an order that the seed draws, since each pause ends up to JITTER_S
-later. A process that is killed is never resumed: nothing of it runs any more, no `finally` either, as with kill -9.
+Our code blocks where it always does (`sleep`, `Event.wait`, `poll`); `seams` has that end up here. The task that is due first
+runs until it blocks again. What is due at the same moment comes in an order that the seed draws, since each pause ends up to
+JITTER_S later. A process that is killed is never resumed: nothing of it runs any more, no `finally` either, as with kill -9.
 """
 
 import hashlib

@@ -3,11 +3,10 @@
 from collections.abc import Callable
 from random import Random
 
-from twin.vocabulary.topics import ALERTS
-
 from tests.plant.simulation.faults import Fault
 from tests.plant.simulation.hostile import Hostile
 from tests.plant.simulation.plant import Plant
+from twin.vocabulary.topics import ALERTS
 
 BROKER_NOTICES_S_MAX = 20.0
 STALL_S_MAX = 6.0
@@ -32,6 +31,7 @@ class Mischief:
             "kill edge": lambda fault, chance: self._kill(self._edge(chance)),
             "kill processors": lambda fault, chance: self._kill("processors"),
             "kill alerts": lambda fault, chance: self._kill(self._plant.alerts_process),
+            "kill notifying": lambda fault, chance: setattr(self._plant.receiver, "is_deadly", True),
             "kill page": lambda fault, chance: self._kill("page"),
             "kill broker": self._kill_broker,
             "kill at disk": self._kill_at_disk,
@@ -60,7 +60,11 @@ class Mischief:
         links = [link for link in self._broker.links if not link.is_cut]
         if links:
             link = chance.choice(links)
-            self._broker.cut(link, chance.choice((0.0, chance.uniform(0.0, 5.0))), chance.choice((0.0, chance.uniform(0.0, BROKER_NOTICES_S_MAX))))
+            self._broker.cut(
+                link,
+                chance.choice((0.0, chance.uniform(0.0, 5.0))),
+                chance.choice((0.0, chance.uniform(0.0, BROKER_NOTICES_S_MAX))),
+            )
 
     def _stall(self, fault: Fault, chance: Random) -> None:
         links = [link for link in self._broker.links if not link.is_cut]
@@ -137,4 +141,4 @@ def heal(plant: Plant) -> None:
     plant.disk.full.clear()
     plant.disk.kill_at.clear()
     plant.away_until_s.clear()
-    plant.receiver.trouble = 0.0
+    plant.receiver.trouble, plant.receiver.is_deadly = 0.0, False

@@ -1,4 +1,4 @@
-"""A whole plant: machines, edges, a broker, processors with their historian and courier, a page, who is notified, and supervisors.
+"""A whole plant: machines, edges, a broker, processors with historian and courier, a page, who is notified, supervisors.
 
 All but the machines, the broker and who is notified is the code that runs in a plant, begun as its commands begin it.
 """
@@ -32,8 +32,8 @@ from cnctwin.api.live.plant import LivePlant
 from cnctwin.api.live.viewer import Viewer
 from cnctwin.running.processors import process
 from edge.config import BrokerSection, EdgeConfig, MachineSection, StoreSection
-from edge.running.run import edge_runtime
 from edge.running.driver import Turning
+from edge.running.run import edge_runtime
 from edge.running.runtime import EdgeRuntime
 from edge.sample import Drop
 from processors.discovery import find
@@ -51,13 +51,15 @@ from tests.plant.simulation.seams import Event, Stand, clock_of, simulated
 
 ADDRESS = BrokerAddress()
 GROUP = "cnc"
-FAULTS_UNTIL_S = 38.0
-RUN_S = 42.0
+FAULTS_UNTIL_S = 20.0
+RUN_S = 24.0
 QUIET_S_MAX = 150.0
 LOOK_S = 1.0
 AUTOSAVE_S = 10.0
 ALERTS = {
-    "receivers": {"desk": {"type": "webhook", "url": "https://desk.plant.example/hook", "give_up_after_s": 60.0, "rate_per_hour": 1000}},
+    "receivers": {
+        "desk": {"type": "webhook", "url": "https://desk.plant.example/hook", "give_up_after_s": 60.0, "rate_per_hour": 1000}
+    },
     "group_wait_s": 1.0,
     "group_interval_s": 5.0,
     "flap_episodes": 50,
@@ -226,9 +228,7 @@ class Plant:
         def main() -> None:
             pairs = [configured(name) for name in names]
             folder = self.disk.folder / where
-            pairs = [
-                (one, one.configured({"store": str(self.store_folder)}) if one.records else config) for one, config in pairs
-            ]
+            pairs = [(one, one.configured({"store": str(self.store_folder)}) if one.records else config) for one, config in pairs]
             process(pairs, ADDRESS, Event(self.kernel), group=GROUP, state_dir=folder)  # type: ignore[arg-type]
 
         return main

@@ -16,6 +16,7 @@ class Receiver:
 
     def __init__(self, kernel: Kernel, chance: Random) -> None:
         self.trouble = 0.0
+        self.is_deadly = False  # the next courier that comes is killed while it waits for the answer
         self.arrived: Counter[str] = Counter()
         self._kernel, self._chance = kernel, chance
 
@@ -29,6 +30,9 @@ class Receiver:
             return Outcome(Verdict.NOT_TAKEN, "refused") if self._chance.random() < 0.5 else Answer(503, {}, b"")
         self.arrived[key] += 1
         self._kernel.note("notified", key)
+        if self.is_deadly:
+            self.is_deadly = False
+            self._kernel.me().process.kill()
         if wrong:
             return Outcome(Verdict.UNSURE, "no answer; it may have arrived")
         self._kernel.sleep(self._chance.uniform(0.0, 0.3))  # a courier that is killed here never knows

@@ -2,8 +2,8 @@
 
 from collections import Counter
 from dataclasses import dataclass
-from typing import Any
 
+from tests.plant.simulation.defects import options_of, put_in
 from tests.plant.simulation.faults import Fault, drawn
 from tests.plant.simulation.invariants import Invariants
 from tests.plant.simulation.mischief import Mischief, heal
@@ -34,10 +34,15 @@ class Result:
         return "\n".join([*lines, f"  replay: python benchmarks/plant_seeds.py --replay {self.seed}"])
 
 
-def lived(seed: int, *, without: frozenset[str] = frozenset(), faults: tuple[Fault, ...] | None = None, **options: Any) -> Result:
-    """Run a seed. `without`: kinds of faults that are left out; `faults`: these instead of those that it draws."""
+def lived(
+    seed: int, *, defect: str | None = None, without: frozenset[str] = frozenset(), faults: tuple[Fault, ...] | None = None
+) -> Result:
+    """Run a seed.
+
+    defect: one of DEFECTS, put back in; without: kinds of faults that are left out; faults: these instead of those that it draws
+    """
     chosen = tuple(drawn(seed, FAULTS_UNTIL_S, without)) if faults is None else faults
-    with plant_of(seed, **options) as plant:
+    with put_in(defect), plant_of(seed, **options_of(defect)) as plant:
         kernel = plant.kernel
         invariants = Invariants(plant)
         Mischief(plant, list(chosen))
@@ -60,3 +65,19 @@ def lived(seed: int, *, without: frozenset[str] = frozenset(), faults: tuple[Fau
             kernel.now_s,
             plant.receiver.arrived.total(),
         )
+
+
+def shrunk(result: Result, defect: str | None = None) -> Result:
+    """Leave out one fault after the other as long as the same invariant is violated; the run with those that are left."""
+    broken = {invariant_of(violation) for violation in result.violations}
+    for fault in result.faults:
+        fewer = tuple(one for one in result.faults if one is not fault)
+        again = lived(result.seed, defect=defect, faults=fewer)
+        if broken & {invariant_of(violation) for violation in again.violations}:
+            result = again
+    return result
+
+
+def invariant_of(violation: str) -> str:
+    """Return the invariant that a violation names."""
+    return violation.split(": ")[1]

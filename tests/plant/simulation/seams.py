@@ -1,7 +1,7 @@
 """The one place where our code meets the simulated plant: its clocks, its threads, its connections and its disks.
 
-Each module of ours says `time.monotonic()`, `threading.Thread(…)`, `sqlite3.connect(…)`; while a plant runs, these names lead to the
-kernel. Nothing but modules of ours is touched, and all of it is put back.
+Each module of ours says `time.monotonic()`, `threading.Thread(…)`, `sqlite3.connect(…)`; while a plant runs, these names lead to
+the kernel. Nothing but modules of ours is touched, and all of it is put back.
 """
 
 import queue

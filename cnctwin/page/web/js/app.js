@@ -6,7 +6,7 @@ import { el, say, setHidden, setText } from "./dom.js";
 import { serverNow } from "./clock.js";
 import { painted } from "./lag.js";
 import { lookup } from "./lookup.js";
-import { askMe } from "./me.js";
+import { askMe, me } from "./me.js";
 import { onFrame } from "./frame.js";
 import { Plant } from "./plant.js";
 import { Stream } from "./stream.js";
@@ -34,6 +34,7 @@ const ALERTS_MS = 5000;
 const main = document.getElementById("main"),
   banner = document.getElementById("banner");
 const behindBanner = document.getElementById("behind");
+const whom = document.getElementById("me");
 const pill = document.getElementById("link"),
   pillWord = pill.querySelector(".word");
 
@@ -222,6 +223,8 @@ setInterval(() => {
 /** Who looks, and what the role may: asked at the start and after each log-in. */
 app.askMe = async () => {
   await askMe();
+  setHidden(whom, !me.user && me.role !== "reader");
+  setText(whom, me.user ?? me.role ?? "");
   onFrame(() => app.view?.onMe?.());
 };
 

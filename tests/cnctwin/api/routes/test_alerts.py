@@ -88,6 +88,22 @@ def test_behind_a_proxy_it_is_the_proxy_s_user_who_acknowledges(firing: Mosquitt
 
 
 @pytest.mark.broker
+def test_an_alert_is_silenced_by_a_person_and_not_by_nobody(firing: Mosquitto) -> None:
+    with served(firing) as server:
+        wait(lambda: alerts(server), "the alert")
+        asked = {"machine": "vmc", "for_s": 3600.0, "by": "ada", "comment": "service"}
+        for wrong in ({**asked, "machine": ""}, {**asked, "by": " "}, {**asked, "for_s": 0}, {**asked, "for_s": 1e300}):
+            assert post(f"{server.url}/silences", json=wrong).status_code == 400
+        assert post(f"{server.url}/silences", json=asked).json()["done"] is True
+        wait(lambda: alerts(server)[0]["silenced_by"], "the silence")
+        (silence,) = get(f"{server.url}/alerts").json()["silences"]
+        assert (silence["by"], silence["matchers"]) == ("ada", {"machine": "vmc"})
+        assert post(f"{server.url}/silences/unknown/end", json={"by": "ada"}).status_code == 404
+        assert post(f"{server.url}/silences/{silence['id']}/end", json={"by": "ada"}).json()["done"] is True
+        wait(lambda: not alerts(server)[0]["silenced_by"], "its end")
+
+
+@pytest.mark.broker
 def test_where_nobody_answers_it_says_so(mosquitto: Mosquitto, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(alert_routes, "ANSWER_S_MAX", 0.3)
     with served(mosquitto) as server:

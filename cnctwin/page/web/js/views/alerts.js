@@ -50,6 +50,20 @@ export function open(app) {
     });
   }
 
+  function silence(alert) {
+    const { machine = "", alertname = "" } = alert.labels ?? {};
+    const hours = el("input", { class: "field", name: "hours", type: "number", min: "0.1", max: "720", step: "any", value: "2" });
+    const about = [
+      el("p", {}, el("strong", {}, machine), `: ${words(alertname)} is told to nobody for a while. It stays on this page.`),
+      el("label", { class: "named" }, "For how many hours", hours),
+    ];
+    openSigned("Silence", about, "Silence", async (by, comment) => {
+      await post("silences", { machine, alertname, for_s: Number(hours.value) * 3600, by, comment });
+      say("Silenced");
+      app.askAlerts();
+    });
+  }
+
   function card(alert) {
     const { labels = {}, annotations = {} } = alert,
       machine = labels.machine ?? "",
@@ -92,6 +106,9 @@ export function open(app) {
         alert.phase === "firing"
           ? el("button", { type: "button", class: "button main", disabled: !may("operator"), onclick: () => acknowledge(alert) }, "Acknowledge")
           : null,
+        alert.phase === "firing" && !alert.silenced_by
+          ? el("button", { type: "button", class: "button", disabled: !may("operator"), onclick: () => silence(alert) }, "Silence")
+          : null,
         machine && Number.isFinite(start)
           ? el(
               "a",
@@ -120,6 +137,15 @@ export function open(app) {
         )
       : null;
 
+  function endSilence(one) {
+    const about = el("p", {}, `${one.comment || "It"}: alerts that it keeps quiet are told to people again.`);
+    openSigned("End this silence?", about, "End it", async (by) => {
+      await post(`silences/${part(one.id ?? "")}/end`, { by });
+      say("Ended");
+      app.askAlerts();
+    });
+  }
+
   function silences(given) {
     if (!given.length) return null;
     const matchers = (one) => Object.entries(one.matchers ?? {}).map(([label, pattern]) => `${label} = ${pattern}`);
@@ -128,14 +154,13 @@ export function open(app) {
       `${moment(Date.parse(one.starts))} to ${moment(Date.parse(one.ends))}`,
       one.by ?? "",
       one.comment ?? "",
-      el("code", {}, one.id ?? ""),
+      el("button", { type: "button", class: "button", disabled: !may("operator"), onclick: () => endSilence(one) }, "End"),
     ]);
     return el(
       "section",
       {},
       el("h2", {}, "Silenced"),
-      table(["What", "When", "By", "Why", "Id"], rows, { label: "Silenced" }),
-      el("p", { class: "note" }, "cnctwin alerts unsilence ID --by YOU ends one."),
+      table(["What", "When", "By", "Why", ""], rows, { label: "Silenced" }),
     );
   }
 
@@ -206,7 +231,7 @@ export function open(app) {
     const known = given.available !== false || all.length;
     body.replaceChildren(
       ...[
-        may("operator") ? null : el("p", { class: "note role" }, whyNot("operator", "acknowledging")),
+        may("operator") ? null : el("p", { class: "note role" }, whyNot("operator", "acknowledging, or silencing,")),
         !known
           ? el(
               "div",

@@ -1,0 +1,400 @@
+"""The checks of an edge node of a peer against our host application: `CHECKS` has them in the order in which they are made."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from sparkplug.broker import BrokerAddress
+from sparkplug.codec import decode
+from sparkplug.datatype import DataType
+from sparkplug.host import EventKind, HostApplication, HostEvent
+from sparkplug.metric import Change, NodeId
+from sparkplug.node_picture import Owner
+from sparkplug.quality import Quality
+from sparkplug.topics import Topic, Verb
+from sparkplug.values import Payload
+from tests.peers.metrics import (
+    BY_NAME,
+    DEFINITION,
+    INSTANCE,
+    NODE_PART,
+    NOTHING,
+    OFFSETS,
+    PART,
+    Line,
+    datatype_of,
+    our_value,
+    scalars,
+)
+from tests.peers.pairing import Broker, Peer
+from tests.peers.process import PeerProcess
+from tests.peers.toolchain import command_of
+from tests.wire.mqtt_packets import Connect, Publish
+from tests.wire.proxy import Proxy
+
+QUIET_S = 2.0
+WRAP = 600
+DEVICE = "lathe"
+
+
+def _host(broker: Broker, host_id: str) -> HostApplication:
+    address = BrokerAddress(*broker.address)
+    return HostApplication(address, host_id, reorder_timeout_ms=500, rebirth_interval_ms_min=500)
+
+
+class EdgePairing:
+    """An edge node of a peer behind a proxy that records it, and a host application of ours on the same broker."""
+
+    def __init__(self, peer: Peer, broker: Broker, proxy: Proxy) -> None:
+        self.peer, self.broker, self.proxy = peer, broker, proxy
+        self.node = NodeId("cnc", f"edge-{peer.name}")
+        self.host = _host(broker, "scada")
+        self.events: list[HostEvent] = []
+        self.process: PeerProcess | None = None
+        self.host.start()
+
+    def close(self) -> None:
+        """End both sides."""
+        self.end()
+        self.host.stop()
+
+    def end(self) -> None:
+        """Kill the peer's program."""
+        if self.process is not None:
+            self.process.kill()
+            self.process = None
+
+    @property
+    def theirs(self) -> PeerProcess:
+        """The peer's program."""
+        assert self.process is not None
+        return self.process
+
+    def lines(self) -> dict[str, list[Line]]:
+        """Return the metrics that the peer declares: those that it can."""
+        device = [*scalars(self.peer.types_lacking), PART, BY_NAME]
+        optional = {"null": [NOTHING], "dataset": [OFFSETS], "template": [INSTANCE]}
+        device += [line for check, lines in optional.items() if check not in self.peer.lacks for line in lines]
+        node = [NODE_PART] + ([] if "template" in self.peer.lacks else [DEFINITION])
+        return {"node": node, "device": device}
+
+    def start(self, primary: str = "") -> None:
+        """Start the peer's program, with or without a primary host."""
+        command, folder = command_of(self.peer.name)
+        self.process = PeerProcess([*command, "edge", *map(str, self.proxy.address), *self.node, primary], folder)
+        self.tell(**self.lines())
+        while self.hear()["event"] != "started":
+            pass
+
+    def tell(self, **line: Any) -> None:
+        """Write a line to the program."""
+        self.theirs.tell(json.dumps(line))
+
+    def hear(self, timeout_s: float = 90.0) -> dict[str, Any]:
+        """Return the next line of the program."""
+        said: dict[str, Any] = json.loads(self.theirs.hear(timeout_s))
+        return said
+
+    def until(self, done: Callable[[], bool], timeout_s: float) -> None:
+        """Poll our host until `done`."""
+        deadline_s = time.monotonic() + timeout_s
+        while not done():
+            assert time.monotonic() < deadline_s, f"in vain; {self.host.counts}, {self.events[-3:]}"
+            self.events += self.host.poll(0.05)
+
+    def ready(self, timeout_s: float) -> None:
+        """Have a peer that runs and is born, whatever came before; our host is there first."""
+        self.until(lambda: self.host.online, timeout_s)
+        if self.process is None:
+            self.start()
+        self.until(lambda: self.born, timeout_s)
+
+    @property
+    def device(self) -> Owner:
+        """What our host knows of the device."""
+        picture = self.host.picture(self.node)
+        assert picture is not None
+        return picture.devices[DEVICE]
+
+    @property
+    def born(self) -> bool:
+        """Return True where node and device are online."""
+        picture = self.host.picture(self.node)
+        return picture is not None and picture.online and DEVICE in picture.devices and picture.devices[DEVICE].online
+
+    @property
+    def dead(self) -> bool:
+        """Return True where the node is offline."""
+        picture = self.host.picture(self.node)
+        return picture is not None and not picture.online
+
+    def sent(self, verb: Verb, connection: int | None = None) -> list[tuple[Publish, Payload]]:
+        """Return what the peer published, as bytes and as we read it."""
+        packets = self.proxy.packets("up", Publish, connection=connection)
+        return [(packet, decode(packet.payload)) for packet in packets if Topic.parse(packet.topic).verb is verb]
+
+    def counted(self, *names: str) -> dict[str, int]:
+        """Return counts of our host that are not zero."""
+        return {name: self.host.counts[name] for name in names if self.host.counts.get(name)}
+
+
+Check = Callable[[EdgePairing, float], None]
+
+
+def births(it: EdgePairing, _patience_s: float) -> None:
+    """Each scalar type at its limits, with its datatype."""
+    device = it.device
+    wrong = [
+        f"{line['name']}: {device.readings[line['name']].value!r}"
+        for line in scalars(it.peer.types_lacking)
+        if device.readings[line["name"]].value != our_value(line) or device.bindings[line["name"]].datatype != datatype_of(line)
+    ]
+    assert not wrong, wrong
+    assert not it.counted("malformed", "unknown_metrics")
+
+
+def nulls(it: EdgePairing, patience_s: float) -> None:
+    """A null in the birth, a value, and a null in data."""
+    name = NOTHING["name"]
+    assert it.device.readings[name].value is None
+    it.tell(do="data", metrics=[{**NOTHING, "value": "5"}])
+    it.until(lambda: it.device.readings[name].value == 5, patience_s)
+    it.tell(do="data", metrics=[NOTHING])
+    it.until(lambda: it.device.readings[name].value is None, patience_s)
+
+
+def units(it: EdgePairing, _patience_s: float) -> None:
+    """The property engUnit of a birth."""
+    assert it.device.readings[PART["name"]].unit == PART["unit"]
+
+
+def dated(it: EdgePairing, _patience_s: float) -> None:
+    """Time stamps of all metrics, seq 0 and Node Control/Rebirth in the NBIRTH."""
+    ((_, birth), *_) = it.sent(Verb.NBIRTH)
+    names = {metric.name: metric for metric in birth.metrics}
+    assert birth.seq == 0 and names["bdSeq"].datatype is DataType.INT64
+    control = names.get("Node Control/Rebirth")
+    assert control is not None and control.value is False and control.datatype is DataType.BOOLEAN
+    assert all(metric.timestamp_ms for metric in birth.metrics), "a metric without a time stamp"
+
+
+def aliases(it: EdgePairing, patience_s: float) -> None:
+    """Data by alias, without the name."""
+    it.tell(do="data", metrics=[{**PART, "value": "4711"}])
+    it.until(lambda: it.device.readings["part"].value == 4711, patience_s)
+    (*_, (_, data)) = it.sent(Verb.DDATA)
+    (metric,) = data.metrics
+    assert metric.alias is not None and metric.name is None
+
+
+def shared(it: EdgePairing, patience_s: float) -> None:
+    """A metric of the node and one of the device with the same name are two."""
+    picture = it.host.picture(it.node)
+    assert picture is not None and picture.own.readings["part"].value == -1
+    it.tell(do="data", metrics=[{**PART, "value": "815"}])
+    it.until(lambda: it.device.readings["part"].value == 815, patience_s)
+    assert picture.own.readings["part"].value == -1
+    births = [payload for verb in (Verb.NBIRTH, Verb.DBIRTH) for _, payload in it.sent(verb)[-1:]]
+    known = [
+        metric.alias for payload in births for metric in payload.metrics if metric.name == "part" and metric.alias is not None
+    ]
+    assert len(known) == len(set(known)), f"one alias for two metrics: {known}"
+
+
+def names(it: EdgePairing, patience_s: float) -> None:
+    """Data by name."""
+    it.tell(do="data", metrics=[{**BY_NAME, "value": "2.25"}])
+    it.until(lambda: it.device.readings["by name"].value == 2.25, patience_s)
+    (*_, (_, data)) = it.sent(Verb.DDATA)
+    (metric,) = data.metrics
+    assert metric.alias is None and metric.name == "by name"
+
+
+def datasets(it: EdgePairing, _patience_s: float) -> None:
+    """A DataSet in the birth."""
+    assert it.device.readings["offsets"].value == our_value(OFFSETS)
+
+
+def templates(it: EdgePairing, _patience_s: float) -> None:
+    """A definition in the NBIRTH and its instance in the DBIRTH."""
+    picture = it.host.picture(it.node)
+    value: Any = it.device.readings["x axis"].value
+    assert (value.ref, [(m.name, m.value) for m in value.metrics]) == ("Axis", [("load", 37.5)])
+    assert picture is not None and set(picture.own.templates) == {"Axis"}
+
+
+def devices(it: EdgePairing, patience_s: float) -> None:
+    """DDEATH and DBIRTH while the node lives."""
+    it.tell(do="device death")
+    it.until(lambda: not it.device.online, patience_s)
+    assert not it.dead and it.device.readings["part"].quality is Quality.STALE
+    it.tell(do="device birth")
+    it.until(lambda: it.born, patience_s)
+    it.tell(do="data", metrics=[{**PART, "value": "3"}])
+    it.until(lambda: it.device.readings["part"].value == 3, patience_s)
+
+
+def wraps(it: EdgePairing, patience_s: float) -> None:
+    """Sequence numbers past 255, more than twice: nothing lost, nothing doubted, each value once and in order."""
+    before, first = it.host.counts, len(it.events)
+    it.tell(do="run", count=WRAP, metric=PART)
+    it.until(lambda: it.device.readings["part"].value == WRAP, patience_s)
+    seen = [r.value for event in it.events[first:] if event.kind is EventKind.DATA for r in event.readings if r.name == "part"]
+    assert seen == list(range(1, WRAP + 1))
+    doubts = ("holes", "lost", "late", "sloppy_sequence", "rebirths_requested")
+    assert {name: it.host.counts.get(name, 0) - before.get(name, 0) for name in doubts} == dict.fromkeys(doubts, 0)
+
+
+def written(it: EdgePairing, patience_s: float) -> None:
+    """A command for a metric of the device, by alias where the birth gave one."""
+    assert it.host.send_command(it.node, DEVICE, [Change("part", 7, int(time.time() * 1000))])
+    heard = it.hear(patience_s)
+    (metric,) = heard["metrics"]
+    birth = it.sent(Verb.DBIRTH)[-1][1]
+    (alias,) = (declared.alias for declared in birth.metrics if declared.name == "part")
+    assert heard["event"] == "command" and heard["device"] == DEVICE and metric["value"] == "7"
+    assert metric["name"] == "part" or metric["alias"] == alias is not None
+
+
+def rebirths(it: EdgePairing, patience_s: float) -> None:
+    """Node Control/Rebirth of a host that comes later and asks for what it has missed."""
+    count = len(it.sent(Verb.NBIRTH))
+    later = _host(it.broker, "later")
+    later.start()
+    deadline_s = time.monotonic() + patience_s
+    try:
+        while len(it.sent(Verb.NBIRTH)) == count:
+            assert time.monotonic() < deadline_s, "no rebirth"
+            it.tell(do="data", metrics=[{**PART, "value": "9"}])
+            for _ in range(5):
+                later.poll(0.05)
+                it.events += it.host.poll(0.05)
+        while (picture := later.picture(it.node)) is None or DEVICE not in picture.devices or not picture.devices[DEVICE].online:
+            assert time.monotonic() < deadline_s, "no DBIRTH behind the NBIRTH"
+            later.poll(0.05)
+    finally:
+        later.stop()
+
+
+def reconnects(it: EdgePairing, patience_s: float) -> None:
+    """The broker's restart. Our host is back first: not every peer can be asked for the birth that it would miss."""
+    it.proxy.refuse()
+    it.broker.restart()
+    it.until(lambda: it.dead and it.host.online, patience_s)
+    it.proxy.accept()
+    it.until(lambda: it.born, patience_s)
+    it.tell(do="data", metrics=[{**PART, "value": "31"}])
+    it.until(lambda: it.device.readings["part"].value == 31, patience_s)
+
+
+def bd_seqs(it: EdgePairing, patience_s: float) -> None:
+    """Each connection has the next bdSeq, in the will and in the NBIRTH."""
+    count = len(it.sent(Verb.NBIRTH))
+    it.proxy.cut()
+    it.until(lambda: len(it.sent(Verb.NBIRTH)) > count, patience_s)
+    it.until(lambda: it.born, patience_s)
+    numbers = []
+    for seen in it.proxy.recorded:
+        if isinstance(seen.packet, Connect) and seen.packet.will is not None:
+            in_will = _bd_seq(decode(seen.packet.will.payload))
+            births = it.sent(Verb.NBIRTH, seen.connection)
+            assert {_bd_seq(payload) for _, payload in births} <= {in_will}, "the NBIRTH has another bdSeq than the will"
+            numbers += [in_will] if births else []
+    after = numbers[-2:]
+    assert after[1] == (after[0] + 1) % 256, f"bdSeq {after[1]} after {after[0]}"
+
+
+def wills(it: EdgePairing, _patience_s: float) -> None:
+    """The will is an NDEATH with QoS 1, not retained, with bdSeq and without seq."""
+    (connect, *_) = it.proxy.packets("up", Connect)
+    will = connect.will
+    assert will is not None and Topic.parse(will.topic).verb is Verb.NDEATH
+    payload = decode(will.payload)
+    assert payload.seq is None and [metric.name for metric in payload.metrics] == ["bdSeq"]
+    assert not will.retain and will.qos == 1, f"QoS {will.qos}"
+
+
+def kills(it: EdgePairing, patience_s: float) -> None:
+    """Kill -9: the will takes the node and its device offline, and everything becomes stale."""
+    it.end()
+    it.until(lambda: it.dead, patience_s)
+    picture = it.host.picture(it.node)
+    assert picture is not None
+    assert {r.quality for _, owner in picture.owners() for r in owner.readings.values()} == {Quality.STALE}
+
+
+def stops(it: EdgePairing, patience_s: float) -> None:
+    """The end by its own will: an NDEATH that our host takes."""
+    it.tell(do="stop")
+    try:
+        it.until(lambda: it.dead, patience_s)
+    finally:
+        it.end()
+
+
+def waits(it: EdgePairing, patience_s: float) -> None:
+    """An edge node with a primary host is born when that host is online, and ends its session when it goes."""
+    it.end()
+    it.until(lambda: it.dead, patience_s)
+    count = len(it.sent(Verb.NBIRTH))
+    it.start("primary")
+    try:
+        with _quiet(it, count):
+            deadline_s = time.monotonic() + QUIET_S
+            while time.monotonic() < deadline_s:
+                it.events += it.host.poll(0.05)
+        primary = _host(it.broker, "primary")
+        primary.start()
+        try:
+            _poll_both(it, primary, lambda: it.born, patience_s)
+        finally:
+            primary.stop()
+        it.until(lambda: it.dead, patience_s)
+    finally:
+        it.end()
+
+
+@contextmanager
+def _quiet(it: EdgePairing, births: int) -> Iterator[None]:
+    yield
+    assert len(it.sent(Verb.NBIRTH)) == births, "born without its primary host"
+
+
+def _poll_both(it: EdgePairing, other: HostApplication, done: Callable[[], bool], timeout_s: float) -> None:
+    deadline_s = time.monotonic() + timeout_s
+    while not done():
+        assert time.monotonic() < deadline_s, "in vain"
+        other.poll(0.02)
+        it.events += it.host.poll(0.02)
+
+
+def _bd_seq(payload: Payload) -> Any:
+    (metric,) = (metric for metric in payload.metrics if metric.name == "bdSeq")
+    return metric.value
+
+
+CHECKS: dict[str, Check] = {
+    "birth": births,
+    "certificate": dated,
+    "null": nulls,
+    "unit": units,
+    "alias": aliases,
+    "shared": shared,
+    "name": names,
+    "dataset": datasets,
+    "template": templates,
+    "device": devices,
+    "wrap": wraps,
+    "write": written,
+    "rebirth": rebirths,
+    "will": wills,
+    "restart": reconnects,
+    "bdseq": bd_seqs,
+    "kill": kills,
+    "stop": stops,
+    "primary": waits,
+}
