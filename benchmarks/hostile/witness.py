@@ -19,6 +19,7 @@ from twin.vocabulary.nodes import edge_node
 from twin.vocabulary.topics import ALERT_STATE, MIRROR
 
 HZ = 5.0
+ARRIVES_S_MAX = 5.0
 DWELL_S = 5.0  # of the rule, processors/rules/rules.toml
 OVERLOADED = 150.0
 COUNT, LOAD = "part_count", "spindle_load_pct"
@@ -63,7 +64,9 @@ class Witness:
         """Fall silent."""
         self._stop.set()
         self._thread.join()
-        time.sleep(1.0)  # what is on its way may arrive
+        until_s = time.monotonic() + ARRIVES_S_MAX
+        while self.missing and time.monotonic() < until_s:  # what is on its way may arrive
+            time.sleep(0.1)
         self._edge.stop()
         self._reader.loop_stop()
         self._reader.disconnect()
