@@ -85,7 +85,7 @@ def test_the_address_of_an_agent_that_is_looked_at(url: str) -> None:
     ],
 )
 def test_an_address_in_the_file_of_an_edge(adapter: str, table: str, scheme: str, tmp_path: Path) -> None:
-    from edge.running.run import broker_address
+    from edge.running.run import broker_addresses
 
     for url in addresses(scheme):
         if scheme == "tcp" and url.endswith(f"h:1?version=5&pass={SECRET}"):
@@ -95,7 +95,7 @@ def test_an_address_in_the_file_of_an_edge(adapter: str, table: str, scheme: str
 
         def read(file: Path = file) -> None:
             config = load(file)
-            broker_address(config.broker, config.path)
+            broker_addresses(config.broker, config.path)
 
         refusal(read)
 
