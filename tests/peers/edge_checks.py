@@ -175,12 +175,13 @@ def units(it: EdgePairing, _patience_s: float) -> None:
 
 
 def dated(it: EdgePairing, _patience_s: float) -> None:
-    """Time stamps of all metrics, seq 0 and Node Control/Rebirth in the NBIRTH."""
+    """Time stamps of all metrics, seq 0 and Node Control/Rebirth without an alias in the NBIRTH."""
     ((_, birth), *_) = it.sent(Verb.NBIRTH)
     names = {metric.name: metric for metric in birth.metrics}
     assert birth.seq == 0 and names["bdSeq"].datatype is DataType.INT64
     control = names.get("Node Control/Rebirth")
     assert control is not None and control.value is False and control.datatype is DataType.BOOLEAN
+    assert control.alias is None, f"Node Control/Rebirth has the alias {control.alias}"
     assert all(metric.timestamp_ms for metric in birth.metrics), "a metric without a time stamp"
 
 
