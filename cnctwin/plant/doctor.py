@@ -154,8 +154,8 @@ def of_faults(node_id: str, metrics: Mapping[str, Reading]) -> list[Finding]:
     faults, restarts, last = (metrics[name].value if name in metrics else None for name in ("faults", "restarts", "fault"))
     if not isinstance(faults, int) or not faults:
         return []
-    times = f", restarted {restarts} times" if restarts else ""
-    return [Finding(True, f"{node_id}: {faults} faults contained{times}; the last: {last}")]
+    times = f", restarted {restarts!s} times" if restarts else ""
+    return [Finding(True, f"{node_id}: {faults} faults contained{times}; the last: {last!s}")]
 
 
 def of_overload(every: Iterable[Mapping[str, Reading]]) -> list[Finding]:
