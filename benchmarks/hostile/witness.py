@@ -95,9 +95,9 @@ class Witness:
                 Change(COUNT, float(count), now_ms),
                 Change(LOAD, OVERLOADED if self._is_over else 20.0 + count % 3, now_ms),
             ]
-            sent_s = time.monotonic()
-            if self._edge.publish(self.name, changes):
-                self.sent[count] = sent_s
+            self.sent[count] = time.monotonic()  # before it is sent: it may be back at once
+            if not self._edge.publish(self.name, changes):
+                del self.sent[count]
 
     def _heard(self, _client: Any, _data: Any, message: mqtt.MQTTMessage) -> None:
         now_s = time.monotonic()

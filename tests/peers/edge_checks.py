@@ -110,7 +110,9 @@ class EdgePairing:
         """Have a peer that runs and is born, whatever came before; our host is there first."""
         self.until(lambda: self.host.online, timeout_s)
         if self.process is None:
+            births = self.host.counts.get("births", 0)
             self.start()
+            self.until(lambda: self.host.counts.get("births", 0) >= births + 2, timeout_s)  # of node and device
         self.until(lambda: self.born, timeout_s)
 
     @property
@@ -329,6 +331,8 @@ def kills(it: EdgePairing, patience_s: float) -> None:
 
 def stops(it: EdgePairing, patience_s: float) -> None:
     """The end by its own will: an NDEATH that our host takes."""
+    it.tell(do="data", metrics=[{**PART, "value": "77"}])
+    it.until(lambda: it.device.readings["part"].value == 77, patience_s)  # it has done what it does after a birth
     it.tell(do="stop")
     try:
         it.until(lambda: it.dead, patience_s)

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -31,16 +32,26 @@ def _pysparkplug(scratch: Path) -> None:
 
 
 def _srad(scratch: Path) -> None:
+    """crates.lock is a Cargo.lock that does not say where its crates come from: from where this machine's cargo has its own."""
+    lock = scratch / "Cargo.lock"
+    _run(["cargo", "generate-lockfile", "--quiet"], scratch)
+    source = next(line for line in lock.read_text().splitlines() if line.startswith("source = "))
+    lock.write_text(re.sub(r"(?m)^(?=checksum = )", lambda _: f"{source}\n", (scratch / "crates.lock").read_text()))
     _run(["cargo", "build", "--locked", "--quiet"], scratch)
+    for left in ("deps", "build", "incremental", ".fingerprint"):
+        shutil.rmtree(scratch / "target" / "debug" / left, ignore_errors=True)
 
 
 def _tahu(scratch: Path) -> None:
-    _run(["mvn", "-B", "-q", "dependency:copy-dependencies", "-DoutputDirectory=lib"], scratch)
+    (scratch / "lib").mkdir()
+    _run(["mvn", "-B", "-q", "validate"], scratch)
     wanted = dict(reversed(line.split()) for line in (scratch / "checksums").read_text().splitlines())
     for jar in sorted((scratch / "lib").iterdir()):
         found = hashlib.sha256(jar.read_bytes()).hexdigest()
         assert wanted.get(jar.name) == found, f"{jar.name} has the checksum {found}, which is not in tests/peers/tahu/checksums"
-    _run(["javac", "-nowarn", "-d", "classes", "-cp", "lib/*", *sorted(map(str, scratch.glob("*.java")))], scratch)
+    _run(
+        ["javac", "-nowarn", "-d", "classes", "-cp", "lib/*", *sorted(source.name for source in scratch.glob("*.java"))], scratch
+    )
 
 
 BUILDS: dict[str, tuple[tuple[str, ...], Callable[[Path], None]]] = {

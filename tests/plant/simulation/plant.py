@@ -18,10 +18,10 @@ from types import SimpleNamespace
 from typing import Any
 
 import cnctwin.api.live.jobs
-import cnctwin.api.live.viewer
 import cnctwin.memory.historian
 import cnctwin.memory.store.embedded
 import cnctwin.memory.store.sealed.tier
+import cnctwin.plant.watch
 import processors.alerts.courier.thread
 import processors.alerts.courier.webhook
 import processors.running.runner
@@ -38,8 +38,6 @@ from edge.running.runtime import EdgeRuntime
 from edge.sample import Drop
 from processors.discovery import find
 from sparkplug.broker import BrokerAddress
-from sparkplug.host import HostApplication
-from sparkplug.topics import group_filter
 from tests.plant.simulation.broker import Broker, Link
 from tests.plant.simulation.connection import SimulatedConnection, SimulatedLoop
 from tests.plant.simulation.control import Machine, NoSection, adapter_of, machine
@@ -250,7 +248,7 @@ class Plant:
         """Return the process whose connection has this client id."""
         if client.startswith("cnc/edge-"):
             return client.removeprefix("cnc/")
-        if client == "host-view-1":
+        if client.startswith("host-view-"):
             return "page"
         is_alerts = client.startswith(("cnc/twin-alerts", "host-twin-alerts", "host-courier"))
         return self.alerts_process if is_alerts else "processors"
@@ -268,9 +266,6 @@ def observed(plant: Plant) -> list[tuple[Any, str, Any]]:
     clock = clock_of(plant.kernel)
     defaults = {**(EdgeRuntime.__init__.__kwdefaults__ or {}), "wall_s": clock.time, "monotonic_s": clock.monotonic}
 
-    def viewer(broker: BrokerAddress, group: str) -> HostApplication:
-        return HostApplication(broker, "view-1", (group_filter(group),), publish_state=False)
-
     def identity() -> Any:
         return SimpleNamespace(hex=f"{chance.getrandbits(128):032x}")
 
@@ -286,7 +281,7 @@ def observed(plant: Plant) -> list[tuple[Any, str, Any]]:
         (processors.alerts.courier.webhook, "exchanged", plant.receiver.exchanged),
         (cnctwin.memory.historian, "StoreRecorder", ObservedRecorder),
         (cnctwin.api.live.jobs, "uuid4", identity),
-        (cnctwin.api.live.viewer, "viewer", viewer),
+        (cnctwin.plant.watch, "uuid4", identity),
         (EdgeRuntime.__init__, "__kwdefaults__", defaults),
     ]
 
@@ -301,7 +296,7 @@ def plant_of(seed: int, **options: Any) -> Iterator[Plant]:
         sqlite3: Stand(sqlite3, {"connect": disk.connect}),
         shutil: Stand(shutil, {"disk_usage": disk.usage}),
         fcntl: Stand(fcntl, {"flock": disk.flock}),
-        os: Stand(os, {"fsync": disk.fsync}),
+        os: Stand(os, {"fsync": disk.fsync, "getpid": lambda: 1}),
     }
     try:
         with simulated(plant.kernel, observed(plant), modules):
