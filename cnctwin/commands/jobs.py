@@ -218,9 +218,7 @@ def _print(told: dict[str, Any], as_json: bool) -> None:
 
 def _document(file: Path) -> dict[str, Any]:
     try:
-        document = json.loads(file.read_bytes())
-    except OSError as error:
-        raise UsageError(f"{file}: cannot be read: {error.strerror}") from None
+        document = json.loads(read_text(file))
     except (ValueError, RecursionError) as error:
         raise UsageError(f"{file}: is not JSON: {error}") from None
     if not isinstance(document, dict):
