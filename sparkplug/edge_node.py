@@ -5,14 +5,14 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 
 from sparkplug.actions import Barrier, Connect, HostState, Publish
-from sparkplug.alias_file import AliasFile
-from sparkplug.bdseq import BdSeq
 from sparkplug.broker import BrokerAddress
 from sparkplug.clock import now_ms
 from sparkplug.edge_session import Command, EdgeNodeSession, Phase
 from sparkplug.errors import SparkplugError, TopicError
 from sparkplug.metric import Change, MetricSpec, NodeId
-from sparkplug.session_lock import SessionLock
+from sparkplug.session_files.alias_file import AliasFile
+from sparkplug.session_files.bdseq import BdSeq
+from sparkplug.session_files.session_lock import SessionLock
 from sparkplug.transport.connection import MqttConnection
 from sparkplug.transport.listener import Listener
 from sparkplug.transport.loop import Loop

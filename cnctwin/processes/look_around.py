@@ -1,8 +1,9 @@
 """A look around the broker before a process connects under its names: does another one, elsewhere, have them already?
 
-On one machine a locked file tells (`sparkplug.session_lock`). From another machine the broker knows: the newcomer connects under
-a name of chance and asks the nodes that it wants to be for their births. Who answers is alive, which a retained state does not
-prove, so a process that was killed, or whose machine lost its power, keeps nobody waiting for longer than this look.
+On one machine a locked file tells (`sparkplug.session_files.session_lock`). From another machine the broker knows: the newcomer
+connects under a name of chance and asks the nodes that it wants to be for their births. Who answers is alive, which a retained
+state does not prove, so a process that was killed, or whose machine lost its power, keeps nobody waiting for longer than this
+look.
 """
 
 import logging

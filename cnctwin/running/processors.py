@@ -12,7 +12,7 @@ from processors.running.runtime import Configured, run
 from sparkplug.admission.limits import DEFAULTS, Limits
 from sparkplug.broker import BrokerAddress
 from sparkplug.metric import NodeId
-from sparkplug.session_lock import SessionLock
+from sparkplug.session_files.session_lock import SessionLock
 
 ALERTS = "alerts"
 

@@ -11,7 +11,7 @@ from sparkplug.broker import BrokerAddress
 from sparkplug.edge_node import EdgeNode
 from sparkplug.errors import AnotherRunsError
 from sparkplug.metric import NodeId
-from tests.sparkplug.test_session_lock import Other
+from tests.sparkplug.session_files.test_session_lock import Other
 
 
 def node(file: Path) -> EdgeNode:

@@ -5,10 +5,10 @@ from typing import Any
 
 import pytest
 
-from sparkplug.bdseq import BdSeq
 from sparkplug.codec import parse
 from sparkplug.datatype import DataType
 from sparkplug.edge_session import EdgeNodeSession
+from sparkplug.session_files.bdseq import BdSeq
 from sparkplug.topics import Verb
 from tests.sparkplug.conformance.life import NODE, EdgeLife
 

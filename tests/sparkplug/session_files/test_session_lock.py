@@ -11,12 +11,12 @@ from sparkplug.broker import BrokerAddress
 from sparkplug.edge_node import EdgeNode
 from sparkplug.errors import AnotherRunsError, SparkplugError
 from sparkplug.metric import NodeId
-from sparkplug.session_lock import SessionLock
+from sparkplug.session_files.session_lock import SessionLock
 
 HOLD = """
 import sys, time
 from pathlib import Path
-from sparkplug.session_lock import SessionLock
+from sparkplug.session_files.session_lock import SessionLock
 lock = SessionLock(Path(sys.argv[1]), "cnc/twin-mirror")
 print("held", flush=True)
 sys.stdin.read()

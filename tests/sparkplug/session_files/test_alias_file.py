@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from sparkplug.alias_file import AliasFile
 from sparkplug.datatype import DataType
 from sparkplug.edge_session import Aliases, EdgeNodeSession
 from sparkplug.metric import MetricSpec, NodeId
+from sparkplug.session_files.alias_file import AliasFile
 
 KEYS = [(None, "bdSeq"), ("mill", "load"), ("mill", "Ω\n"), ("lathe", "load")]
 ALIASES: Aliases = {key: alias for alias, key in enumerate(KEYS, start=1)}

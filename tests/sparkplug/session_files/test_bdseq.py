@@ -10,14 +10,14 @@ from random import Random
 
 import pytest
 
-from sparkplug.bdseq import BdSeq
 from sparkplug.errors import SparkplugError
+from sparkplug.session_files.bdseq import BdSeq
 
 ROOT = Path(__file__).parents[2]
 LOOP = """
 import os, sys
 from pathlib import Path
-from sparkplug.bdseq import BdSeq
+from sparkplug.session_files.bdseq import BdSeq
 numbers = BdSeq(Path(sys.argv[1]))
 while True:
     os.write(1, b"%d\\n" % numbers.next())
