@@ -6,7 +6,7 @@ A sample that a signal has not got is NaN, or None where the column is text. Sig
 import csv
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +15,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from twin.errors import RunLogError
+from twin.run_file import csv_columns, parquet_columns, parquet_names
 
 Floats = NDArray[np.float64]
 
@@ -104,29 +105,20 @@ def _numbers(name: str, values: NDArray[np.generic], source: str) -> Floats:
 
 
 def read_run(path: Path) -> RunLog:
-    """The run log in a Parquet or CSV file (by its ending). Raises RunLogError where there is none."""
+    """The run log in a Parquet or CSV file (by its ending). Raises RunLogError where there is none, or one beyond the bounds."""
     try:
         if path.suffix == ".csv":
-            return run_log(_csv_columns(path), str(path))
-        table = pq.read_table(path)
+            return run_log(csv_columns(path), str(path))
+        names = parquet_names(path)
+        numbers = {name for name in names if name in COLUMNS or AXIS_COLUMN.match(name)}
+        log = run_log(parquet_columns(path, numbers, TEXT_COLUMNS), str(path))
     except FileNotFoundError:
         raise RunLogError(f"{path}: there is no such file") from None
     except (OSError, pa.ArrowException, UnicodeDecodeError, csv.Error) as error:
-        raise RunLogError(f"{path}: cannot be read as a run log: {str(error).splitlines()[0]}") from None
-    return run_log({name: table[name].to_numpy(zero_copy_only=False) for name in table.column_names}, str(path))
-
-
-def _csv_columns(path: Path) -> dict[str, NDArray[np.object_]]:
-    with path.open(newline="", encoding="utf-8") as file:
-        header, *rows = list(csv.reader(file)) or [[]]
-    for number, row in enumerate(rows, start=2):
-        if len(row) != len(header):
-            raise RunLogError(f"{path}: line {number} has {len(row)} fields, the header has {len(header)}")
-    flags = {"true": 1.0, "false": 0.0, "": None}
-    return {
-        name: np.array([flags.get(v.lower(), v) for v in column] or [], dtype=object)
-        for name, column in zip(header, zip(*rows, strict=True) if rows else [()] * len(header), strict=True)
-    }
+        raise RunLogError(
+            f"{path}: cannot be read as a run log: {(str(error).splitlines() or [type(error).__name__])[0]}"
+        ) from None
+    return replace(log, ignored=tuple(name for name in names if name not in numbers and name not in TEXT_COLUMNS))
 
 
 def write_run(run: RunLog, path: Path) -> None:

@@ -19,6 +19,7 @@ from twin.vocabulary.nodes import edge_node
 from twin.vocabulary.topics import ALERT_STATE, MIRROR
 
 HZ = 5.0
+ARRIVES_S_MAX = 5.0
 DWELL_S = 5.0  # of the rule, processors/rules/rules.toml
 OVERLOADED = 150.0
 COUNT, LOAD = "part_count", "spindle_load_pct"
@@ -63,7 +64,9 @@ class Witness:
         """Fall silent."""
         self._stop.set()
         self._thread.join()
-        time.sleep(1.0)  # what is on its way may arrive
+        until_s = time.monotonic() + ARRIVES_S_MAX
+        while self.missing and time.monotonic() < until_s:  # what is on its way may arrive
+            time.sleep(0.1)
         self._edge.stop()
         self._reader.loop_stop()
         self._reader.disconnect()
@@ -92,9 +95,9 @@ class Witness:
                 Change(COUNT, float(count), now_ms),
                 Change(LOAD, OVERLOADED if self._is_over else 20.0 + count % 3, now_ms),
             ]
-            sent_s = time.monotonic()
-            if self._edge.publish(self.name, changes):
-                self.sent[count] = sent_s
+            self.sent[count] = time.monotonic()  # before it is sent: it may be back at once
+            if not self._edge.publish(self.name, changes):
+                del self.sent[count]
 
     def _heard(self, _client: Any, _data: Any, message: mqtt.MQTTMessage) -> None:
         now_s = time.monotonic()

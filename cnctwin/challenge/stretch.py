@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from cnctwin.errors import UsageError
@@ -13,7 +12,9 @@ from cnctwin.memory.store.contract import Query, Store
 from cnctwin.validation.evidence import track_of
 from cnctwin.validation.track import Floats, Grid, held
 from processors.joint_anomaly.config import NUMBERS
+from twin.errors import RunLogError
 from twin.residual.features import SIGNALS
+from twin.run_file import parquet_columns
 from twin.runlog import TEXT_COLUMNS, RunLog, read_run
 
 EVERY_S = 1.0
@@ -28,9 +29,9 @@ def read_stretch(path: Path) -> RunLog:
     if path.suffix == ".csv" or not log.ignored:
         return log
     try:
-        table = pq.read_table(path, columns=list(log.ignored))
-        more = {name: np.asarray(table[name].to_numpy(zero_copy_only=False), dtype=np.float64) for name in log.ignored}
-    except (OSError, pa.ArrowException, TypeError, ValueError):
+        read = parquet_columns(path, log.ignored, ())
+        more = {name: np.asarray(values, dtype=np.float64) for name, values in read.items()}
+    except (OSError, pa.ArrowException, TypeError, ValueError, RunLogError):
         return log
     return replace(log, columns={**log.columns, **more}, ignored=())
 

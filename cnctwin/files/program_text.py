@@ -5,6 +5,8 @@ from pathlib import Path
 
 from cnctwin.errors import UsageError
 
+BYTES_MAX = 128 * 1024 * 1024
+
 
 def decoded(raw: bytes) -> tuple[str, str]:
     """Text and encoding; what is not UTF-8 is Latin-1, as controls write it.
@@ -27,6 +29,8 @@ def read_text(path: Path) -> str:
 def read_encoded(path: Path) -> tuple[str, str]:
     """The text of a file, and the encoding in which it is written again byte for byte. Raises UsageError."""
     try:
+        if path.is_file() and (size := path.stat().st_size) > BYTES_MAX:
+            raise UsageError(f"{path}: has {size} bytes; {BYTES_MAX} are read: cut it into parts")
         raw = path.read_bytes()
     except OSError as error:
         raise UsageError(f"{path}: cannot be read: {error.strerror}") from None

@@ -17,6 +17,11 @@ from sparkplug.metric import Reading
 from sparkplug.quality import Quality
 from twin.vocabulary.nodes import VALIDATION_NODE
 
+_SLOPPY = {
+    "sloppy_births": "births left out what Sparkplug demands (bdSeq, Node Control/Rebirth, a time stamp)",
+    "sloppy_sequence": "messages came with a wrong sequence number",
+    "sloppy_aliases": "aliases stood for a metric of a node and one of its device (as Tahu Java gives them)",
+}
 COME_AND_GO = (VALIDATION_NODE,)  # nodes that tell what they have found, and end
 
 
@@ -100,9 +105,15 @@ def diagnose(host: HostApplication, url: str) -> Report:
     findings += of_overload(health(host).values())
     findings += of_lags(lag_reports(own_values(host)))
     counts = host.counts
+    findings += of_sloppy_peers(counts)
     order = f"{counts.get('lost', 0)} messages lost, {counts.get('malformed', 0)} malformed while listening"
     findings.append(Finding(not counts.get("lost") and not counts.get("malformed"), order))
     return Report(tuple(findings), tuple(stages))
+
+
+def of_sloppy_peers(counts: Mapping[str, int]) -> list[Finding]:
+    """Return a finding for each rule of Sparkplug that a peer has not kept; what it sent is read all the same."""
+    return [Finding(True, f"{counts[name]} {what}; read all the same") for name, what in _SLOPPY.items() if counts.get(name)]
 
 
 def of_lags(reports: Sequence[LagReport]) -> list[Finding]:
@@ -154,8 +165,8 @@ def of_faults(node_id: str, metrics: Mapping[str, Reading]) -> list[Finding]:
     faults, restarts, last = (metrics[name].value if name in metrics else None for name in ("faults", "restarts", "fault"))
     if not isinstance(faults, int) or not faults:
         return []
-    times = f", restarted {restarts} times" if restarts else ""
-    return [Finding(True, f"{node_id}: {faults} faults contained{times}; the last: {last}")]
+    times = f", restarted {restarts!s} times" if restarts else ""
+    return [Finding(True, f"{node_id}: {faults} faults contained{times}; the last: {last!s}")]
 
 
 def of_overload(every: Iterable[Mapping[str, Reading]]) -> list[Finding]:

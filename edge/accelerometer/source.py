@@ -8,6 +8,7 @@ import csv
 import random
 import socket
 import threading
+import time
 import wave
 from collections.abc import Callable, Iterable, Iterator
 from itertools import count
@@ -84,20 +85,20 @@ class Source:
                 self._closed.wait(longest_s * self._chance.uniform(0.5, 1.0))
 
     def _stream(self, connection: socket.socket) -> Iterator[Block | None]:
-        frames, silent_s = Frames(), 0.0
+        frames, whole_s = Frames(), time.monotonic()
         while not self._closed.is_set():
             try:
                 data = connection.recv(READ_BYTES)
             except TimeoutError:
-                silent_s += LOOK_S
-                if silent_s >= SILENCE_S_MAX:
-                    raise ConnectionLostError(f"nothing for {silent_s:g} s") from None
                 yield None
-                continue
-            if not data:
-                raise ConnectionLostError("the sender closed the connection")
-            silent_s = 0.0
-            yield from frames.feed(data)
+            else:
+                if not data:
+                    raise ConnectionLostError("the sender closed the connection")
+                for block in frames.feed(data):
+                    whole_s = time.monotonic()
+                    yield block
+            if time.monotonic() - whole_s >= SILENCE_S_MAX:  # one that drips is as silent as one that sends nothing
+                raise ConnectionLostError(f"no whole block for {SILENCE_S_MAX:g} s")
 
 
 def file_blocks(section: AccelerometerSection) -> Iterator[Block]:

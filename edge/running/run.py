@@ -123,6 +123,9 @@ def edge_runtime(
 def _opener(config: EdgeConfig[Any]) -> Callable[[Publisher], Forwarder] | None:
     """Return what opens the store of this edge, in the thread that uses it; None where it has none."""
     limits, session_file = config.store, config.broker.session_file
+    if limits.await_receipt == "auto" and config.broker.primary_host == HISTORIAN_NODE:
+        # It is named as part of the plant; on a broker where its STATE is removed it is only to be found elsewhere.
+        limits = limits.model_copy(update={"await_receipt": True})
     if not limits.enabled or not (limits.file or session_file):
         return None
     file = Path(limits.file or session_file + ".store")

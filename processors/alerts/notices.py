@@ -1,7 +1,8 @@
 """The times at which a receiver is told: grouping, the interval of a group, repeats, the rate limit, quiet hours.
 
 News waits group_wait_s, so that what happens together is told together. A group that was told is told again after
-group_interval_s; a high alert that begins does not wait for that. In quiet hours only high alerts go out; what is still so at
+group_interval_s; a high alert that begins does not wait for that, but for IN_A_ROW_MAX times. Where more than FOLDED_FROM groups
+have news at once, all of it is one notification. In quiet hours only high alerts go out; what is still so at
 their end goes out as one digest. What the rate limit holds back is told when there is room, as it is then, and the number of
 notifications that were held back is said.
 """
@@ -23,6 +24,10 @@ from processors.config import Configuration
 HOUR_S = 3600.0
 EXPIRES_S = 6 * HOUR_S
 DIGEST = "digest"
+FOLDED = "folded"  # the key of what is told of many groups at once
+FOLDED_FROM = 10  # groups
+FOLDED_S = 60.0
+IN_A_ROW_MAX = 5  # notifications of a group that do not wait for its interval
 
 
 class _Bundle(NamedTuple):
@@ -126,21 +131,50 @@ def _due(desk: _Desk, known: ReceiverState, changes: list[Change]) -> tuple[Rece
     states = {key: group for key, group in known.groups.items() if key in groups or _is_fresh(group, config, clock_s)}
     for key in states.keys() - groups.keys():
         states[key] = replace(states[key], waiting_s=None, is_held=False)
+    if FOLDED in known.groups:
+        states[FOLDED] = known.groups[FOLDED]
+    ready: dict[str, list[Change]] = {}
     for key, news in groups.items():
         group = states.get(key, Group())
         if group.waiting_s is None:
             group = replace(group, waiting_s=clock_s)
         states[key] = group
-        if not _is_ready(group, news, config, clock_s):
-            continue
+        if _is_ready(group, news, config, clock_s):
+            ready[key] = news
+    if sum(not states[key].is_held for key in ready) > FOLDED_FROM:
+        return _folded(desk, replace(known, groups=states), ready)
+    for key, news in ready.items():
         bundle = _Bundle("notify", key, _group_labels(config, news[0].alert), news)
-        known, sent = _send(desk, known, bundle, is_held=group.is_held)
+        known, sent = _send(desk, known, bundle, is_held=states[key].is_held)
         if sent is None:
-            states[key] = replace(group, is_held=True)
+            states[key] = replace(states[key], is_held=True)
             continue
         notices.append(sent)
-        states[key] = Group(sent_s=clock_s)
+        states[key] = _sent(states[key], config, clock_s)
     return replace(known, groups=states), notices
+
+
+def _folded(desk: _Desk, known: ReceiverState, ready: Mapping[str, list[Change]]) -> tuple[ReceiverState, list[Notice]]:
+    """One notification for many groups that have news at once, at most every FOLDED_S: a flood of alerts of many machines is not
+    to use up what may be told of the others. The machines that are known longest come first: a body shows so many and no more."""
+    clock_s, folded = desk.state.clock_s, known.groups.get(FOLDED, Group())
+    if folded.sent_s is not None and clock_s - folded.sent_s < FOLDED_S:
+        return known, []
+    known_for = {machine: place for place, machine in enumerate(desk.state.machines)}  # a flood is of newcomers as a rule
+    news = sorted(
+        (change for of_group in ready.values() for change in of_group),
+        key=lambda change: (-change.alert.severity.rank, known_for.get(change.alert.machine, len(known_for))),
+    )
+    known, sent = _send(desk, known, _Bundle("notify", FOLDED, {}, news), is_held=folded.is_held)
+    if sent is None:
+        return replace(known, groups=known.groups | {FOLDED: replace(folded, is_held=True)}), []
+    told = {key: _sent(known.groups[key], desk.config, clock_s) for key in ready}
+    return replace(known, groups=known.groups | told | {FOLDED: Group(sent_s=clock_s)}), [sent]
+
+
+def _sent(group: Group, config: AlertsConfig, clock_s: float) -> Group:
+    """The group once it was told."""
+    return Group(sent_s=clock_s, in_a_row=group.in_a_row + 1 if _is_fresh(group, config, clock_s) else 0)
 
 
 def _is_ready(group: Group, news: list[Change], config: AlertsConfig, clock_s: float) -> bool:
@@ -149,6 +183,8 @@ def _is_ready(group: Group, news: list[Change], config: AlertsConfig, clock_s: f
         return False
     if group.sent_s is None or clock_s - group.sent_s >= config.group_interval_s:
         return True
+    if group.in_a_row >= IN_A_ROW_MAX:
+        return False
     return any(change.alert.severity is Severity.HIGH and change.what in (FIRING, RAISED) for change in news)
 
 

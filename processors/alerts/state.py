@@ -98,11 +98,13 @@ class LastNotice:
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Alerts that are told together: since when there is news, when they were last told, whether the rate limit holds them."""
+    """Alerts that are told together: since when there is news, when they were last told, whether the rate limit holds them, and
+    how often they were told again within their interval."""
 
     waiting_s: float | None = None
     sent_s: float | None = None
     is_held: bool = False
+    in_a_row: int = 0
 
 
 @dataclass(frozen=True, slots=True)

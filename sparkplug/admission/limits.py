@@ -18,6 +18,7 @@ class Limits:
     text_bytes_max: a text, a unit, the reason of a quality
     value_bytes_max: an array, bytes, a dataset or a template
     metrics_a_device_max: a control declares some hundred; a processor's row holds 5,000
+    devices_a_node_max: a quarter of the machines that a process folds, so that no edge takes all of the room
     metrics_a_node_max, births_a_node_bytes_max: what a node and its devices declare altogether, and the size of these births
     ahead_ms_max: how far a time stamp may lie ahead of the host's clock: a control that says its local time is up to 14 h ahead
     oldest_ms: the oldest time stamp, since 1970; recordings are imported, and the clock of a control may begin at 1970
@@ -37,7 +38,7 @@ class Limits:
     metrics_a_device_max: int = 2000
     metrics_a_node_max: int = 50_000
     births_a_node_bytes_max: int = 32 * 1024 * 1024
-    devices_a_node_max: int = 1000
+    devices_a_node_max: int = 250
     nodes_a_group_max: int = 2000
     ahead_ms_max: int = DAY_MS
     oldest_ms: int = 0

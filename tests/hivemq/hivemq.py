@@ -89,15 +89,19 @@ class HiveMQ:
         return ("127.0.0.1", self.port)
 
     def __enter__(self) -> HiveMQ:
-        classes = built()
         configuration, data = self.home / "conf", self.home / "data"
         for folder in (configuration, data):
             folder.mkdir()
         self._papers(configuration)
         (configuration / "config.xml").write_text(self._configuration(configuration))
         (configuration / "credentials.xml").write_text(self._credentials())
+        self._start()
+        return self
+
+    def _start(self) -> None:
+        classes, configuration, data = built(), self.home / "conf", self.home / "data"
         command = ["java", *JAVA_OPTIONS, "-cp", f"{classes}/classes:{classes}/lib/*", "cnctwin.Broker"]
-        with (self.home / "log").open("wb") as log:
+        with (self.home / "log").open("ab") as log:
             self._process = subprocess.Popen(
                 [*command, str(configuration), str(data), str(configuration / "credentials.xml")],
                 cwd=self.home,
@@ -120,9 +124,16 @@ class HiveMQ:
         # What it says from now on must not fill the pipe.
         self._reader = threading.Thread(target=self._process.stdout.read)
         self._reader.start()
-        return self
+
+    def restart(self) -> None:
+        """End it as a power cut does (-9) and start it again on the same ports."""
+        self._kill()
+        self._start()
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self._kill()
+
+    def _kill(self) -> None:
         assert self._process is not None and self._process.stdin is not None and self._process.stdout is not None
         self._process.kill()  # it has nothing to save, and takes its time to end
         self._process.wait()

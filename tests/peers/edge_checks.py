@@ -110,7 +110,9 @@ class EdgePairing:
         """Have a peer that runs and is born, whatever came before; our host is there first."""
         self.until(lambda: self.host.online, timeout_s)
         if self.process is None:
+            births = self.host.counts.get("births", 0)
             self.start()
+            self.until(lambda: self.host.counts.get("births", 0) >= births + 2, timeout_s)  # of node and device
         self.until(lambda: self.born, timeout_s)
 
     @property
@@ -173,12 +175,13 @@ def units(it: EdgePairing, _patience_s: float) -> None:
 
 
 def dated(it: EdgePairing, _patience_s: float) -> None:
-    """Time stamps of all metrics, seq 0 and Node Control/Rebirth in the NBIRTH."""
+    """Time stamps of all metrics, seq 0 and Node Control/Rebirth without an alias in the NBIRTH."""
     ((_, birth), *_) = it.sent(Verb.NBIRTH)
     names = {metric.name: metric for metric in birth.metrics}
     assert birth.seq == 0 and names["bdSeq"].datatype is DataType.INT64
     control = names.get("Node Control/Rebirth")
     assert control is not None and control.value is False and control.datatype is DataType.BOOLEAN
+    assert control.alias is None, f"Node Control/Rebirth has the alias {control.alias}"
     assert all(metric.timestamp_ms for metric in birth.metrics), "a metric without a time stamp"
 
 
@@ -329,6 +332,8 @@ def kills(it: EdgePairing, patience_s: float) -> None:
 
 def stops(it: EdgePairing, patience_s: float) -> None:
     """The end by its own will: an NDEATH that our host takes."""
+    it.tell(do="data", metrics=[{**PART, "value": "77"}])
+    it.until(lambda: it.device.readings["part"].value == 77, patience_s)  # it has done what it does after a birth
     it.tell(do="stop")
     try:
         it.until(lambda: it.dead, patience_s)

@@ -198,7 +198,7 @@ def aliases(it: HostPairing, patience_s: float) -> None:
     """Our data, which carry aliases and no names or datatypes."""
     after = len(it.heard)
     it.publish(("part", 4711), ("Int64/0", -5), ("UInt64/1", 2**64 - 1), ("String/1", "Ö"))
-    it.until(lambda: it.has("data", DEVICE, after), patience_s)
+    it.until(lambda: len(it.metrics("data", after)) == 4, patience_s)
     said = {name: metric["value"] for name, metric in it.metrics("data", after).items()}
     assert said == {"part": "4711", "Int64/0": "-5", "UInt64/1": str(2**64 - 1), "String/1": "Ö"}
 
@@ -216,13 +216,17 @@ def templates(it: HostPairing, _patience_s: float) -> None:
 
 
 def devices(it: HostPairing, patience_s: float) -> None:
-    """DDEATH and DBIRTH while the node lives."""
-    after = len(it.heard)
+    """DDEATH and DBIRTH while the node lives, with the aliases of before, and data behind them without a rebirth of all."""
+    after, count = len(it.heard), it.births()
     it.edge.remove_device(DEVICE)
     it.until(lambda: it.has("death", DEVICE, after), patience_s)
     assert not it.has("death", None, after)
     it.edge.declare_device(DEVICE, it.specs)
     it.until(lambda: it.has("birth", DEVICE, after), patience_s)
+    it.publish(("part", 3))
+    it.until(lambda: it.metrics("data", after).get("part", {}).get("value") == "3", patience_s)
+    time.sleep(QUIET_S)
+    assert it.births() == count
 
 
 def wraps(it: HostPairing, patience_s: float) -> None:

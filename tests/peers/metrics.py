@@ -4,6 +4,7 @@ checks need. A metric is a line of the language of process.py; `our_value` is wh
 
 from __future__ import annotations
 
+import struct
 from typing import Any
 
 from sparkplug.datatype import BINARIES, SIGNED_BITS, UNSIGNED_BITS, DataType
@@ -90,6 +91,8 @@ def agree(line: Line, heard: Line) -> bool:
     if line["value"] is None or heard["value"] is None or isinstance(line["value"], dict):
         return bool(line["value"] == heard["value"])
     try:
+        if datatype_of(line) is DataType.FLOAT:  # told in as many digits as tell one 32-bit number from the next
+            return struct.pack("<f", float(line["value"])) == struct.pack("<f", float(heard["value"]))
         return our_value(line) == our_value({**line, "value": heard["value"]})
     except ValueError:
         return False

@@ -35,3 +35,5 @@ def test_our_host_and_an_edge_node_of_a_peer(pairing: EdgePairing, check: str) -
         return
     pairing.ready(PATIENCE_S)
     judge(peer, check, lambda patience_s: CHECKS[check](pairing, patience_s))
+    if check in peer.faults:
+        pairing.end()  # it may have left anything behind

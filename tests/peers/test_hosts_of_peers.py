@@ -37,3 +37,5 @@ def test_a_host_application_of_a_peer_and_our_edge(pairing: HostPairing, check: 
         return
     pairing.ready(PATIENCE_S)
     judge(peer, check, lambda patience_s: CHECKS[check](pairing, patience_s))
+    if check in peer.faults:
+        pairing.end()  # it may have left anything behind

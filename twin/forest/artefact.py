@@ -34,6 +34,8 @@ def unpacked(data: bytes, source: str) -> dict[str, NDArray[Any]]:
     """The arrays of an .npz. Raises ForestError where it is none."""
     try:
         with np.load(io.BytesIO(data), allow_pickle=False) as file:
+            if (size := sum(member.file_size for member in file.zip.infolist())) > BYTES_MAX:  # before it is unpacked
+                raise ForestError(f"{source}: unpacks to {size} bytes; {BYTES_MAX} are read: it is no forest")
             return {name: file[name] for name in file.files}
     except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile, zipfile.LargeZipFile) as error:
         raise ForestError(f"{source}: not arrays without pickled objects: {error}") from None

@@ -162,6 +162,8 @@ def load_detector(folder: Path) -> tuple[Detector, str]:
 def _detector(folder: Path, manifest: Manifest, arrays: bytes) -> Detector:
     assert manifest.signal in SIGNALS
     with np.load(io.BytesIO(arrays), allow_pickle=False) as held:
+        if (size := sum(member.file_size for member in held.zip.infolist())) > BYTES_MAX:  # before it is unpacked
+            raise TransientError(f"{folder / ARRAYS} unpacks to {size} bytes, more than {BYTES_MAX}: it is no template")
         parts = {name: np.asarray(held[name], dtype=np.float64) for name in ("start", "between", "end", "stretches")}
     if any(part.ndim != 1 or not np.isfinite(part).all() for part in parts.values()):
         raise TransientError(f"{folder / ARRAYS} holds what is no template; train it anew")

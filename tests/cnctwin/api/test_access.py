@@ -244,6 +244,24 @@ def test_the_address_that_asks_is_that_of_the_connection_whatever_a_header_says(
     assert PROXIED.judge(asking(peer="10.0.0.6", x_remote_user="ada", x_forwarded_for="10.0.0.5"), 0.0).status == 401
 
 
+def test_behind_the_proxy_its_own_word_says_whom_a_limit_is_for_and_nobody_else_s() -> None:
+    forged = asking(peer="10.0.0.5", x_forwarded_for="1.1.1.1, 2001:db8::7:1")
+    assert PROXIED.client(forged) == "2001:db8::/64", "the last entry is the proxy's own"
+    assert PROXIED.client(forged._replace(peer="10.0.0.6")) == "10.0.0.6"
+    for stated in ("", "unknown", "1.1.1.1, evil"):
+        assert PROXIED.client(asking(peer="10.0.0.5", x_forwarded_for=stated)) == "10.0.0.5"
+
+
+def test_behind_the_proxy_who_guesses_waits_and_not_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(page, "DELAY_S", 0.0)
+    access = Access(TOKEN, proxy_header="X-Remote-User", proxy="10.0.0.5")
+    with client_of(access=access, peer="10.0.0.5") as client:
+        for last, statuses in (("1", [401] * OF_ONE_MAX + [429]), ("2", [401])):
+            stated = {"X-Forwarded-For": f"10.1.1.{last}"}
+            told = [client.post("/login", json={"token": "wrong" * 5}, headers=stated).status_code for _ in statuses]
+            assert told == statuses
+
+
 # What the command lets be.
 
 

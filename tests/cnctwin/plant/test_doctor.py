@@ -21,6 +21,7 @@ from cnctwin.plant.doctor import (
     of_lags,
     of_overload,
     of_sequence_holes,
+    of_sloppy_peers,
     of_store,
 )
 from cnctwin.plant.lags import behind, lag_reports
@@ -225,6 +226,15 @@ def test_a_plant_without_a_historian_is_told_that_nothing_keeps_history() -> Non
     assert finding.good
     assert finding.text.startswith("2 edges: no historian has been heard of on this broker: nothing keeps history; start")
     assert of_history([told(history="rows are held until twin-historian has them"), told()]) == []
+
+
+def test_a_peer_that_does_not_keep_a_rule_is_told_and_is_no_bad_news() -> None:
+    assert of_sloppy_peers({"sloppy_aliases": 3, "sloppy_births": 0, "births": 9}) == [
+        Finding(
+            True,
+            "3 aliases stood for a metric of a node and one of its device (as Tahu Java gives them); read all the same",
+        )
+    ]
 
 
 def test_rows_that_the_historian_misses_are_bad_news() -> None:

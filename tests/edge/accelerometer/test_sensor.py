@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 from pydantic import ValidationError
 
+from edge.accelerometer import source
 from edge.accelerometer.fold import BLOCK, BLOCK_METRICS, RATE, RMS, VELOCITY, Delivery
 from edge.accelerometer.frame import encode
 from edge.accelerometer.section import AccelerometerSection, Publish
@@ -282,7 +283,7 @@ def test_a_file_that_cannot_be_read_is_named_and_ends_nothing(tmp_path: Path, na
     [
         ({"url": "http://sensor"}, "use tcp://host:port or file:"),
         ({"url": "tcp://sensor"}, "use tcp://host:port, for instance"),
-        ({"url": "tcp://sensor:99999"}, "Port out of range"),
+        ({"url": "tcp://sensor:99999"}, "its host or port cannot be read"),
         ({"url": "file:///a.mp3"}, "the file has to be one of .wav, .csv, .acb"),
         ({"url": "file:///a.csv"}, "a CSV does not say it; set it"),
         ({"url": "tcp://s:1", "sample_rate_hz": 1000}, "is below 4000"),
@@ -297,3 +298,18 @@ def test_a_table_that_cannot_work_is_refused_before_any_io(table: dict[str, obje
 def test_what_it_publishes_is_canonical_or_declared() -> None:
     assert [signal(name).unit for name in (RMS, VELOCITY)] == ["g", "mm/s"]
     assert {spec.name for spec in HEALTH} == set(Accelerometer(AccelerometerSection()).health())
+
+
+def test_a_sender_that_drips_bytes_that_become_no_block_is_as_silent_as_one_that_hangs(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(source, "SILENCE_S_MAX", 0.5)
+    wire = encode(next(iter(blocks(SAMPLES_G))))
+    assert len(wire) > 400, "which take longer than the test waits"
+
+    def drip(connection: socket.socket) -> None:
+        for byte in wire[:-1]:
+            connection.sendall(bytes([byte]))
+            time.sleep(0.2)
+
+    with Sender(drip, sends(*map(encode, blocks(SAMPLES_G)))) as sender, running(AccelerometerSection(url=sender.url)) as sensor:
+        until(sensor, lambda found: any(isinstance(value, float) for value in values(found)))
+        assert int(sensor.health()["health/accelerometer_reconnects"]) >= 1

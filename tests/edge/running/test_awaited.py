@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from edge.config import StoreSection
+from edge.config import BrokerSection, EdgeConfig, StoreSection
+from edge.running import run
 from edge.running.awaited import LATE_S, NOT_AWAITED, Awaited
 from edge.running.forwarder import SEQUENCE, Forwarder
 from edge.running.receipts import RECEIPT, REPEAT_S, Receipts
@@ -177,3 +178,17 @@ def test_a_node_asks_for_the_state_of_the_hosts_that_it_watches_and_goes_on_with
         assert session.message(STATE, payload, 3) == []
     assert session.host_states == [(HISTORIAN_NODE, ONLINE), (HISTORIAN_NODE, None)]
     assert session.malformed == 1
+
+
+@pytest.mark.parametrize(("primary_host", "is_awaited"), [(HISTORIAN_NODE, True), ("scada", False), ("", False)])
+def test_a_historian_that_is_the_primary_host_is_waited_for_from_the_first_row_on(
+    tmp_path: Path, primary_host: str, is_awaited: bool
+) -> None:
+    broker = BrokerSection(session_file=str(tmp_path / "session"), primary_host=primary_host)
+    opened = run._opener(EdgeConfig(source=None, broker=broker))
+    assert opened is not None
+    forwarder = opened(Wire(Surely()))  # type: ignore[arg-type]
+    forwarder.host_state(HISTORIAN_NODE, None)
+    forwarder.pump()
+    assert (HISTORIAN_NODE in str(forwarder.health()["health/history"])) is is_awaited
+    forwarder.close()

@@ -3,7 +3,7 @@
 from datetime import UTC, datetime
 from typing import Any
 
-from tests.processors.alerts.courier.alert_shop import DESK, PHONE, T0_S, VIBRATION, Shop
+from tests.processors.alerts.courier.alert_shop import DESK, LOAD, PHONE, SCORE, T0_S, VIBRATION, Shop
 
 BRISK = {"keep_firing_for_s": 0.0}
 FLAPPY = {"signals": {VIBRATION: {"severity": "high", **BRISK}, "twin/anomaly_alarm": {"severity": "medium", **BRISK}}}
@@ -265,6 +265,43 @@ def test_high_alerts_are_limited_only_far_beyond_what_a_shop_brings() -> None:
     shop.wait(60)
     assert len(shop.told) == 60
     assert shop.shown()["receivers"]["desk"]["held_back"] == 20
+
+
+def test_a_flood_of_alerts_of_many_machines_is_one_notification_a_minute_and_buries_nobody() -> None:
+    shop = Shop(receivers={"desk": DESK["desk"] | {"rate_per_hour": 5, "rate_high_per_hour": 60}})
+    shop.set("okuma", vibration=False)
+    shop.beat()
+    for number in range(300):
+        shop.set(f"hostile-{number}", vibration=True)
+    shop.wait(11)
+    assert len(shop.told) == 1
+    assert shop.told[0].title.startswith("[300 firing, high] 300 machines")
+    for number in range(300, 900):
+        shop.set(f"hostile-{number}", vibration=True)
+        if number % 30 == 0:
+            shop.beat()
+    shop.set("okuma", vibration=True)
+    told = shop.wait(90)
+    assert len(told) <= 2
+    assert any("okuma" in alert["labels"]["machine"] for one in told for alert in one.body["alerts"])
+    assert shop.shown()["receivers"]["desk"]["held_back"] == 0
+
+
+def test_a_machine_whose_alerts_come_and_go_uses_up_no_more_than_its_share_of_the_rate() -> None:
+    signals = {signal: {"severity": "high", "keep_firing_for_s": 0.0} for signal in (VIBRATION, LOAD, SCORE)}
+    shop = Shop(
+        receivers={"desk": DESK["desk"] | {"rate_high_per_hour": 60}}, signals=signals, flap_episodes=50, group_wait_s=0.0
+    )
+    for _ in range(200):
+        for which in ("vibration", "load", "score"):
+            shop.set("hostile", **{which: True})
+            shop.wait(3)
+            shop.set("hostile", **{which: False})
+            shop.wait(3)
+    assert len(shop.told) < 30
+    shop.set("okuma", vibration=True)
+    (told,) = [one for one in shop.wait(5) if "okuma" in one.title]
+    assert "high" in told.title
 
 
 # Quiet hours.

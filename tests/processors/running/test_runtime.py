@@ -14,7 +14,7 @@ import pytest
 
 from processors.config import Configuration
 from processors.errors import ConfigurationError, UnknownProcessorError
-from processors.running.runtime import configured, run
+from processors.running.runtime import configured, run, runner_of
 from processors.thermal import PROCESSOR as THERMAL
 from sparkplug.broker import BrokerAddress
 from sparkplug.datatype import DataType
@@ -267,6 +267,43 @@ def test_a_broker_that_is_killed_and_comes_back_empty_is_given_everything_again(
             ledger = until(lambda name=name: reader.ledger(name), "the ledger")
             dropped = ledger["ledger/dropped"] + ledger["ledger/buffered"]
             assert ledger["ledger/received"] == ledger["ledger/emitted"] + dropped
+
+
+@pytest.mark.broker
+def test_a_processor_that_fails_dies_as_a_node_and_is_born_again_while_the_other_goes_on(
+    broker: BrokerAddress, reader: Reader, edge: EdgeNode, tmp_path: Path
+) -> None:
+    runner = runner_of(configured(["thermal", "mirror"]), broker, session_dir=tmp_path)
+    (thermal,) = [worker for worker in runner.workers if worker.name == "thermal"]
+    with until_stopped(runner.run):
+        say(edge, 0.0, spindle_rpm=6000.0, spindle_load_pct=50.0)
+        until(lambda: reader.state().get("last_ms") == T0_MS, "the first snapshot")
+        beat, broken = thermal.engine.beat, [True]
+
+        def failing(at_ms: int) -> Any:
+            if broken.pop() if broken else False:
+                raise ZeroDivisionError("our own bug")
+            return beat(at_ms)
+
+        thermal.engine.beat = failing  # type: ignore[method-assign]
+
+        def deaths() -> list[str]:
+            return [e.node.node for e in list(reader.events) if e.kind is EventKind.DEATH and e.device is None]
+
+        until(lambda: "twin-thermal" in deaths(), "the death of the node")
+        until(lambda: reader.ledger().get("health/restarts") == 1, "its restart")
+        assert "our own bug" in reader.ledger()["health/fault"]
+        say(edge, 100.0, spindle_rpm=8000.0)
+        until(lambda: reader.state().get("last_ms") == T0_MS + 100_000, "the message after the restart")
+        until(lambda: (r := reader.twin("twin/spindle_temp_rise_k")) and r.quality is Quality.GOOD, "the twin")
+        assert set(deaths()) == {"twin-thermal"}
+        until(lambda: balanced(reader, "thermal") and balanced(reader, "mirror"), "ledgers that balance")
+
+
+def balanced(reader: Reader, name: str) -> bool:
+    ledger = reader.ledger(name)
+    dropped = ledger["ledger/dropped"] + ledger["ledger/buffered"]
+    return bool(ledger["ledger/received"] == ledger["ledger/emitted"] + dropped)
 
 
 def test_everything_is_checked_before_anything_connects(tmp_path: Path) -> None:

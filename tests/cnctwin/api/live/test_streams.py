@@ -6,6 +6,7 @@ import time
 import pytest
 
 from cnctwin.api.application import create_app
+from cnctwin.api.errors import ApiError
 from cnctwin.api.live import event_stream, fan_out
 from cnctwin.api.live.batches import machine_rows
 from cnctwin.api.live.fan_out import FanOut
@@ -148,6 +149,17 @@ def test_streams_are_bounded_and_one_that_goes_makes_room(monkeypatch: pytest.Mo
         wait(lambda: len(app.state.fan_out) == 0, "the streams to end")
         with streamed("GET", f"{server.url}/stream") as answer:
             assert answer.status_code == 200
+
+
+def test_one_client_does_not_have_all_the_streams(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fan_out, "OF_ONE_MAX", 2)
+    streams = FanOut(small_plant())
+    held = [streams.open(None, "10.0.0.7"), streams.open("vmc", "10.0.0.7")]
+    with pytest.raises(ApiError, match=r"2 streams of 10.0.0.7 are open"):
+        streams.open(None, "10.0.0.7")
+    assert streams.open(None, "10.0.0.8")
+    streams.close(held[0])
+    assert streams.open(None, "10.0.0.7")
 
 
 def test_a_message_is_encoded_once_for_all_who_read_it(monkeypatch: pytest.MonkeyPatch) -> None:
