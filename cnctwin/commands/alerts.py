@@ -37,11 +37,12 @@ def list_alerts(broker: Broker = None, wait_s: Wait = 5.0, as_json: AsJson = Fal
     """All alerts, silences and receivers. Exit code 1: something fires that nobody has acknowledged."""
     with alert_desk(address(broker), wait_s) as desk:
         state = desk.state
-    if as_json:
-        sys.stdout.write(json.dumps(state) + "\n")
-    else:
-        _show(state)
-    raise typer.Exit(1 if any(alert.get("phase") == "firing" for alert in state.get("alerts", ())) else 0)
+        if as_json:
+            sys.stdout.write(json.dumps(state) + "\n")
+        else:
+            _show(state)
+        fires = any(alert.get("phase") == "firing" for alert in state.get("alerts", ()))
+    raise typer.Exit(1 if fires else 0)
 
 
 @alerts_app.command()

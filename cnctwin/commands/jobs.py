@@ -134,13 +134,14 @@ def list_jobs(broker: Broker = None, wait_s: Wait = 5.0, as_json: AsJson = False
     """What runs, what waits, what is over."""
     with JobsClient(_broker(broker)) as jobs:
         state = _answered(lambda: jobs.state(wait_s))
-    if as_json:
-        sys.stdout.write(json.dumps(state) + "\n")
-        return
-    columns = ("job", "kind", "machine", "state", "%", "attempt", "accepted (UTC)", "what")
-    standard_output(TABLE_WIDTH).print(text_table(columns, map(_row, state["jobs"])))
-    if state["disk_trouble"]:
-        _bad_news(f"the consumer cannot write: {state['disk_trouble']}")
+        if as_json:
+            sys.stdout.write(json.dumps(state) + "\n")
+            return
+        columns = ("job", "kind", "machine", "state", "%", "attempt", "accepted (UTC)", "what")
+        standard_output(TABLE_WIDTH).print(text_table(columns, map(_row, state["jobs"])))
+        trouble = state["disk_trouble"]
+    if trouble:
+        _bad_news(f"the consumer cannot write: {trouble}")
 
 
 @jobs_app.command("show")
@@ -153,8 +154,9 @@ def show(
     """One job with its result. Exit code 1: it failed, or was cancelled."""
     with JobsClient(_broker(broker)) as jobs:
         found = jobs.job(job_id, wait_s)
-    _print(found, as_json)
-    raise typer.Exit(1 if found.get("state") in {"failed", "cancelled"} else 0)
+        _print(found, as_json)
+        is_lost = found.get("state") in {"failed", "cancelled"}
+    raise typer.Exit(1 if is_lost else 0)
 
 
 @jobs_app.command("cancel")
@@ -167,9 +169,9 @@ def cancel(
     """End a job that waits or runs. Exit code 1: it was not there, or over."""
     with JobsClient(_broker(broker)) as jobs:
         answer = _answered(lambda: jobs.cancel(job_id, wait_s))
-    if answer["answer"] != "cancelled":
-        _bad_news(answer["reason"])
-    _print(answer, as_json)
+        if answer["answer"] != "cancelled":
+            _bad_news(answer["reason"])
+        _print(answer, as_json)
 
 
 def _row(job: Mapping[str, Any]) -> list[str]:
@@ -235,5 +237,5 @@ def _program(file: Path | None) -> dict[str, str]:
 
 
 def _bad_news(line: str) -> NoReturn:
-    print(f"cnctwin: {line}", file=sys.stderr)
+    print(f"cnctwin: {''.join(letter if letter.isprintable() else ' ' for letter in line)}", file=sys.stderr)
     raise typer.Exit(1)

@@ -43,6 +43,9 @@ class JobsClient:
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         self._host.stop()
+        if isinstance(error, published_state.WRONG_SHAPE) and not isinstance(error, ApplicationError):
+            with published_state.of_its_shape(f"jobs and answers on {self.broker.url}", "cnctwin jobs run"):
+                raise error
 
     def submit(self, document: dict[str, Any], wait_s: float = 15.0) -> dict[str, Any]:
         """Have a job accepted: the consumer's answer. Raises RequestError where it is wrong, NoAnswerError where none comes."""

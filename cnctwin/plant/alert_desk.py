@@ -54,8 +54,13 @@ class Desk:
         if found is None:
             raise UsageError(f"no answer within {wait_s:g} s; does the processor `alerts` run? (cnctwin process alerts)")
         if not found["done"]:
-            raise UsageError(str(found["text"]))
-        return str(found["text"])
+            raise UsageError(_line(found["text"]))
+        return _line(found["text"])
+
+
+def _line(told: Any) -> str:
+    """What came over the broker, without what would steer a terminal."""
+    return "".join(letter if letter.isprintable() else " " for letter in str(told))
 
 
 @contextmanager
@@ -74,6 +79,7 @@ def alert_desk(given: BrokerAddress | None, wait_s: float) -> Iterator[Desk]:
         age_s = published_state.age_s(desk.state, time.time())
         if age_s > FRESH_S_MAX:
             raise UsageError(f"the state of alerts is {age_s:.0f} s old: the processor `alerts` does not run any more")
-        yield desk
+        with published_state.of_its_shape(f"{ALERT_STATE} and its answers on {where.url}", "cnctwin process alerts"):
+            yield desk
     finally:
         host.stop()
