@@ -185,6 +185,17 @@ def dated(it: EdgePairing, _patience_s: float) -> None:
     assert all(metric.timestamp_ms for metric in birth.metrics), "a metric without a time stamp"
 
 
+def unretained(it: EdgePairing, patience_s: float) -> None:
+    """Births and data go with QoS 0, not retained."""
+    it.tell(do="data", metrics=[{**PART, "value": "12"}])
+    it.until(lambda: it.device.readings["part"].value == 12, patience_s)
+    packets = [packet for verb in (Verb.NBIRTH, Verb.DBIRTH, Verb.DDATA) for packet, _ in it.sent(verb)]
+    wrong = sorted(
+        {f"{Topic.parse(packet.topic).verb.name} with QoS {packet.qos}" for packet in packets if packet.qos or packet.retain}
+    )
+    assert not wrong, wrong
+
+
 def aliases(it: EdgePairing, patience_s: float) -> None:
     """Data by alias, without the name."""
     it.tell(do="data", metrics=[{**PART, "value": "4711"}])
@@ -385,6 +396,7 @@ def _bd_seq(payload: Payload) -> Any:
 CHECKS: dict[str, Check] = {
     "birth": births,
     "certificate": dated,
+    "qos": unretained,
     "null": nulls,
     "unit": units,
     "alias": aliases,
