@@ -1,4 +1,4 @@
-"""What an NBIRTH says beside its metrics: the number of the session, and how well it keeps to the specification."""
+"""The rest of an NBIRTH, beside its metrics: the number of the session, and how well it keeps to the specification."""
 
 from typing import Any
 

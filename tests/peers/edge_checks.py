@@ -117,7 +117,7 @@ class EdgePairing:
 
     @property
     def device(self) -> Owner:
-        """What our host knows of the device."""
+        """Return what our host knows of the device."""
         picture = self.host.picture(self.node)
         assert picture is not None
         return picture.devices[DEVICE]

@@ -19,7 +19,7 @@ from tests.wire.mosquitto import Mosquitto, find_mosquitto
 KNOWN = tomllib.loads((Path(__file__).parent / "pairings.toml").read_text())
 PATIENCE_S = 60.0
 FAULT_S = 4.0
-"""How long a fault that is known may take to show."""
+"""The time that a known fault may take to show."""
 
 
 class Broker(Protocol):
@@ -27,7 +27,7 @@ class Broker(Protocol):
 
     @property
     def address(self) -> tuple[str, int]:
-        """Where clients connect."""
+        """The address at which clients connect."""
 
     def restart(self) -> None:
         """End it and start it again on the same port."""
@@ -41,9 +41,9 @@ class Peer:
     version: str
     role: str
     lacks: Mapping[str, str]
-    """What the package does not offer, by check: not tried."""
+    """The things that the package does not offer, by check: not tried."""
     faults: Mapping[str, str]
-    """What it does otherwise than the specification asks, by check: tried, and has to fail."""
+    """The faults of the peer against the specification, by check: tried, and has to fail."""
     types_lacking: tuple[str, ...]
     not_on: Mapping[str, str]
     """The brokers on which a fault of the peer leaves nothing to check."""

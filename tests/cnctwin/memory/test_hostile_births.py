@@ -180,7 +180,7 @@ class Readers:
         self.store.append([Message(self.now_ms, event) for event in events if event.kind is not EventKind.REFUSED])
 
     def known_of(self, machine: str) -> tuple[Any, ...]:
-        """What readers know of a machine: the mirror's topics, the page, the store."""
+        """Return what readers know of a machine: the mirror's topics, the page, the store."""
         mirror = {topic: payload for topic, payload in self.broker.last.items() if topic.startswith(f"cnc/{machine}/")}
         state = self.live.state(machine, 0)
         assert state is not None

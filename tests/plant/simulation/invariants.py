@@ -1,4 +1,4 @@
-"""What has to hold in a plant whatever happens to it. Some of it is looked at all the time, the rest when all is quiet.
+"""The invariants of a plant: they hold whatever happens to it. Some of it is looked at all the time, the rest when all is quiet.
 
 no process ends by itself           (Plant)
 no message makes our code fail      not one that a processor has to contain, whoever has sent it

@@ -15,7 +15,7 @@ QUIET_S = 8.0
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """What a seed came to. `digest`: a hash over all that happened on the broker and to the processes."""
+    """The result of a seed. `digest`: a hash over all that happened on the broker and to the processes."""
 
     seed: int
     digest: str
