@@ -2,32 +2,26 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from itertools import count
 from typing import Any
 
 import processors.mirror
-from cnctwin.memory.historian import StoreRecorder
-from cnctwin.memory.store.contract import Message
 from processors.alerts.courier.desk import Desk
-from processors.running.engine import Engine
 from sparkplug.admission.gate import Gate
-from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.transport.sendable import Sendable
-from tests.plant.simulation.observed import ObservedRecorder
+from tests.plant.simulation.disk import Database
 
 Names = list[tuple[Any, str, Any]]
 
 
 def receipts_before_sync() -> Names:
-    """The historian says that it has a row when it has heard it, and not when it is on the disk."""
-    keep = StoreRecorder.keep
+    """The historian says that it has a row which is committed, but not forced to the disk."""
+    execute = Database.execute
 
-    def hasty(self: StoreRecorder, event: HostEvent, received_ms: int) -> None:
-        keep(self, event, received_ms)
-        if event.kind is not EventKind.PLAIN:
-            self._numbers.note([Message(received_ms, event)])
+    def hasty(self: Database, text: str, *args: Any) -> Any:
+        is_store = self.file.endswith("store.sqlite")
+        return execute(self, text.replace("synchronous = FULL", "synchronous = NORMAL") if is_store else text, *args)
 
-    return [(ObservedRecorder, "keep", hasty)]
+    return [(Database, "execute", hasty)]
 
 
 def claim_unseen() -> Names:
@@ -52,20 +46,6 @@ def key_without_machine() -> Names:
     return [(processors.mirror, "_topics", hasty)]
 
 
-def short_way_forgets() -> Names:
-    """The shortest way of a processor leaves out a message now and then."""
-    way_of = Engine.way_of
-
-    def hasty(self: Engine, node: Any, device: str) -> Any:
-        way = way_of(self, node, device)
-        if way is None:
-            return None
-        taken = count()
-        return lambda message, wall_s: [] if next(taken) % 20 == 19 else way(message, wall_s)
-
-    return [(Engine, "way_of", hasty)]
-
-
 def no_gate() -> Names:
     """Whatever can be decoded is let in, and whatever is to be sent is sent."""
     names: Names = [(Sendable, "takes", lambda self, message: True)]
@@ -85,7 +65,6 @@ DEFECTS: dict[str, Callable[[], Names]] = {
     "no-receipts": list,  # edges forget what only the broker has; `options_of`
     "claim-unseen": claim_unseen,
     "key-without-machine": key_without_machine,
-    "short-way-forgets": short_way_forgets,
     "no-gate": no_gate,
 }
 

@@ -1,6 +1,7 @@
 """The invariants of a plant: they hold whatever happens to it. Some of it is looked at all the time, the rest when all is quiet.
 
 no process ends by itself           (Plant)
+the broker ends no connection of ours  for what it sends, whoever has said it first
 no message makes our code fail      not one that a processor has to contain, whoever has sent it
 ledgers balance                     received = emitted + dropped + buffered, of each edge and each processor, each second
 no sender changes another machine   each value of a machine on the mirror, on the page and in the store is its own
