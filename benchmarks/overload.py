@@ -40,7 +40,7 @@ _SPAWN = multiprocessing.get_context("spawn")
 
 @dataclass(frozen=True, slots=True)
 class Flood:
-    """What the hostile edge sends: so many messages a second, so many signals in each."""
+    """The load of the hostile edge: so many messages a second, so many signals in each."""
 
     rate: float
     metrics: int

@@ -16,17 +16,15 @@ from sparkplug.admission.rates import Overrun
 from sparkplug.admission.refusal import Refusal
 from sparkplug.codec import parse
 from sparkplug.errors import PayloadError, TopicError
-from sparkplug.host_command import command, rebirth_request
 from sparkplug.host_event import EventKind, HostEvent
 from sparkplug.layouts.memory import Memory, Room
 from sparkplug.layouts.route import Route
 from sparkplug.metric import Change, NodeId
-from sparkplug.node_birth import bd_seq_of, is_sloppy
 from sparkplug.node_picture import NodePicture, Owner, tells_quality
 from sparkplug.rebirth import RebirthRequests
 from sparkplug.sequence import Delivery, Numbered, SequenceWindow, Verdict
 from sparkplug.topics import STATE_PREFIX, Topic, Verb, state_topic
-from sparkplug.watched import Received, Watched
+from sparkplug.watched import Received, Watched, bd_seq_of, command, is_sloppy, rebirth_request
 
 __all__ = ["EventKind", "HostEvent", "HostSession"]
 

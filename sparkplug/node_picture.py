@@ -168,7 +168,7 @@ class Owner:
         return self.bindings.get(metric.name) if metric.name else None
 
     def forget_birth(self) -> None:
-        """What the birth said holds no longer, since the node was born again; another birth follows."""
+        """Forget what the birth said: the node was born again, and another birth of the device follows."""
         self.bindings, self.aliases = {}, {}
         self.forget_layouts()
 

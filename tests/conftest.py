@@ -48,6 +48,8 @@ LONG = (
     "twin/gap/programs/test_diagnose.py",
     "cnctwin/demo/test_demo_by_peer.py",
     "hivemq/test_barrier.py",
+    "peers/test_hosts_of_peers.py",
+    "peers/test_edges_of_peers.py",
     "processors/test_contract.py",
     "twin/optimisation/test_limits.py",
     "cnctwin/jobs/test_dask_cluster.py",

@@ -28,7 +28,7 @@ YEARS_900_MS = 900 * 365 * 86_400_000
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """Where the plant is, and the machine whose name the attack may use."""
+    """The plant that is attacked: the port of its broker, and its page."""
 
     port: int
     page_url: str

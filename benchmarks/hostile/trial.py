@@ -32,7 +32,7 @@ LOOK_S = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """What was seen during one attack. None: it never came."""
+    """The figures of one attack. None: it never came."""
 
     attack: str
     value_s: float | None

@@ -79,7 +79,7 @@ class Witness:
 
     @property
     def alert_s(self) -> float | None:
-        """How long after the rule's dwell the alert stood on the broker; None where it never did."""
+        """The time from the end of the rule's dwell until the alert stood on the broker; None where it never did."""
         if self.overloaded_s is None or self.alarmed_s is None:
             return None
         return max(0.0, self.alarmed_s - self.overloaded_s - DWELL_S)

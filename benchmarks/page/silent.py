@@ -24,7 +24,7 @@ def memory_mb(pid: int) -> int:
 
 
 def answered_ms(port: int, source: str) -> str:
-    """How long somebody at this address waits for an answer."""
+    """Return how long somebody at this address waits for an answer."""
     began_s = time.monotonic()
     connection = http.client.HTTPConnection("127.0.0.1", port, timeout=10.0, source_address=(source, 0))
     connection.request("GET", "/livez")

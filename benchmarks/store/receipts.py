@@ -77,7 +77,7 @@ class Edge:
 
 
 def received(mosquitto: Mosquitto) -> int:
-    """How many PUBLISH the broker has received."""
+    """Return the number of PUBLISH that the broker has received."""
     from paho.mqtt import subscribe  # noqa: PLC0415
 
     told = subscribe.simple("$SYS/broker/publish/messages/received", hostname="127.0.0.1", port=mosquitto.port)

@@ -59,7 +59,7 @@ class Desk:
 
 
 def _line(told: Any) -> str:
-    """What came over the broker, without what would steer a terminal."""
+    """Return a text that came over the broker, without what would steer a terminal."""
     return "".join(letter if letter.isprintable() else " " for letter in str(told))
 
 

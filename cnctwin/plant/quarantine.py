@@ -1,4 +1,4 @@
-"""What is refused of the plant: by the host session that looks, and by the processors, which publish their table."""
+"""The refusals of a plant: by the host session that looks, and by the processors, which publish their table."""
 
 import json
 from collections.abc import Iterable, Mapping, Sequence

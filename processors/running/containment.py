@@ -23,7 +23,7 @@ TEXT_MAX = 200
 
 
 class Reach(Enum):
-    """How far a fault reaches."""
+    """The reach of a fault."""
 
     MESSAGE = "message"
     MACHINE = "machine"

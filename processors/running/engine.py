@@ -142,7 +142,9 @@ class Engine:
 
     def lost(self, event: HostEvent, reason: DropReason) -> None:
         """An event is lost before it is fed, or feeding it has failed before it was counted."""
-        if self._is_message(event):
+        if event.kind is EventKind.REFUSED:
+            self.feed(event, 0.0)  # it is nothing but a count
+        elif self._is_message(event):
             self.ledger.count((reason,))
 
     def unsent(self, reason: DropReason = DropReason.BROKER_OFFLINE) -> None:

@@ -100,6 +100,8 @@ class Worker:
             unit = self.engine.restore(event.payload)
         except SnapshotError as error:
             _log.warning("%s: snapshot on %s is not restored, the state starts fresh: %s", self.name, event.topic, error)
+        except Exception as error:
+            self._judge(event.topic, "", error, time.monotonic())
         else:
             self._snapshots[unit] = event.payload
             _log.info("%s: restored %s", self.name, unit)

@@ -1,1 +1,1 @@
-"""What a host session lets in: the limits, what is refused and why, and the gate that decides it once for all consumers."""
+"""The admission to a host session: limits, refusals, and the gate that decides once for all consumers."""

@@ -22,7 +22,7 @@ _ESCAPED_IN_ID = (*_ESCAPED, "/")
 
 
 class Fault(NamedTuple):
-    """Why something is not let in."""
+    """A finding against something: why it is not let in."""
 
     refusal: Refusal
     text: str

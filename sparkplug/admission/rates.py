@@ -36,7 +36,7 @@ class Excess(NamedTuple):
 
 
 class _Allowance:
-    """What a node may still send. Who reads the socket writes it."""
+    """The rest of what a node may send. The thread that reads the socket writes it."""
 
     __slots__ = ("at_once", "bytes_at_once", "bytes_left", "bytes_per_s", "filled_s", "is_closed", "left", "overrun", "per_s")
 

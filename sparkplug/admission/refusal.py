@@ -1,4 +1,4 @@
-"""What was not let in and why: the table of the nodes and devices of which something is refused now."""
+"""Refusals, and the table of the nodes and devices of which something is refused now."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -14,7 +14,7 @@ _KEY_MAX = 255
 
 
 class Refusal(Enum):
-    """Why something is not let in."""
+    """The reason why something is not let in."""
 
     NAME = "name"  # a group, node, device or metric that cannot be a level of a topic
     RESERVED = "reserved"  # a device with a name that the host uses itself

@@ -14,7 +14,7 @@ from sparkplug.metric import NodeId
 from sparkplug.topics import NAMESPACE, Topic, Verb
 
 LATE_S = 0.5  # of a message in the inbox
-LATE_FOR_S = 0.5
+LATE_FOR_S = 1.5  # what came while the process was busy is read within it: some ten thousand messages
 KEPT_MIN = 50  # messages of a node that are never thinned
 AGAIN_S = 0.25
 Item = TypeVar("Item")

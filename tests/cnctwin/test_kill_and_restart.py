@@ -92,7 +92,7 @@ def check_sessions(proxy: Proxy) -> None:
 
 
 def last_packets(proxy: Proxy) -> dict[str, list[Any]]:
-    """What each client sent last, but for those that only looked whether another process has their names."""
+    """Return what each client sent last, but for those that only looked whether another process has their names."""
     last: dict[str, list[Any]] = {}
     client_of: dict[int, str] = {}
     for recorded in proxy.recorded:

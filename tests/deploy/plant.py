@@ -39,7 +39,7 @@ def password_of(user: str) -> str:
 
 
 def plugin_folder() -> Path | None:
-    """Where the plugins of Mosquitto 2.1 lie, by MOSQUITTO_PLUGINS or Debian's habit; None where there are none."""
+    """Return the folder of the plugins of Mosquitto 2.1, by MOSQUITTO_PLUGINS or Debian's habit; None where there are none."""
     folder = Path(os.environ.get("MOSQUITTO_PLUGINS", PLUGINS))
     return folder if (folder / "mosquitto_acl_file.so").exists() else None
 

@@ -324,7 +324,7 @@ def test_the_user_of_the_page_may_do_the_same_on_both_brokers() -> None:
     assert (
         writes
         == set(re.findall(r"<topic>([^<]+)</topic>", hivemq))
-        == {"cnctwin/alerts/command/ack", "spBv1.0/cnc/NCMD/+"} | asks
+        == {*(f"cnctwin/alerts/command/{order}" for order in ("ack", "silence", "unsilence")), "spBv1.0/cnc/NCMD/+"} | asks
     )
 
 

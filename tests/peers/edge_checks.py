@@ -117,7 +117,7 @@ class EdgePairing:
 
     @property
     def device(self) -> Owner:
-        """What our host knows of the device."""
+        """Return what our host knows of the device."""
         picture = self.host.picture(self.node)
         assert picture is not None
         return picture.devices[DEVICE]
@@ -175,13 +175,25 @@ def units(it: EdgePairing, _patience_s: float) -> None:
 
 
 def dated(it: EdgePairing, _patience_s: float) -> None:
-    """Time stamps of all metrics, seq 0 and Node Control/Rebirth in the NBIRTH."""
+    """Time stamps of all metrics, seq 0 and Node Control/Rebirth without an alias in the NBIRTH."""
     ((_, birth), *_) = it.sent(Verb.NBIRTH)
     names = {metric.name: metric for metric in birth.metrics}
     assert birth.seq == 0 and names["bdSeq"].datatype is DataType.INT64
     control = names.get("Node Control/Rebirth")
     assert control is not None and control.value is False and control.datatype is DataType.BOOLEAN
+    assert control.alias is None, f"Node Control/Rebirth has the alias {control.alias}"
     assert all(metric.timestamp_ms for metric in birth.metrics), "a metric without a time stamp"
+
+
+def unretained(it: EdgePairing, patience_s: float) -> None:
+    """Births and data go with QoS 0, not retained."""
+    it.tell(do="data", metrics=[{**PART, "value": "12"}])
+    it.until(lambda: it.device.readings["part"].value == 12, patience_s)
+    packets = [packet for verb in (Verb.NBIRTH, Verb.DBIRTH, Verb.DDATA) for packet, _ in it.sent(verb)]
+    wrong = sorted(
+        {f"{Topic.parse(packet.topic).verb.name} with QoS {packet.qos}" for packet in packets if packet.qos or packet.retain}
+    )
+    assert not wrong, wrong
 
 
 def aliases(it: EdgePairing, patience_s: float) -> None:
@@ -384,6 +396,7 @@ def _bd_seq(payload: Payload) -> Any:
 CHECKS: dict[str, Check] = {
     "birth": births,
     "certificate": dated,
+    "qos": unretained,
     "null": nulls,
     "unit": units,
     "alias": aliases,

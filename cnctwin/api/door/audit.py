@@ -25,7 +25,7 @@ DONE = "done"
 
 
 class Deed(NamedTuple):
-    """Who did what, and what came of it."""
+    """One action: who did it, on what, and what came of it."""
 
     user: str
     role: str
@@ -129,6 +129,6 @@ def _parsed(line: bytes) -> dict[str, Any] | None:
 
 
 def _short(text: str) -> str:
-    """In one line, without what a terminal would obey, and cut."""
+    """Return a text in one line, cut, and without what a terminal would obey."""
     line = "".join(sign if sign.isprintable() else " " for sign in text)
     return line if len(line) <= TEXT_MAX else f"{line[:TEXT_MAX]}…"

@@ -21,7 +21,7 @@ class Role(IntEnum):
 
 
 class Right(NamedTuple):
-    """What a request does: the least role that may, and the action as the record has it; empty where nothing changes."""
+    """The right that a request needs: the least role, and the action as the record has it; empty where nothing changes."""
 
     role: Role
     action: str

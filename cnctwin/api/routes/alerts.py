@@ -137,7 +137,7 @@ def alert_routes(live: LivePlant, viewer: Viewer | None) -> APIRouter:
 
 
 def _signed(request: Request, given: str) -> str:
-    """Who does it: the user, where the server knows one by name, else whoever is given. Raises ApiError where nobody is."""
+    """Return who does it: the user that the server knows by name, else whoever is given. Raises ApiError where nobody is."""
     by = request.state.user or given.strip()
     if not by:
         raise ApiError(400, "by is empty; say who does it")

@@ -75,7 +75,7 @@ def _broker(sources: Sources) -> Part:
 
 
 def _input(live: LivePlant) -> Part:
-    """What came from the broker and could not be taken over."""
+    """Return the part on what came from the broker and could not be taken over."""
     counts = live.counts
     words = {"readings_refused": "readings", "documents_refused": "documents", "failures": "messages"}
     kept_out = ", ".join(f"{counts[name]} {word}" for name, word in words.items() if counts[name])
@@ -101,7 +101,7 @@ def _processors(live: LivePlant) -> Part:
 
 
 def _refused(live: LivePlant) -> Part:
-    """What the processors do not let in."""
+    """Return the part on what is not let in."""
     own = [(view.node, view.values) for view in live.nodes() if view.online and is_twin_node(view.node)]
     lines = refused_lines((), own)
     if not lines:

@@ -12,7 +12,7 @@ from cnctwin.api.door.role import Role
 
 
 class Me(Answer):
-    """Who asks."""
+    """The person who asks, and what their role may do."""
 
     user: str | None = Field(description="null where nobody has a name: on loopback, or with the one token", examples=["ada"])
     role: str = Field(description="reader, operator or administrator", examples=["operator"])
@@ -52,7 +52,7 @@ def people_routes(access: Access, audit: AuditLog) -> APIRouter:
 
     @router.get("/audit", response_model=Audit, responses={403: {"model": Problem}})
     async def deeds(limit: Annotated[int, Query(ge=1, le=REMEMBERED_MAX)] = 100) -> Any:
-        """Who did what, for administrators."""
+        """The record of who did what, for administrators."""
         file = None if audit.file is None else str(audit.file)
         found = [one for one in audit.newest(limit) if DeedDone.model_fields.keys() <= one.keys()]
         return {"file": file, "trouble": audit.trouble, "deeds": found}

@@ -15,7 +15,7 @@ from sparkplug.values import Value
 
 HOUR_MS, DAY_MS, WEEK_MS = 3_600_000, 86_400_000, 7 * 86_400_000
 _STEPS = ((HOUR_MS, None), (DAY_MS, HOUR_MS), (31 * DAY_MS, DAY_MS), (1 << 62, WEEK_MS))
-"""How far back, and the windows in which what is older than an hour is looked for."""
+"""The windows, one further back than the other, in which what is older than an hour is looked for."""
 
 
 class Known(NamedTuple):

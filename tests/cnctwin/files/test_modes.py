@@ -1,4 +1,4 @@
-"""What real commands leave on the disk under a lax umask: state is its owner's alone, what was asked for a group may read."""
+"""Modes of the files of real commands under a lax umask: state is its owner's alone, what was asked for a group may read."""
 
 import os
 import stat

@@ -20,7 +20,7 @@ _TEXT = re.compile(r'"((?:\\x[0-9a-f]{2})*)"')
 
 
 class Cut(NamedTuple):
-    """What the program had said last, and the files that the disk has then, by path."""
+    """The last words of the program, and the files that the disk has then, by path."""
 
     said: str
     files: dict[Path, bytes]
@@ -69,7 +69,7 @@ class _Disk:
             file.system[at : at + len(body)] = body
 
     def files(self) -> dict[Path, bytes]:
-        """What is left after a cut: a file is found where all folders above it are."""
+        """Return what is left after a cut: a file is found where all folders above it are."""
         return {
             path: file.disk
             for path, file in self._entries.items()

@@ -1,4 +1,4 @@
-"""What doctor and the page say of what is refused."""
+"""Doctor and the page name what is refused."""
 
 from cnctwin.plant.quarantine import refused_lines
 from processors.running.quarantine import quarantine_health

@@ -16,7 +16,7 @@ import pysparkplug as spb
 
 WHOLE = {spb.DataType[name] for name in ("INT8", "INT16", "INT32", "INT64", "UINT8", "UINT16", "UINT32", "UINT64")}
 KINDS = {kind.name.replace("_", ""): kind for kind in spb.DataType}
-"""By the name of the specification in capitals."""
+"""The types by the name of the specification, in capitals."""
 PRINTING = threading.Lock()
 
 

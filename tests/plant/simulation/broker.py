@@ -27,6 +27,7 @@ TOPIC_BYTES_MAX = 65_535
 TOPIC_LEVELS_MAX = 200
 PACKET_BYTES_MAX = 4_194_304
 QUEUED_MAX = 2_000
+HOSTILE = "evil-"  # the beginning of the client ids of hostile edges
 LATENCY_S = (0.0002, 0.004)
 NOT_ALLOWED = re.compile("[\x00-\x1f\x7f-\x9f\ud800-\udfff\ufdd0-\ufdef\ufffe\uffff]")
 CONNACK, MESSAGE, PUBACK, ENDED = "connack", "message", "puback", "ended"
@@ -182,6 +183,8 @@ class Broker:
         if fault:
             self.refused += 1
             self.kernel.note("refused", link.client, fault)
+            if not link.client.startswith(HOSTILE):
+                self.kernel.violated("the broker ends no connection of ours", f"{link.client}: {fault}")
             self._end(link)
             return
         self._spread(link.client, message)

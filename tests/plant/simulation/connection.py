@@ -1,4 +1,4 @@
-"""What stands for `sparkplug.transport`: a connection and its loop with the same surface, on the model of a broker.
+"""A stand-in for `sparkplug.transport`: a connection and its loop with the same surface, on the model of a broker.
 
 The life of a connection is that of `MqttConnection`: an attempt in a task of its own, the real itinerary with its pauses, the
 real bounds of what can be sent, an outbox that goes down with the connection, listeners called by whoever turns the loop. The

@@ -35,7 +35,7 @@ class Observed(NamedTuple):
 
 
 class Told(NamedTuple):
-    """What a cursor remembers: the place, and whether the machine has described itself."""
+    """The memory of a cursor: the place, and whether the machine has described itself."""
 
     next_sequence: int
     is_begun: bool = False

@@ -5,27 +5,23 @@ from contextlib import contextmanager
 from typing import Any
 
 import processors.mirror
-from cnctwin.memory.historian import StoreRecorder
-from cnctwin.memory.store.contract import Message
 from processors.alerts.courier.desk import Desk
 from sparkplug.admission.gate import Gate
-from sparkplug.host_session import HostEvent
 from sparkplug.transport.sendable import Sendable
-from tests.plant.simulation.observed import ObservedRecorder
+from tests.plant.simulation.disk import Database
 
 Names = list[tuple[Any, str, Any]]
 
 
 def receipts_before_sync() -> Names:
-    """The historian says that it has a row when it has heard it, and not when it is on the disk."""
-    keep = StoreRecorder.keep
+    """The historian says that it has a row which is committed, but not forced to the disk."""
+    execute = Database.execute
 
-    def hasty(self: StoreRecorder, event: HostEvent, received_ms: int) -> None:
-        keep(self, event, received_ms)
-        if event.device is not None:
-            self._note_kept([Message(received_ms, event)])
+    def hasty(self: Database, text: str, *args: Any) -> Any:
+        is_store = self.file.endswith("store.sqlite")
+        return execute(self, text.replace("synchronous = FULL", "synchronous = NORMAL") if is_store else text, *args)
 
-    return [(ObservedRecorder, "keep", hasty)]
+    return [(Database, "execute", hasty)]
 
 
 def claim_unseen() -> Names:

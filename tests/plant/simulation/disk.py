@@ -32,7 +32,7 @@ _WRITES = ("INSERT", "DELETE", "UPDATE", "REPLACE", "COMMIT", "BEGIN IMMEDIATE")
 
 
 class Frames(NamedTuple):
-    """What the index of a WAL says: its salt, the bytes of a page, committed frames, frames copied to the database."""
+    """The index of a WAL: its salt, the bytes of a page, committed frames, frames copied to the database."""
 
     salt: bytes
     page: int

@@ -1,10 +1,12 @@
-"""What has to hold in a plant whatever happens to it. Some of it is looked at all the time, the rest when all is quiet.
+"""The invariants of a plant: they hold whatever happens to it. Some of it is looked at all the time, the rest when all is quiet.
 
 no process ends by itself           (Plant)
+the broker ends no connection of ours  for what it sends, whoever has said it first
+no message makes our code fail      not one that a processor has to contain, whoever has sent it
 ledgers balance                     received = emitted + dropped + buffered, of each edge and each processor, each second
 no sender changes another machine   each value of a machine on the mirror, on the page and in the store is its own
 no row that was receipted is lost   each row that a receipt has named is in the store, after each death of the historian too
-no observation is lost unsaid       each is in the store, or counted as dropped, or in a hole that the edge has named
+no observation is lost unsaid       each is in the store, or its edge has counted a loss: dropped, in a hole, or sent unstored
 all agree in the end                machine = mirror = page = store
 a state is its fold                 each processor's state is that of a fresh one which is given the same
 no alert twice                      no notification arrives twice; no firing is told by two notifications
@@ -20,6 +22,7 @@ from processors.alerts.messages import DELIVERY, OUTBOX
 from processors.alerts.notification import Notification
 from tests.plant.simulation.control import SPEED, Machine
 from tests.plant.simulation.kernel import EPOCH_S
+from tests.plant.simulation.observed import ObservedEngine
 from tests.plant.simulation.plant import LOOK_S, Plant
 
 SEQUENCE = "edge_sequence"
@@ -49,6 +52,8 @@ class Invariants:
         for where, runner in self._plant.runners.items():
             if self._plant.processes[where].is_alive:
                 for worker in runner.workers:
+                    if worker._faults.faults:
+                        self._kernel.violated("no message makes our code fail", f"{worker.name}: {worker._faults.text}")
                     if worker.engine.ledger.balance:
                         self._kernel.violated("ledgers balance", f"{worker.name} is {worker.engine.ledger.balance} off")
         self._kernel.at(self._kernel.now_s + LOOK_S, self._look)
@@ -108,6 +113,7 @@ class Invariants:
         """Look at everything that has to hold when all is quiet."""
         if not self.is_quiet():
             self._kernel.violated("all comes to its end", self._unfinished())
+        self._judge_folds()
         self._judge_store()
         self._judge_alerts()
 
@@ -119,6 +125,13 @@ class Invariants:
         views = {one.name: {"machine": one.last(SPEED), **self._views(one)} for one in plant.machines}
         differ = {name: seen for name, seen in views.items() if any(value != seen["machine"] for value in seen.values())}
         return f"dead {dead}, notifications left {left}, waiting { ({k: v for k, v in waits.items() if v}) }, differ {differ}"
+
+    def _judge_folds(self) -> None:
+        for runner in self._plant.runners.values():
+            for worker in runner.workers:
+                engine = worker.engine
+                if isinstance(engine, ObservedEngine) and (units := engine.differing()):
+                    self._kernel.violated("a state is its fold", f"{worker.name}: {', '.join(units)}")
 
     def _judge_store(self) -> None:
         plant, kernel = self._plant, self._kernel

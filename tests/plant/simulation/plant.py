@@ -16,16 +16,17 @@ from pathlib import Path
 from random import Random
 from types import SimpleNamespace
 from typing import Any
+from uuid import uuid4
 
-import cnctwin.api.live.jobs
 import cnctwin.memory.historian
 import cnctwin.memory.store.embedded
 import cnctwin.memory.store.sealed.tier
-import cnctwin.plant.watch
+import edge.running.run
 import processors.alerts.courier.thread
 import processors.alerts.courier.webhook
 import processors.running.runner
 import processors.running.runtime
+import processors.running.worker
 import sparkplug.edge_node
 import sparkplug.host
 from cnctwin.api.live.plant import LivePlant
@@ -43,10 +44,12 @@ from tests.plant.simulation.connection import SimulatedConnection, SimulatedLoop
 from tests.plant.simulation.control import Machine, NoSection, adapter_of, machine
 from tests.plant.simulation.disk import Disk
 from tests.plant.simulation.kernel import Kernel, Process
-from tests.plant.simulation.observed import ObservedRecorder, ObservedRunner
+from tests.plant.simulation.observed import ObservedEngine, ObservedForwarder, ObservedRecorder, ObservedRunner
 from tests.plant.simulation.receiver import Receiver
 from tests.plant.simulation.seams import Event, Stand, clock_of, simulated
 
+IMPORTED_LATE = (processors.alerts.courier.thread, cnctwin.memory.store.embedded, cnctwin.memory.store.sealed.tier)
+"""Modules that our code imports when it runs; they have to be there when the names in them are replaced."""
 ADDRESS = BrokerAddress()
 GROUP = "cnc"
 FAULTS_UNTIL_S = 20.0
@@ -54,6 +57,7 @@ RUN_S = 24.0
 QUIET_S_MAX = 150.0
 LOOK_S = 1.0
 AUTOSAVE_S = 10.0
+REFOLD_EVERY = 3  # seeds; in these each state is compared with a second fold
 ALERTS = {
     "receivers": {
         "desk": {"type": "webhook", "url": "https://desk.plant.example/hook", "give_up_after_s": 60.0, "rate_per_hour": 1000}
@@ -82,11 +86,11 @@ class SimulatedDriver:
         """Go round and round."""
         while True:
             now_s = self._kernel.now_s
-            for edge, due_s in list(self._due.items()):
+            for one, due_s in list(self._due.items()):
                 if due_s <= now_s:
-                    wait_s = edge.turn()
-                    if edge in self._due:
-                        self._due[edge] = now_s + wait_s
+                    wait_s = one.turn()
+                    if one in self._due:
+                        self._due[one] = now_s + wait_s
             self.loop.turn(min([0.1, *(max(due_s - self._kernel.now_s, 0.001) for due_s in self._due.values())]))
 
     def add(self, edge: Turning) -> None:
@@ -128,6 +132,7 @@ class Plant:
         self.receipted: dict[str, set[int]] = {}
         self.live = LivePlant()
         self.injected: Counter[str] = Counter()
+        self.unstored: Counter[str] = Counter()  # observations that went out past a disk which took nothing
         self.errors: list[BaseException] = []
         self._losses: Counter[str] = Counter()  # of the lives of each edge that are over
         self._mains: dict[str, Callable[[], None]] = {f"edge-{one.name}": self._edge(one) for one in self.machines}
@@ -196,7 +201,7 @@ class Plant:
     def losses(self, machine: str) -> int:
         """Return how many observations of a machine its edge has said to be lost, in all of its lives."""
         runtime = self.runtimes.get(machine)
-        return self._losses[machine] + (0 if runtime is None else lost_by(runtime))
+        return self._losses[machine] + self.unstored[machine] + (0 if runtime is None else lost_by(runtime))
 
     # What each process does.
 
@@ -248,7 +253,7 @@ class Plant:
         """Return the process whose connection has this client id."""
         if client.startswith("cnc/edge-"):
             return client.removeprefix("cnc/")
-        if client.startswith("host-view-"):
+        if client.startswith(("host-look-", "host-view-")):
             return "page"
         is_alerts = client.startswith(("cnc/twin-alerts", "host-twin-alerts", "host-courier"))
         return self.alerts_process if is_alerts else "processors"
@@ -262,26 +267,23 @@ def lost_by(runtime: EdgeRuntime) -> int:
 
 def observed(plant: Plant) -> list[tuple[Any, str, Any]]:
     """Return the names that are replaced while a plant runs."""
+    ObservedRunner.plant = ObservedRecorder.plant = ObservedForwarder.plant = plant
+    ObservedEngine.remembers = plant.seed % REFOLD_EVERY == 0
     chance = Random(f"host {plant.seed}")
     clock = clock_of(plant.kernel)
     defaults = {**(EdgeRuntime.__init__.__kwdefaults__ or {}), "wall_s": clock.time, "monotonic_s": clock.monotonic}
 
-    def identity() -> Any:
-        return SimpleNamespace(hex=f"{chance.getrandbits(128):032x}")
-
-    ObservedRunner.plant = ObservedRecorder.plant = plant
     return [
         (sparkplug.edge_node, "MqttConnection", SimulatedConnection),
         (sparkplug.host, "MqttConnection", SimulatedConnection),
         (sparkplug.host, "Random", lambda: Random(chance.random())),
         (processors.running.runtime, "Loop", SimulatedLoop),
         (processors.running.runtime, "Runner", ObservedRunner),
+        (processors.running.worker, "Engine", ObservedEngine),
+        (edge.running.run, "Forwarder", ObservedForwarder),
         (processors.running.runner, "PROCESS", "plant:1"),
-        (processors.alerts.courier.thread, "uuid4", identity),
         (processors.alerts.courier.webhook, "exchanged", plant.receiver.exchanged),
         (cnctwin.memory.historian, "StoreRecorder", ObservedRecorder),
-        (cnctwin.api.live.jobs, "uuid4", identity),
-        (cnctwin.plant.watch, "uuid4", identity),
         (EdgeRuntime.__init__, "__kwdefaults__", defaults),
     ]
 
@@ -292,14 +294,16 @@ def plant_of(seed: int, **options: Any) -> Iterator[Plant]:
     folder = Path(tempfile.mkdtemp(prefix="plant-", dir=SHMEM if SHMEM.is_dir() else None))
     plant = Plant(seed, folder, **options)
     disk = plant.disk
-    modules = {
+    chance = Random(f"identity {seed}")
+    stands = {
+        uuid4: lambda: SimpleNamespace(hex=f"{chance.getrandbits(128):032x}"),
         sqlite3: Stand(sqlite3, {"connect": disk.connect}),
         shutil: Stand(shutil, {"disk_usage": disk.usage}),
         fcntl: Stand(fcntl, {"flock": disk.flock}),
         os: Stand(os, {"fsync": disk.fsync, "getpid": lambda: 1}),
     }
     try:
-        with simulated(plant.kernel, observed(plant), modules):
+        with simulated(plant.kernel, observed(plant), stands):
             try:
                 yield plant
             finally:

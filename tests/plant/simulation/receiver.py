@@ -1,4 +1,4 @@
-"""Who is notified: takes what the courier sends, refuses, or takes it and does not answer. Stands for HTTP."""
+"""A receiver of notifications: takes what the courier sends, refuses, or takes it and does not answer. Stands for HTTP."""
 
 from collections import Counter
 from random import Random

@@ -7,14 +7,15 @@ from tests.plant.simulation.defects import options_of, put_in
 from tests.plant.simulation.faults import Fault, drawn
 from tests.plant.simulation.invariants import Invariants
 from tests.plant.simulation.mischief import Mischief, heal
-from tests.plant.simulation.plant import FAULTS_UNTIL_S, QUIET_S_MAX, RUN_S, plant_of
+from tests.plant.simulation.plant import FAULTS_UNTIL_S, LOOK_S, QUIET_S_MAX, RUN_S, plant_of
 
-SETTLE_S = 5.0
+QUIET_S = 8.0
+"""So long nothing may be on its way before a plant is judged."""
 
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """What a seed came to. `digest`: a hash over all that happened on the broker and to the processes."""
+    """The result of a seed. `digest`: a hash over all that happened on the broker and to the processes."""
 
     seed: int
     digest: str
@@ -50,10 +51,10 @@ def lived(
         kernel.run(RUN_S + 3.0)
         heal(plant)
         until_s = kernel.now_s + QUIET_S_MAX
-        kernel.run(kernel.now_s + SETTLE_S)
-        while kernel.now_s < until_s and not invariants.is_quiet():
-            kernel.run(kernel.now_s + 2.0)
-        kernel.run(kernel.now_s + SETTLE_S)
+        quiet_s = 0.0
+        while kernel.now_s < until_s and quiet_s < QUIET_S:  # what is resolved is told a while later
+            kernel.run(kernel.now_s + LOOK_S)
+            quiet_s = quiet_s + LOOK_S if invariants.is_quiet() else 0.0
         invariants.judge()
         return Result(
             seed,

@@ -207,21 +207,22 @@ def threads_of(kernel: Kernel) -> Stand:
 
 
 @contextmanager
-def simulated(kernel: Kernel, others: Sequence[tuple[Any, str, Any]], modules: Mapping[ModuleType, Any]) -> Iterator[None]:
+def simulated(kernel: Kernel, others: Sequence[tuple[Any, str, Any]], stands: Mapping[Any, Any]) -> Iterator[None]:
     """Have our code live on the kernel's clock and threads.
 
-    others: names to replace beside, as (object, attribute, value); modules: more modules, and what stands for each
+    others: names to replace beside, as (object, attribute, value)
+    stands: more modules and functions, and what stands for each wherever it was imported
     """
     queues = Stand(queue, {"Queue": lambda maxsize=0: Queue(kernel, maxsize), "SimpleQueue": lambda: Queue(kernel)})
-    stands: dict[int, Any] = {id(time): clock_of(kernel), id(threading): threads_of(kernel), id(queue): queues}
-    stands |= {id(module): stand for module, stand in modules.items()}
+    by_id: dict[int, Any] = {id(time): clock_of(kernel), id(threading): threads_of(kernel), id(queue): queues}
+    by_id |= {id(replaced): stand for replaced, stand in stands.items()}
     before: list[tuple[Any, str, Any]] = []
     for name, module in list(sys.modules.items()):
         if name.partition(".")[0] in PACKAGES and module is not None:
             for attribute, value in list(vars(module).items()):
-                if id(value) in stands and isinstance(value, ModuleType):
+                if id(value) in by_id:
                     before.append((module, attribute, value))
-                    setattr(module, attribute, stands[id(value)])
+                    setattr(module, attribute, by_id[id(value)])
     for owner, attribute, value in others:
         before.append((owner, attribute, getattr(owner, attribute)))
         setattr(owner, attribute, value)

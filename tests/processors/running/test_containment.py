@@ -1,4 +1,4 @@
-"""How far a fault reaches, and for how long."""
+"""The reach of a fault, and how long it lasts."""
 
 import pytest
 

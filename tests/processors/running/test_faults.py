@@ -194,6 +194,18 @@ def test_a_processor_that_fails_goes_down_alone_and_comes_back_with_its_snapshot
     )
 
 
+def test_a_snapshot_that_cannot_be_taken_by_a_fault_of_ours_costs_that_state_only() -> None:
+    before = engine(RECORDER)
+    before.feed(birth(0.0, spindle_rpm=1.0), 0.0)
+    retained = {f"cnctwin/snapshot/recorder/{name}": before.snapshot("okuma") for name in ("okuma", "mazak")}
+    host = FakeHost(birth(0.5, spindle_rpm=2.0), retained=retained)
+    (worker,) = workers_on(host, RECORDER)
+    worker.engine.restore = lambda _: {}["our own bug"]  # type: ignore[method-assign, assignment]
+    Runner(host, [worker]).run(host.until_empty())
+    assert [kind for kind, *_ in log_of(worker)] == ["birth", "death"]
+    assert worker._faults.faults == 2
+
+
 def test_it_waits_for_its_node_to_be_born_and_for_the_old_one_to_be_gone() -> None:
     host = FakeHost(birth(0.0, spindle_rpm=1.0))
     (worker,) = workers_on(host, RECORDER)

@@ -51,9 +51,9 @@ def test_what_is_refused_is_received_and_dropped_under_its_reason(refusal: Refus
     engine = engine_of(RECORDER)
     event = HostEvent(EventKind.REFUSED, NodeId("cnc", "edge"), "vmc", 0, detail="why", refused=3, refusal=refusal)
     assert engine.feed(event, 0.0) == []
-    engine.received(event, has_room=True)  # one that waits for the snapshots counts when it is fed
+    engine.lost(event._replace(refused=2), DropReason.OVERLOAD)  # the reason for which they were refused came first
     engine.feed(event._replace(device=None, refused=0), 0.0)
-    assert (engine.ledger.received, engine.ledger.dropped_total, engine.ledger.balance) == (3, 3, 0)
+    assert (engine.ledger.received, engine.ledger.dropped_total, engine.ledger.balance) == (5, 5, 0)
     (reason,) = [reason for reason, count in engine.ledger.dropped.items() if count]
     assert reason.value.startswith("refused_")
     assert engine.machines == ()

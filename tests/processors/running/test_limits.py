@@ -1,5 +1,6 @@
 """The table `[limits]` of a configuration file."""
 
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
@@ -48,3 +49,9 @@ def test_the_health_metrics_show_the_first_twenty() -> None:
     assert (
         '{"node": "cnc/edge", "device": "d0", "reason": "name", "text": "why", "since_ms": 0, "count": 2}' in health["quarantine"]
     )
+
+
+def test_the_page_states_the_defaults() -> None:
+    page = (Path(__file__).parents[3] / "docs" / "security.md").read_text(encoding="utf-8")
+    for field in fields(DEFAULTS):
+        assert f"| `{field.name}` | {getattr(DEFAULTS, field.name):,} |" in page

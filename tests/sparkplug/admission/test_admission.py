@@ -1,4 +1,4 @@
-"""What a host session lets in, and what becomes of the rest: the device, its neighbours, the table."""
+"""A host session's admission, and what becomes of the rest: the device, its neighbours, the table."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which broker comes next, and after what pause."""
+"""The next broker, and the pause before it."""
 
 from random import Random
 

@@ -122,7 +122,7 @@ def test_a_log_in_that_is_too_long_is_refused_before_it_is_read(server: Server) 
 
 
 def test_bodies_that_are_poured_in_without_a_token_take_no_memory(server: Server) -> None:
-    """Of sixty connections, in pieces whose sum nobody says beforehand; 7.9 MB each had taken 480 MB."""
+    """Bodies of sixty connections, in pieces whose sum nobody says beforehand; 7.9 MB each had taken 480 MB."""
     head = POST.replace(b"Content-Length: %d", b"Transfer-Encoding: chunked").replace(b"/login", b"%s")
     part = b"10000\r\n" + b"x" * 65536 + b"\r\n"
     paths = [b"/login", b"/predict", b"/jobs"] * 20

@@ -1,4 +1,4 @@
-"""What each role may: stated for every route, and held by the application."""
+"""The rights of each role: stated for every route, and held by the application."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What was told before a stretch and has not changed since holds at its start: in the question, and in a run log."""
+"""A value that was told before a stretch and has not changed since holds at its start: in the question, and in a run log."""
 
 from pathlib import Path
 
