@@ -1,5 +1,6 @@
 """A device or a node as one node tells of it: its metrics, each with its last reading and its trace."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from cnctwin.api.fleet import is_key_signal
@@ -29,3 +30,17 @@ class Owner:
     online: bool = False
     is_control: bool = False  # it tells measured values, not only the twin's
     signals: dict[str, Signal] = field(default_factory=dict)
+    clashing: dict[str, Signal] = field(default_factory=dict)  # that another node of the machine tells already
+
+
+def share(owners: Iterable[Owner]) -> None:
+    """Give each signal of a machine to one node: the first that is online, as the processors do, else the first that told it.
+
+    No node changes what another one says, by taking the name of its machine.
+    """
+    told: set[str] = set()
+    for owner in sorted(owners, key=lambda owner: not owner.online):
+        every = owner.clashing | owner.signals
+        owner.signals = {name: signal for name, signal in every.items() if name not in told}
+        owner.clashing = {name: signal for name, signal in every.items() if name in told}
+        told.update(owner.signals)

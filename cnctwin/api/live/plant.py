@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 from cnctwin.api.fleet import fleet_item
 from cnctwin.api.live.batches import Batch, Row, Waiting, alerts_batch, behind_batch, fleet_rows, machine_rows, state_batch
-from cnctwin.api.live.owner import Owner, Signal
+from cnctwin.api.live.owner import Owner, Signal, share
 from cnctwin.api.live.stamp import STAMP_MS_MAX, is_time, without_time
 from cnctwin.api.live.trace import Sample
 from cnctwin.api.value_object import plain, value_object
@@ -230,7 +230,8 @@ class LivePlant:
         owner = self._owner(event)
         if owner is None:
             return
-        before, owner.online, owner.signals = owner.signals, True, {}
+        before, owner.online = owner.clashing | owner.signals, True
+        owner.signals, owner.clashing = {}, {}
         for told in event.readings:
             reading = self._timed(told, event, now_ms)
             if len(owner.signals) >= SIGNALS_MAX:
@@ -335,6 +336,7 @@ class LivePlant:
         device = event.device
         if device is None:
             return
+        share(self._machines[device].values())
         if (waiting := self._waiting.get(device)) is not None:
             waiting.is_anew, waiting.rows = True, []
         if self._fleet_readers:

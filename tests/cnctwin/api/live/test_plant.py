@@ -78,3 +78,15 @@ def test_an_event_that_nobody_thought_of_is_counted_and_the_next_one_is_taken(ca
     assert live.counts["failures"] == 1
     assert "goes on with the next" in caplog.text
     assert live.readings("vmc")["spindle_rpm"].value == 6000.0
+
+
+def test_who_takes_the_name_of_a_machine_changes_none_of_its_values_until_its_own_edge_is_gone() -> None:
+    live, t_ms = small_plant(), now()
+    live.take([data({LOAD: 55.0}, t_ms)], t_ms)
+    live.take([birth({LOAD: 1.0, "made_up": 3.0}, t_ms, HOSTILE, "vmc"), data({LOAD: 2.0}, t_ms + 1, HOSTILE)], t_ms + 1)
+    assert told(live, "vmc", LOAD)["value"] == 55.0
+    assert told(live, "vmc", "made_up")["value"] == 3.0
+    live.take([death({LOAD: 2.0}, t_ms + 2, HOSTILE, "vmc")], t_ms + 2)
+    assert told(live, "vmc", LOAD)["quality"] == "good"
+    live.take([birth({LOAD: 4.0}, t_ms + 3, HOSTILE, "vmc"), death({LOAD: 55.0}, t_ms + 4)], t_ms + 4)
+    assert told(live, "vmc", LOAD)["value"] == 4.0
