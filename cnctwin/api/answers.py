@@ -40,6 +40,7 @@ class State(Answer):
     now: T
     online: bool
     behind: str | None = Field(None, description="which processors are behind, and how far: the twin's values are so old")
+    refused: str | None = Field(None, description="which devices are in quarantine, and why: nothing of them is taken")
     measured: dict[str, ValueObject]
     twin: dict[str, ValueObject]
 

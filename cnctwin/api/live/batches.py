@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+from cnctwin.api.live.notices import Notices
 from cnctwin.api.value_object import QUALITY_NAMES, Plain
 
 Row = tuple[int, str, Plain, int, str | None]  # t, signal, value, quality, reason
@@ -63,9 +64,9 @@ def fleet_rows(now_ms: int, rows: Sequence[tuple[str, Row]]) -> Batch:
     return Batch(None, event("fleet_rows", {"now": now_ms, "rows": said}))
 
 
-def behind_batch(now_ms: int, behind: str | None) -> Batch:
-    """The sentence on processors that are behind, or that all have caught up, for everybody."""
-    return Batch(ALL, event("processors", {"now": now_ms, "behind": behind}))
+def notices_batch(now_ms: int, notices: Notices) -> Batch:
+    """The sentences above every view, or that there is none any more, for everybody."""
+    return Batch(ALL, event("processors", {"now": now_ms, **notices._asdict()}))
 
 
 def alerts_batch(now_ms: int, alerts: dict[str, Any]) -> Batch:

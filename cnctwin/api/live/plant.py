@@ -12,12 +12,12 @@ from math import isfinite
 from typing import Any, NamedTuple
 
 from cnctwin.api.fleet import fleet_item
-from cnctwin.api.live.batches import Batch, Row, Waiting, alerts_batch, behind_batch, fleet_rows, machine_rows, state_batch
+from cnctwin.api.live.batches import Batch, Row, Waiting, alerts_batch, fleet_rows, machine_rows, notices_batch, state_batch
+from cnctwin.api.live.notices import Notices, notices_of
 from cnctwin.api.live.owner import Owner, Signal, share
 from cnctwin.api.live.stamp import STAMP_MS_MAX, is_time, without_time
 from cnctwin.api.live.trace import Sample
 from cnctwin.api.value_object import plain, value_object
-from cnctwin.plant.lags import behind, lag_reports
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId, Reading
 from sparkplug.quality import Quality
@@ -61,8 +61,8 @@ class LivePlant:
         self._fleet_told_ms = 0
         self._alerts: dict[str, Any] | None = None
         self._alerts_are_new = False
-        self._behind: str | None = None
-        self._behind_looked_ms = 0
+        self._notices = Notices()
+        self._noticed_ms = 0
 
     # What the feeding thread tells.
 
@@ -100,12 +100,12 @@ class LivePlant:
                 self._fleet_told_ms = now_ms
             alerts = self._alerts if self._alerts_are_new and (self._fleet_readers or self._waiting) else None
             self._alerts_are_new = False
-            behind_before = self._behind
-            if not 0 <= now_ms - self._behind_looked_ms < LAG_MS:
-                self._behind_looked_ms, self._behind = now_ms, self._sentence()
+            before = self._notices
+            if not 0 <= now_ms - self._noticed_ms < LAG_MS:
+                self._noticed_ms, self._notices = now_ms, self._noticed()
         batches = [job() for job in jobs]
-        if self._behind != behind_before:
-            batches.append(behind_batch(now_ms, self._behind))
+        if self._notices != before:
+            batches.append(notices_batch(now_ms, self._notices))
         if tell_fleet:
             batches.append(fleet_rows(now_ms, [(machine, row) for (machine, _), row in fleet]))
         if alerts is not None:
@@ -159,10 +159,10 @@ class LivePlant:
         with self._lock:
             return self._alerts
 
-    def behind(self) -> str | None:
-        """The sentence on processors that are behind; None where all are in time."""
+    def notices(self) -> Notices:
+        """What stands above every view."""
         with self._lock:
-            return self._behind
+            return self._notices
 
     def nodes(self) -> list[NodeView]:
         """Each node with its own metrics."""
@@ -211,9 +211,9 @@ class LivePlant:
         self.refuse("readings_refused", f"{reading.name} of {event.device or event.node.node}: {kept_out.reason}")
         return kept_out
 
-    def _sentence(self) -> str | None:
+    def _noticed(self) -> Notices:
         own = ((node.node, owner) for node, owner in self._nodes.items() if owner.online and is_twin_node(node.node))
-        return behind(lag_reports((node, {n: one.reading.value for n, one in owner.signals.items()}) for node, owner in own))
+        return notices_of((node, {name: one.reading.value for name, one in owner.signals.items()}) for node, owner in own)
 
     def _owner(self, event: HostEvent) -> Owner | None:
         if event.device is None:
@@ -375,7 +375,8 @@ class LivePlant:
         for name, signal in _sorted(signals):
             side = twin if name.startswith(TWIN_PREFIX) else measured
             side[name] = value_object(signal.reading, signal.provenance, signal.meaning)
-        return {"machine": machine, "now": now_ms, "online": online, "behind": self._behind, "measured": measured, "twin": twin}
+        head = {"machine": machine, "now": now_ms, "online": online, **self._notices._asdict()}
+        return {**head, "measured": measured, "twin": twin}
 
 
 def _row(reading: Reading) -> Row:

@@ -95,7 +95,7 @@ def _processors(live: LivePlant) -> Part:
     if dead:
         line = f"{len(dead)} of {len(known)} are offline: {', '.join(dead)}; what they said last is not live"
         return Part(part="processors", state="degraded", reason=line, do=f"cnctwin process {' '.join(dead)}")
-    if (behind := live.behind()) is not None:
+    if (behind := live.notices().behind) is not None:
         return Part(part="processors", state="degraded", reason=behind, do="cnctwin plan fleet")
     return Part(part="processors", state="ok", reason=f"{len(known)} online")
 

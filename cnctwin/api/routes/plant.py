@@ -43,13 +43,13 @@ def plant_routes(live: LivePlant, fan_out: FanOut) -> APIRouter:
         Of a machine: `state` (as /state), then `rows`: `{"now", "rows": [[t, signal, value, quality, reason]], "online"}`, and
         `state` again where signals or the connection have changed. Without a machine: `fleet`, then `fleet_rows`:
         `{"now", "rows": [[machine, t, signal, value, quality]]}`. On both: `alerts`, as /alerts, and `processors`:
-        `{"now", "behind"}`, the sentence on processors that fall behind or null, on change.
+        `{"now", "behind", "refused"}`, on change: the sentences on processors that fall behind and on what is refused, or null.
         """
         if machine is not None:
             known_state(live, machine)
         reader = fan_out.open(machine, request.state.client)
         if machine is None:
-            first = event("fleet", {"now": now_ms(), "behind": live.behind(), "machines": live.fleet()})
+            first = event("fleet", {"now": now_ms(), **live.notices()._asdict(), "machines": live.fleet()})
         else:
             first = event("state", known_state(live, machine))
         return EventStream(fan_out, reader, first)

@@ -34,6 +34,7 @@ const ALERTS_MS = 5000;
 const main = document.getElementById("main"),
   banner = document.getElementById("banner");
 const behindBanner = document.getElementById("behind");
+const refusedBanner = document.getElementById("refused");
 const whom = document.getElementById("me");
 const pill = document.getElementById("link"),
   pillWord = pill.querySelector(".word");
@@ -134,13 +135,13 @@ function onStream(event, take) {
   });
 }
 onStream("fleet", (detail) => {
-  heardBehind(detail.behind);
+  heardNotices(detail);
   app.plant.fleet(detail.machines ?? []);
   tabs();
 });
 onStream("fleet_rows", (detail) => app.plant.fleetRows(detail));
 onStream("state", (detail) => {
-  heardBehind(detail.behind);
+  heardNotices(detail);
   app.plant.state(detail);
   tabs();
 });
@@ -150,14 +151,20 @@ app.stream.addEventListener("hole", ({ detail }) => {
   app.view?.onHole?.();
 });
 app.stream.addEventListener("alerts", ({ detail }) => heardAlerts(detail));
-app.stream.addEventListener("processors", ({ detail }) => heardBehind(detail.behind));
+app.stream.addEventListener("processors", ({ detail }) => heardNotices(detail));
 
-/** Processors that fall behind: what the twin says is late, and looks live all the same. */
-function heardBehind(sentence) {
-  setHidden(behindBanner, !sentence);
+/** What stands above every view: processors that fall behind (what the twin says is late, and looks live all the same), and
+ * devices of which nothing is taken. */
+function heardNotices({ behind, refused }) {
+  notice(behindBanner, "Late.", behind);
+  notice(refusedBanner, "Refused.", refused);
+}
+
+function notice(banner, word, sentence) {
+  setHidden(banner, !sentence);
   if (!sentence) return;
-  if (!behindBanner.firstChild) behindBanner.append(el("strong", {}, "Late."), el("span"));
-  setText(behindBanner.lastChild, `${sentence[0].toUpperCase()}${sentence.slice(1)}.`);
+  if (!banner.firstChild) banner.append(el("strong", {}, word), el("span"));
+  setText(banner.lastChild, `${sentence[0].toUpperCase()}${sentence.slice(1)}.`);
 }
 
 function link() {

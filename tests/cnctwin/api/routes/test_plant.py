@@ -178,14 +178,14 @@ def test_processors_that_fall_behind_are_told_on_change_and_stand_in_each_state(
     assert [told(live, t_ms) for t_ms in (2_000, 2_100, 3_000, 4_000)] == [[BEHIND], [], [], []]
     state = live.state("vmc", 4_000)
     assert state is not None
-    assert (state["behind"], live.behind()) == (BEHIND, BEHIND)
+    assert (state["behind"], live.notices().behind) == (BEHIND, BEHIND)
     with client_of(live) as client:
         assert client.get("/state/vmc").json()["behind"] == BEHIND
         (part,) = [part for part in client.get("/health").json()["parts"] if part["part"] == "processors"]
         assert (part["state"], part["reason"]) == ("degraded", BEHIND)
     live.take([data({"health/lag_s": 0.1, "health/published_lag_s": 0.1}, 5_000, THERMAL, None)], 5_000)
     assert told(live, 5_000) == [None]
-    assert live.behind() is None
+    assert live.notices().behind is None
 
 
 def test_a_processor_that_has_died_is_behind_no_longer() -> None:
@@ -194,3 +194,19 @@ def test_a_processor_that_has_died_is_behind_no_longer() -> None:
     assert len(told(live, 1_000)) == 1
     live.take([death({"health/lag_s": 18.0}, 2_000, THERMAL, None)], 2_000)
     assert told(live, 2_000) == [None]
+
+
+def test_what_is_refused_is_told_on_change_and_named_above_every_view() -> None:
+    live = small_plant(1_000)
+    rows = [{"node": "cnc/edge-bad", "device": f"mill-{index}", "text": "its name is too long"} for index in range(3)]
+    live.take([birth({"health/quarantine": "[]"}, 1_000, THERMAL, None)], 1_000)
+    assert told(live, 1_000) == []
+    live.take([data({"health/quarantine": json.dumps(rows)}, 2_000, THERMAL, None)], 2_000)
+    assert told(live, 2_000) == [None]  # nothing is late
+    first, second = (f"mill-{index} of cnc/edge-bad: refused: its name is too long" for index in range(2))
+    assert live.notices().refused == f"{first}; {second}; and 1 more"
+    with client_of(live) as client:
+        assert client.get("/state/vmc").json()["refused"] == live.notices().refused
+    live.take([data({"health/quarantine": "[]"}, 3_000, THERMAL, None)], 3_000)
+    assert told(live, 3_000) == [None]
+    assert live.notices().refused is None
