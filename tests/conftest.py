@@ -1,5 +1,6 @@
 """What tests of several packages share: a real broker, and the proxy in front of it."""
 
+import logging
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -100,6 +101,15 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     tests = Path(__file__).parent
     ranks = {tests / name: rank for rank, name in enumerate(LONG)}
     items.sort(key=lambda item: ranks.get(item.path, len(LONG)))
+
+
+@pytest.fixture(autouse=True)
+def _level_of_our_loggers() -> Iterator[None]:
+    """Take back what a command sets for its process: `doctor` and `serve` silence the connection, which they report themselves."""
+    logger = logging.getLogger("sparkplug")
+    level = logger.level
+    yield
+    logger.setLevel(level)
 
 
 @pytest.fixture(scope="session", autouse=True)
