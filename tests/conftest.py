@@ -105,7 +105,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.fixture(autouse=True)
 def _level_of_our_loggers() -> Iterator[None]:
-    """Take back what a command sets for its process: `doctor` and `serve` silence the connection, which they report themselves."""
+    """Take back what a command sets for its process: `doctor` and `serve` silence the connection and report it themselves."""
     logger = logging.getLogger("sparkplug")
     level = logger.level
     yield
