@@ -11,12 +11,12 @@ def make_folder(folder: Path) -> None:
         missing.pop()
     folder.mkdir(parents=True, exist_ok=True)
     for made in missing:
-        sync_folder(made.parent)
+        sync(made.parent)
 
 
-def sync_folder(folder: Path) -> None:
-    """Force the entries of a folder to the disk: what was made, renamed or removed in it. Raises OSError."""
-    descriptor = os.open(folder, os.O_RDONLY)
+def sync(path: Path) -> None:
+    """Force what is in a file to the disk, or the entries of a folder: what was made, renamed or removed in it. Raises OSError."""
+    descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)
     finally:

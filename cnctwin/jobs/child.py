@@ -20,7 +20,8 @@ from pathlib import Path
 from typing import Any
 
 from cnctwin.errors import ApplicationError, SpreadError
-from cnctwin.jobs.durable import EXIT_DISK, settle, write_json
+from cnctwin.files.synced import sync
+from cnctwin.jobs.durable import EXIT_DISK, write_json
 from cnctwin.jobs.files_root import FilesRoot
 from cnctwin.jobs.left_over import JOB_VARIABLE, kill, left_over
 from cnctwin.jobs.request import read_request
@@ -76,7 +77,7 @@ def attempt(folder: Path, files: FilesRoot, workers: int, dask: str | None) -> d
     shutil.rmtree(result, ignore_errors=True)
     beside.rename(result)
     for file in result.iterdir():
-        settle(file)
+        sync(file)
     sizes = {file.name: file.stat().st_size for file in sorted(result.iterdir())}
     return {"state": "done", "result": {**told, "files": sizes}}
 

@@ -5,6 +5,8 @@ import os
 from pathlib import Path
 from typing import Any
 
+from cnctwin.files.synced import sync
+
 EXIT_DISK = 74
 """Exit code of a process that could not write what it has to say."""
 
@@ -23,16 +25,7 @@ def write_json(path: Path, document: Any, *, durable: bool = True) -> None:
         beside.unlink(missing_ok=True)
         raise
     if durable:
-        settle(path.parent)
-
-
-def settle(path: Path) -> None:
-    """Have what is in a file, or the names in a folder, on the disk."""
-    descriptor = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+        sync(path.parent)
 
 
 def read_json(path: Path, bytes_max: int = 1_000_000) -> dict[str, Any] | None:

@@ -15,7 +15,8 @@ from typing import IO, Any
 from pydantic import ValidationError
 
 from cnctwin.errors import UsageError
-from cnctwin.jobs.durable import read_json, settle, write_json
+from cnctwin.files.synced import sync
+from cnctwin.jobs.durable import read_json, write_json
 from cnctwin.jobs.job import Job, JobState
 from cnctwin.jobs.request import is_id
 
@@ -82,7 +83,7 @@ class JobsFolder:
         except OSError:
             shutil.rmtree(begun, ignore_errors=True)
             raise
-        settle(self.folder)
+        sync(self.folder)
 
     def save(self, job: Job) -> None:
         """Keep how it stands. Raises OSError."""

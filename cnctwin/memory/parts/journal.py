@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from cnctwin.errors import UsageError
-from cnctwin.files.synced import make_folder, sync_folder
+from cnctwin.files.synced import make_folder, sync
 
 IDS_MAX = 5000
 
@@ -56,4 +56,4 @@ class Journal:
             out.flush()
             os.fsync(out.fileno())
         beside.replace(self.file)
-        sync_folder(self.file.parent)
+        sync(self.file.parent)

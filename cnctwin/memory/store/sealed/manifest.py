@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import NamedTuple
 from urllib.parse import quote
 
-from cnctwin.files.synced import make_folder, sync_folder
+from cnctwin.files.synced import make_folder, sync
 from cnctwin.memory.store.contract import StoreError
 from cnctwin.memory.store.series_table import StoredClass
 
@@ -113,7 +113,7 @@ def put(folder: Path, name: str, body: bytes) -> None:
             file.flush()
             os.fsync(file.fileno())
         part.replace(path)
-        sync_folder(path.parent)
+        sync(path.parent)
     except OSError as error:
         raise StoreError(f"{path}: cannot be written: {error.strerror or error}") from error
 
