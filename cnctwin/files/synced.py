@@ -15,7 +15,7 @@ def make_folder(folder: Path) -> None:
 
 
 def sync(path: Path) -> None:
-    """Force what is in a file to the disk, or the entries of a folder: what was made, renamed or removed in it. Raises OSError."""
+    """Force a file to the disk, or the entries of a folder: what was made, renamed or removed in it. Raises OSError."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)
