@@ -11,7 +11,12 @@ SHOWN_MAX = 10
 
 
 def refused_lines(rows: Sequence[Quarantined], own_values: Iterable[tuple[str, Mapping[str, Value]]]) -> list[str]:
-    """Return a line for each node or device of which something is refused, each once, in the order of their names.
+    """Return a line for each of `refusals`."""
+    return [f"{name}: refused: {text}" for name, text in refusals(rows, own_values)]
+
+
+def refusals(rows: Sequence[Quarantined], own_values: Iterable[tuple[str, Mapping[str, Value]]]) -> list[tuple[str, str]]:
+    """Return each node or device of which something is refused, with the reason, in the order of their names.
 
     own_values: the metrics of each node, by its name
     """
@@ -21,7 +26,7 @@ def refused_lines(rows: Sequence[Quarantined], own_values: Iterable[tuple[str, M
             node, device, text = told.get("node"), told.get("device"), told.get("text")
             if isinstance(node, str) and isinstance(text, str) and (device is None or isinstance(device, str)):
                 texts.setdefault(_name(node, device), text)
-    return [f"{name}: refused: {text}" for name, text in sorted(texts.items())]
+    return sorted(texts.items())
 
 
 def _table(value: Value) -> list[Mapping[str, object]]:

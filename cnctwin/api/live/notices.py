@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 from cnctwin.plant.lags import behind, lag_reports
-from cnctwin.plant.quarantine import refused_lines
+from cnctwin.plant.quarantine import refusals
 from sparkplug.values import Value
 
 REFUSED_MAX = 2
@@ -25,6 +25,6 @@ class Notices(NamedTuple):
 def notices_of(own: Iterable[tuple[str, Mapping[str, Value]]]) -> Notices:
     """Return the notices that follow from the metrics of the processors' nodes, by node."""
     nodes = list(own)
-    lines = refused_lines((), nodes)
+    lines = [f"{name}: {text}" for name, text in refusals((), nodes)]
     more = f"; and {len(lines) - REFUSED_MAX} more" if len(lines) > REFUSED_MAX else ""
     return Notices(behind(lag_reports(nodes)), "; ".join(lines[:REFUSED_MAX]) + more or None)

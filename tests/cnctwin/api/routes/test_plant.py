@@ -203,7 +203,7 @@ def test_what_is_refused_is_told_on_change_and_named_above_every_view() -> None:
     assert told(live, 1_000) == []
     live.take([data({"health/quarantine": json.dumps(rows)}, 2_000, THERMAL, None)], 2_000)
     assert told(live, 2_000) == [None]  # nothing is late
-    first, second = (f"mill-{index} of cnc/edge-bad: refused: its name is too long" for index in range(2))
+    first, second = (f"mill-{index} of cnc/edge-bad: its name is too long" for index in range(2))
     assert live.notices().refused == f"{first}; {second}; and 1 more"
     with client_of(live) as client:
         assert client.get("/state/vmc").json()["refused"] == live.notices().refused
