@@ -308,7 +308,7 @@ def reconnects(it: HostPairing, patience_s: float) -> None:
     """The broker's restart: the host says again that it is online, and our data arrive."""
     first = len(it.states())
     it.broker.restart()
-    until(lambda: len(it.states()) > first and it.edge.online, patience_s)
+    until(lambda: any(state["online"] for _, state in it.states()[first:]) and it.edge.online, patience_s)
     after = len(it.heard)
     it.ask_rebirth()
     it.until(lambda: it.has("birth", DEVICE, after), patience_s)

@@ -3,6 +3,7 @@ import java.lang.reflect.Proxy;
 import java.util.ArrayList;
 import java.util.Date;
 import java.util.List;
+import org.eclipse.tahu.exception.TahuException;
 import org.eclipse.tahu.host.HostApplication;
 import org.eclipse.tahu.host.api.MultiHostApplicationEventHandler;
 import org.eclipse.tahu.message.SparkplugBPayloadDecoder;
@@ -21,6 +22,9 @@ import org.eclipse.tahu.mqtt.MqttServerUrl;
 
 /** Tahu's HostApplication, whose events become lines. */
 final class Host implements Peer.Role {
+
+    private static final int ATTEMPTS_MAX = 100;
+    private static final long PAUSE_MS = 100;
 
     private final HostApplication application;
     private final String group;
@@ -61,7 +65,22 @@ final class Host implements Peer.Role {
         final Topic topic = line.hasNonNull("device")
                 ? new Topic(prefix, new DeviceDescriptor(group, node, line.get("device").asText()), MessageType.DCMD)
                 : new Topic(prefix, new EdgeNodeDescriptor(group, node), MessageType.NCMD);
-        application.publishCommand(topic, new SparkplugBPayload(new Date(), new ArrayList<>(Peer.metrics(line.get("metrics")))));
+        publish(topic, new SparkplugBPayload(new Date(), new ArrayList<>(Peer.metrics(line.get("metrics")))));
         return true;
+    }
+
+    /** Tahu refuses a command while it does not know yet that it is connected again, though its STATE is on the broker. */
+    private void publish(final Topic topic, final SparkplugBPayload payload) throws Exception {
+        for (int attempt = 1; ; attempt++) {
+            try {
+                application.publishCommand(topic, payload);
+                return;
+            } catch (final TahuException error) {
+                if (attempt == ATTEMPTS_MAX) {
+                    throw error;
+                }
+                Thread.sleep(PAUSE_MS);
+            }
+        }
     }
 }
