@@ -2,147 +2,30 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from sparkplug.broker import BrokerAddress
 from sparkplug.codec import decode
 from sparkplug.datatype import DataType
-from sparkplug.host import EventKind, HostApplication, HostEvent
-from sparkplug.metric import Change, NodeId
-from sparkplug.node_picture import Owner
+from sparkplug.host import EventKind, HostApplication
+from sparkplug.metric import Change
 from sparkplug.quality import Quality
 from sparkplug.topics import Topic, Verb
 from sparkplug.values import Payload
+from tests.peers.edge_pairing import EdgePairing, host_of
 from tests.peers.metrics import (
     BY_NAME,
-    DEFINITION,
-    INSTANCE,
-    NODE_PART,
     NOTHING,
     OFFSETS,
     PART,
-    Line,
     datatype_of,
     our_value,
     scalars,
 )
-from tests.peers.pairing import Broker, Peer
-from tests.peers.process import PeerProcess
-from tests.peers.toolchain import command_of
-from tests.wire.mqtt_packets import Connect, Publish
-from tests.wire.proxy import Proxy
-
-QUIET_S = 2.0
-WRAP = 600
-DEVICE = "lathe"
-
-
-def _host(broker: Broker, host_id: str) -> HostApplication:
-    address = BrokerAddress(*broker.address)
-    return HostApplication(address, host_id, reorder_timeout_ms=500, rebirth_interval_ms_min=500)
-
-
-class EdgePairing:
-    """An edge node of a peer behind a proxy that records it, and a host application of ours on the same broker."""
-
-    def __init__(self, peer: Peer, broker: Broker, proxy: Proxy) -> None:
-        self.peer, self.broker, self.proxy = peer, broker, proxy
-        self.node = NodeId("cnc", f"edge-{peer.name}")
-        self.host = _host(broker, "scada")
-        self.events: list[HostEvent] = []
-        self.process: PeerProcess | None = None
-        self.host.start()
-
-    def close(self) -> None:
-        """End both sides."""
-        self.end()
-        self.host.stop()
-
-    def end(self) -> None:
-        """Kill the peer's program."""
-        if self.process is not None:
-            self.process.kill()
-            self.process = None
-
-    @property
-    def theirs(self) -> PeerProcess:
-        """The peer's program."""
-        assert self.process is not None
-        return self.process
-
-    def lines(self) -> dict[str, list[Line]]:
-        """Return the metrics that the peer declares: those that it can."""
-        device = [*scalars(self.peer.types_lacking), PART, BY_NAME]
-        optional = {"null": [NOTHING], "dataset": [OFFSETS], "template": [INSTANCE]}
-        device += [line for check, lines in optional.items() if check not in self.peer.lacks for line in lines]
-        node = [NODE_PART] + ([] if "template" in self.peer.lacks else [DEFINITION])
-        return {"node": node, "device": device}
-
-    def start(self, primary: str = "") -> None:
-        """Start the peer's program, with or without a primary host."""
-        command, folder = command_of(self.peer.name)
-        self.process = PeerProcess([*command, "edge", *map(str, self.proxy.address), *self.node, primary], folder)
-        self.tell(**self.lines())
-        while self.hear()["event"] != "started":
-            pass
-
-    def tell(self, **line: Any) -> None:
-        """Write a line to the program."""
-        self.theirs.tell(json.dumps(line))
-
-    def hear(self, timeout_s: float = 90.0) -> dict[str, Any]:
-        """Return the next line of the program."""
-        said: dict[str, Any] = json.loads(self.theirs.hear(timeout_s))
-        return said
-
-    def until(self, done: Callable[[], bool], timeout_s: float) -> None:
-        """Poll our host until `done`."""
-        deadline_s = time.monotonic() + timeout_s
-        while not done():
-            assert time.monotonic() < deadline_s, f"in vain; {self.host.counts}, {self.events[-3:]}"
-            self.events += self.host.poll(0.05)
-
-    def ready(self, timeout_s: float) -> None:
-        """Have a peer that runs and is born, whatever came before; our host is there first."""
-        self.until(lambda: self.host.online, timeout_s)
-        if self.process is None:
-            births = self.host.counts.get("births", 0)
-            self.start()
-            self.until(lambda: self.host.counts.get("births", 0) >= births + 2, timeout_s)  # of node and device
-        self.until(lambda: self.born, timeout_s)
-
-    @property
-    def device(self) -> Owner:
-        """Return what our host knows of the device."""
-        picture = self.host.picture(self.node)
-        assert picture is not None
-        return picture.devices[DEVICE]
-
-    @property
-    def born(self) -> bool:
-        """Return True where node and device are online."""
-        picture = self.host.picture(self.node)
-        return picture is not None and picture.online and DEVICE in picture.devices and picture.devices[DEVICE].online
-
-    @property
-    def dead(self) -> bool:
-        """Return True where the node is offline."""
-        picture = self.host.picture(self.node)
-        return picture is not None and not picture.online
-
-    def sent(self, verb: Verb, connection: int | None = None) -> list[tuple[Publish, Payload]]:
-        """Return what the peer published, as bytes and as we read it."""
-        packets = self.proxy.packets("up", Publish, connection=connection)
-        return [(packet, decode(packet.payload)) for packet in packets if Topic.parse(packet.topic).verb is verb]
-
-    def counted(self, *names: str) -> dict[str, int]:
-        """Return counts of our host that are not zero."""
-        return {name: self.host.counts[name] for name in names if self.host.counts.get(name)}
-
+from tests.peers.pairing import DEVICE, QUIET_S, WRAP
+from tests.wire.mqtt_packets import Connect
 
 Check = Callable[[EdgePairing, float], None]
 
@@ -277,7 +160,7 @@ def written(it: EdgePairing, patience_s: float) -> None:
 def rebirths(it: EdgePairing, patience_s: float) -> None:
     """Node Control/Rebirth of a host that comes later and asks for what it has missed."""
     count = len(it.sent(Verb.NBIRTH))
-    later = _host(it.broker, "later")
+    later = host_of(it.broker, "later")
     later.start()
     deadline_s = time.monotonic() + patience_s
     try:
@@ -363,7 +246,7 @@ def waits(it: EdgePairing, patience_s: float) -> None:
             deadline_s = time.monotonic() + QUIET_S
             while time.monotonic() < deadline_s:
                 it.events += it.host.poll(0.05)
-        primary = _host(it.broker, "primary")
+        primary = host_of(it.broker, "primary")
         primary.start()
         try:
             _poll_both(it, primary, lambda: it.born, patience_s)

@@ -18,6 +18,9 @@ from tests.wire.mosquitto import Mosquitto, find_mosquitto
 
 KNOWN = tomllib.loads((Path(__file__).parent / "pairings.toml").read_text())
 PATIENCE_S = 60.0
+QUIET_S = 2.0
+WRAP = 600
+DEVICE = "lathe"
 FAULT_S = 4.0
 """The time that a known fault may take to show."""
 

@@ -8,7 +8,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from tests.peers.edge_checks import CHECKS, EdgePairing
+from tests.peers.edge_checks import CHECKS
+from tests.peers.edge_pairing import EdgePairing
 from tests.peers.pairing import PATIENCE_S, Peer, broker_of, judge, pairs
 from tests.peers.toolchain import command_of
 from tests.wire.proxy import Proxy

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from tests.peers.host_checks import CHECKS, HostPairing
+from tests.peers.host_checks import CHECKS
+from tests.peers.host_pairing import HostPairing
 from tests.peers.pairing import PATIENCE_S, Peer, broker_of, judge, pairs
 from tests.peers.toolchain import command_of
 from tests.wire.proxy import Proxy

@@ -160,7 +160,7 @@ class LivePlant:
             return self._alerts
 
     def notices(self) -> Notices:
-        """What stands above every view."""
+        """The notices that stand above every view."""
         with self._lock:
             return self._notices
 
