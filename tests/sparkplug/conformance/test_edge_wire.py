@@ -309,9 +309,7 @@ def test_different_nodes_and_hosts_have_different_client_ids(proxy: Proxy) -> No
     "tck-id-operational-behavior-edge-node-birth-sequence-wait",
     "tck-id-operational-behavior-edge-node-termination-host-offline-reconnect",
 )
-def test_a_node_waits_connected_and_dies_once_for_each_time_that_its_host_goes(
-    mosquitto: Mosquitto, proxy: Proxy, version: int
-) -> None:
+def test_a_node_waits_connected_and_dies_once_each_time_its_host_goes(mosquitto: Mosquitto, proxy: Proxy, version: int) -> None:
     _say(mosquitto, STATE, HostState(False, 1000).encode(), retain=True)
     edge = _edge(proxy, version=version, primary_host=HOST_ID)
     edge.start()
