@@ -61,6 +61,11 @@ class AxisRunData:
             "t_s": self.t_s,
         } | {f"{letter}_{column}": values for letter, own in self.others.items() for column, values in _motion(own, period_s)}
 
+    @property
+    def period_s(self) -> float:
+        """Between samples, s."""
+        return float(self.t_s[1] - self.t_s[0])
+
     def stretches(self) -> tuple[slice, ...]:
         """Of motion."""
         return motion_stretches(self.t_s, self.reference_mm)
