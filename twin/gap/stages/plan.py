@@ -18,6 +18,7 @@ from twin.gap.stages.cut import CutStage, cut_runs
 from twin.gap.stages.disturbance import disturbance_of_repeats
 from twin.gap.stages.heat import HeatStage, heat_runs
 from twin.gap.stages.stage import Stage
+from twin.gap.stages.turns import TurnStage, turn_data
 from twin.gap.verdict import judged
 from twin.machine import MachineFile
 from twin.runlog import RunLog
@@ -74,6 +75,9 @@ def explained_stages(ground: Ground, progress: Progress, side_by_side: SideBySid
         if stage.candidates:
             found.append(explain(stage, null=null, progress=progress))
             forces = _pushes(stage, found[0])
+    turning = turn_data(ground.runs)
+    if any(run.fitted for run in turning):
+        found.append(explain(TurnStage(ground.machine, turning, ground.left_out), null=null, progress=progress))
     stages: list[Stage] = [s for letter in ground.machine.axes if (s := axis_stage(ground, letter, forces)) is not None]
     warmups = heat_runs(ground.machine, tuple(r for r in ground.runs if not r.log.axes()))
     if any(run.fitted for run in warmups):
