@@ -51,9 +51,6 @@ def inspected(case: Case) -> tuple[Case, tuple[str, ...]]:
     if not any(run.entry.kind is RunKind.PROGRAM or _comparable(run, case.machine) for run in runs):
         there = ", ".join(runs[0].log.columns) or "no other columns"
         raise CaseError(f"{case.name}: no run can be compared with the machine: {(*notes, f'there are {there}')[0]}")
-    unrepeated = [run for run in runs if run.entry.kind in (RunKind.AIR, RunKind.CUT) and not isinstance(run, TurnRun)]
-    if not looked.repeats() and unrepeated:
-        notes.append("no run was repeated: the floor is what laps of a run or its sensors show, and chance counts as gap")
     if not looked.of(role="check"):
         notes.append("no run of role check: this is judged on the runs that were fitted, which flatters")
     return looked, tuple(notes)
