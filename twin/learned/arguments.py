@@ -52,8 +52,11 @@ AROUND = {
 
 
 def around(t_s: Floats, columns: Mapping[str, Floats | None]) -> dict[str, Floats]:
-    """Return the arguments that the machine as a whole tells; missing samples lie on the line between known ones."""
-    found = {"time_since_start_s": t_s - t_s[:1]}
+    """Return the arguments that the machine as a whole tells; missing samples lie on the line between known ones.
+
+    A coolant that is not recorded is off.
+    """
+    found = {"time_since_start_s": t_s - t_s[:1], "coolant_on": np.zeros(len(t_s))}
     for column, argument in AROUND.items():
         values = columns.get(column)
         known = np.flatnonzero(np.isfinite(values)) if values is not None else np.array([], dtype=np.intp)

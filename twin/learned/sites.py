@@ -14,11 +14,14 @@ QUANTITIES = {
     LearnedSite.FRICTION: {"friction_n": 1.0, "breakaway_n": 1.0},
     LearnedSite.CONTROLLER: {"torque_command_a": 1.0},
     LearnedSite.TABLE_POSITION: {"table_mm": 1.0},
+}
+"""Site → quantities of the axis kernel that a term there is added to, with its sign: a force of + pushes towards +."""
+MACHINE_QUANTITIES = {
     LearnedSite.SPINDLE_POWER: {"electrical_power_kw": 1.0},
     LearnedSite.HEAT_INPUT: {"heat_w": 1.0},
     LearnedSite.HEAT_LOSS: {"heat_w": -1.0},
 }
-"""Site → quantities of the woven kernel that a term there is added to, with its sign: a force of + pushes towards +."""
+"""Site → quantities of the spindle's kernels, likewise: a loss of + cools."""
 READINGS = {
     LearnedSite.POSITION_READING: "pos_mm",
     LearnedSite.TABLE_READING: "table_mm",
@@ -70,7 +73,7 @@ def check_place(site: LearnedSite, on: str, axes: Iterable[str]) -> None:
     elif site in MACHINE_READINGS:
         right = MACHINE_READINGS[site] + (() if site is LearnedSite.FORCE_READING else ("",))
     else:
-        right = ("", *(DIRECTIONS if site is LearnedSite.CUT_FORCE else ()))
+        right = ("", *((*DIRECTIONS, *MACHINE_READINGS[LearnedSite.FORCE_READING]) if site is LearnedSite.CUT_FORCE else ()))
     if on not in right:
         there = ", ".join(name or "nothing (leave `on` out)" for name in right) or "no axis of this machine"
         raise EffectError(f"a learned term at {site.value} is put on {on!r}; it can be on {there}")

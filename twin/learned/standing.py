@@ -8,15 +8,15 @@ from numpy.typing import NDArray
 
 from twin.errors import EffectError
 from twin.learned.section import LearnedSection
-from twin.learned.sites import MACHINE_READINGS, QUANTITIES, READINGS, check_place
+from twin.learned.sites import MACHINE_QUANTITIES, MACHINE_READINGS, QUANTITIES, READINGS, check_place
 from twin.learned.term import Term
 from twin.learned.words import LearnedSite
 
 Floats = NDArray[np.float64]
 Arguments = Mapping[str, Floats]
 Answer = TypeVar("Answer")
-PASSES_MAX = 8
-SETTLED = 1e-3
+PASSES_MAX = 24
+SETTLED = 1e-4
 """Change of a series, over its largest value, below which it is the same."""
 
 
@@ -36,7 +36,7 @@ def added_series(terms: Sequence[Term], arguments: Arguments) -> dict[str, Float
     """Return quantity → (n,) that the terms add to it; terms of readings add to none."""
     added: dict[str, Floats] = {}
     for term in terms:
-        for quantity, sign in QUANTITIES.get(term.site, {}).items():
+        for quantity, sign in (QUANTITIES | MACHINE_QUANTITIES).get(term.site, {}).items():
             series = sign * term.at(arguments)
             added[quantity] = added[quantity] + series if quantity in added else series
     return added

@@ -25,18 +25,20 @@ from twin.errors import EffectError
 from twin.heat.run import Warming, spindle_temperature_c, thermal_constants, thermal_quantities
 from twin.kernels.weave import quantities
 from twin.learned.arguments import around, motion_arguments, other_axes
+from twin.learned.cutting import cut_arguments, cut_series, milling_with_terms
 from twin.learned.sites import MACHINE_READINGS, READINGS
 from twin.learned.standing import axis_terms, check_terms, reading_series, settled, terms_at
 from twin.learned.words import LearnedSite
 from twin.machine import MachineFile
 from twin.process.kernel import process_quantities
-from twin.process.milling import Milling, milling_force, peak_force, tool_constants
+from twin.process.milling import Milling, tool_constants
 from twin.sensor.clock import looked_at, resampled, stamped
 from twin.sensor.reading import readings, sensor_quantities
 from twin.servo.constants import axis_constants, effect_constants
 from twin.servo.disturbance import Disturbance
 from twin.servo.kernel import axis_quantities
 from twin.servo.run import AxisInput, AxisRun, run_axes
+from twin.simulator.peaks import peaks
 from twin.spindle.load import spindle_constants, spindle_load_pct, spindle_quantities
 
 Floats = NDArray[np.float64]
@@ -185,13 +187,16 @@ class _Chain:
             effects = added_effects(self.machine, process_quantities())
             constants = tool_constants(machine.tool) | _named(effects)
             named = tuple(effects)
-            force = milling_force(
-                constants, machine.tool.teeth, milling, period_s=period_s, effects=named, reference_run=self.reference_run
-            )
+            terms = terms_at(machine.learned, {LearnedSite.CUT_FORCE})
+            arguments = self.arguments(None) | cut_arguments(milling, machine.tool.teeth) if terms else {}
+            options = {"period_s": period_s, "effects": named, "reference_run": self.reference_run}
+            series = cut_series(terms, arguments)
+            force = milling_with_terms(constants, machine.tool.teeth, milling, series, **options)
             self.columns["force_x_n"], self.columns["force_y_n"] = force.force_x_n[0], force.force_y_n[0]
             feed = 60.0 * np.hypot(milling.velocity_x_mm_s, milling.velocity_y_mm_s)
             cut = (milling.axial_depth_mm, milling.entry_angle_rad, milling.exit_angle_rad)
-            self.columns["cutting_force_peak_n"] = _peaks(constants, machine.tool.teeth, named, (milling.spindle_rpm, feed, *cut))
+            told_cut = (milling.spindle_rpm, feed, *cut)
+            self.columns["cutting_force_peak_n"] = peaks(constants, machine.tool.teeth, named, told_cut, series)
             mean = {"x": -force.mean_force_x_n[0], "y": -force.mean_force_y_n[0]}
             power_w = force.cutting_power_w()[0]
         for axis in "xy":
@@ -334,20 +339,6 @@ class _Chain:
                 for name in values:
                     if name.endswith(("_pos_mm", "_table_mm", "_torque_a")):
                         values[name] = resampled(values[name], period_of(t_s), at_s)
-
-
-def _peaks(constants: Mapping[str, float], teeth: int, effects: tuple[str, ...], cut: tuple[Floats, ...]) -> Floats:
-    """Peak force at each tick, worked out once for neighbouring ticks that cut alike to seven digits."""
-    rows = np.nan_to_num(np.array(cut))
-    places = 6 - np.floor(np.log10(np.maximum(np.abs(rows).max(axis=1, keepdims=True), 1e-30)))
-    rows = np.round(rows * 10.0**places) / 10.0**places
-    new = np.concatenate([[True], (rows[:, 1:] != rows[:, :-1]).any(axis=0)])
-    different = rows[:, new]
-    cutting = (different[2] > 0.0) & (different[0] > 0.0)
-    peaks = np.zeros(different.shape[1])
-    if cutting.any():
-        peaks[cutting] = peak_force(constants, teeth, *different[:, cutting], effects=effects)[0]
-    return np.asarray(peaks[np.cumsum(new) - 1])
 
 
 def disturbance_of(machine: MachineFile) -> Disturbance | None:

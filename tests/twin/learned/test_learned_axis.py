@@ -27,7 +27,7 @@ stribeck_velocity_mm_s = 6.0
 viscous_n_s_per_mm = 2.0
 """
 MACHINE = machine_from_toml("[machine]\nname = 'small'\n" + AXIS.format(letter="x"))
-T = np.arange(800) * 0.001
+T = np.arange(800, dtype=np.float64) * 0.001
 FORTH_AND_BACK = 10.0 * (1.0 - np.cos(2.0 * np.pi * 2.5 * T))
 TOLD = RunInput(t_s=T, reference_mm={"x": FORTH_AND_BACK})
 
