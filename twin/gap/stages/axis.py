@@ -16,6 +16,7 @@ from twin.effects.catalogue import catalogue, effect_named
 from twin.effects.effect import Effect, Guesses, On, Recorded, called
 from twin.gap.diagnosis import Effected
 from twin.gap.stages.axis_run import OUTPUTS, AxisRunData
+from twin.gap.stages.axis_terms import readings_of_terms, series_of_terms
 from twin.gap.stages.free import Free, constant
 from twin.gap.stages.observed_through import Sensing, Values, seen_late
 from twin.gap.stages.stage import Model, Observed, observed_of
@@ -34,6 +35,7 @@ BLOCK_S = 0.5
 COURSES = 2
 """Pairs of courses, each with its opposite."""
 LANES = 32
+TICKS_TOGETHER = 4
 FACTORS = ("mass_kg", "newton_per_command", "coulomb_n", "static_n", "stribeck_velocity_mm_s", "viscous_n_s_per_mm")
 
 
@@ -75,8 +77,10 @@ class AxisStage:
 
     @property
     def averaged(self) -> int:
-        """A loop does little within 4 ms."""
-        return 4
+        """Return the samples of 4 ticks: a loop does little in so short a time."""
+        known = [np.flatnonzero(np.isfinite(o.measured)) for o in self.observed if o.fitted]
+        every = np.median(np.concatenate([np.diff(k) for k in known] or [np.ones(1)]))
+        return max(1, round(TICKS_TOGETHER / float(every))) if np.isfinite(every) else 1
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -148,6 +152,7 @@ class AxisStage:
         for output in self.outputs:
             sensing = Sensing.of(values, f"{self.letter}_{output}")
             modelled = sensing.readings(outputs[output], self.period_s)
+            modelled = modelled + readings_of_terms(model, theta, f"{self.letter}_{output}", data)
             shown.append(self._grown(modelled, values, data) if output == "table_mm" else modelled)
         at = {output: i for i, output in enumerate(self.outputs)}
         if "table_mm" in at and "pos_mm" in at:
@@ -179,7 +184,8 @@ class AxisStage:
         for stretch in data.stretches():
             start = self._start(values, constants, data, stretch, lanes) | carried
             reference = self._seen_reference(values, data, stretch, lanes)
-            run, many = self._run(constants, reference, data, courses, stretch, start)
+            added = series_of_terms(model, theta, self.letter, data.arguments, stretch)
+            run, many = self._run(constants, reference, data, courses, stretch, start, added)
             for output in self.outputs:
                 whole = run.outputs[OUTPUTS[output]]
                 mean = whole.reshape(-1, many, whole.shape[1]).mean(axis=1)[:lanes]
@@ -200,7 +206,9 @@ class AxisStage:
         courses: Floats,
         stretch: slice,
         start: Mapping[str, Floats],
+        added: Mapping[str, Floats],
     ) -> tuple[AxisRun, int]:
+        """Run the lanes over one stretch, each over all courses; added: quantity → (lanes, ticks), put on top of it."""
         lanes = len(next(iter(constants.values())))
         many = len(courses)
         ticks = len(data.t_s[stretch])
@@ -208,9 +216,9 @@ class AxisStage:
         index = np.minimum(np.arange(fill) // many, lanes - 1)
         known = np.zeros(ticks) if data.disturbance_n is None else data.disturbance_n[stretch]
         force = known[None, :] + courses[:, stretch]
-        own = reference.ndim == 2
-        if own:  # each lane sees a reference of its own
-            columns = np.repeat(reference, many, axis=0)
+        own = reference.ndim == 2 or bool(added)
+        if own:  # each lane sees a reference of its own, or is pushed by a term of its own
+            columns = np.repeat(np.broadcast_to(reference, (lanes, ticks)), many, axis=0)
             force = np.tile(force, (lanes, 1))
             column = np.minimum(np.arange(fill), lanes * many - 1)
         else:
@@ -218,7 +226,7 @@ class AxisStage:
             column = np.arange(fill) % many
         run = run_axes(
             {name: value[index] for name, value in constants.items()},
-            AxisInput(columns, column, force),
+            AxisInput(columns, column, force, added={name: np.repeat(values, many, axis=0) for name, values in added.items()}),
             period_s=self.period_s,
             effects=tuple(e.name for e in axis_effects()),
             outputs=("position_mm", "torque_a", "table_mm"),
