@@ -25,7 +25,7 @@ class AxisPhysics(NamedTuple):
     N, mm, s, A, kg. cable_n_per_mm is of the chain, spot_* of a place with more friction, wait_* of a breakaway force that grows
     at rest, fade of a drive that weakens as it is loaded, leak_per_s the rate at which the controller forgets its integral.
     compensation_a is fed forward against friction by the direction of the reference (over 1 mm/s), filter_s the time constant
-    of a filter of the reference, outer_integral 1 where the position's error is integrated and not the velocity's.
+    of a filter of the reference, outer_per_s the integral of the position loop by its proportional part.
     """
 
     mass_kg: float
@@ -57,7 +57,7 @@ class AxisPhysics(NamedTuple):
     delay_s: float = 0.0
     compensation_a: float = 0.0
     filter_s: float = 0.0
-    outer_integral: float = 0.0
+    outer_per_s: float = 0.0
     spot_n: float = 0.0
     spot_mm: float = 0.0
     spot_width_mm: float = 1.0
@@ -161,16 +161,16 @@ def run(
     at its reference; out: (3, n) position of the motor, torque, position of the table, at the ticks."""
     period, h = 0.001, 0.001 / STEPS
     x, v, z, integral = reference[0], 0.0, 0.0, 0.0
-    wanted, follow = reference[0], 1.0 - exp(-period / p.filter_s) if p.filter_s > 0.0 else 1.0
+    outer, wanted, follow = 0.0, reference[0], 1.0 - exp(-period / p.filter_s) if p.filter_s > 0.0 else 1.0
     rest_s, warmth, heat = 10.0, 0.0, 0.0
     engaged, wind, wind_speed = x, 0.0, 0.0
     screw_rate = sqrt(1000.0 * p.screw_n_per_mm / (0.7 * p.mass_kg)) if p.screw_n_per_mm > 0.0 else 0.0
     for tick in range(-hold, len(reference)):
         now = max(tick, 0)
         wanted = wanted + follow * (reference[now] - wanted) if p.filter_s > 0.0 else reference[now]
-        error = p.position_gain * (wanted - x) + p.velocity_forward * forward_velocity[now] - v
-        summed = p.position_gain * (wanted - x) if p.outer_integral != 0.0 else error
-        integral += (p.integral_gain * summed - p.leak_per_s * integral) * period
+        outer += p.outer_per_s * (wanted - x) * period
+        error = p.position_gain * (wanted - x + outer) + p.velocity_forward * forward_velocity[now] - v
+        integral += (p.integral_gain * error - p.leak_per_s * integral) * period
         integral = min(max(integral, -p.limit_a), p.limit_a)
         torque = p.velocity_gain * error + integral
         if p.compensation_a != 0.0:

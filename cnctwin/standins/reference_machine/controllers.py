@@ -5,18 +5,12 @@ may be hundreds of floors, and not scaled.
 """
 
 from cnctwin.standins.reference_machine.effect import AXES, Chance, Effect, between
-from cnctwin.standins.reference_machine.physics import Physics
 
 MOTION = ("air", "cut")
 
 
 def _ticks(chance: Chance) -> dict[str, float]:
     return {"delay_s": 0.001 * float(chance.integers(1, 3))}
-
-
-def _compensated(physics: Physics, on: str, share: float) -> dict[str, float]:
-    axis = physics.axes[on]
-    return {"compensation_a": share * axis.coulomb_n / axis.newton_per_a}
 
 
 STRUCTURES = (
@@ -33,15 +27,15 @@ STRUCTURES = (
         lambda x, on, p: x.with_axis(on, delay_s=p["delay_s"]), in_controller=True,
     ),
     Effect(
-        "friction_compensation", AXES, MOTION, between(share=(0.4, 0.9)), lambda _, t: t,
-        lambda x, on, p: x.with_axis(on, **_compensated(x, on, p["share"])), in_controller=True,
+        "friction_compensation", AXES, MOTION, between(torque_a=(0.15, 0.5)), lambda _, t: t,
+        lambda x, on, p: x.with_axis(on, compensation_a=p["torque_a"]), in_controller=True,
     ),
     Effect(
         "reference_filter", AXES, MOTION, between(time_constant_s=(0.003, 0.02)), lambda _, t: t,
         lambda x, on, p: x.with_axis(on, filter_s=p["time_constant_s"]), in_controller=True,
     ),
     Effect(
-        "position_integral", AXES, MOTION, lambda _: {}, lambda _, t: t,
-        lambda x, on, _: x.with_axis(on, outer_integral=1.0), in_controller=True,
+        "position_integral", AXES, MOTION, between(gain_per_s=(1.0, 6.0)), lambda _, t: t,
+        lambda x, on, p: x.with_axis(on, outer_per_s=p["gain_per_s"]), in_controller=True,
     ),
 )  # fmt: skip

@@ -95,7 +95,7 @@ def test_a_draw_has_the_shares_of_the_protocol_and_every_effect() -> None:
 
 def test_effects_bear_the_names_and_parameters_of_the_catalogue_or_none_of_them() -> None:
     chance = np.random.default_rng(1)
-    for effect in NAMED:
+    for effect in (*NAMED, *STRUCTURES):
         known = {p.name for p in effect_named(effect.name).parameters}
         assert set(effect.parameters(1.0, effect.traits(chance))) <= known
         assert set(effect.exact) <= known

@@ -88,7 +88,7 @@ def test_a_filtered_reference_trails_by_its_time_constant() -> None:
 
 def test_an_integral_of_the_position_leaves_no_error_at_constant_speed() -> None:
     long = np.maximum(np.arange(3 * TICKS) - 100.0, 0.0) * 0.02
-    motor, _, _ = ran(NOMINAL._replace(outer_integral=1.0), long)
+    motor, _, _ = ran(NOMINAL._replace(outer_per_s=8.0), long)
     assert long[-1] - motor[-1] == pytest.approx(0.0, abs=1e-3)
     plain, _, _ = ran(NOMINAL, long)
     assert long[-1] - plain[-1] == pytest.approx(20.0 / 40.0, rel=1e-3)
