@@ -14,8 +14,10 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from twin.errors import MachineError
 from twin.gcode import Settings
+from twin.learned.section import LEARNED, LearnedSection
 from twin.machine_control import ControlSection
-from twin.rotary import outside_name, outside_text, tables_inside
+from twin.rotary import outside_name, outside_text
+from twin.rotary_tables import tables_inside
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
@@ -249,6 +251,19 @@ class MachineFile(Section):
     uncertainty: dict[str, NotNegative] = Field(default_factory=lambda: {"relative": 0.05})
     noise: dict[str, NotNegative] = Field(default_factory=dict)
     effects: tuple[AddedEffect, ...] = ()
+    learned: tuple[LearnedSection, ...] = ()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _learned_terms_stand_apart(cls, given: Any) -> Any:
+        """Take the learned terms out of [[effects]]: whatever goes through the effects finds those of the catalogue only."""
+        if not isinstance(given, dict) or not isinstance(given.get("effects"), list | tuple):
+            return given
+        learned = [entry for entry in given["effects"] if _is_learned(entry)]
+        return given | {
+            "effects": [entry for entry in given["effects"] if not _is_learned(entry)],
+            "learned": [*given.get("learned", ()), *learned],
+        }
 
     @property
     def rotary(self) -> frozenset[str]:
@@ -271,15 +286,18 @@ def machine_from_toml(text: str, source: str = "machine.toml") -> MachineFile:
 
     Raises MachineError naming source, key, value and what would be right: the first fault, and how many more there are.
     """
+    raw: dict[str, Any] = {}
     try:
-        tables = tomllib.loads(text)
-        return MachineFile.model_validate(tables_inside(tables))
+        raw = tomllib.loads(text)
+        if LEARNED in raw:
+            raise MachineError(f'{LEARNED} is not known; a learned term is one of [[effects]], with effect = "{LEARNED}"')
+        return MachineFile.model_validate(tables_inside(raw))
     except tomllib.TOMLDecodeError as error:
         raise MachineError(f"{source}: is not TOML: {error}") from None
     except ValidationError as error:
         # a key that is not known comes first: the one that is missing is most likely the same, misspelt
-        first, *rest = sorted(_as_written(tables, error), key=lambda fault: fault["type"] != "extra_forbidden")
-        key = ".".join(str(part) for part in first["loc"])
+        first, *rest = sorted(_as_written(raw, error), key=lambda fault: fault["type"] != "extra_forbidden")
+        key = ".".join(str(part) for part in _in_file(first["loc"], raw))
         more = f" (and {len(rest)} more)" if rest else ""
         if first["type"] == "extra_forbidden":
             raise MachineError(f"{source}: {key} is not known; docs/machine.md lists what is{more}") from None
@@ -303,6 +321,18 @@ def _as_written(tables: dict[str, Any], error: ValidationError) -> list[dict[str
             fault["loc"] = (*place[:-1], outside_name(str(place[-1]))[0])
             fault["msg"] = outside_text(fault["msg"], {str(place[1])}, ())
     return faults
+
+
+def _is_learned(entry: Any) -> bool:
+    return isinstance(entry, LearnedSection) or (isinstance(entry, dict) and entry.get("effect") == LEARNED)
+
+
+def _in_file(place: tuple[int | str, ...], raw: dict[str, Any]) -> tuple[int | str, ...]:
+    """The place of a fault as the file counts: learned terms stand among the effects there."""
+    if len(place) < 2 or place[0] not in ("effects", LEARNED) or not isinstance(place[1], int):
+        return place
+    alike = [number for number, entry in enumerate(raw["effects"]) if _is_learned(entry) is (place[0] == LEARNED)]
+    return ("effects", alike[place[1]], *place[2:])
 
 
 def _shown(value: Any) -> str:
