@@ -18,6 +18,7 @@ from twin.gap.experiment.what_next import what_next
 from twin.gap.inspection import inspected, slow_effects
 from twin.gap.intervals import closure_interval
 from twin.gap.joined import joined
+from twin.gap.naming.constants import moved_constants
 from twin.gap.null import NULL, Null
 from twin.gap.patterns import patterns
 from twin.gap.programs.diagnose import diagnose_programs
@@ -91,10 +92,11 @@ def _motion(
     shares = shapley(causes, lambda some: _closed(ground, stages, twins, some))
     traces = traces_of(twins.runs, twins.shown["before"], twins.shown["after"], ground.floors)
     numbers, verdict, named = _numbers(twins), overall(stages), causes_of(stages, shares)
+    constants = moved_constants(ground.machine, [stage.explained for stage in stages])
     progress("what next")
     diagnosis = Diagnosis(
         verdict=verdict,
-        sentence=sentence_of(verdict, stages, named, numbers),
+        sentence=sentence_of(verdict, stages, named, numbers, constants),
         where=where(traces),
         where_after=(left := where(traces, after=True)),
         patterns=patterns(traces, {run.name: run.log for run in twins.runs}, ground.machine),
@@ -106,6 +108,7 @@ def _motion(
         next_experiment=what_next(ground, twins.before, twins.after, stages, left),
         notes=notes + _flattering(checked, twins.runs),
         seconds=0.0,
+        constants=constants,
     )
     known: dict[str, float] = {}
     for stage in stages:

@@ -74,13 +74,25 @@ class Fitted:
 
 def left_by(stage: Stage, model: Model, theta: Floats, *, fitted: bool) -> Left:
     """What the hypothesis at θ leaves on the runs that are fitted, or on the others; where there are none, on the fitted."""
+    return lefts_by(stage, model, theta[None, :], fitted=fitted)[0]
+
+
+def lefts_by(stage: Stage, model: Model, theta: Floats, *, fitted: bool) -> tuple[Left, ...]:
+    """The same at each row of θ, (lanes, p)."""
+    judging = any(not o.fitted and np.isfinite(o.measured).any() for o in stage.observed)
+    runs = [i for i, o in enumerate(stage.observed) if o.fitted is (fitted or not judging)]
+    shown = {i: stage.predict(model, theta, i) for i in runs}
+    return tuple(_left(stage, {i: lanes[lane] for i, lanes in shown.items()}, fitted) for lane in range(len(theta)))
+
+
+def _left(stage: Stage, shown: dict[int, Floats], fitted: bool) -> Left:
+    """What is left by what a hypothesis shows: number of the run → (n,)."""
     signals = tuple(dict.fromkeys(s for o in stage.observed for s in o.signals))
     squares, counts = [], []
     cells, cell_counts = np.zeros((len(signals), REGIMES_MAX)), np.zeros((len(signals), REGIMES_MAX))
-    judging = any(not o.fitted and np.isfinite(o.measured).any() for o in stage.observed)
     for number, observed in enumerate(stage.observed):
-        if observed.fitted is (fitted or not judging):
-            residual = (stage.predict(model, theta[None, :], number)[0] - observed.measured) / observed.floor
+        if number in shown:
+            residual = (shown[number] - observed.measured) / observed.floor
             if fitted:  # the mean of repeated runs is quieter than one of them
                 residual = residual * observed.floor / observed.sigma
             one, count = _by_block(observed, residual, signals)
