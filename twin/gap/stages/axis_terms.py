@@ -1,6 +1,6 @@
 """Learned terms of an axis as series: put on top of a quantity of its loops, or of what a sensor reads."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 from twin.gap.stages.axis_run import AxisRunData
 from twin.gap.stages.stage import Model
 from twin.learned.words import LearnedSite
+from twin.machine import Axis
+from twin.servo.constants import axis_constants
 
 Floats = NDArray[np.float64]
 QUANTITIES = {
@@ -23,6 +25,29 @@ READINGS = {
     LearnedSite.TORQUE_READING: "torque_a",
 }
 """Site → column, without the letter, whose reading a term there is added to."""
+FRICTION_PART = 0.1
+FLOORS = 3.0
+SITES = {
+    "pos_mm": (LearnedSite.AXIS_FORCE, LearnedSite.FRICTION, LearnedSite.CONTROLLER),
+    "torque_a": (LearnedSite.AXIS_FORCE, LearnedSite.FRICTION, LearnedSite.CONTROLLER, LearnedSite.TORQUE_READING),
+    "table_mm": (LearnedSite.TABLE_POSITION, LearnedSite.TABLE_READING),
+}
+"""Output → the sites whose terms it shows."""
+
+
+def sites_of_terms(letter: str, outputs: Sequence[str]) -> dict[LearnedSite, tuple[str, ...]]:
+    """Return the sites of an axis whose terms these outputs show, each with what it is on."""
+    return {site: (letter,) for output in outputs for site in SITES[output]}
+
+
+def size_of_terms(site: LearnedSite, axis: Axis, data: AxisRunData) -> float:
+    """Return the size of a small term: a part of the friction, or a few floors of what is read."""
+    output = READINGS.get(site, "table_mm" if site is LearnedSite.TABLE_POSITION else "")
+    if output in data.floor:
+        return FLOORS * float(np.median(data.floor[output]))
+    constants = axis_constants(axis)
+    friction_n = FRICTION_PART * constants["coulomb_plus_n"]
+    return friction_n / constants["newton_per_command"] if site is LearnedSite.CONTROLLER else friction_n
 
 
 def series_of_terms(model: Model, theta: Floats, letter: str, arguments: Mapping[str, Floats], where: slice) -> dict[str, Floats]:
@@ -33,6 +58,9 @@ def series_of_terms(model: Model, theta: Floats, letter: str, arguments: Mapping
             series = term.series(theta[:, place], {c: arguments[c][where] for c in term.knots.columns})
             for quantity, sign in QUANTITIES[term.site].items():
                 added[quantity] = added.get(quantity, 0.0) + sign * series
+    if added:  # all of them, so that any terms together run on one kernel
+        none = np.zeros_like(next(iter(added.values())))
+        added = {quantity: added.get(quantity, none) for own in QUANTITIES.values() for quantity in own}
     return added
 
 
