@@ -104,7 +104,7 @@ def _motion(
         not_observable=not_observable_of(checked, stages, without),
         not_identifiable=not_identifiable_of(stages),
         next_experiment=what_next(ground, twins.before, twins.after, stages, left),
-        notes=notes + _flattering(checked, twins.runs),
+        notes=notes + ground.floors.notes + _flattering(checked, twins.runs),
         seconds=0.0,
     )
     known: dict[str, float] = {}

@@ -133,6 +133,18 @@ def white_noise(values: Floats) -> float:
     return float(np.median(np.abs(second - np.median(second))) * 1.482602218505602 / np.sqrt(6.0))
 
 
+def resolution(values: Floats) -> float:
+    """The step of a signal that is read in steps: the smallest between two of its values; 0 where all are one.
+
+    >>> round(resolution(np.array([0.02, 0.02, 0.05, 0.03])), 6)
+    0.01
+    """
+    levels = np.unique(values[np.isfinite(values)])
+    steps = np.diff(levels)
+    steps = steps[steps > 1e-7 * float(np.max(np.abs(levels), initial=0.0))]
+    return float(steps.min()) if len(steps) else 0.0
+
+
 NOISE_KEYS = {
     **{"pos_mm": "position_mm", "table_mm": "table_mm", "torque_a": "torque_a", "force_x_n": "force_n", "force_y_n": "force_n"},
     **{"spindle_load_pct": "spindle_load_pct", "spindle_temp_c": "spindle_temp_c"},
@@ -140,9 +152,12 @@ NOISE_KEYS = {
 
 
 def noise_of(machine: MachineFile, log: RunLog, column: str) -> float:
-    """Noise of the sensor of a column: as the machine states it, else from the recording, never quite 0."""
+    """Noise of the sensor of a column: as the machine states it, else from the recording, never quite 0.
+
+    Where most samples of a recording repeat the one before, its resolution r is the noise: r / √12.
+    """
     key = NOISE_KEYS.get(column) or NOISE_KEYS.get(column.partition("_")[2], column)
     stated = machine.noise.get(key)
-    found = stated if stated is not None else white_noise(log[column])
+    found = stated if stated is not None else white_noise(log[column]) or resolution(log[column]) / np.sqrt(12.0)
     scale = float(np.nanmax(np.abs(log[column]))) if len(log) else 1.0
     return max(found, 1e-9 * max(scale, 1.0))

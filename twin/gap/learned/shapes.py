@@ -81,11 +81,11 @@ def knots_of(column: str, low: float, high: float, count: int = PLAIN) -> Floats
     [-100.0, -25.0, 0.0, 25.0, 100.0]
     """
     if column in PERIODS:
-        return np.arange(count) * (PERIODS[column] / count)
+        return np.asarray(np.arange(count) * (PERIODS[column] / count), dtype=np.float64)
     if column in ("direction", "coolant_on"):
         return np.array([low, high])
     if column.endswith("velocity_mm_s"):
         side = np.linspace(-1.0, 1.0, count + 1 - count % 2) if low < 0.0 < high else np.linspace(0.0, 1.0, count)
         reach = max(abs(low), abs(high))
         return np.asarray(np.sign(side) * side**2 * reach if low < 0.0 else np.sign(high) * side**2 * reach)
-    return np.asarray(np.linspace(low, high, count), dtype=np.float64)
+    return np.linspace(low, high, count)

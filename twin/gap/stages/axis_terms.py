@@ -7,24 +7,14 @@ from numpy.typing import NDArray
 
 from twin.gap.stages.axis_run import AxisRunData
 from twin.gap.stages.stage import Model
+from twin.learned.sites import QUANTITIES, READINGS
+from twin.learned.standing import added_series, reading_series
+from twin.learned.term import Term
 from twin.learned.words import LearnedSite
 from twin.machine import Axis
 from twin.servo.constants import axis_constants
 
 Floats = NDArray[np.float64]
-QUANTITIES = {
-    LearnedSite.AXIS_FORCE: {"external_force_n": 1.0},
-    LearnedSite.FRICTION: {"friction_n": 1.0, "breakaway_n": 1.0},
-    LearnedSite.CONTROLLER: {"torque_command_a": 1.0},
-    LearnedSite.TABLE_POSITION: {"table_mm": 1.0},
-}
-"""Site → quantities of the axis kernel that a term there is added to, with its sign: a force of + pushes towards +."""
-READINGS = {
-    LearnedSite.POSITION_READING: "pos_mm",
-    LearnedSite.TABLE_READING: "table_mm",
-    LearnedSite.TORQUE_READING: "torque_a",
-}
-"""Site → column, without the letter, whose reading a term there is added to."""
 FRICTION_PART = 0.1
 FLOORS = 3.0
 SITES = {
@@ -50,9 +40,15 @@ def size_of_terms(site: LearnedSite, axis: Axis, data: AxisRunData) -> float:
     return friction_n / constants["newton_per_command"] if site is LearnedSite.CONTROLLER else friction_n
 
 
-def series_of_terms(model: Model, theta: Floats, letter: str, arguments: Mapping[str, Floats], where: slice) -> dict[str, Floats]:
-    """Return quantity → (lanes, ticks) of the terms on an axis over a stretch, added up; empty where there is none."""
-    added: dict[str, Floats] = {}
+def series_of_terms(
+    model: Model, theta: Floats, letter: str, arguments: Mapping[str, Floats], where: slice, standing: Sequence[Term] = ()
+) -> dict[str, Floats]:
+    """Return quantity → (lanes, ticks) of the terms on an axis over a stretch, added up; empty where there is none.
+
+    standing: those that the machine has already
+    """
+    known = added_series(standing, {c: v[where] for c, v in arguments.items()}) if standing else {}
+    added = {quantity: np.tile(series, (len(theta), 1)) for quantity, series in known.items()}
     for term, place in model.term_places():
         if term.on == letter and term.site in QUANTITIES:
             series = term.series(theta[:, place], {c: arguments[c][where] for c in term.knots.columns})
@@ -64,9 +60,17 @@ def series_of_terms(model: Model, theta: Floats, letter: str, arguments: Mapping
     return added
 
 
-def readings_of_terms(model: Model, theta: Floats, signal: str, data: AxisRunData) -> Floats | float:
-    """Return what the terms on a signal add to its reading over all stretches, (lanes, n); 0 where there is none."""
+def readings_of_terms(
+    model: Model, theta: Floats, signal: str, data: AxisRunData, standing: Sequence[Term] = ()
+) -> Floats | float:
+    """Return what the terms on a signal add to its reading over all stretches, (lanes, n) or (n,); 0 where there is none.
+
+    standing: those that the machine has already
+    """
+    known = reading_series(standing, signal, data.arguments)
     total: Floats | float = 0.0
+    if known is not None:
+        total = known[np.concatenate([np.arange(len(data.t_s))[s] for s in data.stretches()])]
     for term, place in model.term_places():
         if READINGS.get(term.site) == signal.partition("_")[2] and term.on in (signal, signal.partition("_")[0]):
             where = np.concatenate([np.arange(len(data.t_s))[s] for s in data.stretches()])

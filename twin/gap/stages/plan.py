@@ -9,19 +9,23 @@ from numpy.typing import NDArray
 from twin.case import Case, Run, RunKind
 from twin.effects.catalogue import effect_named
 from twin.gap.diagnosis import Effected, Verdict
+from twin.gap.dynamometer.turn_run import TurnRun
 from twin.gap.floors import Floors, repeatability
 from twin.gap.null import NULL, Null
 from twin.gap.search import Explained, explain
 from twin.gap.stages.axis import AxisStage, axis_constants_free, standing_of
 from twin.gap.stages.axis_run import AxisRunData, axis_run_data, repeated_groups
 from twin.gap.stages.cut import CutStage, cut_runs
-from twin.gap.stages.disturbance import disturbance_of_repeats
+from twin.gap.stages.disturbance import disturbance_of_repeats, expected_spread
 from twin.gap.stages.heat import HeatStage, heat_runs
 from twin.gap.stages.stage import Stage
+from twin.gap.stages.turns import TurnStage, turn_data
 from twin.gap.verdict import judged
+from twin.learned.standing import axis_terms
 from twin.machine import MachineFile
 from twin.runlog import RunLog
 from twin.servo.disturbance import Disturbance
+from twin.simulator.response import disturbance_of
 from twin.sites import Site
 
 Floats = NDArray[np.float64]
@@ -45,19 +49,26 @@ class Ground:
 
 
 def ground_of(case: Case, left_out: frozenset[str]) -> Ground:
-    """Floors and disturbance of a case, from its repeated runs."""
+    """Floors and disturbance of a case: from its repeated runs, without them as the machine states the disturbance."""
     machine = case.machine
     recorded = tuple(run for run in case.runs if run.entry.kind is not RunKind.PROGRAM)
-    floors = repeatability(recorded, case.repeats(), machine)
+    # mean turns bring their own floor
+    by_run = tuple(run for run in recorded if not isinstance(run, TurnRun))
+    pairs = tuple(pair for pair in case.repeats() if not any(isinstance(run, TurnRun) for run in pair))
+    floors = repeatability(by_run, pairs, machine) if by_run else Floors(machine, {})
     # what was recorded while the twin was right says how well the machine repeats, and nothing of what is wrong now
     runs = tuple(run for run in recorded if not run.entry.healthy) or recorded
     seen: dict[str, tuple[str, RunLog, AxisRunData]] = {}
-    for one, _ in case.repeats():
+    for one in [one for one, _ in case.repeats()] or recorded:
         for letter in machine.axes:
             data = axis_run_data((one,), letter, floors, None, True)
             if letter not in seen and data is not None:
                 seen[letter] = (letter, one.log, data)
-    disturbance, spread = disturbance_of_repeats(machine, list(seen.values()), floors)
+    if case.repeats():
+        disturbance, spread = disturbance_of_repeats(machine, list(seen.values()), floors)
+    else:
+        disturbance = disturbance_of(machine)
+        spread = expected_spread(machine, list(seen.values()), disturbance) if disturbance else {}
     if disturbance is not None:
         noise = {"disturbance_force_n": disturbance.force_n, "disturbance_correlation_s": disturbance.correlation_s}
         machine = machine.model_copy(update={"noise": dict(machine.noise) | noise})
@@ -74,6 +85,9 @@ def explained_stages(ground: Ground, progress: Progress, side_by_side: SideBySid
         if stage.candidates:
             found.append(explain(stage, null=null, progress=progress))
             forces = _pushes(stage, found[0])
+    turning = turn_data(ground.runs)
+    if any(run.fitted for run in turning):
+        found.append(explain(TurnStage(ground.machine, turning, ground.left_out), null=null, progress=progress))
     stages: list[Stage] = [s for letter in ground.machine.axes if (s := axis_stage(ground, letter, forces)) is not None]
     warmups = heat_runs(ground.machine, tuple(r for r in ground.runs if not r.log.axes()))
     if any(run.fitted for run in warmups):
@@ -127,6 +141,7 @@ def axis_stage(ground: Ground, letter: str, forces: dict[str, dict[str, Floats]]
         ground.disturbance,
         ground.left_out,
         standing,
+        terms=axis_terms(machine.learned, letter),
     )
 
 
