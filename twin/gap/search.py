@@ -102,7 +102,7 @@ def explain(stage: Stage, *, null: Null = NULL, progress: Callable[[str], None] 
         best, beyond = instead[0], False
         rivals[best.effects[0]] = tuple(other.effects[0] for other in instead[1:])
     several = len(best.effects) > 1
-    evidence = {e: advantage(_dropped(stage, best, e).left if several else base.left, best.left) for e in best.effects}
+    evidence = {e: advantage(dropped(stage, best, e).left if several else base.left, best.left) for e in best.effects}
     return Explained(stage, base, best, first, {e: r for e, r in rivals.items() if e in best.effects}, evidence, beyond)
 
 
@@ -231,7 +231,7 @@ def _swapped(stage: Stage, best: Fitted, first: tuple[Tried, ...]) -> Fitted:
 def _pruned(stage: Stage, best: Fitted, null: Null) -> Fitted:
     """Without the effects that the others have made needless."""
     for effected in best.effects[:-1]:
-        without = _dropped(stage, best, effected)
+        without = dropped(stage, best, effected)
         if not null.exceeded(effected, advantage(without.left, best.left), stage.healthy_rms):
             best = without
     return best
@@ -243,8 +243,8 @@ def _is_a_second_name(base: Fitted, before: Fitted, best: Fitted, first: tuple[T
     return alone is not None and only_completes(base.left, before.left, alone.left, best.left)
 
 
-def _dropped(stage: Stage, best: Fitted, effected: Effected) -> Fitted:
-    """The hypothesis without one of its effects, refitted."""
+def dropped(stage: Stage, best: Fitted, effected: Effected) -> Fitted:
+    """Return the hypothesis without one of its effects, refitted."""
     place = dict(best.model.places())[effected]
     theta = np.delete(best.theta, np.arange(place.start, place.stop))
     scale = np.maximum(best.left_fit.rms(), 1.0)
