@@ -50,6 +50,11 @@ class AxisRunData:
         motion = motion_arguments(self.t_s, self.reference_mm) | {"position_mm": position, "torque_a": torque, "t_s": self.t_s}
         return dict(self.around) | motion | other_axes(self.t_s, self.others)
 
+    @property
+    def period_s(self) -> float:
+        """Between samples, s."""
+        return float(self.t_s[1] - self.t_s[0])
+
     def stretches(self) -> tuple[slice, ...]:
         """Of motion."""
         return motion_stretches(self.t_s, self.reference_mm)
