@@ -145,9 +145,10 @@ class AxisStage:
         outputs = self.simulate(model, theta, data)
         values = model.values(theta)
         shown = []
+        starts = np.cumsum([0, *(stretch.stop - stretch.start for stretch in data.stretches())])[:-1].tolist()
         for output in self.outputs:
             sensing = Sensing.of(values, f"{self.letter}_{output}")
-            modelled = sensing.readings(outputs[output], self.period_s)
+            modelled = sensing.readings(outputs[output], self.period_s, starts)
             shown.append(self._grown(modelled, values, data) if output == "table_mm" else modelled)
         at = {output: i for i, output in enumerate(self.outputs)}
         if "table_mm" in at and "pos_mm" in at:
