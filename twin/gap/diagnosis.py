@@ -160,6 +160,68 @@ class NextExperiment:
 
 
 @dataclass(frozen=True, slots=True)
+class Subsystem:
+    """A part of the machine compared alone, driven by what was measured at its input.
+
+    subsystem: `x controller`, `x mechanics`, `x table`, `cut`, `spindle load`, `heat`, `program`, `clock`
+    driven_by: the columns that drive it; compared: the column it answers with; before, after: rms over the floor
+    causes: the names found there
+    """
+
+    subsystem: str
+    driven_by: tuple[str, ...]
+    compared: str
+    before: float
+    after: float
+    verdict: Verdict
+    causes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class MovedConstant:
+    """A constant of the machine that takes up a part of the gap.
+
+    name: its path in machine.toml; deviations: stated standard deviations from stated to found; closure: of the gap as stated
+    """
+
+    name: str
+    stated: float
+    found: float
+    deviations: float
+    closure: float
+
+
+@dataclass(frozen=True, slots=True)
+class LooksLike:
+    """A catalogue effect that is near a learned term, and why it is not its name."""
+
+    effect: str
+    on: str
+    why_not: str
+
+
+@dataclass(frozen=True, slots=True)
+class Learned:
+    """A term that was found and is in no catalogue: a description, not a cause (formats, section 6).
+
+    closure: of the gap that is left without it, on runs that were not fitted, with its 90 % interval
+    table: argument columns, then `value`, `low`, `high`, all of one length, a knot a row (`twin.learned.term`)
+    """
+
+    site: str
+    on: str
+    unit: str
+    depends_on: tuple[str, ...]
+    repeats: bool
+    closure: float
+    closure_low: float
+    closure_high: float
+    table: Mapping[str, tuple[float | str, ...]]
+    looks_like: tuple[LooksLike, ...]
+    sentence: str
+
+
+@dataclass(frozen=True, slots=True)
 class Diagnosis:
     """The answer. sentence: the verdict in one; notes: what else was found on the way, a sentence each."""
 
@@ -176,6 +238,9 @@ class Diagnosis:
     next_experiment: NextExperiment | None
     notes: tuple[str, ...]
     seconds: float
+    subsystems: tuple[Subsystem, ...] = ()
+    constants: tuple[MovedConstant, ...] = ()
+    learned: tuple[Learned, ...] = ()
 
     def to_json(self) -> str:
         """As `diagnosis.json`; a figure that there is none of is null."""

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.case import Run
+from twin.gap.dynamometer.turn_run import SPREAD
 from twin.gap.labels import measured_signals, regimes_of
 from twin.gap.significance import correlation_time
 from twin.machine import MachineFile
@@ -60,6 +61,8 @@ class Floors:
 
     def of(self, log: RunLog, signal: str) -> Floats:
         """The floor of each sample of a signal, (n,)."""
+        if log.has(f"{signal}{SPREAD}"):  # mean turns bring their own
+            return log[f"{signal}{SPREAD}"]
         noise = noise_of(self.machine, log, signal)
         floor = np.full(len(log), noise)
         for regime, here in regimes_of(log, signal, self.machine):

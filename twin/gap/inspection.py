@@ -13,8 +13,10 @@ from twin.case import Case, Run, RunAtHand, RunKind
 from twin.effects.catalogue import catalogue
 from twin.errors import CaseError, RunLogError
 from twin.gap.at_odds import with_known_cut, without_axes_at_odds
+from twin.gap.dynamometer.cutting import is_of_forces_alone
+from twin.gap.dynamometer.turn_run import TurnRun, turn_run
 from twin.gap.labels import measured_signals
-from twin.gap.servo_ticks import SlowRun, on_servo_ticks
+from twin.gap.sampling.servo_ticks import SlowRun, on_servo_ticks
 from twin.gap.stages.cut import cut_runs
 from twin.gap.stages.heat import heat_runs
 from twin.machine import MachineFile
@@ -69,11 +71,15 @@ def _comparable(run: Run, machine: MachineFile) -> bool:
         log.has(f"{a}_ref_mm") and any(log.has(f"{a}_{measured}") for measured in ("pos_mm", "table_mm", "torque_a"))
         for a in machine.axes
     )
-    return axes or bool(cut_runs(machine, (run,))) or bool(heat_runs(machine, (run,)))
+    return axes or isinstance(run, TurnRun) or bool(cut_runs(machine, (run,))) or bool(heat_runs(machine, (run,)))
 
 
 def _usable(run: Run, machine: MachineFile, notes: list[str]) -> Run:
     log = _cleaned(run, notes)
+    if is_of_forces_alone(log):
+        turned = turn_run(run, log, machine, notes)
+        if turned is not None or not log.axes():
+            return turned or RunAtHand(run.entry, run.folder, log)
     if not log.axes():
         if len(log) < ROWS_MIN:
             raise RunLogError(f"{run.name}: has {len(log)} rows; a warm-up of less than {ROWS_MIN} says nothing")
@@ -87,7 +93,7 @@ def _usable(run: Run, machine: MachineFile, notes: list[str]) -> Run:
     log = without_axes_at_odds(run, log, notes)
     if not log.axes():
         return RunAtHand(run.entry, run.folder, log)
-    ticked = on_servo_ticks(run, log, machine.machine.servo_period_s, notes)
+    ticked = on_servo_ticks(run, log, machine, notes)
     if isinstance(ticked, SlowRun):
         return ticked
     return replace(ticked, recording=with_known_cut(run, ticked.log, machine, notes))  # type: ignore[call-arg]
@@ -156,7 +162,7 @@ def _repeats_that_agree(case: Case, notes: list[str]) -> tuple[Run, ...]:
     """The runs, repeats of the same length, and those that contradict each other no longer said to be repeats."""
     runs = {run.name: run for run in case.runs}
     for name, run in runs.items():
-        if run.entry.repeats is None or not isinstance(run, RunAtHand):
+        if run.entry.repeats is None or not isinstance(run, RunAtHand) or isinstance(run, TurnRun):
             continue
         one, other = runs.get(run.entry.repeats), run
         why = "that is no run of the case" if one is None else "that is itself" if one is other else _contradiction(one, other)

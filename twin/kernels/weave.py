@@ -40,6 +40,7 @@ class Woven:
 class _Weaver:
     effects: tuple[Effect, ...]
     replaced: frozenset[str]
+    added: frozenset[str]
     statements: list[ast.stmt] = field(default_factory=list)
     takes: dict[str, None] = field(default_factory=dict)
     sets: dict[str, None] = field(default_factory=dict)
@@ -70,6 +71,8 @@ class _Weaver:
         for effect in self.effects:
             if name in effect.changes:
                 self._change(name, effect)
+        if name in self.added:
+            self.add(_assignment(name, f"{name} + added__{name}"))
 
     def _change(self, quantity: str, effect: Effect) -> None:
         function = effect.changes[quantity]
@@ -113,20 +116,24 @@ def quantities(physics: Iterable[Physics]) -> dict[str, str]:
     return found
 
 
-def weave(physics: Iterable[Physics], effects: Iterable[Effect] = (), replaced: Iterable[str] = ()) -> Woven:
-    """The text of a stage with these effects in it, and with the `replaced` quantities read as `recorded__<quantity>`.
+def weave(
+    physics: Iterable[Physics], effects: Iterable[Effect] = (), replaced: Iterable[str] = (), added: Iterable[str] = ()
+) -> Woven:
+    """The text of a stage with these effects in it.
+
+    replaced: quantities that are read as `recorded__<quantity>`; added: those that have `added__<quantity>` put on top
 
     Effects come in the order given. One that changes nothing in this stage is passed over, so that the caller may hand all
     stages the same effects.
 
-    Raises EffectError where a quantity to be replaced is not marked in this stage.
+    Raises EffectError where a quantity to be replaced or added to is not marked in this stage.
     """
     physics = tuple(physics)
     known = quantities(physics)
-    weaver = _Weaver(tuple(effects), frozenset(replaced))
-    for name in weaver.replaced:
+    weaver = _Weaver(tuple(effects), frozenset(replaced), frozenset(added))
+    for name in weaver.replaced | weaver.added:
         if name not in known:
-            raise EffectError(f"{name!r} is not a quantity that can be replaced here; these are: {', '.join(known)}")
+            raise EffectError(f"{name!r} is not a quantity that can be replaced or added to here; these are: {', '.join(known)}")
     for function in physics:
         tree = ast.parse(textwrap.dedent(inspect.getsource(function))).body[0]
         assert isinstance(tree, ast.FunctionDef)

@@ -128,20 +128,33 @@ def line_starts(plan: Plan, lines: Ints) -> Floats:
     return np.asarray(begins[np.minimum(lines, len(seconds))])
 
 
-def rapid_rate_mm_min(programs: Sequence[RecordedProgram], shortest_mm: float = 100.0) -> tuple[float, float]:
-    """Rapid traverse rate of an axis at 100 % and its spread, read off where one axis alone went `shortest_mm` or more.
+class RapidSeen(NamedTuple):
+    """A long rapid of one axis in a recording: when it was seen, and its level speed over the recorded override."""
 
-    The speed there is level at rate times override. Raises RunLogError where no recording has such a move.
+    t_s: float
+    rate_mm_min: float
+
+
+def rapids_seen(program: RecordedProgram, shortest_mm: float = 100.0) -> list[RapidSeen]:
+    """Return the rapids in which one axis alone went `shortest_mm` or more; the speed there is level at rate times override."""
+    path, run = program.path, program.run
+    _, rapid = program.overrides()
+    alone = np.max(np.abs(path.end_mm - path.start_mm), axis=1) > 0.999999 * path.length_mm
+    line, feed, t_s = (np.asarray(run.columns[name]) for name in ("line", "feed_mm_min", "t_s"))
+    seen = []
+    for k in np.flatnonzero(alone & (path.kind == Kind.RAPID) & (path.length_mm >= shortest_mm)):
+        here = line == path.line[k]
+        if here.any() and np.max(feed[here]) > 0.0:
+            seen.append(RapidSeen(float(t_s[here][0]), float(np.max(feed[here])) / float(rapid[k])))
+    return sorted(seen)
+
+
+def rapid_rate_mm_min(programs: Sequence[RecordedProgram], shortest_mm: float = 100.0) -> tuple[float, float]:
+    """Return the rapid traverse rate of an axis at 100 % and its spread, from the long rapids of the recordings.
+
+    Raises RunLogError where no recording has such a move.
     """
-    read = []
-    for program in programs:
-        path, run = program.path, program.run
-        _, rapid = program.overrides()
-        alone = np.max(np.abs(path.end_mm - path.start_mm), axis=1) > 0.999999 * path.length_mm
-        line, feed = np.asarray(run.columns["line"]), np.asarray(run.columns["feed_mm_min"])
-        for k in np.flatnonzero(alone & (path.kind == Kind.RAPID) & (path.length_mm >= shortest_mm)):
-            here = feed[line == path.line[k]]
-            read += [float(np.max(here)) / float(rapid[k])] if len(here) and np.max(here) > 0.0 else []
+    read = [seen.rate_mm_min for program in programs for seen in rapids_seen(program, shortest_mm)]
     if not read:
         raise RunLogError(f"no rapid of one axis over {shortest_mm} mm in these recordings: state rapid_mm_min")
     middle = float(np.median(read))

@@ -33,7 +33,7 @@ def earlier(values: Floats, since: Floats, sample: int, age_s: float) -> float:
     >>> earlier(np.array([0.0, 1.0, 3.0]), np.array([0.0, 0.1, 0.1]), 2, 0.05)
     2.0
     """
-    right = values[sample]
+    right: float = values[sample]
     near_s = 0.0
     far_s = 0.0
     while sample > 0 and near_s < age_s:
@@ -42,7 +42,8 @@ def earlier(values: Floats, since: Floats, sample: int, age_s: float) -> float:
         left = values[sample]
         if abs(left) >= 0.0:  # a number
             if far_s >= age_s:
-                return right + (left - right) * (age_s - near_s) / (far_s - near_s)
+                right = right + (left - right) * (age_s - near_s) / (far_s - near_s)
+                break
             right = left
             near_s = far_s
     return right

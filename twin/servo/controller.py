@@ -25,6 +25,7 @@ def reference_motion(
     >>> reference_motion(0.1, 0.0, 0.0, 0.001)
     ReferenceMotion(reference_velocity_mm_s=100.0, reference_acceleration_mm_s2=100000.0)
     """
+    reference_mm = at(Site.REFERENCE, reference_mm)
     reference_velocity_mm_s = (reference_mm - previous_reference_mm) / period_s
     reference_acceleration_mm_s2 = (reference_velocity_mm_s - previous_reference_velocity_mm_s) / period_s
     return ReferenceMotion(reference_velocity_mm_s, reference_acceleration_mm_s2)
@@ -57,7 +58,6 @@ def control(
     >>> control(1.0, 0.0, 0.0, 0.0, 40.0, 0.3, 9.0, 60.0, 0.001).torque_a
     12.36
     """
-    position_mm = at(Site.MECHANICS, position_mm)
     velocity_mm_s = at(Site.MECHANICS, velocity_mm_s)
     velocity_feedback_mm_s = at(Site.CONTROLLER, velocity_mm_s)
     following_error_mm = reference_mm - position_mm

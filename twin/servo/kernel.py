@@ -72,14 +72,14 @@ class AxisKernel:
     scratch: names by row of the scratch array: states first, then constants
     rows: of the scratch array, with those that carry a quantity from one loop to the next
     states: how many of them are states
-    recorded: quantities that are read from recordings, in the order of their arguments
+    fed: series beside reference and disturbance, in the order of their arguments: `recorded__<quantity>`, `added__<quantity>`
     """
 
     text: str
     scratch: tuple[str, ...]
     rows: int
     states: int
-    recorded: tuple[str, ...]
+    fed: tuple[str, ...]
 
 
 def _alive(woven: Woven, wanted: frozenset[str]) -> Stage:
@@ -105,19 +105,24 @@ def axis_kernel(
     disturbed: bool = False,
     outputs: tuple[str, ...] = ("position_mm", "torque_a"),
     measured: bool = False,
+    added: tuple[str, ...] = (),
 ) -> AxisKernel:
     """The kernel for `lanes` lanes side by side.
 
     effects: that are in it; recorded: quantities that are replaced; own_inputs: inputs (`reference_mm`, `disturbance_n`,
-    recorded quantities) that each lane has its own of, (ticks, lanes), where the others are shared, (ticks,); disturbed: whether
+    other series) that each lane has its own of, (ticks, lanes), where the others are shared, (ticks,); disturbed: whether
     there is a disturbance_n; outputs: names to keep at each tick; measured: whether sums and peaks are kept
-    (`twin.servo.metrics`)
+    (`twin.servo.metrics`); added: quantities that have a series put on top
     """
-    for name in recorded:
+    for name in (*recorded, *added):
         if name not in axis_quantities():
-            raise EffectError(f"{name!r} is not a quantity that can be replaced; these are: {', '.join(axis_quantities())}")
-    at_tick = weave(control_stage(measured), effects, [q for q in recorded if q in quantities(control_stage(measured))])
-    between = weave(move_stage(effects), effects, [q for q in recorded if q in quantities(move_stage(effects))])
+            raise EffectError(
+                f"{name!r} is not a quantity that can be replaced or added to; these are: {', '.join(axis_quantities())}"
+            )
+    at_tick, between = (
+        weave(physics, effects, *([q for q in some if q in quantities(physics)] for some in (recorded, added)))
+        for physics in (control_stage(measured), move_stage(effects))
+    )
     kept = set(metrics.AxisMetrics._fields) if measured else set()
     wanted = frozenset(outputs) | kept | {"position_mm", "velocity_mm_s"}
     control, move = _alive(at_tick, wanted), _alive(between, wanted)
@@ -130,14 +135,15 @@ def axis_kernel(
             break
         control, move = grown
     taken, set_ = control.takes | move.takes, control.sets | move.sets
-    fed = {*CLOCKS, *INPUTS, *(f"recorded__{name}" for name in recorded)}
+    series = (*(f"recorded__{name}" for name in recorded), *(f"added__{name}" for name in added))
+    fed = {*CLOCKS, *INPUTS, *series}
     own = {f"{effect.name}__{name}" for effect in effects for name in effect.states}
     states = tuple(sorted((taken & set_ & (STATES | own)) | kept))
     constants = tuple(sorted(taken - set(states) - fed))
-    layout = LaneLoops(lanes, (*states, *constants), states, own_inputs, recorded, disturbed)
+    layout = LaneLoops(lanes, (*states, *constants), states, own_inputs, series, disturbed)
     loops = layout.kernel(control, move, outputs)
     text = kernel_text("from math import copysign", _functions(at_tick, between), [loops])
-    return AxisKernel(text, (*states, *constants), layout.rows, len(states), recorded)
+    return AxisKernel(text, (*states, *constants), layout.rows, len(states), series)
 
 
 def _functions(*woven: Woven) -> list[str]:

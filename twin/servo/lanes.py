@@ -65,14 +65,14 @@ class LaneLoops:
     """Writes the kernel.
 
     scratch: names by row: states, then constants; states: those that are states; own_inputs: those of which each lane has its own
-    recorded: quantities that are read from recordings; disturbed: whether there is a disturbance
+    fed: series beside INPUTS, by the names that the statements read; disturbed: whether there is a disturbance
     """
 
     lanes: int
     scratch: tuple[str, ...]
     states: tuple[str, ...]
     own_inputs: tuple[str, ...]
-    recorded: tuple[str, ...]
+    fed: tuple[str, ...]
     disturbed: bool
     carried: dict[str, int] = field(default_factory=dict)
 
@@ -83,7 +83,7 @@ class LaneLoops:
 
     def kernel(self, control: Stage, move: Stage, outputs: tuple[str, ...]) -> str:
         """The function `axes`."""
-        arguments = ["reference_mm_in", *(["disturbance_n_in"] if self.disturbed else []), *(f"{q}_in" for q in self.recorded)]
+        arguments = ["reference_mm_in", *(["disturbance_n_in"] if self.disturbed else []), *(f"{q}_in" for q in self.fed)]
         at_tick = control.sets | control.takes | {*INPUTS, "position_mm", "velocity_mm_s"}
         here = [(row, name) for row, name in enumerate(outputs) if name in at_tick]
         later = [(row, name) for row, name in enumerate(outputs) if name not in at_tick]
@@ -108,7 +108,7 @@ class LaneLoops:
             outs = kept if last else []
             read = part.takes | ({name for _, name in outs} - part.sets)
             body = [f"time_s = {time}"] if "time_s" in read else []
-            body += [f"{n} = {self._input(n)}" for n in (*INPUTS, *(f"recorded__{q}" for q in self.recorded)) if n in read]
+            body += [f"{n} = {self._input(n)}" for n in (*INPUTS, *self.fed) if n in read]
             body += [f"{n} = scratch[{where[n] * self.lanes} + lane]" for n in sorted(read & set(where))]
             body += [ast.unparse(statement) for statement in part.statements]
             body += [f"outputs[({row} * lanes + first_lane + lane) * ticks + tick] = {name}" for row, name in outs]
@@ -121,7 +121,6 @@ class LaneLoops:
         return lines
 
     def _input(self, name: str) -> str:
-        quantity = name.removeprefix("recorded__")
-        if quantity == "disturbance_n" and not self.disturbed:
+        if name == "disturbance_n" and not self.disturbed:
             return "0.0"
-        return f"{quantity}_in[tick * {self.lanes} + lane]" if quantity in self.own_inputs else f"{quantity}_in[tick]"
+        return f"{name}_in[tick * {self.lanes} + lane]" if name in self.own_inputs else f"{name}_in[tick]"

@@ -45,13 +45,15 @@ class AxisInput:
     """The inputs of the lanes, by tick.
 
     reference_mm: (columns, ticks); disturbance_n: the same shape, or None; recorded: quantity → (columns, ticks), taken from a
-    recording in place of what the model makes; column: (lanes,) which column a lane follows
+    recording in place of what the model makes; added: quantity → (columns, ticks), put on top of what the model makes
+    column: (lanes,) which column a lane follows
     """
 
     reference_mm: Array
     column: NDArray[np.intp]
     disturbance_n: Array | None = None
     recorded: Mapping[str, Array] = field(default_factory=dict)
+    added: Mapping[str, Array] = field(default_factory=dict)
 
 
 def run_axes(
@@ -131,18 +133,20 @@ class _Block:
         width = _width(len(self.lanes))
         filled = np.concatenate([self.lanes, np.full(width - len(self.lanes), self.lanes[0])])
         shared = len(set(self.inputs.column[self.lanes].tolist())) == 1
-        recorded = tuple(self.inputs.recorded)
+        recorded, added = tuple(self.inputs.recorded), tuple(self.inputs.added)
+        own = ("reference_mm", "disturbance_n", *(f"recorded__{name}" for name in recorded), *(f"added__{n}" for n in added))
         series = [self.inputs.reference_mm]
         series += [] if self.inputs.disturbance_n is None else [self.inputs.disturbance_n]
-        series += list(self.inputs.recorded.values())
+        series += [*self.inputs.recorded.values(), *self.inputs.added.values()]
         kernel = axis_kernel(
             width,
             self.effects,
             recorded,
-            () if shared else ("reference_mm", "disturbance_n", *recorded),
+            () if shared else own,
             self.inputs.disturbance_n is not None,
             self.outputs,
             self.measured,
+            added,
         )
         column = self.inputs.column[filled]
         fed = [np.ascontiguousarray(s[column[0]] if shared else s[column].T.reshape(-1), dtype=np.float64) for s in series]

@@ -270,7 +270,7 @@ def _sensed(physics: Physics, columns: Columns, chance: np.random.Generator) -> 
 
 def _read(values: Floats, sensor: SensorPhysics, period_s: float) -> Floats:
     if sensor.late_s > 0.0:
-        values = _between(values, np.arange(len(values)) - sensor.late_s / period_s)
+        values = _between(values, np.arange(len(values), dtype=np.float64) - sensor.late_s / period_s)
     if sensor.lag_s > 0.0:
         there = np.isfinite(values)
         keep = np.exp(-period_s / sensor.lag_s)

@@ -16,19 +16,17 @@ from twin.effects.effect import Excitation
 from twin.errors import CaseError, RunLogError
 from twin.gap.diagnosis import Diagnosed, NotObservable
 from twin.gap.programs.answer import Answer, Trials
+from twin.gap.programs.knobs import rapid_rate_of, with_rapids_read
 from twin.gap.programs.search import search
 from twin.gap.programs.trial import Refused, Trial, trial_of
-from twin.machine import MachineFile, Program
+from twin.machine import MachineFile
 from twin.motion.control import RAPID_MM_MIN, program_effects
 from twin.motion.limits import Limits
 from twin.motion.path import EventKind, Kind
-from twin.recording.recorded_program import rapid_rate_mm_min
 from twin.sites import Site
 
 SHORTEST_BLOCK_S = 1.0
 """A block time cannot show where no cutting block is shorter."""
-KNOB = 0.95
-"""Long rapids below this part of the stated rate are said to be slow."""
 
 
 def diagnose_programs(
@@ -74,35 +72,24 @@ def _trials(case: Case) -> Trials:
         notes.append(
             f"overrides are not recorded in {len(trials) - told} of {len(trials)} runs: knobs are taken to stand at 100 %"
         )
-    stated, said = _stated(case.machine, learnt, trials)
-    return Trials(case.machine, stated, program_effects(case.machine), learnt, judged, (*notes, *said))
+    stated, said = _stated(case.machine, trials)
+    read, knobs = with_rapids_read(trials, float(np.max(stated.rapid_mm_min)))
+    by_name = {trial.name: trial for trial in read}
+    learnt, judged = (tuple(by_name[trial.name] for trial in some) for some in (learnt, judged))
+    return Trials(case.machine, stated, program_effects(case.machine), learnt, judged, (*notes, *said, *knobs))
 
 
-def _stated(machine: MachineFile, learnt: Sequence[Trial], trials: Sequence[Trial]) -> tuple[Limits, tuple[str, ...]]:
+def _stated(machine: MachineFile, trials: Sequence[Trial]) -> tuple[Limits, tuple[str, ...]]:
     """[program], or length over feed with the rapid rate that the runs show."""
     if machine.program is not None:
-        return Limits.of(machine.program), _knobs(machine.program, trials)
+        return Limits.of(machine.program), ()
     try:
-        rate, _ = rapid_rate_mm_min([trial.recorded for trial in learnt])
+        rate = rapid_rate_of(trials)
         said = f"the machine states no [program]: length over feed, with the rapid rate read off the runs, {rate:.0f} mm/min"
     except RunLogError:
         rate = RAPID_MM_MIN
         said = f"the machine states no [program] and no run has a long rapid: length over feed, rapids at {rate:.0f} mm/min"
     return Limits(rapid_mm_min=rate, acceleration_mm_s2=np.inf), (said,)
-
-
-def _knobs(program: Program, trials: Sequence[Trial]) -> tuple[str, ...]:
-    """Runs whose long rapids went slower than the stated rate and the recorded override make them."""
-    slow = []
-    for trial in trials:
-        try:
-            ratio = rapid_rate_mm_min([trial.recorded])[0] / program.rapid_mm_min
-        except RunLogError:
-            continue
-        if ratio < KNOB:
-            slow.append(f"{trial.name} {100.0 * ratio:.0f} %")
-    said = "long rapids were slower than the stated rate, as under an override that the recording does not tell"
-    return (f"{said}: {', '.join(slow)}",) if slow else ()
 
 
 def _not_observable(trials: Trials) -> tuple[NotObservable, ...]:

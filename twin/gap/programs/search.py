@@ -9,7 +9,7 @@ more reducible energy (and three thousandths of the whole), and where that is mo
     effect to that, parameters of one side kept to their side, gains some energy on the runs judged on; p is how often it gains as
     much.
 
-The set with the least energy in which every effect is needed is the answer.
+The set with the least energy in which every effect is needed, and told by the runs rather than by a bound, is the answer.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -46,6 +46,8 @@ NOISE_MOST_S = 3.0
 """What is left of a window counts up to this as what may be by chance."""
 AS_WELL = 0.05
 """Part of the resampled runs in which another effect has to be as good to be said not to be told apart."""
+AT_BOUND = 1e-3
+"""Part of its value by which a parameter may be off a bound and still counts as held there: no run tells it."""
 RESAMPLED = 400
 RESAMPLED_BLOCK = 5
 
@@ -155,9 +157,20 @@ def _all_needed(one: Tried, tried: Mapping[Names, Tried], floor: float, chance: 
         least = max(NEEDED * (gained + left - floor), MATERIAL * (_total(tried[frozenset()]) - floor))
         if gained <= 0.0 or gained < least or gained + left <= NOTHING_LEFT * floor:
             return False
-        if chance.p(less, one, one.fitted.model) > alpha:
+        if chance.p(less, one, one.fitted.model) > alpha or not _is_told(one.fitted, name):
             return False
     return True
+
+
+def _is_told(fitted: Fitted, name: str) -> bool:
+    """Return True where a parameter of an effect is away from nothing with its whole interval, and not held at a bound."""
+    intervals = fitted.intervals(name)
+    for p in effect_named(name).parameters:
+        found = intervals[p.name]
+        at_bound = min(abs(found.value - p.low), abs(found.value - p.high)) < AT_BOUND * abs(found.value)
+        if p.null is not None and not at_bound and not found.low <= p.null <= found.high:
+            return True
+    return False
 
 
 @dataclass(frozen=True)

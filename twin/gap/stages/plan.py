@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from twin.case import Case, Run, RunKind
 from twin.effects.catalogue import effect_named
 from twin.gap.diagnosis import Effected, Verdict
+from twin.gap.dynamometer.turn_run import TurnRun
 from twin.gap.floors import Floors, repeatability
 from twin.gap.null import NULL, Null
 from twin.gap.search import Explained, explain
@@ -18,6 +19,7 @@ from twin.gap.stages.cut import CutStage, cut_runs
 from twin.gap.stages.disturbance import disturbance_of_repeats, expected_spread
 from twin.gap.stages.heat import HeatStage, heat_runs
 from twin.gap.stages.stage import Stage
+from twin.gap.stages.turns import TurnStage, turn_data
 from twin.gap.verdict import judged
 from twin.machine import MachineFile
 from twin.runlog import RunLog
@@ -49,7 +51,10 @@ def ground_of(case: Case, left_out: frozenset[str]) -> Ground:
     """Floors and disturbance of a case: from its repeated runs, without them as the machine states the disturbance."""
     machine = case.machine
     recorded = tuple(run for run in case.runs if run.entry.kind is not RunKind.PROGRAM)
-    floors = repeatability(recorded, case.repeats(), machine)
+    # mean turns bring their own floor
+    by_run = tuple(run for run in recorded if not isinstance(run, TurnRun))
+    pairs = tuple(pair for pair in case.repeats() if not any(isinstance(run, TurnRun) for run in pair))
+    floors = repeatability(by_run, pairs, machine) if by_run else Floors(machine, {})
     # what was recorded while the twin was right says how well the machine repeats, and nothing of what is wrong now
     runs = tuple(run for run in recorded if not run.entry.healthy) or recorded
     seen: dict[str, tuple[str, RunLog, AxisRunData]] = {}
@@ -79,6 +84,9 @@ def explained_stages(ground: Ground, progress: Progress, side_by_side: SideBySid
         if stage.candidates:
             found.append(explain(stage, null=null, progress=progress))
             forces = _pushes(stage, found[0])
+    turning = turn_data(ground.runs)
+    if any(run.fitted for run in turning):
+        found.append(explain(TurnStage(ground.machine, turning, ground.left_out), null=null, progress=progress))
     stages: list[Stage] = [s for letter in ground.machine.axes if (s := axis_stage(ground, letter, forces)) is not None]
     warmups = heat_runs(ground.machine, tuple(r for r in ground.runs if not r.log.axes()))
     if any(run.fitted for run in warmups):

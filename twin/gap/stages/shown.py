@@ -20,6 +20,7 @@ from twin.gap.stages.cut import CutStage, cut_runs
 from twin.gap.stages.free import effect_parameters
 from twin.gap.stages.heat import HeatStage, heat_runs
 from twin.gap.stages.stage import Model
+from twin.gap.stages.turns import TurnStage, turn_data
 from twin.machine import MachineFile
 from twin.simulator.response import check_effects, disturbance_of
 from twin.sites import Site
@@ -45,6 +46,9 @@ def shown(machine: MachineFile, run: Run, floors: Floors) -> dict[str, Floats]:
         force = stage.force(model, theta, cut)
         if force is not None:
             pushes = {"x": -np.asarray(force.mean_force_x_n)[0], "y": -np.asarray(force.mean_force_y_n)[0]}
+    for data in turn_data((run,)):
+        turned = TurnStage(machine, (data,))
+        columns |= turned.shown(*_sensing(machine, set(data.signals).__contains__), 0)
     for letter in machine.axes:
         columns |= _axis(machine, run, floors, letter, pushes.get(letter))
     if not run.log.axes():

@@ -5,7 +5,7 @@ the spindle's load, each axis, the spindle's heat. What is wrong in one then isn
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -15,6 +15,7 @@ from twin.effects.catalogue import effect_named
 from twin.effects.effect import Effect, Guesses
 from twin.gap.diagnosis import Effected
 from twin.gap.stages.free import Free, effect_parameters
+from twin.gap.stages.free_term import FreeTerm
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -77,15 +78,17 @@ class Stage(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """A hypothesis: the machine with some effects in it, its constants free within their uncertainty."""
+    """A hypothesis: the machine with some effects and learned terms in it, its constants free within their uncertainty."""
 
     constants: tuple[Free, ...]
     effects: tuple[Effected, ...]
+    terms: tuple[FreeTerm, ...] = ()
 
     @property
     def free(self) -> tuple[Free, ...]:
-        """All free numbers: the constants, then the parameters of each effect."""
-        return self.constants + tuple(p for e in self.effects for p in effect_parameters(effect_named(e.effect)))
+        """All free numbers: the constants, then the parameters of each effect, then the values of each learned term."""
+        own = tuple(p for e in self.effects for p in effect_parameters(effect_named(e.effect)))
+        return self.constants + own + tuple(p for term in self.terms for p in term.free)
 
     def places(self) -> tuple[tuple[Effected, slice], ...]:
         """Return the places of each effect's parameters in θ."""
@@ -94,6 +97,14 @@ class Model:
             count = len(effect_named(effected.effect).parameters)
             places.append((effected, slice(at, at + count)))
             at += count
+        return tuple(places)
+
+    def term_places(self) -> tuple[tuple[FreeTerm, slice], ...]:
+        """Return the places of each learned term's values in θ."""
+        at, places = len(self.free) - sum(term.knots.count for term in self.terms), []
+        for term in self.terms:
+            places.append((term, slice(at, at + term.knots.count)))
+            at += term.knots.count
         return tuple(places)
 
     def null_theta(self) -> Floats:
@@ -135,11 +146,15 @@ class Model:
 
     def with_effect(self, effected: Effected) -> "Model":
         """The same with one effect more."""
-        return Model(self.constants, (*self.effects, effected))
+        return replace(self, effects=(*self.effects, effected))
 
     def without(self, effected: Effected) -> "Model":
         """The same with one effect less."""
-        return Model(self.constants, tuple(e for e in self.effects if e != effected))
+        return replace(self, effects=tuple(e for e in self.effects if e != effected))
+
+    def with_term(self, term: FreeTerm) -> "Model":
+        """The same with one learned term more."""
+        return replace(self, terms=(*self.terms, term))
 
 
 def observed_of(name: str, parts: Sequence[tuple[str, Floats, Floats, Floats, Ints, Regimes]], fitted: bool) -> Observed:

@@ -9,6 +9,8 @@ from tests.twin.gap.programs.written import case_of, made_case, plate_program, p
 from twin.errors import CaseError
 from twin.gap.diagnosis import Diagnosed, Verdict
 from twin.gap.programs.diagnose import diagnose_programs
+from twin.gap.programs.knobs import with_rapids_read
+from twin.gap.programs.trial import Trial, trial_of
 from twin.gcode import Settings, interpret
 from twin.motion.control import control_of
 from twin.motion.path import path_from_moves
@@ -39,6 +41,12 @@ def test_recorded_parts_take_longer_in_corners_and_tool_changes_and_in_the_engra
     assert {"short blocks", "tool change and spindle"} <= {cell.regime for cell in d.where}
 
 
+def test_the_program_is_a_subsystem(plates: Diagnosed) -> None:
+    (program,) = plates.diagnosis.subsystems
+    assert program.subsystem == "program" and program.before == plates.diagnosis.gap.before
+    assert set(program.causes) == {"corner_slowdown", "tool_change_time"}
+
+
 def test_the_gap_shrinks_on_parts_that_were_not_fitted(plates: Diagnosed) -> None:
     gap = plates.diagnosis.gap
     assert gap.closure > 0.95
@@ -54,13 +62,19 @@ def test_a_run_of_another_program_and_one_that_was_broken_off_are_said_to_be_so(
     assert any(n.startswith("aborted.parquet was interrupted and not finished: it came to line 12") for n in notes)
 
 
-def test_the_twin_handed_over_takes_as_long_as_the_diagnosis_says(plates: Diagnosed) -> None:
+def test_the_twin_handed_over_takes_as_long_as_the_diagnosis_says(plates: Diagnosed, tmp_path: Path) -> None:
     (said,) = [note for note in plates.diagnosis.notes if "reference position" in note]
     place = (0.0, 0.0, float(said.split("taken to be ")[1].split(" mm")[0]))
     settings = Settings(start_mm=place, references_mm=(place,), optional_stop=True)
     path = path_from_moves(interpret(plate_program("03"), settings), place)
     (trace,) = [trace for trace in plates.traces if trace.run == "plate_03.parquet"]
-    assert control_of(plates.twin, IDEAL_TIMES).plan(path).total_s == pytest.approx(trace.after[-1], rel=1e-3)
+    assert plates.twin.program is not None
+    (run,) = case_of(tmp_path, {"plate_03": ("check", plate_slice("03"), plate_program("03"))}).runs
+    trial = trial_of(run, Settings())
+    assert isinstance(trial, Trial)
+    ((knobs,), _) = with_rapids_read([trial], float(plates.twin.program.rapid_mm_min))
+    planned = control_of(plates.twin, IDEAL_TIMES).plan(path, *knobs.recorded.overrides())
+    assert planned.total_s == pytest.approx(trace.after[-1], rel=1e-3)
     assert trace.after[-1] == pytest.approx(trace.measured[-1], rel=0.05)
 
 

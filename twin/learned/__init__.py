@@ -1,0 +1,1 @@
+"""Learned terms: tables that were found in recordings and stand in a machine like an effect."""

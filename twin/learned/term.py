@@ -1,0 +1,54 @@
+"""A learned term: a table over what it depends on, put on top of a quantity at its site.
+
+It describes what the recordings show; it names no cause.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.learned.knots import Knots
+from twin.learned.words import LearnedSite, word_of
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Term:
+    """A learned term.
+
+    on: axis letter or signal, or empty; value: at the knots, (count,), in the unit of the site, with its 90 % band low … high
+    """
+
+    site: LearnedSite
+    on: str
+    knots: Knots
+    value: Floats
+    low: Floats
+    high: Floats
+
+    @property
+    def depends_on(self) -> tuple[str, ...]:
+        """The words of what it depends on."""
+        return tuple(dict.fromkeys(word_of(column) for column in self.knots.columns))
+
+    def at(self, arguments: Mapping[str, Floats]) -> Floats:
+        """Return its series at the arguments, column → (n,); (n,)."""
+        return np.asarray(self.knots.interpolated(self.value[None, :], arguments)[0])
+
+    def table(self) -> dict[str, tuple[float, ...]]:
+        """Return it as columns of one length, a knot a row: the arguments, then value, low, high.
+
+        >>> both = np.array([1.0, 2.0])
+        >>> Term(LearnedSite.AXIS_FORCE, "x", Knots({"position_mm": np.array([0.0, 5.0])}), both, both, both).table()["value"]
+        (1.0, 2.0)
+        """
+        grid = np.meshgrid(*self.knots.by_column.values(), indexing="ij")
+        table = {column: _plain(values.ravel()) for column, values in zip(self.knots.columns, grid, strict=True)}
+        return table | {"value": _plain(self.value), "low": _plain(self.low), "high": _plain(self.high)}
+
+
+def _plain(values: Floats) -> tuple[float, ...]:
+    return tuple(float(f"{v:.6g}") for v in values)
