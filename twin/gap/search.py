@@ -54,6 +54,7 @@ class Explained:
 
     base: the machine with its constants refitted; best: with the accepted effects; tried: in the first round, best first
     rivals: effect → what cannot be told from it; evidence: effect → its advantage over the same without it
+    alike: what the remainder partly looks like, where none but specific effects were kept (`twin.gap.specific`); else None
     """
 
     stage: Stage
@@ -62,6 +63,7 @@ class Explained:
     tried: tuple[Tried, ...]
     rivals: dict[Effected, tuple[Effected, ...]]
     evidence: dict[Effected, Advantage]
+    alike: tuple[Effected, ...] | None = None
 
 
 def explain(stage: Stage, *, null: Null = NULL, progress: Callable[[str], None] = lambda _: None) -> Explained:
@@ -90,8 +92,10 @@ def explain(stage: Stage, *, null: Null = NULL, progress: Callable[[str], None] 
         if len(best.effects) > 1:
             best = _swapped(stage, best, first)
     several = len(best.effects) > 1
-    evidence = {e: advantage(_dropped(stage, best, e).left if several else base.left, best.left) for e in best.effects}
-    return Explained(stage, base, best, first, {e: r for e, r in rivals.items() if e in best.effects}, evidence)
+    evidence = {e: advantage(dropped(stage, best, e).left if several else base.left, best.left) for e in best.effects}
+    # what was found beside an effect is no rival of it
+    others = {e: tuple(r for r in rivals[e] if r not in best.effects) for e in best.effects if e in rivals}
+    return Explained(stage, base, best, first, others, evidence)
 
 
 def _gap_left(best: Fitted, null: Null) -> bool:
@@ -211,13 +215,13 @@ def _swapped(stage: Stage, best: Fitted, first: tuple[Tried, ...]) -> Fitted:
 def _pruned(stage: Stage, best: Fitted, null: Null) -> Fitted:
     """Without the effects that the others have made needless."""
     for effected in best.effects[:-1]:
-        without = _dropped(stage, best, effected)
+        without = dropped(stage, best, effected)
         if not null.exceeded(effected, advantage(without.left, best.left), stage.healthy_rms):
             best = without
     return best
 
 
-def _dropped(stage: Stage, best: Fitted, effected: Effected) -> Fitted:
+def dropped(stage: Stage, best: Fitted, effected: Effected) -> Fitted:
     """The hypothesis without one of its effects, refitted."""
     place = dict(best.model.places())[effected]
     theta = np.delete(best.theta, np.arange(place.start, place.stop))

@@ -36,9 +36,11 @@ def judged(explained: Explained) -> Judged:
     worst = explained.stage.healthy_rms
     gap_before, gap_after = bool((before > worst).any()), bool((after > worst).any())
     if not explained.best.effects:
-        return Judged(explained, Verdict.UNKNOWN if gap_before else Verdict.HEALTHY, ())
+        return Judged(explained, Verdict.UNKNOWN, explained.alike or ()) if gap_before else Judged(explained, Verdict.HEALTHY, ())
     if not gap_after:
         return Judged(explained, Verdict.EXPLAINED, ())
+    if explained.alike is not None:
+        return Judged(explained, Verdict.PARTLY, explained.alike)
     near = bool((after < REMAINDER_MAX).all())
     if near and closed_part(explained) >= NAMED_MIN and closed_where_it_acts(explained) >= OWN_MIN:
         return Judged(explained, Verdict.PARTLY, ())
