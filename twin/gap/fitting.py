@@ -121,20 +121,21 @@ def fitted(
     """
     runs = [i for i, o in enumerate(stage.observed) if o.fitted]
     scales = [_scales(stage.observed[i], stage, scale) for i in runs]
+    sampled = [_sampled(stage.observed[i]) for i in runs]
 
     def residuals(theta: Floats) -> Floats:
         parts = []
-        for i, widened in zip(runs, scales, strict=True):
+        for i, widened, there in zip(runs, scales, sampled, strict=True):
             observed = stage.observed[i]
-            away = np.nan_to_num((stage.predict(model, theta, i) - observed.measured) / (observed.sigma * widened))
-            parts.append(_averaged(away, stage.averaged))
+            away = (stage.predict(model, theta, i)[:, there] - observed.measured[there]) / (observed.sigma * widened)[there]
+            parts.append(_averaged(np.nan_to_num(away), stage.averaged))
         return np.concatenate(parts, axis=1)
 
     free = model.free
     bounds = Bounds(*(np.array([getattr(p, key) for p in free]) for key in ("sigma", "low", "high")))
     first, blocks = 0, []
-    for i in runs:
-        blocks.append(_kept(stage.observed[i].block, stage.averaged) + first)
+    for i, there in zip(runs, sampled, strict=True):
+        blocks.append(_kept(stage.observed[i].block[there], stage.averaged) + first)
         first = int(blocks[-1].max()) + 1
     found = descend(
         residuals,
@@ -161,6 +162,12 @@ def _averaged(residual: Floats, count: int) -> Floats:
         return residual
     whole = residual.shape[1] // count * count
     return np.asarray(residual[:, :whole].reshape(len(residual), -1, count).sum(axis=2) / np.sqrt(count))
+
+
+def _sampled(observed: Observed) -> Ints:
+    """Places at which there is a sample; all of them where there is none, so that a fit has something to go by."""
+    there = np.flatnonzero(np.isfinite(observed.measured))
+    return there if len(there) else np.arange(len(observed.measured))
 
 
 def _kept(block: Ints, count: int) -> Ints:

@@ -16,7 +16,7 @@ from twin.gap.at_odds import with_known_cut, without_axes_at_odds
 from twin.gap.dynamometer.cutting import is_of_forces_alone
 from twin.gap.dynamometer.turn_run import TurnRun, turn_run
 from twin.gap.labels import measured_signals
-from twin.gap.servo_ticks import SlowRun, on_servo_ticks
+from twin.gap.sampling.servo_ticks import SlowRun, on_servo_ticks
 from twin.gap.stages.cut import cut_runs
 from twin.gap.stages.heat import heat_runs
 from twin.machine import MachineFile
@@ -93,7 +93,7 @@ def _usable(run: Run, machine: MachineFile, notes: list[str]) -> Run:
     log = without_axes_at_odds(run, log, notes)
     if not log.axes():
         return RunAtHand(run.entry, run.folder, log)
-    ticked = on_servo_ticks(run, log, machine.machine.servo_period_s, notes)
+    ticked = on_servo_ticks(run, log, machine, notes)
     if isinstance(ticked, SlowRun):
         return ticked
     return replace(ticked, recording=with_known_cut(run, ticked.log, machine, notes))  # type: ignore[call-arg]

@@ -26,6 +26,9 @@ def joined(motion: Diagnosed, programs: Diagnosed) -> Diagnosed:
         not_identifiable=one.not_identifiable + other.not_identifiable,
         next_experiment=one.next_experiment or other.next_experiment,
         notes=one.notes + other.notes,
+        subsystems=tuple(sorted(one.subsystems + other.subsystems, key=lambda s: -s.before)),
+        constants=one.constants + other.constants,
+        learned=one.learned + other.learned,
     )
     added = tuple(e for e in programs.twin.effects if e not in motion.twin.effects)
     twin = motion.twin.model_copy(

@@ -12,5 +12,6 @@ def table(position_mm: float) -> float:
     >>> table(12.5)
     12.5
     """
+    position_mm = at(Site.MECHANICS, position_mm)
     table_mm = at(Site.MECHANICS, position_mm)
     return table_mm  # noqa: RET504 - the quantity has a name that effects know

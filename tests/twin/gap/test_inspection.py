@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tests.twin.gap.small_case import HOT, MACHINE, air_case, case_of, columns_of, warm_case
 from twin.case import Case, RunKind
-from twin.errors import CaseError, RunLogError, TwinError
+from twin.errors import CaseError, TwinError
 from twin.gap.inspection import inspected, slow_effects
 from twin.machine import Tool
 
@@ -122,11 +122,6 @@ def test_a_slow_recording_is_compared_where_the_reference_goes_on_evenly() -> No
 def test_one_slow_run_among_others_hides_no_effect() -> None:
     looked, _ = inspected(mutilated(rows(lambda n: np.arange(0, n, 100)), only="check"))
     assert slow_effects(looked) == frozenset()
-
-
-def test_a_recording_faster_than_the_loops_is_one_line() -> None:
-    with pytest.raises(RunLogError, match=r"sampled every 0.5 ms.*state servo_period_s"):
-        inspected(mutilated(lambda own: own.update(t_s=0.5 * own["t_s"])))
 
 
 def test_the_last_samples_of_a_rest_are_kept_since_a_motion_starts_from_them() -> None:

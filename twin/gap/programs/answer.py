@@ -24,6 +24,7 @@ from twin.gap.diagnosis import (
     NextExperiment,
     NotObservable,
     SignalGap,
+    Subsystem,
     Trace,
     Verdict,
     closure_of,
@@ -37,6 +38,7 @@ from twin.gap.wording import digits, percent
 from twin.machine import AddedEffect, MachineFile, Program
 from twin.motion.limits import ACCELERATION_MAX_MM_S2, Limits
 from twin.motion.path import Kind
+from twin.recording.program_run import OVERRIDES
 
 Floats = NDArray[np.float64]
 
@@ -98,9 +100,16 @@ class Answer:
             next_experiment=self._next(),
             notes=(*trials.notes, *self._notes(gaps)),
             seconds=0.0,
+            subsystems=(self._subsystem(numbers, verdict),),
         )
         twin = with_uncertainty(self.twin(), {}, causes)
         return Diagnosed(diagnosis, twin, tuple(t for gap in self._all(gaps, before, after) for t in _traces(gap)))
+
+    def _subsystem(self, numbers: GapNumbers, verdict: Verdict) -> Subsystem:
+        told = any(trial.overrides_told for trial in self.trials.judged)
+        driven_by = ("program", *(OVERRIDES.values() if told else ()))
+        causes = tuple(sorted(self.found.chosen.names))
+        return Subsystem("program", driven_by, "line", numbers.before, numbers.after, verdict, causes)
 
     def _all(self, gaps: list[RunGap], before: Model, after: Model) -> list[RunGap]:
         judged = {gap.watched.trial.name for gap in gaps}

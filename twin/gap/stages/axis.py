@@ -22,6 +22,7 @@ from twin.gap.stages.observed_through import Sensing, Values, seen_late
 from twin.gap.stages.stage import Model, Observed, observed_of
 from twin.identification.axis_parameters import AxisParameter, constants_at
 from twin.identification.batch_fit import time_blocks
+from twin.learned.term import Term
 from twin.machine import Axis, MachineFile
 from twin.servo.constants import axis_constants, effect_constants
 from twin.servo.disturbance import Disturbance
@@ -35,6 +36,7 @@ BLOCK_S = 0.5
 COURSES = 2
 """Pairs of courses, each with its opposite."""
 LANES = 32
+TICKS_TOGETHER = 4
 FACTORS = ("mass_kg", "newton_per_command", "coulomb_n", "static_n", "stribeck_velocity_mm_s", "viscous_n_s_per_mm")
 
 
@@ -57,6 +59,7 @@ class AxisStage:
     left_out: frozenset[str] = frozenset()
     standing: tuple[tuple[str, Mapping[str, float]], ...] = ()
     pairs: int = COURSES
+    terms: tuple[Term, ...] = ()
     observed: tuple[Observed, ...] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -76,8 +79,10 @@ class AxisStage:
 
     @property
     def averaged(self) -> int:
-        """A loop does little within 4 ms."""
-        return 4
+        """Return the samples of 4 ticks: a loop does little in so short a time."""
+        known = [np.flatnonzero(np.isfinite(o.measured)) for o in self.observed if o.fitted]
+        every = np.median(np.concatenate([np.diff(k) for k in known] or [np.ones(1)]))
+        return max(1, round(TICKS_TOGETHER / float(every))) if np.isfinite(every) else 1
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -85,17 +90,31 @@ class AxisStage:
         return tuple(name for name in OUTPUTS if name in self.runs[0].measured)
 
     @property
+    def carried_states(self) -> frozenset[str]:
+        """States of effects that outlast a rest."""
+        return frozenset(f"{effect.name}__{state}" for effect in axis_effects() for state in effect.carried)
+
+    @property
+    def stateable(self) -> tuple[Effected, ...]:
+        """Effects on the axis itself of which machine and recordings say all that they need."""
+        warm = all(run.rise_k is not None for run in self.runs)
+        there = self.left_out | {name for name, _ in self.standing}
+        unknown = set() if warm else {"temperature_rise_k"}
+        unknown |= set() if self.axis.screw_lead_mm is not None else {"screw_lead_mm"}
+        of_axis = (e for e in catalogue().values() if e.on is On.AXIS and e.name not in there)
+        return tuple(Effected(e.name, self.letter) for e in of_axis if not unknown & set(e.needs))
+
+    @property
     def candidates(self) -> tuple[Effected, ...]:
         """Effects of the axis that its signals can show, sensors and clock included."""
         found = []
+        stateable = set(self.stateable)
         for effect in catalogue().values():
             if effect.name in self.left_out or any(effect.name == name for name, _ in self.standing):
                 continue
-            warm = all(run.rise_k is not None for run in self.runs)
-            if effect.on is On.AXIS and ("temperature_rise_k" not in effect.needs or warm):
+            if Effected(effect.name, self.letter) in stateable:
                 shown = any(s.replace("{a}", self.letter) == f"{self.letter}_{o}" for s in effect.shows_in for o in self.outputs)
-                known = "screw_lead_mm" not in effect.needs or self.axis.screw_lead_mm is not None
-                found += [Effected(effect.name, self.letter)] if shown and known else []
+                found += [Effected(effect.name, self.letter)] if shown else []
             elif effect.on is On.SIGNAL:
                 found += [Effected(effect.name, f"{self.letter}_{output}") for output in self.outputs]
             elif effect.site is Site.CLOCK:
@@ -149,15 +168,15 @@ class AxisStage:
         for output in self.outputs:
             sensing = Sensing.of(values, f"{self.letter}_{output}")
             modelled = sensing.readings(outputs[output], self.period_s)
-            modelled = modelled + readings_of_terms(model, theta, f"{self.letter}_{output}", data)
-            shown.append(self._grown(modelled, values, data) if output == "table_mm" else modelled)
+            modelled = modelled + readings_of_terms(model, theta, f"{self.letter}_{output}", data, self.terms)
+            shown.append(self.grown(modelled, values, data) if output == "table_mm" else modelled)
         at = {output: i for i, output in enumerate(self.outputs)}
         if "table_mm" in at and "pos_mm" in at:
             shown[at["table_mm"]] = shown[at["table_mm"]] - shown[at["pos_mm"]]
         return np.concatenate(shown, axis=1)
 
-    def _grown(self, table_mm: Floats, values: Values, data: AxisRunData) -> Floats:
-        """The table, (lanes, n), as the effects of the model make it grow with the recorded temperature."""
+    def grown(self, table_mm: Floats, values: Values, data: AxisRunData) -> Floats:
+        """Return the table, (lanes, n), as the effects of the model make it grow with the recorded temperature."""
         for effected, given in values.items():
             reading = effect_named(effected.effect).changes.get("reading")
             if reading is None or effected.on != self.letter or data.rise_k is None:
@@ -171,17 +190,17 @@ class AxisStage:
         """The outputs over the stretches one after another, each (lanes, n): before sensors, on the recording's clock."""
         lanes = len(theta)
         values = model.values(theta)
-        constants = self._constants(model, theta)
+        constants = self.lane_constants(model, theta)
         courses = self._courses(len(data.t_s))
         parts: dict[str, list[Floats]] = {output: [] for output in self.outputs}
         carried: dict[str, Floats] = {}
-        kept = {f"{effect.name}__{state}" for effect in axis_effects() for state in effect.carried}
+        kept = set(self.carried_states)
         if "torque_a" not in data.measured:  # an integral that was not measured goes on as the twin left it
             kept.add("integral_a")
         for stretch in data.stretches():
             start = self._start(values, constants, data, stretch, lanes) | carried
-            reference = self._seen_reference(values, data, stretch, lanes)
-            added = series_of_terms(model, theta, self.letter, data.arguments, stretch)
+            reference = self.seen_reference(values, data, stretch, lanes)
+            added = series_of_terms(model, theta, self.letter, data.arguments, stretch, self.terms)
             run, many = self._run(constants, reference, data, courses, stretch, start, added)
             for output in self.outputs:
                 whole = run.outputs[OUTPUTS[output]]
@@ -190,7 +209,7 @@ class AxisStage:
             carried = {k: v.reshape(-1, many)[:lanes, 0] for k, v in run.state.items() if k in kept}
         return {output: np.concatenate(p, axis=1) for output, p in parts.items()}
 
-    def _seen_reference(self, values: Values, data: AxisRunData, stretch: slice, lanes: int) -> Floats:
+    def seen_reference(self, values: Values, data: AxisRunData, stretch: slice, lanes: int) -> Floats:
         """The reference that the loop sees: (n,), or (lanes, n) where it sees it late."""
         period_s = float(data.t_s[1] - data.t_s[0])
         return seen_late(data.reference_mm[stretch], data.t_s[stretch], period_s, values, Site.REFERENCE, self.letter, lanes)
@@ -232,7 +251,8 @@ class AxisStage:
         )
         return run, many
 
-    def _constants(self, model: Model, theta: Floats) -> dict[str, Floats]:
+    def lane_constants(self, model: Model, theta: Floats) -> dict[str, Floats]:
+        """Return the constants of the axis and of its effects at each row of θ, name → (lanes,)."""
         base = axis_constants(self.axis)
         parameters = tuple(AxisParameter(p.name, "", True, p.sigma) for p in model.constants)
         constants = constants_at(base, parameters, theta[:, : len(parameters)])
@@ -265,13 +285,13 @@ class AxisStage:
         torque = data.measured["torque_a"][where] if "torque_a" in data.measured else np.zeros(len(reference))
         read = start_state(self.axis, reference, position, torque, self.period_s)
         state = {k: np.full(lanes, v) for k, v in read.items()} | self._start_of_loops(values, read, float(reference[0]), lanes)
-        load = _at_rest("load_n", constants, {}, lanes)
+        load = at_rest("load_n", constants, {}, lanes)
         if "torque_a" not in data.measured and self.axis.velocity_integral_gain_a_per_mm > 0.0:
             state["integral_a"] = load / constants["newton_per_command"]
         held = constants["newton_per_command"] * state["integral_a"] - load
         static = np.where(held > 0.0, constants["static_plus_n"], constants["static_minus_n"])
         held = np.clip(held, -static, static)
-        state["bristle_mm"] = _at_rest("bristle_mm", constants, {"held_n": held}, lanes)
+        state["bristle_mm"] = at_rest("bristle_mm", constants, {"held_n": held}, lanes)
         return state
 
     def _start_of_loops(self, values: Values, read: Mapping[str, float], reference_mm: float, lanes: int) -> dict[str, Floats]:
@@ -299,7 +319,7 @@ def _stamped(shown: Floats, t_s: Floats, values: Values) -> Floats:
     return seen_late(shown, t_s, float(t_s[1] - t_s[0]), values, Site.CLOCK, "", len(shown))
 
 
-def _at_rest(start: str, constants: Mapping[str, Floats], known: Mapping[str, Floats], lanes: int) -> Floats:
+def at_rest(start: str, constants: Mapping[str, Floats], known: Mapping[str, Floats], lanes: int) -> Floats:
     """The start of a stretch as the effects of the axis make it together, (lanes,)."""
     parts = []
     for effect in axis_effects():

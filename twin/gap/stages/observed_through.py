@@ -46,6 +46,15 @@ class Sensing:
                 reading = np.asarray(called(undo, self.effects[name], reading))
         return reading
 
+    def undone(self, readings: Floats) -> Floats:
+        """Return the values behind readings, (n,), in each lane, (lanes, n), or (1, n) where no sensor is in the way."""
+        values = readings[None, :]
+        for name in sorted(self.effects):
+            if undo := effect_named(name).undo:
+                given = {key: np.atleast_1d(value)[:, None] for key, value in self.effects[name].items()}
+                values = np.asarray(called(undo, given, values))
+        return values
+
 
 def seen_late(series: Floats, t_s: Floats, period_s: float, values: Values, site: Site, on: str, lanes: int) -> Floats:
     """A series, (n,) or (lanes, n), as it is seen late by the effects of a model at a site; as it is where none makes it late."""

@@ -41,6 +41,12 @@ def test_recorded_parts_take_longer_in_corners_and_tool_changes_and_in_the_engra
     assert {"short blocks", "tool change and spindle"} <= {cell.regime for cell in d.where}
 
 
+def test_the_program_is_a_subsystem(plates: Diagnosed) -> None:
+    (program,) = plates.diagnosis.subsystems
+    assert program.subsystem == "program" and program.before == plates.diagnosis.gap.before
+    assert set(program.causes) == {"corner_slowdown", "tool_change_time"}
+
+
 def test_the_gap_shrinks_on_parts_that_were_not_fitted(plates: Diagnosed) -> None:
     gap = plates.diagnosis.gap
     assert gap.closure > 0.95

@@ -1,0 +1,1 @@
+"""Recordings of any sample period, on the ticks of the servo loops."""
