@@ -58,6 +58,7 @@ class Explained:
     base: the machine with its constants refitted; best: with the accepted effects; tried: in the first round, best first
     rivals: effect → what cannot be told from it; evidence: effect → its advantage over the same without it
     beyond: constants of the base have to be further from what is stated than two deviations, and no effect puts them back
+    alike: what the remainder partly looks like, where none but specific effects were kept (`twin.gap.specific`); else None
     """
 
     stage: Stage
@@ -67,6 +68,7 @@ class Explained:
     rivals: dict[Effected, tuple[Effected, ...]]
     evidence: dict[Effected, Advantage]
     beyond: bool = False
+    alike: tuple[Effected, ...] | None = None
 
 
 def explain(stage: Stage, *, null: Null = NULL, progress: Callable[[str], None] = lambda _: None) -> Explained:
@@ -103,7 +105,9 @@ def explain(stage: Stage, *, null: Null = NULL, progress: Callable[[str], None] 
         rivals[best.effects[0]] = tuple(other.effects[0] for other in instead[1:])
     several = len(best.effects) > 1
     evidence = {e: advantage(dropped(stage, best, e).left if several else base.left, best.left) for e in best.effects}
-    return Explained(stage, base, best, first, {e: r for e, r in rivals.items() if e in best.effects}, evidence, beyond)
+    # what was found beside an effect is no rival of it
+    others = {e: tuple(r for r in rivals[e] if r not in best.effects) for e in best.effects if e in rivals}
+    return Explained(stage, base, best, first, others, evidence, beyond)
 
 
 def _gap_left(best: Fitted, null: Null) -> bool:

@@ -38,9 +38,11 @@ def judged(explained: Explained) -> Judged:
     gap_before, gap_after = bool((before > worst).any()), bool((after > worst).any())
     if not explained.best.effects:
         taken_up = Verdict.EXPLAINED if explained.beyond else Verdict.HEALTHY
-        return Judged(explained, Verdict.UNKNOWN if gap_before else taken_up, ())
+        return Judged(explained, Verdict.UNKNOWN if gap_before else taken_up, explained.alike or () if gap_before else ())
     if not gap_after:
         return Judged(explained, Verdict.EXPLAINED, ())
+    if explained.alike is not None:
+        return Judged(explained, Verdict.PARTLY, explained.alike)
     near = bool((after < REMAINDER_MAX).all())
     if near and closed_part(explained) >= NAMED_MIN and closed_where_it_acts(explained) >= OWN_MIN:
         return Judged(explained, Verdict.PARTLY, ())
