@@ -21,6 +21,7 @@ from twin.gap.joined import joined
 from twin.gap.naming.constants import moved_constants
 from twin.gap.null import NULL, Null
 from twin.gap.opened import combined
+from twin.gap.own_units import in_own_units
 from twin.gap.patterns import patterns
 from twin.gap.programs.diagnose import diagnose_programs
 from twin.gap.refitted import constant_deviations, with_constants, with_effects, with_uncertainty
@@ -73,6 +74,7 @@ def diagnose(
     if programs or not machine:
         answers.append(diagnose_programs(case, without=without, progress=progress))
     found = answers[0] if len(answers) == 1 else joined(*answers)
+    found = in_own_units(found, case.machine)
     return replace(found, diagnosis=replace(found.diagnosis, seconds=round(clock() - began, 1)))
 
 
