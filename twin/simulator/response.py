@@ -197,7 +197,7 @@ class _Chain:
             feed = 60.0 * np.hypot(milling.velocity_x_mm_s, milling.velocity_y_mm_s)
             cut = (milling.axial_depth_mm, milling.entry_angle_rad, milling.exit_angle_rad)
             told_cut = (milling.spindle_rpm, feed, *cut)
-            self.columns["cutting_force_peak_n"] = peaks(constants, machine.tool.teeth, named, told_cut, series)
+            self.columns["cutting_force_peak_n"] = peaks(constants, machine.tool.teeth, named, told_cut, terms, arguments)
             mean = {"x": -force.mean_force_x_n[0], "y": -force.mean_force_y_n[0]}
             power_w = force.cutting_power_w()[0]
         for axis in "xy":

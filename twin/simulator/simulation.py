@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from twin.engagement.along_path import Section, engaged_along
 from twin.errors import MachineError
 from twin.gcode import Settings, interpret
+from twin.learned.standing import seconds_of
 from twin.machine import MachineFile, Program
 from twin.motion.control import RAPID_MM_MIN, control_of, effects_tell
 from twin.motion.motion import ExecState, Motion
@@ -36,18 +37,19 @@ class Simulation:
     """A run of the simulated machine.
 
     run: what it records, at the servo period; response: with the spread of its courses; plan: with the times of each line
-    notes: what the machine description did not say, and what was taken for it
+    notes: what the machine description did not say, and what was taken for it; learned_s: seconds that learned terms add
     """
 
     run: RunLog
     response: Response
     plan: Plan
     notes: tuple[str, ...]
+    learned_s: float = 0.0
 
     @property
     def seconds(self) -> float:
         """Time that the program takes."""
-        return self.plan.total_s
+        return self.plan.total_s + self.learned_s
 
     def following_error_mm(self) -> Mapping[str, Floats]:
         """Axis → reference minus position, (n,)."""
@@ -108,8 +110,11 @@ def simulate(
         if term.is_recording
     ]
     notes += _saturated(machine, response)
+    learned_s = seconds_of(machine.learned, planned.total_s)
+    if learned_s:
+        notes.append(f"{learned_s:.2f} s of the program's time are a learned term: they are in no signal of this run")
     run = replace(_log(motion, told, response, path, name), rotary=machine.rotary)
-    return Simulation(run, response, planned, tuple(notes))
+    return Simulation(run, response, planned, tuple(notes), learned_s)
 
 
 def _settings(machine: MachineFile) -> Settings:
