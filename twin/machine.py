@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from twin.errors import MachineError
 from twin.gcode import Settings
+from twin.learned.section import LEARNED, LearnedSection
 from twin.machine_control import ControlSection
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -242,6 +243,19 @@ class MachineFile(Section):
     uncertainty: dict[str, NotNegative] = Field(default_factory=lambda: {"relative": 0.05})
     noise: dict[str, NotNegative] = Field(default_factory=dict)
     effects: tuple[AddedEffect, ...] = ()
+    learned: tuple[LearnedSection, ...] = ()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _learned_terms_stand_apart(cls, given: Any) -> Any:
+        """Take the learned terms out of [[effects]]: whatever goes through the effects finds those of the catalogue only."""
+        if not isinstance(given, dict) or not isinstance(given.get("effects"), list | tuple):
+            return given
+        learned = [entry for entry in given["effects"] if _is_learned(entry)]
+        return given | {
+            "effects": [entry for entry in given["effects"] if not _is_learned(entry)],
+            "learned": [*given.get("learned", ()), *learned],
+        }
 
     @property
     def settings(self) -> Settings:
@@ -254,19 +268,37 @@ def machine_from_toml(text: str, source: str = "machine.toml") -> MachineFile:
 
     Raises MachineError naming source, key, value and what would be right: the first fault, and how many more there are.
     """
+    raw: dict[str, Any] = {}
     try:
-        return MachineFile.model_validate(tomllib.loads(text))
+        raw = tomllib.loads(text)
+        if LEARNED in raw:
+            raise MachineError(
+                f'{source}: {LEARNED} is not known; a learned term is one of [[effects]], with effect = "{LEARNED}"'
+            )
+        return MachineFile.model_validate(raw)
     except tomllib.TOMLDecodeError as error:
         raise MachineError(f"{source}: is not TOML: {error}") from None
     except ValidationError as error:
         # a key that is not known comes first: the one that is missing is most likely the same, misspelt
         first, *rest = sorted(error.errors(include_url=False), key=lambda fault: fault["type"] != "extra_forbidden")
-        key = ".".join(str(part) for part in first["loc"])
+        key = ".".join(str(part) for part in _in_file(first["loc"], raw))
         more = f" (and {len(rest)} more)" if rest else ""
         if first["type"] == "extra_forbidden":
             raise MachineError(f"{source}: {key} is not known; docs/machine.md lists what is{more}") from None
         said = first["msg"].removeprefix("Value error, ")
         raise MachineError(f"{source}: {key}: {said}{_shown(first['input'])}{more}") from None
+
+
+def _is_learned(entry: Any) -> bool:
+    return isinstance(entry, LearnedSection) or (isinstance(entry, dict) and entry.get("effect") == LEARNED)
+
+
+def _in_file(place: tuple[int | str, ...], raw: dict[str, Any]) -> tuple[int | str, ...]:
+    """The place of a fault as the file counts: learned terms stand among the effects there."""
+    if len(place) < 2 or place[0] not in ("effects", LEARNED) or not isinstance(place[1], int):
+        return place
+    alike = [number for number, entry in enumerate(raw["effects"]) if _is_learned(entry) is (place[0] == LEARNED)]
+    return ("effects", alike[place[1]], *place[2:])
 
 
 def _shown(value: Any) -> str:

@@ -15,5 +15,7 @@ def machine_to_toml(machine: MachineFile) -> str:
     True
     """
     values = machine.model_dump(mode="json", exclude_none=True)
+    learned = [{key: value for key, value in term.items() if value not in ("", [])} for term in values.pop("learned")]
+    values["effects"] += learned
     values["control"] = {key: value for key, value in values["control"].items() if value not in ({}, [])}
     return tomli_w.dumps({key: value for key, value in values.items() if value not in ({}, [])}, multiline_strings=False)

@@ -12,7 +12,6 @@ All three see the fit runs only, and the machine as it is stated.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -312,8 +311,3 @@ def by_forest(forest: RandomForestClassifier, case: Case) -> Diagnosed:
         return answer(case, [], unknown=True)
     effect = AddedEffect(effect=name, on=on, parameters=catalogue()[name].typical_values())
     return answer(case, [(effect, 1.0)])
-
-
-def random_forest(forest: RandomForestClassifier) -> Any:
-    """The forest as a diagnosis that worker processes can be given."""
-    return partial(by_forest, forest)

@@ -5,7 +5,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from cnctwin.blind_check.question import Sort
+from cnctwin.blind_check.question import DrawnEffect, Sort, effect_on
+from cnctwin.standins.reference_machine.effect import ActsAt
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,6 +21,12 @@ class Answered:
     size_over_floor: Mapping[str, float]
 
     @property
+    def acts_at(self) -> tuple[ActsAt, ...]:
+        """The descriptions of it that are right, where no catalogue has it."""
+        asked = DrawnEffect(self.effect, self.on, 0.0, self.named)
+        return () if self.named else effect_on(asked).acts_at(self.on, self.stated)
+
+    @property
     def size(self) -> float:
         """The size of its largest signal."""
         return max(self.size_over_floor.values(), default=0.0)
@@ -27,12 +34,17 @@ class Answered:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """All effects of a machine; size_over_floor: of all of them together."""
+    """All effects of a machine.
+
+    size_over_floor: of all of them together; controller: the structure of its controller where it is not the stated one, which
+    is there beside what is asked
+    """
 
     name: str
     sort: Sort
     effects: tuple[Answered, ...]
     size_over_floor: Mapping[str, float]
+    controller: Answered | None = None
 
     @property
     def size(self) -> float:
@@ -60,8 +72,13 @@ def answers_from_json(text: str) -> tuple[Answer, ...]:
         Answer(
             name,
             Sort(entry["sort"]),
-            tuple(Answered(**{**effect, "exact": tuple(effect["exact"])}) for effect in entry["effects"]),
+            tuple(_answered(effect) for effect in entry["effects"]),
             entry["size_over_floor"],
+            _answered(entry["controller"]) if entry["controller"] else None,
         )
         for name, entry in json.loads(text).items()
     )
+
+
+def _answered(entry: Mapping[str, Any]) -> Answered:
+    return Answered(**{**entry, "exact": tuple(entry["exact"])})

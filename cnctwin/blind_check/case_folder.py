@@ -11,7 +11,7 @@ import numpy as np
 import tomli_w
 
 from cnctwin.blind_check.answer import Answer, Answered
-from cnctwin.blind_check.question import DrawnEffect, Question, effect_on
+from cnctwin.blind_check.question import DrawnEffect, Question, effect_on, structure_named
 from cnctwin.standins.reference_machine.effect import Parameters
 from cnctwin.standins.reference_machine.physics import Physics, physics_of
 from cnctwin.standins.reference_machine.program import air_program, cut_program, nc_text
@@ -37,11 +37,16 @@ Course = Motion | WarmUp
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """The machine of a question: what it states, what it is without its effects, and what its programs are."""
+    """The machine of a question.
+
+    stated: its figures as it states them; healthy: what it is without the effects that are asked; nominal: the same with the
+    controller that it states; courses: of its programs
+    """
 
     question: Question
     stated: MachineFigures
     healthy: Physics
+    nominal: Physics
     courses: Mapping[tuple[str, int], Course]
 
 
@@ -57,7 +62,21 @@ def machine_of(question: Question) -> Machine:
             courses[kind, run] = _drawn(kind, stated, dynamics, question.warm, chance)
         courses[kind, REPEAT] = _drawn(kind, stated, dynamics, question.warm, chance) if kind == "warmup" else courses[kind, FIT]
     restless = replace(healthy, disturbance_n=float(chance.uniform(0.7, 1.3)), disturbance_s=float(chance.uniform(0.03, 0.08)))
-    return Machine(question, stated, restless, courses)
+    return Machine(question, stated, _controlled(question, restless), restless, courses)
+
+
+def _controlled(question: Question, physics: Physics) -> Physics:
+    """The physics with the controller of the question."""
+    structure = question.controller
+    if structure is None:
+        return physics
+    return structure_named(structure.effect).acts(physics, structure.on, _structure_parameters(question))
+
+
+def _structure_parameters(question: Question) -> Parameters:
+    assert question.controller is not None
+    structure = structure_named(question.controller.effect)
+    return structure.parameters(1.0, structure.traits(np.random.default_rng([question.seed, 5])))
 
 
 def _drawn(kind: str, stated: MachineFigures, dynamics: Dynamics, warm: bool, chance: np.random.Generator) -> Course:
@@ -136,13 +155,20 @@ def _amplitude(
 
 
 def _size(
-    machine: Machine, physics: Physics, runs: Mapping[str, tuple[int, ...]], floors: Mapping[str, Mapping[str, float]], axes: str
+    machine: Machine,
+    physics: Physics,
+    runs: Mapping[str, tuple[int, ...]],
+    floors: Mapping[str, Mapping[str, float]],
+    axes: str,
+    *,
+    bare: Physics | None = None,
 ) -> dict[str, float]:
-    """Signal → size over the floor, the larger where runs of two kinds show it."""
+    """Signal → size over the floor beside `bare` (the healthy machine), the larger where runs of two kinds show it."""
+    bare = machine.healthy if bare is None else bare
     found: dict[str, float] = {}
     for kind, numbers in runs.items():
         changed = [recorded(machine, physics, kind, run, axes) for run in numbers]
-        healthy = [recorded(machine, machine.healthy, kind, run, axes) for run in numbers]
+        healthy = [recorded(machine, bare, kind, run, axes) for run in numbers]
         for name, size in sizes(rms_by_signal(changed, healthy), floors[kind]).items():
             found[name] = max(found.get(name, 0.0), round(size, 3))
     return found
@@ -156,7 +182,18 @@ def answer_of(question: Question) -> Answer:
     if len(effects) > 1:
         floors = {kind: _floors(machine, kind) for kind in question.kinds}
         together = _size(machine, physics, dict.fromkeys(question.kinds, (FIT, CHECK)), floors, "xyz")
-    return Answer(question.name, question.sort, effects, together)
+    return Answer(question.name, question.sort, effects, together, _controller(machine))
+
+
+def _controller(machine: Machine) -> Answered | None:
+    """The structure of the controller where it is not the stated one, and how much of a gap it is by itself."""
+    structure = machine.question.controller
+    if structure is None:
+        return None
+    kinds = [kind for kind in machine.question.kinds if kind in structure_named(structure.effect).kinds]
+    floors = {kind: _floors(machine, kind) for kind in kinds}
+    size = _size(machine, machine.healthy, dict.fromkeys(kinds, (FIT, CHECK)), floors, structure.on, bare=machine.nominal)
+    return Answered(structure.effect, structure.on, True, dict(_structure_parameters(machine.question)), (), size)
 
 
 def write_case(folder: Path, question: Question, answer: Answer | None = None) -> Answer:
@@ -166,6 +203,17 @@ def write_case(folder: Path, question: Question, answer: Answer | None = None) -
     runs = [(kind, run) for kind in question.kinds for run in (FIT, REPEAT, CHECK)]
     write_folder(folder, machine, physics_with(machine, answer), runs)
     return answer
+
+
+def check_runs(question: Question, answer: Answer) -> None:
+    """Record each run of a question once. Raises ValueError where a reading is no number, and whatever the physics raises."""
+    machine = machine_of(question)
+    physics = physics_with(machine, answer)
+    for kind in question.kinds:
+        for run in (FIT, REPEAT, CHECK, UNSEEN):
+            for name, values in recorded(machine, physics, kind, run).items():
+                if np.isinf(values).any() or np.isnan(values).all():
+                    raise ValueError(f"{question.name}: {name} of the {kind} run is not finite")
 
 
 NAMES = {FIT: "fit", REPEAT: "fit_2", CHECK: "check", UNSEEN: "check"}

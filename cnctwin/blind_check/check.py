@@ -1,145 +1,116 @@
-"""Runs the blind check: draws questions, seals the answers, has cases diagnosed from folders alone, opens the seal, scores."""
+"""Runs the blind check: draws questions, seals the answers, has cases diagnosed from folders alone, opens the seal, scores.
 
-import shutil
-import tempfile
+Each case is kept as soon as it is done, so a check that was stopped goes on where it stopped, and what is done can be published.
+"""
+
+import json
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
-from multiprocessing import get_context
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from cnctwin.blind_check.answer import Answer, answers_from_json, answers_json
-from cnctwin.blind_check.case_folder import answer_of, write_case
-from cnctwin.blind_check.given import Given, given_of
-from cnctwin.blind_check.question import Question, draw
+from cnctwin.blind_check.kept import Kept, begun
+from cnctwin.blind_check.piece import drawn, judged
+from cnctwin.blind_check.question import Draft
 from cnctwin.blind_check.scoring import Judged, Scored, scored
-from cnctwin.blind_check.sealed import opened, seal
-from cnctwin.blind_check.unseen import closure_on_unseen
-from twin.case import Case, read_case
-from twin.errors import TwinError
-from twin.gap.diagnosis import Diagnosed, Verdict
-from twin.machine import machine_from_toml
-from twin.machine_toml import machine_to_toml
+from cnctwin.jobs.spread import Spread
 
-Diagnose = Callable[[Case], Diagnosed]
-"""A function at the top of a module, so that a worker process finds it by name."""
-BATCH = 8
-"""Cases for each worker whose folders are there at a time."""
+Methods = Mapping[str, str]
+"""Name → `module:function`, by which any process finds it: a function of a case that returns what was diagnosed."""
+Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True)
 class CheckResult:
-    """The check. seal: of the answers, shown before anything was diagnosed; salt: opens it"""
+    """The check as far as it is done.
+
+    seal: of the answers, shown before anything was diagnosed; salt: opens it; asked: cases that were to be drawn; redrawn: those
+    whose first question could not be; undrawn: those of which none could be; programs: states of the twin that diagnosed
+    """
 
     seed: int
     seal: str
     salt: str
+    asked: int
+    redrawn: tuple[str, ...]
+    undrawn: tuple[str, ...]
+    programs: frozenset[str]
     cases: tuple[Judged, ...]
     scored: Scored
     seconds: float
 
 
-def run_check(
-    count: int,
-    seed: int,
-    diagnose: Diagnose,
-    *,
-    workers: int = 2,
-    progress: Callable[[str], None] = lambda _: None,
-    clock: Callable[[], float] = time.perf_counter,
-) -> CheckResult:
-    """Draws `count` questions, seals their answers, has them diagnosed, and scores what came.
-
-    workers: processes; 0 = in this one. A diagnosis that raises is a case that failed: it named nothing. Folders of cases are
-    removed.
-    """
-    return run_checks(count, seed, {"": diagnose}, workers=workers, progress=progress, clock=clock)[""]
-
-
 def run_checks(
-    count: int,
-    seed: int,
-    methods: Mapping[str, Diagnose],
+    drafts: Sequence[Draft],
+    methods: Methods,
+    folder: Path,
     *,
-    workers: int = 2,
-    progress: Callable[[str], None] = lambda _: None,
+    seed: int = 0,
+    spread: Spread = map,
+    progress: Progress = lambda _: None,
+    stopped: Callable[[], bool] = lambda: False,
     clock: Callable[[], float] = time.perf_counter,
 ) -> dict[str, CheckResult]:
-    """As `run_check`, by several methods on the same cases; name → result, `seconds` that of all of them."""
+    """Draw the questions of `drafts`, seal their answers, have each method diagnose them, and score what came.
+
+    folder: of the check, which is made, or gone on with; spread: where pieces are computed
+    stopped: asked between cases; what is done until then is scored
+
+    Name of a method → its result. A question that cannot be drawn ends no other; a diagnosis that raises is a case that failed.
+    """
     begin = clock()
-    questions = draw(count, seed)
-    with _mapping(workers) as mapped:
-        answers = []
-        for answer in mapped(answer_of, questions):
-            answers.append(answer)
-            progress(f"drawing machines: {len(answers)} of {count}")
-        sealed = seal(answers_json(answers))
-        progress(f"answers sealed as {sealed.seal.digest}")
-        given: dict[str, list[Given]] = {name: [] for name in methods}
-        batch = BATCH * max(workers, 1)
-        for first in range(0, count, batch):
-            chosen = slice(first, first + batch)
-            for name, found in _batch(mapped, questions[chosen], answers[chosen], methods).items():
-                given[name] += found
-            progress(f"diagnosing: {min(first + batch, count)} of {count}")
-    true = {answer.name: answer for answer in answers_from_json(opened(sealed.seal, sealed.salt, sealed.text))}
-    results = {}
-    for name, listed in given.items():
-        cases = tuple(Judged(true[q.name], one) for q, one in zip(questions, listed, strict=True))
-        results[name] = CheckResult(seed, sealed.seal.digest, sealed.salt, cases, scored(cases), clock() - begin)
-    return results
+    kept = begun(folder, seed, drafts)
+    _draw(kept, spread, progress, stopped)
+    if kept.seal:
+        progress(f"answers sealed as {kept.seal}")
+        _diagnose(kept, methods, spread, progress, stopped)
+    return {name: result_of(kept, name, clock() - begin) for name in methods}
 
 
-Mapped = Callable[..., Iterator[Any]]
-"""As `map`, in this process or in others."""
+def result_of(kept: Kept, method: str, seconds: float = 0.0) -> CheckResult:
+    """Return what a method has given until now, scored."""
+    cases, programs = kept.judged(method)
+    redrawn = tuple(f"{name}: {found['said'][0]}" for name, found in kept.drawn.items() if found["said"])
+    undrawn = tuple(name for name, found in kept.drawn.items() if found["redraws"] is None)
+    return CheckResult(
+        kept.seed, kept.seal, kept.salt, len(kept.drafts), redrawn, undrawn, programs, cases, scored(cases), seconds
+    )
 
 
-@contextmanager
-def _mapping(workers: int) -> Iterator[Mapped]:
-    """Maps in so many processes; in this one where there are none."""
-    if workers < 1:
-        yield map
+def _draw(kept: Kept, spread: Spread, progress: Progress, stopped: Callable[[], bool]) -> None:
+    left = [(name, draft) for name, draft in zip(kept.names, kept.drafts, strict=True) if name not in kept.drawn]
+    texts = [json.dumps({"draft": draft, "salt": kept.salt}) for _, draft in left]
+    if stopped():
         return
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        yield pool.map
+    for (name, _), found in zip(left, spread(drawn, texts), strict=False):
+        kept.keep_drawn(name, json.loads(found))
+        progress(f"drawing machines: {len(kept.drawn)} of {len(kept.drafts)}")
+        if stopped():
+            return
 
 
-def _batch(
-    mapped: Mapped, questions: Sequence[Question], answers: Sequence[Answer], methods: Mapping[str, Diagnose]
-) -> dict[str, list[Given]]:
-    """Writes some cases, has each method diagnose and judges it, and removes them."""
-    root = Path(tempfile.mkdtemp(prefix="blind-check-"))
-    try:
-        folders = [root / question.name for question in questions]
-        list(mapped(write_case, folders, questions, answers))
-        results = {}
-        for name, diagnose in methods.items():
-            found = list(mapped(diagnosed, folders, [diagnose] * len(folders)))
-            closures = mapped(_closure, questions, answers, [twin for _, twin in found])
-            results[name] = [replace(given, closure_unseen=part) for (given, _), part in zip(found, closures, strict=True)]
-        return results
-    finally:
-        shutil.rmtree(root, ignore_errors=True)
-
-
-def diagnosed(folder: Path, diagnose: Diagnose) -> tuple[Given, str]:
-    """Return the diagnosis of a folder and its twin as TOML; empty where it failed."""
-    begin = time.perf_counter()
-    try:
-        found = diagnose(read_case(folder))
-    except (TwinError, ArithmeticError, ValueError, LookupError, AssertionError) as error:
-        said = f"{type(error).__name__}: {error}"
-        return Given(Verdict.UNKNOWN, (), (), time.perf_counter() - begin, failed=said), ""
-    return given_of(found.diagnosis, time.perf_counter() - begin), machine_to_toml(found.twin)
-
-
-def _closure(question: Question, answer: Answer, twin: str) -> float | None:
-    if not twin or not answer.effects:
-        return None
-    try:
-        return closure_on_unseen(question, answer, machine_from_toml(twin))
-    except TwinError:
-        return None
+def _diagnose(kept: Kept, methods: Methods, spread: Spread, progress: Progress, stopped: Callable[[], bool]) -> None:
+    left = list(kept.missing(tuple(methods)))
+    drafts = dict(zip(kept.names, kept.drafts, strict=True))
+    texts = [
+        json.dumps(
+            {
+                "draft": drafts[name],
+                "salt": kept.salt,
+                "redraws": kept.drawn[name]["redraws"],
+                "digest": kept.drawn[name]["digest"],
+                "methods": {method: methods[method] for method in missing},
+            }
+        )
+        for name, missing in left
+    ]
+    count = len(kept.asked)
+    progress(f"diagnosing: {count - len(left)} of {count}")
+    if stopped():
+        return
+    for done, ((name, _), text) in enumerate(zip(left, spread(judged, texts), strict=False), start=1):
+        found = json.loads(text)
+        kept.keep_given(name, found["answer"], found["given"])
+        progress(f"diagnosing: {count - len(left) + done} of {count}")
+        if stopped():
+            return

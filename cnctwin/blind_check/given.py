@@ -1,9 +1,10 @@
-"""A diagnosis of a case, reduced to what is scored."""
+"""A diagnosis of a case, reduced to what is scored; read from `diagnosis.json` (formats, section 6)."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
 
-from twin.gap.diagnosis import Diagnosis, Verdict
+from twin.gap.diagnosis import Verdict
 
 Interval = tuple[float, float]
 Named = tuple[str, str]
@@ -25,8 +26,22 @@ class GivenCause:
 
 
 @dataclass(frozen=True, slots=True)
+class GivenTerm:
+    """A term that was learned: where it acts, what it is on, on what it depends, and the share of the gap that it closes."""
+
+    site: str
+    on: str
+    depends_on: frozenset[str]
+    closure: float
+
+
+@dataclass(frozen=True, slots=True)
 class Given:
-    """The diagnosis as it came. closure_unseen: on runs the diagnosis never had; failed: why there is no diagnosis."""
+    """The diagnosis as it came.
+
+    closure_unseen: on runs the diagnosis never had; failed: why there is no diagnosis
+    subsystems: name → verdict; learned: the term that closes most first
+    """
 
     verdict: Verdict
     causes: tuple[GivenCause, ...]
@@ -34,16 +49,41 @@ class Given:
     seconds: float
     closure_unseen: float | None = None
     failed: str = ""
+    subsystems: Mapping[str, Verdict] = field(default_factory=dict)
+    learned: tuple[GivenTerm, ...] = ()
 
 
-def given_of(diagnosis: Diagnosis, seconds: float) -> Given:
-    """The diagnosis, reduced."""
-    causes = tuple(
-        GivenCause(
-            (cause.effect, cause.on),
-            frozenset((other.effect, other.on) for other in cause.indistinguishable_from),
-            {name: (interval.low, interval.high) for name, interval in cause.parameters.items()},
-        )
-        for cause in diagnosis.causes
+def given_of(kept: Mapping[str, Any]) -> Given:
+    """Return what is scored of a kept diagnosis: `diagnosis`, `seconds`, `failed`, `closure_unseen`."""
+    found = kept["diagnosis"]
+    learned = [
+        GivenTerm(term["site"], term.get("on", ""), frozenset(term["depends_on"]), term.get("closure") or 0.0)
+        for term in found.get("learned", ())
+    ]
+    return Given(
+        Verdict(found.get("verdict", Verdict.UNKNOWN)),
+        _causes(found.get("causes", ())),
+        tuple(found.get("not_identifiable", ())),
+        kept["seconds"],
+        kept["closure_unseen"],
+        kept["failed"],
+        {one["subsystem"]: Verdict(one["verdict"]) for one in found.get("subsystems", ())},
+        tuple(sorted(learned, key=lambda term: -term.closure)),
     )
-    return Given(diagnosis.verdict, causes, diagnosis.not_identifiable, seconds)
+
+
+def _causes(causes: Sequence[Mapping[str, Any]]) -> tuple[GivenCause, ...]:
+    return tuple(
+        GivenCause(
+            (cause["effect"], cause["on"]),
+            frozenset((other["effect"], other["on"]) for other in cause["indistinguishable_from"]),
+            {name: _interval(values) for name, values in cause["parameters"].items()},
+        )
+        for cause in causes
+    )
+
+
+def _interval(values: Mapping[str, Any]) -> Interval:
+    """Return the ends of an interval; one that is null is open."""
+    low, high = values["low"], values["high"]
+    return (float("-inf") if low is None else low, float("inf") if high is None else high)

@@ -1,11 +1,12 @@
 """A question of the blind check: which runs of a reference machine, and which effects it has. Drawn by seed."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
 
+from cnctwin.standins.reference_machine.controllers import STRUCTURES
 from cnctwin.standins.reference_machine.effect import Effect
 from cnctwin.standins.reference_machine.named_effects import NAMED
 from cnctwin.standins.reference_machine.unnamed_effects import UNNAMED
@@ -14,6 +15,8 @@ Chance = np.random.Generator
 SIZES = (0.7, 30.0)
 """Smallest and largest size of an effect over the floor; drawn evenly over its logarithm."""
 KINDS = ("air", "cut", "warmup")
+OTHER_CONTROLLERS = 1.0 / 3.0
+"""Share of cases whose machine has another structure of controller than it states."""
 
 
 class Sort(StrEnum):
@@ -41,6 +44,14 @@ class DrawnEffect:
 
 
 @dataclass(frozen=True, slots=True)
+class Structure:
+    """The structure of an axis' controller where it is not the nominal one: its name, and the axis."""
+
+    effect: str
+    on: str
+
+
+@dataclass(frozen=True, slots=True)
 class Question:
     """seed: of machine, programs, chances; kinds: of runs; warm: the spindle turns in air, its temperature is recorded."""
 
@@ -50,6 +61,21 @@ class Question:
     kinds: tuple[str, ...]
     asked: tuple[DrawnEffect, ...]
     warm: bool = False
+    controller: Structure | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Draft:
+    """A question by its seed, from which it is drawn, or drawn again with a later seed where it came to nothing.
+
+    effect: which one it asks first, None = none; other_controller: give an axis another structure of controller where that shows
+    """
+
+    name: str
+    sort: Sort
+    seed: int
+    effect: str | None
+    other_controller: bool = False
 
 
 def effect_on(asked: DrawnEffect) -> Effect:
@@ -60,6 +86,11 @@ def effect_on(asked: DrawnEffect) -> Effect:
     return found[0]
 
 
+def structure_named(name: str) -> Effect:
+    """The structure of a controller by its name."""
+    return next(effect for effect in STRUCTURES if effect.name == name)
+
+
 def names(*, named: bool) -> tuple[str, ...]:
     """The effects there are, each once."""
     return tuple(dict.fromkeys(effect.name for effect in (NAMED if named else UNNAMED)))
@@ -67,14 +98,41 @@ def names(*, named: bool) -> tuple[str, ...]:
 
 def draw(count: int, seed: int, sort: Sort | None = None, effect: str | None = None) -> tuple[Question, ...]:
     """`count` questions in the shares of the protocol, each effect as often as any; of one sort, with one effect, where given."""
+    return tuple(question_of(draft) for draft in drafts(count, seed, sort, effect))
+
+
+def drafts(count: int, seed: int, sort: Sort | None = None, effect: str | None = None) -> tuple[Draft, ...]:
+    """As `draw`, not yet drawn. Only questions of all sorts have machines with other controllers among them."""
     chance = np.random.default_rng([seed, 77])
     sorts = [sort] * count if sort else _sorts(count, chance)
     turn = {True: _endless(names(named=True), chance), False: _endless(names(named=False), chance)}
-    questions = []
+    found = []
     for number, one in enumerate(sorts):
         first = effect or (next_of(turn[one is not Sort.OUTSIDE]) if COUNT[one] else None)
-        questions.append(_question(f"case_{number + 1:03d}", one, int(chance.integers(2**31)), first))
-    return tuple(questions)
+        found.append(Draft(f"case_{number + 1:03d}", one, int(chance.integers(2**31)), first))
+    if sort is None:
+        can = [i for i, draft in enumerate(found) if _can_have_another(question_of(draft))]
+        for i in np.random.default_rng([seed, 78]).permutation(can)[: round(OTHER_CONTROLLERS * count)]:
+            found[i] = replace(found[i], other_controller=True)
+    return tuple(found)
+
+
+def question_of(draft: Draft, redraws: int = 0) -> Question:
+    """The question of a draft; with each redraw another one of the same sort and the same first effect."""
+    question = _question(draft.name, draft.sort, draft.seed + redraws, draft.effect)
+    if not draft.other_controller or not _can_have_another(question):
+        return question
+    chance = np.random.default_rng([question.seed, 6])
+    moving = "xyz" if "air" in question.kinds else "xy"
+    asked = [effect.on[0] for effect in question.asked if effect.on[:1] in moving and effect.on]
+    on = asked[0] if asked else str(chance.choice(list(moving)))
+    return replace(question, controller=Structure(STRUCTURES[int(chance.integers(len(STRUCTURES)))].name, on))
+
+
+def _can_have_another(question: Question) -> bool:
+    """Tell whether axes move, and nothing that is asked is in the controller itself; a healthy machine has the one it states."""
+    moves = {"air", "cut"} & set(question.kinds)
+    return bool(question.asked) and bool(moves) and not any(effect_on(asked).in_controller for asked in question.asked)
 
 
 def _sorts(count: int, chance: Chance) -> list[Sort]:

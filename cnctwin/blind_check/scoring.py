@@ -4,14 +4,14 @@ An effect counts as named where effect and `on` are both right. The size of a ca
 signal, over the healthy floor.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import cos, inf
 
 import numpy as np
 
 from cnctwin.blind_check.answer import Answer, Answered
-from cnctwin.blind_check.given import Given, Named
+from cnctwin.blind_check.given import Given, GivenTerm, Named
 from cnctwin.blind_check.question import Sort
 from cnctwin.blind_check.rate import Rate, rate_of
 from twin.gap.diagnosis import Verdict
@@ -30,28 +30,45 @@ class Judged:
 
     @property
     def truths(self) -> frozenset[Named]:
-        """The effects of the machine."""
+        """The effects of the machine that are asked."""
         return frozenset((effect.effect, effect.on) for effect in self.answer.effects)
 
     @property
+    def structure(self) -> frozenset[Named]:
+        """The structure of a controller that is not the stated one, which may be named or not; none as a rule."""
+        controller = self.answer.controller
+        return frozenset() if controller is None else frozenset({(controller.effect, controller.on)})
+
+    @property
+    def controller_told(self) -> bool:
+        """True where another structure of a controller is named, or its subsystem called not understood; or there is none."""
+        doubtful = (Verdict.UNKNOWN, Verdict.PARTLY)
+        return all(
+            any(truth in cause.reported for cause in self.given.causes)
+            or self.given.subsystems.get(f"{truth[1]} controller") in doubtful
+            for truth in self.structure
+        )
+
+    @property
     def names(self) -> frozenset[Named]:
-        """The causes by name."""
-        return frozenset(cause.named for cause in self.given.causes)
+        """The causes by name, but for the structure of a controller."""
+        return frozenset(cause.named for cause in self.given.causes) - self.structure
 
     @property
     def right(self) -> bool:
         """Named by name: all there are, and none besides."""
-        return self.names == self.truths
+        return self.names == self.truths and self.controller_told
 
     @property
     def in_class(self) -> bool:
         """Each effect is in a reported class, and each class has one of them."""
-        return not self.wrong and all(any(truth in cause.reported for cause in self.given.causes) for truth in self.truths)
+        found = all(any(truth in cause.reported for cause in self.given.causes) for truth in self.truths)
+        return found and not self.wrong and self.controller_told
 
     @property
     def wrong(self) -> bool:
         """A cause is reported whose class holds no effect of the machine."""
-        return any(not cause.reported & self.truths for cause in self.given.causes)
+        return any(not cause.reported & (self.truths | self.structure) for cause in self.given.causes)
 
     @property
     def some(self) -> bool:
@@ -60,8 +77,25 @@ class Judged:
 
     @property
     def unknown(self) -> bool:
-        """It is said that the cause is not known, and none is named."""
-        return self.given.verdict is Verdict.UNKNOWN and not self.given.causes and not self.given.failed
+        """It is said that the cause is not known, and none is named but the structure of a controller."""
+        without = (Verdict.UNKNOWN, Verdict.PARTLY) if self.structure else (Verdict.UNKNOWN,)
+        return self.given.verdict in without and not self.names and not self.given.failed
+
+    @property
+    def site_right(self) -> bool:
+        """The learned term that closes most acts where one of the effects does."""
+        return any(self.given.learned and _acts_at(effect, self.given.learned[0]) for effect in self.answer.effects)
+
+    @property
+    def variables_right(self) -> bool:
+        """It depends on what the effect depends on as well."""
+        terms = self.given.learned[:1]
+        return any(
+            term.depends_on == one.depends_on and term.site == one.site and _acts_at(effect, term)
+            for effect in self.answer.effects
+            for one in effect.acts_at
+            for term in terms
+        )
 
     def covered(self) -> tuple[bool, ...]:
         """For each parameter of a rightly named single effect that is said to be identifiable: does its 90 % interval hold it?"""
@@ -73,12 +107,29 @@ class Judged:
         return tuple(_within(truth, name, *cause.intervals[name]) for name in known)
 
 
+def _acts_at(effect: Answered, term: GivenTerm) -> bool:
+    """Tell whether a term is at a site of the effect, and on its axis; `on` may be a column of that axis."""
+    return any(term.site == one.site for one in effect.acts_at) and term.on[: len(effect.on)] == effect.on
+
+
 def _within(truth: Answered, name: str, low: float, high: float) -> bool:
     value = truth.stated[name]
     if name == "phase_rad":
         middle, half = 0.5 * (low + high), 0.5 * (high - low)
         return half >= np.pi or cos(value - middle) >= cos(half)
     return low <= value <= high
+
+
+@dataclass(frozen=True, slots=True)
+class LearnedScores:
+    """The learned terms of cases that were called outside the catalogue; of each the term that closes most.
+
+    site: acts where the effect does; variables: depends on what it does, where the site is right; closure: median on unseen runs
+    """
+
+    site: Rate
+    variables: Rate
+    closure: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,18 +151,41 @@ class Scores:
     class_size: float
 
 
+def closures(cases: Iterable[Judged]) -> list[float]:
+    """The shares of the gap that are gone on runs never seen, where there is something to close."""
+    return [case.given.closure_unseen for case in cases if case.given.closure_unseen is not None]
+
+
 @dataclass(frozen=True, slots=True)
 class Scored:
-    """By size, from `JUDGED_FROM` on, and of the healthy ones; by effect: of single ones from there on."""
+    """By size, from `JUDGED_FROM` on, and of the healthy ones; by effect: of single ones from there on.
+
+    nominal, other_controller: as `judged`, of machines with the controller that they state, and of those with another one
+    controller_told: of the latter, those where it is named, or called not understood
+    """
 
     by_size: Mapping[tuple[float, float], Scores]
     judged: Scores
+    nominal: Scores
+    other_controller: Scores
+    controller_told: Rate
+    learned: LearnedScores
     healthy: Rate
     healthy_wrong: Rate
     by_effect: Mapping[str, tuple[Rate, Rate]]
     failed: Rate
     seconds_median: float
     seconds_max: float
+
+
+def learned_scores(cases: Sequence[Judged]) -> LearnedScores:
+    """The scores of the learned terms of these cases; one without a term is wrong. Closure is of stated controllers."""
+    closed = closures(case for case in cases if not case.structure)
+    return LearnedScores(
+        rate_of(case.site_right for case in cases),
+        rate_of(case.variables_right for case in cases),
+        float(np.median(closed)) if closed else float("nan"),
+    )
 
 
 CLOSED = 0.95
@@ -125,14 +199,14 @@ def scores(cases: Sequence[Judged]) -> Scores:
         return [case for case in cases if case.answer.sort is sort]
 
     single, pair, outside, triple = of(Sort.SINGLE), of(Sort.PAIR), of(Sort.OUTSIDE), of(Sort.TRIPLE)
-    closed = [case.given.closure_unseen for case in single if case.given.closure_unseen is not None]
+    closed = closures(case for case in single if not case.structure)
     sizes = [len(cause.reported) for case in single for cause in case.given.causes]
     return Scores(
         single_right=rate_of(case.right for case in single),
         single_in_class=rate_of(case.in_class for case in single),
         single_wrong=rate_of(case.wrong for case in single),
         outside_unknown=rate_of(case.unknown for case in outside),
-        outside_wrong=rate_of(bool(case.given.causes) for case in outside),
+        outside_wrong=rate_of(bool(case.names) for case in outside),
         pair_both=rate_of(case.in_class for case in pair),
         pair_some=rate_of(case.some for case in pair),
         pair_wrong=rate_of(case.wrong for case in pair),
@@ -162,6 +236,10 @@ def scored(cases: Sequence[Judged]) -> Scored:
     return Scored(
         {(low, high): scores([case for case in sick if low <= case.answer.size < high]) for low, high in BINS},
         scores(seen),
+        scores([case for case in seen if not case.structure]),
+        scores(other := [case for case in seen if case.structure]),
+        rate_of(case.controller_told for case in other),
+        learned_scores([case for case in seen if case.answer.sort is Sort.OUTSIDE and case.unknown]),
         rate_of(case.given.verdict is Verdict.HEALTHY for case in healthy),
         rate_of(bool(case.given.causes) for case in healthy),
         by_effect,

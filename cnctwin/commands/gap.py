@@ -1,9 +1,12 @@
 """`cnctwin gap`: the sim-to-real gap from the command line."""
 
 import json
+import os
 import sys
+import tempfile
 from collections.abc import Iterable
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -15,6 +18,7 @@ from cnctwin.commands.extras import needed_by
 from cnctwin.commands.options import AsJson
 from cnctwin.errors import UsageError
 from cnctwin.files.output import write
+from cnctwin.processes.stopping import stopped_by_signals
 from cnctwin.terminal.console import standard_output
 from cnctwin.terminal.spinner import working
 
@@ -81,18 +85,43 @@ def score(
 def check(
     cases: Annotated[int, typer.Option(help="Machines to draw", min=1)] = 40,
     seed: Annotated[int, typer.Option(help="Of the machines; another one, other machines", min=0)] = 1,
-    workers: Annotated[int, typer.Option(help="Processes", min=0)] = 2,
+    keep: Annotated[
+        Path | None,
+        typer.Option(help="A folder for what is done: with the same cases and seed, the check goes on where it stopped"),
+    ] = None,
+    workers: Annotated[int | None, typer.Option(help="Processes, one thread each; as many as there are cores", min=1)] = None,
+    dask: Annotated[str | None, typer.Option(help="Or a Dask cluster: tcp://… or tls://… (docs/jobs.md)")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """The blind check: an independent plant withholds its effects, answers sealed by hash; accuracy over effect size."""
+    """The blind check: an independent plant withholds its effects, answers sealed by hash; accuracy over effect size.
+
+    Ctrl-C ends it after the cases that have begun, and prints the score of those that are done.
+    """
     with needed_by("the twin", "twin"):
-        from cnctwin.batch.diagnosis import diagnosed_alone
-        from cnctwin.blind_check.check import run_check
+        from cnctwin.blind_check.check import run_checks
+        from cnctwin.blind_check.question import drafts
         from cnctwin.blind_check.table import check_json, missed, table
+        from cnctwin.jobs.dask_cluster import DaskCluster
+        from cnctwin.jobs.spread import spread_over
     if cases < 1:
         raise UsageError(f"--cases {cases}: at least one")
-    with working("blind check") as say:
-        result = run_check(cases, seed, diagnosed_alone, workers=workers, progress=say)
+    cluster = DaskCluster.from_text(dask) if dask is not None else None
+    cores = workers or (os.cpu_count() if find_spec("joblib") else None) or 1
+    with (
+        tempfile.TemporaryDirectory(prefix="blind-check-") as passing,
+        stopped_by_signals() as stop,
+        spread_over(min(cores, cases), cluster) as spread,
+        working("blind check") as say,
+    ):
+        result = run_checks(
+            drafts(cases, seed),
+            {"diagnosis": "cnctwin.batch.diagnosis:diagnosed_alone"},
+            keep or Path(passing),
+            seed=seed,
+            spread=spread,
+            progress=say,
+            stopped=stop.is_set,
+        )["diagnosis"]
     sys.stdout.write(json.dumps(check_json(result)) + "\n" if as_json else table(result) + "\n")
     raise typer.Exit(1 if missed(result) else 0)
 

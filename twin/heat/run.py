@@ -63,13 +63,15 @@ def spindle_temperature_c(
     start_c: ArrayLike,
     *,
     effects: Sequence[str] = (),
+    added_w: ArrayLike | None = None,
     reference_run: bool = False,
 ) -> Array:
     """Temperature at each sample, (lanes, samples), °C, from `start_c` at the first one.
 
     constants: name → a number or (lanes,), of the machine (`thermal_constants`) and of the effects (`effect__parameter`)
     start_c: a number, or (lanes,)
-    effects: names of those that are in the kernel; reference_run: in plain Python, slowly, from the same text
+    effects: names of those that are in the kernel; added_w: heat on top, (samples,) or (lanes, samples), or None
+    reference_run: in plain Python, slowly, from the same text
 
     100 W into 5,000 J/K behind 0.2 K/W for one time constant of 1,000 s, in two steps:
 
@@ -81,7 +83,7 @@ def spindle_temperature_c(
     Raises TwinError where times do not increase, an input has no sample at all or does not fit; EffectError where a constant is
     missing or an effect does not act on the spindle's heat.
     """
-    text, names = _kernel(HEAT.effects(effects))
+    text, names = _kernel(HEAT.effects(effects), added_w is not None)
     given = HEAT.taken(constants, names)
     times, inputs = _held_inputs(warming)
     columns = [np.asarray(column, dtype=np.float64).reshape(-1) for column in (start_c, *given)]
@@ -93,8 +95,10 @@ def spindle_temperature_c(
     rows = np.array(rest).T.reshape(len(start), len(names))
     out = np.empty((len(start), len(times)))
     warm = kernel_function(text, "warm", reference_run=reference_run)
+    added = [] if added_w is None else [np.broadcast_to(np.asarray(added_w, dtype=np.float64), out.shape)]
     for lane in range(len(start)):
-        warm(np.ascontiguousarray(rows[lane]), float(start[lane]), times, *inputs, out[lane])
+        own = [np.ascontiguousarray(series[lane]) for series in added]
+        warm(np.ascontiguousarray(rows[lane]), float(start[lane]), times, *inputs, *own, out[lane])
     return out
 
 
@@ -128,15 +132,16 @@ def _held_inputs(warming: Warming) -> tuple[Array, list[Array]]:
 
 
 @cache
-def _kernel(effects: tuple[Effect, ...]) -> tuple[str, tuple[str, ...]]:
-    """The text that defines `warm`, and the constants that it takes, in order."""
-    woven = weave(HEAT.physics, effects)
-    scalars = Scalars.of(woven, effects, FED)
-    arguments = ", ".join(f"{name}_in" for name in INPUTS)
+def _kernel(effects: tuple[Effect, ...], added: bool = False) -> tuple[str, tuple[str, ...]]:
+    """The text that defines `warm`, and the constants that it takes, in order. added: with a heat on top"""
+    woven = weave(HEAT.physics, effects, (), ("heat_w",) if added else ())
+    fed = (*INPUTS, *(["added__heat_w"] if added else []))
+    scalars = Scalars.of(woven, effects, (*FED, *fed))
+    arguments = ", ".join(f"{name}_in" for name in fed)
     start = [*scalars.before_loop(), "temperature_c = start_c", *scalars.states_at_start()]
     tick = ["shown_c[sample] = temperature_c", "if sample + 1 < len(t_s):"]
     body = ["time_s = t_s[sample]", "duration_s = t_s[sample + 1] - time_s"]
-    body += [f"{name} = {name}_in[sample]" for name in INPUTS] + scalars.in_loop()
+    body += [f"{name} = {name}_in[sample]" for name in fed] + scalars.in_loop()
     body += [*woven.body.splitlines(), "temperature_c = temperature_next_c"]
     lines = [
         KERNEL,

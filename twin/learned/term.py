@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from twin.errors import EffectError
 from twin.learned.knots import Knots
 from twin.learned.words import LearnedSite, word_of
 
@@ -35,7 +36,14 @@ class Term:
         return tuple(dict.fromkeys(word_of(column) for column in self.knots.columns))
 
     def at(self, arguments: Mapping[str, Floats]) -> Floats:
-        """Return its series at the arguments, column → (n,); (n,)."""
+        """Return its series at the arguments, column → (n,); (n,).
+
+        Raises EffectError where an argument is not known.
+        """
+        for column in self.knots.columns:
+            if column not in arguments:
+                on = f" on {self.on}" if self.on else ""
+                raise EffectError(f"the learned term at {self.site.value}{on} needs {column}, which this run has not got there")
         return np.asarray(self.knots.interpolated(self.value[None, :], arguments)[0])
 
     def table(self) -> dict[str, tuple[float, ...]]:

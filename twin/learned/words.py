@@ -34,6 +34,7 @@ WORDS = {
     "spindle_angle_rad": "spindle_angle",
     "spindle_rpm": "spindle_rpm",
     "chip_mm": "chip",
+    "axial_depth_mm": "chip",
     "temperature_c": "temperature",
     "coolant_on": "coolant",
     "time_since_start_s": "time_since_start",

@@ -24,19 +24,26 @@ from twin.effects.effect import On
 from twin.errors import EffectError
 from twin.heat.run import Warming, spindle_temperature_c, thermal_constants, thermal_quantities
 from twin.kernels.weave import quantities
+from twin.learned.arguments import around, motion_arguments, other_axes
+from twin.learned.cutting import cut_arguments, cut_series, milling_with_terms
+from twin.learned.sites import MACHINE_READINGS, READINGS
+from twin.learned.standing import axis_terms, check_terms, reading_series, settled, terms_at
+from twin.learned.words import LearnedSite
 from twin.machine import MachineFile
 from twin.process.kernel import process_quantities
-from twin.process.milling import Milling, milling_force, peak_force, tool_constants
+from twin.process.milling import Milling, tool_constants
 from twin.sensor.clock import looked_at, resampled, stamped
 from twin.sensor.reading import readings, sensor_quantities
 from twin.servo.constants import axis_constants, effect_constants
 from twin.servo.disturbance import Disturbance
 from twin.servo.kernel import axis_quantities
 from twin.servo.run import AxisInput, AxisRun, run_axes
+from twin.simulator.peaks import peaks
 from twin.spindle.load import spindle_constants, spindle_load_pct, spindle_quantities
 
 Floats = NDArray[np.float64]
 SIGNAL = re.compile(r"^([a-z][a-z0-9]?_(pos_mm|table_mm|torque_a)|force_[xy]_n|spindle_load_pct|spindle_temp_c)$")
+HEAT_SITES = (LearnedSite.HEAT_INPUT, LearnedSite.HEAT_LOSS)
 COURSES = 32
 COURSES_SEED = 20
 NOISE_OF = {"pos_mm": "position_mm", "table_mm": "table_mm", "torque_a": "torque_a"}
@@ -100,6 +107,7 @@ def check_effects(machine: MachineFile) -> None:
             raise EffectError(
                 f"{added.effect} is put on {added.on!r}, which is no column that a machine answers with (x_pos_mm, …)"
             )
+    check_terms(machine.learned, machine.axes)
 
 
 def respond(
@@ -122,8 +130,11 @@ def respond(
     """
     check_effects(machine)
     chain = _Chain(machine, told, recorded or {}, reference_run)
-    chain.axes(chain.process(), seed, courses)
-    chain.heat()
+    force = chain.process()
+    temperature_c = chain.heat()
+    chain.axes(force, seed, courses, temperature_c)
+    if temperature_c is not None:
+        chain.columns["spindle_temp_c"] = temperature_c
     chain.sensors()
     if seed is not None:
         _noise(machine, chain.columns, np.random.default_rng([seed, 1]))
@@ -155,7 +166,7 @@ def _named(prefix: Mapping[str, Mapping[str, float]]) -> dict[str, float]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Chain:
-    """The sites of one run, in order; each adds its columns."""
+    """The sites of one run, in order; each adds its columns. depended: axis letter → the arguments of learned terms on it"""
 
     machine: MachineFile
     told: RunInput
@@ -163,6 +174,7 @@ class _Chain:
     reference_run: bool
     columns: dict[str, Floats] = field(default_factory=dict)
     spread: dict[str, Floats] = field(default_factory=dict)
+    depended: dict[str, Mapping[str, Floats]] = field(default_factory=dict)
 
     def process(self) -> dict[str, Floats]:
         """Adds forces and load; the mean force of each tick that resists an axis, by its letter."""
@@ -175,13 +187,16 @@ class _Chain:
             effects = added_effects(self.machine, process_quantities())
             constants = tool_constants(machine.tool) | _named(effects)
             named = tuple(effects)
-            force = milling_force(
-                constants, machine.tool.teeth, milling, period_s=period_s, effects=named, reference_run=self.reference_run
-            )
+            terms = terms_at(machine.learned, {LearnedSite.CUT_FORCE})
+            arguments = self.arguments(None) | cut_arguments(milling, machine.tool.teeth) if terms else {}
+            options = {"period_s": period_s, "effects": named, "reference_run": self.reference_run}
+            series = cut_series(terms, arguments)
+            force = milling_with_terms(constants, machine.tool.teeth, milling, series, **options)
             self.columns["force_x_n"], self.columns["force_y_n"] = force.force_x_n[0], force.force_y_n[0]
             feed = 60.0 * np.hypot(milling.velocity_x_mm_s, milling.velocity_y_mm_s)
             cut = (milling.axial_depth_mm, milling.entry_angle_rad, milling.exit_angle_rad)
-            self.columns["cutting_force_peak_n"] = _peaks(constants, machine.tool.teeth, named, (milling.spindle_rpm, feed, *cut))
+            told_cut = (milling.spindle_rpm, feed, *cut)
+            self.columns["cutting_force_peak_n"] = peaks(constants, machine.tool.teeth, named, told_cut, series)
             mean = {"x": -force.mean_force_x_n[0], "y": -force.mean_force_y_n[0]}
             power_w = force.cutting_power_w()[0]
         for axis in "xy":
@@ -189,17 +204,25 @@ class _Chain:
                 mean[axis] = -np.nan_to_num(self.recorded[f"force_{axis}_n"])
         if machine.spindle is not None and told.spindle_rpm is not None and told.reference_mm:
             effects = added_effects(self.machine, spindle_quantities())
-            self.columns["spindle_load_pct"] = spindle_load_pct(
-                spindle_constants(machine.spindle) | _named(effects),
-                power_w,
-                told.spindle_rpm,
-                period_s=period_s,
-                effects=tuple(effects),
-                reference_run=self.reference_run,
-            )[0]
+            spindle, rpm = spindle_constants(machine.spindle) | _named(effects), told.spindle_rpm
+
+            def load(added: Mapping[str, Floats]) -> Floats:
+                found = spindle_load_pct(
+                    spindle,
+                    power_w,
+                    rpm,
+                    period_s=period_s,
+                    effects=tuple(effects),
+                    added_kw=added.get("electrical_power_kw"),
+                    reference_run=self.reference_run,
+                )
+                return np.asarray(found[0])
+
+            terms = terms_at(machine.learned, {LearnedSite.SPINDLE_POWER})
+            self.columns["spindle_load_pct"] = settled(terms, load, lambda shown: self.arguments(None) | {"load_pct": shown})
         return mean
 
-    def axes(self, mean_force: Mapping[str, Floats], seed: int | None, courses: int) -> None:
+    def axes(self, mean_force: Mapping[str, Floats], seed: int | None, courses: int, temperature_c: Floats | None) -> None:
         """Adds position, table and torque of each axis that the machine has."""
         disturbance = disturbance_of(self.machine)
         many = courses if disturbance and seed is None else 1
@@ -208,13 +231,13 @@ class _Chain:
             if disturbance:
                 chance = [COURSES_SEED, number] if seed is None else [seed, 2, number]
                 force = force + disturbance.courses(many, len(reference), self.machine.machine.servo_period_s, chance)
-            run = self.axis(letter, reference, force, many)
+            run = self.axis(letter, reference, force, many, temperature_c)
             for output, column in (("position_mm", "pos_mm"), ("torque_a", "torque_a"), ("table_mm", "table_mm")):
                 self.columns[f"{letter}_{column}"] = run.outputs[output].mean(axis=0)
                 if many > 1:
                     self.spread[f"{letter}_{column}"] = run.outputs[output].std(axis=0)
 
-    def axis(self, letter: str, reference: Floats, force: Floats, many: int) -> AxisRun:
+    def axis(self, letter: str, reference: Floats, force: Floats, many: int, temperature_c: Floats | None) -> AxisRun:
         """One axis over all its courses."""
         period_s = self.machine.machine.servo_period_s
         base = axis_constants(self.machine.axes[letter])
@@ -222,36 +245,76 @@ class _Chain:
         for name, given in effects.items():
             base |= effect_constants(effect_named(name), given, base, letter)
         replaced = _replaced(letter, self.recorded, period_s)
-        return run_axes(
-            {name: np.full(many, value) for name, value in base.items()},
-            AxisInput(
-                np.tile(_seen_reference(reference, self.told.t_s, self.machine, letter), (many, 1)),
-                np.arange(many),
-                force if force.any() else None,
-                {name: np.tile(values, (many, 1)) for name, values in replaced.items()},
-            ),
-            period_s=period_s,
-            effects=tuple(effects),
-            outputs=("position_mm", "torque_a", "table_mm"),
-            start=self.told.start.get(letter),
-            reference_run=self.reference_run,
-        )
+        seen = _seen_reference(reference, self.told.t_s, self.machine, letter)
 
-    def heat(self) -> None:
-        """Adds the spindle's temperature where the machine states its heat, and load, speed and surroundings are known."""
+        def run(added: Mapping[str, Floats]) -> AxisRun:
+            return run_axes(
+                {name: np.full(many, value) for name, value in base.items()},
+                AxisInput(
+                    np.tile(seen, (many, 1)),
+                    np.arange(many),
+                    force if force.any() else None,
+                    {name: np.tile(values, (many, 1)) for name, values in replaced.items()},
+                    {name: np.tile(values, (many, 1)) for name, values in added.items()},
+                ),
+                period_s=period_s,
+                effects=tuple(effects),
+                outputs=("position_mm", "torque_a", "table_mm"),
+                start=self.told.start.get(letter),
+                reference_run=self.reference_run,
+            )
+
+        terms = axis_terms(self.machine.learned, letter)
+        if not terms:
+            return run({})
+        fixed = self.arguments(temperature_c) | motion_arguments(self.told.t_s, reference)
+
+        def arguments(found: AxisRun) -> dict[str, Floats]:
+            position, torque = (found.outputs[name].mean(axis=0) for name in ("position_mm", "torque_a"))
+            position = self.recorded.get(f"{letter}_pos_mm", position)
+            return fixed | {"position_mm": position, "torque_a": self.recorded.get(f"{letter}_torque_a", torque)}
+
+        answer = settled(terms, run, arguments)
+        self.depended[letter] = arguments(answer)
+        return answer
+
+    def arguments(self, temperature_c: Floats | None) -> dict[str, Floats]:
+        """The arguments of learned terms that the machine as a whole tells."""
+        told = self.told
+        load = self.recorded.get("spindle_load_pct", self.columns.get("spindle_load_pct"))
+        columns = {
+            "spindle_rpm": told.spindle_rpm,
+            "spindle_angle_rad": told.spindle_angle_rad,
+            "axial_depth_mm": told.axial_depth_mm,
+            "coolant_on": told.coolant_on,
+            "spindle_load_pct": load,
+            "spindle_temp_c": temperature_c,
+        }
+        return around(told.t_s, columns) | other_axes(told.t_s, told.reference_mm)
+
+    def heat(self) -> Floats | None:
+        """The spindle's temperature where the machine states its heat, and load, speed and surroundings are known."""
         thermal, told = self.machine.thermal, self.told
         load = self.recorded.get("spindle_load_pct", self.columns.get("spindle_load_pct"))
         if thermal is None or load is None or told.spindle_rpm is None or told.ambient_temp_c is None:
-            return
+            return None
         ambient_c = float(told.ambient_temp_c[np.isfinite(told.ambient_temp_c)][0])
         effects = added_effects(self.machine, thermal_quantities())
-        self.columns["spindle_temp_c"] = spindle_temperature_c(
-            thermal_constants(thermal) | _named(effects),
-            Warming(told.t_s, load, told.spindle_rpm, told.ambient_temp_c, told.coolant_on),
-            ambient_c if told.start_temp_c is None else told.start_temp_c,
-            effects=tuple(effects),
-            reference_run=self.reference_run,
-        )[0]
+        constants = thermal_constants(thermal) | _named(effects)
+        warming = Warming(told.t_s, load, told.spindle_rpm, told.ambient_temp_c, told.coolant_on)
+
+        def warm(added: Mapping[str, Floats]) -> Floats:
+            found = spindle_temperature_c(
+                constants,
+                warming,
+                ambient_c if told.start_temp_c is None else told.start_temp_c,
+                effects=tuple(effects),
+                added_w=added.get("heat_w"),
+                reference_run=self.reference_run,
+            )
+            return np.asarray(found[0])
+
+        return settled(terms_at(self.machine.learned, HEAT_SITES), warm, self.arguments)
 
     def sensors(self) -> None:
         """Turns what is into what is recorded: sensors first, then the clock that stamps them."""
@@ -259,11 +322,16 @@ class _Chain:
         since = np.diff(t_s, prepend=t_s[:1])
         temperature = self.columns.get("spindle_temp_c")
         rise = None if temperature is None else temperature - temperature[0]
+        reading_terms = terms_at(self.machine.learned, {*READINGS, *MACHINE_READINGS})
         for name in list(self.columns):
             effects = added_effects(self.machine, sensor_quantities(), name)
             if name.endswith("_table_mm"):
                 effects |= added_effects(self.machine, sensor_quantities(), name.removesuffix("_table_mm"))
             self.columns[name] = readings(self.columns[name], since, effects, rise, self.reference_run)
+            if reading_terms:
+                depended = self.depended.get(name.partition("_")[0]) or self.arguments(temperature)
+                learned = reading_series(reading_terms, name, depended)
+                self.columns[name] = self.columns[name] if learned is None else self.columns[name] + learned
         drifting = added_effects(self.machine, quantities((stamped,)))
         if drifting and self.told.reference_mm:
             at_s = _mapped(t_s, drifting, "feedback_time_s") - t_s[0]
@@ -271,20 +339,6 @@ class _Chain:
                 for name in values:
                     if name.endswith(("_pos_mm", "_table_mm", "_torque_a")):
                         values[name] = resampled(values[name], period_of(t_s), at_s)
-
-
-def _peaks(constants: Mapping[str, float], teeth: int, effects: tuple[str, ...], cut: tuple[Floats, ...]) -> Floats:
-    """Peak force at each tick, worked out once for neighbouring ticks that cut alike to seven digits."""
-    rows = np.nan_to_num(np.array(cut))
-    places = 6 - np.floor(np.log10(np.maximum(np.abs(rows).max(axis=1, keepdims=True), 1e-30)))
-    rows = np.round(rows * 10.0**places) / 10.0**places
-    new = np.concatenate([[True], (rows[:, 1:] != rows[:, :-1]).any(axis=0)])
-    different = rows[:, new]
-    cutting = (different[2] > 0.0) & (different[0] > 0.0)
-    peaks = np.zeros(different.shape[1])
-    if cutting.any():
-        peaks[cutting] = peak_force(constants, teeth, *different[:, cutting], effects=effects)[0]
-    return np.asarray(peaks[np.cumsum(new) - 1])
 
 
 def disturbance_of(machine: MachineFile) -> Disturbance | None:

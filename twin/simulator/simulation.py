@@ -102,6 +102,11 @@ def simulate(
         start_temp_c=start_temperature_c,
     )
     response = respond(machine, told, seed=seed)
+    notes += [
+        f"the learned term at {term} describes the time of a recording; it is left out"
+        for term in machine.learned
+        if term.is_recording
+    ]
     notes += _saturated(machine, response)
     return Simulation(_log(motion, told, response, path, name), response, planned, tuple(notes))
 

@@ -49,13 +49,15 @@ def spindle_load_pct(
     *,
     period_s: float = 0.001,
     effects: Sequence[str] = (),
+    added_kw: ArrayLike | None = None,
     reference_run: bool = False,
 ) -> Array:
     """Return the meter's reading at each tick, (lanes, ticks), % of rated power.
 
     constants: name → a number or (lanes,), of the spindle (`spindle_constants`) and of the effects (`effect__parameter`)
     cutting_power_w: mean over each tick, and spindle_rpm: each (ticks,) or (lanes, ticks)
-    effects: names of those that are in the kernel; reference_run: in plain Python, slowly, from the same text
+    effects: names of those that are in the kernel; added_kw: electrical power on top, (ticks,) or (lanes, ticks), or None
+    reference_run: in plain Python, slowly, from the same text
 
     1,870 W of cut at an efficiency of 0.85, and 0.25 kW, are 2.45 kW of 11 kW:
 
@@ -65,14 +67,16 @@ def spindle_load_pct(
 
     Raises TwinError where shapes do not fit, EffectError where a constant is missing or an effect does not act on the spindle.
     """
-    text, names = _kernel(SPINDLE.effects(effects))
+    text, names = _kernel(SPINDLE.effects(effects), added_kw is not None)
     power_w, rpm, rows = _fitted(cutting_power_w, spindle_rpm, constants, names)
     window = max(round(WINDOW_S / period_s), 1)
     out = np.empty(power_w.shape)
     load = kernel_function(text, "load", reference_run=reference_run)
     later = np.zeros(window + 1)
+    added = [] if added_kw is None else [np.broadcast_to(np.asarray(added_kw, dtype=np.float64), power_w.shape)]
     for lane in range(len(power_w)):
-        load(rows[lane], power_w[lane], rpm[lane], window, period_s, later, out[lane])
+        own = [np.ascontiguousarray(series[lane]) for series in added]
+        load(rows[lane], power_w[lane], rpm[lane], window, period_s, later, *own, out[lane])
     return out
 
 
@@ -97,15 +101,17 @@ def _fitted(
 
 
 @cache
-def _kernel(effects: tuple[Effect, ...]) -> tuple[str, tuple[str, ...]]:
-    """The text that defines `load`, and the constants that it takes, in order."""
-    woven = weave(SPINDLE.physics, effects)
-    scalars = Scalars.of(woven, effects, FED)
+def _kernel(effects: tuple[Effect, ...], added: bool = False) -> tuple[str, tuple[str, ...]]:
+    """The text that defines `load`, and the constants that it takes, in order. added: with a power on top"""
+    woven = weave(SPINDLE.physics, effects, (), ("electrical_power_kw",) if added else ())
+    scalars = Scalars.of(woven, effects, (*FED, "added__electrical_power_kw"))
     assert all(isinstance(value, float) for value in scalars.states.values()), "the meter has no state to start from"
-    body = [*scalars.in_loop(), *woven.body.splitlines()]
+    top = ["added__electrical_power_kw = added_kw[tick]"] if added else []
+    body = [*scalars.in_loop(), *top, *woven.body.splitlines()]
+    fed = "added_kw, " if added else ""
     lines = [
         KERNEL,
-        "def load(constants, cutting_power_w, spindle_rpm_in, window, period_s, later_w, shown_pct):",
+        f"def load(constants, cutting_power_w, spindle_rpm_in, window, period_s, later_w, {fed}shown_pct):",
         *(f"    {line}" for line in [*scalars.before_loop(), *scalars.states_at_start()]),
         *(f"    {line}" for line in _WINDOW),
         *(f"        {line}" for line in [*body, "shown_pct[tick] = spindle_load_pct"]),

@@ -23,7 +23,9 @@ class AxisPhysics(NamedTuple):
     """Constants of an axis; from `gravity_n` on, what a nominal axis has not got, at nothing.
 
     N, mm, s, A, kg. cable_n_per_mm is of the chain, spot_* of a place with more friction, wait_* of a breakaway force that grows
-    at rest, fade of a drive that weakens as it is loaded, leak_s the time in which the controller forgets its integral.
+    at rest, fade of a drive that weakens as it is loaded, leak_per_s the rate at which the controller forgets its integral.
+    compensation_a is fed forward against friction by the direction of the reference (over 1 mm/s), filter_s the time constant
+    of a filter of the reference, outer_per_s the integral of the position loop by its proportional part.
     """
 
     mass_kg: float
@@ -53,6 +55,9 @@ class AxisPhysics(NamedTuple):
     velocity_forward: float = 0.0
     acceleration_forward: float = 0.0
     delay_s: float = 0.0
+    compensation_a: float = 0.0
+    filter_s: float = 0.0
+    outer_per_s: float = 0.0
     spot_n: float = 0.0
     spot_mm: float = 0.0
     spot_width_mm: float = 1.0
@@ -156,15 +161,20 @@ def run(
     at its reference; out: (3, n) position of the motor, torque, position of the table, at the ticks."""
     period, h = 0.001, 0.001 / STEPS
     x, v, z, integral = reference[0], 0.0, 0.0, 0.0
+    outer, wanted, follow = 0.0, reference[0], 1.0 - exp(-period / p.filter_s) if p.filter_s > 0.0 else 1.0
     rest_s, warmth, heat = 10.0, 0.0, 0.0
     engaged, wind, wind_speed = x, 0.0, 0.0
     screw_rate = sqrt(1000.0 * p.screw_n_per_mm / (0.7 * p.mass_kg)) if p.screw_n_per_mm > 0.0 else 0.0
     for tick in range(-hold, len(reference)):
         now = max(tick, 0)
-        error = p.position_gain * (reference[now] - x) + p.velocity_forward * forward_velocity[now] - v
+        wanted = wanted + follow * (reference[now] - wanted) if p.filter_s > 0.0 else reference[now]
+        outer += p.outer_per_s * (wanted - x) * period
+        error = p.position_gain * (wanted - x + outer) + p.velocity_forward * forward_velocity[now] - v
         integral += (p.integral_gain * error - p.leak_per_s * integral) * period
         integral = min(max(integral, -p.limit_a), p.limit_a)
         torque = p.velocity_gain * error + integral
+        if p.compensation_a != 0.0:
+            torque += p.compensation_a * min(max(forward_velocity[now], -1.0), 1.0)
         torque += p.acceleration_forward * p.mass_kg * 0.001 * forward_acceleration[now] / p.newton_per_a
         torque = min(max(torque, -p.limit_a), p.limit_a)
         table = engaged - wind

@@ -14,6 +14,37 @@ AXES = ("x", "y", "z")
 
 
 @dataclass(frozen=True, slots=True)
+class ActsAt:
+    """A place where an effect acts and what it depends on there, in the words of formats, section 6.
+
+    >>> ActsAt.from_text("axis_force: position direction") == ActsAt("axis_force", frozenset({"direction", "position"}))
+    True
+    """
+
+    site: str
+    depends_on: frozenset[str]
+
+    @classmethod
+    def from_text(cls, text: str) -> "ActsAt":
+        """Read `site: word word`."""
+        site, _, words = text.partition(":")
+        return cls(site, frozenset(words.split()))
+
+
+Described = Callable[[str, Parameters], tuple[ActsAt, ...]]
+"""What an effect is put on and its parameters → the descriptions of it that are equally right."""
+
+
+def described(*texts: str) -> Described:
+    """Return the same descriptions wherever the effect is."""
+    alternatives = tuple(ActsAt.from_text(text) for text in texts)
+    return lambda _on, _parameters: alternatives
+
+
+UNDESCRIBED = described()
+
+
+@dataclass(frozen=True, slots=True)
 class Effect:
     """One effect.
 
@@ -25,6 +56,8 @@ class Effect:
     acts: the physics with it
     most, least: the largest amplitude that makes sense, and the smallest that the steps of the integration can follow
     exact: parameters that mean here what they mean in the catalogue
+    in_controller: it changes what the control computes
+    acts_at: the descriptions of an effect of no catalogue that are right
     """
 
     name: str
@@ -37,6 +70,8 @@ class Effect:
     exact: tuple[str, ...] = ()
     warm: bool = False
     least: float = 1e-4
+    in_controller: bool = False
+    acts_at: Described = UNDESCRIBED
 
 
 def none(_: Chance) -> Parameters:

@@ -105,19 +105,19 @@ AXIS_EFFECTS = (
     Effect(
         "servo_gain", AXES, MOTION, _gain_traits,
         lambda a, t: {f"{name}_scale": exp(0.1 * a * t[name]) for name in ("position", "velocity", "integral")}, _gains, 6.0,
-        ("position_scale", "velocity_scale", "integral_scale"),
+        ("position_scale", "velocity_scale", "integral_scale"), in_controller=True,
     ),
     Effect(
         "velocity_feedforward", AXES, MOTION, none, lambda a, _: {"gain": 0.3 * a},
-        lambda x, on, p: x.with_axis(on, velocity_forward=p["gain"]), 3.0, ("gain",),
+        lambda x, on, p: x.with_axis(on, velocity_forward=p["gain"]), 3.0, ("gain",), in_controller=True,
     ),
     Effect(
         "acceleration_feedforward", AXES, MOTION, none, lambda a, _: {"gain": 0.3 * a},
-        lambda x, on, p: x.with_axis(on, acceleration_forward=p["gain"]), 4.0, ("gain",),
+        lambda x, on, p: x.with_axis(on, acceleration_forward=p["gain"]), 4.0, ("gain",), in_controller=True,
     ),
     Effect(
         "command_delay", AXES, MOTION, none, lambda a, _: {"delay_s": 0.002 * a},
-        lambda x, on, p: x.with_axis(on, delay_s=p["delay_s"]), 10.0, ("delay_s",),
+        lambda x, on, p: x.with_axis(on, delay_s=p["delay_s"]), 10.0, ("delay_s",), in_controller=True,
     ),
     Effect(
         "thermal_growth", AXES, ("air",), sign, lambda a, t: {"um_per_k": 5.0 * a * t["sign"]},

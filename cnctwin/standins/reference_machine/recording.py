@@ -153,11 +153,11 @@ def _from_outside(physics: Physics, motion: Motion, letter: str) -> Floats:
 def _axis_run(physics: Physics, motion: Motion, letter: str, force: Floats) -> Floats:
     p, number, path = physics.axes[letter], "xyz".index(letter), motion.path
     reference = path.at_ticks(number, p.delay_s)
-    forward = p.velocity_forward != 0.0 or p.acceleration_forward != 0.0
+    forward = p.velocity_forward != 0.0 or p.acceleration_forward != 0.0 or p.compensation_a != 0.0
     velocity = path.velocity(number, p.delay_s) if forward else np.zeros(len(reference))
     acceleration = path.acceleration(number, p.delay_s) if forward else velocity
-    if p.warmup != 0.0:
-        speed = np.abs(path.velocity(number))
+    speed = np.abs(path.velocity(number))
+    if p.warmup != 0.0 and speed.any():  # an axis that does not move does not warm
         p = p._replace(warmup_w=float(np.mean(speed * (p.coulomb_n + p.viscous * speed))))
     out = np.empty((3, len(reference)))
     axis.run(p, reference, velocity, acceleration, force, HOLD, out)

@@ -1,13 +1,16 @@
 """The blind check from draw to table, with diagnoses that know nothing, or everything."""
 
 import json
+from collections.abc import Callable, Iterator, Sequence
+from itertools import chain, repeat
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from cnctwin.blind_check import check as check_module
-from cnctwin.blind_check.answer import answers_from_json, answers_json
+from cnctwin.blind_check import piece
+from cnctwin.blind_check.answer import Answer, answers_from_json, answers_json
 from cnctwin.blind_check.case_folder import (
     FIT,
     UNSEEN,
@@ -18,11 +21,29 @@ from cnctwin.blind_check.case_folder import (
     write_case,
     write_folder,
 )
-from cnctwin.blind_check.check import diagnosed, run_check
-from cnctwin.blind_check.question import SHARES, SIZES, DrawnEffect, Question, Sort, draw, names
+from cnctwin.blind_check.check import CheckResult, run_checks
+from cnctwin.blind_check.given import given_of
+from cnctwin.blind_check.kept import read_kept
+from cnctwin.blind_check.piece import Diagnose, diagnosed
+from cnctwin.blind_check.question import (
+    SHARES,
+    SIZES,
+    Draft,
+    DrawnEffect,
+    Question,
+    Sort,
+    Structure,
+    draw,
+    effect_on,
+    names,
+    question_of,
+)
+from cnctwin.blind_check.scoring import Judged, scored
 from cnctwin.blind_check.sealed import SealError, opened, seal
 from cnctwin.blind_check.table import table
 from cnctwin.blind_check.write import main
+from cnctwin.errors import UsageError
+from cnctwin.standins.reference_machine.controllers import STRUCTURES
 from cnctwin.standins.reference_machine.named_effects import NAMED
 from cnctwin.standins.reference_machine.unnamed_effects import UNNAMED
 from twin.case import Case, read_case
@@ -44,8 +65,21 @@ def never_comes(case: Case) -> Diagnosed:
     raise TwinError(f"{case.name} cannot be diagnosed")
 
 
-def only_warm(count: int, seed: int) -> tuple[Question, ...]:
-    return (WARM, Question("case_002", Sort.HEALTHY, 6, ("warmup",), ()))[:count]
+class BreakError(Exception):
+    """An error of no family."""
+
+
+def breaks(case: Case) -> Diagnosed:
+    raise BreakError(f"{case.name} is too much")
+
+
+NOTHING = {"nothing": f"{__name__}:nothing_found"}
+DRAFTS = (Draft("case_001", Sort.SINGLE, 1002, "coolant_cooling"), Draft("case_002", Sort.HEALTHY, 1005, None))
+"""Two warm-ups, which are quick."""
+
+
+def check(folder: Path, drafts: Sequence[Draft] = DRAFTS, **how: Any) -> CheckResult:
+    return run_checks(drafts, NOTHING, folder, seed=1, **how)["nothing"]
 
 
 def test_a_draw_has_the_shares_of_the_protocol_and_every_effect() -> None:
@@ -61,7 +95,7 @@ def test_a_draw_has_the_shares_of_the_protocol_and_every_effect() -> None:
 
 def test_effects_bear_the_names_and_parameters_of_the_catalogue_or_none_of_them() -> None:
     chance = np.random.default_rng(1)
-    for effect in NAMED:
+    for effect in (*NAMED, *STRUCTURES):
         known = {p.name for p in effect_named(effect.name).parameters}
         assert set(effect.parameters(1.0, effect.traits(chance))) <= known
         assert set(effect.exact) <= known
@@ -128,10 +162,13 @@ def test_answers_go_through_json_and_are_sealed() -> None:
     assert seal(text).seal != sealed.seal
 
 
-def test_a_diagnosis_that_finds_nothing_is_right_on_a_healthy_machine_only(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(check_module, "draw", only_warm)
+def test_the_quick_questions_are_quick() -> None:
+    assert [question_of(draft).kinds for draft in DRAFTS] == [("warmup",), ("warmup",)]
+
+
+def test_a_diagnosis_that_finds_nothing_is_right_on_a_healthy_machine_only(tmp_path: Path) -> None:
     said: list[str] = []
-    result = run_check(2, 1, nothing_found, workers=0, progress=said.append)
+    result = check(tmp_path, progress=said.append)
     assert result.scored.healthy.share == 1.0
     assert result.scored.judged.single_right.share == 0.0
     assert result.scored.judged.closure < 0.2
@@ -140,10 +177,107 @@ def test_a_diagnosis_that_finds_nothing_is_right_on_a_healthy_machine_only(monke
     assert "called healthy" in table(result) and result.seal in table(result)
 
 
-def test_a_diagnosis_that_raises_is_counted(tmp_path: Path) -> None:
+def test_a_check_goes_on_where_it_stopped(tmp_path: Path) -> None:
+    once = check(tmp_path / "once")
+    done: list[str] = []
+
+    def counted(function: Callable[[str], str], texts: Sequence[str]) -> Iterator[str]:
+        for text in texts:
+            done.append(function.__name__)
+            yield function(text)
+
+    asked = chain([False] * 4, repeat(True))
+    first = check(tmp_path / "twice", spread=counted, stopped=lambda: next(asked))
+    assert (len(first.cases), first.asked, done) == (1, 2, ["drawn", "drawn", "judged"])
+    assert f"1 of 2 cases, seed 1, answers sealed as {first.seal}" in table(first)
+    again = check(tmp_path / "twice", spread=counted)
+    assert done == ["drawn", "drawn", "judged", "judged"]
+    assert (again.seal, again.salt) == (first.seal, first.salt)
+    assert [case.answer for case in again.cases] == [case.answer for case in once.cases]
+    check(tmp_path / "twice", spread=counted)
+    assert len(done) == 4
+
+
+def test_no_answer_is_in_a_file_before_its_case_is_diagnosed(tmp_path: Path) -> None:
+    asked = chain([False, False], repeat(True))
+    check(tmp_path, DRAFTS, stopped=lambda: next(asked))
+    kept = [path.relative_to(tmp_path) for path in tmp_path.rglob("*") if path.is_file()]
+    assert kept == [Path("check.json")]
+    assert "size_over_floor" not in (tmp_path / "check.json").read_text()
+
+
+def test_another_check_does_not_go_on_in_the_same_folder(tmp_path: Path) -> None:
+    check(tmp_path, DRAFTS[1:])
+    with pytest.raises(UsageError, match="holds another check, of 1 cases with seed 1"):
+        check(tmp_path)
+
+
+def test_an_answer_that_was_changed_does_not_open(tmp_path: Path) -> None:
+    check(tmp_path, DRAFTS[:1])
+    path = tmp_path / "nothing" / "case_001.json"
+    path.write_text(path.read_text().replace("coolant_cooling", "sensor_bias"))
+    with pytest.raises(SealError):
+        read_kept(tmp_path).judged("nothing")
+
+
+def test_a_question_that_cannot_be_drawn_is_drawn_again_and_ends_no_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails(question: Question) -> Answer:
+        if question.name == "case_001" and question.seed < DRAFTS[0].seed + failing:
+            raise ZeroDivisionError("division by zero")
+        return answer_of(question)
+
+    monkeypatch.setattr(piece, "answer_of", fails)
+    failing = 1
+    result = check(tmp_path / "once")
+    assert result.redrawn == ("case_001: ZeroDivisionError: division by zero",)
+    assert len(result.cases) == 2 and "questions drawn again: 1" in table(result)
+    failing = 100
+    result = check(tmp_path / "never")
+    assert result.undrawn == ("case_001",) and len(result.cases) == 1
+    assert "could not be drawn: case_001" in table(result)
+
+
+def test_an_axis_that_warms_and_does_not_move_is_drawn() -> None:
+    """A triple in air and in the cut, in which z rests: seed 424242 ended on it."""
+    question = Question("case", Sort.SINGLE, 5, ("cut",), (DrawnEffect("viscous_warmup", "z", 4.0),))
+    machine = machine_of(question)
+    warming = machine.healthy.with_axis("z", warmup=0.3, warmup_s=8.0)
+    assert np.isfinite(recorded(machine, warming, "cut", FIT, "z")["z_pos_mm"]).all()
+
+
+@pytest.mark.parametrize(("diagnose", "said"), [(never_comes, "TwinError"), (breaks, "BreakError")])
+def test_a_diagnosis_that_raises_is_counted(diagnose: Diagnose, said: str, tmp_path: Path) -> None:
     write_case(tmp_path / "case", WARM)
-    given, twin = diagnosed(tmp_path / "case", never_comes)
-    assert "cannot be diagnosed" in given.failed and not given.causes and not twin
+    given, twin = diagnosed(tmp_path / "case", diagnose)
+    assert given["failed"].startswith(said) and not given["diagnosis"] and not twin
+    judged = Judged(answer_of(WARM), given_of(given | {"closure_unseen": None}))
+    assert scored([judged]).failed.share == 1.0 and not (judged.right or judged.wrong or judged.unknown)
+
+
+def test_a_third_of_the_machines_has_another_controller_beside_what_is_asked() -> None:
+    questions = draw(600, seed=1)
+    other = [q for q in questions if q.controller is not None]
+    assert len(other) == 200
+    assert {q.controller.effect for q in other if q.controller} == {structure.name for structure in STRUCTURES}
+    for question in other:
+        assert question.asked and {"air", "cut"} & set(question.kinds)
+        assert not any(effect_on(asked).in_controller for asked in question.asked)
+    assert not any(q.controller for q in draw(40, 1, Sort.SINGLE))
+
+
+def test_another_controller_is_a_gap_that_the_answer_holds_and_no_file_tells(tmp_path: Path) -> None:
+    question = Question(
+        "case", Sort.SINGLE, 5, ("cut",), (DrawnEffect("backlash", "x", 8.0),), controller=Structure("velocity_feedforward", "x")
+    )
+    answer = write_case(tmp_path / "case", question)
+    assert [effect.effect for effect in answer.effects] == ["backlash"]
+    assert answer.effects[0].size == pytest.approx(8.0, rel=0.6), "sized beside the machine with that controller"
+    assert answer.controller is not None and answer.controller.size_over_floor["x_pos_mm"] > 100.0
+    text = answers_json([answer])
+    assert "velocity_feedforward" in text and answers_json(answers_from_json(text)) == text
+    assert "feedforward" not in (tmp_path / "case" / "machine.toml").read_text()
 
 
 def test_cases_are_written_with_their_answers(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

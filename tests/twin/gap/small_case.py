@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.case import Case, Run, RunAtHand, RunEntry, RunKind
+from twin.learned.section import LearnedSection
 from twin.machine import AddedEffect, MachineFile, Thermal, machine_from_toml
 from twin.runlog import RunLog, run_log
 from twin.simulator.response import RunInput, respond
@@ -56,9 +57,9 @@ def plant(effects: tuple[AddedEffect, ...] = (), machine: MachineFile = MACHINE)
     return machine.model_copy(update={"axes": {"z": axis}, "noise": noise, "effects": effects})
 
 
-def air_case(*effects: AddedEffect, machine: MachineFile = MACHINE) -> Case:
-    """Two runs of one program to learn from, one of another program to be judged on."""
-    real = plant(effects)
+def air_case(*effects: AddedEffect, machine: MachineFile = MACHINE, learned: tuple[LearnedSection, ...] = ()) -> Case:
+    """Two runs of one program to learn from, one of another program to be judged on. learned: terms of the real machine"""
+    real = plant(effects).model_copy(update={"learned": learned})
     runs = {
         name: (simulate(real, text, seed=seed).run, role, repeats)
         for seed, (name, text, role, repeats) in enumerate(

@@ -22,6 +22,7 @@ from twin.gap.stages.observed_through import Sensing, Values, seen_late
 from twin.gap.stages.stage import Model, Observed, observed_of
 from twin.identification.axis_parameters import AxisParameter, constants_at
 from twin.identification.batch_fit import time_blocks
+from twin.learned.term import Term
 from twin.machine import Axis, MachineFile
 from twin.servo.constants import axis_constants, effect_constants
 from twin.servo.disturbance import Disturbance
@@ -58,6 +59,7 @@ class AxisStage:
     left_out: frozenset[str] = frozenset()
     standing: tuple[tuple[str, Mapping[str, float]], ...] = ()
     pairs: int = COURSES
+    terms: tuple[Term, ...] = ()
     observed: tuple[Observed, ...] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -166,7 +168,7 @@ class AxisStage:
         for output in self.outputs:
             sensing = Sensing.of(values, f"{self.letter}_{output}")
             modelled = sensing.readings(outputs[output], self.period_s)
-            modelled = modelled + readings_of_terms(model, theta, f"{self.letter}_{output}", data)
+            modelled = modelled + readings_of_terms(model, theta, f"{self.letter}_{output}", data, self.terms)
             shown.append(self.grown(modelled, values, data) if output == "table_mm" else modelled)
         at = {output: i for i, output in enumerate(self.outputs)}
         if "table_mm" in at and "pos_mm" in at:
@@ -198,7 +200,7 @@ class AxisStage:
         for stretch in data.stretches():
             start = self._start(values, constants, data, stretch, lanes) | carried
             reference = self.seen_reference(values, data, stretch, lanes)
-            added = series_of_terms(model, theta, self.letter, data.arguments, stretch)
+            added = series_of_terms(model, theta, self.letter, data.arguments, stretch, self.terms)
             run, many = self._run(constants, reference, data, courses, stretch, start, added)
             for output in self.outputs:
                 whole = run.outputs[OUTPUTS[output]]

@@ -11,6 +11,7 @@ from twin.case import Run
 from twin.gap.floors import Floors
 from twin.gap.labels import regime_labels
 from twin.gap.stages.smoothed import filled, low_passed
+from twin.learned.arguments import around, motion_arguments, other_axes
 from twin.regimes import axis_regimes, motion_stretches
 from twin.runlog import RunLog
 
@@ -19,8 +20,6 @@ OUTPUTS = {"pos_mm": "position_mm", "torque_a": "torque_a", "table_mm": "table_m
 """Column of the run log, without the letter → output of the loops."""
 MOVED_HZ = 15.0
 """Cutoff of a measured motion that stands for a reference."""
-STILL_MM_S = 1e-6
-"""Speed of a reference below which it stands."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +28,8 @@ class AxisRunData:
 
     disturbance_n: known force that resists motion in +, or None; measured: output → values; count: of the runs averaged
     regime: number of the regime (`twin.gap.labels`); rise_k: of the spindle's temperature since the start
-    others: letter → reference of the other axes; told: whether the reference was recorded, else the measured position is it
+    others: letter → reference of the other axes; around: what a learned term may depend on of the machine as a whole
+    told: whether the reference was recorded, else the measured position is it
     """
 
     name: str
@@ -43,27 +43,17 @@ class AxisRunData:
     count: int
     fitted: bool
     others: Mapping[str, Floats] = field(default_factory=dict)
+    around: Mapping[str, Floats] = field(default_factory=dict)
     told: bool = True
 
     @cached_property
     def arguments(self) -> Mapping[str, Floats]:
         """What a learned term of the axis may depend on, column → (n,): its own measured motion, what it is told, time."""
-        period_s = float(np.median(np.diff(self.t_s)))
         position = self.measured.get("pos_mm", self.measured.get("table_mm", self.reference_mm))
         position = np.where(np.isfinite(position), position, self.reference_mm)
-        velocity = np.gradient(self.reference_mm, period_s)
-        moving = np.abs(velocity) > STILL_MM_S
-        last = np.maximum.accumulate(np.where(moving, np.arange(len(velocity)), -1))
-        direction = np.where(last >= 0, np.sign(velocity[np.maximum(last, 0)]), 0.0)
-        return {
-            "position_mm": position,
-            "velocity_mm_s": velocity,
-            "direction": direction,
-            "acceleration_mm_s2": np.gradient(velocity, period_s),
-            "torque_a": np.nan_to_num(self.measured.get("torque_a", np.zeros(len(self.t_s)))),
-            "time_since_start_s": self.t_s - self.t_s[0],
-            "t_s": self.t_s,
-        } | {f"{letter}_{column}": values for letter, own in self.others.items() for column, values in _motion(own, period_s)}
+        torque = np.nan_to_num(self.measured.get("torque_a", np.zeros(len(self.t_s))))
+        motion = motion_arguments(self.t_s, self.reference_mm) | {"position_mm": position, "torque_a": torque, "t_s": self.t_s}
+        return dict(self.around) | motion | other_axes(self.t_s, self.others)
 
     @property
     def period_s(self) -> float:
@@ -90,7 +80,19 @@ def axis_run_data(
     regime = regime_labels(log, f"{letter}_ref_mm", floors.machine)[1] if told else axis_regimes(log.t_s, reference)
     others = {a: log[f"{a}_ref_mm"] for a in log.axes() if a != letter and log.has(f"{a}_ref_mm")}
     return AxisRunData(
-        group[0].name, log.t_s, reference, measured, floor, regime, _rise_k(log), disturbance_n, len(group), fitted, others, told
+        group[0].name,
+        log.t_s,
+        reference,
+        measured,
+        floor,
+        regime,
+        _rise_k(log),
+        disturbance_n,
+        len(group),
+        fitted,
+        others,
+        around(log.t_s, log.columns),
+        told,
     )
 
 
@@ -101,16 +103,6 @@ def _moved_mm(group: Sequence[Run], letter: str) -> Floats | None:
     log = group[0].log
     position = filled(np.mean([run.log[f"{letter}_pos_mm"] for run in group], axis=0))
     return low_passed(position, float(log.t_s[1] - log.t_s[0]), MOVED_HZ)
-
-
-def _motion(reference_mm: Floats, period_s: float) -> tuple[tuple[str, Floats], ...]:
-    """The motion of another axis as a learned term may depend on it."""
-    velocity = np.gradient(reference_mm, period_s)
-    return (
-        ("position_mm", reference_mm),
-        ("velocity_mm_s", velocity),
-        ("acceleration_mm_s2", np.gradient(velocity, period_s)),
-    )
 
 
 def _rise_k(log: RunLog) -> Floats | None:

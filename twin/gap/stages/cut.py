@@ -18,10 +18,15 @@ from twin.gap.stages.free import Free, constant
 from twin.gap.stages.observed_through import Sensing
 from twin.gap.stages.stage import Model, Observed, observed_of
 from twin.identification.batch_fit import time_blocks
+from twin.learned.arguments import around, other_axes
+from twin.learned.cutting import cut_arguments, cut_series, milling_with_terms
+from twin.learned.standing import added_series, reading_series, terms_at
+from twin.learned.term import Term
+from twin.learned.words import LearnedSite
 from twin.machine import MachineFile
 from twin.process.jump import at_a_jump
 from twin.process.kernel import process_quantities
-from twin.process.milling import Milling, MillingForce, milling_force, tool_constants
+from twin.process.milling import Milling, MillingForce, tool_constants
 from twin.runlog import RunLog
 from twin.simulator.recorded import told_of
 from twin.simulator.response import milling_of
@@ -68,6 +73,11 @@ class CutStage:
     def standing(self) -> dict[str, Mapping[str, float]]:
         """Effects that the machine has already."""
         return added_effects(self.machine, {*process_quantities(), *spindle_quantities()})
+
+    @cached_property
+    def terms(self) -> tuple[Term, ...]:
+        """Learned terms that the machine has already."""
+        return terms_at(self.machine.learned, (LearnedSite.CUT_FORCE, LearnedSite.SPINDLE_POWER, LearnedSite.FORCE_READING))
 
     @property
     def constants(self) -> tuple[Free, ...]:
@@ -130,12 +140,21 @@ class CutStage:
         period_s = self.machine.machine.servo_period_s
         for signal in self.observed[run].signals:
             if signal == LOAD:
-                values_of = self._load(model, theta, power_w, data.log["spindle_rpm"], period_s)
+                values_of = self._load(model, theta, power_w, data, period_s)
             else:
                 assert force is not None
                 values_of = np.broadcast_to(force.force_x_n if signal == "force_x_n" else force.force_y_n, (lanes, ticks))
-            shown.append(Sensing.of(values, signal).readings(values_of, period_s))
+            learned = reading_series(self.terms, signal, self._arguments(data)) if self.terms else None
+            shown.append(Sensing.of(values, signal).readings(values_of, period_s) + (0.0 if learned is None else learned))
         return np.concatenate(shown, axis=1)
+
+    def _arguments(self, data: CutRun) -> dict[str, Floats]:
+        """The arguments of learned terms in a run, by its recording."""
+        log = data.log
+        references = {a: log[f"{a}_ref_mm"] for a in log.axes() if log.has(f"{a}_ref_mm")}
+        known = around(log.t_s, log.columns) | other_axes(log.t_s, references)
+        tool = self.machine.tool
+        return known | (cut_arguments(data.milling, tool.teeth) if data.milling is not None and tool is not None else {})
 
     def force(self, model: Model, theta: Floats, data: CutRun) -> MillingForce | None:
         """The cutting force at each row of θ; None where nothing is cut."""
@@ -148,15 +167,17 @@ class CutStage:
         }
         effects = acting(process_quantities())
         constants |= model.effect_constants(theta, effects, self.standing)
-        return milling_force(
+        series = cut_series(self.terms, self._arguments(data)) if self.terms else {}
+        return milling_with_terms(
             constants,
             self.machine.tool.teeth,
             data.milling,
+            series,
             period_s=self.machine.machine.servo_period_s,
             effects=tuple(e.name for e in effects),
         )
 
-    def _load(self, model: Model, theta: Floats, power_w: Floats, rpm: Floats, period_s: float) -> Floats:
+    def _load(self, model: Model, theta: Floats, power_w: Floats, data: CutRun, period_s: float) -> Floats:
         assert self.machine.spindle is not None
         factors = model.factors(theta)
         one = np.ones(len(theta))
@@ -165,7 +186,15 @@ class CutStage:
         }
         effects = acting(spindle_quantities())
         constants |= model.effect_constants(theta, effects, self.standing)
-        return spindle_load_pct(constants, power_w, rpm, period_s=period_s, effects=tuple(e.name for e in effects))
+        added = added_series(self.terms, self._arguments(data)) if self.terms else {}
+        return spindle_load_pct(
+            constants,
+            power_w,
+            data.log["spindle_rpm"],
+            period_s=period_s,
+            effects=tuple(e.name for e in effects),
+            added_kw=added.get("electrical_power_kw"),
+        )
 
 
 def cut_runs(machine: MachineFile, runs: tuple[Run, ...]) -> tuple[CutRun, ...]:

@@ -20,6 +20,10 @@ from twin.gap.stages.observed_through import Sensing
 from twin.gap.stages.stage import Model, Observed, observed_of
 from twin.heat.run import Warming, spindle_temperature_c, thermal_constants, thermal_quantities
 from twin.identification.batch_fit import time_blocks
+from twin.learned.arguments import around
+from twin.learned.standing import added_series, reading_series, terms_at
+from twin.learned.term import Term
+from twin.learned.words import LearnedSite
 from twin.machine import MachineFile
 from twin.runlog import RunLog
 from twin.simulator.recorded import start_temperature_c
@@ -67,6 +71,12 @@ class HeatStage:
         """Effects that the machine has already."""
         return added_effects(self.machine, thermal_quantities())
 
+    @cached_property
+    def terms(self) -> tuple[Term, ...]:
+        """Learned terms that the machine has already."""
+        sites = (LearnedSite.HEAT_INPUT, LearnedSite.HEAT_LOSS, LearnedSite.TEMPERATURE_READING)
+        return terms_at(self.machine.learned, sites)
+
     @property
     def constants(self) -> tuple[Free, ...]:
         """Heat by load and by speed, resistance, capacity: only their ratios show, so their priors say the rest."""
@@ -110,9 +120,18 @@ class HeatStage:
         constants |= model.effect_constants(theta, self.effects, self.standing)
         sensing = Sensing.of(values, SIGNAL)
         start = sensing.value(np.full(len(theta), start_temperature_c(data.log.t_s, data.log[SIGNAL])))
-        shown = spindle_temperature_c(constants, data.warming, start, effects=tuple(e.name for e in self.effects))
+        arguments = around(data.log.t_s, data.log.columns) if self.terms else {}
+        shown = spindle_temperature_c(
+            constants,
+            data.warming,
+            start,
+            effects=tuple(e.name for e in self.effects),
+            added_w=added_series(self.terms, arguments).get("heat_w"),
+        )
+        learned = reading_series(self.terms, SIGNAL, arguments)
         period_s = float(np.median(np.diff(data.log.t_s)))
-        return sensing.readings(np.broadcast_to(shown, (len(theta), shown.shape[1])), period_s)
+        read = sensing.readings(np.broadcast_to(shown, (len(theta), shown.shape[1])), period_s)
+        return read if learned is None else read + learned
 
 
 def heat_runs(machine: MachineFile, runs: tuple[Run, ...]) -> tuple[HeatRun, ...]:

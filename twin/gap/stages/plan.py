@@ -21,6 +21,7 @@ from twin.gap.stages.heat import HeatStage, heat_runs
 from twin.gap.stages.stage import Stage
 from twin.gap.stages.turns import TurnStage, turn_data
 from twin.gap.verdict import judged
+from twin.learned.standing import axis_terms
 from twin.machine import MachineFile
 from twin.runlog import RunLog
 from twin.servo.disturbance import Disturbance
@@ -150,6 +151,7 @@ def _axis_stage(ground: Ground, letter: str, forces: dict[str, dict[str, Floats]
         ground.disturbance,
         ground.left_out,
         standing,
+        terms=axis_terms(machine.learned, letter),
     )
 
 

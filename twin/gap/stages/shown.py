@@ -22,6 +22,7 @@ from twin.gap.stages.heat import HeatStage, heat_runs
 from twin.gap.stages.open_loop.plan import open_columns
 from twin.gap.stages.stage import Model
 from twin.gap.stages.turns import TurnStage, turn_data
+from twin.learned.standing import axis_terms
 from twin.machine import MachineFile
 from twin.simulator.response import check_effects, disturbance_of
 from twin.sites import Site
@@ -66,8 +67,9 @@ def _axis(machine: MachineFile, run: Run, floors: Floors, letter: str, push: Flo
         return {}
     standing = standing_of(machine, letter)
     period_s = machine.machine.servo_period_s
+    terms = axis_terms(machine.learned, letter)
     stage = AxisStage(
-        letter, machine.axes[letter], period_s, (data,), (), disturbance_of(machine), standing=standing, pairs=PAIRS
+        letter, machine.axes[letter], period_s, (data,), (), disturbance_of(machine), standing=standing, pairs=PAIRS, terms=terms
     )
     fixed = {name for name, _ in standing}
     model, theta = _sensing(machine, lambda on: on.startswith(f"{letter}_"), letter, fixed)

@@ -70,3 +70,25 @@ def test_twice_as_many_forces_make_twice_the_acceleration() -> None:
 def test_torque_and_integral_stay_within_the_limit() -> None:
     _, torque, _ = ran(NOMINAL._replace(limit_a=1.0), ramp(150.0))
     assert np.abs(torque).max() == 1.0
+
+
+@pytest.mark.parametrize("speed", [20.0, -100.0])
+def test_compensated_friction_is_there_at_once_and_changes_nothing_later(speed: float) -> None:
+    reference = ramp(speed)
+    plain, compensated = (ran(NOMINAL._replace(compensation_a=a), reference) for a in (0.0, 0.4))
+    assert compensated[1][-1] == pytest.approx(plain[1][-1], rel=1e-3), "the torque is what friction takes"
+    assert (compensated[1] - plain[1])[100] == pytest.approx(np.sign(speed) * 0.4), "it is there as soon as the reference moves"
+
+
+def test_a_filtered_reference_trails_by_its_time_constant() -> None:
+    reference = ramp(50.0)
+    motor, _, _ = ran(NOMINAL._replace(filter_s=0.01), reference)
+    assert reference[-1] - motor[-1] == pytest.approx(50.0 / 40.0 + 50.0 * 0.01, rel=0.02)
+
+
+def test_an_integral_of_the_position_leaves_no_error_at_constant_speed() -> None:
+    long = np.maximum(np.arange(3 * TICKS) - 100.0, 0.0) * 0.02
+    motor, _, _ = ran(NOMINAL._replace(outer_per_s=8.0), long)
+    assert long[-1] - motor[-1] == pytest.approx(0.0, abs=1e-3)
+    plain, _, _ = ran(NOMINAL, long)
+    assert long[-1] - plain[-1] == pytest.approx(20.0 / 40.0, rel=1e-3)

@@ -8,6 +8,7 @@ from twin.errors import EffectError
 from twin.gap.inspection import inspected
 from twin.gap.stages.plan import ground_of
 from twin.gap.stages.shown import shown
+from twin.learned.section import LearnedSection
 from twin.machine import AddedEffect
 
 BIAS = AddedEffect(effect="sensor_bias", on="z_torque_a", parameters={"bias": 1.5})
@@ -62,3 +63,33 @@ def test_the_heat_of_a_warm_up_is_shown() -> None:
     found = shown(case.machine, case.runs[0], ground_of(case, frozenset()).floors)
     assert list(found) == ["spindle_temp_c"]
     assert np.isfinite(found["spindle_temp_c"]).all()
+
+
+TABLES = {
+    "friction": {"direction": (-1.0, 1.0), "value": (40.0, 40.0)},
+    "axis_force": {"position_mm": (0.0, 45.0), "value": (0.0, 250.0)},
+}
+
+
+@pytest.mark.parametrize("site", TABLES)
+def test_a_learned_term_closes_the_gap_of_a_machine_that_has_it(site: str) -> None:
+    learned = (LearnedSection.model_validate({"site": site, "on": "z", "table": TABLES[site]}),)
+    real, case = plant().model_copy(update={"learned": learned}), air_case(learned=learned)
+    run, floors = case.runs[2], ground_of(case, frozenset()).floors
+    left = {}
+    for name, machine in (("with", real), ("without", plant())):
+        found = shown(machine, run, floors)
+        left[name] = {s: np.sqrt(np.nanmean(((v - run.log[s]) / floors.of(run.log, s)) ** 2)) for s, v in found.items()}
+    assert max(left["with"].values()) < 1.5
+    assert left["without"]["z_torque_a"] > 3.0
+
+
+def test_a_learned_reading_is_shown_once() -> None:
+    case = air_case()
+    run, floors = case.runs[0], ground_of(case, frozenset()).floors
+    term = LearnedSection.model_validate(
+        {"site": "torque_reading", "on": "z_torque_a", "table": {"direction": (-1.0, 1.0), "value": (1.5, 1.5)}}
+    )
+    bare, biased = (shown(m, run, floors)["z_torque_a"] for m in (plant(), plant().model_copy(update={"learned": (term,)})))
+    moved = np.isfinite(bare)
+    np.testing.assert_allclose(biased[moved] - bare[moved], 1.5)

@@ -1,0 +1,88 @@
+"""The learned terms that a machine has already, as the series that they add to its quantities and readings."""
+
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.errors import EffectError
+from twin.learned.section import LearnedSection
+from twin.learned.sites import MACHINE_QUANTITIES, MACHINE_READINGS, QUANTITIES, READINGS, check_place
+from twin.learned.term import Term
+from twin.learned.words import LearnedSite
+
+Floats = NDArray[np.float64]
+Arguments = Mapping[str, Floats]
+Answer = TypeVar("Answer")
+PASSES_MAX = 24
+SETTLED = 1e-4
+"""Change of a series, over its largest value, below which it is the same."""
+
+
+def terms_at(sections: Sequence[LearnedSection], sites: Collection[LearnedSite], on: str | None = None) -> tuple[Term, ...]:
+    """Return the terms at these sites, on `on` where that is given; those over the time of recordings say nothing of others."""
+    here = (s for s in sections if s.site in sites and on in (None, s.on) and not s.is_recording)
+    return tuple(section.term for section in here)
+
+
+def axis_terms(sections: Sequence[LearnedSection], letter: str) -> tuple[Term, ...]:
+    """Return the terms on an axis and on what its sensors read."""
+    found = terms_at(sections, {*QUANTITIES, *READINGS})
+    return tuple(term for term in found if term.on.partition("_")[0] == letter)
+
+
+def added_series(terms: Sequence[Term], arguments: Arguments) -> dict[str, Floats]:
+    """Return quantity → (n,) that the terms add to it; terms of readings add to none."""
+    added: dict[str, Floats] = {}
+    for term in terms:
+        for quantity, sign in (QUANTITIES | MACHINE_QUANTITIES).get(term.site, {}).items():
+            series = sign * term.at(arguments)
+            added[quantity] = added[quantity] + series if quantity in added else series
+    return added
+
+
+def reading_series(terms: Sequence[Term], signal: str, arguments: Arguments) -> Floats | None:
+    """Return what the terms add to the reading of a signal, (n,); None where none does."""
+    letter, _, column = signal.partition("_")
+    found: Floats | None = None
+    for term in terms:
+        of_axis = READINGS.get(term.site) == column and term.on in (letter, signal)
+        of_machine = signal in MACHINE_READINGS.get(term.site, ()) and term.on in ("", signal)
+        if of_axis or of_machine:
+            found = term.at(arguments) if found is None else found + term.at(arguments)
+    return found
+
+
+def settled(
+    terms: Sequence[Term], answer: Callable[[dict[str, Floats]], Answer], arguments: Callable[[Answer], Arguments]
+) -> Answer:
+    """Return the answer of a part of the machine with the terms in it.
+
+    The first pass is without them. Its answer tells what they depend on, and so what they add in the next one; passes go on until
+    that changes no more.
+    """
+    found, before = answer({}), dict[str, Floats]()
+    for _ in range(PASSES_MAX if terms else 0):
+        added = added_series(terms, arguments(found))
+        if all(
+            np.abs(series - before.get(name, 0.0)).max(initial=0.0) <= SETTLED * np.abs(series).max(initial=0.0)
+            for name, series in added.items()
+        ):
+            break
+        found, before = answer(added), added
+    return found
+
+
+def check_terms(sections: Sequence[LearnedSection], axes: Iterable[str]) -> None:
+    """Raises EffectError where a learned term of a machine is put on what there is not, or is there twice."""
+    seen: set[tuple[LearnedSite, str, frozenset[str]]] = set()
+    letters = tuple(axes)
+    for section in sections:
+        check_place(section.site, section.on, letters)
+        own = (section.site, section.on, frozenset(section.arguments))
+        if own in seen:
+            raise EffectError(
+                f"the learned term at {section} over {', '.join(section.arguments)} is there twice; add the tables up"
+            )
+        seen.add(own)
