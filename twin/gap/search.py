@@ -58,7 +58,7 @@ class Explained:
     base: the machine with its constants refitted; best: with the accepted effects; tried: in the first round, best first
     rivals: effect → what cannot be told from it; evidence: effect → its advantage over the same without it
     beyond: constants of the base have to be further from what is stated than two deviations, and no effect puts them back
-    alike: what the remainder partly looks like, where none but specific effects were kept (`twin.gap.specific`); else None
+    alike: what the remainder partly looks like, where none but specific effects were kept (`twin.gap.naming.specific`); else None
     """
 
     stage: Stage
