@@ -10,12 +10,13 @@ from scipy.special import erfc
 from twin.case import Case
 from twin.effects.catalogue import catalogue, effect_named
 from twin.effects.effect import Effect, On
-from twin.gap.diagnosis import Candidate, Cause, Effected, GapNumbers, Interval, NotObservable, Verdict
+from twin.gap.diagnosis import Candidate, Cause, Effected, GapNumbers, Interval, MovedConstant, NotObservable, Verdict
 from twin.gap.evidence import advantage
 from twin.gap.intervals import parameter_intervals
+from twin.gap.naming.constants import said_of
 from twin.gap.null import Null
 from twin.gap.refitted import KNOWN_MIN
-from twin.gap.search import Explained
+from twin.gap.search import Explained, is_nothing
 from twin.gap.verdict import Judged
 from twin.gap.wording import percent
 from twin.runlog import AXIS_COLUMN
@@ -26,16 +27,9 @@ def found_effects(stages: Sequence[Judged]) -> list[tuple[Effected, dict[str, fl
     found: dict[Effected, list[dict[str, float]]] = {}
     for stage in stages:
         for effected, values in stage.explained.best.values.items():
-            if not _is_nothing(effected, values):
+            if not is_nothing(effected, values):
                 found.setdefault(effected, []).append(values)
     return [(e, {k: float(np.mean([v[k] for v in values])) for k in values[0]}) for e, values in found.items()]
-
-
-def _is_nothing(effected: Effected, values: Mapping[str, float]) -> bool:
-    """Return True where a fit ended at nothing: at the null value, or stiffer than the effect's file calls finite."""
-    effect = effect_named(effected.effect)
-    stiff = {p.name for p in effect.parameters if p.null is not None and np.isinf(p.null)}
-    return effect.is_null(values) or any(values[p.name] > p.high for p in effect.parameters if p.name in stiff)
 
 
 def causes_of(stages: Sequence[Judged], shares: Mapping[Effected, float]) -> tuple[Cause, ...]:
@@ -45,7 +39,7 @@ def causes_of(stages: Sequence[Judged], shares: Mapping[Effected, float]) -> tup
         found = stage.explained
         intervals = parameter_intervals(found.best)
         for effected, values in found.best.values.items():
-            if _is_nothing(effected, values):
+            if is_nothing(effected, values):
                 continue
             share = float(f"{shares.get(effected, 0.0):.4g}")
             rivals = tuple(r for r in found.rivals.get(effected, ()) if r not in causes)
@@ -142,10 +136,18 @@ def not_identifiable_of(stages: Sequence[Judged]) -> tuple[str, ...]:
     return tuple(said)
 
 
-def sentence_of(verdict: Verdict, stages: Sequence[Judged], causes: Sequence[Cause], gap: GapNumbers) -> str:
+def sentence_of(
+    verdict: Verdict, stages: Sequence[Judged], causes: Sequence[Cause], gap: GapNumbers, constants: Sequence[MovedConstant]
+) -> str:
     """The verdict, as one would say it."""
+    moved = said_of(constants)
     if verdict is Verdict.HEALTHY:
-        return f"Healthy: with its constants refitted, the twin is {gap.before:.2g} × what repeated runs differ by."
+        leaves = f"{gap.before:.2g} × what repeated runs differ by"
+        if moved:
+            return f"Healthy, with {moved}: the twin is then {leaves}."
+        return f"Healthy: with its constants refitted, the twin is {leaves}."
+    if verdict is Verdict.EXPLAINED and not causes:
+        return f"Explained by constants that are further off than stated: {moved}; no effect of the catalogue does so better."
     unknown = [s for s in stages if s.verdict is Verdict.UNKNOWN]
     if not causes:
         where = ", ".join(s.explained.stage.name for s in unknown)
@@ -164,7 +166,7 @@ def sentence_of(verdict: Verdict, stages: Sequence[Judged], causes: Sequence[Cau
 def _said(cause: Cause) -> str:
     parameters = effect_named(cause.effect).parameters
     told = max((p for p in parameters if p.null is not None), key=lambda p: _clearness(cause.parameters[p.name], p.null))
-    figure = _figure(cause.parameters[told.name])
+    figure = figure_of(cause.parameters[told.name])
     size = figure if len(parameters) == 1 else f"{told.name} {figure}"
     rivals = ", ".join(_in_words(e.effect, e.on if e.on != cause.on else "") for e in cause.indistinguishable_from)
     return f"{_in_words(cause.effect, cause.on)} ({size}{f'; or {rivals}' if rivals else ''})"
@@ -186,6 +188,7 @@ def _in_words(effect: str, on: str) -> str:
     return f"{effect.replace('_', ' ')}{f' on {where}' if on else ''}"
 
 
-def _figure(interval: Interval) -> str:
+def figure_of(interval: Interval) -> str:
+    """A figure with the half of its interval, as sentences have it."""
     half = (interval.high - interval.low) / 2.0
     return f"{interval.value:.3g} ± {half:.1g} {interval.unit}".strip()

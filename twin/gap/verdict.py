@@ -1,7 +1,8 @@
 """The verdict: what may be said of what was found.
 
 A stage whose gap was hardly closed has no named cause: an effect that explains a half of a gap is more often the next best shape
-than the truth. What a healthy twin leaves at worst, each stage knows.
+than the truth. What a healthy twin leaves at worst, each stage knows. A stage whose constants had to move by more than two stated
+deviations is explained by them, and not healthy.
 """
 
 from dataclasses import dataclass
@@ -36,9 +37,12 @@ def judged(explained: Explained) -> Judged:
     worst = explained.stage.healthy_rms
     gap_before, gap_after = bool((before > worst).any()), bool((after > worst).any())
     if not explained.best.effects:
-        return Judged(explained, Verdict.UNKNOWN if gap_before else Verdict.HEALTHY, ())
+        taken_up = Verdict.EXPLAINED if explained.beyond else Verdict.HEALTHY
+        return Judged(explained, Verdict.UNKNOWN if gap_before else taken_up, explained.alike or () if gap_before else ())
     if not gap_after:
         return Judged(explained, Verdict.EXPLAINED, ())
+    if explained.alike is not None:
+        return Judged(explained, Verdict.PARTLY, explained.alike)
     near = bool((after < REMAINDER_MAX).all())
     if near and closed_part(explained) >= NAMED_MIN and closed_where_it_acts(explained) >= OWN_MIN:
         return Judged(explained, Verdict.PARTLY, ())

@@ -32,6 +32,7 @@ from twin.learned.words import LearnedSite
 from twin.machine import MachineFile
 from twin.process.kernel import process_quantities
 from twin.process.milling import Milling, tool_constants
+from twin.rotary import outside_name
 from twin.sensor.clock import looked_at, resampled, stamped
 from twin.sensor.reading import readings, sensor_quantities
 from twin.servo.constants import axis_constants, effect_constants
@@ -378,10 +379,16 @@ def _mapped(t_s: Floats, effects: Mapping[str, Mapping[str, float]], quantity: s
     return seen
 
 
+def noise_key(machine: MachineFile, column: str) -> str:
+    """Return the key of [noise] that states the noise of a column; empty where there is none."""
+    letter, _, rest = column.partition("_")
+    key = SENSOR_NOISE.get(column) or NOISE_OF.get(rest, "")
+    return outside_name(key)[0] if letter in machine.rotary else key
+
+
 def _noise(machine: MachineFile, columns: dict[str, Floats], chance: np.random.Generator) -> None:
     """Adds what the sensors make of it."""
     for name, values in columns.items():
-        key = SENSOR_NOISE.get(name) or NOISE_OF.get(name.partition("_")[2])
-        sigma = machine.noise.get(key, 0.0) if key else 0.0
+        sigma = machine.noise.get(noise_key(machine, name), 0.0)
         if sigma > 0.0:
             columns[name] = values + sigma * chance.standard_normal(len(values))

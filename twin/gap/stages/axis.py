@@ -16,13 +16,14 @@ from twin.effects.catalogue import catalogue, effect_named
 from twin.effects.effect import Effect, Guesses, On, Recorded, called
 from twin.gap.diagnosis import Effected
 from twin.gap.stages.axis_run import OUTPUTS, AxisRunData
-from twin.gap.stages.axis_terms import readings_of_terms, series_of_terms
+from twin.gap.stages.axis_terms import readings_of_terms, series_of_terms, sites_of_terms, size_of_terms
 from twin.gap.stages.free import Free, constant
 from twin.gap.stages.observed_through import Sensing, Values, seen_late
 from twin.gap.stages.stage import Model, Observed, observed_of
 from twin.identification.axis_parameters import AxisParameter, constants_at
 from twin.identification.batch_fit import time_blocks
 from twin.learned.term import Term
+from twin.learned.words import LearnedSite
 from twin.machine import Axis, MachineFile
 from twin.servo.constants import axis_constants, effect_constants
 from twin.servo.disturbance import Disturbance
@@ -121,6 +122,21 @@ class AxisStage:
                 found.append(Effected(effect.name))
         return tuple(found)
 
+    @property
+    def term_sites(self) -> Mapping[LearnedSite, tuple[str, ...]]:
+        """The sites of learned terms that the outputs show."""
+        return sites_of_terms(self.letter, self.outputs)
+
+    def term_sizes(self, site: LearnedSite, on: str) -> float:
+        """Return the size of a small term: a tenth of the friction, a few floors of a reading."""
+        del on
+        return size_of_terms(site, self.axis, self.runs[0])
+
+    def term_arguments(self, run: int) -> Mapping[str, Floats]:
+        """Return what a term may depend on in a run, over its stretches."""
+        where = np.concatenate([np.arange(len(self.runs[run].t_s))[s] for s in self.runs[run].stretches()])
+        return {column: values[where] for column, values in self.runs[run].arguments.items()}
+
     def first_guesses(self, candidate: Effected) -> Guesses:
         """Return the effect's own guesses."""
         output = candidate.on.removeprefix(f"{self.letter}_")
@@ -165,9 +181,10 @@ class AxisStage:
         outputs = self.simulate(model, theta, data)
         values = model.values(theta)
         shown = []
+        starts = np.cumsum([0, *(stretch.stop - stretch.start for stretch in data.stretches())])[:-1].tolist()
         for output in self.outputs:
             sensing = Sensing.of(values, f"{self.letter}_{output}")
-            modelled = sensing.readings(outputs[output], self.period_s)
+            modelled = sensing.readings(outputs[output], self.period_s, starts)
             modelled = modelled + readings_of_terms(model, theta, f"{self.letter}_{output}", data, self.terms)
             shown.append(self.grown(modelled, values, data) if output == "table_mm" else modelled)
         at = {output: i for i, output in enumerate(self.outputs)}

@@ -35,6 +35,10 @@ class Loop(Protocol):
         """The column, without the axis letter, that it answers with."""
 
     @property
+    def healthy_rms(self) -> float:
+        """The most that a healthy machine's twin leaves, in floors."""
+
+    @property
     def sites(self) -> tuple[LearnedSite, ...]:
         """Where a learned term may act in it."""
 
