@@ -10,10 +10,12 @@ Files, columns and answers have degrees; this module alone knows how one becomes
 
 import math
 import re
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 from twin.errors import MachineError
+from twin.learned.sites import UNITS as UNITS_OF_TERMS
+from twin.learned.words import OF_AXIS, LearnedSite
 
 PER_NM = 1000.0 * math.pi / 180.0
 """N for each N m, and the square root of kg for each kg m²."""
@@ -44,6 +46,8 @@ UNITS = {
     "A·s/mm": ("A·s/deg", 1.0),
 }
 """Unit inside → outside, and how many inside one outside is."""
+VALUES = ("value", "low", "high")
+"""Columns of the table of a learned term that are in the unit of its site."""
 WORDS = (("force_", "torque_"), ("mass_", "inertia_"))
 """Beginning of a name of a force or a mass inside, outside."""
 COLUMN = re.compile(r"^([a-z][a-z0-9]?)_(ref|pos|table)_deg$")
@@ -230,6 +234,7 @@ def tables_outside(tables: Mapping[str, Any], letters: Collection[str]) -> dict[
     found["noise"] = noise
     found["uncertainty"] = {outside_path(path, letters): value for path, value in tables.get("uncertainty", {}).items()}
     found["effects"] = [_effect_outside(effect, letters) for effect in tables.get("effects", [])]
+    found["learned"] = [_term_outside(term, letters) for term in tables.get("learned", [])]
     return found
 
 
@@ -265,7 +270,9 @@ def _times(value: Any, factor: float) -> Any:
     return float(f"{value * factor:.{DIGITS}g}") if factor < 1.0 else value * factor
 
 
-def _effect_inside(effect: Mapping[str, Any], letters: Iterable[str]) -> dict[str, Any]:
+def _effect_inside(effect: Mapping[str, Any], letters: Collection[str]) -> dict[str, Any]:
+    if isinstance(effect.get("table"), dict):
+        return _term_inside(effect, letters)
     on = effect.get("on")
     found = dict(effect)
     if isinstance(on, str):
@@ -273,6 +280,43 @@ def _effect_inside(effect: Mapping[str, Any], letters: Iterable[str]) -> dict[st
     if on in letters and isinstance(effect.get("parameters"), dict):
         found["parameters"] = _axis(effect["parameters"], inside_name, scaled=True)
     return found
+
+
+def _term_inside(term: Mapping[str, Any], letters: Collection[str]) -> dict[str, Any]:
+    """A learned term as it is inside; one on a rotary axis is in its own unit unless another one is stated."""
+    on, site = inside_column(str(term.get("on", ""))), term.get("site")
+    table = {inside_name(column)[0]: values for column, values in term["table"].items()}
+    found = {**term, "table": table, **({"on": on} if "on" in term else {})}
+    if site not in UNITS_OF_TERMS or not _is_on(on, letters):
+        return found
+    inside = UNITS_OF_TERMS[LearnedSite(site)][0]
+    outside, factor = outside_unit(inside)
+    if term.get("unit", outside) != outside:
+        raise MachineError(
+            f"the learned term at {site} on {on} is in {term['unit']}; that axis turns, so it has to be in {outside}"
+        )
+    scaled = {name: _times(values, factor) if factor != 1.0 and name in VALUES else values for name, values in table.items()}
+    return found | {"table": scaled} | ({"unit": inside} if "unit" in term else {})
+
+
+def _term_outside(term: Mapping[str, Any], letters: Collection[str]) -> dict[str, Any]:
+    own = _is_on(term.get("on", ""), letters)
+    unit, factor = outside_unit(UNITS_OF_TERMS[LearnedSite(term["site"])][0]) if own else (term.get("unit", ""), 1.0)
+    table = {}
+    for column, values in term["table"].items():
+        letter, _, rest = column.partition("_")
+        turned = letter in letters if rest in OF_AXIS else own
+        table[outside_name(column)[0] if turned and column not in VALUES else column] = (
+            _times(values, 1.0 / factor) if factor != 1.0 and column in VALUES else values
+        )
+    return {**term, "on": outside_names(term.get("on", ""), letters), "table": table} | (
+        {"unit": unit} if term.get("unit") else {}
+    )
+
+
+def _is_on(on: str, letters: Collection[str]) -> bool:
+    """Return True where a term is on one of these axes, or on a signal of one."""
+    return on.partition("_")[0] in letters
 
 
 def _effect_outside(effect: Mapping[str, Any], letters: Collection[str]) -> dict[str, Any]:
