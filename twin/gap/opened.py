@@ -96,8 +96,8 @@ def combined(
     progress("opening the loops")
     closed: dict[str, Judged | None] = {s.explained.stage.letter: s for s in found if isinstance(s.explained.stage, AxisStage)}
     axes = {letter: s.explained.stage for letter, s in closed.items() if s is not None}
-    for axis in unheard_axes(ground):
-        axes[axis.letter], closed[axis.letter] = axis, None
+    for unheard in unheard_axes(ground):
+        axes[unheard.letter], closed[unheard.letter] = unheard, None
     loops: list[OpenStage] = []
     for axis in axes.values():
         if isinstance(axis, AxisStage):
