@@ -20,6 +20,7 @@ from twin.effects.effect import On
 from twin.gap.diagnosis import Effected
 from twin.gap.evidence import Advantage, advantage
 from twin.gap.fitting import Fitted, fitted, settled
+from twin.gap.naming.certain import certain_of, dropped, only
 from twin.gap.naming.instead import instead_of_constants
 from twin.gap.naming.moved import has_to_be_beyond
 from twin.gap.naming.siblings import only_completes
@@ -39,6 +40,7 @@ THETA_NULL = 1e-4
 """θ below which an effect is null: the fit has taken it away."""
 PAIR_GAP = 3.0
 PAIRS_OF = 6
+CHANCE_BLOCKS = 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,6 +60,7 @@ class Explained:
     base: the machine with its constants refitted; best: with the accepted effects; tried: in the first round, best first
     rivals: effect → what cannot be told from it; evidence: effect → its advantage over the same without it
     beyond: constants of the base have to be further from what is stated than two deviations, and no effect puts them back
+    likeness: effects that were accepted and are not certain beside what is left (`twin.gap.naming.certain`)
     """
 
     stage: Stage
@@ -67,6 +70,7 @@ class Explained:
     rivals: dict[Effected, tuple[Effected, ...]]
     evidence: dict[Effected, Advantage]
     beyond: bool = False
+    likeness: tuple[Effected, ...] = ()
 
 
 def explain(stage: Stage, *, null: Null = NULL, progress: Callable[[str], None] = lambda _: None) -> Explained:
@@ -101,9 +105,19 @@ def explain(stage: Stage, *, null: Null = NULL, progress: Callable[[str], None] 
     if beyond and (instead := instead_of_constants(stage, base, [t.found for t in first if t.found is not None])):
         best, beyond = instead[0], False
         rivals[best.effects[0]] = tuple(other.effects[0] for other in instead[1:])
+    likeness: tuple[Effected, ...] = ()
+    if best.effects and leaves_a_gap(stage, best):
+        certain = certain_of(stage, base, best, null)
+        likeness = tuple(e for e in best.effects if e not in certain)
+        best = only(stage, base, best, certain) if likeness else best
     several = len(best.effects) > 1
-    evidence = {e: advantage(_dropped(stage, best, e).left if several else base.left, best.left) for e in best.effects}
-    return Explained(stage, base, best, first, {e: r for e, r in rivals.items() if e in best.effects}, evidence, beyond)
+    evidence = {e: advantage(dropped(stage, best, e).left if several else base.left, best.left) for e in best.effects}
+    return Explained(stage, base, best, first, {e: r for e, r in rivals.items() if e in best.effects}, evidence, beyond, likeness)
+
+
+def leaves_a_gap(stage: Stage, found: Fitted) -> bool:
+    """Return True where a hypothesis leaves more than a healthy twin does, but for the worst blocks: those are chance."""
+    return bool((found.left.rms_but_worst(CHANCE_BLOCKS) > stage.healthy_rms).any())
 
 
 def _gap_left(best: Fitted, null: Null) -> bool:
@@ -231,7 +245,7 @@ def _swapped(stage: Stage, best: Fitted, first: tuple[Tried, ...]) -> Fitted:
 def _pruned(stage: Stage, best: Fitted, null: Null) -> Fitted:
     """Without the effects that the others have made needless."""
     for effected in best.effects[:-1]:
-        without = _dropped(stage, best, effected)
+        without = dropped(stage, best, effected)
         if not null.exceeded(effected, advantage(without.left, best.left), stage.healthy_rms):
             best = without
     return best
@@ -241,14 +255,6 @@ def _is_a_second_name(base: Fitted, before: Fitted, best: Fitted, first: tuple[T
     """Return True where the effect that came last is a second name for what the others explain."""
     alone = next((t.found for t in first if t.effected == best.effects[-1] and t.found is not None), None)
     return alone is not None and only_completes(base.left, before.left, alone.left, best.left)
-
-
-def _dropped(stage: Stage, best: Fitted, effected: Effected) -> Fitted:
-    """The hypothesis without one of its effects, refitted."""
-    place = dict(best.model.places())[effected]
-    theta = np.delete(best.theta, np.arange(place.start, place.stop))
-    scale = np.maximum(best.left_fit.rms(), 1.0)
-    return fitted(stage, best.model.without(effected), theta, scale=scale, steps_max=STEPS_MAX)
 
 
 def without(explained: Explained) -> Explained:
