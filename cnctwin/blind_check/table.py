@@ -22,6 +22,16 @@ ROWS = (
     ("90 % intervals that cover", "covered", "85–95 %"),
 )
 
+CURVE = (
+    ("single: right", "single_right"),
+    ("single: in class", "single_in_class"),
+    ("single: wrong", "single_wrong"),
+    ("outside: unknown", "outside_unknown"),
+    ("outside: named", "outside_wrong"),
+    ("pair: both", "pair_both"),
+)
+"""What is shown over the size of the effect."""
+
 
 def table(result: CheckResult) -> str:
     """The whole result, for reading; shares with their 95 % intervals."""
@@ -149,18 +159,9 @@ def _figure(value: float) -> str:
 
 
 def _curve(found: Scored) -> list[str]:
-    """Named right, wrongly named, unknown by size."""
-    titles = ("single: right", "single: in class", "single: wrong", "outside: named", "pair: both")
-    rows = [f"{'size / floor':12s} " + "".join(f"{title:25s}" for title in titles)]
+    """The scores by size."""
+    rows = [f"{'size / floor':12s} " + "".join(f"{title:25s}" for title, _ in CURVE).rstrip()]
     for (low, high), scores in found.by_size.items():
-        rows.append(f"{_bin(low, high):12s} {_cells(scores)}")
+        size = f"> {low:g}" if high == inf else f"{low:g} to {high:g}"
+        rows.append(f"{size:12s} " + "".join(f"{getattr(scores, name)!s:25s}" for _, name in CURVE).rstrip())
     return rows
-
-
-def _bin(low: float, high: float) -> str:
-    return f"> {low:g}" if high == inf else f"{low:g} to {high:g}"
-
-
-def _cells(scores: Scores) -> str:
-    rates = (scores.single_right, scores.single_in_class, scores.single_wrong, scores.outside_wrong)
-    return "".join(f"{rate!s:25s}" for rate in rates) + str(scores.pair_both)

@@ -166,7 +166,7 @@ def sentence_of(
 def _said(cause: Cause) -> str:
     parameters = effect_named(cause.effect).parameters
     told = max((p for p in parameters if p.null is not None), key=lambda p: _clearness(cause.parameters[p.name], p.null))
-    figure = _figure(cause.parameters[told.name])
+    figure = figure_of(cause.parameters[told.name])
     size = figure if len(parameters) == 1 else f"{told.name} {figure}"
     rivals = ", ".join(_in_words(e.effect, e.on if e.on != cause.on else "") for e in cause.indistinguishable_from)
     return f"{_in_words(cause.effect, cause.on)} ({size}{f'; or {rivals}' if rivals else ''})"
@@ -188,6 +188,7 @@ def _in_words(effect: str, on: str) -> str:
     return f"{effect.replace('_', ' ')}{f' on {where}' if on else ''}"
 
 
-def _figure(interval: Interval) -> str:
+def figure_of(interval: Interval) -> str:
+    """A figure with the half of its interval, as sentences have it."""
     half = (interval.high - interval.low) / 2.0
     return f"{interval.value:.3g} ± {half:.1g} {interval.unit}".strip()

@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.gap.descent import Bounds, descend
+from twin.gap.descent import STEP, Bounds, descend
 from twin.gap.diagnosis import Effected
 from twin.gap.stages.stage import Model, Observed, Stage
 
@@ -94,7 +94,7 @@ def _left(stage: Stage, shown: dict[int, Floats], fitted: bool) -> Left:
         if number in shown:
             residual = (shown[number] - observed.measured) / observed.floor
             if fitted:  # the mean of repeated runs is quieter than one of them
-                residual = residual * observed.floor / observed.sigma
+                residual = residual * np.maximum(observed.floor / observed.sigma, 1.0)
             one, count = _by_block(observed, residual, signals)
             squares.append(one)
             counts.append(count)
@@ -149,7 +149,15 @@ def fitted(
     for i, there in zip(runs, sampled, strict=True):
         blocks.append(_kept(stage.observed[i].block[there], stage.averaged) + first)
         first = int(blocks[-1].max()) + 1
-    found = descend(residuals, bounds, np.concatenate(blocks), start, steps_max=steps_max, tolerance=tolerance)
+    found = descend(
+        residuals,
+        bounds,
+        np.concatenate(blocks),
+        start,
+        steps_max=steps_max,
+        tolerance=tolerance,
+        slope_step=max((stage.observed[i].slope_step for i in runs), default=STEP),
+    )
     return Fitted(
         model,
         found.theta,

@@ -60,7 +60,7 @@ class Explained:
     base: the machine with its constants refitted; best: with the accepted effects; tried: in the first round, best first
     rivals: effect → what cannot be told from it; evidence: effect → its advantage over the same without it
     beyond: constants of the base have to be further from what is stated than two deviations, and no effect puts them back
-    likeness: effects that were accepted and are not certain beside what is left (`twin.gap.naming.certain`)
+    alike: what the remainder partly looks like: effects that were accepted and are not certain (`twin.gap.naming.certain`)
     """
 
     stage: Stage
@@ -70,11 +70,13 @@ class Explained:
     rivals: dict[Effected, tuple[Effected, ...]]
     evidence: dict[Effected, Advantage]
     beyond: bool = False
-    likeness: tuple[Effected, ...] = ()
+    alike: tuple[Effected, ...] = ()
 
 
-def explain(stage: Stage, *, null: Null = NULL, progress: Callable[[str], None] = lambda _: None) -> Explained:
-    """The effects in a stage."""
+def explain(
+    stage: Stage, *, null: Null = NULL, progress: Callable[[str], None] = lambda _: None, doubtful: bool = False
+) -> Explained:
+    """The effects in a stage. doubtful: with those that are not certain beside what is left"""
     bare = Model(stage.constants, ())
     base = settled(stage, fitted(stage, bare, bare.null_theta()))
     best, first = base, tuple[Tried, ...]()
@@ -105,14 +107,21 @@ def explain(stage: Stage, *, null: Null = NULL, progress: Callable[[str], None] 
     if beyond and (instead := instead_of_constants(stage, base, [t.found for t in first if t.found is not None])):
         best, beyond = instead[0], False
         rivals[best.effects[0]] = tuple(other.effects[0] for other in instead[1:])
-    likeness: tuple[Effected, ...] = ()
-    if best.effects and leaves_a_gap(stage, best):
-        certain = certain_of(stage, base, best, null)
-        likeness = tuple(e for e in best.effects if e not in certain)
-        best = only(stage, base, best, certain) if likeness else best
+    best, alike = (best, ()) if doubtful else with_certain(stage, base, best, null)
     several = len(best.effects) > 1
     evidence = {e: advantage(dropped(stage, best, e).left if several else base.left, best.left) for e in best.effects}
-    return Explained(stage, base, best, first, {e: r for e, r in rivals.items() if e in best.effects}, evidence, beyond, likeness)
+    # what was found beside an effect is no rival of it
+    others = {e: tuple(r for r in rivals[e] if r not in best.effects) for e in best.effects if e in rivals}
+    return Explained(stage, base, best, first, others, evidence, beyond, alike)
+
+
+def with_certain(stage: Stage, base: Fitted, best: Fitted, null: Null = NULL) -> tuple[Fitted, tuple[Effected, ...]]:
+    """Return the hypothesis with those of its effects that may be named beside what is left, and the others."""
+    if not best.effects or not leaves_a_gap(stage, best):
+        return best, ()
+    certain = certain_of(stage, base, best, null)
+    alike = tuple(e for e in best.effects if e not in certain)
+    return (only(stage, base, best, certain) if alike else best), alike
 
 
 def leaves_a_gap(stage: Stage, found: Fitted) -> bool:

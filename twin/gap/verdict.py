@@ -21,7 +21,7 @@ class Judged:
 
 def judged(explained: Explained) -> Judged:
     """The verdict on one stage."""
-    likeness = explained.likeness
+    likeness = explained.alike
     if leaves_a_gap(explained.stage, explained.best):
         return Judged(explained, Verdict.PARTLY if explained.best.effects else Verdict.UNKNOWN, likeness)
     if explained.best.effects or explained.beyond:

@@ -15,6 +15,7 @@ from twin.learned.words import LearnedSite
 Floats = NDArray[np.float64]
 Arguments = Mapping[str, Floats]
 Answer = TypeVar("Answer")
+SINCE = "time_since_start_s"
 PASSES_MAX = 24
 SETTLED = 1e-4
 """Change of a series, over its largest value, below which it is the same."""
@@ -80,9 +81,17 @@ def check_terms(sections: Sequence[LearnedSection], axes: Iterable[str]) -> None
     letters = tuple(axes)
     for section in sections:
         check_place(section.site, section.on, letters)
+        if section.site is LearnedSite.PROGRAM_TIME and not section.is_recording and section.arguments != (SINCE,):
+            raise EffectError(f"the learned term at {section} is over {', '.join(section.arguments)}; it has to be over {SINCE}")
         own = (section.site, section.on, frozenset(section.arguments))
         if own in seen:
             raise EffectError(
                 f"the learned term at {section} over {', '.join(section.arguments)} is there twice; add the tables up"
             )
         seen.add(own)
+
+
+def seconds_of(sections: Sequence[LearnedSection], planned_s: float) -> float:
+    """Return the seconds that the learned terms add to a program, by what it takes without them."""
+    terms = terms_at(sections, (LearnedSite.PROGRAM_TIME,))
+    return float(sum(term.at({SINCE: np.array([planned_s])})[0] for term in terms))

@@ -20,7 +20,7 @@ from twin.process.milling import Milling, milling_force
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
-STEPS_PER_TOOTH = 48
+STEPS_PER_TOOTH = 96
 GRID_PER_ORDER = 16
 NEWTON_STEPS = 4
 TAU = 2.0 * np.pi

@@ -18,7 +18,7 @@ from twin.gap.diagnosis import Effected
 from twin.gap.experiment.envelope import Envelope
 from twin.gap.experiment.menu import Shows, Snippet
 from twin.gap.stages.free import effect_parameters
-from twin.gcode import interpret
+from twin.gcode import Settings, interpret
 from twin.machine import AddedEffect, MachineFile
 from twin.motion.motion import Motion
 from twin.motion.path import EventKind, path_from_moves
@@ -71,7 +71,8 @@ class Trial:
 
 def trial_of(snippet: Snippet, machine: MachineFile, envelope: Envelope) -> Trial:
     """The program planned on the machine's control, or on a middling one where none is stated."""
-    planned = plan(path_from_moves(interpret(snippet.program())), machine.program or IDEAL_TIMES)
+    moves = interpret(snippet.program(), Settings(axes=machine.words))
+    planned = plan(path_from_moves(moves, axes=machine.words), machine.program or IDEAL_TIMES)
     heat = snippet.shows is Shows.HEAT
     motion = sampled(planned, HEAT_PERIOD_S if heat else machine.machine.servo_period_s)
     block = motion.line - 1  # the first line is the %

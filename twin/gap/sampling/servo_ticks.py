@@ -7,6 +7,8 @@ nearest one, by at most half a tick or half a sample (`twin.gap.sampling.sample_
 samples are kept over which the reference goes on evenly: between them it is not known.
 """
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -72,7 +74,7 @@ def _without_doubt(name: str, log: RunLog, placed: RunLog, times: SampleTimes, m
             f"{name}: between samples the reference of {letter} is not known well enough for {np.mean(doubt):.0%} of the time; "
             "nothing is compared there"
         )
-    return RunLog(placed.t_s, columns, placed.text, placed.ignored, placed.source)
+    return replace(placed, columns=columns)
 
 
 def _placed(log: RunLog, times: SampleTimes, period_s: float) -> RunLog:
@@ -94,7 +96,7 @@ def _placed(log: RunLog, times: SampleTimes, period_s: float) -> RunLog:
         else:
             columns[name] = times.last(values)
     text = log.text if len(ticks) == len(log) else {}
-    return RunLog(np.asarray(ticks * period_s, dtype=np.float64), columns, text, log.ignored, log.source)
+    return replace(log, t_s=np.asarray(ticks * period_s, dtype=np.float64), columns=columns, text=text)
 
 
 def _turned(log: RunLog, times: SampleTimes, period_s: float) -> Floats:
@@ -138,7 +140,7 @@ def _slow(log: RunLog, period_s: float) -> RunLog:
             columns[name][place] = np.where(_even_here(log.columns.get(f"{match[1]}_ref_mm"), place, settled), values, np.nan)
         elif name in WHEN_SLOW:
             columns[name] = values[np.clip(np.searchsorted(place, ticks, side="right") - 1, 0, len(values) - 1)]
-    return RunLog(np.asarray(ticks * period_s, dtype=np.float64), columns, {}, log.ignored, log.source)
+    return replace(log, t_s=np.asarray(ticks * period_s, dtype=np.float64), columns=columns, text={})
 
 
 def _even_here(reference: Floats | None, place: NDArray[np.intp], settled: int) -> NDArray[np.bool_]:

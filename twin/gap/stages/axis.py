@@ -181,9 +181,10 @@ class AxisStage:
         outputs = self.simulate(model, theta, data)
         values = model.values(theta)
         shown = []
+        starts = np.cumsum([0, *(stretch.stop - stretch.start for stretch in data.stretches())])[:-1].tolist()
         for output in self.outputs:
             sensing = Sensing.of(values, f"{self.letter}_{output}")
-            modelled = sensing.readings(outputs[output], self.period_s)
+            modelled = sensing.readings(outputs[output], self.period_s, starts)
             modelled = modelled + readings_of_terms(model, theta, f"{self.letter}_{output}", data, self.terms)
             shown.append(self.grown(modelled, values, data) if output == "table_mm" else modelled)
         at = {output: i for i, output in enumerate(self.outputs)}

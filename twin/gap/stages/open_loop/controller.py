@@ -19,7 +19,7 @@ from twin.gap.stages.free import Free
 from twin.gap.stages.observed_through import Sensing
 from twin.gap.stages.open_loop.lanes import Driven, run_lanes
 from twin.gap.stages.open_loop.loop import added_at
-from twin.gap.stages.open_loop.smoothed import filled, low_passed, velocity_of
+from twin.gap.stages.smoothed import filled, low_passed, velocity_of
 from twin.gap.stages.stage import Model
 from twin.learned.words import LearnedSite
 from twin.servo.kernel import axis_quantities
@@ -41,6 +41,7 @@ class Controller:
     name: str = "controller"
     driven_by: tuple[str, ...] = ("ref_mm", "pos_mm")
     compared: str = "torque_a"
+    healthy_rms: float = 1.3
     sites: tuple[LearnedSite, ...] = (LearnedSite.CONTROLLER, LearnedSite.TORQUE_READING)
 
     def acts(self, effect: Effect) -> bool:

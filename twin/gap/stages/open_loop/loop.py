@@ -8,9 +8,10 @@ from numpy.typing import NDArray
 from twin.effects.effect import Effect
 from twin.gap.stages.axis import AxisStage
 from twin.gap.stages.axis_run import AxisRunData
-from twin.gap.stages.axis_terms import QUANTITIES, series_of_terms
+from twin.gap.stages.axis_terms import series_of_terms
 from twin.gap.stages.free import Free
 from twin.gap.stages.stage import Model
+from twin.learned.sites import QUANTITIES
 from twin.learned.words import LearnedSite
 
 Floats = NDArray[np.float64]
@@ -32,6 +33,10 @@ class Loop(Protocol):
     @property
     def compared(self) -> str:
         """The column, without the axis letter, that it answers with."""
+
+    @property
+    def healthy_rms(self) -> float:
+        """The most that a healthy machine's twin leaves, in floors."""
 
     @property
     def sites(self) -> tuple[LearnedSite, ...]:
