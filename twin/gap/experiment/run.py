@@ -19,6 +19,7 @@ from twin.gap.experiment.envelope import Envelope
 from twin.gap.experiment.menu import Shows, Snippet
 from twin.gap.stages.free import effect_parameters
 from twin.gcode import Settings, interpret
+from twin.learned.standing import moved_by
 from twin.machine import AddedEffect, MachineFile
 from twin.motion.motion import Motion
 from twin.motion.path import EventKind, path_from_moves
@@ -153,7 +154,8 @@ def cut_down(machine: MachineFile, snippet: Snippet) -> MachineFile:
         match = AXIS_COLUMN.match(added.on)
         return match is None or match[1] in axes
 
-    return machine.model_copy(update={"axes": axes, "effects": tuple(e for e in machine.effects if stays(e))})
+    kept = {"effects": tuple(e for e in machine.effects if stays(e)), "learned": moved_by(machine.learned, letters)}
+    return machine.model_copy(update={"axes": axes} | kept)
 
 
 def sensitivities(
