@@ -170,7 +170,7 @@ class AxisStage:
                 measured = measured - run.measured["pos_mm"]
                 noise = np.sqrt(np.min(floor) ** 2 + np.min(run.floor["pos_mm"]) ** 2)
                 floor = np.full(len(floor), noise)
-            known = measured[where]
+            known = run.of_loops(measured)[where]
             sigma = floor[where] / np.sqrt(run.count)
             parts.append((f"{self.letter}_{output}", known, floor[where], sigma, blocks, run.regime[where]))
         return observed_of(run.name, parts, run.fitted)
