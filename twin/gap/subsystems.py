@@ -7,10 +7,11 @@ import numpy as np
 from twin.gap.diagnosis import Subsystem, Verdict
 from twin.gap.fitting import Left
 from twin.gap.opened import Opened
+from twin.gap.search import CHANCE_BLOCKS
 from twin.gap.stages.axis import AxisStage
 from twin.gap.stages.open_loop.stage import OpenStage
 from twin.gap.stages.turns import TO_TOOTH
-from twin.gap.verdict import CHANCE_BLOCKS, Judged
+from twin.gap.verdict import Judged
 
 DRIVEN_BY = {
     "force_x_n": ("cut", ("spindle_angle_rad", "axial_depth_mm", "entry_angle_rad", "exit_angle_rad")),

@@ -89,7 +89,7 @@ def explained_stages(ground: Ground, progress: Progress, side_by_side: SideBySid
     turning = turn_data(ground.runs)
     if any(run.fitted for run in turning):
         turns = TurnStage(ground.machine, turning, ground.left_out)
-        found.append(only_specific(turns, explain(turns, null=null, progress=progress)))
+        found.append(only_specific(turns, explain(turns, null=null, progress=progress, doubtful=True)))
     stages: list[Stage] = [s for letter in ground.machine.axes if (s := axis_stage(ground, letter, forces)) is not None]
     warmups = heat_runs(ground.machine, tuple(r for r in ground.runs if not r.log.axes()))
     if any(run.fitted for run in warmups):
