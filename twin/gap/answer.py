@@ -181,10 +181,10 @@ def _clearness(interval: Interval, null: float | None) -> float:
 
 def _in_words(effect: str, on: str) -> str:
     """
-    >>> _in_words("direction_friction", "x"), _in_words("sensor_bias", "z_torque_a")
-    ('direction friction on X', 'sensor bias on z_torque_a')
+    >>> _in_words("direction_friction", "x"), _in_words("sensor_bias", "z_torque_a"), _in_words("runout", "3")
+    ('direction friction on X', 'sensor bias on z_torque_a', 'runout on tool 3')
     """
-    where = on.upper() if len(on) == 1 else on
+    where = f"tool {on}" if on.isdigit() else on.upper() if len(on) == 1 else on
     return f"{effect.replace('_', ' ')}{f' on {where}' if on else ''}"
 
 

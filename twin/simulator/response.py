@@ -64,6 +64,7 @@ class RunInput:
     spindle_rpm, spindle_angle_rad, axial_depth_mm, entry_angle_rad, exit_angle_rad: of the cut; None = nothing is cut
     coolant_on, ambient_temp_c: of the heat; None = never on, not known
     start: axis letter → the state of the axis at the first tick (`twin.servo.run`); start_temp_c: of the spindle
+    tool: number of the one in the spindle, where the machine describes several; empty = [tool]
     """
 
     t_s: Floats
@@ -77,6 +78,7 @@ class RunInput:
     ambient_temp_c: Floats | None = None
     start: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     start_temp_c: float | None = None
+    tool: str = ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,6 +92,7 @@ class Response:
 def check_effects(machine: MachineFile) -> None:
     """Raises EffectError where an effect of the machine is unknown, out of bounds, doubled, or put on what there is not."""
     seen: set[tuple[str, str]] = set()
+    of_the_cut = set(process_quantities())
     for added in machine.effects:
         effect = effect_named(added.effect)
         effect.checked(added.parameters)
@@ -100,8 +103,13 @@ def check_effects(machine: MachineFile) -> None:
             raise EffectError(f"{added.effect} acts on an axis: say which by `on`")
         if effect.on is On.AXIS and added.on not in machine.axes:
             raise EffectError(f"{added.effect} is put on {added.on!r}, which is no axis; there are {', '.join(machine.axes)}")
-        if effect.on is On.MACHINE and added.on:
-            raise EffectError(f"{added.effect} is put on {added.on!r}; it acts on the machine as a whole, so `on` is empty")
+        if effect.on is On.MACHINE and added.on and not (added.on in machine.tools and of_the_cut & set(effect.changes)):
+            tools = (
+                f", or one of the tools {', '.join(machine.tools)}" if machine.tools and of_the_cut & set(effect.changes) else ""
+            )
+            raise EffectError(
+                f"{added.effect} is put on {added.on!r}; it acts on the machine as a whole, so `on` is empty{tools}"
+            )
         if effect.on is On.SIGNAL and not added.on:
             raise EffectError(f"{added.effect} acts on a signal: say which by `on`")
         if effect.on is On.SIGNAL and not SIGNAL.match(added.on):
@@ -130,6 +138,7 @@ def respond(
     Raises EffectError where the machine's effects do not fit it.
     """
     check_effects(machine)
+    machine = machine.with_tool(told.tool)
     chain = _Chain(machine, told, recorded or {}, reference_run)
     force = chain.process()
     temperature_c = chain.heat()
