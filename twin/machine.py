@@ -16,7 +16,8 @@ from twin.errors import MachineError
 from twin.gcode import Settings
 from twin.learned.section import LEARNED, LearnedSection
 from twin.machine_control import ControlSection
-from twin.rotary import outside_name, outside_text, tables_inside
+from twin.rotary import outside_name, outside_text
+from twin.rotary_tables import tables_inside
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]

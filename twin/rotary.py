@@ -10,10 +10,7 @@ Files, columns and answers have degrees; this module alone knows how one becomes
 
 import math
 import re
-from collections.abc import Collection, Iterable, Mapping
-from typing import Any
-
-from twin.errors import MachineError
+from collections.abc import Collection
 
 PER_NM = 1000.0 * math.pi / 180.0
 """N for each N m, and the square root of kg for each kg m²."""
@@ -61,8 +58,6 @@ NAME = re.compile(
     r"(?<![\w.])(?!force_[xy]_n|[a-z][a-z0-9]?_(?:ref|pos|table)_mm)[a-z][a-z_]*_(?:mm_s2|mm_s|mm|n|kg)(?![\w.])|\bum_per_k\b"
 )
 PATH = re.compile(r"\b(?:axes|effects)(?:\.\w+){2,}")
-DIGITS = 12
-"""Digits with which a figure is written, so that a file that was read is written as it was."""
 
 
 def outside_name(name: str) -> tuple[str, float]:
@@ -187,96 +182,3 @@ def _divided(number: str, factor: float) -> str:
     value = float(number.replace("−", "-").replace(",", "")) / factor
     shown = f"{value:.{digits}g}".replace("-", "−" if "−" in number else "-")
     return f"+{shown}" if number.startswith("+") else shown
-
-
-def tables_inside(tables: Mapping[str, Any], *, scaled: bool = True) -> dict[str, Any]:
-    """Return the tables of a machine file with its rotary axes as they are inside.
-
-    scaled: whether figures become those of the units inside; without it a fault can be told in the figures of the file
-
-    Raises MachineError where an axis has keys of both kinds.
-    """
-    axes = tables.get("axes")
-    letters = (
-        {a for a, axis in axes.items() if isinstance(axis, dict) and _is_rotary(a, axis)} if isinstance(axes, dict) else set()
-    )
-    found = dict(tables)
-    if isinstance(found.get("noise"), dict):
-        found["noise"] = {("disturbance_force_n" if k == "disturbance_torque_nm" else k): v for k, v in found["noise"].items()}
-        if "disturbance_torque_nm" in tables["noise"]:
-            found["noise"]["disturbance_force_n"] = _times(tables["noise"]["disturbance_torque_nm"], PER_NM if scaled else 1.0)
-    if not letters:
-        return found
-    found["axes"] = {
-        a: _axis(axis, inside_name, scaled) | {"is_rotary": True} if a in letters else axis for a, axis in axes.items()
-    }
-    if isinstance(found.get("uncertainty"), dict):
-        found["uncertainty"] = {inside_path(path, letters): value for path, value in found["uncertainty"].items()}
-    if isinstance(found.get("effects"), list):
-        found["effects"] = [_effect_inside(e, letters) if isinstance(e, dict) else e for e in found["effects"]]
-    return found
-
-
-def tables_outside(tables: Mapping[str, Any], letters: Collection[str]) -> dict[str, Any]:
-    """Return the tables of a machine, as they are inside, as its file has them. letters: of its rotary axes."""
-    found = dict(tables)
-    letters = set(letters)
-    found["axes"] = {
-        a: _axis(axis, outside_name, scaled=True, divided=True) if a in letters else axis for a, axis in tables["axes"].items()
-    }
-    noise = dict(tables.get("noise", {}))
-    if "disturbance_force_n" in noise and letters == set(tables["axes"]):
-        noise["disturbance_torque_nm"] = _times(noise.pop("disturbance_force_n"), 1.0 / PER_NM)
-    found["noise"] = noise
-    found["uncertainty"] = {outside_path(path, letters): value for path, value in tables.get("uncertainty", {}).items()}
-    found["effects"] = [_effect_outside(effect, letters) for effect in tables.get("effects", [])]
-    return found
-
-
-def _is_rotary(letter: str, axis: Mapping[str, Any]) -> bool:
-    friction = axis.get("friction")
-    keys = [*axis, *(friction if isinstance(friction, dict) else ())]
-    rotary = [key for key in keys if inside_name(key)[0] != key]
-    linear = [key for key in keys if outside_name(key)[0] != key or key == "torque_constant_nm_per_a"]
-    if "is_rotary" in axis:
-        raise MachineError(f"axes.{letter}.is_rotary is not known; an axis with inertia_kg_m2 is a rotary one")
-    if rotary and linear:
-        raise MachineError(f"axes.{letter} has {rotary[0]} of a rotary axis and {linear[0]} of a linear one; state one kind")
-    return bool(rotary)
-
-
-def _axis(axis: Mapping[str, Any], name_of: Any, scaled: bool, *, divided: bool = False) -> dict[str, Any]:
-    found: dict[str, Any] = {}
-    for key, value in axis.items():
-        name, factor = name_of(key)
-        if isinstance(value, dict):
-            found[name] = _axis(value, name_of, scaled, divided=divided)
-        else:
-            found[name] = _times(value, 1.0 / factor if divided else factor) if scaled and factor != 1.0 else value
-    return found
-
-
-def _times(value: Any, factor: float) -> Any:
-    """A figure, or one for each direction, in another unit; whatever is no figure as it is."""
-    if isinstance(value, list | tuple):
-        return [_times(one, factor) for one in value]
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return value
-    return float(f"{value * factor:.{DIGITS}g}") if factor < 1.0 else value * factor
-
-
-def _effect_inside(effect: Mapping[str, Any], letters: Iterable[str]) -> dict[str, Any]:
-    on = effect.get("on")
-    found = dict(effect)
-    if isinstance(on, str):
-        found["on"] = inside_column(on)
-    if on in letters and isinstance(effect.get("parameters"), dict):
-        found["parameters"] = _axis(effect["parameters"], inside_name, scaled=True)
-    return found
-
-
-def _effect_outside(effect: Mapping[str, Any], letters: Collection[str]) -> dict[str, Any]:
-    found = dict(effect) | {"on": outside_names(effect.get("on", ""), letters)}
-    if effect.get("on") in letters and "parameters" in effect:
-        found["parameters"] = _axis(effect["parameters"], outside_name, scaled=True, divided=True)
-    return found

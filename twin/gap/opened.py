@@ -14,8 +14,9 @@ from twin.gap.diagnosis import Effected, Verdict
 from twin.gap.evidence import advantage
 from twin.gap.fitting import Fitted, fitted, settled
 from twin.gap.labels import AXIS
+from twin.gap.naming.certain import dropped
 from twin.gap.null import NULL, Null
-from twin.gap.search import Explained, dropped, explain, without
+from twin.gap.search import Explained, explain, with_certain, without
 from twin.gap.stages.axis import AxisStage
 from twin.gap.stages.open_loop.plan import ON_TOP_OF, open_stages
 from twin.gap.stages.open_loop.stage import OpenStage
@@ -96,8 +97,8 @@ def combined(
     progress("opening the loops")
     closed: dict[str, Judged | None] = {s.explained.stage.letter: s for s in found if isinstance(s.explained.stage, AxisStage)}
     axes = {letter: s.explained.stage for letter, s in closed.items() if s is not None}
-    for axis in unheard_axes(ground):
-        axes[axis.letter], closed[axis.letter] = axis, None
+    for unheard in unheard_axes(ground):
+        axes[unheard.letter], closed[unheard.letter] = unheard, None
     loops: list[OpenStage] = []
     for axis in axes.values():
         if isinstance(axis, AxisStage):
@@ -169,7 +170,9 @@ def _confirmed(of_axis: Judged, opened: Opened, null: Null) -> Judged:
     evidence = {e: advantage(_without(stage, best, e, base).left, best.left) for e in best.effects}
     if not all(null.exceeded(effected, over, stage.healthy_rms) for effected, over in evidence.items()):
         return of_axis
-    again = judged(Explained(stage, base, best, of_axis.explained.tried, rivals, evidence))
+    best, alike = with_certain(stage, base, best, null)
+    evidence = {e: over for e, over in evidence.items() if e in best.effects}
+    again = judged(Explained(stage, base, best, of_axis.explained.tried, rivals, evidence, alike=alike))
     return of_axis if again.verdict is Verdict.UNKNOWN else again
 
 

@@ -11,7 +11,7 @@ from twin.gap.answer import figure_of
 from twin.gap.diagnosis import Cause, Cell, Diagnosed, Interval, Learned, MovedConstant, Pattern, SignalGap
 from twin.machine import MachineFile
 from twin.rotary import outside_name, outside_names, outside_path, outside_text, outside_unit
-from twin.runlog import AXIS_COLUMN
+from twin.rotary_tables import is_on, term_outside
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,8 +23,7 @@ class _Axes:
 
     def turns(self, on: str) -> bool:
         """Return True where this is a rotary axis, or a signal of one."""
-        match = AXIS_COLUMN.match(on)
-        return (match[1] if match else on) in self.rotary
+        return is_on(on, self.rotary)
 
     def text(self, text: str) -> str:
         """Return a text that may speak of any axis."""
@@ -108,21 +107,12 @@ def _constant(constant: MovedConstant, axes: _Axes) -> MovedConstant:
 
 
 def _learned(learned: Learned, axes: _Axes) -> Learned:
-    """A learned term; a column of its table that is called by a name of an axis is one of its own axis."""
-    unit, factor = outside_unit(learned.unit)
-    table: dict[str, tuple[float | str, ...]] = {}
-    for column, values in learned.table.items():
-        if column in ("value", "low", "high"):
-            table[column] = tuple(v if isinstance(v, str) else v / factor for v in values)
-        else:
-            letter = column.partition("_")[0]
-            of_another = len(letter) <= 2 and letter not in axes.rotary  # y_position_mm
-            table[column if of_another else outside_name(column)[0]] = values
+    """A learned term on a rotary axis; its sentence speaks of that axis."""
     return replace(
         learned,
         on=outside_names(learned.on, axes.rotary),
-        unit=unit,
-        table=table,
+        unit=_unit(axes, learned.on, learned.unit),
+        table={name: tuple(v) for name, v in term_outside(learned.table, learned.on, learned.unit, axes.rotary).items()},
         looks_like=_told(learned.looks_like, axes),
         sentence=outside_text(learned.sentence, axes.rotary, ()),
     )

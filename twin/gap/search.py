@@ -20,6 +20,7 @@ from twin.effects.effect import On
 from twin.gap.diagnosis import Effected
 from twin.gap.evidence import Advantage, advantage
 from twin.gap.fitting import Fitted, fitted, settled
+from twin.gap.naming.certain import certain_of, dropped, only
 from twin.gap.naming.instead import instead_of_constants
 from twin.gap.naming.moved import has_to_be_beyond
 from twin.gap.naming.siblings import only_completes
@@ -39,6 +40,7 @@ THETA_NULL = 1e-4
 """θ below which an effect is null: the fit has taken it away."""
 PAIR_GAP = 3.0
 PAIRS_OF = 6
+CHANCE_BLOCKS = 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,7 +60,7 @@ class Explained:
     base: the machine with its constants refitted; best: with the accepted effects; tried: in the first round, best first
     rivals: effect → what cannot be told from it; evidence: effect → its advantage over the same without it
     beyond: constants of the base have to be further from what is stated than two deviations, and no effect puts them back
-    alike: what the remainder partly looks like, where none but specific effects were kept (`twin.gap.specific`); else None
+    alike: what the remainder partly looks like: effects that were accepted and are not certain (`twin.gap.naming.certain`)
     """
 
     stage: Stage
@@ -68,11 +70,13 @@ class Explained:
     rivals: dict[Effected, tuple[Effected, ...]]
     evidence: dict[Effected, Advantage]
     beyond: bool = False
-    alike: tuple[Effected, ...] | None = None
+    alike: tuple[Effected, ...] = ()
 
 
-def explain(stage: Stage, *, null: Null = NULL, progress: Callable[[str], None] = lambda _: None) -> Explained:
-    """The effects in a stage."""
+def explain(
+    stage: Stage, *, null: Null = NULL, progress: Callable[[str], None] = lambda _: None, doubtful: bool = False
+) -> Explained:
+    """The effects in a stage. doubtful: with those that are not certain beside what is left"""
     bare = Model(stage.constants, ())
     base = settled(stage, fitted(stage, bare, bare.null_theta()))
     best, first = base, tuple[Tried, ...]()
@@ -103,11 +107,26 @@ def explain(stage: Stage, *, null: Null = NULL, progress: Callable[[str], None] 
     if beyond and (instead := instead_of_constants(stage, base, [t.found for t in first if t.found is not None])):
         best, beyond = instead[0], False
         rivals[best.effects[0]] = tuple(other.effects[0] for other in instead[1:])
+    best, alike = (best, ()) if doubtful else with_certain(stage, base, best, null)
     several = len(best.effects) > 1
     evidence = {e: advantage(dropped(stage, best, e).left if several else base.left, best.left) for e in best.effects}
     # what was found beside an effect is no rival of it
     others = {e: tuple(r for r in rivals[e] if r not in best.effects) for e in best.effects if e in rivals}
-    return Explained(stage, base, best, first, others, evidence, beyond)
+    return Explained(stage, base, best, first, others, evidence, beyond, alike)
+
+
+def with_certain(stage: Stage, base: Fitted, best: Fitted, null: Null = NULL) -> tuple[Fitted, tuple[Effected, ...]]:
+    """Return the hypothesis with those of its effects that may be named beside what is left, and the others."""
+    if not best.effects or not leaves_a_gap(stage, best):
+        return best, ()
+    certain = certain_of(stage, base, best, null)
+    alike = tuple(e for e in best.effects if e not in certain)
+    return (only(stage, base, best, certain) if alike else best), alike
+
+
+def leaves_a_gap(stage: Stage, found: Fitted) -> bool:
+    """Return True where a hypothesis leaves more than a healthy twin does, but for the worst blocks: those are chance."""
+    return bool((found.left.rms_but_worst(CHANCE_BLOCKS) > stage.healthy_rms).any())
 
 
 def _gap_left(best: Fitted, null: Null) -> bool:
@@ -245,14 +264,6 @@ def _is_a_second_name(base: Fitted, before: Fitted, best: Fitted, first: tuple[T
     """Return True where the effect that came last is a second name for what the others explain."""
     alone = next((t.found for t in first if t.effected == best.effects[-1] and t.found is not None), None)
     return alone is not None and only_completes(base.left, before.left, alone.left, best.left)
-
-
-def dropped(stage: Stage, best: Fitted, effected: Effected) -> Fitted:
-    """Return the hypothesis without one of its effects, refitted."""
-    place = dict(best.model.places())[effected]
-    theta = np.delete(best.theta, np.arange(place.start, place.stop))
-    scale = np.maximum(best.left_fit.rms(), 1.0)
-    return fitted(stage, best.model.without(effected), theta, scale=scale, steps_max=STEPS_MAX)
 
 
 def without(explained: Explained) -> Explained:

@@ -49,16 +49,17 @@ class LearnedForces:
         terms = terms_at(learned, (LearnedSite.CUT_FORCE,))
         if not terms:
             return None
-        pushes = [sum(largest(t) for t in terms if direction_of(t.on) == direction) for direction in ("x", "y")]
+        push_x, push_y = (sum((largest(t) for t in terms if direction_of(t.on) == direction), 0.0) for direction in ("x", "y"))
         specific = [greatest(term, KNOWN) for term in terms if not direction_of(term.on)]
-        rows, kind = np.unique(np.round(np.vstack([cuts, tool]), 4), axis=1, return_inverse=True)
+        every: Floats = np.vstack([cuts, tool.astype(np.float64)])
+        rows, kind = np.unique(np.round(every, 4), axis=1, return_inverse=True)
         peak, tangential = np.ones((2, rows.shape[1], len(ADVANCES_MM)))
         for index, own in enumerate(tools):
             mine = np.flatnonzero(rows[3] == index)
             for part in (mine[k : k + BLOCK] for k in range(0, len(mine) if specific else 0, BLOCK)):
                 given = {**tool_constants(own), **constants}
                 peak[part], tangential[part] = _ratios(specific, rows[:3, part], own.teeth, given, effects)
-        return cls(peak, tangential, kind.reshape(-1).astype(np.int64), float(np.hypot(*pushes)))
+        return cls(peak, tangential, kind.reshape(-1).astype(np.int64), float(np.hypot(push_x, push_y)))
 
     def peaks_n(self, chosen: Ints, advance_mm: Floats, without_n: Floats) -> Floats:
         """Return the peaks of some cuts at advances from those without the terms, all (…, chosen)."""

@@ -11,9 +11,9 @@ from twin.effects.catalogue import effect_named
 from twin.gap.diagnosis import Effected, Verdict
 from twin.gap.dynamometer.turn_run import TurnRun
 from twin.gap.floors import Floors, repeatability
+from twin.gap.naming.specific import only_specific
 from twin.gap.null import NULL, Null
 from twin.gap.search import Explained, explain
-from twin.gap.specific import only_specific
 from twin.gap.stages.axis import AxisStage, axis_constants_free, standing_of
 from twin.gap.stages.axis_run import AxisRunData, axis_run_data, repeated_groups
 from twin.gap.stages.cut import CutStage, cut_runs
@@ -89,7 +89,7 @@ def explained_stages(ground: Ground, progress: Progress, side_by_side: SideBySid
     turning = turn_data(ground.runs)
     if any(run.fitted for run in turning):
         turns = TurnStage(ground.machine, turning, ground.left_out)
-        found.append(only_specific(turns, explain(turns, null=null, progress=progress)))
+        found.append(only_specific(turns, explain(turns, null=null, progress=progress, doubtful=True)))
     stages: list[Stage] = [s for letter in ground.machine.axes if (s := axis_stage(ground, letter, forces)) is not None]
     warmups = heat_runs(ground.machine, tuple(r for r in ground.runs if not r.log.axes()))
     if any(run.fitted for run in warmups):

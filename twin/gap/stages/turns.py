@@ -30,6 +30,9 @@ from twin.gap.stages.cut import acting
 from twin.gap.stages.free import Free, constant
 from twin.gap.stages.observed_through import Sensing
 from twin.gap.stages.stage import Model, Observed, observed_of
+from twin.learned.standing import terms_at
+from twin.learned.term import Term
+from twin.learned.words import LearnedSite
 from twin.machine import MachineFile
 from twin.process.kernel import process_quantities
 from twin.process.milling import tool_constants
@@ -111,6 +114,11 @@ class TurnStage:
     def standing(self) -> dict[str, Mapping[str, float]]:
         """Effects that the machine has already."""
         return added_effects(self.machine, process_quantities())
+
+    @cached_property
+    def terms(self) -> tuple[Term, ...]:
+        """Learned terms of the cut that the machine has already."""
+        return terms_at(self.machine.learned, (LearnedSite.CUT_FORCE,))
 
     @property
     def constants(self) -> tuple[Free, ...]:
@@ -221,7 +229,7 @@ class TurnStage:
     def _orders(self, constants: dict[str, ArrayLike], sensing: list[Sensing], stretch: Stretch, data: TurnData) -> Complexes:
         """Amplitudes of the orders that the twin's sensors show, (signals, lanes, orders)."""
         effects = tuple(e.name for e in acting(process_quantities()))
-        turn = fine_turn(constants, self.teeth, stretch.cut, effects)
+        turn = fine_turn(constants, self.teeth, stretch.cut, effects, self.terms)
         shown = []
         for sensor, signal in zip(sensing, data.signals, strict=True):
             force = turn.force[FORCES.index(signal)]

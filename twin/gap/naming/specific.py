@@ -13,7 +13,8 @@ from dataclasses import replace
 
 from twin.gap.diagnosis import Effected
 from twin.gap.evidence import Advantage, advantage
-from twin.gap.search import Explained, dropped
+from twin.gap.naming.certain import dropped
+from twin.gap.search import Explained
 from twin.gap.stages.stage import Stage
 
 SHARE_MIN = 0.6
