@@ -43,9 +43,10 @@ class Judged:
 
     @property
     def controller_told(self) -> bool:
-        """True where another structure of a controller is named, or its subsystem called not understood; or there is none."""
+        """True where another structure of a controller is named, or its subsystem called not understood; or none shows."""
         doubtful = (Verdict.UNKNOWN, Verdict.PARTLY)
-        return all(
+        controller = self.answer.controller
+        return (controller is not None and controller.size < JUDGED_FROM) or all(
             any(truth in cause.reported for cause in self.given.causes)
             or self.given.subsystems.get(f"{truth[1]} controller") in doubtful
             for truth in self.structure

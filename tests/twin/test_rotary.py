@@ -51,6 +51,36 @@ def test_a_file_that_was_read_is_written_as_it_was() -> None:
     assert machine_to_toml(machine_from_toml(text)) == text
 
 
+TERMS = """
+[[effects]]
+effect = "learned"
+site = "axis_force"
+on = "b"
+unit = "N m"
+depends_on = ["position"]
+table = { position_deg = [0.0, 90.0], value = [0.0, 2.0], low = [-0.5, 1.5], high = [0.5, 2.5] }
+[[effects]]
+effect = "learned"
+site = "position_reading"
+on = "b_pos_deg"
+table = { velocity_deg_s = [0.0, 10.0], value = [0.0, 0.002] }
+"""
+
+
+def test_a_learned_term_of_a_rotary_axis_is_in_degrees_and_nm_and_comes_back() -> None:
+    machine = machine_from_toml(STATED + TERMS)
+    force, reading = machine.learned
+    assert force.table["position_mm"] == (0.0, 90.0)
+    assert force.table["value"] == pytest.approx((0.0, 2.0 * 1000.0 * math.pi / 180.0))
+    assert (reading.on, reading.table["value"]) == ("b_pos_mm", (0.0, 0.002))
+    text = machine_to_toml(machine)
+    assert "_mm" not in text
+    assert 'unit = "N m"' in text
+    again = machine_from_toml(text)
+    assert again.learned[0].table["high"] == pytest.approx(force.table["high"])
+    assert machine_to_toml(again) == text
+
+
 def test_each_key_of_an_axis_has_one_name_outside_and_comes_back() -> None:
     for key in (*Axis.model_fields, *Friction.model_fields):
         name, factor = outside_name(key)

@@ -76,7 +76,7 @@ def _comparable(run: Run, machine: MachineFile) -> bool:
 
 def _usable(run: Run, machine: MachineFile, notes: list[str]) -> Run:
     log = _cleaned(run, notes)
-    if is_of_forces_alone(log):
+    if is_of_forces_alone(log, machine.axes):
         turned = turn_run(run, log, machine, notes)
         if turned is not None or not log.axes():
             return turned or RunAtHand(run.entry, run.folder, log)

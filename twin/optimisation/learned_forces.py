@@ -51,7 +51,8 @@ class LearnedForces:
             return None
         push_x, push_y = (sum((largest(t) for t in terms if direction_of(t.on) == direction), 0.0) for direction in ("x", "y"))
         specific = [greatest(term, KNOWN) for term in terms if not direction_of(term.on)]
-        rows, kind = np.unique(np.round(np.vstack([cuts, tool]), 4), axis=1, return_inverse=True)
+        every: Floats = np.vstack([cuts, tool.astype(np.float64)])
+        rows, kind = np.unique(np.round(every, 4), axis=1, return_inverse=True)
         peak, tangential = np.ones((2, rows.shape[1], len(ADVANCES_MM)))
         for index, own in enumerate(tools):
             mine = np.flatnonzero(rows[3] == index)

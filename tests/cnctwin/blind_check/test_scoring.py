@@ -151,6 +151,13 @@ def test_another_controller_may_be_named_or_called_not_understood(
     assert (one.right, one.in_class, one.wrong) == (right, in_class, wrong)
 
 
+def test_another_controller_that_does_not_show_need_not_be_told() -> None:
+    one = with_another_controller([cause(GRAVITY)], {})
+    assert one.answer.controller is not None and not one.right
+    small = replace(one.answer.controller, size_over_floor={"x_pos_mm": 1.2})
+    assert Judged(replace(one.answer, controller=small), one.given).right
+
+
 def test_cases_with_another_controller_are_scored_apart_as_well() -> None:
     other = with_another_controller([cause(GRAVITY)], {"x controller": Verdict.UNKNOWN})
     found = scored([other, case(Sort.SINGLE, [GRAVITY], [])])

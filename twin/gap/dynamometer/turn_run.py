@@ -46,7 +46,7 @@ class TurnRun(RunAtHand):
 
 def turn_run(run: Run, log: RunLog, machine: MachineFile, notes: list[str]) -> Run | None:
     """The run as mean turns; None where it is not of forces alone, or lacks what a cut is compared by, which `notes` say."""
-    if not is_of_forces_alone(log):
+    if not is_of_forces_alone(log, machine.axes):
         return None
     lacks = ([] if machine.tool else ["[tool] in the machine's file"]) + missing(log)
     if lacks or machine.tool is None:

@@ -11,9 +11,9 @@ from twin.effects.catalogue import effect_named
 from twin.gap.diagnosis import Effected, Verdict
 from twin.gap.dynamometer.turn_run import TurnRun
 from twin.gap.floors import Floors, repeatability
+from twin.gap.naming.specific import only_specific
 from twin.gap.null import NULL, Null
 from twin.gap.search import Explained, explain
-from twin.gap.specific import only_specific
 from twin.gap.stages.axis import AxisStage, axis_constants_free, standing_of
 from twin.gap.stages.axis_run import AxisRunData, axis_run_data, repeated_groups
 from twin.gap.stages.cut import CutStage, cut_runs
