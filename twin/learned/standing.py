@@ -10,6 +10,7 @@ from twin.errors import EffectError
 from twin.learned.arguments import motion_arguments
 from twin.learned.section import LearnedSection
 from twin.learned.sites import AXIS_SITES, MACHINE_QUANTITIES, MACHINE_READINGS, QUANTITIES, READINGS, check_place
+from twin.learned.summed import Place, place_of
 from twin.learned.term import Term
 from twin.learned.words import OF_AXIS, LearnedSite
 
@@ -92,18 +93,17 @@ def settled(
 
 def check_terms(sections: Sequence[LearnedSection], axes: Iterable[str]) -> None:
     """Raises EffectError where a learned term of a machine is put on what there is not, or is there twice."""
-    seen: set[tuple[LearnedSite, str, frozenset[str]]] = set()
+    seen: set[Place] = set()
     letters = tuple(axes)
     for section in sections:
         check_place(section.site, section.on, letters)
         if section.site is LearnedSite.PROGRAM_TIME and not section.is_recording and section.arguments != (SINCE,):
             raise EffectError(f"the learned term at {section} is over {', '.join(section.arguments)}; it has to be over {SINCE}")
-        own = (section.site, section.on, frozenset(section.arguments))
-        if own in seen:
+        if not section.is_recording and place_of(section) in seen:
             raise EffectError(
                 f"the learned term at {section} over {', '.join(section.arguments)} is there twice; add the tables up"
             )
-        seen.add(own)
+        seen.add(place_of(section))
 
 
 def seconds_of(sections: Sequence[LearnedSection], planned_s: float) -> float:
