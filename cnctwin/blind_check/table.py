@@ -12,8 +12,11 @@ ROWS = (
     ("single effect: named right", "single_right", "≥ 95 %"),
     ("single effect: in the reported class", "single_in_class", "≥ 99 %"),
     ("single effect: a wrong name", "single_wrong", "≤ 2 %"),
-    ("outside the catalogue: called unknown", "outside_unknown", "≥ 90 %"),
-    ("outside the catalogue: wrongly named", "outside_wrong", "≤ 5 %"),
+    ("outside the catalogue: called so", "outside_unknown", ""),
+    ("outside the catalogue: taken up by constants, said so", "outside_taken_up", ""),
+    ("outside the catalogue: either of the two", "outside_told", "≥ 95 %"),
+    ("outside the catalogue: missed", "outside_missed", "≤ 2 %"),
+    ("outside the catalogue: wrongly named", "outside_wrong", "≤ 2 %"),
     ("pair: both right", "pair_both", "≥ 90 %"),
     ("pair: at least one right", "pair_some", ""),
     ("pair: a wrong name", "pair_wrong", ""),
@@ -26,7 +29,8 @@ CURVE = (
     ("single: right", "single_right"),
     ("single: in class", "single_in_class"),
     ("single: wrong", "single_wrong"),
-    ("outside: unknown", "outside_unknown"),
+    ("outside: called so", "outside_unknown"),
+    ("outside: missed", "outside_missed"),
     ("outside: named", "outside_wrong"),
     ("pair: both", "pair_both"),
 )
@@ -110,8 +114,8 @@ def _rate(rate: Rate) -> dict[str, Any]:
 def missed(result: CheckResult) -> tuple[str, ...]:
     """The targets that this check shows to be missed: a whole 95 % interval on the wrong side."""
     found = result.scored
-    least = {"single_right": 0.95, "single_in_class": 0.99, "outside_unknown": 0.90, "pair_both": 0.90, "triple_all": 0.80}
-    most = {"single_wrong": 0.02, "outside_wrong": 0.05}
+    least = {"single_right": 0.95, "single_in_class": 0.99, "outside_told": 0.95, "pair_both": 0.90, "triple_all": 0.80}
+    most = {"single_wrong": 0.02, "outside_wrong": 0.02, "outside_missed": 0.02}
     said = [name for name, target in least.items() if (r := getattr(found.judged, name)).count and r.high < target]
     said += [name for name, target in most.items() if (r := getattr(found.judged, name)).count and r.low > target]
     site, variables = found.learned.site, found.learned.variables
@@ -143,7 +147,7 @@ def target_rows(found: Scored) -> list[tuple[str, str, str]]:
 
 def controller_rows(found: Scored) -> list[tuple[str, str, str]]:
     """Return what is scored, of machines with the controller that they state, and of those with another one."""
-    names = ("single_right", "single_wrong", "outside_unknown", "outside_wrong", "pair_both", "pair_wrong", "triple_all")
+    names = ("single_right", "single_wrong", "outside_told", "outside_wrong", "pair_both", "pair_wrong", "triple_all")
     titles = {name: title for title, name, _ in ROWS}
     rows = [(titles[name], str(getattr(found.nominal, name)), str(getattr(found.other_controller, name))) for name in names]
     return [*rows, ("another controller is named, or called not understood", "", str(found.controller_told))]

@@ -50,22 +50,27 @@ def reference_deg(strokes: tuple[tuple[float, float], ...]) -> Floats:
     return np.cumsum(np.where(np.abs(speed) < 1e-9, 0.0, speed)) * 0.001
 
 
-def recorded(machine: MachineFile, strokes: tuple[tuple[float, float], ...], seed: int) -> dict[str, Floats]:
-    """The columns that the machine records over these strokes, in degrees."""
+def recorded(machine: MachineFile, strokes: tuple[tuple[float, float], ...], seed: int, name: str = "b") -> dict[str, Floats]:
+    """The columns that the machine records over these strokes, in degrees, of an axis of this name."""
     reference = reference_deg(strokes)
     t_s = np.arange(len(reference)) * 0.001
     answered = respond(machine, RunInput(t_s, {"b": reference}), seed=seed).columns
     return {
         "t_s": t_s,
-        "b_ref_deg": reference,
-        "b_pos_deg": answered["b_pos_mm"],
-        "b_table_deg": answered["b_table_mm"],
-        "b_torque_a": answered["b_torque_a"],
+        f"{name}_ref_deg": reference,
+        f"{name}_pos_deg": answered["b_pos_mm"],
+        f"{name}_table_deg": answered["b_table_mm"],
+        f"{name}_torque_a": answered["b_torque_a"],
     }
 
 
-def rotary_case(effects: str = "", stated: str = STATED) -> Case:
-    """The table with these effects, and 2 % more inertia than stated, recorded three times."""
+def rotary_case(effects: str = "", stated: str = STATED, name: str = "b", every: int = 1) -> Case:
+    """The table with these effects, and 2 % more inertia than stated, recorded three times.
+
+    name: what its axis is called in the recordings and as stated; every: ticks from sample to sample
+    """
     real = machine_from_toml(STATED.replace("inertia_kg_m2 = 2.5", "inertia_kg_m2 = 2.55") + effects)
     runs = (("fit", LEARN), ("fit again", LEARN), ("check", JUDGE))
-    return case_of(machine_from_toml(stated), {name: recorded(real, s, seed) for seed, (name, s) in enumerate(runs)})
+    columns = {run: recorded(real, strokes, seed, name) for seed, (run, strokes) in enumerate(runs)}
+    columns = {run: {column: values[::every] for column, values in own.items()} for run, own in columns.items()}
+    return case_of(machine_from_toml(stated.replace("axes.b", f"axes.{name}")), columns)

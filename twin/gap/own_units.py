@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any
 
-from twin.gap.answer import figure_of
 from twin.gap.diagnosis import Cause, Cell, Diagnosed, Interval, Learned, MovedConstant, Pattern, SignalGap
+from twin.gap.naming.sentence import figure_of
 from twin.machine import MachineFile
 from twin.rotary import outside_name, outside_names, outside_path, outside_text, outside_unit
 from twin.rotary_tables import is_on, term_outside

@@ -58,6 +58,13 @@ def test_a_healthy_rotary_axis_is_healthy() -> None:
     assert diagnose(rotary_case()).diagnosis.verdict is Verdict.HEALTHY
 
 
+def test_the_joint_of_a_robot_is_an_axis_though_no_program_has_a_word_for_it() -> None:
+    answer = diagnose(rotary_case(LOAD, name="j1", every=4)).diagnosis
+    assert [(cause.effect, cause.on) for cause in answer.causes] == [("gravity", "j1")]
+    found = answer.causes[0].parameters["torque_nm"]
+    assert found.low < 6.0 < found.high
+
+
 def test_an_axis_of_another_kind_than_stated_is_not_compared() -> None:
     linear = STATED.replace("inertia_kg_m2", "mass_kg").replace("torque_per_command_nm", "force_per_command_n")
     linear = linear.replace("_per_deg", "_per_mm").replace("_nm_s_", "_n_s_").replace("_nm =", "_n =").replace("_deg_s", "_mm_s")

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from twin.effects.catalogue import effect_named
 from twin.effects.effect import On, called
-from twin.errors import TwinError
+from twin.errors import MachineError, TwinError
 from twin.gap.diagnosis import Effected
 from twin.gap.experiment.envelope import Envelope
 from twin.gap.experiment.menu import Shows, Snippet
@@ -71,7 +71,12 @@ class Trial:
 
 
 def trial_of(snippet: Snippet, machine: MachineFile, envelope: Envelope) -> Trial:
-    """The program planned on the machine's control, or on a middling one where none is stated."""
+    """The program planned on the machine's control, or on a middling one where none is stated.
+
+    Raises MachineError where it moves an axis that programs have no word for, as the joint of a robot.
+    """
+    if unknown := [letter for letter in snippet.letters if letter not in machine.words]:
+        raise MachineError(f"no program moves {', '.join(unknown)}; it has words for {', '.join(machine.words)}")
     moves = interpret(snippet.program(), Settings(axes=machine.words))
     planned = plan(path_from_moves(moves, axes=machine.words), machine.program or IDEAL_TIMES)
     heat = snippet.shows is Shows.HEAT
