@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.depth import examples
-from tests.twin.learned.test_learned_axis import columns, learned, same
+from tests.twin.learned.small_axis import columns, learned, same
 from twin.learned.section import LearnedSection
 from twin.learned.summed import summed
 
