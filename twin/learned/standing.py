@@ -72,15 +72,18 @@ def reading_series(terms: Sequence[Term], signal: str, arguments: Arguments) -> 
 
 
 def settled(
-    terms: Sequence[Term], answer: Callable[[dict[str, Floats]], Answer], arguments: Callable[[Answer], Arguments]
+    terms: Sequence[Term],
+    answer: Callable[[dict[str, Floats]], Answer],
+    arguments: Callable[[Answer], Arguments],
+    passes_max: int = PASSES_MAX,
 ) -> Answer:
     """Return the answer of a part of the machine with the terms in it.
 
     The first pass is without them. Its answer tells what they depend on, and so what they add in the next one; passes go on until
-    that changes no more.
+    that changes no more, or there have been `passes_max` with terms.
     """
     found, before = answer({}), dict[str, Floats]()
-    for _ in range(PASSES_MAX if terms else 0):
+    for _ in range(passes_max if terms else 0):
         added = added_series(terms, arguments(found))
         if all(
             np.abs(series - before.get(name, 0.0)).max(initial=0.0) <= SETTLED * np.abs(series).max(initial=0.0)

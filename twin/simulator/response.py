@@ -192,7 +192,9 @@ class _Chain:
                 return np.asarray(found[0])
 
             terms = terms_at(machine.learned, {LearnedSite.SPINDLE_POWER})
-            self.columns["spindle_load_pct"] = settled(terms, load, lambda shown: self.arguments(None) | {"load_pct": shown})
+            self.columns["spindle_load_pct"] = settled(
+                terms, load, lambda bare: self.arguments(None) | {"load_pct": bare}, passes_max=1
+            )
         return mean
 
     def axes(self, mean_force: Mapping[str, Floats], seed: int | None, courses: int, temperature_c: Floats | None) -> None:
