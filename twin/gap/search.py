@@ -66,8 +66,7 @@ class Explained:
 
 def explain(stage: Stage, *, null: Null = NULL, progress: Callable[[str], None] = lambda _: None) -> Explained:
     """The effects in a stage."""
-    bare = Model(stage.constants, ())
-    base = settled(stage, fitted(stage, bare, bare.null_theta()))
+    base = bare_fit(stage)
     best, first = base, tuple[Tried, ...]()
     rivals: dict[Effected, tuple[Effected, ...]] = {}
     for number in range(ROUNDS_MAX):
@@ -92,6 +91,12 @@ def explain(stage: Stage, *, null: Null = NULL, progress: Callable[[str], None] 
     several = len(best.effects) > 1
     evidence = {e: advantage(dropped(stage, best, e).left if several else base.left, best.left) for e in best.effects}
     return Explained(stage, base, best, first, {e: r for e, r in rivals.items() if e in best.effects}, evidence)
+
+
+def bare_fit(stage: Stage) -> Fitted:
+    """Return the machine with its constants refitted and no effect."""
+    bare = Model(stage.constants, ())
+    return settled(stage, fitted(stage, bare, bare.null_theta()))
 
 
 def _gap_left(best: Fitted, null: Null) -> bool:

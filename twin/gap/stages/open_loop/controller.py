@@ -86,7 +86,7 @@ class Controller:
         known = np.isfinite(data.measured["pos_mm"]) & np.isfinite(data.measured["torque_a"])
         torque = filled(data.measured["torque_a"])
         sensing = Sensing.of(values, f"{letter}_torque_a")
-        terms = readings_of_terms(model, theta, f"{letter}_torque_a", data)
+        terms = readings_of_terms(model, theta, f"{letter}_torque_a", data, axis.terms)
         whole = np.zeros((len(theta), sum(len(data.t_s[s]) for s in data.stretches())))
         first, carried = 0, dict[str, Floats]()
         for stretch in data.stretches():

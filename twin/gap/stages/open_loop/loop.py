@@ -77,5 +77,5 @@ def added_at(
 ) -> dict[str, Floats]:
     """Return quantity → (lanes, ticks) of the learned terms of a model at these sites, over a stretch."""
     here = {quantity for site in sites for quantity in QUANTITIES.get(site, {})}
-    series = series_of_terms(model, theta, axis.letter, data.arguments, stretch)
+    series = series_of_terms(model, theta, axis.letter, data.arguments, stretch, axis.terms)
     return {quantity: values for quantity, values in series.items() if quantity in here}

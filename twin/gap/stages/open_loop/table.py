@@ -75,5 +75,5 @@ class Table:
             carried = {name: value for name, value in state.items() if name in axis.carried_states}
         signal = f"{axis.letter}_table_mm"
         shown = Sensing.of(values, signal).readings(np.concatenate(parts, axis=1), data.period_s)
-        shown = shown + readings_of_terms(model, theta, signal, data)
+        shown = shown + readings_of_terms(model, theta, signal, data, axis.terms)
         return axis.grown(shown, values, data) - over_stretches(data, position)
