@@ -37,9 +37,15 @@ class Null:
 
         healthy_rms: what a healthy twin leaves in this stage at worst, in floors; where that is much, much has to be taken away
         """
+        return self._exceeded(self.closes.get(effected.effect, self.closes_any), over, healthy_rms)
+
+    def exceeded_by_any(self, over: Advantage, healthy_rms: float = SMOOTH) -> bool:
+        """As `exceeded`, of what is no effect of the catalogue."""
+        return self._exceeded(self.closes_any, over, healthy_rms)
+
+    def _exceeded(self, closes: float, over: Advantage, healthy_rms: float) -> bool:
         rough = max((healthy_rms**2 - 1.0) / (SMOOTH**2 - 1.0), 1.0)
-        least = self.closes.get(effected.effect, self.closes_any) * rough
-        return over.sigmas > self.sigmas and over.closes > least and over.share > self.share_least
+        return over.sigmas > self.sigmas and over.closes > closes * rough and over.share > self.share_least
 
     def p_value(self, over: Advantage) -> float:
         """Of a healthy machine showing so much: one-sided, with the spread that healthy machines have."""

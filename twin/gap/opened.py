@@ -14,8 +14,9 @@ from twin.gap.diagnosis import Effected, Verdict
 from twin.gap.evidence import advantage
 from twin.gap.fitting import Fitted, fitted, settled
 from twin.gap.labels import AXIS
+from twin.gap.naming.certain import dropped
 from twin.gap.null import NULL, Null
-from twin.gap.search import Explained, dropped, explain, without
+from twin.gap.search import Explained, explain, with_certain, without
 from twin.gap.stages.axis import AxisStage
 from twin.gap.stages.open_loop.plan import ON_TOP_OF, open_stages
 from twin.gap.stages.open_loop.stage import OpenStage
@@ -23,6 +24,8 @@ from twin.gap.stages.plan import Ground, SideBySide, unheard_axes
 from twin.gap.stages.stage import Model, Stage
 from twin.gap.verdict import Judged, judged
 
+FAR = 30.0
+"""Gap, in floors, above which a closed loop that is partly explained is not believed either."""
 STEPS_MAX = 5
 TRIFLE = 0.02
 """Part of the gap of an open loop below which an effect is no cause, where the loop is not explained."""
@@ -43,7 +46,9 @@ class Opened:
         if self.closed is None:
             return True
         controller = self.loops.get("controller")
-        return self.closed.verdict not in SETTLED and controller is not None and controller.verdict not in SETTLED
+        if self.closed.verdict in SETTLED or controller is None or controller.verdict in SETTLED:
+            return False
+        return self.closed.verdict is Verdict.UNKNOWN or self.closed.explained.best.left.gap() > FAR
 
     @property
     def judged(self) -> tuple[Judged, ...]:
@@ -187,7 +192,9 @@ def _confirmed(of_axis: Judged, opened: Opened, null: Null) -> Judged:
     evidence = {e: advantage(_without(stage, best, e, base).left, best.left) for e in best.effects}
     if not all(null.exceeded(effected, over, stage.healthy_rms) for effected, over in evidence.items()):
         return of_axis
-    again = judged(Explained(stage, base, best, of_axis.explained.tried, rivals, evidence))
+    best, alike = with_certain(stage, base, best, null)
+    evidence = {e: over for e, over in evidence.items() if e in best.effects}
+    again = judged(Explained(stage, base, best, of_axis.explained.tried, rivals, evidence, alike=alike))
     return of_axis if again.verdict is Verdict.UNKNOWN else again
 
 

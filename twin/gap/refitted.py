@@ -64,11 +64,16 @@ def constant_deviations(machine: MachineFile, stage: Stage, found: Fitted) -> di
     variances = np.diag(found.covariance)
     told = {}
     for free, variance, known in zip(found.model.constants, variances, found.known, strict=False):
-        path = axis_constant_path(machine, stage.letter, free.name) if isinstance(stage, AxisStage | OpenStage) else free.name
+        path = constant_path(machine, stage, free.name)
         deviation = _shown(float(np.sqrt(max(variance, 0.0))))  # θ is the logarithm of a factor
         if known >= KNOWN_MIN and 0.0 < deviation < np.inf:
             told[path] = deviation
     return told
+
+
+def constant_path(machine: MachineFile, stage: Stage, name: str) -> str:
+    """Return the path in machine.toml of a free constant of a stage."""
+    return axis_constant_path(machine, stage.letter, name) if isinstance(stage, AxisStage | OpenStage) else name
 
 
 def cause_deviations(cause: Cause) -> dict[str, float]:

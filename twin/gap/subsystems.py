@@ -7,9 +7,11 @@ import numpy as np
 from twin.gap.diagnosis import Subsystem, Verdict
 from twin.gap.fitting import Left
 from twin.gap.opened import Opened
+from twin.gap.search import CHANCE_BLOCKS
 from twin.gap.stages.axis import AxisStage
 from twin.gap.stages.open_loop.stage import OpenStage
-from twin.gap.verdict import CHANCE_BLOCKS, Judged
+from twin.gap.stages.turns import TO_TOOTH
+from twin.gap.verdict import Judged
 
 DRIVEN_BY = {
     "force_x_n": ("cut", ("spindle_angle_rad", "axial_depth_mm", "entry_angle_rad", "exit_angle_rad")),
@@ -44,8 +46,9 @@ def _of_signals(stage: Judged) -> list[Subsystem]:
     base, best = stage.explained.base.left, stage.explained.best.left
     by_name: dict[str, list[str]] = {}
     for signal in base.signals:
-        if signal in DRIVEN_BY:
-            by_name.setdefault(DRIVEN_BY[signal][0], []).append(signal)
+        recorded = signal.removesuffix(TO_TOOTH)
+        if recorded in DRIVEN_BY:
+            by_name.setdefault(DRIVEN_BY[recorded][0], []).append(signal)
     found = []
     for name, signals in by_name.items():
         before, after = (_rms_of(left, signals) for left in (base, best))

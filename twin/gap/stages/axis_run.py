@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from twin.case import Run
 from twin.gap.floors import Floors
 from twin.gap.labels import regime_labels
+from twin.gap.sampling.servo_ticks import DOUBT
 from twin.gap.stages.smoothed import filled, low_passed
 from twin.learned.arguments import around, motion_arguments, other_axes
 from twin.regimes import axis_regimes, motion_stretches
@@ -30,6 +31,7 @@ class AxisRunData:
     regime: number of the regime (`twin.gap.labels`); rise_k: of the spindle's temperature since the start
     others: letter → reference of the other axes; around: what a learned term may depend on of the machine as a whole
     told: whether the reference was recorded, else the measured position is it
+    doubt: (n,) where the reference is not known well enough between samples, or None
     """
 
     name: str
@@ -45,6 +47,7 @@ class AxisRunData:
     others: Mapping[str, Floats] = field(default_factory=dict)
     around: Mapping[str, Floats] = field(default_factory=dict)
     told: bool = True
+    doubt: NDArray[np.bool_] | None = None
 
     @cached_property
     def arguments(self) -> Mapping[str, Floats]:
@@ -54,6 +57,10 @@ class AxisRunData:
         torque = np.nan_to_num(self.measured.get("torque_a", np.zeros(len(self.t_s))))
         motion = motion_arguments(self.t_s, self.reference_mm) | {"position_mm": position, "torque_a": torque, "t_s": self.t_s}
         return dict(self.around) | motion | other_axes(self.t_s, self.others)
+
+    def of_loops(self, values: Floats) -> Floats:
+        """Return values, (n,), with NaN where the loops saw a reference that is not known well enough."""
+        return values if self.doubt is None else np.where(self.doubt, np.nan, values)
 
     @property
     def period_s(self) -> float:
@@ -93,7 +100,13 @@ def axis_run_data(
         others,
         around(log.t_s, log.columns),
         told,
+        _doubt(group, letter),
     )
+
+
+def _doubt(group: Sequence[Run], letter: str) -> NDArray[np.bool_] | None:
+    known = [run.log.columns[f"{letter}_{DOUBT}"] > 0.0 for run in group if f"{letter}_{DOUBT}" in run.log.columns]
+    return np.any(known, axis=0) if known else None
 
 
 def _moved_mm(group: Sequence[Run], letter: str) -> Floats | None:

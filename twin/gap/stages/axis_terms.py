@@ -10,8 +10,34 @@ from twin.gap.stages.stage import Model
 from twin.learned.sites import QUANTITIES, READINGS
 from twin.learned.standing import added_series, reading_series
 from twin.learned.term import Term
+from twin.learned.words import LearnedSite
+from twin.machine import Axis
+from twin.servo.constants import axis_constants
 
 Floats = NDArray[np.float64]
+FRICTION_PART = 0.1
+FLOORS = 3.0
+SITES = {
+    "pos_mm": (LearnedSite.AXIS_FORCE, LearnedSite.FRICTION, LearnedSite.CONTROLLER),
+    "torque_a": (LearnedSite.AXIS_FORCE, LearnedSite.FRICTION, LearnedSite.CONTROLLER, LearnedSite.TORQUE_READING),
+    "table_mm": (LearnedSite.TABLE_POSITION, LearnedSite.TABLE_READING),
+}
+"""Output → the sites whose terms it shows."""
+
+
+def sites_of_terms(letter: str, outputs: Sequence[str]) -> dict[LearnedSite, tuple[str, ...]]:
+    """Return the sites of an axis whose terms these outputs show, each with what it is on."""
+    return {site: (letter,) for output in outputs for site in SITES[output]}
+
+
+def size_of_terms(site: LearnedSite, axis: Axis, data: AxisRunData) -> float:
+    """Return the size of a small term: a part of the friction, or a few floors of what is read."""
+    output = READINGS.get(site, "table_mm" if site is LearnedSite.TABLE_POSITION else "")
+    if output in data.floor:
+        return FLOORS * float(np.median(data.floor[output]))
+    constants = axis_constants(axis)
+    friction_n = FRICTION_PART * constants["coulomb_plus_n"]
+    return friction_n / constants["newton_per_command"] if site is LearnedSite.CONTROLLER else friction_n
 
 
 def series_of_terms(
@@ -28,6 +54,9 @@ def series_of_terms(
             series = term.series(theta[:, place], {c: arguments[c][where] for c in term.knots.columns})
             for quantity, sign in QUANTITIES[term.site].items():
                 added[quantity] = added.get(quantity, 0.0) + sign * series
+    if added:  # all of them, so that any terms together run on one kernel
+        none = np.zeros_like(next(iter(added.values())))
+        added = {quantity: added.get(quantity, none) for own in QUANTITIES.values() for quantity in own}
     return added
 
 
@@ -47,3 +76,23 @@ def readings_of_terms(
             where = np.concatenate([np.arange(len(data.t_s))[s] for s in data.stretches()])
             total = total + term.series(theta[:, place], {c: data.arguments[c][where] for c in term.knots.columns})
     return total
+
+
+def start_of_terms(
+    model: Model, theta: Floats, letter: str, arguments: Mapping[str, Floats], tick: int, standing: Sequence[Term] = ()
+) -> dict[str, Floats]:
+    """Return what the terms on an axis add at one tick, by quantity of its kernel and by column that is read, (lanes,) each."""
+    if not standing and not model.terms:
+        return {}
+    here = {column: values[tick : tick + 1] for column, values in arguments.items()}
+    found = {name: values[:, 0] for name, values in series_of_terms(model, theta, letter, here, slice(0, 1), standing).items()}
+    for column in READINGS.values():
+        known = reading_series(standing, f"{letter}_{column}", here)
+        own = [
+            term.series(theta[:, place], here)[:, 0]
+            for term, place in model.term_places()
+            if READINGS.get(term.site) == column and term.on in (letter, f"{letter}_{column}")
+        ]
+        if known is not None or own:
+            found[column] = sum(own, np.full(len(theta), 0.0 if known is None else known[0]))
+    return found

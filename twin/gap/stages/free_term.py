@@ -3,7 +3,7 @@
     value = size · L z,   z ~ N(0, SIGMA²),   L Lᵀ = exp(−½ (Δ / length)²) over the knots of each argument
 
 so that the prior of each z is alike and the term is smooth (a Gaussian process on the knots: Rasmussen and Williams 2006,
-section 2.2).
+section 2.2). A constant and a straight line are in it as well (section 2.7 there), so that it goes on where nothing was recorded.
 """
 
 from collections.abc import Mapping
@@ -54,7 +54,7 @@ class FreeTerm:
             if column in PERIODS:
                 apart = np.minimum(apart, PERIODS[column] - apart)
             length = self.lengths.get(column, 0.0)
-            alike = np.exp(-0.5 * (apart / length) ** 2) if length > 0.0 else np.eye(len(knots))
+            alike = np.exp(-0.5 * (apart / length) ** 2) + _trend(column, knots) if length > 0.0 else np.eye(len(knots))
             parts.append(np.linalg.cholesky(alike + JITTER * np.eye(len(knots))))
         return np.asarray(self.size * reduce(np.kron, parts))
 
@@ -67,3 +67,11 @@ class FreeTerm:
         value = self.root @ z
         half = Z90 * np.sqrt(np.maximum(np.diag(self.root @ covariance @ self.root.T), 0.0))
         return Term(self.site, self.on, self.knots, value, value - half, value + half)
+
+
+def _trend(column: str, knots: Floats) -> Floats:
+    """Covariance of a constant and a straight line over the knots of an argument that does not come round again."""
+    if column in PERIODS or len(knots) < 2:
+        return np.zeros((len(knots), len(knots)))
+    along = 2.0 * (knots - knots[0]) / (knots[-1] - knots[0]) - 1.0
+    return np.asarray(1.0 + np.outer(along, along))

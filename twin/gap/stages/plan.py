@@ -11,6 +11,7 @@ from twin.effects.catalogue import effect_named
 from twin.gap.diagnosis import Effected, Verdict
 from twin.gap.dynamometer.turn_run import TurnRun
 from twin.gap.floors import Floors, repeatability
+from twin.gap.naming.specific import only_specific
 from twin.gap.null import NULL, Null
 from twin.gap.search import Explained, bare_fit, explain
 from twin.gap.stages.axis import AxisStage, axis_constants_free, standing_of
@@ -90,7 +91,8 @@ def explained_stages(ground: Ground, progress: Progress, side_by_side: SideBySid
             forces = _pushes(stage, found[0])
     turning = turn_data(ground.runs)
     if any(run.fitted for run in turning):
-        found.append(explain(TurnStage(ground.machine, turning, ground.left_out), null=null, progress=progress))
+        turns = TurnStage(ground.machine, turning, ground.left_out)
+        found.append(only_specific(turns, explain(turns, null=null, progress=progress, doubtful=True)))
     stages: list[Stage] = [s for letter in ground.machine.axes if (s := axis_stage(ground, letter, forces)) is not None]
     warmups = heat_runs(ground.machine, tuple(r for r in ground.runs if not r.log.axes()))
     if any(run.fitted for run in warmups):

@@ -84,7 +84,7 @@ def _axis(machine: MachineFile, run: Run, floors: Floors, letter: str, push: Flo
     for signal, values in zip(observed.signals, predicted, strict=True):
         column = np.full(len(data.t_s), np.nan)
         column[where] = values
-        columns[signal] = column
+        columns[signal] = data.of_loops(column)
     if f"{letter}_table_mm" in columns and f"{letter}_pos_mm" in columns:
         columns[f"{letter}_table_mm"] += columns[f"{letter}_pos_mm"]
     return columns

@@ -60,7 +60,7 @@ class Controller:
 
     def recorded(self, data: AxisRunData) -> Floats:
         """The torque within the bandwidth, about a line over each stretch."""
-        known = np.isfinite(data.measured["pos_mm"]) & np.isfinite(data.measured["torque_a"])
+        known = np.isfinite(data.of_loops(data.measured["pos_mm"])) & np.isfinite(data.measured["torque_a"])
         smooth = low_passed(filled(data.measured["torque_a"]), data.period_s, BANDWIDTH_HZ)
         smooth = np.where(known, smooth, np.nan)
         return np.concatenate([_about_line(smooth[s][None, :], known[s])[0] for s in data.stretches()])
@@ -83,7 +83,7 @@ class Controller:
         values = model.values(theta)
         position = filled(data.measured["pos_mm"])
         velocity = velocity_of(position, period_s, VELOCITY_OVER * BANDWIDTH_HZ)
-        known = np.isfinite(data.measured["pos_mm"]) & np.isfinite(data.measured["torque_a"])
+        known = np.isfinite(data.of_loops(data.measured["pos_mm"])) & np.isfinite(data.measured["torque_a"])
         torque = filled(data.measured["torque_a"])
         sensing = Sensing.of(values, f"{letter}_torque_a")
         terms = readings_of_terms(model, theta, f"{letter}_torque_a", data, axis.terms)

@@ -75,7 +75,7 @@ def over_stretches(data: AxisRunData, values: Floats) -> Floats:
 def added_at(
     sites: tuple[LearnedSite, ...], model: Model, theta: Floats, axis: AxisStage, data: AxisRunData, stretch: slice
 ) -> dict[str, Floats]:
-    """Return quantity → (lanes, ticks) of the learned terms of a model at these sites, over a stretch."""
+    """Return quantity → (lanes, ticks) of the learned terms of machine and model at these sites, over a stretch."""
     here = {quantity for site in sites for quantity in QUANTITIES.get(site, {})}
     series = series_of_terms(model, theta, axis.letter, data.arguments, stretch, axis.terms)
     return {quantity: values for quantity, values in series.items() if quantity in here}
