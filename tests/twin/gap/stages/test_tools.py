@@ -8,12 +8,13 @@ import pytest
 from tests.twin.gap.dynamometer.dynamometer_case import dynamometer_case
 from tests.twin.gap.dynamometer.milled import Cutter
 from twin.case import RunAtHand
+from twin.effects.added import check_effects
 from twin.errors import EffectError
 from twin.gap.diagnose import diagnose
 from twin.machine import AddedEffect, MachineFile
 from twin.runlog import run_log
 from twin.simulator.recorded import tool_of
-from twin.simulator.response import RunInput, check_effects, respond
+from twin.simulator.response import RunInput, respond
 
 SHARP, WORN = Cutter(), Cutter(edge_n_per_mm=15.0, edge_radial_n_per_mm=20.0)
 EDGE = {"tangential_n_per_mm": 15.0, "radial_n_per_mm": 20.0}
