@@ -18,10 +18,10 @@ from twin.gap.learned.wording import sentence
 from twin.gap.null import NULL, Null
 from twin.gap.refitted import with_constants
 from twin.gap.score import Squares
-from twin.gap.search import Explained
+from twin.gap.search import CHANCE_BLOCKS, Explained
 from twin.gap.stages.free_term import FreeTerm
 from twin.gap.stages.stage import Stage
-from twin.gap.verdict import CHANCE_BLOCKS, Judged
+from twin.gap.verdict import Judged
 from twin.gap.wording import percent
 from twin.learned.section import LearnedSection, Likeness
 from twin.learned.sites import unit_at
