@@ -10,10 +10,9 @@ from scipy.special import erfc
 from twin.case import Case
 from twin.effects.catalogue import catalogue, effect_named
 from twin.effects.effect import Effect, On
-from twin.gap.diagnosis import Candidate, Cause, Effected, GapNumbers, Interval, MovedConstant, NotObservable, Verdict
+from twin.gap.diagnosis import Candidate, Cause, Effected, Interval, NotObservable
 from twin.gap.evidence import advantage
 from twin.gap.intervals import parameter_intervals
-from twin.gap.naming.constants import said_of
 from twin.gap.null import Null
 from twin.gap.refitted import KNOWN_MIN
 from twin.gap.search import Explained, is_nothing
@@ -21,7 +20,6 @@ from twin.gap.stages.axis import AxisStage
 from twin.gap.stages.open_loop.stage import OpenStage
 from twin.gap.stages.stage import Stage
 from twin.gap.verdict import Judged
-from twin.gap.wording import percent
 from twin.runlog import AXIS_COLUMN
 
 
@@ -143,61 +141,3 @@ def not_identifiable_of(stages: Sequence[Judged]) -> tuple[str, ...]:
                 where = stage.explained.stage.name
                 said.append(f"{where}: {free.name}: these runs do not tell it; the stated value and its uncertainty stand")
     return tuple(said)
-
-
-def sentence_of(
-    verdict: Verdict, stages: Sequence[Judged], causes: Sequence[Cause], gap: GapNumbers, constants: Sequence[MovedConstant]
-) -> str:
-    """The verdict, as one would say it."""
-    moved = said_of(constants)
-    if verdict is Verdict.HEALTHY:
-        leaves = f"{gap.before:.2g} × what repeated runs differ by"
-        if moved:
-            return f"Healthy, with {moved}: the twin is then {leaves}."
-        return f"Healthy: with its constants refitted, the twin is {leaves}."
-    if verdict is Verdict.EXPLAINED and not causes:
-        return f"Explained by constants that are further off than stated: {moved}; no effect of the catalogue does so better."
-    unknown = [s for s in stages if s.verdict is Verdict.UNKNOWN]
-    if not causes:
-        where = ", ".join(s.explained.stage.name for s in unknown)
-        looks = [str(e) for s in unknown for e in s.likeness]
-        partly = f"; it partly looks like {', '.join(looks)}, which does not explain it" if looks else ""
-        return f"Unknown: a gap of {gap.before:.3g} × the floor in {where} that no effect of the catalogue explains{partly}."
-    parts = [f"{percent(c.closure)} {'' if i else 'of the gap comes '}from {_said(c)}" for i, c in enumerate(causes)]
-    left = max(0.0, 1.0 - gap.closure)
-    rest = "" if verdict is Verdict.EXPLAINED else f"; {percent(left)} remains, cause unknown"
-    if verdict is Verdict.PARTLY and unknown:
-        rest += f" ({', '.join(s.explained.stage.name for s in unknown)})"
-    head = "Explained" if verdict is Verdict.EXPLAINED else "Partly explained"
-    return f"{head}: {'; '.join(parts)}{rest}."
-
-
-def _said(cause: Cause) -> str:
-    parameters = effect_named(cause.effect).parameters
-    told = max((p for p in parameters if p.null is not None), key=lambda p: _clearness(cause.parameters[p.name], p.null))
-    figure = figure_of(cause.parameters[told.name])
-    size = figure if len(parameters) == 1 else f"{told.name} {figure}"
-    rivals = ", ".join(_in_words(e.effect, e.on if e.on != cause.on else "") for e in cause.indistinguishable_from)
-    return f"{_in_words(cause.effect, cause.on)} ({size}{f'; or {rivals}' if rivals else ''})"
-
-
-def _clearness(interval: Interval, null: float | None) -> float:
-    """Return the half-widths of its interval by which a figure is away from nothing."""
-    if null is None or not np.isfinite(null):
-        return np.inf
-    return abs(interval.value - null) / max((interval.high - interval.low) / 2.0, 1e-12)
-
-
-def _in_words(effect: str, on: str) -> str:
-    """
-    >>> _in_words("direction_friction", "x"), _in_words("sensor_bias", "z_torque_a")
-    ('direction friction on X', 'sensor bias on z_torque_a')
-    """
-    where = on.upper() if len(on) == 1 else on
-    return f"{effect.replace('_', ' ')}{f' on {where}' if on else ''}"
-
-
-def figure_of(interval: Interval) -> str:
-    """A figure with the half of its interval, as sentences have it."""
-    half = (interval.high - interval.low) / 2.0
-    return f"{interval.value:.3g} ± {half:.1g} {interval.unit}".strip()

@@ -12,13 +12,15 @@ from numpy.typing import NDArray
 
 from twin.case import Case, Run, RunKind
 from twin.errors import CaseError
-from twin.gap.answer import candidates_of, causes_of, found_effects, not_identifiable_of, not_observable_of, sentence_of
+from twin.gap.answer import candidates_of, causes_of, found_effects, not_identifiable_of, not_observable_of
 from twin.gap.diagnosis import Diagnosed, Diagnosis, Effected, GapNumbers, SignalGap, closure_of
 from twin.gap.experiment.what_next import what_next
 from twin.gap.inspection import inspected, slow_effects
 from twin.gap.intervals import closure_interval
 from twin.gap.joined import joined
+from twin.gap.learned.answer import described_stages, learned_of, with_learned
 from twin.gap.naming.constants import moved_constants
+from twin.gap.naming.sentence import sentence_of
 from twin.gap.null import NULL, Null
 from twin.gap.opened import combined
 from twin.gap.own_units import in_own_units
@@ -99,11 +101,11 @@ def _motion(
     shares = shapley(causes, lambda some: _closed(ground, stages, twins, some))
     traces = traces_of(twins.runs, twins.shown["before"], twins.shown["after"], ground.floors)
     numbers, verdict, named = _numbers(twins), overall(stages), causes_of(stages, shares)
-    constants = moved_constants(ground.machine, [stage.explained for stage in stages])
+    learned = described_stages(stages, progress, null)
     progress("what next")
     diagnosis = Diagnosis(
         verdict=verdict,
-        sentence=sentence_of(verdict, stages, named, numbers, constants),
+        sentence="",
         where=where(traces),
         where_after=(left := where(traces, after=True)),
         patterns=patterns(traces, {run.name: run.log for run in twins.runs}, ground.machine),
@@ -116,12 +118,14 @@ def _motion(
         subsystems=subsystems_of(stages, both.opened),
         notes=notes + both.notes + ground.floors.notes + _flattering(checked, twins.runs),
         seconds=0.0,
-        constants=constants,
+        constants=moved_constants(ground.machine, [stage.explained for stage in stages]),
+        learned=learned_of(learned),
     )
+    diagnosis = replace(diagnosis, sentence=sentence_of(diagnosis, stages))
     known: dict[str, float] = {}
     for stage in stages:
         known |= constant_deviations(twins.after, stage.explained.stage, stage.explained.best)
-    return Diagnosed(diagnosis, with_uncertainty(twins.after, known, named), traces)
+    return Diagnosed(diagnosis, with_learned(with_uncertainty(twins.after, known, named), learned), traces)
 
 
 def _flattering(case: Case, runs: tuple[Run, ...]) -> tuple[str, ...]:

@@ -38,7 +38,7 @@ def test_constants_that_have_to_be_far_off_are_a_finding_and_no_effect() -> None
     assert found.verdict is Verdict.EXPLAINED
     assert found.causes == ()
     assert found.gap.before < 1.3
-    assert "constants" in found.sentence
+    assert "further than its uncertainty allows" in found.sentence
     assert max(c.deviations for c in found.constants) > 2.0
 
 
