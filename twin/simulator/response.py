@@ -264,6 +264,7 @@ class _Chain:
             "coolant_on": told.coolant_on,
             "spindle_load_pct": load,
             "spindle_temp_c": temperature_c,
+            "ambient_temp_c": told.ambient_temp_c,
         }
         return around(told.t_s, columns) | other_axes(told.t_s, told.reference_mm)
 
