@@ -25,6 +25,7 @@ from twin.gap.verdict import Judged
 from twin.gap.wording import percent
 from twin.learned.section import LearnedSection, Likeness
 from twin.learned.sites import unit_at
+from twin.learned.summed import summed
 from twin.learned.term import Term
 from twin.machine import MachineFile
 
@@ -71,7 +72,7 @@ def with_learned(machine: MachineFile, described: Sequence[Described]) -> Machin
     for one in described:
         machine = with_constants(machine, one.stage, one.found)
         sections += [_section(term) for term in one.learned]
-    return machine.model_copy(update={"learned": (*machine.learned, *sections)})
+    return machine.model_copy(update={"learned": summed((*machine.learned, *sections))})
 
 
 def _described(explained: Explained, likeness: Sequence[Effected], null: Null) -> Described | None:

@@ -236,16 +236,14 @@ class CutStage:
         }
         effects = acting(spindle_quantities())
         constants |= model.effect_constants(theta, effects, self.standing)
-        known = added_series(self.terms, self._arguments(data)) if self.terms else {}
-        added = with_quantity_terms(known, model, theta, lambda: self._told(data))
-        return spindle_load_pct(
-            constants,
-            power_w,
-            data.log["spindle_rpm"],
-            period_s=period_s,
-            effects=tuple(e.name for e in effects),
-            added_kw=added.get("electrical_power_kw"),
-        )
+        named = tuple(e.name for e in effects)
+
+        def load(added_kw: Floats | None) -> Floats:
+            rpm = data.log["spindle_rpm"]
+            return spindle_load_pct(constants, power_w, rpm, period_s=period_s, effects=named, added_kw=added_kw)
+
+        known = added_series(self.terms, self._arguments(data) | {"load_pct": load(None)[0]}) if self.terms else {}
+        return load(with_quantity_terms(known, model, theta, lambda: self._told(data)).get("electrical_power_kw"))
 
 
 def cut_runs(machine: MachineFile, runs: tuple[Run, ...]) -> tuple[CutRun, ...]:
