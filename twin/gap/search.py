@@ -82,8 +82,7 @@ def explain(
     stage: Stage, *, null: Null = NULL, progress: Callable[[str], None] = lambda _: None, doubtful: bool = False
 ) -> Explained:
     """The effects in a stage. doubtful: with those that are not certain beside what is left"""
-    bare = Model(stage.constants, ())
-    base = settled(stage, fitted(stage, bare, bare.null_theta()))
+    base = bare_fit(stage)
     best, first = base, tuple[Tried, ...]()
     rivals: dict[Effected, tuple[Effected, ...]] = {}
     for number in range(ROUNDS_MAX):
@@ -138,6 +137,12 @@ def leaves_a_gap(stage: Stage, found: Fitted) -> bool:
     unseen = found.left.rms_but_worst(CHANCE_BLOCKS) > stage.healthy_rms
     seen = found.left_fit.rms_but_worst(CHANCE_BLOCKS) > FITTED_WORST * stage.healthy_rms
     return bool(unseen.any() or (not found.effects and seen.any()))
+
+
+def bare_fit(stage: Stage) -> Fitted:
+    """Return the machine with its constants refitted and no effect."""
+    bare = Model(stage.constants, ())
+    return settled(stage, fitted(stage, bare, bare.null_theta()))
 
 
 def _gap_left(best: Fitted, null: Null) -> bool:

@@ -180,8 +180,8 @@ def diagnosis() -> dict[str, Any]:
         "notes": [],
         "seconds": 21.0,
         "subsystems": [
-            part("z mechanics", "z_torque_a", 57.2, 1.02, "explained", "gravity"),
-            part("z controller", "z_torque_a", 0.6),
+            part("z mechanics", 57.2, 1.02, "explained", "gravity"),
+            part("z controller", 0.6, 0.6, "healthy"),
         ],
         "constants": [{"name": "axes.y.mass_kg", "stated": 320.0, "found": 339.0, "deviations": 2.1, "closure": 0.4}],
         "learned": [

@@ -6,13 +6,15 @@ whatever else is left. An effect is dropped, and the others fitted again without
 
     (m₀ − m₁) / (m₀ − 1) ≥ SHARE_MIN   and   m₀ − m₁ ≥ CLOSES_MIN,
 
-m₀ and m₁ being the mean squares, in floors², that are left on unseen runs without it and with it.
+m₀ and m₁ being the mean squares, in floors², that are left on unseen runs without it and with it. An effect of a sensor changes
+all that its signal shows, and so fits a little of anything: it is named only where nothing is left.
 """
 
 from dataclasses import replace
 
+from twin.effects.catalogue import effect_named
 from twin.gap.diagnosis import Effected
-from twin.gap.evidence import Advantage, advantage
+from twin.gap.evidence import advantage
 from twin.gap.naming.certain import dropped
 from twin.gap.search import Explained
 from twin.gap.stages.stage import Stage
@@ -24,7 +26,7 @@ CLOSES_MIN = 2.0
 def only_specific(stage: Stage, found: Explained) -> Explained:
     """The same with none but specific effects, and the others among what the remainder looks like."""
     alike: list[Effected] = []
-    while vague := {e: over for e, over in found.evidence.items() if not _is_specific(over)}:
+    while vague := {e: over for e, over in found.evidence.items() if not _is_specific(stage, found, e)}:
         worst = min(vague, key=lambda e: vague[e].gain)
         alike.append(worst)
         best = dropped(stage, found.best, worst)
@@ -34,5 +36,8 @@ def only_specific(stage: Stage, found: Explained) -> Explained:
     return replace(found, alike=tuple(alike))
 
 
-def _is_specific(over: Advantage) -> bool:
-    return over.share >= SHARE_MIN and over.closes >= CLOSES_MIN
+def _is_specific(stage: Stage, found: Explained, effected: Effected) -> bool:
+    over = found.evidence[effected]
+    if over.share < SHARE_MIN or over.closes < CLOSES_MIN:
+        return False
+    return not effect_named(effected.effect).is_of_measurement or bool((found.best.left.rms() <= stage.healthy_rms).all())

@@ -104,7 +104,7 @@ class TurnStage:
     left_out: frozenset[str] = frozenset()
     name: str = "cut"
     averaged: int = 1
-    healthy_rms: float = 1.3
+    healthy_rms: float = 1.5
     observed: tuple[Observed, ...] = field(init=False)
 
     def __post_init__(self) -> None:
