@@ -108,7 +108,7 @@ def explain(
         if len(best.effects) > 1:
             best = _swapped(stage, best, first)
     beyond = not best.effects and has_to_be_beyond(stage, base)
-    if beyond and (instead := instead_of_constants(stage, base, [t.found for t in first if t.found is not None])):
+    if beyond and (instead := instead_of_constants(stage, base)):
         best, beyond = instead[0], False
         rivals[best.effects[0]] = tuple(other.effects[0] for other in instead[1:])
     best, alike = (best, ()) if doubtful else with_certain(stage, base, best, null)
