@@ -18,7 +18,7 @@ from twin.gap.learned.wording import sentence
 from twin.gap.null import NULL, Null
 from twin.gap.refitted import with_constants
 from twin.gap.score import Squares
-from twin.gap.search import CHANCE_BLOCKS, Explained
+from twin.gap.search import Explained, leaves_a_gap
 from twin.gap.stages.free_term import FreeTerm
 from twin.gap.stages.stage import Stage
 from twin.gap.verdict import Judged
@@ -80,7 +80,7 @@ def _described(explained: Explained, likeness: Sequence[Effected], null: Null) -
     stage, parent = explained.stage, explained.best
     learned: list[Learned] = []
     for _ in range(TERMS_MAX):
-        if not _something_left(stage, parent):
+        if learned and not leaves_a_gap(stage, parent):
             break
         shapes = free_form(stage, parent, null=null)
         if not shapes:
@@ -92,10 +92,6 @@ def _described(explained: Explained, likeness: Sequence[Effected], null: Null) -
         learned.append(one)
         parent = best.found
     return Described(stage, parent, tuple(learned)) if learned else None
-
-
-def _something_left(stage: Stage, parent: Fitted) -> bool:
-    return bool((parent.left.rms_but_worst(CHANCE_BLOCKS) > stage.healthy_rms).any())
 
 
 def _learned(explained: Explained, parent: Fitted, best: Shaped, likeness: Sequence[Effected]) -> Learned:

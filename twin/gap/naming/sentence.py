@@ -45,6 +45,9 @@ def _begun(told: Diagnosis, stages: Sequence[Judged]) -> str:
         )
     looks = ", ".join(str(e) for s in stages for e in s.likeness)
     partly = f"; it partly looks like {looks}, which does not explain it" if looks else ""
+    partly += "".join(
+        f"; {s.explained.stage.name} comes to rest with another torque than the twin's" for s in unknown if s.explained.stops
+    )
     return f"Unknown: a gap of {told.gap.before:.3g} × the floor in {where} that no effect of the catalogue explains{partly}"
 
 
