@@ -79,15 +79,23 @@ class Explained:
 
 
 def explain(
-    stage: Stage, *, null: Null = NULL, progress: Callable[[str], None] = lambda _: None, doubtful: bool = False
+    stage: Stage,
+    *,
+    null: Null = NULL,
+    progress: Callable[[str], None] = lambda _: None,
+    doubtful: bool = False,
+    known: Fitted | None = None,
 ) -> Explained:
-    """The effects in a stage. doubtful: with those that are not certain beside what is left"""
+    """The effects in a stage.
+
+    doubtful: with those that are not certain beside what is left; known: with effects that were found in a part of it alone
+    """
     base = bare_fit(stage)
-    best, first = base, tuple[Tried, ...]()
-    rivals: dict[Effected, tuple[Effected, ...]] = {}
+    best, first = base if known is None else _with_known(stage, base, known, null), tuple[Tried, ...]()
+    rivals: dict[Effected, tuple[Effected, ...]] = dict.fromkeys(best.effects, ())
     for number in range(ROUNDS_MAX):
         progress(f"{stage.name}, round {number + 1}")
-        if number and not _gap_left(best, null):
+        if (number or best.effects) and not _gap_left(best, null):
             break
         tried = _tried(stage, best, stage.candidates, null)
         first = first or tried
@@ -137,6 +145,22 @@ def leaves_a_gap(stage: Stage, found: Fitted) -> bool:
     unseen = found.left.rms_but_worst(CHANCE_BLOCKS) > stage.healthy_rms
     seen = found.left_fit.rms_but_worst(CHANCE_BLOCKS) > FITTED_WORST * stage.healthy_rms
     return bool(unseen.any() or (not found.effects and seen.any()))
+
+
+def _with_known(stage: Stage, base: Fitted, known: Fitted, null: Null) -> Fitted:
+    """The machine with the effects of another hypothesis, refitted from there; without those that this stage does not show."""
+    places, model, theta = dict(known.model.places()), base.model, base.theta
+    for effected in known.effects:
+        if effected in stage.candidates:
+            model, theta = model.with_effect(effected), np.concatenate([theta, known.theta[places[effected]]])
+    if not model.effects:
+        return base
+    found = settled(stage, fitted(stage, model, theta), rounds=1)
+    for effected in found.effects:
+        without = dropped(stage, found, effected) if len(found.effects) > 1 else base
+        if not null.exceeded(effected, advantage(without.left, found.left), stage.healthy_rms):
+            found = without
+    return found
 
 
 def bare_fit(stage: Stage) -> Fitted:

@@ -112,8 +112,11 @@ def _explained(stage: Stage, ground: Ground, null: Null, progress: Progress) -> 
         if base.left.gap() > FAR:
             loops = open_stages(stage, ground.runs, ground.repeats, ground.floors)
             controller = next((loop for loop in loops if loop.loop.name == "controller"), None)
-            if controller is not None and judged(explain(controller, null=null, progress=progress)).verdict is Verdict.UNKNOWN:
-                return Explained(stage, base, base, (), {}, {})
+            if controller is not None:
+                alone = explain(controller, null=null, progress=progress)
+                if judged(alone).verdict is Verdict.UNKNOWN:
+                    return Explained(stage, base, base, (), {}, {})
+                return explain(stage, null=null, progress=progress, known=alone.best)
     return explain(stage, null=null, progress=progress)
 
 
