@@ -16,6 +16,8 @@ from twin.errors import MachineError
 from twin.gcode import Settings
 from twin.learned.section import LEARNED, LearnedSection
 from twin.machine_control import ControlSection
+from twin.rotary import outside_name, outside_text
+from twin.rotary_tables import tables_inside
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
@@ -61,7 +63,10 @@ def by_side(value: float | tuple[float, float], side: int) -> float:
 
 
 class Axis(Section):
-    """[axes.a]: feed drive and servo loops. The force of a torque command comes from the screw or is stated as such."""
+    """[axes.a]: feed drive and servo loops. The force of a torque command comes from the screw or is stated as such.
+
+    A rotary axis is stated in degrees and N m, and is here as a point on it is that moves 1 mm for each degree (`twin.rotary`).
+    """
 
     mass_kg: Positive
     screw_lead_mm: Positive | None = None
@@ -72,9 +77,12 @@ class Axis(Section):
     velocity_integral_gain_a_per_mm: NotNegative = 0.0
     torque_limit_a: Positive
     friction: Friction
+    is_rotary: bool = Field(default=False, exclude=True)
 
     @model_validator(mode="after")
     def _force_is_known_once(self) -> Self:
+        if self.is_rotary and self.force_per_command_n is None:
+            raise ValueError("state torque_per_command_nm")
         screw = self.screw_lead_mm is not None and self.torque_constant_nm_per_a is not None
         if (self.force_per_command_n is None) != screw:
             raise ValueError("state either force_per_command_n, or screw_lead_mm with torque_constant_nm_per_a")
@@ -258,6 +266,16 @@ class MachineFile(Section):
         }
 
     @property
+    def rotary(self) -> frozenset[str]:
+        """Letters of the rotary axes."""
+        return frozenset(letter for letter, axis in self.axes.items() if axis.is_rotary)
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """Letters of the axes that a program of the machine can have words for: x, y, z, and its rotary ones among a, b, c."""
+        return ("x", "y", "z", *sorted(self.rotary & {"a", "b", "c"}))
+
+    @property
     def settings(self) -> Settings:
         """The settings with which the control reads a program: [control]."""
         return self.control.settings()
@@ -272,21 +290,37 @@ def machine_from_toml(text: str, source: str = "machine.toml") -> MachineFile:
     try:
         raw = tomllib.loads(text)
         if LEARNED in raw:
-            raise MachineError(
-                f'{source}: {LEARNED} is not known; a learned term is one of [[effects]], with effect = "{LEARNED}"'
-            )
-        return MachineFile.model_validate(raw)
+            raise MachineError(f'{LEARNED} is not known; a learned term is one of [[effects]], with effect = "{LEARNED}"')
+        return MachineFile.model_validate(tables_inside(raw))
     except tomllib.TOMLDecodeError as error:
         raise MachineError(f"{source}: is not TOML: {error}") from None
     except ValidationError as error:
         # a key that is not known comes first: the one that is missing is most likely the same, misspelt
-        first, *rest = sorted(error.errors(include_url=False), key=lambda fault: fault["type"] != "extra_forbidden")
+        first, *rest = sorted(_as_written(raw, error), key=lambda fault: fault["type"] != "extra_forbidden")
         key = ".".join(str(part) for part in _in_file(first["loc"], raw))
         more = f" (and {len(rest)} more)" if rest else ""
         if first["type"] == "extra_forbidden":
             raise MachineError(f"{source}: {key} is not known; docs/machine.md lists what is{more}") from None
         said = first["msg"].removeprefix("Value error, ")
         raise MachineError(f"{source}: {key}: {said}{_shown(first['input'])}{more}") from None
+    except MachineError as error:
+        raise MachineError(f"{source}: {error}") from None
+
+
+def _as_written(tables: dict[str, Any], error: ValidationError) -> list[dict[str, Any]]:
+    """The faults of a file, those of rotary axes with the names and figures that the file has."""
+    written = tables_inside(tables, scaled=False)
+    try:
+        MachineFile.model_validate(written)
+    except ValidationError as unscaled:
+        error = unscaled
+    faults: list[dict[str, Any]] = [dict(fault) for fault in error.errors(include_url=False)]
+    for fault in faults:
+        place = fault["loc"]
+        if len(place) > 1 and place[0] == "axes" and "is_rotary" in written["axes"].get(place[1], ()):
+            fault["loc"] = (*place[:-1], outside_name(str(place[-1]))[0])
+            fault["msg"] = outside_text(fault["msg"], {str(place[1])}, ())
+    return faults
 
 
 def _is_learned(entry: Any) -> bool:

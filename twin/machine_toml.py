@@ -3,6 +3,7 @@
 import tomli_w
 
 from twin.machine import MachineFile
+from twin.rotary_tables import tables_outside
 
 
 def machine_to_toml(machine: MachineFile) -> str:
@@ -17,5 +18,7 @@ def machine_to_toml(machine: MachineFile) -> str:
     values = machine.model_dump(mode="json", exclude_none=True)
     learned = [{key: value for key, value in term.items() if value not in ("", [])} for term in values.pop("learned")]
     values["effects"] += learned
+    if machine.rotary:
+        values = tables_outside(values, machine.rotary)
     values["control"] = {key: value for key, value in values["control"].items() if value not in ({}, [])}
     return tomli_w.dumps({key: value for key, value in values.items() if value not in ({}, [])}, multiline_strings=False)

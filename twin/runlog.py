@@ -15,6 +15,8 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from twin.errors import RunLogError
+from twin.rotary import COLUMN as ROTARY_COLUMN
+from twin.rotary import inside_column, outside_names
 from twin.run_file import csv_columns, parquet_columns, parquet_names
 
 Floats = NDArray[np.float64]
@@ -38,7 +40,8 @@ class RunLog:
     """One run.
 
     t_s: (n,), s, increasing; columns: name → (n,), in the unit of the name; text: name → (n,) of text; ignored: columns that are
-    not in the format; source: what to call it in a message
+    not in the format; source: what to call it in a message; rotary: letters of the axes that its file has in degrees, whose
+    columns are called here as those of the others (`twin.rotary`)
     """
 
     t_s: Floats
@@ -46,6 +49,7 @@ class RunLog:
     text: Mapping[str, NDArray[np.object_]]
     ignored: tuple[str, ...] = ()
     source: str = "run"
+    rotary: frozenset[str] = frozenset()
 
     def __len__(self) -> int:
         return len(self.t_s)
@@ -75,6 +79,11 @@ def run_log(columns: Mapping[str, NDArray[np.generic]], source: str = "run") -> 
         raise RunLogError(f"{source}: there is no column t_s; a run log has the time since its start in it, in s")
     numbers: dict[str, Floats] = {}
     text: dict[str, NDArray[np.object_]] = {}
+    rotary = frozenset(match[1] for name in columns if (match := ROTARY_COLUMN.match(name)))
+    ignored = tuple(n for n in columns if not (n in COLUMNS or n in TEXT_COLUMNS or AXIS_COLUMN.match(inside_column(n))))
+    if both := [name for name in columns if inside_column(name) != name and inside_column(name) in columns]:
+        raise RunLogError(f"{source}: there are {both[0]} and {inside_column(both[0])}; an axis turns or goes straight")
+    columns = {inside_column(name): values for name, values in columns.items()}
     rows = len(columns["t_s"])
     for name, values in columns.items():
         if len(values) != rows:
@@ -94,7 +103,7 @@ def run_log(columns: Mapping[str, NDArray[np.generic]], source: str = "run") -> 
         raise RunLogError(
             f"{source}: t_s does not increase from row {row + 1} ({t_s[row]:g} s) to {row + 2} ({t_s[row + 1]:g} s)"
         )
-    return RunLog(t_s, numbers, text, tuple(n for n in columns if n != "t_s" and n not in numbers and n not in text), source)
+    return RunLog(t_s, numbers, text, ignored, source, rotary)
 
 
 def _numbers(name: str, values: NDArray[np.generic], source: str) -> Floats:
@@ -110,7 +119,7 @@ def read_run(path: Path) -> RunLog:
         if path.suffix == ".csv":
             return run_log(csv_columns(path), str(path))
         names = parquet_names(path)
-        numbers = {name for name in names if name in COLUMNS or AXIS_COLUMN.match(name)}
+        numbers = {name for name in names if name in COLUMNS or AXIS_COLUMN.match(inside_column(name))}
         log = run_log(parquet_columns(path, numbers, TEXT_COLUMNS), str(path))
     except FileNotFoundError:
         raise RunLogError(f"{path}: there is no such file") from None
@@ -124,7 +133,7 @@ def read_run(path: Path) -> RunLog:
 def write_run(run: RunLog, path: Path) -> None:
     """Writes a run log as Parquet, or as CSV where the path ends so; NaN becomes null."""
     arrays = {"t_s": pa.array(run.t_s)}
-    arrays |= {name: pa.array(values, from_pandas=True) for name, values in run.columns.items()}
+    arrays |= {outside_names(name, run.rotary): pa.array(values, from_pandas=True) for name, values in run.columns.items()}
     arrays |= {name: pa.array(list(values), type=pa.string()) for name, values in run.text.items()}
     table = pa.table(arrays)
     if path.suffix == ".csv":

@@ -1,11 +1,10 @@
-"""Where the thresholds of the gap diagnosis come from: healthy machines, and machines whose effect is not in the catalogue.
+"""Where the thresholds of the gap diagnosis come from: healthy machines.
 
-    .venv/bin/python benchmarks/gap/thresholds.py --healthy 16 --each 1 --seed 501
+    .venv/bin/python benchmarks/gap/thresholds.py --healthy 16 --seed 501
 
-* healthy machines of the reference plant: for each candidate the largest decrease of a signal's mean square (floors²), how many
-  sigmas it had, and whether `twin.gap.null` would have accepted it
-* leave one effect out: a machine with each effect in turn, diagnosed with that effect out of the catalogue. What is named then is
-  wrong, or cannot be told from it (a sibling); what is called unknown is right
+On healthy machines of the reference plant: for each candidate the largest decrease of a signal's mean square (floors²), how many
+sigmas it had, and whether `twin.gap.null` would have accepted it. `benchmarks/gap/leave_one_out.py` is the other side: machines
+whose effect is not in the catalogue.
 """
 
 import argparse
@@ -14,23 +13,20 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from cnctwin.blind_check.case_folder import write_case
-from cnctwin.blind_check.question import Question, Sort, draw, names
+from cnctwin.blind_check.question import Question, Sort, draw
 from twin.case import Case, read_case
-from twin.gap.diagnose import diagnose
 from twin.gap.null import NULL
 from twin.gap.search import Explained
 from twin.gap.stages.plan import explained_stages, ground_of
 
 
 def main() -> None:
-    """Prints both tables."""
+    """Print the table."""
     asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     asked.add_argument("--healthy", type=int, default=16)
-    asked.add_argument("--each", type=int, default=1)
     asked.add_argument("--seed", type=int, default=501)
     given = asked.parse_args()
     healthy(given.healthy, given.seed)
-    left_out(given.each, given.seed)
 
 
 def healthy(count: int, seed: int) -> None:
@@ -51,22 +47,6 @@ def healthy(count: int, seed: int) -> None:
     print(f"{'candidate':28s} closes (floors²; accepted above {NULL.closes_any:g})  sigmas (above {NULL.sigmas:g})")
     for name, (closes, sigmas) in sorted(largest.items(), key=lambda item: -item[1][0]):
         print(f"{name:28s} {closes:8.3f} {sigmas:30.1f}")
-
-
-def left_out(each: int, seed: int) -> None:
-    """What is named where the true effect is not in the catalogue."""
-    print(f"\n{'left out':28s} {'size':>6s}  verdict without it; named")
-    unknown, named, judged = 0, 0, 0
-    for name in names(named=True):
-        for question, case in _cases(draw(each, seed, Sort.SINGLE, name)):
-            found = diagnose(case, without=frozenset({name})).diagnosis
-            said = ", ".join(f"{c.effect}{f' on {c.on}' if c.on else ''}" for c in found.causes)
-            size = max(one.target for one in question.asked)
-            judged += size >= 2.0
-            named += size >= 2.0 and bool(found.causes)
-            unknown += size >= 2.0 and found.verdict == "unknown"
-            print(f"{name:28s} {size:6.1f}  {found.verdict.value}; {said}", flush=True)
-    print(f"of {judged} asked to be at least 2 floors: unknown {unknown}, something named {named}")
 
 
 def _stages(case: Case) -> list[Explained]:

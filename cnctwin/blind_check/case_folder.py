@@ -94,10 +94,13 @@ def recorded(machine: Machine, physics: Physics, kind: str, run: int, axes: str 
     return warmup_run(physics, told, number) if isinstance(told, WarmUp) else motion_run(physics, told, number, axes)
 
 
-def with_effects(machine: Machine) -> tuple[Physics, tuple[Answered, ...]]:
+Floors = Mapping[str, Mapping[str, float]]
+"""Kind of run → signal → what healthy runs differ by."""
+
+
+def with_effects(machine: Machine, floors: Floors) -> tuple[Physics, tuple[Answered, ...]]:
     """The machine's physics with its effects, each scaled alone to its target on the fit runs; and what they are."""
     chance = np.random.default_rng([machine.question.seed, 4])
-    floors = {kind: _floors(machine, kind) for kind in machine.question.kinds}
     physics, answered = machine.healthy, []
     for asked in machine.question.asked:
         effect = effect_on(asked)
@@ -137,7 +140,7 @@ def _amplitude(
     asked: DrawnEffect,
     traits: Parameters,
     kinds: list[str],
-    floors: Mapping[str, Mapping[str, float]],
+    floors: Floors,
 ) -> float:
     """The amplitude at which the largest signal of a fit run has the size that is asked for."""
     effect, axes = effect_on(asked), _moved(asked)
@@ -158,7 +161,7 @@ def _size(
     machine: Machine,
     physics: Physics,
     runs: Mapping[str, tuple[int, ...]],
-    floors: Mapping[str, Mapping[str, float]],
+    floors: Floors,
     axes: str,
     *,
     bare: Physics | None = None,
@@ -177,21 +180,20 @@ def _size(
 def answer_of(question: Question) -> Answer:
     """The answer to a question: what its effects are, and how large."""
     machine = machine_of(question)
-    physics, effects = with_effects(machine)
+    floors = {kind: _floors(machine, kind) for kind in question.kinds if question.asked}
+    physics, effects = with_effects(machine, floors)
     together = effects[0].size_over_floor if len(effects) == 1 else {}
     if len(effects) > 1:
-        floors = {kind: _floors(machine, kind) for kind in question.kinds}
         together = _size(machine, physics, dict.fromkeys(question.kinds, (FIT, CHECK)), floors, "xyz")
-    return Answer(question.name, question.sort, effects, together, _controller(machine))
+    return Answer(question.name, question.sort, effects, together, _controller(machine, floors))
 
 
-def _controller(machine: Machine) -> Answered | None:
+def _controller(machine: Machine, floors: Floors) -> Answered | None:
     """The structure of the controller where it is not the stated one, and how much of a gap it is by itself."""
     structure = machine.question.controller
     if structure is None:
         return None
     kinds = [kind for kind in machine.question.kinds if kind in structure_named(structure.effect).kinds]
-    floors = {kind: _floors(machine, kind) for kind in kinds}
     size = _size(machine, machine.healthy, dict.fromkeys(kinds, (FIT, CHECK)), floors, structure.on, bare=machine.nominal)
     return Answered(structure.effect, structure.on, True, dict(_structure_parameters(machine.question)), (), size)
 

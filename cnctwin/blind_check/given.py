@@ -41,6 +41,7 @@ class Given:
 
     closure_unseen: on runs the diagnosis never had; failed: why there is no diagnosis
     subsystems: name → verdict; learned: the term that closes most first
+    constants: path of each that moved → stated deviations
     """
 
     verdict: Verdict
@@ -51,6 +52,7 @@ class Given:
     failed: str = ""
     subsystems: Mapping[str, Verdict] = field(default_factory=dict)
     learned: tuple[GivenTerm, ...] = ()
+    constants: Mapping[str, float] = field(default_factory=dict)
 
 
 def given_of(kept: Mapping[str, Any]) -> Given:
@@ -69,6 +71,7 @@ def given_of(kept: Mapping[str, Any]) -> Given:
         kept["failed"],
         {one["subsystem"]: Verdict(one["verdict"]) for one in found.get("subsystems", ())},
         tuple(sorted(learned, key=lambda term: -term.closure)),
+        {one["name"]: one["deviations"] for one in found.get("constants", ())},
     )
 
 

@@ -19,6 +19,8 @@ from twin.gap.diagnosis import Verdict
 BINS = ((0.0, 1.0), (1.0, 1.5), (1.5, 2.0), (2.0, 3.0), (3.0, 10.0), (10.0, inf))
 JUDGED_FROM = 2.0
 """Size from which the targets hold."""
+CLOSED = 0.95
+"""Share of what the true effect closes that has to be reached."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,9 +43,10 @@ class Judged:
 
     @property
     def controller_told(self) -> bool:
-        """True where another structure of a controller is named, or its subsystem called not understood; or there is none."""
+        """True where another structure of a controller is named, or its subsystem called not understood; or none shows."""
         doubtful = (Verdict.UNKNOWN, Verdict.PARTLY)
-        return all(
+        controller = self.answer.controller
+        return (controller is not None and controller.size < JUDGED_FROM) or all(
             any(truth in cause.reported for cause in self.given.causes)
             or self.given.subsystems.get(f"{truth[1]} controller") in doubtful
             for truth in self.structure
@@ -77,9 +80,21 @@ class Judged:
 
     @property
     def unknown(self) -> bool:
-        """It is said that the cause is not known, and none is named but the structure of a controller."""
+        """It is said that the cause is not known, or it is described, and none is named but the structure of a controller."""
         without = (Verdict.UNKNOWN, Verdict.PARTLY) if self.structure else (Verdict.UNKNOWN,)
-        return self.given.verdict in without and not self.names and not self.given.failed
+        said = self.given.verdict in without or bool(self.given.learned)
+        return said and not self.names and not self.given.failed
+
+    @property
+    def taken_up(self) -> bool:
+        """The constants have taken the effect up, runs never seen included, and it is said which of them moved."""
+        closed = self.given.closure_unseen is not None and self.given.closure_unseen >= CLOSED
+        return closed and bool(self.given.constants) and not (self.names or self.unknown or self.given.failed)
+
+    @property
+    def missed(self) -> bool:
+        """It is there, and nothing is said of it."""
+        return not (self.names or self.unknown or self.taken_up)
 
     @property
     def site_right(self) -> bool:
@@ -134,12 +149,18 @@ class LearnedScores:
 
 @dataclass(frozen=True, slots=True)
 class Scores:
-    """The score of the cases of some sizes. closure: median share of the gap that is gone on runs never seen."""
+    """The score of the cases of some sizes. closure: median share of the gap that is gone on runs never seen.
+
+    outside_told: called unknown, or taken up by the constants, and said so
+    """
 
     single_right: Rate
     single_in_class: Rate
     single_wrong: Rate
     outside_unknown: Rate
+    outside_taken_up: Rate
+    outside_told: Rate
+    outside_missed: Rate
     outside_wrong: Rate
     pair_both: Rate
     pair_some: Rate
@@ -188,10 +209,6 @@ def learned_scores(cases: Sequence[Judged]) -> LearnedScores:
     )
 
 
-CLOSED = 0.95
-"""Share of what the true effect closes that has to be reached."""
-
-
 def scores(cases: Sequence[Judged]) -> Scores:
     """The scores of these cases."""
 
@@ -206,6 +223,9 @@ def scores(cases: Sequence[Judged]) -> Scores:
         single_in_class=rate_of(case.in_class for case in single),
         single_wrong=rate_of(case.wrong for case in single),
         outside_unknown=rate_of(case.unknown for case in outside),
+        outside_taken_up=rate_of(case.taken_up for case in outside),
+        outside_told=rate_of(case.unknown or case.taken_up for case in outside),
+        outside_missed=rate_of(case.missed for case in outside),
         outside_wrong=rate_of(bool(case.names) for case in outside),
         pair_both=rate_of(case.in_class for case in pair),
         pair_some=rate_of(case.some for case in pair),

@@ -12,8 +12,11 @@ ROWS = (
     ("single effect: named right", "single_right", "≥ 95 %"),
     ("single effect: in the reported class", "single_in_class", "≥ 99 %"),
     ("single effect: a wrong name", "single_wrong", "≤ 2 %"),
-    ("outside the catalogue: called unknown", "outside_unknown", "≥ 90 %"),
-    ("outside the catalogue: wrongly named", "outside_wrong", "≤ 5 %"),
+    ("outside the catalogue: called so", "outside_unknown", ""),
+    ("outside the catalogue: taken up by constants, said so", "outside_taken_up", ""),
+    ("outside the catalogue: either of the two", "outside_told", "≥ 95 %"),
+    ("outside the catalogue: missed", "outside_missed", "≤ 2 %"),
+    ("outside the catalogue: wrongly named", "outside_wrong", "≤ 2 %"),
     ("pair: both right", "pair_both", "≥ 90 %"),
     ("pair: at least one right", "pair_some", ""),
     ("pair: a wrong name", "pair_wrong", ""),
@@ -21,6 +24,17 @@ ROWS = (
     ("unseen runs: closure of at least 0.95 of the truth's", "closure_reached", ""),
     ("90 % intervals that cover", "covered", "85–95 %"),
 )
+
+CURVE = (
+    ("single: right", "single_right"),
+    ("single: in class", "single_in_class"),
+    ("single: wrong", "single_wrong"),
+    ("outside: called so", "outside_unknown"),
+    ("outside: missed", "outside_missed"),
+    ("outside: named", "outside_wrong"),
+    ("pair: both", "pair_both"),
+)
+"""What is shown over the size of the effect."""
 
 
 def table(result: CheckResult) -> str:
@@ -100,8 +114,8 @@ def _rate(rate: Rate) -> dict[str, Any]:
 def missed(result: CheckResult) -> tuple[str, ...]:
     """The targets that this check shows to be missed: a whole 95 % interval on the wrong side."""
     found = result.scored
-    least = {"single_right": 0.95, "single_in_class": 0.99, "outside_unknown": 0.90, "pair_both": 0.90, "triple_all": 0.80}
-    most = {"single_wrong": 0.02, "outside_wrong": 0.05}
+    least = {"single_right": 0.95, "single_in_class": 0.99, "outside_told": 0.95, "pair_both": 0.90, "triple_all": 0.80}
+    most = {"single_wrong": 0.02, "outside_wrong": 0.02, "outside_missed": 0.02}
     said = [name for name, target in least.items() if (r := getattr(found.judged, name)).count and r.high < target]
     said += [name for name, target in most.items() if (r := getattr(found.judged, name)).count and r.low > target]
     site, variables = found.learned.site, found.learned.variables
@@ -133,7 +147,7 @@ def target_rows(found: Scored) -> list[tuple[str, str, str]]:
 
 def controller_rows(found: Scored) -> list[tuple[str, str, str]]:
     """Return what is scored, of machines with the controller that they state, and of those with another one."""
-    names = ("single_right", "single_wrong", "outside_unknown", "outside_wrong", "pair_both", "pair_wrong", "triple_all")
+    names = ("single_right", "single_wrong", "outside_told", "outside_wrong", "pair_both", "pair_wrong", "triple_all")
     titles = {name: title for title, name, _ in ROWS}
     rows = [(titles[name], str(getattr(found.nominal, name)), str(getattr(found.other_controller, name))) for name in names]
     return [*rows, ("another controller is named, or called not understood", "", str(found.controller_told))]
@@ -149,18 +163,9 @@ def _figure(value: float) -> str:
 
 
 def _curve(found: Scored) -> list[str]:
-    """Named right, wrongly named, unknown by size."""
-    titles = ("single: right", "single: in class", "single: wrong", "outside: named", "pair: both")
-    rows = [f"{'size / floor':12s} " + "".join(f"{title:25s}" for title in titles)]
+    """The scores by size."""
+    rows = [f"{'size / floor':12s} " + "".join(f"{title:25s}" for title, _ in CURVE).rstrip()]
     for (low, high), scores in found.by_size.items():
-        rows.append(f"{_bin(low, high):12s} {_cells(scores)}")
+        size = f"> {low:g}" if high == inf else f"{low:g} to {high:g}"
+        rows.append(f"{size:12s} " + "".join(f"{getattr(scores, name)!s:25s}" for _, name in CURVE).rstrip())
     return rows
-
-
-def _bin(low: float, high: float) -> str:
-    return f"> {low:g}" if high == inf else f"{low:g} to {high:g}"
-
-
-def _cells(scores: Scores) -> str:
-    rates = (scores.single_right, scores.single_in_class, scores.single_wrong, scores.outside_wrong)
-    return "".join(f"{rate!s:25s}" for rate in rates) + str(scores.pair_both)

@@ -149,6 +149,9 @@ def _print(answer: "Diagnosed", files: Iterable[str], out: Path, console: Consol
             console.print(f"· {sentence}", markup=False, highlight=False, soft_wrap=True)
     if found.causes:
         console.print(_causes_table(found))
+    for table in (_subsystems_table(found), _constants_table(found), _learned_table(found)):
+        if table.row_count:
+            console.print(table)
     if found.next_experiment is not None:
         console.print("\n[bold]next experiment[/]")
         console.print(found.next_experiment.why, markup=False, highlight=False, soft_wrap=True)
@@ -167,6 +170,41 @@ def _causes_table(found: "Diagnosis") -> Table:
         rivals = ", ".join(str(e) for e in cause.indistinguishable_from)
         causes.add_row(cause.effect, cause.on, parameters, f"{100 * cause.closure:.1f} %", rivals)
     return causes
+
+
+def _subsystems_table(found: "Diagnosis") -> Table:
+    """Return the table of the parts compared alone, worst first."""
+    parts = Table(title="part by part, driven by what was measured", title_justify="left")
+    for column in ("part", "compared", "gap before → after", "verdict", "causes"):
+        parts.add_column(column, justify="right" if column.startswith("gap") else "left")
+    for one in found.subsystems:
+        gap = f"{one.before:.3g} → {one.after:.3g} ×"
+        parts.add_row(one.subsystem, one.compared, gap, one.verdict.value.replace("_", " "), ", ".join(one.causes))
+    return parts
+
+
+def _constants_table(found: "Diagnosis") -> Table:
+    """Return the table of the constants that take up a part of the gap."""
+    constants = Table(title="constants that take up a part of the gap", title_justify="left")
+    for column in ("constant", "stated", "found", "moved by", "share"):
+        constants.add_column(column, justify="left" if column == "constant" else "right")
+    for one in found.constants:
+        constants.add_row(
+            one.name, f"{one.stated:.4g}", f"{one.found:.4g}", f"{one.deviations:.2g} σ", f"{100 * one.closure:.1f} %"
+        )
+    return constants
+
+
+def _learned_table(found: "Diagnosis") -> Table:
+    """Return the table of what is in no catalogue: described, not named."""
+    learned = Table(title="described, not named", title_justify="left")
+    for column in ("where", "over", "closes (90 %)", "repeats", ""):
+        learned.add_column(column)
+    for one in found.learned:
+        closes = f"{100 * one.closure:.0f} % ({100 * one.closure_low:.0f} to {100 * one.closure_high:.0f})"
+        where = f"{one.site.replace('_', ' ')}{f' on {one.on}' if one.on else ''}"
+        learned.add_row(where, ", ".join(one.depends_on), closes, "yes" if one.repeats else "no", one.sentence)
+    return learned
 
 
 def score_json(found: "Score") -> dict[str, Any]:

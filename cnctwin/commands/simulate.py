@@ -70,7 +70,10 @@ def _summary_of(done: "Simulation") -> dict[str, Any]:
 
     run = done.run
     axes = {
-        axis: {"following_error_mm": figures(error), "torque_a": figures(run[f"{axis}_torque_a"])}
+        axis: {
+            f"following_error_{'deg' if axis in run.rotary else 'mm'}": figures(error),
+            "torque_a": figures(run[f"{axis}_torque_a"]),
+        }
         for axis, error in done.following_error_mm().items()
     }
     summary: dict[str, Any] = {"seconds": done.seconds, "axes": axes}
@@ -90,8 +93,10 @@ def _table(program: str, machine: str, summary: dict[str, Any]) -> Table:
     for column in ("", "unit", "rms", "peak"):
         table.add_column(column, justify="left" if column in ("", "unit") else "right")
     for axis, signals in summary["axes"].items():
-        error, torque = signals["following_error_mm"], signals["torque_a"]
-        table.add_row(f"following error {axis.upper()}", "µm", f"{1000 * error['rms']:.1f}", f"{1000 * error['peak']:.1f}")
+        torque, turns = signals["torque_a"], "following_error_deg" in signals
+        error = signals["following_error_deg" if turns else "following_error_mm"]
+        unit = "mdeg" if turns else "µm"
+        table.add_row(f"following error {axis.upper()}", unit, f"{1000 * error['rms']:.1f}", f"{1000 * error['peak']:.1f}")
         table.add_row(f"torque command {axis.upper()}", "A", f"{torque['rms']:.3f}", f"{torque['peak']:.3f}")
     if force := summary.get("cutting_force_n"):
         table.add_row("cutting force, while cutting", "N", f"{force['rms']:.1f}", f"{force['peak']:.1f}")

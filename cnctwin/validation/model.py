@@ -18,6 +18,7 @@ from processors.config import Configuration
 from twin.cutting import SpindleDrive, cutting_force
 from twin.effects.catalogue import effect_named
 from twin.effects.effect import On
+from twin.learned.standing import on_axes
 from twin.machine import MachineFile
 from twin.runlog import RunLog
 from twin.simulator.recorded import told_of
@@ -63,9 +64,8 @@ HEAT = ("alpha_w_per_pct_rpm2", "beta_w_per_rpm", "resistance_k_per_w", "capacit
 
 def _without_axes(machine: MachineFile) -> MachineFile:
     effects = tuple(e for e in machine.effects if effect_named(e.effect).on is not On.AXIS)
-    return machine.model_copy(
-        update={"axes": {}, "effects": tuple(e for e in effects if not e.on.endswith(("_mm", "_torque_a")))}
-    )
+    kept = {"effects": tuple(e for e in effects if not e.on.endswith(("_mm", "_torque_a")))}
+    return machine.model_copy(update={"axes": {}, "learned": on_axes(machine.learned, ())} | kept)
 
 
 def temperature(twin: Twin, evidence: Evidence, grid: Grid, held_s: float) -> tuple[Floats, str]:

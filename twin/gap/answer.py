@@ -10,14 +10,13 @@ from scipy.special import erfc
 from twin.case import Case
 from twin.effects.catalogue import catalogue, effect_named
 from twin.effects.effect import Effect, On
-from twin.gap.diagnosis import Candidate, Cause, Effected, GapNumbers, Interval, NotObservable, Verdict
+from twin.gap.diagnosis import Candidate, Cause, Effected, Interval, NotObservable
 from twin.gap.evidence import advantage
 from twin.gap.intervals import parameter_intervals
 from twin.gap.null import Null
 from twin.gap.refitted import KNOWN_MIN
-from twin.gap.search import Explained
+from twin.gap.search import Explained, is_nothing
 from twin.gap.verdict import Judged
-from twin.gap.wording import percent
 from twin.runlog import AXIS_COLUMN
 
 
@@ -26,16 +25,9 @@ def found_effects(stages: Sequence[Judged]) -> list[tuple[Effected, dict[str, fl
     found: dict[Effected, list[dict[str, float]]] = {}
     for stage in stages:
         for effected, values in stage.explained.best.values.items():
-            if not _is_nothing(effected, values):
+            if not is_nothing(effected, values):
                 found.setdefault(effected, []).append(values)
     return [(e, {k: float(np.mean([v[k] for v in values])) for k in values[0]}) for e, values in found.items()]
-
-
-def _is_nothing(effected: Effected, values: Mapping[str, float]) -> bool:
-    """Return True where a fit ended at nothing: at the null value, or stiffer than the effect's file calls finite."""
-    effect = effect_named(effected.effect)
-    stiff = {p.name for p in effect.parameters if p.null is not None and np.isinf(p.null)}
-    return effect.is_null(values) or any(values[p.name] > p.high for p in effect.parameters if p.name in stiff)
 
 
 def causes_of(stages: Sequence[Judged], shares: Mapping[Effected, float]) -> tuple[Cause, ...]:
@@ -45,7 +37,7 @@ def causes_of(stages: Sequence[Judged], shares: Mapping[Effected, float]) -> tup
         found = stage.explained
         intervals = parameter_intervals(found.best)
         for effected, values in found.best.values.items():
-            if _is_nothing(effected, values):
+            if is_nothing(effected, values):
                 continue
             share = float(f"{shares.get(effected, 0.0):.4g}")
             rivals = tuple(r for r in found.rivals.get(effected, ()) if r not in causes)
@@ -140,52 +132,3 @@ def not_identifiable_of(stages: Sequence[Judged]) -> tuple[str, ...]:
                 where = stage.explained.stage.name
                 said.append(f"{where}: {free.name}: these runs do not tell it; the stated value and its uncertainty stand")
     return tuple(said)
-
-
-def sentence_of(verdict: Verdict, stages: Sequence[Judged], causes: Sequence[Cause], gap: GapNumbers) -> str:
-    """The verdict, as one would say it."""
-    if verdict is Verdict.HEALTHY:
-        return f"Healthy: with its constants refitted, the twin is {gap.before:.2g} × what repeated runs differ by."
-    unknown = [s for s in stages if s.verdict is Verdict.UNKNOWN]
-    if not causes:
-        where = ", ".join(s.explained.stage.name for s in unknown)
-        looks = [str(e) for s in unknown for e in s.likeness]
-        partly = f"; it partly looks like {', '.join(looks)}, which does not explain it" if looks else ""
-        return f"Unknown: a gap of {gap.before:.3g} × the floor in {where} that no effect of the catalogue explains{partly}."
-    parts = [f"{percent(c.closure)} {'' if i else 'of the gap comes '}from {_said(c)}" for i, c in enumerate(causes)]
-    left = max(0.0, 1.0 - gap.closure)
-    rest = "" if verdict is Verdict.EXPLAINED else f"; {percent(left)} remains, cause unknown"
-    if verdict is Verdict.PARTLY and unknown:
-        rest += f" ({', '.join(s.explained.stage.name for s in unknown)})"
-    head = "Explained" if verdict is Verdict.EXPLAINED else "Partly explained"
-    return f"{head}: {'; '.join(parts)}{rest}."
-
-
-def _said(cause: Cause) -> str:
-    parameters = effect_named(cause.effect).parameters
-    told = max((p for p in parameters if p.null is not None), key=lambda p: _clearness(cause.parameters[p.name], p.null))
-    figure = _figure(cause.parameters[told.name])
-    size = figure if len(parameters) == 1 else f"{told.name} {figure}"
-    rivals = ", ".join(_in_words(e.effect, e.on if e.on != cause.on else "") for e in cause.indistinguishable_from)
-    return f"{_in_words(cause.effect, cause.on)} ({size}{f'; or {rivals}' if rivals else ''})"
-
-
-def _clearness(interval: Interval, null: float | None) -> float:
-    """Return the half-widths of its interval by which a figure is away from nothing."""
-    if null is None or not np.isfinite(null):
-        return np.inf
-    return abs(interval.value - null) / max((interval.high - interval.low) / 2.0, 1e-12)
-
-
-def _in_words(effect: str, on: str) -> str:
-    """
-    >>> _in_words("direction_friction", "x"), _in_words("sensor_bias", "z_torque_a")
-    ('direction friction on X', 'sensor bias on z_torque_a')
-    """
-    where = on.upper() if len(on) == 1 else on
-    return f"{effect.replace('_', ' ')}{f' on {where}' if on else ''}"
-
-
-def _figure(interval: Interval) -> str:
-    half = (interval.high - interval.low) / 2.0
-    return f"{interval.value:.3g} ± {half:.1g} {interval.unit}".strip()

@@ -4,6 +4,8 @@ A column that cannot be what its name says is left out, and so is what depends o
 else be blamed on the axes that it pushes and the meter that shows it.
 """
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -45,6 +47,20 @@ def without_axes_at_odds(run: Run, log: RunLog, notes: list[str]) -> RunLog:
     return _without(log, dropped)
 
 
+def without_axes_of_another_kind(run: Run, log: RunLog, machine: MachineFile, notes: list[str]) -> RunLog:
+    """Without the axes that are recorded in degrees and stated as linear ones, or the other way round."""
+    dropped: set[str] = set()
+    for letter, axis in machine.axes.items():
+        own = [name for name in log.columns if (m := AXIS_COLUMN.match(name)) and m[1] == letter]
+        if axis.is_rotary is not (letter in log.rotary) and any(name.endswith("_mm") for name in own):
+            recorded, stated = ("degrees", "a linear") if letter in log.rotary else ("mm", "a rotary")
+            notes.append(
+                f"{run.name}: {letter} is recorded in {recorded}, and axes.{letter} is {stated} axis: it is not compared"
+            )
+            dropped |= set(own)
+    return _without(log, dropped)
+
+
 def _off(slope: float) -> bool:
     return np.isfinite(slope) and not 1.0 / OFF < slope < OFF
 
@@ -67,7 +83,7 @@ def with_known_cut(run: Run, log: RunLog, machine: MachineFile, notes: list[str]
     columns, bad = dict(log.columns), _engagement_at_odds(run, log, notes)
     for name in bad:
         del columns[name]
-    cleaned = RunLog(log.t_s, columns, log.text, log.ignored, log.source)
+    cleaned = replace(log, columns=columns)
     cuts = run.entry.kind is RunKind.CUT or bool((np.nan_to_num(log.columns.get("axial_depth_mm", np.zeros(1))) > 0.0).any())
     if not cuts or (machine.tool is not None and milling_of(told_of(cleaned, machine)) is not None):
         return cleaned
@@ -83,7 +99,7 @@ def with_known_cut(run: Run, log: RunLog, machine: MachineFile, notes: list[str]
             "spindle's load are not compared"
         )
         columns |= {name: np.where(cutting, np.nan, columns[name]) for name in hidden}
-    return RunLog(log.t_s, columns, log.text, log.ignored, log.source)
+    return replace(log, columns=columns)
 
 
 def _around(here: NDArray[np.bool_], t_s: Floats) -> NDArray[np.bool_]:
@@ -121,4 +137,4 @@ def _engagement_at_odds(run: Run, log: RunLog, notes: list[str]) -> list[str]:
 def _without(log: RunLog, names: set[str]) -> RunLog:
     if not names:
         return log
-    return RunLog(log.t_s, {n: v for n, v in log.columns.items() if n not in names}, log.text, log.ignored, log.source)
+    return replace(log, columns={n: v for n, v in log.columns.items() if n not in names})

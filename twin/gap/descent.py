@@ -43,12 +43,19 @@ class Minimum:
 
 
 def descend(
-    residuals: Residuals, bounds: Bounds, blocks: NDArray[np.intp], start: Floats, *, steps_max: int = 30, tolerance: float = 1e-4
+    residuals: Residuals,
+    bounds: Bounds,
+    blocks: NDArray[np.intp],
+    start: Floats,
+    *,
+    steps_max: int = 30,
+    tolerance: float = 1e-4,
+    slope_step: float = STEP,
 ) -> Minimum:
     """Descend from `start` to a minimum.
 
     residuals: θ (candidates, p) → (candidates, n) in units of their noise; blocks: (n,) time block of each residual
-    tolerance: relative decrease of the cost at which the search ends
+    tolerance: relative decrease of the cost at which the search ends; slope_step: of θ, for its slopes
     """
     theta = np.clip(start, bounds.low, bounds.high)
     here = residuals(theta[None, :])[0]
@@ -56,7 +63,7 @@ def descend(
     slopes = np.zeros((len(here), len(theta)))
     stale = True
     for _ in range(steps_max if len(theta) else 0):
-        slopes = _slopes(residuals, theta, here, bounds)
+        slopes = _slopes(residuals, theta, here, bounds, slope_step)
         stale = False
         trials = np.stack([_step(slopes, here, theta, bounds, damping) for damping in DAMPINGS])
         shown = residuals(trials)
@@ -70,7 +77,7 @@ def descend(
         if gain < tolerance * (cost + gain):
             break
     if stale:
-        slopes = _slopes(residuals, theta, here, bounds)
+        slopes = _slopes(residuals, theta, here, bounds, slope_step)
         evaluations += len(theta)
     return _minimum(theta, here, slopes, bounds, blocks, cost, evaluations)
 
@@ -80,12 +87,12 @@ def _cost(residual: Floats, theta: Floats, bounds: Bounds) -> float:
     return float(robust.sum() + np.sum((theta / bounds.sigma) ** 2))
 
 
-def _slopes(residuals: Residuals, theta: Floats, here: Floats, bounds: Bounds) -> Floats:
+def _slopes(residuals: Residuals, theta: Floats, here: Floats, bounds: Bounds, step: float) -> Floats:
     """(n, p), by differences towards the middle of the bounds."""
     if not len(theta):
         return np.zeros((len(here), 0))
     inward = np.where(theta > 0.5 * (bounds.low + bounds.high), -1.0, 1.0)
-    moves = inward * STEP * np.maximum(1.0, np.abs(theta)) * np.minimum(1.0, 100.0 * bounds.sigma)
+    moves = inward * step * np.maximum(1.0, np.abs(theta)) * np.minimum(1.0, 100.0 * bounds.sigma)
     shown = residuals(theta + np.diag(moves))
     return np.asarray((shown - here).T / moves)
 

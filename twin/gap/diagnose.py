@@ -12,14 +12,18 @@ from numpy.typing import NDArray
 
 from twin.case import Case, Run, RunKind
 from twin.errors import CaseError
-from twin.gap.answer import candidates_of, causes_of, found_effects, not_identifiable_of, not_observable_of, sentence_of
+from twin.gap.answer import candidates_of, causes_of, found_effects, not_identifiable_of, not_observable_of
 from twin.gap.diagnosis import Diagnosed, Diagnosis, Effected, GapNumbers, SignalGap, closure_of
 from twin.gap.experiment.what_next import what_next
 from twin.gap.inspection import inspected, slow_effects
 from twin.gap.intervals import closure_interval
 from twin.gap.joined import joined
 from twin.gap.learned.answer import described_stages, learned_of, with_learned
+from twin.gap.naming.constants import moved_constants
+from twin.gap.naming.sentence import sentence_of
 from twin.gap.null import NULL, Null
+from twin.gap.opened import combined
+from twin.gap.own_units import in_own_units
 from twin.gap.patterns import patterns
 from twin.gap.programs.diagnose import diagnose_programs
 from twin.gap.refitted import constant_deviations, with_constants, with_effects, with_uncertainty
@@ -27,6 +31,7 @@ from twin.gap.score import Squares, gap_of, squares_of, traces_of, unit_of
 from twin.gap.shares import shapley
 from twin.gap.stages.plan import Ground, SideBySide, explained_stages, ground_of
 from twin.gap.stages.shown import shown_by_run
+from twin.gap.subsystems import subsystems_of
 from twin.gap.verdict import Judged, judged, overall
 from twin.gap.where import where
 from twin.machine import MachineFile
@@ -71,6 +76,7 @@ def diagnose(
     if programs or not machine:
         answers.append(diagnose_programs(case, without=without, progress=progress))
     found = answers[0] if len(answers) == 1 else joined(*answers)
+    found = in_own_units(found, case.machine)
     return replace(found, diagnosis=replace(found.diagnosis, seconds=round(clock() - began, 1)))
 
 
@@ -81,7 +87,10 @@ def _motion(
     progress("reading the runs")
     checked, notes = inspected(case)
     ground = ground_of(checked, without | slow_effects(checked))
-    stages = [judged(found) for found in explained_stages(ground, progress, side_by_side, null)]
+    found = [judged(one) for one in explained_stages(ground, progress, side_by_side, null)]
+    both = combined(ground, found, progress, side_by_side, null)
+    stages = both.stages
+    ground = replace(ground, floors=replace(ground.floors, opened=both.floors))
     if not stages:
         raise CaseError(
             f"{case.name}: no run of role fit moves an axis, cuts or warms up beside its reference; nothing to diagnose"
@@ -96,7 +105,7 @@ def _motion(
     progress("what next")
     diagnosis = Diagnosis(
         verdict=verdict,
-        sentence=sentence_of(verdict, stages, named, numbers),
+        sentence="",
         where=where(traces),
         where_after=(left := where(traces, after=True)),
         patterns=patterns(traces, {run.name: run.log for run in twins.runs}, ground.machine),
@@ -106,10 +115,13 @@ def _motion(
         not_observable=not_observable_of(checked, stages, without),
         not_identifiable=not_identifiable_of(stages),
         next_experiment=what_next(ground, twins.before, twins.after, stages, left),
-        notes=notes + ground.floors.notes + _flattering(checked, twins.runs),
+        subsystems=subsystems_of(stages, both.opened),
+        notes=notes + both.notes + ground.floors.notes + _flattering(checked, twins.runs),
         seconds=0.0,
         learned=learned_of(learned),
+        constants=moved_constants(ground.machine, [stage.explained for stage in stages]),
     )
+    diagnosis = replace(diagnosis, sentence=sentence_of(diagnosis, stages))
     known: dict[str, float] = {}
     for stage in stages:
         known |= constant_deviations(twins.after, stage.explained.stage, stage.explained.best)

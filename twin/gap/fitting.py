@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.gap.descent import Bounds, descend
+from twin.gap.descent import STEP, Bounds, descend
 from twin.gap.diagnosis import Effected
 from twin.gap.stages.stage import Model, Observed, Stage
 
@@ -74,15 +74,27 @@ class Fitted:
 
 def left_by(stage: Stage, model: Model, theta: Floats, *, fitted: bool) -> Left:
     """What the hypothesis at θ leaves on the runs that are fitted, or on the others; where there are none, on the fitted."""
+    return lefts_by(stage, model, theta[None, :], fitted=fitted)[0]
+
+
+def lefts_by(stage: Stage, model: Model, theta: Floats, *, fitted: bool) -> tuple[Left, ...]:
+    """The same at each row of θ, (lanes, p)."""
+    judging = any(not o.fitted and np.isfinite(o.measured).any() for o in stage.observed)
+    runs = [i for i, o in enumerate(stage.observed) if o.fitted is (fitted or not judging)]
+    shown = {i: stage.predict(model, theta, i) for i in runs}
+    return tuple(_left(stage, {i: lanes[lane] for i, lanes in shown.items()}, fitted) for lane in range(len(theta)))
+
+
+def _left(stage: Stage, shown: dict[int, Floats], fitted: bool) -> Left:
+    """What is left by what a hypothesis shows: number of the run → (n,)."""
     signals = tuple(dict.fromkeys(s for o in stage.observed for s in o.signals))
     squares, counts = [], []
     cells, cell_counts = np.zeros((len(signals), REGIMES_MAX)), np.zeros((len(signals), REGIMES_MAX))
-    judging = any(not o.fitted and np.isfinite(o.measured).any() for o in stage.observed)
     for number, observed in enumerate(stage.observed):
-        if observed.fitted is (fitted or not judging):
-            residual = (stage.predict(model, theta[None, :], number)[0] - observed.measured) / observed.floor
+        if number in shown:
+            residual = (shown[number] - observed.measured) / observed.floor
             if fitted:  # the mean of repeated runs is quieter than one of them
-                residual = residual * observed.floor / observed.sigma
+                residual = residual * np.maximum(observed.floor / observed.sigma, 1.0)
             one, count = _by_block(observed, residual, signals)
             squares.append(one)
             counts.append(count)
@@ -137,7 +149,15 @@ def fitted(
     for i, there in zip(runs, sampled, strict=True):
         blocks.append(_kept(stage.observed[i].block[there], stage.averaged) + first)
         first = int(blocks[-1].max()) + 1
-    found = descend(residuals, bounds, np.concatenate(blocks), start, steps_max=steps_max, tolerance=tolerance)
+    found = descend(
+        residuals,
+        bounds,
+        np.concatenate(blocks),
+        start,
+        steps_max=steps_max,
+        tolerance=tolerance,
+        slope_step=max((stage.observed[i].slope_step for i in runs), default=STEP),
+    )
     return Fitted(
         model,
         found.theta,

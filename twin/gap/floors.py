@@ -50,6 +50,7 @@ class Floors:
     """Floors by (signal, regime).
 
     repeated: rms, from repeated runs or laps; expected: rms, from the twin's own courses
+    opened: rms, of axes that their open loops decide; these stand in place of the others
     error: relative standard error of `repeated`; notes: sentences on the origin of the floors and their certainty
     """
 
@@ -58,6 +59,12 @@ class Floors:
     expected: Mapping[Key, float] = field(default_factory=dict)
     error: Mapping[Key, float] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    opened: Mapping[Key, float] = field(default_factory=dict)
+
+    @property
+    def opened_axes(self) -> frozenset[str]:
+        """Letters of the axes that their open loops decide."""
+        return frozenset(signal.partition("_")[0] for signal, _ in self.opened)
 
     def of(self, log: RunLog, signal: str) -> Floats:
         """The floor of each sample of a signal, (n,)."""
@@ -66,8 +73,9 @@ class Floors:
         noise = noise_of(self.machine, log, signal)
         floor = np.full(len(log), noise)
         for regime, here in regimes_of(log, signal, self.machine):
-            known = [v for v in (self.repeated.get((signal, regime)), self.expected.get((signal, regime))) if v is not None]
-            floor[here] = max([noise, *known])
+            key = (signal, regime)
+            known = [v for v in (self.repeated.get(key), self.expected.get(key)) if v is not None]
+            floor[here] = self.opened.get(key, max([noise, *known]))
         return floor
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from twin.case import Case, Run, RunAtHand, RunKind
 from twin.effects.catalogue import catalogue
 from twin.errors import CaseError, RunLogError
-from twin.gap.at_odds import with_known_cut, without_axes_at_odds
+from twin.gap.at_odds import with_known_cut, without_axes_at_odds, without_axes_of_another_kind
 from twin.gap.dynamometer.cutting import is_of_forces_alone
 from twin.gap.dynamometer.turn_run import TurnRun, turn_run
 from twin.gap.labels import measured_signals
@@ -76,7 +76,7 @@ def _comparable(run: Run, machine: MachineFile) -> bool:
 
 def _usable(run: Run, machine: MachineFile, notes: list[str]) -> Run:
     log = _cleaned(run, notes)
-    if is_of_forces_alone(log):
+    if is_of_forces_alone(log, machine.axes):
         turned = turn_run(run, log, machine, notes)
         if turned is not None or not log.axes():
             return turned or RunAtHand(run.entry, run.folder, log)
@@ -90,7 +90,7 @@ def _usable(run: Run, machine: MachineFile, notes: list[str]) -> Run:
             notes.append(f"{run.name}: axis {letter} is not in the machine's file, and is not compared")
         elif not log.has(f"{letter}_ref_mm"):
             notes.append(f"{run.name}: {letter}_ref_mm is not recorded, and axis {letter} is not compared")
-    log = without_axes_at_odds(run, log, notes)
+    log = without_axes_at_odds(run, without_axes_of_another_kind(run, log, machine, notes), notes)
     if not log.axes():
         return RunAtHand(run.entry, run.folder, log)
     ticked = on_servo_ticks(run, log, machine, notes)
@@ -138,7 +138,7 @@ def _cleaned(run: Run, notes: list[str]) -> RunLog:
             columns[name] = np.where(finite, values, np.nan) if infinite else values
         else:
             notes.append(f"{run.name}: {name} has no value at all; it counts as not recorded")
-    cleaned = RunLog(log.t_s - log.t_s[0], columns, log.text, log.ignored, log.source)
+    cleaned = replace(log, t_s=log.t_s - log.t_s[0], columns=columns)
     for name in measured_signals(cleaned):
         missing = _missing(columns[name])
         if len(log) > FEW and np.nanmin(columns[name]) == np.nanmax(columns[name]):
@@ -181,7 +181,7 @@ def _repeats_that_agree(case: Case, notes: list[str]) -> tuple[Run, ...]:
 
 def _first(log: RunLog, count: int) -> RunLog:
     text = {name: values[:count] for name, values in log.text.items()}
-    return RunLog(log.t_s[:count], {n: v[:count] for n, v in log.columns.items()}, text, log.ignored, log.source)
+    return replace(log, t_s=log.t_s[:count], columns={n: v[:count] for n, v in log.columns.items()}, text=text)
 
 
 def _contradiction(one: Run, other: Run) -> str:

@@ -35,6 +35,7 @@ def joined(motion: Diagnosed, programs: Diagnosed) -> Diagnosed:
         update={
             "program": programs.twin.program,
             "effects": motion.twin.effects + added,
+            "learned": motion.twin.learned + tuple(t for t in programs.twin.learned if t not in motion.twin.learned),
             "uncertainty": {**programs.twin.uncertainty, **motion.twin.uncertainty},
         }
     )

@@ -11,6 +11,7 @@ from twin.gap.diagnosis import Cause, Effected
 from twin.gap.fitting import Fitted
 from twin.gap.intervals import Z90
 from twin.gap.stages.axis import AxisStage, axis_constant_path
+from twin.gap.stages.open_loop.stage import OpenStage
 from twin.gap.stages.stage import Stage
 from twin.identification.axis_parameters import AxisParameter, identified_axis
 from twin.machine import AddedEffect, MachineFile
@@ -23,7 +24,7 @@ def with_constants(machine: MachineFile, stage: Stage, found: Fitted) -> Machine
     """The machine with the constants of one stage as they were fitted."""
     count = len(found.model.constants)
     theta = found.theta[:count]
-    if isinstance(stage, AxisStage):
+    if isinstance(stage, AxisStage | OpenStage):
         parameters = tuple(AxisParameter(p.name, "", True, p.sigma) for p in found.model.constants)
         axis = identified_axis(machine.axes[stage.letter], parameters, theta)
         return machine.model_copy(update={"axes": dict(machine.axes) | {stage.letter: axis}})
@@ -63,11 +64,16 @@ def constant_deviations(machine: MachineFile, stage: Stage, found: Fitted) -> di
     variances = np.diag(found.covariance)
     told = {}
     for free, variance, known in zip(found.model.constants, variances, found.known, strict=False):
-        path = axis_constant_path(machine, stage.letter, free.name) if isinstance(stage, AxisStage) else free.name
+        path = constant_path(machine, stage, free.name)
         deviation = _shown(float(np.sqrt(max(variance, 0.0))))  # θ is the logarithm of a factor
         if known >= KNOWN_MIN and 0.0 < deviation < np.inf:
             told[path] = deviation
     return told
+
+
+def constant_path(machine: MachineFile, stage: Stage, name: str) -> str:
+    """Return the path in machine.toml of a free constant of a stage."""
+    return axis_constant_path(machine, stage.letter, name) if isinstance(stage, AxisStage | OpenStage) else name
 
 
 def cause_deviations(cause: Cause) -> dict[str, float]:

@@ -10,6 +10,7 @@ from twin.gap.score import gap_of, squares_of, unit_of
 from twin.gap.stages.plan import ground_of
 from twin.gap.stages.shown import shown_by_run
 from twin.machine import MachineFile
+from twin.rotary import outside_names
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,5 +40,8 @@ def score_of(machine: MachineFile, case: Case) -> Score:
     squares = squares_of(ground.runs, shown_by_run(ground.machine, ground.runs, ground.floors), ground.floors)
     if not squares:
         raise CaseError(f"{case.name}: no run records a signal that {machine.machine.name} answers with")
-    by_signal = {s: SignalScore(v.rms(), v.floor(), unit_of(s)) for s, v in squares.items()}
+    by_signal = {}
+    for signal, found in squares.items():
+        own = outside_names(signal, machine.rotary)
+        by_signal[own] = SignalScore(found.rms(), found.floor(), unit_of(own))
     return Score(gap_of(squares), by_signal)

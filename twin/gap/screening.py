@@ -50,7 +50,8 @@ def guesses(stage: Stage, parent: Fitted, effected: Effected, slopes: list[Float
     """Where to start the parameters of an effect, best first.
 
     Each linear parameter is tried at the size that machines show, with the sensitivities of the parent projected out; angles by a
-    pair of signatures a quarter of a turn apart; shapes, and what is infinite where there is no effect, over a grid.
+    pair of signatures a quarter of a turn apart; shapes, and what is infinite where there is no effect, over a grid. A size that
+    the recordings suggest is started from as it is, and counts with the part of it that fits best.
     """
     free = effect_parameters(effect_named(effected.effect))
     suggested = stage.first_guesses(effected)
@@ -65,7 +66,7 @@ def guesses(stage: Stage, parent: Fitted, effected: Effected, slopes: list[Float
     model = parent.model.with_effect(effected)
     residual, signature = _signatures(stage, model, np.concatenate([bare, theta]), slopes, parent)
     low, high = (np.array([getattr(p, key) for p in free]) for key in ("low", "high"))
-    found = []
+    found: list[tuple[float, Guess]] = []
     for first in range(0, len(own), together):
         columns, guess = signature[:, first : first + together], theta[first].copy()
         amplitude: Floats = np.ones(together)
@@ -76,8 +77,14 @@ def guesses(stage: Stage, parent: Fitted, effected: Effected, slopes: list[Float
             _place(guess, amplitude, offset, linear, angle, theta[first : first + together])
         left = residual - columns @ amplitude
         guess[offset:] = np.clip(guess[offset:], low, high)
-        found.append(Guess(effected, guess, 1.0 - float(np.sum(left**2) / max(np.sum(residual**2), 1e-12))))
-    return tuple(sorted(found, key=lambda g: -g.closes))
+        energy = max(float(np.sum(residual**2)), 1e-12)
+        closes = as_it_is = 1.0 - float(np.sum(left**2)) / energy
+        if suggested:
+            along, across = float(columns[:, 0] @ residual), float(columns[:, 0] @ columns[:, 0])
+            part = min(max(along, 0.0) / max(across, 1e-300), 1.0)
+            closes = part * (2.0 * along - part * across) / energy
+        found.append((as_it_is, Guess(effected, guess, closes)))
+    return tuple(guess for _, guess in sorted(found, key=lambda one: -one[0]))
 
 
 def _probes(shape: Floats, free: tuple[Free, ...], linear: list[int], angle: int | None) -> Floats:

@@ -8,7 +8,7 @@ A candidate is accepted where it beats its parent on the judging runs by more si
 on healthy machines (`twin.gap.null`).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -20,6 +20,10 @@ from twin.effects.effect import On
 from twin.gap.diagnosis import Effected
 from twin.gap.evidence import Advantage, advantage
 from twin.gap.fitting import Fitted, fitted, settled
+from twin.gap.naming.certain import certain_of, dropped, only
+from twin.gap.naming.instead import instead_of_constants
+from twin.gap.naming.moved import has_to_be_beyond
+from twin.gap.naming.siblings import only_completes
 from twin.gap.null import NULL, Null
 from twin.gap.screening import Guess, guesses, sensitivities
 from twin.gap.stages.stage import Model, Stage
@@ -36,6 +40,7 @@ THETA_NULL = 1e-4
 """θ below which an effect is null: the fit has taken it away."""
 PAIR_GAP = 3.0
 PAIRS_OF = 6
+CHANCE_BLOCKS = 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,6 +59,8 @@ class Explained:
 
     base: the machine with its constants refitted; best: with the accepted effects; tried: in the first round, best first
     rivals: effect → what cannot be told from it; evidence: effect → its advantage over the same without it
+    beyond: constants of the base have to be further from what is stated than two deviations, and no effect puts them back
+    alike: what the remainder partly looks like: effects that were accepted and are not certain (`twin.gap.naming.certain`)
     """
 
     stage: Stage
@@ -62,10 +69,14 @@ class Explained:
     tried: tuple[Tried, ...]
     rivals: dict[Effected, tuple[Effected, ...]]
     evidence: dict[Effected, Advantage]
+    beyond: bool = False
+    alike: tuple[Effected, ...] = ()
 
 
-def explain(stage: Stage, *, null: Null = NULL, progress: Callable[[str], None] = lambda _: None) -> Explained:
-    """The effects in a stage."""
+def explain(
+    stage: Stage, *, null: Null = NULL, progress: Callable[[str], None] = lambda _: None, doubtful: bool = False
+) -> Explained:
+    """The effects in a stage. doubtful: with those that are not certain beside what is left"""
     bare = Model(stage.constants, ())
     base = settled(stage, fitted(stage, bare, bare.null_theta()))
     best, first = base, tuple[Tried, ...]()
@@ -85,13 +96,37 @@ def explain(stage: Stage, *, null: Null = NULL, progress: Callable[[str], None] 
             continue
         chosen, equals = _chosen(accepted)
         assert chosen.found is not None
+        settled_with = settled(stage, chosen.found, rounds=1)
+        if best.effects and _is_a_second_name(base, best, settled_with, first):
+            break
         rivals[chosen.effected] = equals
-        best = _pruned(stage, settled(stage, chosen.found, rounds=1), null)
+        best = _pruned(stage, settled_with, null)
         if len(best.effects) > 1:
             best = _swapped(stage, best, first)
+    beyond = not best.effects and has_to_be_beyond(stage, base)
+    if beyond and (instead := instead_of_constants(stage, base, [t.found for t in first if t.found is not None])):
+        best, beyond = instead[0], False
+        rivals[best.effects[0]] = tuple(other.effects[0] for other in instead[1:])
+    best, alike = (best, ()) if doubtful else with_certain(stage, base, best, null)
     several = len(best.effects) > 1
-    evidence = {e: advantage(_dropped(stage, best, e).left if several else base.left, best.left) for e in best.effects}
-    return Explained(stage, base, best, first, {e: r for e, r in rivals.items() if e in best.effects}, evidence)
+    evidence = {e: advantage(dropped(stage, best, e).left if several else base.left, best.left) for e in best.effects}
+    # what was found beside an effect is no rival of it
+    others = {e: tuple(r for r in rivals[e] if r not in best.effects) for e in best.effects if e in rivals}
+    return Explained(stage, base, best, first, others, evidence, beyond, alike)
+
+
+def with_certain(stage: Stage, base: Fitted, best: Fitted, null: Null = NULL) -> tuple[Fitted, tuple[Effected, ...]]:
+    """Return the hypothesis with those of its effects that may be named beside what is left, and the others."""
+    if not best.effects or not leaves_a_gap(stage, best):
+        return best, ()
+    certain = certain_of(stage, base, best, null)
+    alike = tuple(e for e in best.effects if e not in certain)
+    return (only(stage, base, best, certain) if alike else best), alike
+
+
+def leaves_a_gap(stage: Stage, found: Fitted) -> bool:
+    """Return True where a hypothesis leaves more than a healthy twin does, but for the worst blocks: those are chance."""
+    return bool((found.left.rms_but_worst(CHANCE_BLOCKS) > stage.healthy_rms).any())
 
 
 def _gap_left(best: Fitted, null: Null) -> bool:
@@ -108,7 +143,15 @@ def _is_not_null(found: Fitted, effected: Effected) -> bool:
     """Return True unless the fit ended where the effect is nothing."""
     place = dict(found.model.places())[effected]
     sizes = [i for i in range(place.start, place.stop) if not (found.model.free[i].is_shape or found.model.free[i].is_angle)]
-    return bool((np.abs(found.theta[sizes]) > THETA_NULL).any())
+    moved = bool((np.abs(found.theta[sizes]) > THETA_NULL).any())
+    return moved and not is_nothing(effected, found.values[effected])
+
+
+def is_nothing(effected: Effected, values: Mapping[str, float]) -> bool:
+    """Return True where a fit ended at nothing: at the null value, or stiffer than the effect's file calls finite."""
+    effect = effect_named(effected.effect)
+    stiff = {p.name for p in effect.parameters if p.null is not None and np.isinf(p.null)}
+    return effect.is_null(values) or any(values[p.name] > p.high for p in effect.parameters if p.name in stiff)
 
 
 def _tried(stage: Stage, parent: Fitted, candidates: tuple[Effected, ...], null: Null) -> tuple[Tried, ...]:
@@ -211,18 +254,16 @@ def _swapped(stage: Stage, best: Fitted, first: tuple[Tried, ...]) -> Fitted:
 def _pruned(stage: Stage, best: Fitted, null: Null) -> Fitted:
     """Without the effects that the others have made needless."""
     for effected in best.effects[:-1]:
-        without = _dropped(stage, best, effected)
+        without = dropped(stage, best, effected)
         if not null.exceeded(effected, advantage(without.left, best.left), stage.healthy_rms):
             best = without
     return best
 
 
-def _dropped(stage: Stage, best: Fitted, effected: Effected) -> Fitted:
-    """The hypothesis without one of its effects, refitted."""
-    place = dict(best.model.places())[effected]
-    theta = np.delete(best.theta, np.arange(place.start, place.stop))
-    scale = np.maximum(best.left_fit.rms(), 1.0)
-    return fitted(stage, best.model.without(effected), theta, scale=scale, steps_max=STEPS_MAX)
+def _is_a_second_name(base: Fitted, before: Fitted, best: Fitted, first: tuple[Tried, ...]) -> bool:
+    """Return True where the effect that came last is a second name for what the others explain."""
+    alone = next((t.found for t in first if t.effected == best.effects[-1] and t.found is not None), None)
+    return alone is not None and only_completes(base.left, before.left, alone.left, best.left)
 
 
 def without(explained: Explained) -> Explained:

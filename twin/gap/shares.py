@@ -6,19 +6,18 @@ share_i = Σ_S |S|! (n − |S| − 1)! / n! · (closed(S ∪ i) − closed(S))
 from collections.abc import Callable
 from itertools import combinations
 from math import factorial
+from typing import TypeVar
 
-from twin.gap.diagnosis import Effected
-
+Part = TypeVar("Part")
 EXACT_MAX = 4
 
 
-def shapley(causes: tuple[Effected, ...], closed: Callable[[frozenset[Effected]], float]) -> dict[Effected, float]:
+def shapley(causes: tuple[Part, ...], closed: Callable[[frozenset[Part]], float]) -> dict[Part, float]:
     """Share of each cause; above EXACT_MAX of them by leaving one out, scaled to the whole.
 
     closed: what a set of causes closes, 0 for none
 
-    >>> gravity, play = Effected("gravity", "z"), Effected("backlash", "x")
-    >>> shapley((gravity, play), lambda s: 0.6 * (gravity in s) + 0.3 * (play in s))[gravity].__round__(6)
+    >>> shapley(("gravity", "play"), lambda s: 0.6 * ("gravity" in s) + 0.3 * ("play" in s))["gravity"].__round__(6)
     0.6
     """
     whole, count = frozenset(causes), len(causes)

@@ -15,6 +15,29 @@ SIGNAL_WORDS = {
     "feed_mm_min": "the feed",
     "vibration_rms_g": "the vibration",
 }
+CONSTANT_WORDS = {
+    "mass_kg": "mass",
+    "inertia_kg_m2": "inertia",
+    "torque_constant_nm_per_a": "torque constant",
+    "force_per_command_n": "force per command",
+    "torque_per_command_nm": "torque per command",
+    "coulomb_n": "Coulomb friction",
+    "coulomb_nm": "Coulomb friction",
+    "static_n": "breakaway friction",
+    "static_nm": "breakaway friction",
+    "stribeck_velocity_mm_s": "Stribeck velocity",
+    "stribeck_velocity_deg_s": "Stribeck velocity",
+    "viscous_n_s_per_mm": "viscous friction",
+    "viscous_nm_s_per_deg": "viscous friction",
+    "tangential_coefficient_n_per_mm2": "cutting coefficient K_t",
+    "radial_ratio": "ratio of radial to tangential force",
+    "efficiency": "efficiency of the spindle drive",
+    "idle_power_kw": "idle power of the spindle",
+    "alpha_w_per_pct_rpm2": "heat by load of the spindle",
+    "beta_w_per_rpm": "heat by speed of the spindle",
+    "resistance_k_per_w": "thermal resistance",
+    "capacity_j_per_k": "heat capacity",
+}
 REGIME_WORDS = {
     "rest": "at standstill",
     "reversal": "at reversals",
@@ -48,6 +71,17 @@ def signal_words(signal: str) -> str:
 def regime_words(regime: str) -> str:
     """A regime in words that go after those of a signal."""
     return REGIME_WORDS.get(regime, f"in {regime}")
+
+
+def constant_words(path: str) -> str:
+    """A constant of the machine, by its path in machine.toml, in words.
+
+    >>> constant_words("axes.y.mass_kg"), constant_words("thermal.resistance_k_per_w")
+    ('the mass of Y', 'the thermal resistance')
+    """
+    keys = path.split(".")
+    words = CONSTANT_WORDS.get(keys[-1], f"{keys[-1].replace('_', ' ')} in [{'.'.join(keys[:-1])}]")
+    return f"the {words}{f' of {keys[1].upper()}' if keys[0] == 'axes' and len(keys) > 1 else ''}"
 
 
 def group_of(signal: str) -> str:

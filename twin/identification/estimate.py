@@ -1,9 +1,12 @@
 """An estimate: a figure, its interval, and whether the recordings can know it."""
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from twin.rotary import outside_name, outside_path, outside_unit
 
 Floats = NDArray[np.float64]
 INTERVAL_Z = 1.959963984540054
@@ -31,6 +34,21 @@ class Estimate:
     def identifiable(self) -> bool:
         """Return True where the recordings say more about it than was known before."""
         return self.known_by > 0.5
+
+    def in_own_units(self, rotary: Collection[str]) -> "Estimate":
+        """Return it in degrees and N m where it is of one of the rotary axes.
+
+        >>> estimate = Estimate("axes.b.friction.viscous_n_s_per_mm", 2.0, 1.9, 2.1, "N·s/mm", 2.0).in_own_units({"b"})
+        >>> estimate.path, round(estimate.value, 4), estimate.unit
+        ('axes.b.friction.viscous_nm_s_per_deg', 0.1146, 'N m s/deg')
+        """
+        path = outside_path(self.path, rotary)
+        if path == self.path:
+            return self
+        factor = outside_name(self.path)[1]
+        value, low, high = (figure / factor for figure in (self.value, self.low, self.high))
+        stated = None if self.stated is None else self.stated / factor
+        return Estimate(path, value, low, high, outside_unit(self.unit)[0], stated, self.known_by)
 
     def sentence(self) -> str:
         """In words.

@@ -5,7 +5,7 @@ the heat; none needs anything of those after it.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from twin.identification.cutting_fit import fit_cutting, fit_spindle, force_of, 
 from twin.identification.estimate import INTERVAL_Z, Estimate
 from twin.identification.thermal_fit import NAMES, WarmingRun, fit_thermal, with_thermal
 from twin.machine import MachineFile
+from twin.rotary import outside_names, outside_text
 from twin.simulator.recorded import noise_of, told_of
 from twin.simulator.response import milling_of
 
@@ -77,7 +78,20 @@ def identify(case: Case, *, free_gains: bool = False, progress: Progress = lambd
     progress("checking")
     judged = case.of(role="check") or fits
     gaps = free_run_gap(machine, judged, case.repeats())
-    return Identification(machine, tuple(known), tuple(unknown), tuple(notes), gaps, _misfits(judged, gaps))
+    found = Identification(machine, tuple(known), tuple(unknown), tuple(notes), gaps, _misfits(judged, gaps))
+    return in_own_units(found) if machine.rotary else found
+
+
+def in_own_units(found: Identification) -> Identification:
+    """Return what was identified with the rotary axes of the machine in degrees and N m (`twin.rotary`)."""
+    rotary = found.machine.rotary
+    others = frozenset(found.machine.axes) - rotary
+    unknown, notes, misfits = (
+        tuple(outside_text(text, rotary, others) for text in part) for part in (found.unknown, found.notes, found.misfits)
+    )
+    estimates = tuple(estimate.in_own_units(rotary) for estimate in found.estimates)
+    gaps = tuple(replace(row, signal=outside_names(row.signal, rotary)) for row in found.gaps)
+    return Identification(found.machine, estimates, unknown, notes, gaps, misfits)
 
 
 def _misfits(runs: tuple[Run, ...], gaps: tuple[GapRow, ...]) -> tuple[str, ...]:

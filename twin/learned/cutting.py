@@ -21,11 +21,14 @@ from twin.process.milling import Milling, MillingForce, milling_force
 
 Floats = NDArray[np.float64]
 COEFFICIENT = "tangential_coefficient_n_per_mm2"
+KNOWN = ("chip_mm", "axial_depth_mm")
+"""Arguments that a cut tells whatever its speed, place and time."""
+ANGLES_BY_TOOTH = 48
 FORCES = ("force_x_n", "force_y_n", "mean_force_x_n", "mean_force_y_n", "mean_tangential_n")
 
 
 def cut_arguments(milling: Milling, teeth: int) -> dict[str, Floats]:
-    """Return the arguments that a cut tells, (ticks,): its chip is the mean of the teeth that are in the cut at the tick.
+    """Return the arguments that a cut tells, as its signals are shaped; its chip is the mean of the teeth that cut at the tick.
 
     One tooth of a slot in the middle of its arc, at 0.1 mm a tooth:
 
@@ -38,7 +41,7 @@ def cut_arguments(milling: Milling, teeth: int) -> dict[str, Floats]:
     advance = np.where(rpm > 0.0, 60.0 * speed / (teeth * np.maximum(rpm, 1e-9)), 0.0)
     heading = np.arctan2(milling.velocity_y_mm_s, milling.velocity_x_mm_s)
     entry, leaving = np.nan_to_num(milling.entry_angle_rad), np.nan_to_num(milling.exit_angle_rad)
-    thickness, engaged = np.zeros(len(rpm)), np.zeros(len(rpm))
+    thickness, engaged = np.zeros(rpm.shape), np.zeros(rpm.shape)
     for tooth in range(teeth):
         angle = milling.spindle_angle_rad + 2.0 * np.pi * tooth / teeth - heading
         cuts = (np.mod(angle - entry, 2.0 * np.pi) <= leaving - entry) & is_cutting(milling)
@@ -53,7 +56,7 @@ def cut_arguments(milling: Milling, teeth: int) -> dict[str, Floats]:
 
 
 def is_cutting(milling: Milling) -> NDArray[np.bool_]:
-    """Return True at the ticks at which a tooth can cut, (ticks,)."""
+    """Return True at the ticks at which a tooth can cut, as its signals are shaped."""
     return np.asarray((np.nan_to_num(milling.axial_depth_mm) > 0.0) & (np.nan_to_num(milling.spindle_rpm) > 0.0))
 
 
@@ -99,3 +102,31 @@ def milling_with_terms(
             force, **{name: getattr(force, name) + push for name in (f"force_{direction}_n", f"mean_force_{direction}_n")}
         )
     return force
+
+
+def sampled_forces(
+    terms: Sequence[Term],
+    cuts: Floats,
+    advance_mm: Floats,
+    teeth: int,
+    constants: Mapping[str, ArrayLike],
+    effects: tuple[str, ...],
+) -> tuple[tuple[Floats, Floats], tuple[Floats, Floats]]:
+    """Return greatest resultant and mean tangential force over a turn, (cuts,) each, with terms of the cut and without them.
+
+    cuts: depth, entry and exit, (3, cuts); advance_mm: in a tooth period, (cuts,); terms: over `KNOWN` alone
+    """
+    angles = ANGLES_BY_TOOTH * teeth
+    shape = (cuts.shape[1], angles)
+    turn = np.broadcast_to(2.0 * np.pi * np.arange(angles) / angles, shape)
+    depth, entry, leaving, advance = (np.broadcast_to(row[:, None], shape) for row in (*cuts, advance_mm))
+    # a turn a second, so that the speed is what is cut in one
+    motion = Milling(turn, np.full(shape, 60.0), advance * teeth, np.zeros(shape), depth, entry, leaving)
+    series = cut_series(terms, cut_arguments(motion, teeth) | {"time_since_start_s": np.zeros(shape)})
+    options = {"period_s": 1.0 / angles, "effects": effects}
+    with_terms, without = (_sizes(milling_with_terms(constants, teeth, motion, own, **options)) for own in (series, {}))
+    return with_terms, without
+
+
+def _sizes(force: MillingForce) -> tuple[Floats, Floats]:
+    return np.hypot(force.force_x_n, force.force_y_n).max(axis=1), force.mean_tangential_n.mean(axis=1)

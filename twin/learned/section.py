@@ -57,8 +57,9 @@ class LearnedSection(BaseModel):
         if self.depends_on and set(self.depends_on) != {word_of(column) for column in arguments}:
             said, over = ", ".join(self.depends_on), ", ".join(arguments)
             raise ValueError(f"the learned term at {self} says that it depends on {said}; its table is over {over}")
-        if self.unit and self.unit not in UNITS[self.site]:
-            raise ValueError(f"the learned term at {self} is in {self.unit}; a term there is in {' or '.join(UNITS[self.site])}")
+        right = (unit_at(self.site, self.on),) if self.site is LearnedSite.CUT_FORCE else UNITS[self.site]
+        if self.unit and self.unit not in right:
+            raise ValueError(f"the learned term at {self} is in {self.unit}; a term there is in {' or '.join(right)}")
         return self
 
     def __str__(self) -> str:

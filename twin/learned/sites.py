@@ -36,11 +36,11 @@ MACHINE_READINGS = {
 AXIS_SITES = (LearnedSite.CONTROLLER, LearnedSite.AXIS_FORCE, LearnedSite.FRICTION, LearnedSite.TABLE_POSITION)
 UNITS = {
     LearnedSite.CONTROLLER: ("A",),
-    LearnedSite.AXIS_FORCE: ("N", "N m"),
-    LearnedSite.FRICTION: ("N", "N m"),
-    LearnedSite.TABLE_POSITION: ("mm", "deg"),
-    LearnedSite.POSITION_READING: ("mm", "deg"),
-    LearnedSite.TABLE_READING: ("mm", "deg"),
+    LearnedSite.AXIS_FORCE: ("N",),
+    LearnedSite.FRICTION: ("N",),
+    LearnedSite.TABLE_POSITION: ("mm",),
+    LearnedSite.POSITION_READING: ("mm",),
+    LearnedSite.TABLE_READING: ("mm",),
     LearnedSite.TORQUE_READING: ("A",),
     LearnedSite.CUT_FORCE: ("N/mm²", "N"),
     LearnedSite.FORCE_READING: ("N",),
@@ -50,7 +50,7 @@ UNITS = {
     LearnedSite.TEMPERATURE_READING: ("°C", "K"),
     LearnedSite.PROGRAM_TIME: ("s",),
 }
-"""Site → its unit, and the other one that a rotary axis has."""
+"""Site → its units; of the cut the second one where it is a force in one direction. Those of rotary axes: `twin.rotary`."""
 DIRECTIONS = ("x", "y")
 
 

@@ -7,14 +7,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.errors import EffectError
+from twin.learned.arguments import motion_arguments
 from twin.learned.section import LearnedSection
-from twin.learned.sites import MACHINE_QUANTITIES, MACHINE_READINGS, QUANTITIES, READINGS, check_place
+from twin.learned.sites import AXIS_SITES, MACHINE_QUANTITIES, MACHINE_READINGS, QUANTITIES, READINGS, check_place
 from twin.learned.term import Term
-from twin.learned.words import LearnedSite
+from twin.learned.words import OF_AXIS, LearnedSite
 
 Floats = NDArray[np.float64]
 Arguments = Mapping[str, Floats]
 Answer = TypeVar("Answer")
+SINCE = "time_since_start_s"
 PASSES_MAX = 24
 SETTLED = 1e-4
 """Change of a series, over its largest value, below which it is the same."""
@@ -30,6 +32,20 @@ def axis_terms(sections: Sequence[LearnedSection], letter: str) -> tuple[Term, .
     """Return the terms on an axis and on what its sensors read."""
     found = terms_at(sections, {*QUANTITIES, *READINGS})
     return tuple(term for term in found if term.on.partition("_")[0] == letter)
+
+
+def on_axes(sections: Sequence[LearnedSection], axes: Collection[str]) -> tuple[LearnedSection, ...]:
+    """Return the learned terms of a machine with no more axes than these: on them, or on the machine as a whole."""
+    of_axis = {*AXIS_SITES, *READINGS}
+    return tuple(s for s in sections if s.site not in of_axis or s.on.partition("_")[0] in axes)
+
+
+def moved_by(sections: Sequence[LearnedSection], axes: Collection[str]) -> tuple[LearnedSection, ...]:
+    """Return those of `on_axes` that the motion of these axes alone decides; terms of spindle and heat stay."""
+    told = {*motion_arguments(np.zeros(1), np.zeros(1)), "torque_a", "coolant_on"}
+    told |= {f"{letter}_{column}" for letter in axes for column in OF_AXIS}
+    of_axis = {*AXIS_SITES, *READINGS}
+    return tuple(s for s in on_axes(sections, axes) if s.site not in of_axis or set(s.arguments) <= told)
 
 
 def added_series(terms: Sequence[Term], arguments: Arguments) -> dict[str, Floats]:
@@ -80,9 +96,17 @@ def check_terms(sections: Sequence[LearnedSection], axes: Iterable[str]) -> None
     letters = tuple(axes)
     for section in sections:
         check_place(section.site, section.on, letters)
+        if section.site is LearnedSite.PROGRAM_TIME and not section.is_recording and section.arguments != (SINCE,):
+            raise EffectError(f"the learned term at {section} is over {', '.join(section.arguments)}; it has to be over {SINCE}")
         own = (section.site, section.on, frozenset(section.arguments))
         if own in seen:
             raise EffectError(
                 f"the learned term at {section} over {', '.join(section.arguments)} is there twice; add the tables up"
             )
         seen.add(own)
+
+
+def seconds_of(sections: Sequence[LearnedSection], planned_s: float) -> float:
+    """Return the seconds that the learned terms add to a program, by what it takes without them."""
+    terms = terms_at(sections, (LearnedSite.PROGRAM_TIME,))
+    return float(sum(term.at({SINCE: np.array([planned_s])})[0] for term in terms))

@@ -36,7 +36,7 @@ class Term:
         return tuple(dict.fromkeys(word_of(column) for column in self.knots.columns))
 
     def at(self, arguments: Mapping[str, Floats]) -> Floats:
-        """Return its series at the arguments, column → (n,); (n,).
+        """Return its series at the arguments, column → arrays of one shape; of that shape.
 
         Raises EffectError where an argument is not known.
         """
@@ -44,7 +44,9 @@ class Term:
             if column not in arguments:
                 on = f" on {self.on}" if self.on else ""
                 raise EffectError(f"the learned term at {self.site.value}{on} needs {column}, which this run has not got there")
-        return np.asarray(self.knots.interpolated(self.value[None, :], arguments)[0])
+        shape = np.shape(arguments[self.knots.columns[0]])
+        flat = {column: np.ravel(arguments[column]) for column in self.knots.columns}
+        return np.asarray(self.knots.interpolated(self.value[None, :], flat)[0].reshape(shape))
 
     def table(self) -> dict[str, tuple[float, ...]]:
         """Return it as columns of one length, a knot a row: the arguments, then value, low, high.

@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 
 from twin.effects.catalogue import effect_named
 from twin.errors import MachineError
+from twin.learned.standing import terms_at
+from twin.learned.words import LearnedSite
 from twin.machine import Limits, MachineFile, Tool
 from twin.optimisation.answer import Binds
 from twin.optimisation.forces import ADVANCE_MAX_MM, CutForces, advance_at
@@ -235,7 +237,7 @@ def _spans(program: Programmed, line: FeedLine, limits: Limits) -> tuple[tuple[S
             return (), f"no speed of the spindle gives {asked} m/min on {tool.diameter_mm:g} mm"
     spans: tuple[Span, ...] = ((low, high),)
     if tool.modes:
-        hardness, cuts = _hardness(program.machine), program.cuts
+        hardness, cuts = _hardness(program.machine, tool), program.cuts
         arcs = np.round(np.column_stack([cuts.entry_angle_rad, cuts.exit_angle_rad, cuts.heading_rad]), 2)[slice(*line.cuts)]
         for entry, leaving, heading in np.unique(arcs, axis=0).tolist():
             same = (arcs == (entry, leaving, heading)).all(axis=1)
@@ -256,10 +258,12 @@ def _stable(
     return stable_speeds(tool.modes, cut, depth_mm * (1.0 if steady else INTERRUPTED), low, high)
 
 
-def _hardness(machine: MachineFile) -> float:
-    """K_t over the stated one, where the diagnosis found another material."""
+def _hardness(machine: MachineFile, tool: Tool) -> float:
+    """K_t over the stated one, where the diagnosis found another material; the greatest that learned terms make it."""
+    learned = terms_at(machine.learned, (LearnedSite.CUT_FORCE,), "")
+    more = sum(max(float(term.value.max()), 0.0) for term in learned) / tool.tangential_coefficient_n_per_mm2
     factors = ((e, effect_named(e.effect).multiplies.get("tangential_coefficient_n_per_mm2")) for e in machine.effects)
-    return math.prod(added.parameters.get(factor, 1.0) for added, factor in factors if factor)
+    return (1.0 + more) * math.prod(added.parameters.get(factor, 1.0) for added, factor in factors if factor)
 
 
 def _too_much(

@@ -9,6 +9,7 @@ from twin.optimisation.allowed import limits_of
 from twin.optimisation.answer import Bound, FrontPoint, LineAnswer, Objective, Optimised, Resimulated, Search, Totals
 from twin.optimisation.bound import bound_of
 from twin.optimisation.forces import CutForces
+from twin.optimisation.learned_forces import learned_notes
 from twin.optimisation.margin import margin
 from twin.optimisation.problem import Problem
 from twin.optimisation.question import Question, problem, single
@@ -172,6 +173,7 @@ def _notes(made: Problem, question: Question, path: Path, value: float) -> tuple
         notes.append("no limit of the chip: look at the greatest one, or write chip_mm in [limits]")
     if any(tool.modes for _, tool in made.program.tools):
         notes.append("chatter by zero order: where teeth cut one by one a pocket can hold less than it promises; try it before")
+    notes += learned_notes(made.program.machine)
     if question.planned is not None:
         notes.append("what the lines cut is taken from a run log")
     if limits_of(made.program.machine, question.force_limit_n).force_n is None:

@@ -2,7 +2,7 @@
 
 Nothing else of feed and speed goes into the force (formats, section 4), so a limit of force is a limit of c: c_max, from which
 the feed at any speed n is c_max · N · n. Nominally the force is c times a figure, and c_max is exact; with an edge force or a
-size effect it is the root of a growing function, found to 1e-12.
+size effect it is the root of a growing function, found to 1e-12. What the learned terms of a machine make of it is sampled.
 """
 
 from collections.abc import Callable, Mapping
@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from twin.effects.added import added_effects
 from twin.effects.catalogue import effect_named
 from twin.machine import Tool
+from twin.optimisation.learned_forces import LearnedForces
 from twin.optimisation.program import Cuts, Programmed
 from twin.process.kernel import process_quantities
 from twin.process.milling import Milling, milling_force, peak_force, tool_constants
@@ -30,7 +31,7 @@ ADVANCE_MAX_MM = 1e3
 class CutForces:
     """The cuts of a program with the tools that make them. Advances c are mm a tooth period, (cuts,) or a number.
 
-    numbers: where each tool is described: `tool`, or `tools.7`
+    numbers: where each tool is described: `tool`, or `tools.7`; learned: what the learned terms of the machine make of them
     """
 
     cuts: Cuts
@@ -39,6 +40,7 @@ class CutForces:
     tool_of_cut: Ints
     effects: tuple[str, ...]
     effect_constants: Mapping[str, float] = field(default_factory=dict)
+    learned: LearnedForces | None = None
 
     @classmethod
     def of(cls, program: Programmed) -> "CutForces":
@@ -47,7 +49,10 @@ class CutForces:
         constants = {f"{e}__{k}": v for e, given in added.items() for k, v in effect_named(e).checked(given).items()}
         tool = np.array([program.lines[int(line)].tool for line in program.cuts.line], dtype=np.int64)
         named = tuple(f"tools.{n}" if str(n) in program.machine.tools else "tool" for n, _ in program.tools)
-        return cls(program.cuts, tuple(tool for _, tool in program.tools), named, tool, tuple(added), constants)
+        tools, cuts = tuple(tool for _, tool in program.tools), program.cuts
+        rows = np.array([cuts.axial_depth_mm, cuts.entry_angle_rad, cuts.exit_angle_rad])
+        learned = LearnedForces.of(program.machine.learned, rows, tools, tool, tuple(added), constants)
+        return cls(cuts, tools, named, tool, tuple(added), constants, learned)
 
     @property
     def teeth(self) -> Ints:
@@ -73,7 +78,7 @@ class CutForces:
                 constants: dict[str, ArrayLike] = {**tool_constants(tool), **self.effect_constants}
                 cuts = np.tile(chosen[mine], len(advance_mm))
                 out[:, mine] = self._peak(tool, constants, cuts, advance_mm[:, mine].ravel())[0].reshape(len(advance_mm), -1)
-        return out
+        return out if self.learned is None else self.learned.peaks_n(chosen, advance_mm, out)
 
     def tangential_n(self, advance_mm: ArrayLike, chosen: Ints | None = None) -> Floats:
         """Mean over a turn of the tangential force of all teeth, of all cuts or of the chosen ones."""
@@ -84,7 +89,7 @@ class CutForces:
             mine = np.flatnonzero(self.tool_of_cut[rows] == index)
             if len(mine):
                 out[mine] = self._tangential_of_tool(tool, rows[mine], advance[mine])
-        return out
+        return out if self.learned is None else self.learned.tangential_n(rows, advance, out)
 
     def chip_ratio(self) -> Floats:
         """Greatest chip thickness over c: 1 where the arc goes through the middle, else the larger sine of its ends, (cuts,)."""
@@ -108,7 +113,7 @@ class CutForces:
                     if name in constants and where in ("", self.numbers[index]):
                         constants[name] = np.asarray(constants[name]) * factor
                 out[:, mine] = self._peak(tool, constants, chosen[mine], advance_mm[mine])
-        return out
+        return out if self.learned is None else self.learned.peaks_n(chosen, advance_mm, out)
 
     def _peak(self, tool: Tool, constants: Mapping[str, ArrayLike], mine: Ints, advance: Floats) -> Floats:
         cuts, feed = self.cuts, advance * tool.teeth * RPM

@@ -1,4 +1,4 @@
-"""A sensor: what it reads of what is. Nominally the same, at once.
+"""A sensor: its reading of a value. Nominally the value itself, at once.
 
 A series is read sample by sample, in the same woven text for all signals; samples that are not there stay away.
 """
@@ -21,23 +21,48 @@ Floats = NDArray[np.float64]
 
 
 class Reading(NamedTuple):
-    """The reading of the sensor."""
+    """The reading of the sensor, and the age, s, of the value that it reads."""
 
     reading: float
+    age_s: float
 
 
-def sense(value: float) -> Reading:
+def earlier(values: Floats, since: Floats, sample: int, age_s: float) -> float:
+    """Return the value of `age_s` before a sample, between those that there are; before the first one, that.
+
+    >>> earlier(np.array([0.0, 1.0, 3.0]), np.array([0.0, 0.1, 0.1]), 2, 0.05)
+    2.0
+    """
+    right: float = values[sample]
+    near_s = 0.0
+    far_s = 0.0
+    while sample > 0 and near_s < age_s:
+        far_s += since[sample]
+        sample -= 1
+        left = values[sample]
+        if abs(left) >= 0.0:  # a number
+            if far_s >= age_s:
+                right = right + (left - right) * (age_s - near_s) / (far_s - near_s)
+                break
+            right = left
+            near_s = far_s
+    return right
+
+
+def sense(values: Floats, since: Floats, sample: int) -> Reading:
     """One sample.
 
-    >>> sense(21.5).reading
+    >>> sense(np.array([21.5]), np.array([0.0]), 0).reading
     21.5
     """
+    age_s = at(Site.SENSOR, 0.0)
+    value = earlier(values, since, sample, age_s)
     reading = at(Site.SENSOR, value)
-    return Reading(reading)
+    return Reading(reading, age_s)
 
 
 SENSOR = Assembly((sense,), acts_on="a sensor", owner="a sensor")
-FED = ("value", "is_first", "since_s", "temperature_rise_k")
+FED = ("values", "since", "sample", "is_first", "since_s", "temperature_rise_k")
 
 
 def sensor_quantities() -> dict[str, str]:
@@ -54,7 +79,8 @@ def readings(
 ) -> Floats:
     """Return the sensor's readings of `values`, (n,), NaN where there is no sample.
 
-    since_s: (n,) s since the sample before, 0 for the first; effects: name → parameters, as put on this signal
+    since_s: (n,) s since the sample before, 0 for the first; infinite where what came before is forgotten
+    effects: name → parameters, as put on this signal
     temperature_rise_k: (n,) of the machine since the start; needed by what grows with it
 
     Raises EffectError where an effect is none of a sensor, or a rise is needed and not known.
@@ -86,9 +112,8 @@ def _kernel(effects: tuple[Effect, ...]) -> tuple[str, tuple[str, ...]]:
         "    first = True",
         *(f"    {line}" for line in [*scalars.before_loop(), *scalars.states_at_start()]),
         "    for sample in range(len(values)):",
-        "        value = values[sample]",
-        "        if value != value:",
-        "            out[sample] = value",
+        "        if values[sample] != values[sample]:",
+        "            out[sample] = values[sample]",
         "            continue",
         "        is_first = 1.0 if first else 0.0",
         "        first = False",
@@ -96,5 +121,5 @@ def _kernel(effects: tuple[Effect, ...]) -> tuple[str, tuple[str, ...]]:
         "        temperature_rise_k = rise[sample]",
         *(f"        {line}" for line in body),
     ]
-    functions = [function_text(elementary.exp_of_minus), function_text(elementary.sine_of_turns), *woven.functions]
+    functions = [function_text(f) for f in (elementary.exp_of_minus, elementary.sine_of_turns, earlier)] + [*woven.functions]
     return kernel_text("from math import exp, sqrt", functions, ["\n".join(lines)]), scalars.constants

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from twin.errors import RunLogError
 from twin.machine import Axis, MachineFile
 from twin.runlog import RunLog
-from twin.simulator.response import RunInput, period_of
+from twin.simulator.response import RunInput, noise_key, period_of
 
 Floats = NDArray[np.float64]
 
@@ -145,19 +145,12 @@ def resolution(values: Floats) -> float:
     return float(steps.min()) if len(steps) else 0.0
 
 
-NOISE_KEYS = {
-    **{"pos_mm": "position_mm", "table_mm": "table_mm", "torque_a": "torque_a", "force_x_n": "force_n", "force_y_n": "force_n"},
-    **{"spindle_load_pct": "spindle_load_pct", "spindle_temp_c": "spindle_temp_c"},
-}
-
-
 def noise_of(machine: MachineFile, log: RunLog, column: str) -> float:
     """Noise of the sensor of a column: as the machine states it, else from the recording, never quite 0.
 
     Where most samples of a recording repeat the one before, its resolution r is the noise: r / √12.
     """
-    key = NOISE_KEYS.get(column) or NOISE_KEYS.get(column.partition("_")[2], column)
-    stated = machine.noise.get(key)
+    stated = machine.noise.get(noise_key(machine, column) or column)
     found = stated if stated is not None else white_noise(log[column]) or resolution(log[column]) / np.sqrt(12.0)
     scale = float(np.nanmax(np.abs(log[column]))) if len(log) else 1.0
     return max(found, 1e-9 * max(scale, 1.0))

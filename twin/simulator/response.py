@@ -32,6 +32,7 @@ from twin.learned.words import LearnedSite
 from twin.machine import MachineFile
 from twin.process.kernel import process_quantities
 from twin.process.milling import Milling, tool_constants
+from twin.rotary import outside_name
 from twin.sensor.clock import looked_at, resampled, stamped
 from twin.sensor.reading import readings, sensor_quantities
 from twin.servo.constants import axis_constants, effect_constants
@@ -196,7 +197,7 @@ class _Chain:
             feed = 60.0 * np.hypot(milling.velocity_x_mm_s, milling.velocity_y_mm_s)
             cut = (milling.axial_depth_mm, milling.entry_angle_rad, milling.exit_angle_rad)
             told_cut = (milling.spindle_rpm, feed, *cut)
-            self.columns["cutting_force_peak_n"] = peaks(constants, machine.tool.teeth, named, told_cut, series)
+            self.columns["cutting_force_peak_n"] = peaks(constants, machine.tool.teeth, named, told_cut, terms, arguments)
             mean = {"x": -force.mean_force_x_n[0], "y": -force.mean_force_y_n[0]}
             power_w = force.cutting_power_w()[0]
         for axis in "xy":
@@ -379,10 +380,16 @@ def _mapped(t_s: Floats, effects: Mapping[str, Mapping[str, float]], quantity: s
     return seen
 
 
+def noise_key(machine: MachineFile, column: str) -> str:
+    """Return the key of [noise] that states the noise of a column; empty where there is none."""
+    letter, _, rest = column.partition("_")
+    key = SENSOR_NOISE.get(column) or NOISE_OF.get(rest, "")
+    return outside_name(key)[0] if letter in machine.rotary else key
+
+
 def _noise(machine: MachineFile, columns: dict[str, Floats], chance: np.random.Generator) -> None:
     """Adds what the sensors make of it."""
     for name, values in columns.items():
-        key = SENSOR_NOISE.get(name) or NOISE_OF.get(name.partition("_")[2])
-        sigma = machine.noise.get(key, 0.0) if key else 0.0
+        sigma = machine.noise.get(noise_key(machine, name), 0.0)
         if sigma > 0.0:
             columns[name] = values + sigma * chance.standard_normal(len(values))

@@ -4,7 +4,7 @@ program → canonical moves (twin.gcode) → path, look-ahead, reference (twin.m
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from twin.engagement.along_path import Section, engaged_along
 from twin.errors import MachineError
 from twin.gcode import Settings, interpret
+from twin.learned.standing import seconds_of
 from twin.machine import MachineFile, Program
 from twin.motion.control import RAPID_MM_MIN, control_of, effects_tell
 from twin.motion.motion import ExecState, Motion
@@ -36,18 +37,19 @@ class Simulation:
     """A run of the simulated machine.
 
     run: what it records, at the servo period; response: with the spread of its courses; plan: with the times of each line
-    notes: what the machine description did not say, and what was taken for it
+    notes: what the machine description did not say, and what was taken for it; learned_s: seconds that learned terms add
     """
 
     run: RunLog
     response: Response
     plan: Plan
     notes: tuple[str, ...]
+    learned_s: float = 0.0
 
     @property
     def seconds(self) -> float:
         """Time that the program takes."""
-        return self.plan.total_s
+        return self.plan.total_s + self.learned_s
 
     def following_error_mm(self) -> Mapping[str, Floats]:
         """Axis → reference minus position, (n,)."""
@@ -75,8 +77,8 @@ def simulate(
     would be longer than 8 million ticks, EffectError where its effects do not fit.
     """
     notes: list[str] = []
-    settings = machine.settings if settings is None else settings
-    path = path_from_moves(interpret(text, settings), settings.start_mm or None)
+    settings = _settings(machine) if settings is None else settings
+    path = path_from_moves(interpret(text, settings), settings.start_mm or None, settings.axes)
     moving = [a for column, a in enumerate(path.axes) if np.any(path.start_mm[:, column] != path.end_mm[:, column])]
     missing = [a for a in moving if a not in machine.axes]
     if missing:
@@ -108,7 +110,25 @@ def simulate(
         if term.is_recording
     ]
     notes += _saturated(machine, response)
-    return Simulation(_log(motion, told, response, path, name), response, planned, tuple(notes))
+    learned_s = seconds_of(machine.learned, planned.total_s)
+    if learned_s:
+        notes.append(f"{learned_s:.2f} s of the program's time are a learned term: they are in no signal of this run")
+    run = replace(_log(motion, told, response, path, name), rotary=machine.rotary)
+    return Simulation(run, response, planned, tuple(notes), learned_s)
+
+
+def _settings(machine: MachineFile) -> Settings:
+    """The settings of the control, with a word for each rotary axis of the machine, which starts at 0 deg."""
+    settings = machine.settings
+    if not (more := (0.0,) * (len(machine.words) - 3)):
+        return settings
+    return replace(
+        settings,
+        axes=machine.words,
+        start_mm=(*settings.start_mm, *more) if settings.start_mm else (),
+        work_offsets_mm={name: (*place, *more) for name, place in settings.work_offsets_mm.items()},
+        references_mm=tuple((*place, *more) for place in settings.references_mm),
+    )
 
 
 def _planned(machine: MachineFile, path: Path, notes: list[str]) -> Plan:

@@ -1,10 +1,13 @@
 """The page: all sections in the order in which they are read, its style and its script inside."""
 
 from cnctwin.reports.gap.causes import candidates, causes
+from cnctwin.reports.gap.constants import constants
 from cnctwin.reports.gap.document import document, own_text
 from cnctwin.reports.gap.heat_map import where
+from cnctwin.reports.gap.learned import learned
 from cnctwin.reports.gap.markup import tag
 from cnctwin.reports.gap.patterns import patterns
+from cnctwin.reports.gap.subsystems import subsystems
 from cnctwin.reports.gap.traces import traces
 from cnctwin.reports.gap.untold import cannot_be_told, judged, next_experiment, notes
 from cnctwin.reports.gap.verdict import figures, headline
@@ -22,10 +25,13 @@ def report_html(diagnosed: Diagnosed, title: str) -> str:
         "main",
         headline(diagnosis, title),
         figures(diagnosis),
+        subsystems(diagnosis),
         where(diagnosis),
         traces(diagnosed),
         how_far(diagnosis),
         causes(diagnosis),
+        learned(diagnosis),
+        constants(diagnosis),
         candidates(diagnosis),
         patterns(diagnosis),
         cannot_be_told(diagnosis),

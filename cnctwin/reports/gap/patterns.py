@@ -54,7 +54,7 @@ def _card(pattern: Pattern) -> Markup:
 
 def _scale(signal: str) -> tuple[float, str]:
     """By the end of the signal's name, which is its unit."""
-    ends = {"mm": "mm", "a": "A", "n": "N", "pct": "%", "c": "K", "kw": "kW"}
+    ends = {"mm": "mm", "deg": "deg", "a": "A", "n": "N", "pct": "%", "c": "K", "kw": "kW"}
     unit = ends.get(signal.rsplit("_", 1)[-1], "")
     return gap_unit(unit)
 

@@ -10,6 +10,7 @@ from collections.abc import Iterable
 
 from twin.effects.catalogue import catalogue
 from twin.effects.effect import Effect
+from twin.rotary import inside_column
 from twin.runlog import AXIS_COLUMN
 
 _OF_AXIS = {"pos_mm": "position", "table_mm": "table position", "torque_a": "torque", "ref_mm": "reference"}
@@ -27,24 +28,32 @@ _REGIMES = (
     *("rest", "reversal", "acceleration", "constant speed −", "constant speed +", "rapid"),
     *("cutting", "air", "spindle ramp", "dwell", "tool change", "warm-up", "cool-down", "run"),
 )
-_SHOWN = {"mm": (1000.0, "µm"), "°C": (1.0, "K"), "c": (1.0, "K"), "C": (1.0, "K"), "a": (1.0, "A"), "n": (1.0, "N")}
+_SHOWN = {
+    "mm": (1000.0, "µm"),
+    "deg": (1000.0, "mdeg"),
+    "°C": (1.0, "K"),
+    "c": (1.0, "K"),
+    "C": (1.0, "K"),
+    "a": (1.0, "A"),
+    "n": (1.0, "N"),
+}
 
 
 def signal_name(signal: str) -> str:
     """A column of a run log in words; one that is not known, as it is."""
-    if match := AXIS_COLUMN.match(signal):
+    if match := AXIS_COLUMN.match(inside_column(signal)):
         return f"{match[1].upper()} {_OF_AXIS[match[2]]}"
     return _OTHER.get(signal, signal)
 
 
 def is_position(signal: str) -> bool:
     """Return True if its gap is micrometres in strokes of hundreds of millimetres, not to be seen in the signal itself."""
-    return signal.endswith(("_pos_mm", "_table_mm"))
+    return inside_column(signal).endswith(("_pos_mm", "_table_mm"))
 
 
 def is_of_axis(signal: str) -> bool:
     """Return True if it is a column of an axis."""
-    return AXIS_COLUMN.match(signal) is not None
+    return AXIS_COLUMN.match(inside_column(signal)) is not None
 
 
 def gap_unit(unit: str) -> tuple[float, str]:
@@ -68,7 +77,7 @@ def in_order_of_signals(signals: Iterable[str]) -> list[str]:
     columns = (*_OF_AXIS, *_OTHER)
 
     def place(signal: str) -> tuple[int, str, int]:
-        match = AXIS_COLUMN.match(signal)
+        match = AXIS_COLUMN.match(inside_column(signal))
         if match:
             return 0, match[1], columns.index(match[2])
         return 1, "", columns.index(signal) if signal in columns else len(columns)

@@ -65,11 +65,11 @@ def _rank(trace: Trace) -> tuple[bool, float]:
 
 
 def _interest(trace: Trace) -> float:
-    return over_floor(trace) / (1.1 if trace.signal.endswith("_table_mm") else 1.0)
+    return over_floor(trace) / (1.1 if "_table_" in trace.signal else 1.0)
 
 
 def _place(signal: str) -> str:
-    return signal.replace("_table_mm", "_pos_mm")
+    return signal.replace("_table_", "_pos_")
 
 
 def changed(trace: Trace) -> bool:

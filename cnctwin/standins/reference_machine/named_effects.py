@@ -210,6 +210,16 @@ SENSOR_EFFECTS = tuple(
     )
 )  # fmt: skip
 
+LATE_EFFECTS = tuple(
+    Effect(
+        "sensor_delay", (column,), ("warmup",) if column == "spindle_temp_c" else ("cut",) if column[1] != "_" else MOTION, none,
+        lambda a, _, column=column: {"delay_s": LAGS_S.get(column, 0.001) * a},  # type: ignore[misc]
+        lambda x, on, p: x.with_sensor(on, late_s=p["delay_s"]), 20.0, ("delay_s",),
+    )
+    for column in (*SENSED_UNITS, *(f"{a}_pos_mm" for a in AXES))
+)  # fmt: skip
+"""A position that is recorded late is in time for its loop."""
+
 
 def _clock(physics: Physics, _: str, p: Parameters) -> Physics:
     return replace(physics, clock_ppm=p["ppm"], clock_offset_s=p["offset_s"])
@@ -223,5 +233,5 @@ CLOCK_EFFECTS = (
     ),
 )  # fmt: skip
 
-NAMED = (*AXIS_EFFECTS, *CUT_EFFECTS, *METER_EFFECTS, *HEAT_EFFECTS, *SENSOR_EFFECTS, *CLOCK_EFFECTS)
+NAMED = (*AXIS_EFFECTS, *CUT_EFFECTS, *METER_EFFECTS, *HEAT_EFFECTS, *SENSOR_EFFECTS, *LATE_EFFECTS, *CLOCK_EFFECTS)
 """All of them; a sensor's once for each column that it can be on."""

@@ -14,11 +14,12 @@ from cnctwin.standins.reference_machine.stated import AxisFigures, MachineFigure
 
 @dataclass(frozen=True, slots=True)
 class SensorPhysics:
-    """reading = bias + scale · value, with a first-order lag; nominally the value."""
+    """reading = bias + scale · value, with a first-order lag, of a value that may be late; nominally the value."""
 
     bias: float = 0.0
     scale: float = 1.0
     lag_s: float = 0.0
+    late_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

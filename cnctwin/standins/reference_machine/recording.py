@@ -169,7 +169,12 @@ def _stamped(physics: Physics, values: Floats) -> Floats:
     if physics.clock_ppm == 0.0 and physics.clock_offset_s == 0.0:
         return values
     t_ms = np.arange(len(values), dtype=np.float64)
-    place = np.clip(t_ms - 1000.0 * physics.clock_offset_s - 1e-6 * physics.clock_ppm * t_ms, 0.0, len(values) - 1.0)
+    return _between(values, t_ms - 1000.0 * physics.clock_offset_s - 1e-6 * physics.clock_ppm * t_ms)
+
+
+def _between(values: Floats, place: Floats) -> Floats:
+    """Return the values at places between the samples, by a parabola; the first and the last one beyond the ends."""
+    place = np.clip(place, 0.0, len(values) - 1.0)
     middle = np.clip(np.round(place).astype(np.intp), 1, len(values) - 2)
     part = place - middle
     before, here, after = values[middle - 1], values[middle], values[middle + 1]
@@ -264,6 +269,8 @@ def _sensed(physics: Physics, columns: Columns, chance: np.random.Generator) -> 
 
 
 def _read(values: Floats, sensor: SensorPhysics, period_s: float) -> Floats:
+    if sensor.late_s > 0.0:
+        values = _between(values, np.arange(len(values), dtype=np.float64) - sensor.late_s / period_s)
     if sensor.lag_s > 0.0:
         there = np.isfinite(values)
         keep = np.exp(-period_s / sensor.lag_s)

@@ -132,7 +132,7 @@ CUT_EFFECTS = (
     ),
     Effect(
         "meter_dead_band", ("",), CUT, none, lambda a, _: {"dead_pct": 1.5 * a},
-        lambda x, _, p: x.with_part("meter", dead_pct=p["dead_pct"]), 8.0,
+        lambda x, _, p: x.with_part("meter", dead_pct=p["dead_pct"]), 2.0,
         acts_at=described("spindle_power: load", "spindle_power: time"),
     ),
     Effect(

@@ -43,6 +43,7 @@ from cnctwin.blind_check.sealed import SealError, opened, seal
 from cnctwin.blind_check.table import table
 from cnctwin.blind_check.write import main
 from cnctwin.errors import UsageError
+from cnctwin.jobs.spread import spread_over
 from cnctwin.standins.reference_machine.controllers import STRUCTURES
 from cnctwin.standins.reference_machine.named_effects import NAMED
 from cnctwin.standins.reference_machine.unnamed_effects import UNNAMED
@@ -196,6 +197,14 @@ def test_a_check_goes_on_where_it_stopped(tmp_path: Path) -> None:
     assert [case.answer for case in again.cases] == [case.answer for case in once.cases]
     check(tmp_path / "twice", spread=counted)
     assert len(done) == 4
+
+
+def test_a_check_in_other_processes_is_the_same(tmp_path: Path) -> None:
+    here = check(tmp_path / "here")
+    with spread_over(2) as spread:
+        there = check(tmp_path / "there", spread=spread)
+    assert [case.answer for case in there.cases] == [case.answer for case in here.cases]
+    assert [case.given.closure_unseen for case in there.cases] == [case.given.closure_unseen for case in here.cases]
 
 
 def test_no_answer_is_in_a_file_before_its_case_is_diagnosed(tmp_path: Path) -> None:

@@ -65,6 +65,28 @@ def test_an_effect_outside_the_catalogue_is_right_when_it_is_unknown() -> None:
     assert (found.outside_unknown.hits, found.outside_wrong.hits, found.outside_wrong.count) == (1, 1, 3)
 
 
+@pytest.mark.parametrize(
+    ("changes", "called", "taken_up", "missed"),
+    [
+        ({"verdict": Verdict.UNKNOWN}, True, False, False),
+        ({"verdict": Verdict.PARTLY, "learned": (GivenTerm("friction", "x", frozenset({"position"}), 0.9),)}, True, False, False),
+        ({"closure_unseen": 0.97, "constants": {"axes.x.mass_kg": 2.3}}, False, True, False),
+        ({"closure_unseen": 0.97}, False, False, True),
+        ({"closure_unseen": 0.6, "constants": {"axes.x.mass_kg": 2.3}}, False, False, True),
+        ({"causes": (cause(GRAVITY),), "verdict": Verdict.EXPLAINED}, False, False, False),
+    ],
+)
+def test_an_effect_outside_is_called_so_or_taken_up_and_said_so_or_missed_or_named(
+    changes: Mapping[str, object], called: bool, taken_up: bool, missed: bool
+) -> None:
+    healthy = case(Sort.OUTSIDE, [("cable_chain", "x")], [], Verdict.HEALTHY)
+    found = scored([replace(healthy, given=replace(healthy.given, **changes))]).judged  # type: ignore[arg-type]
+    hits = (found.outside_unknown.hits, found.outside_taken_up.hits, found.outside_missed.hits)
+    assert hits == (called, taken_up, missed)
+    assert found.outside_told.hits == (called or taken_up)
+    assert sum(hits) + found.outside_wrong.hits == 1
+
+
 def test_cases_fall_into_bins_by_their_smallest_effect() -> None:
     small, large = case(Sort.SINGLE, [GRAVITY], [], size=1.2), case(Sort.SINGLE, [GRAVITY], [cause(GRAVITY)], size=50.0)
     found = scored([small, large])
@@ -127,6 +149,13 @@ def test_another_controller_may_be_named_or_called_not_understood(
 ) -> None:
     one = with_another_controller(causes, subsystems)
     assert (one.right, one.in_class, one.wrong) == (right, in_class, wrong)
+
+
+def test_another_controller_that_does_not_show_need_not_be_told() -> None:
+    one = with_another_controller([cause(GRAVITY)], {})
+    assert one.answer.controller is not None and not one.right
+    small = replace(one.answer.controller, size_over_floor={"x_pos_mm": 1.2})
+    assert Judged(replace(one.answer, controller=small), one.given).right
 
 
 def test_cases_with_another_controller_are_scored_apart_as_well() -> None:

@@ -179,7 +179,33 @@ def diagnosis() -> dict[str, Any]:
         },
         "notes": [],
         "seconds": 21.0,
+        "subsystems": [
+            part("z mechanics", 57.2, 1.02, "explained", "gravity"),
+            part("z controller", 0.6, 0.6, "healthy"),
+        ],
+        "constants": [{"name": "axes.y.mass_kg", "stated": 320.0, "found": 339.0, "deviations": 2.1, "closure": 0.4}],
+        "learned": [
+            {
+                "site": "axis_force",
+                "on": "x",
+                "unit": "N",
+                "depends_on": ["position"],
+                "repeats": True,
+                "closure": 0.81,
+                "closure_low": 0.74,
+                "closure_high": 0.86,
+                "table": {"position_mm": [0.0, 2.5], "value": [1.2, 43.0], "low": [-0.5, 40.1], "high": [2.9, 45.9]},
+                "looks_like": [{"effect": "direction_friction", "on": "x", "why_not": "it closes 31 %"}],
+                "sentence": "a force on X of +43 N between 118 and 141 mm, in both directions",
+            }
+        ],
     }
+
+
+def part(name: str, before: float, after: float, verdict: str, *causes: str) -> dict[str, Any]:
+    """A subsystem of a diagnosis, compared in the Z torque."""
+    shown = {"subsystem": name, "driven_by": [], "compared": "z_torque_a", "verdict": verdict, "causes": list(causes)}
+    return shown | {"before": before, "after": after}
 
 
 def gap(machine: str, found: dict[str, Any] | None) -> dict[str, Any]:

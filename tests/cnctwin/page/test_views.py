@@ -133,6 +133,11 @@ def test_the_gap_has_a_place_a_cause_and_a_next_step(visit: Visit) -> None:
         "Not told apart from",
         "no force_x_n",
         "Next experiment",
+        "Z mechanics",
+        "as told",
+        "A force on X of +43 N between 118 and 141 mm",
+        "direction friction on X, but it closes 31 %",
+        "axes.y.mass_kg",
     ):
         expect(main).to_contain_text(text)
     expect(page.get_by_role("link", name="Open the whole report")).to_have_attribute("href", "gap/vmc/report")

@@ -146,19 +146,24 @@ def size_in_floors(case: Case, make: Callable[..., Case]) -> float:
 
 
 def made_with(effect: Effect, floors: float) -> tuple[Case, float]:
-    """A case made with an effect near a size in floors, and its size: by steps in proportion, halved where one goes too far."""
-    make, part, low, high = maker(effect), 0.3, 0.0, math.inf
-    case = make(added(effect, part))
-    size = size_in_floors(case, make)
+    """A case made with an effect near a size in floors, and its size."""
+    make = maker(effect)
+    one, size = sized(effect, floors, make)
+    return make(one), size
+
+
+def sized(effect: Effect, floors: float, make: Callable[..., Case]) -> tuple[AddedEffect, float]:
+    """The effect near a size in floors, and its size: by steps in proportion, halved where one goes too far."""
+    part, low, high = 0.3, 0.0, math.inf
+    size = size_in_floors(make(added(effect, part)), make)
     for _ in range(STEPS_MAX):
         if NEAR * floors < size < floors / NEAR:
             break
         low, high = (part, high) if size < floors else (low, part)
         proportional = part * floors / size if size > 0.0 else 10.0 * part
         part = proportional if low < proportional < high else math.sqrt(low * high)
-        case = make(added(effect, part))
-        size = size_in_floors(case, make)
-    return case, size
+        size = size_in_floors(make(added(effect, part)), make)
+    return added(effect, part), size
 
 
 def diagnosed(effect: Effect, floors: float) -> tuple[Diagnosis, float]:

@@ -57,13 +57,19 @@ def plant(effects: tuple[AddedEffect, ...] = (), machine: MachineFile = MACHINE)
     return machine.model_copy(update={"axes": {"z": axis}, "noise": noise, "effects": effects})
 
 
-def air_case(*effects: AddedEffect, machine: MachineFile = MACHINE, learned: tuple[LearnedSection, ...] = ()) -> Case:
+def air_case(
+    *effects: AddedEffect,
+    machine: MachineFile = MACHINE,
+    learned: tuple[LearnedSection, ...] = (),
+    learn: str = LEARN,
+    judge: str = JUDGE,
+) -> Case:
     """Two runs of one program to learn from, one of another program to be judged on. learned: terms of the real machine"""
     real = plant(effects).model_copy(update={"learned": learned})
     runs = {
         name: (simulate(real, text, seed=seed).run, role, repeats)
         for seed, (name, text, role, repeats) in enumerate(
-            (("fit", LEARN, "fit", None), ("fit again", LEARN, "fit", "fit"), ("check", JUDGE, "check", None))
+            (("fit", learn, "fit", None), ("fit again", learn, "fit", "fit"), ("check", judge, "check", None))
         )
     }
     return case_of(machine, {name: axis_columns(log) for name, (log, _, _) in runs.items()})

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from twin.errors import EffectError
 from twin.learned.section import LearnedSection
 from twin.learned.sites import AXIS_SITES, READINGS
+from twin.learned.standing import moved_by, on_axes
 from twin.machine import AddedEffect, MachineFile, machine_from_toml
 from twin.simulator.response import RunInput, respond
 
@@ -126,3 +127,13 @@ def test_two_terms_on_one_place_over_different_things_stand_side_by_side() -> No
     table = {"position_mm": [0.0, 5.0], "velocity_mm_s": [0.0, 1.0]}
     terms = [learned("axis_force", column, at, [0.0, 40.0]) for column, at in table.items()]
     assert np.abs(columns(*terms)["x_torque_a"] - columns(terms[0])["x_torque_a"]).max() > 0.01
+
+
+def test_a_machine_with_fewer_axes_keeps_the_terms_that_it_can_have() -> None:
+    on_x, on_y = (learned("friction", "position_mm", [0.0], [1.0], on) for on in "xy")
+    coupled = learned("axis_force", "y_acceleration_mm_s2", [0.0], [1.0])
+    warm = learned("friction", "temperature_c", [20.0], [1.0])
+    spindle = learned("spindle_power", "spindle_rpm", [0.0], [1.0], on="")
+    every = (on_x, on_y, coupled, warm, spindle)
+    assert on_axes(every, ["x"]) == (on_x, coupled, warm, spindle)
+    assert moved_by(every, ["x"]) == (on_x, spindle)

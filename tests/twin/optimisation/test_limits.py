@@ -16,6 +16,11 @@ from twin.optimisation.question import Question, problem
 
 EDGE = [{"effect": "edge_force", "on": "", "parameters": {"tangential_n_per_mm": 8.0, "radial_n_per_mm": 12.0}}]
 SIZE = [{"effect": "size_effect", "on": "", "parameters": {"exponent": 0.3}}]
+LEARNED = [
+    {"effect": "learned", "site": "cut_force", "table": {"chip_mm": [0.0, 0.01, 0.04], "value": [900.0, 400.0, -200.0]}},
+    {"effect": "learned", "site": "cut_force", "on": "x", "table": {"x_position_mm": [0.0, 9.0], "value": [-3.0, 2.0]}},
+    {"effect": "learned", "site": "spindle_power", "table": {"load_pct": [0.0, 20.0, 30.0], "value": [0.01, 0.03, 0.02]}},
+]
 ALL = {"power_kw": 0.2, "torque_nm": 0.08, "chip_mm": [0.002, 0.05], "surface_speed_m_min": [30.0, 140.0]}
 SPINDLE = {"rated_power_kw": 1.0, "efficiency": 0.8, "idle_power_kw": 0.1}
 
@@ -24,7 +29,7 @@ def limited(effects: object = (), limits: object = ALL) -> Question:
     return second(machine_toml=machine_with(text("second.toml"), limits=limits, spindle=SPINDLE, effects=effects))
 
 
-@pytest.mark.parametrize("effects", [(), EDGE, SIZE], ids=["nominal", "edge force", "size effect"])
+@pytest.mark.parametrize("effects", [(), EDGE, SIZE, LEARNED], ids=["nominal", "edge force", "size effect", "learned"])
 @settings(max_examples=examples(20), deadline=None)
 @given(st.integers(0, 2**32))
 def test_every_candidate_keeps_every_limit(effects: object, seed: int) -> None:

@@ -33,7 +33,26 @@ def test_bias_comes_before_lag_and_python_reads_the_same() -> None:
     assert kernel[0] == 2.0
 
 
-@pytest.mark.parametrize("name", ["sensor_bias", "sensor_scale", "sensor_lag"])
+def test_a_late_reading_is_the_value_of_before_between_the_samples_that_there_are() -> None:
+    ramp = np.where(np.isnan(STEP), np.nan, np.arange(9.0))
+    read = readings(ramp, SINCE, {"sensor_delay": {"delay_s": 0.015}})
+    np.testing.assert_allclose(read, [0.0, 0.0, 0.5, np.nan, 2.5, 3.5, 4.5, 5.5, 6.5], atol=1e-12)
+    python = readings(ramp, SINCE, {"sensor_delay": {"delay_s": 0.015}}, reference_run=True)
+    np.testing.assert_array_equal(read, python)
+
+
+def test_a_reading_that_is_later_than_the_recording_is_the_first_one() -> None:
+    np.testing.assert_array_equal(readings(STEP + 5.0, SINCE, {"sensor_delay": {"delay_s": 60.0}})[[0, 8]], [5.0, 5.0])
+
+
+def test_a_sensor_forgets_what_came_before_an_infinite_time() -> None:
+    since = SINCE.copy()
+    since[6] = np.inf
+    effects = {"sensor_delay": {"delay_s": 0.01}, "sensor_lag": {"time_constant_s": 1.0}}
+    assert readings(np.where(np.arange(9) < 6, 100.0, 3.0), since, effects)[6:] == pytest.approx([3.0, 3.0, 3.0])
+
+
+@pytest.mark.parametrize("name", ["sensor_bias", "sensor_scale", "sensor_lag", "sensor_delay"])
 def test_at_its_null_value_a_sensor_effect_is_not_there(name: str) -> None:
     np.testing.assert_array_equal(readings(STEP, SINCE, {name: effect_named(name).null_values()}), STEP)
 

@@ -5,6 +5,7 @@ not in yet or comes out, the engagement is not the planned one: turns whose forc
 those within a tool's radius of feed after the air.
 """
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,18 +61,27 @@ class Cutting:
     air: Bools
 
 
-def is_of_forces_alone(log: RunLog) -> bool:
-    """Return True where forces are recorded, and nothing that an axis answers with.
+def is_of_forces_alone(log: RunLog, axes: Collection[str]) -> bool:
+    """Return True where forces are recorded, and nothing that one of these axes answers with.
+
+    A position that is the reference over again is no answer.
 
     >>> from twin.runlog import run_log
     >>> row = np.ones(1)
-    >>> is_of_forces_alone(run_log({"t_s": row, "force_x_n": row, "x_ref_mm": row}))
+    >>> is_of_forces_alone(run_log({"t_s": row, "force_x_n": row, "x_ref_mm": row, "x_pos_mm": row}), "x")
     True
-    >>> is_of_forces_alone(run_log({"t_s": row, "force_x_n": row, "x_torque_a": row}))
+    >>> is_of_forces_alone(run_log({"t_s": row, "force_x_n": row, "x_torque_a": row}), "x")
     False
     """
-    answers = any((m := AXIS_COLUMN.match(name)) and m[2] != "ref_mm" and log.has(name) for name in log.columns)
-    return any(log.has(force) for force in FORCES) and not answers
+    return any(log.has(force) for force in FORCES) and not any(_is_answer(log, name, axes) for name in log.columns)
+
+
+def _is_answer(log: RunLog, name: str, axes: Collection[str]) -> bool:
+    match = AXIS_COLUMN.match(name)
+    if match is None or match[2] == "ref_mm" or match[1] not in axes or not log.has(name):
+        return False
+    reference = f"{match[1]}_ref_mm"
+    return match[2] == "torque_a" or not log.has(reference) or not np.array_equal(log[name], log[reference], equal_nan=True)
 
 
 def missing(log: RunLog) -> list[str]:
@@ -84,6 +94,8 @@ def turns_of(log: RunLog, angle_rad: Floats) -> Turns:
     """The turns of the spindle, by its angle as far as it is known, (n,), increasing."""
     of = np.floor((angle_rad - angle_rad[0]) / TAU).astype(np.intp)
     rpm, depth, entry, leaving = (_held(log[name]) for name in ENGAGEMENT)
+    if not _is_sparse(log["axial_depth_mm"]):
+        depth = np.nan_to_num(log["axial_depth_mm"])  # null = not in the cut
     feed, heading = _feed(log)
     force = [_held(log[name]) for name in FORCES if log.has(name)]
     variance = np.sum([_mean(f**2, of) - _mean(f, of) ** 2 for f in force], axis=0)
@@ -158,6 +170,12 @@ def _held(values: Floats) -> Floats:
         return values
     last = np.maximum.accumulate(np.where(there, np.arange(len(values)), -1))
     return np.asarray(values[np.where(last < 0, int(np.argmax(there)), last)])
+
+
+def _is_sparse(values: Floats) -> bool:
+    """Return True where a series is recorded more slowly than the others, so that what is missing is not absent."""
+    there = np.flatnonzero(np.isfinite(values))
+    return len(there) > 1 and float(np.median(np.diff(there))) > 1.0
 
 
 def _mean(values: Floats, of: Ints) -> Floats:

@@ -15,12 +15,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from twin.process.milling import Milling, milling_force
+from twin.learned.cutting import cut_arguments, cut_series, milling_with_terms
+from twin.learned.term import Term
+from twin.process.milling import Milling
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
-STEPS_PER_TOOTH = 48
+STEPS_PER_TOOTH = 96
 GRID_PER_ORDER = 16
 NEWTON_STEPS = 4
 TAU = 2.0 * np.pi
@@ -63,11 +65,15 @@ class FineTurn:
         return np.asarray(found)
 
 
-def fine_turn(constants: Mapping[str, ArrayLike], teeth: int, cut: Engagement, effects: Sequence[str]) -> FineTurn:
-    """A turn of the tool in this engagement, in all lanes."""
+def fine_turn(
+    constants: Mapping[str, ArrayLike], teeth: int, cut: Engagement, effects: Sequence[str], terms: Sequence[Term] = ()
+) -> FineTurn:
+    """A turn of the tool in this engagement, in all lanes. terms: learned ones of the cut that the machine has"""
     steps = teeth * STEPS_PER_TOOTH
     step_s = 60.0 / (cut.rpm * steps)
-    force = milling_force(constants, teeth, cut.over(np.arange(steps) * TAU / steps), period_s=step_s, effects=effects)
+    motion = cut.over(np.arange(steps) * TAU / steps)
+    series = cut_series(terms, cut_arguments(motion, teeth))
+    force = milling_with_terms(constants, teeth, motion, series, period_s=step_s, effects=effects)
     return FineTurn(np.stack([force.mean_force_x_n, force.mean_force_y_n]), step_s)
 
 

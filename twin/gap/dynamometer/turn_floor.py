@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
-PART, LEAST = 0.015, 0.003
+PART, LEAST = 0.02, 0.003
 """Of the order itself in both directions, and of the whole force."""
 RESONANCE_HZ = 1500.0
 """Of a table with work on it, where it is low."""
@@ -47,7 +47,7 @@ def turn_floor(orders: Complexes, spindle_hz: float) -> TurnFloor:
 
     >>> still = np.tile(np.array([0.0, 100.0 + 0.0j]), (2, 4, 1))
     >>> turn_floor(still, 15.0).floor.round(2).tolist()
-    [[0.3, 2.14], [0.3, 2.14]]
+    [[0.3, 2.84], [0.3, 2.84]]
     """
     count, number = orders.shape[1], np.arange(orders.shape[2])
     away = orders - orders.mean(axis=1, keepdims=True)

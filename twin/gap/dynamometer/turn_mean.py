@@ -28,10 +28,11 @@ CARRIED = 0.42
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TurnMeans:
-    """Mean turns. force: (signals, blocks, points); at: (blocks,) sample in the middle."""
+    """Mean turns. force: (signals, blocks, points); at: (blocks,) sample in the middle; highest: last order that is known."""
 
     force: Floats
     at: Ints
+    highest: int
 
 
 def highest_order(teeth: int, samples_per_turn: float) -> int:
@@ -61,7 +62,7 @@ def turn_means(force: Floats, angle_rad: Floats, turn: Ints, teeth: int, *, with
         found[:, number] = _turn(force[:, here], angle_rad[here], order, points)
     if not with_mean:
         found -= found.mean(axis=2, keepdims=True)
-    return TurnMeans(found, at)
+    return TurnMeans(found, at, order)
 
 
 def _turn(force: Floats, angle_rad: Floats, order: int, points: int) -> Floats:

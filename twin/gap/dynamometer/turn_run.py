@@ -32,16 +32,21 @@ SPREAD = "_spread"
 
 @dataclass(frozen=True)
 class TurnRun(RunAtHand):
-    """A run whose log holds mean turns. points: of a turn; knows_phase: whether the spindle's angle was recorded, and fits."""
+    """A run whose log holds mean turns.
+
+    points: of a turn; highest: order up to which turns are known; knows_phase: whether the spindle's angle was recorded, and fits
+    knows_mean: whether the mean force is known, by what the sensors show in the air
+    """
 
     points: int
+    highest: int
     knows_phase: bool
     knows_mean: bool
 
 
 def turn_run(run: Run, log: RunLog, machine: MachineFile, notes: list[str]) -> Run | None:
     """The run as mean turns; None where it is not of forces alone, or lacks what a cut is compared by, which `notes` say."""
-    if not is_of_forces_alone(log):
+    if not is_of_forces_alone(log, machine.axes):
         return None
     lacks = ([] if machine.tool else ["[tool] in the machine's file"]) + missing(log)
     if lacks or machine.tool is None:
@@ -93,10 +98,12 @@ def _as_turns(
         for number, (s, cut, m) in enumerate(zip(samples, cuts, means, strict=True))
     ]
     notes += _said(run, log, signals, cutting, [f.off for f in found], has_angle and not fits, offset)
-    points = means[0].force.shape[2]
+    points, highest = means[0].force.shape[2], min(mean.highest for mean in means)
     columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     t_s = columns.pop("t_s")
-    return TurnRun(run.entry, run.folder, RunLog(t_s, columns, {}, log.ignored, log.source), points, fits, offset is not None)
+    return TurnRun(
+        run.entry, run.folder, RunLog(t_s, columns, {}, log.ignored, log.source), points, highest, fits, offset is not None
+    )
 
 
 def _was_replaced(angle_rad: Floats, stated_rad: Floats) -> bool:
@@ -127,7 +134,7 @@ def _stretch(number: int, at_s: Floats, cut: Engagement, means: TurnMeans, signa
     columns = {"t_s": (at_s[:, None] + within * min(60.0 / cut.rpm, room_s)).ravel()}
     columns |= {"spindle_angle_rad": np.tile(within * TAU, blocks)}
     columns |= {name: np.full(blocks * points, value) for name, value in told.items()}
-    floor = turn_floor(orders_of(means.force, points // 2 - 1), cut.rpm / 60.0).rms()
+    floor = turn_floor(orders_of(means.force, means.highest), cut.rpm / 60.0).rms()
     for name, mean, spread in zip(signals, means.force, floor, strict=True):
         columns |= {name: mean.ravel(), name + SPREAD: np.full(blocks * points, spread)}
     return columns

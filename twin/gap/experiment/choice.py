@@ -27,6 +27,7 @@ from twin.gap.experiment.run import Columns, Trial, sensitivities, shown, trial_
 from twin.gap.wording import digits
 from twin.machine import MachineFile
 from twin.runlog import AXIS_COLUMN
+from twin.simulator.response import noise_key
 from twin.sites import Site
 
 Floats = NDArray[np.float64]
@@ -42,13 +43,13 @@ CORRELATION_S = {Shows.AXIS: 0.05, Shows.SPINDLE: 0.2, Shows.CUT: 0.05, Shows.HE
 LONG_S = 60.0
 """Programs longer than this are tried only where no shorter one does."""
 SENSORS = {
-    "pos_mm": ("position_mm", 0.001),
-    "table_mm": ("table_mm", 0.001),
-    "torque_a": ("torque_a", 0.03),
-    "force_x_n": ("force_n", 5.0),
-    "force_y_n": ("force_n", 5.0),
-    "spindle_load_pct": ("spindle_load_pct", 0.5),
-    "spindle_temp_c": ("spindle_temp_c", 0.2),
+    "pos_mm": 0.001,
+    "table_mm": 0.001,
+    "torque_a": 0.03,
+    "force_x_n": 5.0,
+    "force_y_n": 5.0,
+    "spindle_load_pct": 0.5,
+    "spindle_temp_c": 0.2,
 }
 """Noise of a sensor that is not there yet: as machine.toml states it, else a middling one."""
 
@@ -223,8 +224,8 @@ def _floors_apart(
 def sensor_floor(machine: MachineFile, signal: str) -> float:
     """Noise of the sensor of a signal: as the machine states it, else a middling one."""
     match = AXIS_COLUMN.match(signal)
-    key, middling = SENSORS.get(match[2] if match else signal, ("", 1.0))
-    return machine.noise.get(key) or middling
+    middling = SENSORS.get(match[2] if match else signal, 1.0)
+    return machine.noise.get(noise_key(machine, signal)) or middling
 
 
 def _names(effects: Iterable[Effected]) -> str:

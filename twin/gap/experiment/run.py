@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 
 from twin.effects.catalogue import effect_named
 from twin.effects.effect import On, called
-from twin.errors import TwinError
+from twin.errors import MachineError, TwinError
 from twin.gap.diagnosis import Effected
 from twin.gap.experiment.envelope import Envelope
 from twin.gap.experiment.menu import Shows, Snippet
 from twin.gap.stages.free import effect_parameters
-from twin.gcode import interpret
+from twin.gcode import Settings, interpret
+from twin.learned.standing import moved_by
 from twin.machine import AddedEffect, MachineFile
 from twin.motion.motion import Motion
 from twin.motion.path import EventKind, path_from_moves
@@ -70,8 +71,14 @@ class Trial:
 
 
 def trial_of(snippet: Snippet, machine: MachineFile, envelope: Envelope) -> Trial:
-    """The program planned on the machine's control, or on a middling one where none is stated."""
-    planned = plan(path_from_moves(interpret(snippet.program())), machine.program or IDEAL_TIMES)
+    """The program planned on the machine's control, or on a middling one where none is stated.
+
+    Raises MachineError where it moves an axis that programs have no word for, as the joint of a robot.
+    """
+    if unknown := [letter for letter in snippet.letters if letter not in machine.words]:
+        raise MachineError(f"no program moves {', '.join(unknown)}; it has words for {', '.join(machine.words)}")
+    moves = interpret(snippet.program(), Settings(axes=machine.words))
+    planned = plan(path_from_moves(moves, axes=machine.words), machine.program or IDEAL_TIMES)
     heat = snippet.shows is Shows.HEAT
     motion = sampled(planned, HEAT_PERIOD_S if heat else machine.machine.servo_period_s)
     block = motion.line - 1  # the first line is the %
@@ -152,7 +159,8 @@ def cut_down(machine: MachineFile, snippet: Snippet) -> MachineFile:
         match = AXIS_COLUMN.match(added.on)
         return match is None or match[1] in axes
 
-    return machine.model_copy(update={"axes": axes, "effects": tuple(e for e in machine.effects if stays(e))})
+    kept = {"effects": tuple(e for e in machine.effects if stays(e)), "learned": moved_by(machine.learned, letters)}
+    return machine.model_copy(update={"axes": axes} | kept)
 
 
 def sensitivities(

@@ -73,8 +73,8 @@ def _trials(case: Case) -> Trials:
             f"overrides are not recorded in {len(trials) - told} of {len(trials)} runs: knobs are taken to stand at 100 %"
         )
     stated, said = _stated(case.machine, trials)
-    read, knobs = with_rapids_read(trials, float(np.max(stated.rapid_mm_min)))
-    by_name = {trial.name: trial for trial in read}
+    with_knobs, knobs = with_rapids_read(trials, float(np.max(stated.rapid_mm_min)))
+    by_name = {trial.name: trial for trial in with_knobs}
     learnt, judged = (tuple(by_name[trial.name] for trial in some) for some in (learnt, judged))
     return Trials(case.machine, stated, program_effects(case.machine), learnt, judged, (*notes, *said, *knobs))
 

@@ -7,6 +7,8 @@ nearest one, by at most half a tick or half a sample (`twin.gap.sampling.sample_
 samples are kept over which the reference goes on evenly: between them it is not known.
 """
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,6 +29,8 @@ EVEN_MM, RESOLUTION_MM_MAX = 3e-4, 3e-3
 """By which an even reference may bend from sample to sample, and what its resolution may add."""
 ANSWERS = ("force_x_n", "force_y_n", "spindle_load_pct", "spindle_power_kw", "spindle_temp_c", "vibration_rms_g")
 """Columns beside those of the axes that the machine answers with; all others are held between samples."""
+DOUBT = "doubt"
+"""Column of an axis, behind its letter."""
 WHEN_SLOW = ("spindle_rpm", "coolant_on", "ambient_temp_c", "axial_depth_mm", "line")
 """Columns beside those of the axes that mean something in a slow recording: forces and the spindle's angle do not."""
 TURN_RAD = 2.0 * np.pi
@@ -53,26 +57,24 @@ def on_servo_ticks(run: Run, log: RunLog, machine: MachineFile, notes: list[str]
     times = sample_times(log, period_s)
     notes += [f"{run.name}: {said}" for said in times.notes]
     placed = _placed(log, times, period_s)
-    return RunAtHand(run.entry, run.folder, _without_doubt(run.name, log, placed, times, machine, notes))
+    return RunAtHand(run.entry, run.folder, _with_doubt(run.name, log, placed, times, machine, notes))
 
 
-def _without_doubt(name: str, log: RunLog, placed: RunLog, times: SampleTimes, machine: MachineFile, notes: list[str]) -> RunLog:
-    """The placed recording without what an axis answered where its reference is not known well enough between samples."""
+def _with_doubt(name: str, log: RunLog, placed: RunLog, times: SampleTimes, machine: MachineFile, notes: list[str]) -> RunLog:
+    """The placed recording with a column that is 1 where the reference of an axis is not known well enough between samples."""
     columns = dict(placed.columns)
     for letter, axis in machine.axes.items():
         reference = log.columns.get(f"{letter}_ref_mm")
         if reference is None:
             continue
         doubt = times.in_doubt(reference, axis.position_gain_per_s, machine.machine.servo_period_s)
-        answers = [n for n in columns if (m := AXIS_COLUMN.match(n)) and m[1] == letter and m[2] != "ref_mm"]
-        if not answers or not doubt.any():
-            continue
-        columns |= {n: np.where(doubt, np.nan, columns[n]) for n in answers}
-        notes.append(
-            f"{name}: between samples the reference of {letter} is not known well enough for {np.mean(doubt):.0%} of the time; "
-            "nothing is compared there"
-        )
-    return RunLog(placed.t_s, columns, placed.text, placed.ignored, placed.source)
+        if doubt.any():
+            columns[f"{letter}_{DOUBT}"] = doubt.astype(np.float64)
+            notes.append(
+                f"{name}: between samples the reference of {letter} is not known well enough for {np.mean(doubt):.0%} of the "
+                "time; its loops are not compared there"
+            )
+    return replace(placed, columns=columns)
 
 
 def _placed(log: RunLog, times: SampleTimes, period_s: float) -> RunLog:
@@ -94,7 +96,7 @@ def _placed(log: RunLog, times: SampleTimes, period_s: float) -> RunLog:
         else:
             columns[name] = times.last(values)
     text = log.text if len(ticks) == len(log) else {}
-    return RunLog(np.asarray(ticks * period_s, dtype=np.float64), columns, text, log.ignored, log.source)
+    return replace(log, t_s=np.asarray(ticks * period_s, dtype=np.float64), columns=columns, text=text)
 
 
 def _turned(log: RunLog, times: SampleTimes, period_s: float) -> Floats:
@@ -138,7 +140,7 @@ def _slow(log: RunLog, period_s: float) -> RunLog:
             columns[name][place] = np.where(_even_here(log.columns.get(f"{match[1]}_ref_mm"), place, settled), values, np.nan)
         elif name in WHEN_SLOW:
             columns[name] = values[np.clip(np.searchsorted(place, ticks, side="right") - 1, 0, len(values) - 1)]
-    return RunLog(np.asarray(ticks * period_s, dtype=np.float64), columns, {}, log.ignored, log.source)
+    return replace(log, t_s=np.asarray(ticks * period_s, dtype=np.float64), columns=columns, text={})
 
 
 def _even_here(reference: Floats | None, place: NDArray[np.intp], settled: int) -> NDArray[np.bool_]:

@@ -16,7 +16,7 @@ from twin.effects.catalogue import catalogue, effect_named
 from twin.effects.effect import Effect, Guesses, On, Recorded, called
 from twin.gap.diagnosis import Effected
 from twin.gap.stages.axis_run import OUTPUTS, AxisRunData
-from twin.gap.stages.axis_terms import readings_of_terms, series_of_terms, sites_of_terms, size_of_terms
+from twin.gap.stages.axis_terms import readings_of_terms, series_of_terms, sites_of_terms, size_of_terms, start_of_terms
 from twin.gap.stages.free import Free, constant
 from twin.gap.stages.observed_through import Sensing, Values, seen_late
 from twin.gap.stages.stage import Model, Observed, observed_of
@@ -170,7 +170,7 @@ class AxisStage:
                 measured = measured - run.measured["pos_mm"]
                 noise = np.sqrt(np.min(floor) ** 2 + np.min(run.floor["pos_mm"]) ** 2)
                 floor = np.full(len(floor), noise)
-            known = measured[where]
+            known = run.of_loops(measured)[where]
             sigma = floor[where] / np.sqrt(run.count)
             parts.append((f"{self.letter}_{output}", known, floor[where], sigma, blocks, run.regime[where]))
         return observed_of(run.name, parts, run.fitted)
@@ -181,9 +181,10 @@ class AxisStage:
         outputs = self.simulate(model, theta, data)
         values = model.values(theta)
         shown = []
+        starts = np.cumsum([0, *(stretch.stop - stretch.start for stretch in data.stretches())])[:-1].tolist()
         for output in self.outputs:
             sensing = Sensing.of(values, f"{self.letter}_{output}")
-            modelled = sensing.readings(outputs[output], self.period_s)
+            modelled = sensing.readings(outputs[output], self.period_s, starts)
             modelled = modelled + readings_of_terms(model, theta, f"{self.letter}_{output}", data, self.terms)
             shown.append(self.grown(modelled, values, data) if output == "table_mm" else modelled)
         at = {output: i for i, output in enumerate(self.outputs)}
@@ -214,7 +215,8 @@ class AxisStage:
         if "torque_a" not in data.measured:  # an integral that was not measured goes on as the twin left it
             kept.add("integral_a")
         for stretch in data.stretches():
-            start = self._start(values, constants, data, stretch, lanes) | carried
+            learned = start_of_terms(model, theta, self.letter, data.arguments, stretch.start, self.terms)
+            start = self._start(values, constants, data, stretch, lanes, learned) | carried
             reference = self.seen_reference(values, data, stretch, lanes)
             added = series_of_terms(model, theta, self.letter, data.arguments, stretch, self.terms)
             run, many = self._run(constants, reference, data, courses, stretch, start, added)
@@ -294,14 +296,19 @@ class AxisStage:
         data: AxisRunData,
         where: slice,
         lanes: int,
+        learned: Mapping[str, Floats],
     ) -> dict[str, Floats]:
-        """The state at the first sample of a stretch, as the sensors of each lane would have it."""
+        """The state at the first sample of a stretch, as the sensors of each lane would have it.
+
+        learned: what learned terms add there to a force or a reading
+        """
         reference = data.reference_mm[where]
         position = data.measured.get("pos_mm", data.measured.get("table_mm", data.reference_mm))[where]
         torque = data.measured["torque_a"][where] if "torque_a" in data.measured else np.zeros(len(reference))
         read = start_state(self.axis, reference, position, torque, self.period_s)
-        state = {k: np.full(lanes, v) for k, v in read.items()} | self._start_of_loops(values, read, float(reference[0]), lanes)
-        load = at_rest("load_n", constants, {}, lanes)
+        loops = self._start_of_loops(values, read, float(reference[0]), lanes, learned)
+        state = {k: np.full(lanes, v) for k, v in read.items()} | loops
+        load = at_rest("load_n", constants, {}, lanes) - learned.get("external_force_n", 0.0)
         if "torque_a" not in data.measured and self.axis.velocity_integral_gain_a_per_mm > 0.0:
             state["integral_a"] = load / constants["newton_per_command"]
         held = constants["newton_per_command"] * state["integral_a"] - load
@@ -310,14 +317,16 @@ class AxisStage:
         state["bristle_mm"] = at_rest("bristle_mm", constants, {"held_n": held}, lanes)
         return state
 
-    def _start_of_loops(self, values: Values, read: Mapping[str, float], reference_mm: float, lanes: int) -> dict[str, Floats]:
+    def _start_of_loops(
+        self, values: Values, read: Mapping[str, float], reference_mm: float, lanes: int, learned: Mapping[str, Floats]
+    ) -> dict[str, Floats]:
         """Position and integrals of the loops whose position and torque the sensors of each lane read as `read`."""
-        position = Sensing.of(values, f"{self.letter}_pos_mm").value(np.full(lanes, read["position_mm"]))
+        position = Sensing.of(values, f"{self.letter}_pos_mm").value(read["position_mm"] - learned.get("pos_mm", np.zeros(lanes)))
         integral = np.full(lanes, read["integral_a"])
         if self.axis.velocity_integral_gain_a_per_mm > 0.0:
             gain = self.axis.velocity_gain_a_s_per_mm + self.axis.velocity_integral_gain_a_per_mm * self.period_s
             part = gain * self.axis.position_gain_per_s  # of the torque that the position loop asks for
-            torque = integral + part * (reference_mm - read["position_mm"])
+            torque = integral + part * (reference_mm - read["position_mm"]) - learned.get("torque_a", 0.0)
             integral = Sensing.of(values, f"{self.letter}_torque_a").value(torque) - part * (reference_mm - position)
         return {"position_mm": position, "integral_a": integral}
 

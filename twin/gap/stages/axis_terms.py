@@ -76,3 +76,23 @@ def readings_of_terms(
             where = np.concatenate([np.arange(len(data.t_s))[s] for s in data.stretches()])
             total = total + term.series(theta[:, place], {c: data.arguments[c][where] for c in term.knots.columns})
     return total
+
+
+def start_of_terms(
+    model: Model, theta: Floats, letter: str, arguments: Mapping[str, Floats], tick: int, standing: Sequence[Term] = ()
+) -> dict[str, Floats]:
+    """Return what the terms on an axis add at one tick, by quantity of its kernel and by column that is read, (lanes,) each."""
+    if not standing and not model.terms:
+        return {}
+    here = {column: values[tick : tick + 1] for column, values in arguments.items()}
+    found = {name: values[:, 0] for name, values in series_of_terms(model, theta, letter, here, slice(0, 1), standing).items()}
+    for column in READINGS.values():
+        known = reading_series(standing, f"{letter}_{column}", here)
+        own = [
+            term.series(theta[:, place], here)[:, 0]
+            for term, place in model.term_places()
+            if READINGS.get(term.site) == column and term.on in (letter, f"{letter}_{column}")
+        ]
+        if known is not None or own:
+            found[column] = sum(own, np.full(len(theta), 0.0 if known is None else known[0]))
+    return found

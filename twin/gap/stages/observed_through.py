@@ -1,6 +1,6 @@
 """Sensors and clocks in many candidate machines at once: `twin.sensor`, lane by lane."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,11 +27,12 @@ class Sensing:
         """The sensor of `signal` among the effects of a model."""
         return Sensing({e.effect: v for e, v in values.items() if e.on == signal and effect_named(e.effect).on is On.SIGNAL})
 
-    def readings(self, values: Floats, period_s: float) -> Floats:
-        """Return the readings of values, (lanes, n)."""
+    def readings(self, values: Floats, period_s: float, starts: Sequence[int] = ()) -> Floats:
+        """Return the readings of values, (lanes, n). starts: samples at which the machine had come to rest, its sensors too"""
         if not self.effects:
             return values
         since = np.full(values.shape[1], period_s)
+        since[list(starts)] = np.inf
         since[0] = 0.0
         rows = []
         for lane in range(len(values)):

@@ -11,6 +11,7 @@ from twin.effects.catalogue import effect_named
 from twin.gap.diagnosis import Effected, Verdict
 from twin.gap.dynamometer.turn_run import TurnRun
 from twin.gap.floors import Floors, repeatability
+from twin.gap.naming.specific import only_specific
 from twin.gap.null import NULL, Null
 from twin.gap.search import Explained, explain
 from twin.gap.stages.axis import AxisStage, axis_constants_free, standing_of
@@ -62,7 +63,7 @@ def ground_of(case: Case, left_out: frozenset[str]) -> Ground:
     for one in [one for one, _ in case.repeats()] or recorded:
         for letter in machine.axes:
             data = axis_run_data((one,), letter, floors, None, True)
-            if letter not in seen and data is not None:
+            if letter not in seen and data is not None and data.told:
                 seen[letter] = (letter, one.log, data)
     if case.repeats():
         disturbance, spread = disturbance_of_repeats(machine, list(seen.values()), floors)
@@ -87,7 +88,8 @@ def explained_stages(ground: Ground, progress: Progress, side_by_side: SideBySid
             forces = _pushes(stage, found[0])
     turning = turn_data(ground.runs)
     if any(run.fitted for run in turning):
-        found.append(explain(TurnStage(ground.machine, turning, ground.left_out), null=null, progress=progress))
+        turns = TurnStage(ground.machine, turning, ground.left_out)
+        found.append(only_specific(turns, explain(turns, null=null, progress=progress, doubtful=True)))
     stages: list[Stage] = [s for letter in ground.machine.axes if (s := axis_stage(ground, letter, forces)) is not None]
     warmups = heat_runs(ground.machine, tuple(r for r in ground.runs if not r.log.axes()))
     if any(run.fitted for run in warmups):
@@ -122,13 +124,23 @@ def _is_clock(effected: Effected) -> bool:
 
 def axis_stage(ground: Ground, letter: str, forces: dict[str, dict[str, Floats]]) -> AxisStage | None:
     """The stage of an axis; None where no run to be fitted moves it."""
+    return _axis_stage(ground, letter, forces, told=True)
+
+
+def unheard_axes(ground: Ground) -> tuple[AxisStage, ...]:
+    """The axes whose reference no run to be fitted records, and whose motion it does: there the measured one stands for it."""
+    found = (_axis_stage(ground, letter, {}, told=False) for letter in ground.machine.axes)
+    return tuple(stage for stage in found if stage is not None)
+
+
+def _axis_stage(ground: Ground, letter: str, forces: dict[str, dict[str, Floats]], *, told: bool) -> AxisStage | None:
     machine = ground.machine
     data = []
     for role in ("fit", "check"):
         for group in repeated_groups(tuple(r for r in ground.runs if r.entry.role == role), ground.repeats):
             push = forces.get(group[0].name, {}).get(letter)
             data.append(axis_run_data(group, letter, ground.floors, push, role == "fit"))
-    known = tuple(d for d in data if d is not None)
+    known = tuple(d for d in data if d is not None and d.told is told)
     if not any(d.fitted for d in known):
         return None
     standing = standing_of(machine, letter)

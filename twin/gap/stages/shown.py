@@ -19,6 +19,7 @@ from twin.gap.stages.axis_run import axis_run_data
 from twin.gap.stages.cut import CutStage, cut_runs
 from twin.gap.stages.free import effect_parameters
 from twin.gap.stages.heat import HeatStage, heat_runs
+from twin.gap.stages.open_loop.plan import open_columns
 from twin.gap.stages.stage import Model
 from twin.gap.stages.turns import TurnStage, turn_data
 from twin.learned.standing import axis_terms
@@ -72,6 +73,10 @@ def _axis(machine: MachineFile, run: Run, floors: Floors, letter: str, push: Flo
     )
     fixed = {name for name, _ in standing}
     model, theta = _sensing(machine, lambda on: on.startswith(f"{letter}_"), letter, fixed)
+    if letter in floors.opened_axes:
+        return open_columns(stage, model, theta, data)
+    if not data.told:
+        return {}
     observed = stage.observed[0]
     predicted = stage.predict(model, theta, 0)[0].reshape(len(observed.signals), -1)
     where = np.concatenate([np.arange(len(data.t_s))[s] for s in data.stretches()])
@@ -79,7 +84,7 @@ def _axis(machine: MachineFile, run: Run, floors: Floors, letter: str, push: Flo
     for signal, values in zip(observed.signals, predicted, strict=True):
         column = np.full(len(data.t_s), np.nan)
         column[where] = values
-        columns[signal] = column
+        columns[signal] = data.of_loops(column)
     if f"{letter}_table_mm" in columns and f"{letter}_pos_mm" in columns:
         columns[f"{letter}_table_mm"] += columns[f"{letter}_pos_mm"]
     return columns

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from twin.effects.catalogue import effect_named
 from twin.effects.effect import Effect, Guesses
+from twin.gap.descent import STEP
 from twin.gap.diagnosis import Effected
 from twin.gap.stages.free import Free, effect_parameters
 from twin.gap.stages.free_term import FreeTerm
@@ -29,6 +30,7 @@ class Observed:
     measured: (n,), NaN where there is no sample; floor: (n,) what repeated runs differ by; sigma: (n,) of what is compared, less
     than the floor where repeated runs were averaged; signal: (n,) index into `signals`; block: (n,) number of the time block
     regime: (n,) number of the regime (`twin.gap.labels`)
+    slope_step: step of θ for slopes; a longer one where what is shown has small jumps
     """
 
     name: str
@@ -40,6 +42,7 @@ class Observed:
     block: Ints
     regime: Regimes
     fitted: bool
+    slope_step: float = STEP
 
 
 class Stage(Protocol):
@@ -157,7 +160,9 @@ class Model:
         return replace(self, terms=(*self.terms, term))
 
 
-def observed_of(name: str, parts: Sequence[tuple[str, Floats, Floats, Floats, Ints, Regimes]], fitted: bool) -> Observed:
+def observed_of(
+    name: str, parts: Sequence[tuple[str, Floats, Floats, Floats, Ints, Regimes]], fitted: bool, slope_step: float = STEP
+) -> Observed:
     """From (signal, measured, floor, sigma, block, regime) of each signal."""
     return Observed(
         name,
@@ -169,4 +174,5 @@ def observed_of(name: str, parts: Sequence[tuple[str, Floats, Floats, Floats, In
         np.concatenate([p[4] for p in parts]),
         np.concatenate([p[5] for p in parts]),
         fitted,
+        slope_step,
     )

@@ -4,7 +4,7 @@ A turn is compared by its orders (a line at so many times the spindle's frequenc
 what all teeth do alike, and by what a tooth departs from the mean of all. Equal teeth have nothing of the second, whatever the
 material, the chip or a resonance of the table does to the first, so what is left of one part drowns nothing in the other.
 
-    tooth passing   orders 0, N, 2N, 3N          tooth to tooth   all others below 3N
+    tooth passing   orders 0, N, 2N, 3N          tooth to tooth   all others up to 3N
 
 The phase of the spindle is a nuisance of each even stretch, and so is a shift within a tooth where the angle was recorded.
 """
@@ -24,13 +24,15 @@ from twin.gap.diagnosis import Effected
 from twin.gap.dynamometer.cutting import FORCES
 from twin.gap.dynamometer.mean_turn import Engagement, best_phase, fine_turn, orders_of, turn_of
 from twin.gap.dynamometer.turn_floor import turn_floor
-from twin.gap.dynamometer.turn_mean import PASSINGS
 from twin.gap.dynamometer.turn_run import TurnRun
 from twin.gap.labels import regime_labels
 from twin.gap.stages.cut import acting
 from twin.gap.stages.free import Free, constant
 from twin.gap.stages.observed_through import Sensing
 from twin.gap.stages.stage import Model, Observed, observed_of
+from twin.learned.standing import terms_at
+from twin.learned.term import Term
+from twin.learned.words import LearnedSite
 from twin.machine import MachineFile
 from twin.process.kernel import process_quantities
 from twin.process.milling import tool_constants
@@ -41,6 +43,8 @@ Complexes = NDArray[np.complex128]
 TO_TOOTH = " tooth to tooth"
 SETTLING_TURNS = 4
 """Turns that a sensor is driven through before the one that is compared."""
+SLOPE_STEP = 0.01
+"""A force that begins with the chip jumps where runout takes the chip away, and steps from node to node of the turn."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,6 +67,7 @@ class TurnData:
     log: RunLog
     signals: tuple[str, ...]
     stretches: tuple[Stretch, ...]
+    highest: int
     knows_phase: bool
     knows_mean: bool
     fitted: bool
@@ -85,7 +90,9 @@ def _data(run: TurnRun) -> TurnData:
         )
         measured = np.stack([log[name][here].reshape(-1, run.points) for name in signals])
         stretches.append(Stretch(Engagement(rpm, feed / 60.0, depth, entry, leaving, heading), measured))
-    return TurnData(run.name, log, signals, tuple(stretches), run.knows_phase, run.knows_mean, run.entry.role == "fit")
+    return TurnData(
+        run.name, log, signals, tuple(stretches), run.highest, run.knows_phase, run.knows_mean, run.entry.role == "fit"
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +104,7 @@ class TurnStage:
     left_out: frozenset[str] = frozenset()
     name: str = "cut"
     averaged: int = 1
-    healthy_rms: float = 1.3
+    healthy_rms: float = 1.5
     observed: tuple[Observed, ...] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -107,6 +114,11 @@ class TurnStage:
     def standing(self) -> dict[str, Mapping[str, float]]:
         """Effects that the machine has already."""
         return added_effects(self.machine, process_quantities())
+
+    @cached_property
+    def terms(self) -> tuple[Term, ...]:
+        """Learned terms of the cut that the machine has already."""
+        return terms_at(self.machine.learned, (LearnedSite.CUT_FORCE,))
 
     @property
     def constants(self) -> tuple[Free, ...]:
@@ -137,26 +149,21 @@ class TurnStage:
         assert self.machine.tool is not None
         return self.machine.tool.teeth
 
-    @property
-    def highest(self) -> int:
-        """Highest order that is compared."""
-        return PASSINGS * self.teeth
-
-    def _parts(self, signals: tuple[str, ...]) -> list[tuple[str, int, NDArray[np.intp]]]:
-        """Name, number of the signal and orders of each part that is compared."""
-        order = np.arange(self.highest + 1)
+    def _parts(self, run: TurnData) -> list[tuple[str, int, NDArray[np.intp]]]:
+        """Name, number of the signal and orders of each part of a run that is compared."""
+        order = np.arange(run.highest + 1)
         alike = order % self.teeth == 0
-        parts = [(signal, n, order[alike]) for n, signal in enumerate(signals)]
-        return parts + [(signal + TO_TOOTH, n, order[~alike]) for n, signal in enumerate(signals) if self.teeth > 1]
+        parts = [(signal, n, order[alike]) for n, signal in enumerate(run.signals)]
+        return parts + [(signal + TO_TOOTH, n, order[~alike]) for n, signal in enumerate(run.signals) if self.teeth > 1]
 
     def _observed(self, run: TurnData) -> Observed:
         label = regime_labels(run.log, run.signals[0], self.machine)[1][:1]
-        measured = [stretch.orders(self.highest) for stretch in run.stretches]
+        measured = [stretch.orders(run.highest) for stretch in run.stretches]
         floors = [turn_floor(m, s.cut.rpm / 60.0) for m, s in zip(measured, run.stretches, strict=True)]
         counts = [m.shape[1] for m in measured]
         first = np.cumsum([0, *counts])
         parts = []
-        for name, n, orders in self._parts(run.signals):
+        for name, n, orders in self._parts(run):
             series = np.concatenate([_plain(m[n][:, orders]).ravel() for m in measured])
             floor, sigma = (
                 np.concatenate([np.tile(np.repeat(v[n][orders], 2), count) for v, count in zip(values, counts, strict=True)])
@@ -168,13 +175,13 @@ class TurnStage:
                 np.tile((np.repeat(orders, 2) == 0) & (np.arange(2 * len(orders)) % 2 == 1), first[-1]), np.nan, series
             )
             parts.append((name, series, floor, sigma, block, np.repeat(label, len(series))))
-        return observed_of(run.name, parts, run.fitted)
+        return observed_of(run.name, parts, run.fitted, SLOPE_STEP)
 
     def predict(self, model: Model, theta: Floats, run: int) -> Floats:
         """Both parts of the turns at each row of θ, (lanes, n)."""
         data, shown = self.runs[run], self.turns(model, theta, run)
         parts = []
-        for _, n, orders in self._parts(data.signals):
+        for _, n, orders in self._parts(data):
             for turn, stretch in zip(shown, data.stretches, strict=True):
                 parts.append(np.tile(_plain(turn[n][:, orders]), (1, stretch.measured.shape[1])))
         return np.concatenate(parts, axis=1)
@@ -199,7 +206,17 @@ class TurnStage:
         sensing = [Sensing.of(values, signal) for signal in data.signals]
         orders = [self._orders(constants, sensing, stretch, data) for stretch in data.stretches]
         phases = self._phases(orders, data)
-        return [found * np.exp(-1j * np.arange(self.highest + 1) * p[:, None]) for found, p in zip(orders, phases, strict=True)]
+        return [found * np.exp(-1j * np.arange(data.highest + 1) * p[:, None]) for found, p in zip(orders, phases, strict=True)]
+
+    @cached_property
+    def _seen(self) -> dict[str, tuple[list[Complexes], list[Floats]]]:
+        """Run → the mean turn of each stretch in floors, and those floors; (signals, orders) each."""
+        found = {}
+        for run in self.runs:
+            blocks = [stretch.orders(run.highest) for stretch in run.stretches]
+            noise = [turn_floor(b, s.cut.rpm / 60.0).floor for b, s in zip(blocks, run.stretches, strict=True)]
+            found[run.name] = ([b.mean(axis=1) / n for b, n in zip(blocks, noise, strict=True)], noise)
+        return found
 
     def _constants(self, model: Model, theta: Floats) -> dict[str, ArrayLike]:
         assert self.machine.tool is not None
@@ -212,7 +229,7 @@ class TurnStage:
     def _orders(self, constants: dict[str, ArrayLike], sensing: list[Sensing], stretch: Stretch, data: TurnData) -> Complexes:
         """Amplitudes of the orders that the twin's sensors show, (signals, lanes, orders)."""
         effects = tuple(e.name for e in acting(process_quantities()))
-        turn = fine_turn(constants, self.teeth, stretch.cut, effects)
+        turn = fine_turn(constants, self.teeth, stretch.cut, effects, self.terms)
         shown = []
         for sensor, signal in zip(sensing, data.signals, strict=True):
             force = turn.force[FORCES.index(signal)]
@@ -221,16 +238,14 @@ class TurnStage:
                 settled = sensor.readings(np.tile(force, (1, SETTLING_TURNS)), turn.step_s)
                 force = (settled - sensor.readings(np.zeros_like(settled), turn.step_s))[:, -force.shape[1] :]
             shown.append(force)
-        found = type(turn)(np.stack(shown), turn.step_s).orders(self.highest)
+        found = type(turn)(np.stack(shown), turn.step_s).orders(data.highest)
         if not data.knows_mean:
             found[..., 0] = 0.0
         return found
 
     def _phases(self, orders: list[Complexes], data: TurnData) -> list[Floats]:
         """The phase of each stretch, (lanes,) each: one for all, within a tooth, where the angle was recorded."""
-        blocks = [stretch.orders(self.highest) for stretch in data.stretches]
-        noise = [turn_floor(b, s.cut.rpm / 60.0).floor for b, s in zip(blocks, data.stretches, strict=True)]
-        seen = [b.mean(axis=1) / n for b, n in zip(blocks, noise, strict=True)]
+        seen, noise = self._seen[data.name]
         twins = [found / n[:, None, :] for found, n in zip(orders, noise, strict=True)]
         if not data.knows_phase:
             return [best_phase(one, twin, np.pi) for one, twin in zip(seen, twins, strict=True)]

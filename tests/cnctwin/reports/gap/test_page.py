@@ -17,7 +17,18 @@ from cnctwin.reports.gap.page import report_html
 from tests.cnctwin.reports.gap.diagnosed import DIAGNOSED, explained, healthy, partly, unknown
 from tests.cnctwin.reports.gap.page_reader import PageReader
 from tests.cnctwin.reports.hostile import HOSTILE, hostile
-from twin.gap.diagnosis import Candidate, Diagnosed, Interval, Pattern, Trace
+from twin.gap.diagnosis import (
+    Candidate,
+    Diagnosed,
+    Interval,
+    Learned,
+    LooksLike,
+    MovedConstant,
+    Pattern,
+    Subsystem,
+    Trace,
+    Verdict,
+)
 
 ROOT = Path(__file__).parents[4]
 ORDER = ["where", "traces", "far", "causes", "candidates", "patterns", "untold", "next", "notes", "judged"]
@@ -42,6 +53,39 @@ def test_a_page_needs_nothing_from_elsewhere_and_stays_small(name: str) -> None:
     assert not [key for _, given in page.elements for key in given if key.startswith("on")]
     assert not re.search(r"https?://(?!www\.w3\.org/2000/svg)", text)
     assert len(text.encode()) < 1_500_000
+
+
+def test_parts_constants_and_learned_terms_have_sections_of_their_own_where_there_are_any() -> None:
+    given = unknown()
+    knots = (0.0, 100.0, 200.0)
+    force = Learned(
+        "axis_force", "x", "N", ("position", "direction"), True, 0.81, 0.74, 0.86,
+        {
+            "position_mm": knots * 2, "direction": (-1.0,) * 3 + (1.0,) * 3,
+            "value": (0.0, 43.0, 1.0) * 2, "low": (-1.0,) * 6, "high": (44.0,) * 6,
+        },
+        (LooksLike("direction_friction", "x", "it closes 31 %"),), "a force on X of +43 N about 100 mm, in both directions",
+    )  # fmt: skip
+    pushes = replace(
+        force, depends_on=("time",), repeats=False, sentence="two pushes of 30 N",
+        table={"t_s": (0.0, 1.0, 0.0, 1.0), "run": ("a", "a", "b", "b"), "value": (0.0, 30.0, 0.0, 30.0)},
+    )  # fmt: skip
+    diagnosis = replace(
+        given.diagnosis,
+        subsystems=(
+            Subsystem("cut", ("spindle_rpm",), "force_x_n", 1.0, 1.0, Verdict.HEALTHY),
+            Subsystem("x mechanics", ("x_torque_a",), "x_torque_a", 8.1, 1.1, Verdict.EXPLAINED, ("gravity",)),
+            Subsystem("x controller", ("x_ref_mm", "x_pos_mm"), "x_torque_a", 90.0, 90.0, Verdict.UNKNOWN),
+        ),
+        constants=(MovedConstant("axes.x.mass_kg", 320.0, 339.0, 2.4, 0.4),),
+        learned=(force, pushes),
+    )
+    page = PageReader(report_html(replace(given, diagnosis=diagnosis), "machine"))
+    headings = [heading["id"] for heading in page.of("h2")]
+    assert headings[0] == "subsystems" and {"learned", "constants"} < set(headings)
+    assert page.text.index("X controller") < page.text.index("X mechanics") < page.text.index("Cut")
+    for said in ("not understood", "Two pushes of 30 N.", "direction friction on X, but it closes 31 %", "moving in −", "2.4 σ"):
+        assert said in page.text
 
 
 def test_the_policy_names_the_style_and_the_script_that_are_there() -> None:

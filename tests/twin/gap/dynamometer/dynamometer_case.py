@@ -22,10 +22,12 @@ def run_at_hand(name: str, role: str, log: RunLog) -> RunAtHand:
     return RunAtHand(RunEntry(file=name, kind=RunKind.CUT, role="check" if role == "check" else "fit"), Path(), log)
 
 
-def dynamometer_case(cutter: Cutter, bench: Bench | None = None, *, with_angle: bool = False, seed: int = 10) -> Case:
+def dynamometer_case(
+    cutter: Cutter, bench: Bench | None = None, *, with_angle: bool = False, air_s: float = 0.4, seed: int = 10
+) -> Case:
     """The case."""
     runs = []
     for number, feeds in enumerate(FEEDS):
-        log = run_log(recorded(cutter, feeds, arc=ARC, seed=seed + number, with_angle=with_angle, bench=bench))
+        log = run_log(recorded(cutter, feeds, arc=ARC, seed=seed + number, with_angle=with_angle, air_s=air_s, bench=bench))
         runs.append(run_at_hand(f"run_{number}", "check" if number == len(FEEDS) - 1 else "fit", log))
     return Case("bench", machine(cutter), tuple(runs))

@@ -25,13 +25,14 @@ class Cutter:
     runout_mm: float = 0.0
     runout_rad: float = 0.6
     helix_deg: float = 0.0
+    chipped_mm: float = 0.0
 
 
 @dataclass(frozen=True)
 class Bench:
     """How it is recorded."""
 
-    rate_hz: float = 10_000.0
+    rate_hz: float = 8_000.0
     resonance_hz: float = 1400.0
     damping: float = 0.06
     drift_n_per_s: float = 3.0
@@ -51,6 +52,7 @@ def forces(cutter: Cutter, angle: Floats, feed_mm_min: Floats, rpm: float, depth
     """Force on the tool, x along the feed, (2, n)."""
     advance = feed_mm_min / (cutter.teeth * rpm)
     radius = cutter.runout_mm * np.cos(cutter.runout_rad + 2.0 * np.pi * np.arange(cutter.teeth) / cutter.teeth)
+    radius[0] -= cutter.chipped_mm
     found = np.zeros((2, len(angle)))
     for tooth in range(cutter.teeth):
         for number in range(SLICES):

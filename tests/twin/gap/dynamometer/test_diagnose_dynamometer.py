@@ -2,19 +2,22 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from tests.twin.gap.dynamometer.dynamometer_case import dynamometer_case
 from tests.twin.gap.dynamometer.milled import Bench, Cutter
+from twin.case import RunAtHand
 from twin.gap.diagnose import diagnose
 from twin.gap.diagnosis import Diagnosis, Verdict
+from twin.runlog import run_log
 
 EDGED = {"edge_n_per_mm": 15.0, "edge_radial_n_per_mm": 20.0}
 ROUGH = Bench(resonance_hz=1000.0, damping=0.03, noise_n=6.0, vibration_n=25.0, drift_n_per_s=6.0)
 
 
-def found(cutter: Cutter, bench: Bench | None = None, *, with_angle: bool = False) -> Diagnosis:
-    return diagnose(dynamometer_case(cutter, bench, with_angle=with_angle)).diagnosis
+def found(cutter: Cutter, bench: Bench | None = None, *, with_angle: bool = False, air_s: float = 0.4) -> Diagnosis:
+    return diagnose(dynamometer_case(cutter, bench, with_angle=with_angle, air_s=air_s)).diagnosis
 
 
 def names(diagnosis: Diagnosis) -> set[str]:
@@ -53,6 +56,34 @@ def test_one_alone_is_named_alone(cutter: Cutter, named: str) -> None:
 def test_both_are_named_on_a_rough_bench() -> None:
     diagnosis = found(Cutter(runout_mm=0.01, helix_deg=30.0, **EDGED), ROUGH)
     assert names(diagnosis) >= {"runout", "edge_force"}, diagnosis.sentence
+
+
+def test_an_edge_is_certain_beside_a_chipped_tooth_that_is_in_no_catalogue() -> None:
+    diagnosis = found(Cutter(chipped_mm=0.02, **EDGED))
+    assert diagnosis.verdict is Verdict.PARTLY, diagnosis.sentence
+    assert names(diagnosis) == {"edge_force"}, diagnosis.sentence
+
+
+def test_a_chipped_tooth_alone_has_no_name() -> None:
+    diagnosis = found(Cutter(chipped_mm=0.02))
+    assert (diagnosis.verdict, diagnosis.causes) == (Verdict.UNKNOWN, ()), diagnosis.sentence
+
+
+def test_without_air_an_edge_is_told_by_what_changes_within_a_turn() -> None:
+    diagnosis = found(Cutter(runout_mm=0.01, **EDGED), air_s=0.0)
+    assert names(diagnosis) == {"runout", "edge_force"}, diagnosis.sentence
+
+
+def test_a_recording_at_the_servo_period_with_references_is_one_too() -> None:
+    case = dynamometer_case(Cutter(runout_mm=0.01, **EDGED), replace(ROUGH, rate_hz=1000.0, resonance_hz=0.0), with_angle=True)
+    runs = []
+    for run in case.runs:
+        way = np.concatenate([[0.0], np.cumsum(run.log["feed_mm_min"][1:] / 60.0 * np.diff(run.log.t_s))])
+        columns = {name: values for name, values in run.log.columns.items() if name != "feed_mm_min"}
+        columns |= {"t_s": run.log.t_s, "x_ref_mm": way, "y_ref_mm": np.zeros_like(way)}
+        runs.append(RunAtHand(run.entry, run.folder, run_log(columns)))
+    diagnosis = diagnose(replace(case, runs=tuple(runs))).diagnosis
+    assert names(diagnosis) == {"runout", "edge_force"}, diagnosis.sentence
 
 
 def test_drift_alone_is_no_cause() -> None:

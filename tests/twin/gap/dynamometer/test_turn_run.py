@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from tests.twin.gap.dynamometer.dynamometer_case import ARC, machine, run_at_hand
 from tests.twin.gap.dynamometer.milled import Bench, Cutter, forces, recorded
 from twin.case import Run
+from twin.gap.dynamometer.cutting import is_of_forces_alone
 from twin.gap.dynamometer.turn_run import TurnRun, turn_run
 from twin.runlog import RunLog, run_log
 
@@ -119,4 +120,17 @@ def test_too_few_samples_a_turn_are_refused() -> None:
 
 def test_a_recording_with_axes_that_answer_is_left_alone() -> None:
     columns = recorded(CUTTER, (600.0,), arc=ARC, bench=QUIET, seconds=0.4)
-    assert turned(columns | {"x_ref_mm": columns["t_s"], "x_pos_mm": columns["t_s"]}) == (None, [])
+    log = run_log(columns | {"x_ref_mm": columns["t_s"], "x_pos_mm": columns["t_s"] + 0.001})
+    assert not is_of_forces_alone(log, "x")
+    assert is_of_forces_alone(log, "z")
+
+
+def test_a_depth_that_is_null_is_no_cut_and_one_that_is_sampled_slowly_is() -> None:
+    columns = recorded(CUTTER, (600.0,), arc=ARC, bench=QUIET)
+    planned = of_turns(columns)
+    null = of_turns(columns | {"axial_depth_mm": np.where(columns["axial_depth_mm"] > 0.0, 2.0, np.nan)})
+    slow = np.where(np.arange(len(columns["t_s"])) % 40 == 0, columns["axial_depth_mm"], np.nan)
+    sparse = of_turns(columns | {"axial_depth_mm": slow})
+    for run in (null, sparse):
+        assert run.knows_mean
+        assert mean_turn(run.log, run, 0) == pytest.approx(mean_turn(planned.log, planned, 0), abs=1.0)

@@ -14,20 +14,21 @@ from twin.gap.stages.plan import axis_stage, ground_of
 from twin.gap.stages.stage import Model
 from twin.learned.knots import Knots
 from twin.learned.words import LearnedSite
+from twin.machine import AddedEffect
 
 Floats = NDArray[np.float64]
 
 
-def healthy_stage() -> AxisStage:
-    """The axis of the small case, as it is."""
-    stage = axis_stage(ground_of(air_case(), frozenset()), "z", {})
+def healthy_stage(*effects: AddedEffect) -> AxisStage:
+    """The axis of the small case, as it is; with these effects in its machine."""
+    stage = axis_stage(ground_of(air_case(*effects), frozenset()), "z", {})
     assert stage is not None
     return stage
 
 
-def stage_with(site: LearnedSite, knots: Mapping[str, Floats], shape: Callable[..., Floats]) -> AxisStage:
-    """The same with a term: its values at the knots are `shape` of the knots of each argument."""
-    stage = healthy_stage()
+def stage_with(site: LearnedSite, knots: Mapping[str, Floats], shape: Callable[..., Floats], *effects: AddedEffect) -> AxisStage:
+    """The same with a term: its values at the knots are `shape` of the knots of each argument; effects: of the catalogue, too."""
+    stage = healthy_stage(*effects)
     term = FreeTerm(site, "z", Knots(knots), 1.0, {})
     values = shape(*(v.ravel() for v in np.meshgrid(*knots.values(), indexing="ij")))
     model = Model((), ()).with_term(term)

@@ -4,11 +4,14 @@ import numpy as np
 import pytest
 
 from tests.twin.gap.sampling.recorded_at import case_recorded_every
-from tests.twin.gap.small_case import MACHINE, case_of
-from twin.case import RunKind
+from tests.twin.gap.small_case import MACHINE, case_of, plant
+from twin.case import Case, RunKind
 from twin.gap.diagnose import diagnose
 from twin.gap.diagnosis import Verdict
 from twin.gap.inspection import inspected
+from twin.gap.stages.open_loop.mechanics import Mechanics
+from twin.gap.stages.plan import axis_stage, ground_of
+from twin.gap.stages.stage import Model
 from twin.machine import AddedEffect
 
 ASYMMETRY = AddedEffect(effect="direction_friction", on="z", parameters={"asymmetry": 0.12})
@@ -52,3 +55,30 @@ def test_the_spindle_turns_on_between_slower_samples() -> None:
     away = np.angle(np.exp(1j * (log["spindle_angle_rad"] - turn * log.t_s)))
     assert np.abs(away).max() < 1e-6
     assert np.isfinite(log["force_x_n"]).sum() == 500
+
+
+def test_what_was_measured_stays_where_only_the_reference_is_in_doubt() -> None:
+    looked, notes = inspected(case_recorded_every(0.008))
+    log = looked.runs[0].log
+    doubt = log.columns["z_doubt"] > 0.0
+    assert 0.05 < doubt.mean() < 0.5
+    assert any("is not known well enough" in note for note in notes)
+    assert np.isfinite(log["z_pos_mm"][doubt]).any()
+    stage = axis_stage(ground_of(looked, frozenset()), "z", {})
+    assert stage is not None
+    data = stage.runs[0]
+    assert np.isnan(data.of_loops(data.measured["pos_mm"])[doubt]).all()
+
+
+@pytest.mark.parametrize("sample_s", [0.002, 0.0033, 0.008])
+def test_an_open_loop_of_the_true_machine_leaves_as_little_at_any_sample_period(sample_s: float) -> None:
+    left = []
+    for every_s in (0.001, sample_s):
+        case = case_recorded_every(every_s)
+        looked, _ = inspected(Case(case.name, plant(), case.runs))
+        stage = axis_stage(ground_of(looked, frozenset()), "z", {})
+        assert stage is not None
+        run, loop = stage.runs[-1], Mechanics()
+        away = loop.answer(stage, Model((), ()), np.zeros((1, 0)), run)[0] - loop.recorded(run)
+        left.append(float(np.sqrt(np.nanmean(away**2))))
+    assert left[1] < 2.0 * left[0]

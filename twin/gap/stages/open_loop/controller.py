@@ -19,7 +19,7 @@ from twin.gap.stages.free import Free
 from twin.gap.stages.observed_through import Sensing
 from twin.gap.stages.open_loop.lanes import Driven, run_lanes
 from twin.gap.stages.open_loop.loop import added_at
-from twin.gap.stages.open_loop.smoothed import filled, low_passed, velocity_of
+from twin.gap.stages.smoothed import filled, low_passed, velocity_of
 from twin.gap.stages.stage import Model
 from twin.learned.words import LearnedSite
 from twin.servo.kernel import axis_quantities
@@ -41,6 +41,7 @@ class Controller:
     name: str = "controller"
     driven_by: tuple[str, ...] = ("ref_mm", "pos_mm")
     compared: str = "torque_a"
+    healthy_rms: float = 1.3
     sites: tuple[LearnedSite, ...] = (LearnedSite.CONTROLLER, LearnedSite.TORQUE_READING)
 
     def acts(self, effect: Effect) -> bool:
@@ -59,7 +60,7 @@ class Controller:
 
     def recorded(self, data: AxisRunData) -> Floats:
         """The torque within the bandwidth, about a line over each stretch."""
-        known = np.isfinite(data.measured["pos_mm"]) & np.isfinite(data.measured["torque_a"])
+        known = np.isfinite(data.of_loops(data.measured["pos_mm"])) & np.isfinite(data.measured["torque_a"])
         smooth = low_passed(filled(data.measured["torque_a"]), data.period_s, BANDWIDTH_HZ)
         smooth = np.where(known, smooth, np.nan)
         return np.concatenate([_about_line(smooth[s][None, :], known[s])[0] for s in data.stretches()])
@@ -82,10 +83,10 @@ class Controller:
         values = model.values(theta)
         position = filled(data.measured["pos_mm"])
         velocity = velocity_of(position, period_s, VELOCITY_OVER * BANDWIDTH_HZ)
-        known = np.isfinite(data.measured["pos_mm"]) & np.isfinite(data.measured["torque_a"])
+        known = np.isfinite(data.of_loops(data.measured["pos_mm"])) & np.isfinite(data.measured["torque_a"])
         torque = filled(data.measured["torque_a"])
         sensing = Sensing.of(values, f"{letter}_torque_a")
-        terms = readings_of_terms(model, theta, f"{letter}_torque_a", data)
+        terms = readings_of_terms(model, theta, f"{letter}_torque_a", data, axis.terms)
         whole = np.zeros((len(theta), sum(len(data.t_s[s]) for s in data.stretches())))
         first, carried = 0, dict[str, Floats]()
         for stretch in data.stretches():

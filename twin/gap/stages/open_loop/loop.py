@@ -8,9 +8,10 @@ from numpy.typing import NDArray
 from twin.effects.effect import Effect
 from twin.gap.stages.axis import AxisStage
 from twin.gap.stages.axis_run import AxisRunData
-from twin.gap.stages.axis_terms import QUANTITIES, series_of_terms
+from twin.gap.stages.axis_terms import series_of_terms
 from twin.gap.stages.free import Free
 from twin.gap.stages.stage import Model
+from twin.learned.sites import QUANTITIES
 from twin.learned.words import LearnedSite
 
 Floats = NDArray[np.float64]
@@ -32,6 +33,10 @@ class Loop(Protocol):
     @property
     def compared(self) -> str:
         """The column, without the axis letter, that it answers with."""
+
+    @property
+    def healthy_rms(self) -> float:
+        """The most that a healthy machine's twin leaves, in floors."""
 
     @property
     def sites(self) -> tuple[LearnedSite, ...]:
@@ -70,7 +75,7 @@ def over_stretches(data: AxisRunData, values: Floats) -> Floats:
 def added_at(
     sites: tuple[LearnedSite, ...], model: Model, theta: Floats, axis: AxisStage, data: AxisRunData, stretch: slice
 ) -> dict[str, Floats]:
-    """Return quantity → (lanes, ticks) of the learned terms of a model at these sites, over a stretch."""
+    """Return quantity → (lanes, ticks) of the learned terms of machine and model at these sites, over a stretch."""
     here = {quantity for site in sites for quantity in QUANTITIES.get(site, {})}
-    series = series_of_terms(model, theta, axis.letter, data.arguments, stretch)
+    series = series_of_terms(model, theta, axis.letter, data.arguments, stretch, axis.terms)
     return {quantity: values for quantity, values in series.items() if quantity in here}

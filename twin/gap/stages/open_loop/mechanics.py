@@ -21,7 +21,7 @@ from twin.gap.stages.free import Free
 from twin.gap.stages.observed_through import Sensing
 from twin.gap.stages.open_loop.lanes import Driven, run_lanes
 from twin.gap.stages.open_loop.loop import added_at, over_stretches
-from twin.gap.stages.open_loop.smoothed import filled, low_passed, velocity_of
+from twin.gap.stages.smoothed import filled, low_passed, sample_period_s, velocity_of
 from twin.gap.stages.stage import Model
 from twin.learned.words import LearnedSite
 from twin.servo.kernel import axis_quantities
@@ -46,6 +46,7 @@ class Mechanics:
     name: str = "mechanics"
     driven_by: tuple[str, ...] = ("pos_mm", "torque_a")
     compared: str = "torque_a"
+    healthy_rms: float = 2.0  # an observer sees how an axis comes to rest and breaks away far below the floor of the torque
     sites: tuple[LearnedSite, ...] = (LearnedSite.AXIS_FORCE, LearnedSite.FRICTION)
 
     def acts(self, effect: Effect) -> bool:
@@ -74,7 +75,7 @@ class Mechanics:
     def answer(self, axis: AxisStage, model: Model, theta: Floats, data: AxisRunData) -> Floats:
         """The torque of the observer, (lanes, n), in units of the torque command."""
         letter, period_s = axis.letter, data.period_s
-        hz = min(BANDWIDTH_HZ, OF_RATE / period_s)
+        hz = min(BANDWIDTH_HZ, OF_RATE / sample_period_s(data.measured["pos_mm"], period_s))
         constants, base = axis.lane_constants(model, theta), axis.axis
         force_n = base.newton_per_command
         gain = 2.0 * (2.0 * np.pi * hz) * base.mass_kg / 1000.0 / force_n
@@ -88,8 +89,6 @@ class Mechanics:
         position = filled(data.measured["pos_mm"])
         velocity = velocity_of(position, period_s, VELOCITY_OVER * hz)
         torque = Sensing.of(model.values(theta), f"{letter}_torque_a").undone(filled(data.measured["torque_a"]))
-        if period_s > 1.5 * axis.period_s:  # not what was held since the sample, but the mean until the next one
-            torque = 0.5 * (torque + np.concatenate([torque[:, 1:], torque[:, -1:]], axis=1))
         parts: list[Floats] = []
         carried: dict[str, Floats] = {}
         for stretch in data.stretches():

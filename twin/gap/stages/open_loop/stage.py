@@ -13,6 +13,7 @@ from twin.gap.stages.axis import BLOCK_S, AxisStage
 from twin.gap.stages.axis_run import AxisRunData
 from twin.gap.stages.free import Free
 from twin.gap.stages.open_loop.loop import ALIKE_S, Loop, places
+from twin.gap.stages.smoothed import sample_period_s
 from twin.gap.stages.stage import Model, Observed, observed_of
 from twin.identification.batch_fit import time_blocks
 
@@ -27,7 +28,6 @@ class OpenStage:
     closed: AxisStage
     loop: Loop
     floors: Mapping[int, float]
-    healthy_rms: float = 1.3
     observed: tuple[Observed, ...] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -49,9 +49,15 @@ class OpenStage:
         return f"{self.closed.letter} {self.loop.name}"
 
     @property
+    def healthy_rms(self) -> float:
+        """The most that a healthy machine's twin leaves of it, in floors."""
+        return self.loop.healthy_rms
+
+    @property
     def averaged(self) -> int:
         """Samples within a few milliseconds go together."""
-        return max(1, round(AVERAGED_S / self.closed.runs[0].period_s))
+        data = self.closed.runs[0]
+        return max(1, round(AVERAGED_S / sample_period_s(data.measured["pos_mm"], data.period_s)))
 
     @property
     def constants(self) -> tuple[Free, ...]:

@@ -13,7 +13,7 @@ from twin.gap.stages.free import Free
 from twin.gap.stages.observed_through import Sensing
 from twin.gap.stages.open_loop.lanes import Driven, run_lanes
 from twin.gap.stages.open_loop.loop import added_at, over_stretches
-from twin.gap.stages.open_loop.smoothed import filled
+from twin.gap.stages.smoothed import filled
 from twin.gap.stages.stage import Model
 from twin.learned.words import LearnedSite
 
@@ -27,6 +27,7 @@ class Table:
     driven_by: tuple[str, ...]
     name: str = "table"
     compared: str = "table_mm"
+    healthy_rms: float = 1.3
     sites: tuple[LearnedSite, ...] = (LearnedSite.TABLE_POSITION, LearnedSite.TABLE_READING)
 
     def acts(self, effect: Effect) -> bool:
@@ -74,5 +75,5 @@ class Table:
             carried = {name: value for name, value in state.items() if name in axis.carried_states}
         signal = f"{axis.letter}_table_mm"
         shown = Sensing.of(values, signal).readings(np.concatenate(parts, axis=1), data.period_s)
-        shown = shown + readings_of_terms(model, theta, signal, data)
+        shown = shown + readings_of_terms(model, theta, signal, data, axis.terms)
         return axis.grown(shown, values, data) - over_stretches(data, position)

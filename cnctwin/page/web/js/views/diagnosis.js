@@ -3,6 +3,7 @@
 import { drawn, el, say, symbol } from "../dom.js";
 import { lookup } from "../lookup.js";
 import { number, recorded, sentence, share, words } from "../text.js";
+import { partsSections } from "./diagnosis_parts.js";
 import { shade } from "./gap_shade.js";
 
 const VERDICTS = lookup({
@@ -18,11 +19,15 @@ const on = (one) =>
 const list = (value) => (Array.isArray(value) ? value : []);
 
 export function diagnosisSections(diagnosis, report) {
+  const [parts, learned, constants] = partsSections(diagnosis);
   return [
     verdict(diagnosis, report),
+    parts,
     where(list(diagnosis.where)),
     shrinks(diagnosis.gap),
     causes(list(diagnosis.causes)),
+    learned,
+    constants,
     untold(diagnosis),
   ].filter(Boolean);
 }

@@ -7,9 +7,12 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfiltfilt
 
 Floats = NDArray[np.float64]
+HOLE = 2.5
+"""Sample periods beyond which neighbouring samples say nothing of what was between them."""
 NYQUIST_MAX = 0.8
 """Part of the Nyquist frequency above which there is nothing to take away."""
 
@@ -37,11 +40,31 @@ def _sections(part: float) -> Floats:
 
 
 def filled(values: Floats) -> Floats:
-    """Return (n,) with missing samples taken from their neighbours; 0 where there are none at all."""
+    """Return (n,) with missing samples taken from their neighbours; 0 where there are none at all.
+
+    Between even samples by a cubic spline, over holes and beyond the ends straight.
+    """
     there = np.flatnonzero(np.isfinite(values))
-    if len(there) == len(values):
-        return values
-    return np.interp(np.arange(len(values)), there, values[there]) if len(there) else np.zeros(len(values))
+    if len(there) in (0, len(values)):
+        return np.nan_to_num(values)
+    ticks = np.arange(len(values))
+    straight = np.interp(ticks, there, values[there])
+    if len(there) < 4:
+        return straight
+    apart = np.diff(there)
+    before = np.clip(np.searchsorted(there, ticks, side="right") - 1, 0, len(apart) - 1)
+    even = (apart[before] <= HOLE * np.median(apart)) & (ticks >= there[0]) & (ticks <= there[-1])
+    return np.where(even, CubicSpline(there, values[there])(ticks), straight)
+
+
+def sample_period_s(values: Floats, period_s: float) -> float:
+    """Return the time from sample to sample of a series at ticks of `period_s`, NaN where there is none.
+
+    >>> sample_period_s(np.array([0.0, np.nan, 1.0, np.nan, 2.0]), 0.001)
+    0.002
+    """
+    there = np.flatnonzero(np.isfinite(values))
+    return float(np.median(np.diff(there))) * period_s if len(there) > 1 else float("inf")
 
 
 def velocity_of(position: Floats, period_s: float, cutoff_hz: float) -> Floats:

@@ -1,0 +1,55 @@
+"""Effects that explain what constants far from their stated values explain, and let them be near those again.
+
+An effect is taken where it follows the unseen runs as well, puts back more constants than it has parameters of its own, and is
+clearly the cheaper: Σ (θ / σ)² of the constants falls by more than chance and its parameters are worth. An effect that only does
+what one constant does (a coefficient, a mass) is no better an explanation than that constant.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from twin.effects.catalogue import effect_named
+from twin.gap.evidence import advantage
+from twin.gap.fitting import Fitted, fitted
+from twin.gap.naming.moved import cost, deviations
+from twin.gap.stages.stage import Stage
+
+TRIED = 4
+CHEAPER = 9.0
+"""By how much Σ (θ / σ)² has to fall, and by twice the number of its parameters more."""
+PUT_BACK = 1.0
+"""Stated deviations within which a constant is back."""
+AS_WELL = 0.02
+STEPS_MAX = 14
+
+
+def instead_of_constants(stage: Stage, base: Fitted, tried: Sequence[Fitted]) -> tuple[Fitted, ...]:
+    """Return the machine with one effect, cheapest first; empty where none explains better than the constants.
+
+    tried: the machine with each effect that was fitted
+    """
+    near = sorted((f for f in tried if len(f.effects) == 1), key=lambda f: f.left_fit.excess() + 0.5 * cost(f))[:TRIED]
+    again = [_from_stated(stage, one) for one in near]
+    return tuple(sorted((one for one in again if _is_better(one, base)), key=cost))
+
+
+def _from_stated(stage: Stage, one: Fitted) -> Fitted:
+    """The same fitted anew, its constants as stated at the start."""
+    theta = one.theta.copy()
+    theta[: len(one.model.constants)] = 0.0
+    scale = np.maximum(one.left_fit.rms(), 1.0)
+    other = fitted(stage, one.model, theta, scale=scale, steps_max=STEPS_MAX)
+    return other if other.left_fit.excess() + 0.5 * cost(other) < one.left_fit.excess() + 0.5 * cost(one) else one
+
+
+def _is_better(one: Fitted, base: Fitted) -> bool:
+    over = advantage(one.left, base.left)
+    own = len(effect_named(one.effects[0].effect).parameters)
+    back = _away(base) - _away(one)
+    as_well = over.gain < max(2.0 * over.error, AS_WELL)
+    return as_well and back > own and cost(base) - cost(one) > CHEAPER + 2.0 * own
+
+
+def _away(found: Fitted) -> int:
+    return int(np.count_nonzero(np.abs(deviations(found)) >= PUT_BACK))

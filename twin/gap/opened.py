@@ -1,0 +1,180 @@
+"""Opens the loops of each axis, and combines what they say with the closed loop.
+
+The closed loop is the judge where it explains its gap, and where the controller is understood: then what the open loops find is
+confirmed in it. Where the controller is another one than the twin's, the closed loop says nothing of the rest, and mechanics and
+table are judged by themselves.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from twin.gap.diagnosis import Effected, Verdict
+from twin.gap.evidence import advantage
+from twin.gap.fitting import Fitted, fitted, settled
+from twin.gap.labels import AXIS
+from twin.gap.naming.certain import dropped
+from twin.gap.null import NULL, Null
+from twin.gap.search import Explained, explain, with_certain, without
+from twin.gap.stages.axis import AxisStage
+from twin.gap.stages.open_loop.plan import ON_TOP_OF, open_stages
+from twin.gap.stages.open_loop.stage import OpenStage
+from twin.gap.stages.plan import Ground, SideBySide, unheard_axes
+from twin.gap.stages.stage import Model, Stage
+from twin.gap.verdict import Judged, judged
+
+STEPS_MAX = 5
+SETTLED = {Verdict.HEALTHY, Verdict.EXPLAINED}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Opened:
+    """The open loops of one axis. closed: what the closed loop says, None where the reference was not recorded"""
+
+    letter: str
+    closed: Judged | None
+    loops: Mapping[str, Judged]
+
+    @property
+    def decides(self) -> bool:
+        """Return True where the open loops are judged in place of the closed one: its controller is not the twin's."""
+        if self.closed is None:
+            return True
+        controller = self.loops.get("controller")
+        return self.closed.verdict not in SETTLED and controller is not None and controller.verdict not in SETTLED
+
+    @property
+    def judged(self) -> tuple[Judged, ...]:
+        """The open loops as they stand in place of the closed one: a controller that is another one has no named cause."""
+        return tuple(_unnamed(loop) if name == "controller" else loop for name, loop in self.loops.items())
+
+    @property
+    def floors(self) -> dict[tuple[str, str], float]:
+        """(signal, regime) → floor of what the open loops answer beside their controller."""
+        found: dict[tuple[str, str], float] = {}
+        for name, loop in self.loops.items():
+            stage = loop.explained.stage
+            assert isinstance(stage, OpenStage)
+            if name in ON_TOP_OF:
+                signal = f"{self.letter}_{stage.loop.compared}"
+                found |= {(signal, AXIS[regime]): floor for regime, floor in stage.floors.items()}
+                found[signal, "run"] = max(stage.floors.values())
+        return found
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Combined:
+    """stages: what the answer is made of; opened: the axes, each with its open loops"""
+
+    stages: list[Judged]
+    opened: tuple[Opened, ...]
+
+    @property
+    def by_open_loops(self) -> frozenset[str]:
+        """Letters of the axes that their open loops decide."""
+        return frozenset(axis.letter for axis in self.opened if axis.decides)
+
+    @property
+    def floors(self) -> dict[tuple[str, str], float]:
+        """(signal, regime) → floor, of the axes that their open loops decide."""
+        return {key: floor for axis in self.opened if axis.decides for key, floor in axis.floors.items()}
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """A sentence on each of these axes."""
+        return tuple(_note(axis) for axis in self.opened if axis.decides)
+
+
+def combined(
+    ground: Ground,
+    found: Sequence[Judged],
+    progress: Callable[[str], None],
+    side_by_side: SideBySide = map,
+    null: Null = NULL,
+) -> Combined:
+    """Return the stages of a case with the loops of each axis opened."""
+    progress("opening the loops")
+    closed: dict[str, Judged | None] = {s.explained.stage.letter: s for s in found if isinstance(s.explained.stage, AxisStage)}
+    axes = {letter: s.explained.stage for letter, s in closed.items() if s is not None}
+    for unheard in unheard_axes(ground):
+        axes[unheard.letter], closed[unheard.letter] = unheard, None
+    loops: list[OpenStage] = []
+    for axis in axes.values():
+        if isinstance(axis, AxisStage):
+            loops += open_stages(axis, ground.runs, ground.repeats, ground.floors)
+
+    def explained(stage: Stage) -> Explained:
+        assert isinstance(stage, OpenStage)
+        of_axis = closed[stage.letter]
+        if of_axis is None or of_axis.verdict not in SETTLED:
+            return explain(stage, null=null, progress=progress)
+        return _carried_over(stage, of_axis.explained)
+
+    by_axis: dict[str, dict[str, Judged]] = {}
+    for loop, answer in zip(loops, side_by_side(explained, loops), strict=True):
+        by_axis.setdefault(loop.letter, {})[loop.loop.name] = judged(answer)
+    opened = tuple(Opened(letter, closed[letter], own) for letter, own in by_axis.items())
+    stages = [s for s in found if not isinstance(s.explained.stage, AxisStage)]
+    for letter, of_axis in closed.items():
+        here = next((axis for axis in opened if axis.letter == letter), None)
+        if here is not None and here.decides:
+            stages += here.judged
+        elif of_axis is not None:
+            stages.append(of_axis if here is None else _confirmed(of_axis, here, null))
+    return Combined(stages, opened)
+
+
+def _unnamed(loop: Judged) -> Judged:
+    if loop.verdict in SETTLED:
+        return loop
+    return Judged(without(loop.explained), Verdict.UNKNOWN, loop.explained.best.effects or loop.likeness)
+
+
+def _note(axis: Opened) -> str:
+    compared = " and ".join(name for name in axis.loops if name in ON_TOP_OF) or "nothing"
+    why = "its reference was not recorded" if axis.closed is None else "its controller is another one than the twin's"
+    return f"axis {axis.letter}: {why}; {compared} compared alone, driven by what was measured"
+
+
+def _carried_over(stage: OpenStage, closed: Explained) -> Explained:
+    """The open loop with what the closed one has found, fitted from there."""
+    count = len(stage.constants)
+    bare = Model(stage.constants, ())
+    base = fitted(stage, bare, closed.base.theta[:count], steps_max=STEPS_MAX)
+    here = tuple(e for e in closed.best.effects if e in stage.candidates)
+    if not here:
+        return Explained(stage, base, base, (), {}, {})
+    places = dict(closed.best.model.places())
+    theta = np.concatenate([closed.best.theta[:count], *(closed.best.theta[places[e]] for e in here)])
+    best = fitted(stage, replace(bare, effects=here), theta, steps_max=STEPS_MAX)
+    return Explained(stage, base, best, (), {}, {})
+
+
+def _confirmed(of_axis: Judged, opened: Opened, null: Null) -> Judged:
+    """The closed loop with what its open loops have found, where it has no answer of its own and they hold in it."""
+    if of_axis.verdict is not Verdict.UNKNOWN:
+        return of_axis
+    stage, base = of_axis.explained.stage, of_axis.explained.base
+    model, theta = base.model, base.theta
+    rivals: dict[Effected, tuple[Effected, ...]] = {}
+    for loop in opened.loops.values():
+        best = loop.explained.best
+        for effected, place in best.model.places():
+            if effected in stage.candidates and effected not in model.effects:
+                model, theta = model.with_effect(effected), np.concatenate([theta, best.theta[place]])
+                rivals[effected] = loop.explained.rivals.get(effected, ())
+    if not model.effects:
+        return of_axis
+    best = settled(stage, fitted(stage, model, theta), rounds=1)
+    evidence = {e: advantage(_without(stage, best, e, base).left, best.left) for e in best.effects}
+    if not all(null.exceeded(effected, over, stage.healthy_rms) for effected, over in evidence.items()):
+        return of_axis
+    best, alike = with_certain(stage, base, best, null)
+    evidence = {e: over for e, over in evidence.items() if e in best.effects}
+    again = judged(Explained(stage, base, best, of_axis.explained.tried, rivals, evidence, alike=alike))
+    return of_axis if again.verdict is Verdict.UNKNOWN else again
+
+
+def _without(stage: Stage, best: Fitted, effected: Effected, base: Fitted) -> Fitted:
+    return dropped(stage, best, effected) if len(best.effects) > 1 else base
