@@ -38,6 +38,48 @@ def sensitivities(stage: Stage, parent: Fitted) -> list[Floats]:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Unexplained:
+    """The residual of a hypothesis on the runs that are fitted, with what its own free numbers can do about it projected out.
+
+    weights: (n,) of each run; shown: (n,) of each run; basis: orthonormal, of those free numbers; residual: projected, (n + p,)
+    """
+
+    weights: tuple[Floats, ...]
+    shown: tuple[Floats, ...]
+    basis: Floats
+    residual: Floats
+
+    def projected(self, signatures: Floats) -> Floats:
+        """Return signatures, (n, probes), projected likewise, (n + p, probes)."""
+        whole = np.zeros((len(self.residual), signatures.shape[1]))
+        whole[: len(signatures)] = signatures
+        return np.asarray(whole - self.basis @ (self.basis.T @ whole))
+
+
+def unexplained(stage: Stage, parent: Fitted) -> Unexplained:
+    """Return what a hypothesis leaves unexplained.
+
+    Constants may not go far from what the machine states, so moves of three of their deviations cost as much as the residual.
+    """
+    residuals, weights, shows, moves = [], [], [], []
+    runs = [i for i, o in enumerate(stage.observed) if o.fitted]
+    for i, slope in zip(runs, sensitivities(stage, parent), strict=True):
+        observed = stage.observed[i]
+        shown = stage.predict(parent.model, parent.theta[None, :], i)[0]
+        residual = np.nan_to_num((observed.measured - shown) / observed.sigma)
+        weight = np.isfinite(observed.measured) / np.sqrt(1.0 + (residual / 20.0) ** 2)
+        residuals.append(residual * weight)
+        weights.append(weight)
+        shows.append(shown)
+        moves.append(slope * weight[:, None])
+    left = np.concatenate(residuals)
+    cost = np.linalg.norm(left) / 3.0 / np.array([p.sigma for p in parent.model.free])
+    basis, _ = np.linalg.qr(np.concatenate([*moves, np.diag(cost)]))
+    whole = np.concatenate([left, -cost * parent.theta])
+    return Unexplained(tuple(weights), tuple(shows), basis, whole - basis @ (basis.T @ whole))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Guess:
     """A start for an effect. closes: part of the residual's energy that it would take away, were it linear."""
 
@@ -46,7 +88,7 @@ class Guess:
     closes: float
 
 
-def guesses(stage: Stage, parent: Fitted, effected: Effected, slopes: list[Floats]) -> tuple[Guess, ...]:
+def guesses(stage: Stage, parent: Fitted, effected: Effected, left: Unexplained) -> tuple[Guess, ...]:
     """Where to start the parameters of an effect, best first.
 
     Each linear parameter is tried at the size that machines show, with the sensitivities of the parent projected out; angles by a
@@ -62,9 +104,7 @@ def guesses(stage: Stage, parent: Fitted, effected: Effected, slopes: list[Float
     own = np.concatenate([_probes(shape, free, linear, angle) for shape in shapes])
     offset = len(parent.theta)
     theta = np.concatenate([np.tile(parent.theta, (len(own), 1)), own], axis=1)
-    bare = np.concatenate([parent.theta, np.zeros(len(free))])[None, :]
-    model = parent.model.with_effect(effected)
-    residual, signature = _signatures(stage, model, np.concatenate([bare, theta]), slopes, parent)
+    residual, signature = left.residual, left.projected(_signatures(stage, parent.model.with_effect(effected), theta, left))
     low, high = (np.array([getattr(p, key) for p in free]) for key in ("low", "high"))
     found: list[tuple[float, Guess]] = []
     for first in range(0, len(own), together):
@@ -75,10 +115,10 @@ def guesses(stage: Stage, parent: Fitted, effected: Effected, slopes: list[Float
             ridge = 1e-9 * np.eye(together) * max(float(np.trace(gram)), 1e-12)
             amplitude = np.asarray(np.linalg.solve(gram + ridge, columns.T @ residual), dtype=np.float64)
             _place(guess, amplitude, offset, linear, angle, theta[first : first + together])
-        left = residual - columns @ amplitude
+        rest = residual - columns @ amplitude
         guess[offset:] = np.clip(guess[offset:], low, high)
         energy = max(float(np.sum(residual**2)), 1e-12)
-        closes = as_it_is = 1.0 - float(np.sum(left**2)) / energy
+        closes = as_it_is = 1.0 - float(np.sum(rest**2)) / energy
         if suggested:
             along, across = float(columns[:, 0] @ residual), float(columns[:, 0] @ columns[:, 0])
             part = min(max(along, 0.0) / max(across, 1e-300), 1.0)
@@ -111,30 +151,14 @@ def _place(guess: Floats, amplitude: Floats, offset: int, linear: list[int], ang
     guess[offset + angle] = np.arctan2(across, along)
 
 
-def _signatures(stage: Stage, model: Model, theta: Floats, slopes: list[Floats], parent: Fitted) -> tuple[Floats, Floats]:
-    """Residual (n,) and what each probe changes (n, probes), with what the parent's free numbers can do about it projected out.
-
-    Constants may not go far from what the machine states, so moves of three of their deviations cost as much as the residual.
-    """
-    residuals, signatures, moves = [], [], []
-    for i, slope in zip([i for i, o in enumerate(stage.observed) if o.fitted], slopes, strict=True):
-        observed = stage.observed[i]
-        shown = stage.predict(model, theta, i)
-        residual = np.nan_to_num((observed.measured - shown[0]) / observed.sigma)
-        weight = np.isfinite(observed.measured) / np.sqrt(1.0 + (residual / 20.0) ** 2)
-        residuals.append(residual * weight)
-        signatures.append(np.nan_to_num((shown[1:] - shown[0]).T / observed.sigma[:, None]) * weight[:, None])
-        moves.append(slope * weight[:, None])
-    residual = np.concatenate(residuals)
-    deviation = np.array([p.sigma for p in parent.model.free])
-    cost = np.linalg.norm(residual) / 3.0 / deviation
-    basis, _ = np.linalg.qr(np.concatenate([*moves, np.diag(cost)]))
-    probes = theta.shape[0] - 1
-    both = np.zeros((len(residual) + len(deviation), 1 + probes))
-    both[: len(residual), 0], both[len(residual) :, 0] = residual, -cost * parent.theta
-    both[: len(residual), 1:] = np.concatenate(signatures)
-    both -= basis @ (basis.T @ both)
-    return both[:, 0], both[:, 1:]
+def _signatures(stage: Stage, model: Model, theta: Floats, left: Unexplained) -> Floats:
+    """What each probe changes, (n, probes), weighted as the residual is."""
+    runs = [i for i, o in enumerate(stage.observed) if o.fitted]
+    parts = [
+        np.nan_to_num((stage.predict(model, theta, i) - shown).T / stage.observed[i].sigma[:, None]) * weight[:, None]
+        for i, shown, weight in zip(runs, left.shown, left.weights, strict=True)
+    ]
+    return np.concatenate(parts)
 
 
 def _theta(free: tuple[Free, ...], values: Mapping[str, float]) -> Floats:

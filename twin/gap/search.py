@@ -26,7 +26,7 @@ from twin.gap.naming.moved import has_to_be_beyond
 from twin.gap.naming.siblings import only_completes
 from twin.gap.naming.stops import stops_are_at_odds
 from twin.gap.null import NULL, Null
-from twin.gap.screening import Guess, guesses, sensitivities
+from twin.gap.screening import Guess, guesses, unexplained
 from twin.gap.stages.stage import Model, Stage
 
 Floats = NDArray[np.float64]
@@ -196,8 +196,8 @@ def is_nothing(effected: Effected, values: Mapping[str, float]) -> bool:
 
 def _tried(stage: Stage, parent: Fitted, candidates: tuple[Effected, ...], null: Null) -> tuple[Tried, ...]:
     """All candidates on top of a parent, best first."""
-    slopes = sensitivities(stage, parent)
-    screened = [guesses(stage, parent, c, slopes) for c in candidates if c not in parent.effects]
+    left = unexplained(stage, parent)
+    screened = [guesses(stage, parent, c, left) for c in candidates if c not in parent.effects]
     screened.sort(key=lambda g: -g[0].closes)
     wanted = [g for g in screened if g[0].closes > CLOSES_LEAST][:SCREENED_MAX]
     if _gap_left(parent, null):

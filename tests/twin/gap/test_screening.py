@@ -6,7 +6,7 @@ import pytest
 from tests.twin.gap.one_line import BIAS, SAMPLES, SCALE, OneLine
 from twin.gap.diagnosis import Effected
 from twin.gap.fitting import fitted
-from twin.gap.screening import guesses, sensitivities
+from twin.gap.screening import guesses, sensitivities, unexplained
 from twin.gap.stages.stage import Model
 
 
@@ -14,10 +14,10 @@ def screened(stage: OneLine) -> dict[object, tuple[float, float]]:
     """Candidate → (what its first guess closes, its value there)."""
     bare = Model(stage.constants, ())
     parent = fitted(stage, bare, bare.null_theta())
-    slopes = sensitivities(stage, parent)
+    left = unexplained(stage, parent)
     found = {}
     for candidate in stage.candidates:
-        best = guesses(stage, parent, candidate, slopes)[0]
+        best = guesses(stage, parent, candidate, left)[0]
         values = bare.with_effect(candidate).values(best.theta[None, :])[candidate]
         found[candidate] = (best.closes, float(next(iter(values.values()))[0]))
     return found

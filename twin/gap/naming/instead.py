@@ -11,7 +11,7 @@ from twin.effects.catalogue import effect_named
 from twin.gap.evidence import advantage
 from twin.gap.fitting import Fitted, fitted
 from twin.gap.naming.moved import cost, deviations
-from twin.gap.screening import guesses, sensitivities
+from twin.gap.screening import guesses, unexplained
 from twin.gap.stages.stage import Model, Stage
 
 TRIED = 4
@@ -29,8 +29,8 @@ def instead_of_constants(stage: Stage, base: Fitted) -> tuple[Fitted, ...]:
     Effects are screened and started on the machine as it is stated: the constants of `base` have taken up what they would show.
     """
     stated = fitted(stage, Model((), ()), np.zeros(0))
-    slopes = sensitivities(stage, stated)
-    likely = sorted((guesses(stage, stated, c, slopes)[0] for c in stage.candidates), key=lambda guess: -guess.closes)[:TRIED]
+    left = unexplained(stage, stated)
+    likely = sorted((guesses(stage, stated, c, left)[0] for c in stage.candidates), key=lambda guess: -guess.closes)[:TRIED]
     scale = np.maximum(base.left_fit.rms(), 1.0)
     at_first = np.zeros(len(base.model.constants))
     again = []
