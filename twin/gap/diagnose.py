@@ -20,10 +20,10 @@ from twin.gap.intervals import closure_interval
 from twin.gap.joined import joined
 from twin.gap.learned.answer import described_stages, learned_of, with_learned
 from twin.gap.naming.constants import moved_constants
+from twin.gap.naming.own_units import in_own_units
 from twin.gap.naming.sentence import sentence_of
 from twin.gap.null import NULL, Null
 from twin.gap.opened import combined
-from twin.gap.own_units import in_own_units
 from twin.gap.patterns import patterns
 from twin.gap.programs.diagnose import diagnose_programs
 from twin.gap.refitted import constant_deviations, with_constants, with_effects, with_uncertainty

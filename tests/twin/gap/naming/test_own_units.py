@@ -12,7 +12,7 @@ from twin.errors import CaseError
 from twin.gap.diagnose import diagnose
 from twin.gap.diagnosis import Diagnosed, Learned, MovedConstant, Verdict
 from twin.gap.inspection import inspected
-from twin.gap.own_units import in_own_units
+from twin.gap.naming.own_units import in_own_units
 from twin.gap.score_of import score_of
 from twin.machine import machine_from_toml
 from twin.machine_toml import machine_to_toml
