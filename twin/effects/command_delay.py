@@ -24,7 +24,6 @@ EFFECT = Effect(
     parameters=(Parameter("delay_s", "s", 0.0, 0.0, 0.05, 0.002, "age of the reference in the loop"),),
     changes={"reference_time_s": reference_time_s},
     shows_in=("{a}_torque_a", "{a}_pos_mm"),
-    shows_only_fast=True,
     late_s=late_s,
     equation="ref_seen(t) = ref(t − delay)",
     reference="FANUC AC servo parameter manual B-65270EN, interpolation period and position-loop delay",

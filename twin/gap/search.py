@@ -37,6 +37,8 @@ STEPS_FIRST, STEPS_MAX = 6, 14
 REFINED = 3
 SWAPPED_WITH = 3
 SWAP_SIGMAS = 2.0
+CHANCE = 6.0
+"""Floors², summed over the judged samples, that have to tell one hypothesis from another: a likelihood ratio of 20."""
 THETA_NULL = 1e-4
 """θ below which an effect is null: the fit has taken it away."""
 PAIR_GAP = 3.0
@@ -106,7 +108,7 @@ def explain(
                 break
             best = pair
             continue
-        chosen, equals = _chosen(accepted)
+        chosen, equals = _chosen(accepted, tried)
         assert chosen.found is not None
         settled_with = settled(stage, chosen.found, rounds=1)
         if best.effects and _is_a_second_name(base, best, settled_with, first):
@@ -230,18 +232,29 @@ def _best_fit(stage: Stage, parent: Fitted, found: tuple[Guess, ...], scale: Flo
     return min((one, other), key=lambda f: f.left_fit.excess())
 
 
-def _chosen(accepted: list[Tried]) -> tuple[Tried, tuple[Effected, ...]]:
-    """The best one, and what cannot be told from it; among equals the simplest, the machine before its sensors."""
+def _chosen(accepted: list[Tried], tried: tuple[Tried, ...]) -> tuple[Tried, tuple[Effected, ...]]:
+    """The best one, and what cannot be told from it; among equals the simplest, the machine before its sensors.
+
+    Where samples are few, what was not accepted may follow as well but for chance: it stands beside what was.
+    """
     best = max(accepted, key=lambda t: t.over.gain if t.over else 0.0)
-    assert best.found is not None
+    assert best.found is not None and best.over is not None
+    half = 0.5 * best.over.closes
     equals = [t for t in accepted if t.found is not None and (t is best or _equal(t.found, best.found))]
     chosen = min(equals, key=_plainness)
+    beside = [t for t in tried if t not in accepted and t.found is not None and t.over is not None and t.over.closes > half]
+    equals += [t for t in beside if t.found is not None and _within_chance(t.found, best.found)]
     return chosen, tuple(t.effected for t in sorted(equals, key=_plainness) if t is not chosen)
 
 
 def _equal(one: Fitted, best: Fitted) -> bool:
     over = advantage(one.left, best.left)
-    return over.gain < max(2.0 * over.error, 0.02) and over.gain < 0.25
+    return _within_chance(one, best) or over.gain < min(max(2.0 * over.error, 0.02), 0.25)
+
+
+def _within_chance(one: Fitted, best: Fitted) -> bool:
+    """Return True where the judged samples are too few to tell the two, as they are where a recording is slow."""
+    return float(one.left.squares.sum() - best.left.squares.sum()) < CHANCE
 
 
 def _plainness(tried: Tried) -> tuple[bool, int, bool, float]:

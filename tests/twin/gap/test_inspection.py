@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 Columns = dict[str, dict[str, Floats]]
 NOT_WHEN_SLOW = frozenset(
     {
-        *("presliding", "command_delay", "acceleration_feedforward", "payload", "velocity_feedback_delay", "torque_ripple"),
+        *("presliding", "acceleration_feedforward", "payload", "velocity_feedback_delay", "torque_ripple"),
         *("friction_compensation", "position_integral", "reference_filter"),
         *("torque_limit", "lead_error", "sensor_lag", "runout", "helix", "load_peak_hold"),
     }

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tests.twin.gap.one_line import BIAS, SCALE, OneLine
-from twin.gap.diagnosis import Verdict
+from tests.twin.gap.one_line import BIAS, SAMPLES, SCALE, OneLine
+from twin.gap.diagnosis import Effected, Verdict
 from twin.gap.search import explain
 from twin.gap.verdict import judged, overall
 
@@ -60,3 +60,16 @@ def test_the_machine_is_as_well_known_as_its_stages() -> None:
     assert overall([healthy, named]) is Verdict.EXPLAINED
     assert overall([named, unknown]) is Verdict.PARTLY
     assert overall([healthy, unknown]) is Verdict.UNKNOWN
+
+
+def test_what_a_few_samples_within_their_floor_cannot_tell_apart_is_one_class() -> None:
+    def told(floor: float) -> set[Effected]:
+        stage = OneLine(bias=2.0)
+        judged = stage.observed[1]
+        judged.floor[:] = judged.sigma[:] = floor
+        judged.measured[~np.isin(np.arange(SAMPLES), np.arange(340, SAMPLES, 8))] = np.nan
+        found = explain(stage)
+        return {e for one in found.best.effects for e in (one, *found.rivals.get(one, ()))}
+
+    assert told(0.7) == {BIAS, SCALE}
+    assert told(0.02) == {BIAS}
