@@ -18,6 +18,7 @@ from twin.gap.experiment.what_next import what_next
 from twin.gap.inspection import inspected, slow_effects
 from twin.gap.intervals import closure_interval
 from twin.gap.joined import joined
+from twin.gap.learned.answer import described_stages, learned_of, with_learned
 from twin.gap.naming.constants import moved_constants
 from twin.gap.naming.sentence import sentence_of
 from twin.gap.null import NULL, Null
@@ -100,6 +101,7 @@ def _motion(
     shares = shapley(causes, lambda some: _closed(ground, stages, twins, some))
     traces = traces_of(twins.runs, twins.shown["before"], twins.shown["after"], ground.floors)
     numbers, verdict, named = _numbers(twins), overall(stages), causes_of(stages, shares)
+    learned = described_stages(stages, progress, null)
     progress("what next")
     diagnosis = Diagnosis(
         verdict=verdict,
@@ -117,12 +119,13 @@ def _motion(
         notes=notes + both.notes + ground.floors.notes + _flattering(checked, twins.runs),
         seconds=0.0,
         constants=moved_constants(ground.machine, [stage.explained for stage in stages]),
+        learned=learned_of(learned),
     )
     diagnosis = replace(diagnosis, sentence=sentence_of(diagnosis, stages))
     known: dict[str, float] = {}
     for stage in stages:
         known |= constant_deviations(twins.after, stage.explained.stage, stage.explained.best)
-    return Diagnosed(diagnosis, with_uncertainty(twins.after, known, named), traces)
+    return Diagnosed(diagnosis, with_learned(with_uncertainty(twins.after, known, named), learned), traces)
 
 
 def _flattering(case: Case, runs: tuple[Run, ...]) -> tuple[str, ...]:

@@ -47,8 +47,9 @@ AROUND = {
     "coolant_on": "coolant_on",
     "spindle_load_pct": "load_pct",
     "spindle_temp_c": "temperature_c",
+    "ambient_temp_c": "ambient_c",
 }
-"""Column of a run log → argument that it is."""
+"""Column of a run log → argument that it is; the surroundings only as what the spindle is warmer than they."""
 
 
 def around(t_s: Floats, columns: Mapping[str, Floats | None]) -> dict[str, Floats]:
@@ -62,6 +63,8 @@ def around(t_s: Floats, columns: Mapping[str, Floats | None]) -> dict[str, Float
         known = np.flatnonzero(np.isfinite(values)) if values is not None else np.array([], dtype=np.intp)
         if values is not None and len(known):
             found[argument] = values if len(known) == len(t_s) else np.interp(t_s, t_s[known], values[known])
+    if {"temperature_c", "ambient_c"} <= set(found):
+        found["temperature_rise_k"] = found["temperature_c"] - found.pop("ambient_c")
     return found
 
 

@@ -36,6 +36,7 @@ WORDS = {
     "chip_mm": "chip",
     "axial_depth_mm": "chip",
     "temperature_c": "temperature",
+    "temperature_rise_k": "temperature",
     "coolant_on": "coolant",
     "time_since_start_s": "time_since_start",
     "t_s": "time",

@@ -101,3 +101,9 @@ def test_a_learned_heat_is_shown_beside_a_recording() -> None:
     bare, warmer, off = (shown(m, run, floors)["spindle_temp_c"] for m in (case.machine, more, reads))
     assert np.max(warmer - bare) == pytest.approx(40.0 * 0.12, rel=0.1)
     np.testing.assert_allclose(off - bare, 0.7, atol=1e-9)
+
+
+def test_a_power_over_the_load_is_over_the_load_without_it(bare: dict[str, np.ndarray]) -> None:
+    """1 kW for each 100 %: the load of 11 kW is 1/11 more than it was, and no more for that."""
+    shown = run(term("spindle_power", "load_pct", [0.0, 100.0], [0.0, 1.0]))
+    np.testing.assert_allclose(shown["spindle_load_pct"], bare["spindle_load_pct"] * (1.0 + 1.0 / 11.0), rtol=1e-9)

@@ -20,8 +20,6 @@ from twin.gap.stages.free_term import SIGMA, FreeTerm
 
 Floats = NDArray[np.float64]
 STEP_PROBE = 1e-3
-TOGETHER, MANY = 4, 4000
-"""Samples that are taken together at least, in a run of many."""
 ROBUST = 20.0
 SIZES = (0.5, 2.0, 8.0, 32.0, 128.0)
 LENGTHS = (0.0, 0.06, 0.2, 0.6)
@@ -67,7 +65,7 @@ class Screen:
     def of(stage: Learnable, parent: Fitted) -> "Screen":
         """Return the screen of a stage at a parent."""
         quiet = _quiet(stage)
-        together = max(stage.averaged, TOGETHER if len(stage.observed[0].measured) > MANY else 1)
+        together = stage.averaged
         pieces = []
         for number, observed in enumerate(stage.observed):
             shown = stage.predict(parent.model, parent.theta[None, :], number)[0]
@@ -112,13 +110,16 @@ class Screen:
         basis, upper = self._solved
         columns = np.concatenate([changed, np.zeros((len(self._own), changed.shape[1]))])
         free, through = (v - basis @ (basis.T @ v) for v in (self._start, columns))
-        likelihood, chosen, values = self._chosen(term, through.T @ through, through.T @ free)
-        delta = _solved(upper, basis.T @ (self._start - columns @ values))
+        found = []
+        for likelihood, chosen, values in self._sized(term, through.T @ through, through.T @ free):
+            delta = _solved(upper, basis.T @ (self._start - columns @ values))
+            after = self._unseen(delta, {run: move @ values for run, move in moves.items()})
+            found.append((likelihood + 0.5 * (self._unseen_at_best - after), chosen, values, delta))
+        score, chosen, values, delta = max(found, key=lambda f: f[0])
         low, high = (np.array([getattr(p, key) for p in self.parent.model.free]) for key in ("low", "high"))
         theta = np.clip(self.parent.theta + delta, low, high)
-        after = self._unseen(delta, {run: move @ values for run, move in moves.items()})
         z = np.linalg.solve(chosen.root, values * term.size)
-        return Screened(chosen, np.concatenate([theta, z]), likelihood + 0.5 * (self._unseen_at_best - after))
+        return Screened(chosen, np.concatenate([theta, z]), score)
 
     def _unseen(self, delta: Floats, changed: Mapping[int, Floats]) -> float:
         """Squares that are left on the runs that are not fitted, over the noise."""
@@ -138,8 +139,8 @@ class Screen:
         changed[:, ~np.isfinite(observed.measured)] = 0.0
         return _averaged(changed, self.together).T * piece.weight[:, None]
 
-    def _chosen(self, term: FreeTerm, gram: Floats, towards: Floats) -> tuple[float, FreeTerm, Floats]:
-        """The size and lengths of the largest marginal likelihood: ln of it, the term, and its values in small terms."""
+    def _sized(self, term: FreeTerm, gram: Floats, towards: Floats) -> list[tuple[float, FreeTerm, Floats]]:
+        """Return the term in each length, at its likeliest size: ln of the likelihood, the term, its values in small terms."""
         found = []
         for length in LENGTHS if any(len(k) > 2 for k in term.knots.by_column.values()) else LENGTHS[:1]:
             one = replace(term, lengths=_lengths(term, length))
@@ -147,12 +148,12 @@ class Screen:
             powers, turned = np.linalg.eigh(root.T @ gram @ root)
             powers = np.maximum(powers, 0.0)
             along = turned.T @ (root.T @ towards)
-            for size in SIZES:
-                inner = 1.0 + size**2 * powers
-                likelihood = 0.5 * float(np.sum((size * along) ** 2 / inner) - np.sum(np.log(inner)))
-                found.append((likelihood, size, replace(one, size=size * term.size), size**2 * root @ (turned @ (along / inner))))
-        best = max(found, key=lambda f: f[0])
-        return best[0], best[2], best[3]
+            inner = 1.0 + np.square(SIZES)[:, None] * powers
+            gains = 0.5 * (((np.array(SIZES)[:, None] * along) ** 2 / inner) - np.log(inner)).sum(axis=1)
+            best = int(np.argmax(gains))
+            values = SIZES[best] ** 2 * root @ (turned @ (along / inner[best]))
+            found.append((float(gains[best]), replace(one, size=SIZES[best] * term.size), values))
+        return found
 
 
 def _lengths(term: FreeTerm, length: float) -> dict[str, float]:
@@ -170,9 +171,9 @@ def _solved(upper: Floats, right: Floats) -> Floats:
 
 
 def _averaged(values: Floats, count: int) -> Floats:
-    """Sums of `count` neighbours over √count, (lanes, m); a sum without one of its samples is 0."""
+    """Sums of `count` neighbours over √count, (lanes, m); a sample that is not there is 0."""
     whole = values.shape[1] // count * count
-    return np.asarray(np.nan_to_num(values[:, :whole].reshape(len(values), whole // count, count).sum(axis=2) / np.sqrt(count)))
+    return np.asarray(np.nan_to_num(values[:, :whole]).reshape(len(values), whole // count, count).sum(axis=2) / np.sqrt(count))
 
 
 def _slopes(stage: Learnable, parent: Fitted, run: int) -> Floats:

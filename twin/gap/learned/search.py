@@ -32,6 +32,8 @@ MORE_SIGMAS = 2.0
 """Standard errors by which a term over two arguments has to be better than one over one."""
 MUCH_SHARE, MUCH_SIGMAS = 0.25, 2.0
 """A term that takes away such a part of the gap is believed from so many standard errors on."""
+SEEN_SHARE, SEEN_SIGMAS = 0.6, 4.0
+"""The same on the runs that are fitted, of a term that does not help less than nothing on the others."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,7 +59,7 @@ def free_form(
     wanted = [s for s in screened if s.score > max(SCORE_LEAST, SCORE_PART * screened[0].score)][:FITTED_MAX]
     fits = [_fitted(stage, screen.stage, parent, one) for one in wanted]
     shaped = [Shaped(s.term, f, advantage(parent.left, f.left)) for s, f in zip(wanted, fits, strict=True)]
-    return _ranked(parent, [one for one in shaped if _significant(stage, one, null)])
+    return _ranked(parent, [one for one in shaped if _significant(stage, parent, one, null)])
 
 
 def refitted_beside(stage: Stage, found: Fitted, term: FreeTerm) -> Fitted:
@@ -86,11 +88,17 @@ def _fitted(stage: Learnable, quiet: Learnable, parent: Fitted, start: Screened)
     return replace(found, left=left, left_fit=left_fit)
 
 
-def _significant(stage: Stage, shaped: Shaped, null: Null) -> bool:
-    """Return True where a term does more than on a healthy machine; one that takes away much may do so less surely."""
-    over = shaped.over
+def _significant(stage: Stage, parent: Fitted, shaped: Shaped, null: Null) -> bool:
+    """Return True where a term does more than on a healthy machine.
+
+    One that takes away much may do so less surely; one that is certain on the runs that are fitted may help little where the
+    other runs hardly come by.
+    """
+    over, seen = shaped.over, advantage(parent.left_fit, shaped.found.left_fit)
     surely = null.exceeded_by_any(over, stage.healthy_rms)
-    return surely or (over.sigmas > MUCH_SIGMAS and over.share > MUCH_SHARE and over.closes > null.closes_any)
+    much = over.sigmas > MUCH_SIGMAS and over.share > MUCH_SHARE and over.closes > null.closes_any
+    elsewhere = over.gain > 0.0 and seen.sigmas > SEEN_SIGMAS and seen.share > SEEN_SHARE
+    return surely or much or elsewhere
 
 
 def _ranked(parent: Fitted, shaped: list[Shaped]) -> tuple[Shaped, ...]:

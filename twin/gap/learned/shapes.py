@@ -18,7 +18,15 @@ SHARP = ("position_mm", "time_since_start_s")
 FLAT = 1e-9
 """Range of an argument below which it is the same everywhere."""
 MOTION = ("position_mm", "velocity_mm_s", "direction", "acceleration_mm_s2", "time_since_start_s", "temperature_c")
-CUTTING = ("chip_mm", "spindle_angle_rad", "spindle_rpm", "x_position_mm", "y_position_mm", "time_since_start_s")
+CUTTING = (
+    "chip_mm",
+    "axial_depth_mm",
+    "spindle_angle_rad",
+    "spindle_rpm",
+    "x_position_mm",
+    "y_position_mm",
+    "time_since_start_s",
+)
 ALONE: Mapping[LearnedSite, tuple[str, ...]] = {
     S.AXIS_FORCE: MOTION,
     S.FRICTION: ("position_mm", "velocity_mm_s", "time_since_start_s", "temperature_c"),
@@ -27,10 +35,9 @@ ALONE: Mapping[LearnedSite, tuple[str, ...]] = {
     S.TABLE_READING: ("position_mm", "temperature_c", "time_since_start_s"),
     S.TORQUE_READING: ("torque_a",),
     S.CUT_FORCE: CUTTING,
-    S.FORCE_READING: ("time_since_start_s",),
     S.SPINDLE_POWER: ("load_pct", "spindle_rpm", "time_since_start_s"),
-    S.HEAT_INPUT: ("spindle_rpm", "load_pct", "time_since_start_s"),
-    S.HEAT_LOSS: ("temperature_c", "coolant_on", "spindle_rpm"),
+    S.HEAT_INPUT: ("temperature_rise_k", "spindle_rpm", "load_pct", "time_since_start_s"),
+    S.HEAT_LOSS: ("coolant_on",),
     S.TEMPERATURE_READING: ("temperature_c",),
 }
 """Site → the single arguments that are tried there."""
@@ -38,6 +45,8 @@ TOGETHER: Mapping[LearnedSite, tuple[tuple[str, str], ...]] = {
     S.AXIS_FORCE: (("position_mm", "direction"), ("velocity_mm_s", "time_since_start_s")),
     S.FRICTION: (("position_mm", "direction"),),
     S.TABLE_POSITION: (("position_mm", "direction"),),
+    S.CUT_FORCE: (("x_position_mm", "y_position_mm"),),
+    S.HEAT_INPUT: (("temperature_rise_k", "spindle_rpm"),),
 }
 """Site → the pairs of arguments that are tried there."""
 OTHERS: Mapping[LearnedSite, tuple[str, ...]] = {S.AXIS_FORCE: OF_AXIS}

@@ -15,6 +15,7 @@ from twin.gap.diagnosis import Effected
 from twin.gap.floors import Floors
 from twin.gap.labels import regime_labels
 from twin.gap.stages.free import Free, constant
+from twin.gap.stages.machine_terms import reading_of_terms, with_force_terms, with_quantity_terms
 from twin.gap.stages.observed_through import Sensing
 from twin.gap.stages.stage import Model, Observed, observed_of
 from twin.identification.batch_fit import time_blocks
@@ -36,6 +37,7 @@ Floats = NDArray[np.float64]
 BLOCK_S = 0.25
 FORCES = ("force_x_n", "force_y_n")
 LOAD = "spindle_load_pct"
+TERM_PART, TERM_FLOORS = 0.05, 3.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,6 +67,7 @@ class CutStage:
     averaged: int = 1
     healthy_rms: float = 1.3
     observed: tuple[Observed, ...] = field(init=False)
+    _arguments_told: dict[str, Mapping[str, Floats]] = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "observed", tuple(self._observed(run) for run in self.runs))
@@ -145,7 +148,9 @@ class CutStage:
                 assert force is not None
                 values_of = np.broadcast_to(force.force_x_n if signal == "force_x_n" else force.force_y_n, (lanes, ticks))
             learned = reading_series(self.terms, signal, self._arguments(data)) if self.terms else None
-            shown.append(Sensing.of(values, signal).readings(values_of, period_s) + (0.0 if learned is None else learned))
+            fitted = reading_of_terms(model, theta, signal, lambda: self._told(data))
+            read = Sensing.of(values, signal).readings(values_of, period_s) + fitted
+            shown.append(read if learned is None else read + learned)
         return np.concatenate(shown, axis=1)
 
     def _arguments(self, data: CutRun) -> dict[str, Floats]:
@@ -155,6 +160,42 @@ class CutStage:
         known = around(log.t_s, log.columns) | other_axes(log.t_s, references)
         tool = self.machine.tool
         return known | (cut_arguments(data.milling, tool.teeth) if data.milling is not None and tool is not None else {})
+
+    def _told(self, data: CutRun) -> Mapping[str, Floats]:
+        """The same with the load that the machine as stated shows: the recorded one has in it what is looked for."""
+        if data.name not in self._arguments_told:
+            told = self._arguments(data)
+            if LOAD in self.observed[0].signals and data.log.has("spindle_rpm"):
+                bare, theta = Model((), ()), np.zeros((1, 0))
+                force = self.force(bare, theta, data)
+                power_w = np.zeros((1, len(data.log))) if force is None else force.cutting_power_w()
+                told["load_pct"] = self._load(bare, theta, power_w, data, self.machine.machine.servo_period_s)[0]
+            self._arguments_told[data.name] = told
+        return self._arguments_told[data.name]
+
+    @property
+    def term_sites(self) -> Mapping[LearnedSite, tuple[str, ...]]:
+        """The sites of learned terms that forces and load show."""
+        signals = {s for o in self.observed for s in o.signals}
+        forces = tuple(signal for signal in FORCES if signal in signals)
+        of_forces = {LearnedSite.CUT_FORCE: ("",), LearnedSite.FORCE_READING: forces} if forces else {}
+        return of_forces | ({LearnedSite.SPINDLE_POWER: ("",)} if LOAD in signals else {})
+
+    def term_sizes(self, site: LearnedSite, on: str) -> float:
+        """Return the size of a small term: a part of K_t or of the rated power, or a few floors of what is read."""
+        if site is LearnedSite.CUT_FORCE:
+            assert self.machine.tool is not None
+            return TERM_PART * self.machine.tool.tangential_coefficient_n_per_mm2
+        if site is LearnedSite.SPINDLE_POWER:
+            assert self.machine.spindle is not None
+            return TERM_PART * max(self.machine.spindle.idle_power_kw, TERM_PART * self.machine.spindle.rated_power_kw)
+        return TERM_FLOORS * float(np.nanmedian(self.floors.of(self.runs[0].log, on)))
+
+    def term_arguments(self, run: int) -> Mapping[str, Floats]:
+        """Return what a term may depend on in a run, where it cuts if there is a cut."""
+        told = self._told(self.runs[run])
+        cutting = told.get("axial_depth_mm", np.ones(len(self.runs[run].log))) > 0.0
+        return {name: values[cutting] if name != "load_pct" else values for name, values in told.items()}
 
     def force(self, model: Model, theta: Floats, data: CutRun) -> MillingForce | None:
         """The cutting force at each row of θ; None where nothing is cut."""
@@ -167,7 +208,8 @@ class CutStage:
         }
         effects = acting(process_quantities())
         constants |= model.effect_constants(theta, effects, self.standing)
-        series = cut_series(self.terms, self._arguments(data)) if self.terms else {}
+        known = cut_series(self.terms, self._arguments(data)) if self.terms else {}
+        series = with_force_terms(known, model, theta, lambda: self._told(data))
         return milling_with_terms(
             constants,
             self.machine.tool.teeth,
@@ -186,7 +228,8 @@ class CutStage:
         }
         effects = acting(spindle_quantities())
         constants |= model.effect_constants(theta, effects, self.standing)
-        added = added_series(self.terms, self._arguments(data)) if self.terms else {}
+        known = added_series(self.terms, self._arguments(data)) if self.terms else {}
+        added = with_quantity_terms(known, model, theta, lambda: self._told(data))
         return spindle_load_pct(
             constants,
             power_w,

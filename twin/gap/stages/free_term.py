@@ -52,7 +52,7 @@ class FreeTerm:
         for column, knots in self.knots.by_column.items():
             apart = np.abs(knots[:, None] - knots[None, :])
             if column in PERIODS:
-                apart = np.minimum(apart, PERIODS[column] - apart)
+                apart = PERIODS[column] / np.pi * np.sin(np.pi * apart / PERIODS[column])  # the chord
             length = self.lengths.get(column, 0.0)
             alike = np.exp(-0.5 * (apart / length) ** 2) + _trend(column, knots) if length > 0.0 else np.eye(len(knots))
             parts.append(np.linalg.cholesky(alike + JITTER * np.eye(len(knots))))

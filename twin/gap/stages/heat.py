@@ -16,6 +16,7 @@ from twin.gap.floors import Floors
 from twin.gap.labels import regime_labels
 from twin.gap.stages.cut import acting
 from twin.gap.stages.free import Free, constant
+from twin.gap.stages.machine_terms import reading_of_terms, with_quantity_terms
 from twin.gap.stages.observed_through import Sensing
 from twin.gap.stages.stage import Model, Observed, observed_of
 from twin.heat.run import Warming, spindle_temperature_c, thermal_constants, thermal_quantities
@@ -32,6 +33,7 @@ Floats = NDArray[np.float64]
 BLOCK_S = 120.0
 SIGNAL = "spindle_temp_c"
 NAMES = ("alpha_w_per_pct_rpm2", "beta_w_per_rpm", "resistance_k_per_w", "capacity_j_per_k")
+TERM_FLOORS = 3.0
 NEEDS = (SIGNAL, "spindle_rpm", "spindle_load_pct", "ambient_temp_c")
 
 
@@ -98,6 +100,23 @@ class HeatStage:
         sensors = [e for e in catalogue().values() if e.on is On.SIGNAL and e.name not in self.left_out]
         return tuple(found + [Effected(e.name, SIGNAL) for e in sensors])
 
+    @property
+    def term_sites(self) -> Mapping[LearnedSite, tuple[str, ...]]:
+        """The sites of learned terms that the temperature shows."""
+        return {LearnedSite.HEAT_INPUT: ("",), LearnedSite.HEAT_LOSS: ("",), LearnedSite.TEMPERATURE_READING: ("",)}
+
+    def term_sizes(self, site: LearnedSite, on: str) -> float:
+        """Return the size of a small term: what warms the spindle by a degree, or a few floors of the reading."""
+        del on
+        assert self.machine.thermal is not None
+        if site is LearnedSite.TEMPERATURE_READING:
+            return TERM_FLOORS * float(np.nanmedian(self.floors.of(self.runs[0].log, SIGNAL)))
+        return 1.0 / self.machine.thermal.resistance_k_per_w
+
+    def term_arguments(self, run: int) -> Mapping[str, Floats]:
+        """Return what a term may depend on in a run."""
+        return around(self.runs[run].log.t_s, self.runs[run].log.columns)
+
     def first_guesses(self, candidate: Effected) -> Guesses:
         """Return the effect's own guesses."""
         return effect_named(candidate.effect).first_guesses(Recorded(float(np.median(np.diff(self.runs[0].log.t_s)))))
@@ -120,17 +139,19 @@ class HeatStage:
         constants |= model.effect_constants(theta, self.effects, self.standing)
         sensing = Sensing.of(values, SIGNAL)
         start = sensing.value(np.full(len(theta), start_temperature_c(data.log.t_s, data.log[SIGNAL])))
-        arguments = around(data.log.t_s, data.log.columns) if self.terms else {}
+        arguments = around(data.log.t_s, data.log.columns) if self.terms or model.terms else {}
+        added = with_quantity_terms(added_series(self.terms, arguments), model, theta, lambda: arguments)
         shown = spindle_temperature_c(
             constants,
             data.warming,
             start,
             effects=tuple(e.name for e in self.effects),
-            added_w=added_series(self.terms, arguments).get("heat_w"),
+            added_w=added.get("heat_w"),
         )
         learned = reading_series(self.terms, SIGNAL, arguments)
         period_s = float(np.median(np.diff(data.log.t_s)))
         read = sensing.readings(np.broadcast_to(shown, (len(theta), shown.shape[1])), period_s)
+        read = read + reading_of_terms(model, theta, SIGNAL, lambda: arguments)
         return read if learned is None else read + learned
 
 

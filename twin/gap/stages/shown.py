@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.case import Run
+from twin.effects.added import check_effects
 from twin.effects.catalogue import effect_named
 from twin.effects.effect import On
 from twin.gap.diagnosis import Effected
@@ -24,7 +25,7 @@ from twin.gap.stages.stage import Model
 from twin.gap.stages.turns import TurnStage, turn_data
 from twin.learned.standing import axis_terms
 from twin.machine import MachineFile
-from twin.simulator.response import check_effects, disturbance_of
+from twin.simulator.response import disturbance_of
 from twin.sites import Site
 
 Floats = NDArray[np.float64]
