@@ -65,7 +65,8 @@ def by_side(value: float | tuple[float, float], side: int) -> float:
 class Axis(Section):
     """[axes.a]: feed drive and servo loops. The force of a torque command comes from the screw or is stated as such.
 
-    A rotary axis is stated in degrees and N m, and is here as a point on it is that moves 1 mm for each degree (`twin.rotary`).
+    A rotary axis is stated in degrees and N m, and is here as a point on it is that moves 1 mm for each degree, with forces and
+    masses in units of its `scale` (`twin.rotary`).
     """
 
     mass_kg: Positive
@@ -77,7 +78,7 @@ class Axis(Section):
     velocity_integral_gain_a_per_mm: NotNegative = 0.0
     torque_limit_a: Positive
     friction: Friction
-    is_rotary: bool = Field(default=False, exclude=True)
+    scale: Positive | None = Field(default=None, exclude=True)
 
     @model_validator(mode="after")
     def _force_is_known_once(self) -> Self:
@@ -87,6 +88,11 @@ class Axis(Section):
         if (self.force_per_command_n is None) != screw:
             raise ValueError("state either force_per_command_n, or screw_lead_mm with torque_constant_nm_per_a")
         return self
+
+    @property
+    def is_rotary(self) -> bool:
+        """Return True where it turns."""
+        return self.scale is not None
 
     @property
     def newton_per_command(self) -> float:
@@ -266,14 +272,29 @@ class MachineFile(Section):
         }
 
     @property
-    def rotary(self) -> frozenset[str]:
-        """Letters of the rotary axes."""
-        return frozenset(letter for letter, axis in self.axes.items() if axis.is_rotary)
+    def rotary(self) -> dict[str, float]:
+        """Letters of the rotary axes, each with the scale of its forces and masses."""
+        return {letter: axis.scale for letter, axis in self.axes.items() if axis.scale is not None}
 
     @property
     def words(self) -> tuple[str, ...]:
         """Letters of the axes that a program of the machine can have words for: x, y, z, and its rotary ones among a, b, c."""
-        return ("x", "y", "z", *sorted(self.rotary & {"a", "b", "c"}))
+        return ("x", "y", "z", *sorted(self.rotary.keys() & {"a", "b", "c"}))
+
+    def with_tool(self, number: str) -> Self:
+        """The machine with tool `number` in its spindle: as [tool], with what is known of it and the effects on it.
+
+        The same where no [tools.N] describes it.
+        """
+        if number not in self.tools:
+            return self
+        mine = tuple(
+            e.model_copy(update={"on": ""}) if e.on == number else e
+            for e in self.effects
+            if e.on not in self.tools or e.on == number
+        )
+        known = {path.replace(f"tools.{number}.", "tool."): v for path, v in self.uncertainty.items()}
+        return self.model_copy(update={"tool": self.tools[number], "effects": mine, "uncertainty": known})
 
     @property
     def settings(self) -> Settings:
@@ -317,9 +338,9 @@ def _as_written(tables: dict[str, Any], error: ValidationError) -> list[dict[str
     faults: list[dict[str, Any]] = [dict(fault) for fault in error.errors(include_url=False)]
     for fault in faults:
         place = fault["loc"]
-        if len(place) > 1 and place[0] == "axes" and "is_rotary" in written["axes"].get(place[1], ()):
+        if len(place) > 1 and place[0] == "axes" and "scale" in written["axes"].get(place[1], ()):
             fault["loc"] = (*place[:-1], outside_name(str(place[-1]))[0])
-            fault["msg"] = outside_text(fault["msg"], {str(place[1])}, ())
+            fault["msg"] = outside_text(fault["msg"], {str(place[1]): 1.0}, ())
     return faults
 
 

@@ -5,13 +5,19 @@ point, so all physics, effects and bounds of linear axes hold for it, at sizes t
 
     1 deg = 1 mm,   F = T · 1000 π / 180: 1 N m = 17.45 N,   m = J · (1000 π / 180)²: 1 kg m² = 304.6 kg
 
+A wrist and the shoulder of a press robot are a thousandfold apart, and what is looked for has the size of a feed axis. Forces and
+masses of an axis are therefore in units of a power of ten inside, its `scale`, which changes no motion: `letters` below has the
+scale of each rotary axis by its letter.
+
 Files, columns and answers have degrees; this module alone knows how one becomes the other.
 """
 
 import math
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 
+USUAL = 400.0
+"""Friction in N, or mass in kg, of a feed axis."""
 PER_NM = 1000.0 * math.pi / 180.0
 """N for each N m, and the square root of kg for each kg m²."""
 ENDINGS = (
@@ -60,7 +66,27 @@ NAME = re.compile(
 PATH = re.compile(r"\b(?:axes|effects)(?:\.\w+){2,}")
 
 
-def outside_name(name: str) -> tuple[str, float]:
+Letters = Mapping[str, float]
+
+
+def scale_of(coulomb_nm: float, inertia_kg_m2: float) -> float:
+    """Return the scale of an axis: its Coulomb friction is a few hundred N inside, or its mass a few hundred kg without one.
+
+    >>> scale_of(14.0, 2.5), scale_of(0.05, 0.004), scale_of(0.0, 250.0)
+    (1.0, 1000.0, 0.01)
+    """
+    inside = PER_NM * coulomb_nm or PER_NM**2 * inertia_kg_m2
+    if not (math.isfinite(inside) and inside > 0.0):
+        return 1.0
+    return 10.0 ** min(max(round(math.log10(USUAL / inside)), -6), 6)
+
+
+def _scaled(factor: float, scale: float) -> float:
+    """How many units inside one outside is; forces and masses are in units of the scale."""
+    return factor * scale if factor in (PER_NM, PER_NM**2) else factor
+
+
+def outside_name(name: str, scale: float = 1.0) -> tuple[str, float]:
     """Return the name of a figure of a rotary axis, and how many units inside one of its units is.
 
     >>> outside_name("stribeck_velocity_mm_s"), outside_name("torque_limit_a")
@@ -75,11 +101,11 @@ def outside_name(name: str) -> tuple[str, float]:
             for own, other in WORDS:
                 if factor != 1.0 and f"{stem}_".startswith(own):
                     stem = other[:-1] + stem[len(own) - 1 :]
-            return stem + outside, factor
+            return stem + outside, _scaled(factor, scale)
     return name, 1.0
 
 
-def inside_name(name: str) -> tuple[str, float]:
+def inside_name(name: str, scale: float = 1.0) -> tuple[str, float]:
     """Return the name inside of a figure of a rotary axis, and how many units inside one of its units is.
 
     >>> inside_name("inertia_kg_m2")[0], inside_name("coulomb_nm")[0], inside_name("position_gain_per_s")[0]
@@ -91,17 +117,18 @@ def inside_name(name: str) -> tuple[str, float]:
             for own, other in WORDS:
                 if factor != 1.0 and f"{stem}_".startswith(other):
                     stem = own[:-1] + stem[len(other) - 1 :]
-            return stem + inside, factor
+            return stem + inside, _scaled(factor, scale)
     return name, 1.0
 
 
-def outside_unit(unit: str) -> tuple[str, float]:
+def outside_unit(unit: str, scale: float = 1.0) -> tuple[str, float]:
     """Return the unit of a figure of a rotary axis, and how many units inside it is.
 
     >>> outside_unit("mm"), outside_unit("A")
     (('deg', 1.0), ('A', 1.0))
     """
-    return UNITS.get(unit, (unit, 1.0))
+    outside, factor = UNITS.get(unit, (unit, 1.0))
+    return outside, _scaled(factor, scale)
 
 
 def inside_column(name: str) -> str:
@@ -146,32 +173,35 @@ def inside_path(path: str, letters: Collection[str]) -> str:
     return ".".join(parts)
 
 
-def outside_text(text: str, letters: Collection[str], others: Collection[str]) -> str:
+def outside_text(text: str, letters: Letters, others: Collection[str]) -> str:
     """Return a text with the figures, names and columns of rotary axes in degrees and N m.
 
-    letters: of the rotary axes; others: of the linear ones. A clause that speaks of a linear axis keeps its units.
+    others: the letters of the linear axes. A clause that speaks of one of them keeps its units.
 
-    >>> outside_text("gravity on B (349 ± 17 N); backlash on X (3.3 µm)", {"b"}, {"x"})
+    >>> outside_text("gravity on B (349 ± 17 N); backlash on X (3.3 µm)", {"b": 1.0}, {"x"})
     'gravity on B (20 ± 0.97 N m); backlash on X (3.3 µm)'
-    >>> outside_text("mean +3.3 µm at 12 mm/s in b_pos_mm", {"b"}, {"x"})
+    >>> outside_text("mean +3.3 µm at 12 mm/s in b_pos_mm", {"b": 1.0}, {"x"})
     'mean +0.0033 deg at 12 deg/s in b_pos_deg'
     """
     clauses = re.split(r"(; |\. )", text)
-    told = "".join(_clause(clause, set(letters), set(others)) for clause in clauses)
+    told = "".join(_clause(clause, letters, set(others)) for clause in clauses)
     return PATH.sub(lambda match: outside_path(match[0], letters), outside_names(told, letters))
 
 
-def _clause(clause: str, letters: set[str], others: set[str]) -> str:
+def _clause(clause: str, letters: Letters, others: set[str]) -> str:
     """A clause with the figures and names of rotary axes as they are outside, where it speaks of no linear one."""
     spoken_of = {next(group for group in match.groups() if group).lower() for match in LETTER.finditer(clause)}
-    if spoken_of & others or (others and not spoken_of & letters):
+    meant = spoken_of & letters.keys()
+    if spoken_of & others or (others and not meant):
         return clause
-    clause = FIGURES.sub(_figures, clause)
+    scales = {letters[letter] for letter in meant or letters}
+    if len(scales) == 1:
+        clause = FIGURES.sub(lambda match: _figures(match, next(iter(scales))), clause)
     return NAME.sub(lambda match: outside_name(match[0])[0], clause)
 
 
-def _figures(match: re.Match[str]) -> str:
-    unit, factor = UNITS[match[2]]
+def _figures(match: re.Match[str], scale: float) -> str:
+    unit, factor = outside_unit(match[2], scale)
     numbers = match[1] if factor == 1.0 else re.sub(NUMBER, lambda m: _divided(m[0], factor), match[1])
     return f"{numbers} {unit}"
 

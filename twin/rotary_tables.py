@@ -9,7 +9,18 @@ from typing import Any
 from twin.errors import MachineError
 from twin.learned.sites import UNITS
 from twin.learned.words import OF_AXIS
-from twin.rotary import PER_NM, inside_column, inside_name, inside_path, outside_name, outside_names, outside_path, outside_unit
+from twin.rotary import (
+    PER_NM,
+    Letters,
+    inside_column,
+    inside_name,
+    inside_path,
+    outside_name,
+    outside_names,
+    outside_path,
+    outside_unit,
+    scale_of,
+)
 
 Tables = dict[str, Any]
 DIGITS = 12
@@ -33,12 +44,14 @@ def tables_inside(tables: Mapping[str, Any], *, scaled: bool = True) -> Tables:
         found["noise"] = {key: value for key, value in noise.items() if key != TURNING_DISTURBANCE} | {DISTURBANCE: force}
     if not isinstance(axes, dict):
         return found
-    letters = {letter for letter, axis in axes.items() if isinstance(axis, dict) and _is_rotary(letter, axis)}
+    letters = {a: _scale(axis) for a, axis in axes.items() if isinstance(axis, dict) and _is_rotary(a, axis)}
     if not letters:
         return found
+    if isinstance(noise, dict) and TURNING_DISTURBANCE in noise:
+        found["noise"][DISTURBANCE] = _times(found["noise"][DISTURBANCE], max(letters.values()))
     found["axes"] = {
-        letter: _renamed(axis, inside_name, scaled=scaled) | {"is_rotary": True} if letter in letters else axis
-        for letter, axis in axes.items()
+        a: _renamed(axis, inside_name, letters[a], scaled=scaled) | {"scale": letters[a]} if a in letters else axis
+        for a, axis in axes.items()
     }
     if isinstance(found.get("uncertainty"), dict):
         found["uncertainty"] = {inside_path(path, letters): value for path, value in found["uncertainty"].items()}
@@ -47,29 +60,28 @@ def tables_inside(tables: Mapping[str, Any], *, scaled: bool = True) -> Tables:
     return found
 
 
-def tables_outside(tables: Mapping[str, Any], letters: Collection[str]) -> Tables:
-    """Return the tables of a machine, as they are inside, as its file has them. letters: of its rotary axes"""
+def tables_outside(tables: Mapping[str, Any], letters: Letters) -> Tables:
+    """Return the tables of a machine, as they are inside, as its file has them."""
     found = dict(tables)
     found["axes"] = {
-        letter: _renamed(axis, outside_name, outwards=True) if letter in letters else axis
-        for letter, axis in tables["axes"].items()
+        a: _renamed(axis, outside_name, letters[a], outwards=True) if a in letters else axis for a, axis in tables["axes"].items()
     }
     noise = dict(tables.get("noise", {}))
-    if DISTURBANCE in noise and set(letters) == set(tables["axes"]):  # one for all axes
-        noise[TURNING_DISTURBANCE] = _over(noise.pop(DISTURBANCE), PER_NM)
+    if DISTURBANCE in noise and letters.keys() == tables["axes"].keys() and len(set(letters.values())) == 1:
+        noise[TURNING_DISTURBANCE] = _over(noise.pop(DISTURBANCE), PER_NM * max(letters.values()))  # one for all axes
     found["noise"] = noise
     found["uncertainty"] = {outside_path(path, letters): value for path, value in tables.get("uncertainty", {}).items()}
     found["effects"] = [_effect_outside(effect, letters) for effect in tables.get("effects", [])]
     return found
 
 
-def term_outside(table: Mapping[str, Any], on: str, unit: str, letters: Collection[str]) -> Tables:
+def term_outside(table: Mapping[str, Any], on: str, unit: str, letters: Letters) -> Tables:
     """Return the table of a learned term on an axis, a signal or nothing, as it is inside, as a file has it.
 
-    >>> term_outside({"position_mm": [0.0, 9.0], "value": [0.0, 34.9]}, "b", "N", {"b"})
-    {'position_deg': [0.0, 9.0], 'value': [0.0, 1.99962270586]}
+    >>> term_outside({"position_mm": [0.0, 9.0], "value": [0.0, 2.0 * PER_NM]}, "b", "N", {"b": 1.0})
+    {'position_deg': [0.0, 9.0], 'value': [0.0, 2.0]}
     """
-    factor = outside_unit(unit)[1] if is_on(on, letters) else 1.0
+    factor = outside_unit(unit, scale_on(on, letters))[1] if is_on(on, letters) else 1.0
     return {
         _argument(column, on, letters, OF_AXIS, outside_name): _over(values, factor) if column in FIGURES else values
         for column, values in table.items()
@@ -85,27 +97,47 @@ def is_on(on: str, letters: Collection[str]) -> bool:
     return on.partition("_")[0] in letters
 
 
+def scale_on(on: str, letters: Letters) -> float:
+    """Return the scale of the axis that this is, or is a signal of; 1 where it is another one."""
+    return letters.get(on.partition("_")[0], 1.0)
+
+
+def _scale(axis: Mapping[str, Any]) -> float:
+    """The scale of an axis as its file has it, which may have anything in it."""
+    friction = axis.get("friction")
+    coulomb = friction.get("coulomb_nm") if isinstance(friction, dict) else None
+    coulomb = coulomb[0] if isinstance(coulomb, list) and coulomb else coulomb
+    inertia = axis.get("inertia_kg_m2")
+    known = [float(v) if isinstance(v, int | float) and v > 0.0 else 0.0 for v in (coulomb, inertia)]
+    return scale_of(*known)
+
+
 def _is_rotary(letter: str, axis: Mapping[str, Any]) -> bool:
     friction = axis.get("friction")
     keys = [*axis, *(friction if isinstance(friction, dict) else ())]
     rotary = [key for key in keys if inside_name(key)[0] != key]
     linear = [key for key in keys if outside_name(key)[0] != key or key == "torque_constant_nm_per_a"]
-    if "is_rotary" in axis:
-        raise MachineError(f"axes.{letter}.is_rotary is not known; an axis with inertia_kg_m2 is a rotary one")
+    if "scale" in axis:
+        raise MachineError(f"axes.{letter}.scale is not known; docs/machine.md lists what is")
     if rotary and linear:
         raise MachineError(f"axes.{letter} has {rotary[0]} of a rotary axis and {linear[0]} of a linear one; state one kind")
     return bool(rotary)
 
 
 def _renamed(
-    table: Mapping[str, Any], name_of: Callable[[str], tuple[str, float]], *, scaled: bool = True, outwards: bool = False
+    table: Mapping[str, Any],
+    name_of: Callable[[str, float], tuple[str, float]],
+    scale: float,
+    *,
+    scaled: bool = True,
+    outwards: bool = False,
 ) -> Tables:
     """A table, and the tables in it, under other names and in other units."""
     found: Tables = {}
     for key, value in table.items():
-        name, factor = name_of(key)
+        name, factor = name_of(key, scale)
         if isinstance(value, dict):
-            found[name] = _renamed(value, name_of, scaled=scaled, outwards=outwards)
+            found[name] = _renamed(value, name_of, scale, scaled=scaled, outwards=outwards)
         elif not scaled or factor == 1.0:
             found[name] = value
         else:
@@ -128,16 +160,16 @@ def _over(value: Any, factor: float) -> Any:
     return float(f"{value / factor:.{DIGITS}g}") if isinstance(value, int | float) else value
 
 
-def _effect_inside(effect: Mapping[str, Any], letters: Collection[str]) -> Tables:
+def _effect_inside(effect: Mapping[str, Any], letters: Letters) -> Tables:
     on, found = effect.get("on", ""), dict(effect)
     if not isinstance(on, str):
         return found
     found["on"] = inside_column(on)
     if on in letters and isinstance(effect.get("parameters"), dict):
-        found["parameters"] = _renamed(effect["parameters"], inside_name)
+        found["parameters"] = _renamed(effect["parameters"], inside_name, letters[on])
     if isinstance(effect.get("table"), dict):
         inside = UNITS.get(effect.get("site", ""), ("",))[0]
-        unit, factor = outside_unit(inside) if is_on(on, letters) else (inside, 1.0)
+        unit, factor = outside_unit(inside, scale_on(on, letters)) if is_on(on, letters) else (inside, 1.0)
         factor = factor if effect.get("unit", unit) == unit else 1.0
         found |= {"unit": inside} if effect.get("unit") == unit else {}
         found["table"] = {
@@ -147,12 +179,12 @@ def _effect_inside(effect: Mapping[str, Any], letters: Collection[str]) -> Table
     return found
 
 
-def _effect_outside(effect: Mapping[str, Any], letters: Collection[str]) -> Tables:
+def _effect_outside(effect: Mapping[str, Any], letters: Letters) -> Tables:
     on, found = effect.get("on", ""), dict(effect)
     if on:
         found["on"] = outside_names(on, letters)
     if on in letters and "parameters" in effect:
-        found["parameters"] = _renamed(effect["parameters"], outside_name, outwards=True)
+        found["parameters"] = _renamed(effect["parameters"], outside_name, letters[on], outwards=True)
     if "table" in effect:
         inside = effect.get("unit") or UNITS[effect["site"]][0]
         found["table"] = term_outside(effect["table"], on, inside, letters)
@@ -162,7 +194,7 @@ def _effect_outside(effect: Mapping[str, Any], letters: Collection[str]) -> Tabl
 
 
 def _argument(
-    column: str, on: str, letters: Collection[str], of_axis: Collection[str], name_of: Callable[[str], tuple[str, float]]
+    column: str, on: str, letters: Letters, of_axis: Collection[str], name_of: Callable[[str], tuple[str, float]]
 ) -> str:
     """A column of a learned term: of its own axis, of another one, or of neither."""
     letter, _, rest = column.partition("_")

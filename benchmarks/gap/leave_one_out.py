@@ -44,6 +44,7 @@ MECHANICS = {"external_force_n": FORCE | {"torque_reading"}, "moving_mass_kg": F
 """The same of the mechanics, by the quantity that the effect changes; a constant force is also a bias of the torque."""
 READINGS = {
     "table_mm": TABLE,
+    "pos_mm": frozenset({"position_reading"}),
     "torque_a": FORCE | {"torque_reading"},
     "x_n": frozenset({"cut_force", "force_reading"}),
     "y_n": frozenset({"cut_force", "force_reading"}),

@@ -53,8 +53,7 @@ def tables(result: CheckResult) -> str:
     parts = [
         f"{len(result.cases)} of {result.asked} cases, seed {result.seed}, sealed as `{result.seal}`, salt `{result.salt}`; "
         f"shares with 95 % intervals. Questions drawn again: {len(result.redrawn)}; not to be drawn: {len(result.undrawn)}; "
-        f"diagnoses that failed: {found.failed}. Seconds a case on one core, median and longest: "
-        f"{found.seconds_median:.0f}, {found.seconds_max:.0f}.",
+        f"diagnoses that failed: {found.failed}. Each case had one core.",
         markdown((FROM, "found (95 % interval; count)", "target"), target_rows(found)),
         markdown((f"{FROM}, by controller", "as stated", "another structure"), controller_rows(found)),
         by_size(found),

@@ -11,7 +11,7 @@ at 1 kHz, thinned to each rate and diagnosed. A row of the table is printed for 
     wrong    something else is named, and it is not        unknown  there is a gap without a name
     –        it is called healthy, or cannot be seen at this rate; slower ones are not tried then
 
-The machine is the twin's own simulator with other constants than its file states. All effects take some ten minutes of one core.
+The machine is the twin's own simulator with other constants than its file states. An effect takes about a minute of one core.
 """
 
 import argparse
@@ -26,6 +26,7 @@ from twin.effects.effect import Effect
 from twin.errors import TwinError
 from twin.gap.diagnose import diagnose
 from twin.machine import AddedEffect
+from twin.sites import Site
 
 RATES_HZ = (1000, 100, 50, 20, 10)
 SAID = {"named": "named", "in the class": "class", "unknown": "unknown", "missed": "–"}
@@ -64,7 +65,9 @@ def main() -> None:
     )
     asked.add_argument("--floors", type=float, default=10.0, help="size of each effect in the designed program")
     given = asked.parse_args()
-    effects = [effect_named(name) for name in given.only] or [e for e in catalogue().values() if maker(e) is air_case]
+    effects = [effect_named(name) for name in given.only] or [
+        e for e in catalogue().values() if maker(e) is air_case and e.site is not Site.PROGRAM
+    ]
     programs = (designed, production)
     print(f"| effect | {' | '.join(f'{make.__name__}, {hz} Hz' for make in programs for hz in given.rates)} |")
     print("|---" * (1 + 2 * len(given.rates)) + "|")

@@ -42,11 +42,15 @@ class Judged:
         return frozenset() if controller is None else frozenset({(controller.effect, controller.on)})
 
     @property
+    def controller_shows(self) -> bool:
+        """True where another structure of a controller is a gap of the judged size by itself."""
+        return self.answer.controller is not None and self.answer.controller.size >= JUDGED_FROM
+
+    @property
     def controller_told(self) -> bool:
         """True where another structure of a controller is named, or its subsystem called not understood; or none shows."""
         doubtful = (Verdict.UNKNOWN, Verdict.PARTLY)
-        controller = self.answer.controller
-        return (controller is not None and controller.size < JUDGED_FROM) or all(
+        return not self.controller_shows or all(
             any(truth in cause.reported for cause in self.given.causes)
             or self.given.subsystems.get(f"{truth[1]} controller") in doubtful
             for truth in self.structure
@@ -54,8 +58,8 @@ class Judged:
 
     @property
     def names(self) -> frozenset[Named]:
-        """The causes by name, but for the structure of a controller."""
-        return frozenset(cause.named for cause in self.given.causes) - self.structure
+        """The causes by name, but for those whose class has the structure of a controller."""
+        return frozenset(cause.named for cause in self.given.causes if not cause.reported & self.structure)
 
     @property
     def right(self) -> bool:
@@ -182,7 +186,7 @@ class Scored:
     """By size, from `JUDGED_FROM` on, and of the healthy ones; by effect: of single ones from there on.
 
     nominal, other_controller: as `judged`, of machines with the controller that they state, and of those with another one
-    controller_told: of the latter, those where it is named, or called not understood
+    controller_told: of those where it shows by itself, the ones where it is named, or called not understood
     """
 
     by_size: Mapping[tuple[float, float], Scores]
@@ -258,7 +262,7 @@ def scored(cases: Sequence[Judged]) -> Scored:
         scores(seen),
         scores([case for case in seen if not case.structure]),
         scores(other := [case for case in seen if case.structure]),
-        rate_of(case.controller_told for case in other),
+        rate_of(case.controller_told for case in other if case.controller_shows),
         learned_scores([case for case in seen if case.answer.sort is Sort.OUTSIDE and case.unknown]),
         rate_of(case.given.verdict is Verdict.HEALTHY for case in healthy),
         rate_of(bool(case.given.causes) for case in healthy),

@@ -29,10 +29,10 @@ def simulate(
 ) -> None:
     """Run a part program on the twin as on a machine: time, peak force, following error, and a run log."""
     with needed_by("the twin", "twin"):
+        from twin.effects.added import check_effects
         from twin.errors import EffectError, PartProgramError
         from twin.machine import read_machine
         from twin.runlog import write_run
-        from twin.simulator.response import check_effects
         from twin.simulator.simulation import simulate as simulated
     described = read_machine(machine)
     try:

@@ -6,11 +6,11 @@ import pytest
 
 from tests.twin.axes import AXIS
 from twin.case import read_case
+from twin.effects.added import check_effects
 from twin.errors import CaseError, MachineError
 from twin.gcode import IntegerWords, Settings, ToolOffset
 from twin.machine import machine_from_toml, read_machine
 from twin.machine_toml import machine_to_toml
-from twin.simulator.response import check_effects
 
 HEAD = "[machine]\nname = 'a'\n"
 WHOLE = (

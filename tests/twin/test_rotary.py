@@ -34,7 +34,7 @@ def test_a_rotary_axis_is_a_point_on_it_that_moves_a_mm_for_each_degree() -> Non
     assert 1000.0 * axis.newton_per_command / axis.mass_kg == pytest.approx(math.degrees(12.0 / 2.5))
     # power at 30 deg/s against Coulomb friction
     assert 0.001 * float(axis.friction.coulomb_n) * 30.0 == pytest.approx(14.0 * math.radians(30.0))  # type: ignore[arg-type]
-    assert machine.rotary == {"b"}
+    assert machine.rotary == {"b": 1.0}
     assert machine.effects[0].parameters["force_n"] == pytest.approx(6.0 * 1000.0 * math.pi / 180.0)
     assert machine.effects[1].on == "b_pos_mm"
     assert machine.uncertainty["axes.b.mass_kg"] == 0.1
@@ -47,7 +47,7 @@ def test_a_file_that_was_read_is_written_as_it_was() -> None:
     for figure in ('"axes.b.inertia_kg_m2" = 0.1', "position_deg = 0.0002", "disturbance_torque_nm = 0.05", 'on = "b_pos_deg"'):
         assert figure in text
     assert "_mm" not in text
-    assert "is_rotary" not in text
+    assert "scale" not in text
     assert machine_to_toml(machine_from_toml(text)) == text
 
 
@@ -81,8 +81,37 @@ def test_a_learned_term_of_a_rotary_axis_is_in_degrees_and_nm_and_comes_back() -
     assert machine_to_toml(again) == text
 
 
+def test_a_wrist_and_a_shoulder_have_the_size_of_a_feed_axis_inside() -> None:
+    machine = machine_from_toml(STATED + EFFECTS)
+    small = STATED + EFFECTS
+    for key in (
+        "inertia_kg_m2",
+        "torque_per_command_nm",
+        "coulomb_nm",
+        "viscous_nm_s_per_deg",
+        "torque_nm",
+        "disturbance_torque_nm",
+    ):
+        small = re.sub(
+            rf"\b{key} = ([0-9.]+)", lambda found: f"{found[0].partition('=')[0]}= {float(found[1]) / 1000.0:.12g}", small
+        )
+    small = small.replace("[18.0, 18.5]", "[0.018, 0.0185]")
+    wrist = machine_from_toml(small)
+    assert wrist.rotary == {"b": 1000.0}
+    for key in ("mass_kg", "force_per_command_n"):
+        assert getattr(wrist.axes["b"], key) == pytest.approx(getattr(machine.axes["b"], key))
+    assert wrist.effects[0].parameters["force_n"] == pytest.approx(machine.effects[0].parameters["force_n"])
+    assert wrist.noise["disturbance_force_n"] == pytest.approx(machine.noise["disturbance_force_n"])
+    text = machine_to_toml(wrist)
+    assert "inertia_kg_m2 = 0.0025\n" in text
+    assert "torque_nm = 0.006" in text
+    assert "disturbance_torque_nm = 5e-05" in text
+    assert machine_to_toml(machine_from_toml(text)) == text
+    assert outside_text("gravity on B (107.6 ± 5 N)", wrist.rotary, ()) == "gravity on B (0.006165 ± 0.00029 N m)"
+
+
 def test_each_key_of_an_axis_has_one_name_outside_and_comes_back() -> None:
-    for key in (*Axis.model_fields, *Friction.model_fields):
+    for key in ({*Axis.model_fields} - {"scale"}) | {*Friction.model_fields}:
         name, factor = outside_name(key)
         assert inside_name(name) == (key, factor)
         assert not re.search(r"_mm|_kg$|_n$|_n_", name)
@@ -96,7 +125,7 @@ def test_each_key_of_an_axis_has_one_name_outside_and_comes_back() -> None:
         ("coulomb_nm = 14.0", "coulomb_nm = 24.0", r"static_nm \(18.0, 18.5\) is below coulomb_nm 24.0"),
         ("coulomb_nm = 14.0", "coulomb_n = 14.0", "inertia_kg_m2 of a rotary axis and coulomb_n of a linear one"),
         ("torque_per_command_nm = 12.0\n", "", "axes.b: state torque_per_command_nm"),
-        ("torque_limit_a = 30.0", "torque_limit_a = 30.0\nis_rotary = true", "axes.b.is_rotary is not known"),
+        ("torque_limit_a = 30.0", "torque_limit_a = 30.0\nscale = 1.0", "axes.b.scale is not known"),
     ],
 )
 def test_a_fault_is_told_in_the_words_and_figures_of_the_file(written: str, instead: str, said: str) -> None:
@@ -144,7 +173,7 @@ def test_a_program_has_a_word_for_a_rotary_axis() -> None:
     ],
 )
 def test_a_text_speaks_of_a_rotary_axis_in_its_own_units(inside: str, outside: str) -> None:
-    assert outside_text(inside, {"b"}, {"x"}) == outside
+    assert outside_text(inside, {"b": 1.0}, {"x"}) == outside
 
 
 def test_a_learned_term_on_a_rotary_axis_is_in_n_m_over_degrees() -> None:

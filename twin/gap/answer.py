@@ -16,6 +16,9 @@ from twin.gap.intervals import parameter_intervals
 from twin.gap.null import Null
 from twin.gap.refitted import KNOWN_MIN
 from twin.gap.search import Explained, is_nothing
+from twin.gap.stages.axis import AxisStage
+from twin.gap.stages.open_loop.stage import OpenStage
+from twin.gap.stages.stage import Stage
 from twin.gap.verdict import Judged
 from twin.runlog import AXIS_COLUMN
 
@@ -35,7 +38,7 @@ def causes_of(stages: Sequence[Judged], shares: Mapping[Effected, float]) -> tup
     causes: dict[Effected, Cause] = {}
     for stage in stages:
         found = stage.explained
-        intervals = parameter_intervals(found.best)
+        intervals = parameter_intervals(found.best, _input_errors(found.stage))
         for effected, values in found.best.values.items():
             if is_nothing(effected, values):
                 continue
@@ -44,6 +47,12 @@ def causes_of(stages: Sequence[Judged], shares: Mapping[Effected, float]) -> tup
             one = Cause(effected.effect, effected.on, _probability(found, effected), intervals[effected], rivals, share)
             causes[effected] = one if effected not in causes else _joined(causes[effected], one)
     return tuple(sorted(causes.values(), key=lambda c: -c.closure))
+
+
+def _input_errors(stage: Stage) -> dict[str, float]:
+    """Return the relative standard errors of what a stage is driven by, by quantity."""
+    axis = stage.closed if isinstance(stage, OpenStage) else stage
+    return {"temperature_rise_k": max(run.rise_error for run in axis.runs)} if isinstance(axis, AxisStage) else {}
 
 
 def _joined(one: Cause, other: Cause) -> Cause:

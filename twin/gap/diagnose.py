@@ -118,8 +118,8 @@ def _motion(
         subsystems=subsystems_of(stages, both.opened),
         notes=notes + both.notes + ground.floors.notes + _flattering(checked, twins.runs),
         seconds=0.0,
-        learned=learned_of(learned),
         constants=moved_constants(ground.machine, [stage.explained for stage in stages]),
+        learned=learned_of(learned),
     )
     diagnosis = replace(diagnosis, sentence=sentence_of(diagnosis, stages))
     known: dict[str, float] = {}

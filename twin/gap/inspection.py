@@ -21,6 +21,7 @@ from twin.gap.stages.cut import cut_runs
 from twin.gap.stages.heat import heat_runs
 from twin.machine import MachineFile
 from twin.runlog import AXIS_COLUMN, RunLog
+from twin.simulator.recorded import tool_of
 
 Floats = NDArray[np.float64]
 CONTRADICTION = 0.3
@@ -70,12 +71,18 @@ def _comparable(run: Run, machine: MachineFile) -> bool:
     axes = any(
         log.has(f"{a}_ref_mm") and any(log.has(f"{a}_{measured}") for measured in ("pos_mm", "table_mm", "torque_a"))
         for a in machine.axes
-    )
+    ) or any(_alone(log, a) for a in machine.axes)
     return axes or isinstance(run, TurnRun) or bool(cut_runs(machine, (run,))) or bool(heat_runs(machine, (run,)))
+
+
+def _alone(log: RunLog, letter: str) -> bool:
+    """Return True where a part of an axis can be compared without its reference: its mechanics, or its table."""
+    return log.has(f"{letter}_pos_mm") and any(log.has(f"{letter}_{answer}") for answer in ("torque_a", "table_mm"))
 
 
 def _usable(run: Run, machine: MachineFile, notes: list[str]) -> Run:
     log = _cleaned(run, notes)
+    machine = machine.with_tool(tool_of(log, machine))
     if is_of_forces_alone(log, machine.axes):
         turned = turn_run(run, log, machine, notes)
         if turned is not None or not log.axes():
@@ -89,7 +96,8 @@ def _usable(run: Run, machine: MachineFile, notes: list[str]) -> Run:
         if letter not in machine.axes:
             notes.append(f"{run.name}: axis {letter} is not in the machine's file, and is not compared")
         elif not log.has(f"{letter}_ref_mm"):
-            notes.append(f"{run.name}: {letter}_ref_mm is not recorded, and axis {letter} is not compared")
+            what = "its parts are compared alone" if _alone(log, letter) else f"axis {letter} is not compared"
+            notes.append(f"{run.name}: {letter}_ref_mm is not recorded, and {what}")
     log = without_axes_at_odds(run, without_axes_of_another_kind(run, log, machine, notes), notes)
     if not log.axes():
         return RunAtHand(run.entry, run.folder, log)

@@ -1,6 +1,7 @@
 """Intervals of what is reported: of the causes' parameters, and of how far the gap shrinks."""
 
 from collections.abc import Mapping
+from types import MappingProxyType
 
 import numpy as np
 
@@ -9,23 +10,31 @@ from twin.gap.diagnosis import Effected, Interval, closure_of
 from twin.gap.fitting import Fitted
 from twin.gap.score import Squares
 
+Intervals = dict[Effected, dict[str, Interval]]
 Z90 = 1.6448536269514722
 SEED = 4
 DRAWS = 400
 
 
-def parameter_intervals(found: Fitted) -> dict[Effected, dict[str, Interval]]:
-    """The parameters of each effect with their 90 % intervals, from the covariance clustered over time blocks."""
-    intervals: dict[Effected, dict[str, Interval]] = {}
+def parameter_intervals(found: Fitted, input_errors: Mapping[str, float] = MappingProxyType({})) -> Intervals:
+    """The parameters of each effect with their 90 % intervals, from the covariance clustered over time blocks.
+
+    input_errors: quantity that an effect needs → its relative standard error, by which the effect's size is uncertain as well
+    """
+    intervals: Intervals = {}
     free = found.model.free
     deviation = np.sqrt(np.maximum(np.diag(found.covariance), 0.0))
     for effected, place in found.model.places():
-        parameters = effect_named(effected.effect).parameters
+        effect = effect_named(effected.effect)
+        parameters = effect.parameters
+        also = Z90 * max((error for need, error in input_errors.items() if need in effect.needs), default=0.0)
         intervals[effected] = {}
         for p, i in zip(parameters, range(place.start, place.stop), strict=True):
             theta = found.theta[i]
             ends = np.clip(theta + Z90 * deviation[i] * np.array([-1.0, 0.0, 1.0]), free[i].low, free[i].high)
             low, value, high = np.sort(free[i].value(ends)).tolist()
+            if also > 0.0:
+                low, high = (value + sign * float(np.hypot(end - value, also * value)) for sign, end in ((-1, low), (1, high)))
             intervals[effected][p.name] = Interval(value, low, high, p.unit)
     return intervals
 

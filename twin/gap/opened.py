@@ -24,7 +24,11 @@ from twin.gap.stages.plan import Ground, SideBySide, unheard_axes
 from twin.gap.stages.stage import Model, Stage
 from twin.gap.verdict import Judged, judged
 
+FAR = 30.0
+"""Gap, in floors, above which a closed loop that is partly explained is not believed either."""
 STEPS_MAX = 5
+TRIFLE = 0.02
+"""Part of the gap of an open loop below which an effect is no cause, where the loop is not explained."""
 SETTLED = {Verdict.HEALTHY, Verdict.EXPLAINED}
 
 
@@ -42,7 +46,9 @@ class Opened:
         if self.closed is None:
             return True
         controller = self.loops.get("controller")
-        return self.closed.verdict not in SETTLED and controller is not None and controller.verdict not in SETTLED
+        if self.closed.verdict in SETTLED or controller is None or controller.verdict in SETTLED:
+            return False
+        return self.closed.verdict is Verdict.UNKNOWN or self.closed.explained.best.left.gap() > FAR
 
     @property
     def judged(self) -> tuple[Judged, ...]:
@@ -107,8 +113,10 @@ def combined(
     def explained(stage: Stage) -> Explained:
         assert isinstance(stage, OpenStage)
         of_axis = closed[stage.letter]
+        if stage.loop.name == "controller" and of_axis is not None and not of_axis.explained.tried:
+            return _carried_over(stage, of_axis.explained)  # it has been looked at, and is another one
         if of_axis is None or of_axis.verdict not in SETTLED:
-            return explain(stage, null=null, progress=progress)
+            return _without_trifles(explain(stage, null=null, progress=progress))
         return _carried_over(stage, of_axis.explained)
 
     by_axis: dict[str, dict[str, Judged]] = {}
@@ -149,6 +157,20 @@ def _carried_over(stage: OpenStage, closed: Explained) -> Explained:
     theta = np.concatenate([closed.best.theta[:count], *(closed.best.theta[places[e]] for e in here)])
     best = fitted(stage, replace(bare, effects=here), theta, steps_max=STEPS_MAX)
     return Explained(stage, base, best, (), {}, {})
+
+
+def _without_trifles(explained: Explained) -> Explained:
+    """The same without effects that take next to nothing of a gap of which something stays: they are shapes of what is left."""
+    stage, best, reducible = explained.stage, explained.best, explained.base.left.gap() ** 2 - 1.0
+    if judged(explained).verdict is Verdict.EXPLAINED:
+        return explained
+    for effected in best.effects:
+        bare = dropped(stage, best, effected)
+        if len(best.effects) > 1 and bare.left.gap() ** 2 - best.left.gap() ** 2 < TRIFLE * reducible:
+            best = bare
+    kept = set(best.effects)
+    rivals = {e: r for e, r in explained.rivals.items() if e in kept}
+    return replace(explained, best=best, rivals=rivals, evidence={e: a for e, a in explained.evidence.items() if e in kept})
 
 
 def _confirmed(of_axis: Judged, opened: Opened, null: Null) -> Judged:

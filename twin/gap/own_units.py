@@ -10,20 +10,24 @@ from typing import Any
 from twin.gap.diagnosis import Cause, Cell, Diagnosed, Interval, Learned, MovedConstant, Pattern, SignalGap
 from twin.gap.naming.sentence import figure_of
 from twin.machine import MachineFile
-from twin.rotary import outside_name, outside_names, outside_path, outside_text, outside_unit
+from twin.rotary import Letters, outside_name, outside_names, outside_path, outside_text, outside_unit
 from twin.rotary_tables import is_on, term_outside
 
 
 @dataclass(frozen=True, slots=True)
 class _Axes:
-    """Letters of the rotary axes of a machine, and of the others."""
+    """The rotary axes of a machine with their scales, and the letters of the others."""
 
-    rotary: frozenset[str]
+    rotary: Letters
     others: frozenset[str]
 
     def turns(self, on: str) -> bool:
         """Return True where this is a rotary axis, or a signal of one."""
         return is_on(on, self.rotary)
+
+    def alone(self, on: str) -> Letters:
+        """The axis that this is, or is a signal of."""
+        return {letter: scale for letter, scale in self.rotary.items() if is_on(on, (letter,))}
 
     def text(self, text: str) -> str:
         """Return a text that may speak of any axis."""
@@ -34,7 +38,7 @@ def in_own_units(found: Diagnosed, machine: MachineFile) -> Diagnosed:
     """Return the answer with what concerns the rotary axes of the machine in degrees and N m; as it is where there are none."""
     if not machine.rotary:
         return found
-    axes = _Axes(machine.rotary, frozenset(machine.axes) - machine.rotary)
+    axes = _Axes(machine.rotary, frozenset(machine.axes.keys() - machine.rotary.keys()))
     traces = tuple(
         replace(t, signal=outside_names(t.signal, axes.rotary), unit=_unit(axes, t.signal, t.unit)) for t in found.traces
     )
@@ -81,7 +85,7 @@ def _cell(cell: Cell | Pattern, axes: _Axes) -> Cell | Pattern:
     """A cell or pattern; its sentence speaks of the axis of its signal."""
     if not axes.turns(cell.signal):
         return cell
-    cell = replace(cell, sentence=outside_text(cell.sentence, axes.rotary, ()))
+    cell = replace(cell, sentence=outside_text(cell.sentence, axes.alone(cell.signal), ()))
     return replace(cell, at_unit=outside_unit(cell.at_unit)[0]) if isinstance(cell, Pattern) else cell
 
 
@@ -89,7 +93,7 @@ def _cause(cause: Cause, axes: _Axes) -> Cause:
     on_axis = cause.on in axes.rotary
     parameters = {}
     for name, interval in cause.parameters.items():
-        told, factor = outside_name(name) if on_axis else (name, 1.0)
+        told, factor = outside_name(name, axes.rotary[cause.on]) if on_axis else (name, 1.0)
         unit = outside_unit(interval.unit)[0]
         parameters[told] = Interval(interval.value / factor, interval.low / factor, interval.high / factor, unit)
     return replace(
@@ -102,7 +106,8 @@ def _cause(cause: Cause, axes: _Axes) -> Cause:
 
 def _constant(constant: MovedConstant, axes: _Axes) -> MovedConstant:
     path = outside_path(constant.name, axes.rotary)
-    factor = outside_name(constant.name)[1] if path != constant.name else 1.0
+    letter = constant.name.split(".")[1] if path != constant.name else ""
+    factor = outside_name(constant.name, axes.rotary[letter])[1] if letter in axes.rotary else 1.0
     return replace(constant, name=path, stated=constant.stated / factor, found=constant.found / factor)
 
 
@@ -114,5 +119,5 @@ def _learned(learned: Learned, axes: _Axes) -> Learned:
         unit=_unit(axes, learned.on, learned.unit),
         table={name: tuple(v) for name, v in term_outside(learned.table, learned.on, learned.unit, axes.rotary).items()},
         looks_like=_told(learned.looks_like, axes),
-        sentence=outside_text(learned.sentence, axes.rotary, ()),
+        sentence=outside_text(learned.sentence, axes.alone(learned.on), ()),
     )

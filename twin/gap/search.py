@@ -24,6 +24,7 @@ from twin.gap.naming.certain import certain_of, dropped, only
 from twin.gap.naming.instead import instead_of_constants
 from twin.gap.naming.moved import has_to_be_beyond
 from twin.gap.naming.siblings import only_completes
+from twin.gap.naming.stops import stops_are_at_odds
 from twin.gap.null import NULL, Null
 from twin.gap.screening import Guess, guesses, sensitivities
 from twin.gap.stages.stage import Model, Stage
@@ -41,6 +42,8 @@ THETA_NULL = 1e-4
 PAIR_GAP = 3.0
 PAIRS_OF = 6
 CHANCE_BLOCKS = 2
+FITTED_WORST = 1.25
+"""What a healthy twin leaves at worst of the mean of repeated runs that it was fitted to, over what it leaves of another run."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,6 +64,7 @@ class Explained:
     rivals: effect → what cannot be told from it; evidence: effect → its advantage over the same without it
     beyond: constants of the base have to be further from what is stated than two deviations, and no effect puts them back
     alike: what the remainder partly looks like: effects that were accepted and are not certain (`twin.gap.naming.certain`)
+    stops: the axis comes to rest with another torque than the twin's, and no effect was accepted
     """
 
     stage: Stage
@@ -71,19 +75,27 @@ class Explained:
     evidence: dict[Effected, Advantage]
     beyond: bool = False
     alike: tuple[Effected, ...] = ()
+    stops: bool = False
 
 
 def explain(
-    stage: Stage, *, null: Null = NULL, progress: Callable[[str], None] = lambda _: None, doubtful: bool = False
+    stage: Stage,
+    *,
+    null: Null = NULL,
+    progress: Callable[[str], None] = lambda _: None,
+    doubtful: bool = False,
+    known: Fitted | None = None,
 ) -> Explained:
-    """The effects in a stage. doubtful: with those that are not certain beside what is left"""
-    bare = Model(stage.constants, ())
-    base = settled(stage, fitted(stage, bare, bare.null_theta()))
-    best, first = base, tuple[Tried, ...]()
-    rivals: dict[Effected, tuple[Effected, ...]] = {}
+    """The effects in a stage.
+
+    doubtful: with those that are not certain beside what is left; known: with effects that were found in a part of it alone
+    """
+    base = bare_fit(stage)
+    best, first = base if known is None else _with_known(stage, base, known, null), tuple[Tried, ...]()
+    rivals: dict[Effected, tuple[Effected, ...]] = dict.fromkeys(best.effects, ())
     for number in range(ROUNDS_MAX):
         progress(f"{stage.name}, round {number + 1}")
-        if number and not _gap_left(best, null):
+        if (number or best.effects) and not _gap_left(best, null):
             break
         tried = _tried(stage, best, stage.candidates, null)
         first = first or tried
@@ -104,15 +116,16 @@ def explain(
         if len(best.effects) > 1:
             best = _swapped(stage, best, first)
     beyond = not best.effects and has_to_be_beyond(stage, base)
-    if beyond and (instead := instead_of_constants(stage, base, [t.found for t in first if t.found is not None])):
+    if beyond and (instead := instead_of_constants(stage, base)):
         best, beyond = instead[0], False
         rivals[best.effects[0]] = tuple(other.effects[0] for other in instead[1:])
     best, alike = (best, ()) if doubtful else with_certain(stage, base, best, null)
     several = len(best.effects) > 1
     evidence = {e: advantage(dropped(stage, best, e).left if several else base.left, best.left) for e in best.effects}
+    stops = not best.effects and stops_are_at_odds(stage, base)
     # what was found beside an effect is no rival of it
     others = {e: tuple(r for r in rivals[e] if r not in best.effects) for e in best.effects if e in rivals}
-    return Explained(stage, base, best, first, others, evidence, beyond, alike)
+    return Explained(stage, base, best, first, others, evidence, beyond, alike, stops)
 
 
 def with_certain(stage: Stage, base: Fitted, best: Fitted, null: Null = NULL) -> tuple[Fitted, tuple[Effected, ...]]:
@@ -125,8 +138,35 @@ def with_certain(stage: Stage, base: Fitted, best: Fitted, null: Null = NULL) ->
 
 
 def leaves_a_gap(stage: Stage, found: Fitted) -> bool:
-    """Return True where a hypothesis leaves more than a healthy twin does, but for the worst blocks: those are chance."""
-    return bool((found.left.rms_but_worst(CHANCE_BLOCKS) > stage.healthy_rms).any())
+    """Return True where a hypothesis leaves more than a healthy twin does, but for the worst blocks: those are chance.
+
+    The bare machine has to follow what it was fitted to as well: what comes and goes with time may be in no other run.
+    """
+    unseen = found.left.rms_but_worst(CHANCE_BLOCKS) > stage.healthy_rms
+    seen = found.left_fit.rms_but_worst(CHANCE_BLOCKS) > FITTED_WORST * stage.healthy_rms
+    return bool(unseen.any() or (not found.effects and seen.any()))
+
+
+def _with_known(stage: Stage, base: Fitted, known: Fitted, null: Null) -> Fitted:
+    """The machine with the effects of another hypothesis, refitted from there; without those that this stage does not show."""
+    places, model, theta = dict(known.model.places()), base.model, base.theta
+    for effected in known.effects:
+        if effected in stage.candidates:
+            model, theta = model.with_effect(effected), np.concatenate([theta, known.theta[places[effected]]])
+    if not model.effects:
+        return base
+    found = settled(stage, fitted(stage, model, theta), rounds=1)
+    for effected in found.effects:
+        without = dropped(stage, found, effected) if len(found.effects) > 1 else base
+        if not null.exceeded(effected, advantage(without.left, found.left), stage.healthy_rms):
+            found = without
+    return found
+
+
+def bare_fit(stage: Stage) -> Fitted:
+    """Return the machine with its constants refitted and no effect."""
+    bare = Model(stage.constants, ())
+    return settled(stage, fitted(stage, bare, bare.null_theta()))
 
 
 def _gap_left(best: Fitted, null: Null) -> bool:

@@ -1,12 +1,11 @@
 """An estimate: a figure, its interval, and whether the recordings can know it."""
 
-from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.rotary import outside_name, outside_path, outside_unit
+from twin.rotary import Letters, outside_name, outside_path, outside_unit
 
 Floats = NDArray[np.float64]
 INTERVAL_Z = 1.959963984540054
@@ -35,17 +34,17 @@ class Estimate:
         """Return True where the recordings say more about it than was known before."""
         return self.known_by > 0.5
 
-    def in_own_units(self, rotary: Collection[str]) -> "Estimate":
+    def in_own_units(self, rotary: Letters) -> "Estimate":
         """Return it in degrees and N m where it is of one of the rotary axes.
 
-        >>> estimate = Estimate("axes.b.friction.viscous_n_s_per_mm", 2.0, 1.9, 2.1, "N·s/mm", 2.0).in_own_units({"b"})
+        >>> estimate = Estimate("axes.b.friction.viscous_n_s_per_mm", 2.0, 1.9, 2.1, "N·s/mm", 2.0).in_own_units({"b": 1.0})
         >>> estimate.path, round(estimate.value, 4), estimate.unit
         ('axes.b.friction.viscous_nm_s_per_deg', 0.1146, 'N m s/deg')
         """
         path = outside_path(self.path, rotary)
         if path == self.path:
             return self
-        factor = outside_name(self.path)[1]
+        factor = outside_name(self.path, rotary.get(self.path.split(".")[1], 1.0))[1]
         value, low, high = (figure / factor for figure in (self.value, self.low, self.high))
         stated = None if self.stated is None else self.stated / factor
         return Estimate(path, value, low, high, outside_unit(self.unit)[0], stated, self.known_by)

@@ -85,7 +85,7 @@ def identify(case: Case, *, free_gains: bool = False, progress: Progress = lambd
 def in_own_units(found: Identification) -> Identification:
     """Return what was identified with the rotary axes of the machine in degrees and N m (`twin.rotary`)."""
     rotary = found.machine.rotary
-    others = frozenset(found.machine.axes) - rotary
+    others = found.machine.axes.keys() - rotary.keys()
     unknown, notes, misfits = (
         tuple(outside_text(text, rotary, others) for text in part) for part in (found.unknown, found.notes, found.misfits)
     )

@@ -10,6 +10,7 @@ from twin.errors import EffectError
 from twin.learned.arguments import motion_arguments
 from twin.learned.section import LearnedSection
 from twin.learned.sites import AXIS_SITES, MACHINE_QUANTITIES, MACHINE_READINGS, QUANTITIES, READINGS, check_place
+from twin.learned.summed import Place, place_of
 from twin.learned.term import Term
 from twin.learned.words import OF_AXIS, LearnedSite
 
@@ -71,15 +72,18 @@ def reading_series(terms: Sequence[Term], signal: str, arguments: Arguments) -> 
 
 
 def settled(
-    terms: Sequence[Term], answer: Callable[[dict[str, Floats]], Answer], arguments: Callable[[Answer], Arguments]
+    terms: Sequence[Term],
+    answer: Callable[[dict[str, Floats]], Answer],
+    arguments: Callable[[Answer], Arguments],
+    passes_max: int = PASSES_MAX,
 ) -> Answer:
     """Return the answer of a part of the machine with the terms in it.
 
     The first pass is without them. Its answer tells what they depend on, and so what they add in the next one; passes go on until
-    that changes no more.
+    that changes no more, or there have been `passes_max` with terms.
     """
     found, before = answer({}), dict[str, Floats]()
-    for _ in range(PASSES_MAX if terms else 0):
+    for _ in range(passes_max if terms else 0):
         added = added_series(terms, arguments(found))
         if all(
             np.abs(series - before.get(name, 0.0)).max(initial=0.0) <= SETTLED * np.abs(series).max(initial=0.0)
@@ -92,18 +96,17 @@ def settled(
 
 def check_terms(sections: Sequence[LearnedSection], axes: Iterable[str]) -> None:
     """Raises EffectError where a learned term of a machine is put on what there is not, or is there twice."""
-    seen: set[tuple[LearnedSite, str, frozenset[str]]] = set()
+    seen: set[Place] = set()
     letters = tuple(axes)
     for section in sections:
         check_place(section.site, section.on, letters)
         if section.site is LearnedSite.PROGRAM_TIME and not section.is_recording and section.arguments != (SINCE,):
             raise EffectError(f"the learned term at {section} is over {', '.join(section.arguments)}; it has to be over {SINCE}")
-        own = (section.site, section.on, frozenset(section.arguments))
-        if own in seen:
+        if not section.is_recording and place_of(section) in seen:
             raise EffectError(
                 f"the learned term at {section} over {', '.join(section.arguments)} is there twice; add the tables up"
             )
-        seen.add(own)
+        seen.add(place_of(section))
 
 
 def seconds_of(sections: Sequence[LearnedSection], planned_s: float) -> float:

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, field, replace
 from functools import lru_cache
 from typing import Any, Self
 
+from twin.effects.added import check_effects
 from twin.errors import LimitsError, OptimisationError
 from twin.machine import machine_from_toml
 from twin.optimisation.allowed import Impossible, allowed, limits_of
@@ -16,7 +17,6 @@ from twin.optimisation.forces import CutForces
 from twin.optimisation.problem import Problem, control_of
 from twin.optimisation.program import Programmed, programmed
 from twin.optimisation.speeds.groups import speed_groups
-from twin.simulator.response import check_effects
 
 POPULATION_MAX, EVOLUTIONS_MAX, ISLANDS_MAX = 10_000, 100_000, 64
 

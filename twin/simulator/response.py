@@ -11,23 +11,20 @@ A machine with a disturbance (`[noise] disturbance_force_n`) is a distribution o
 spread, or, with a seed, one of them, with the noise of its sensors on top, as a real machine would record it.
 """
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.effects.added import added_effects
+from twin.effects.added import added_effects, check_effects
 from twin.effects.catalogue import effect_named
-from twin.effects.effect import On
-from twin.errors import EffectError
 from twin.heat.run import Warming, spindle_temperature_c, thermal_constants, thermal_quantities
 from twin.kernels.weave import quantities
 from twin.learned.arguments import around, motion_arguments, other_axes
 from twin.learned.cutting import cut_arguments, cut_series, milling_with_terms
 from twin.learned.sites import MACHINE_READINGS, READINGS
-from twin.learned.standing import axis_terms, check_terms, reading_series, settled, terms_at
+from twin.learned.standing import axis_terms, reading_series, settled, terms_at
 from twin.learned.words import LearnedSite
 from twin.machine import MachineFile
 from twin.process.kernel import process_quantities
@@ -43,7 +40,6 @@ from twin.simulator.peaks import peaks
 from twin.spindle.load import spindle_constants, spindle_load_pct, spindle_quantities
 
 Floats = NDArray[np.float64]
-SIGNAL = re.compile(r"^([a-z][a-z0-9]?_(pos_mm|table_mm|torque_a)|force_[xy]_n|spindle_load_pct|spindle_temp_c)$")
 HEAT_SITES = (LearnedSite.HEAT_INPUT, LearnedSite.HEAT_LOSS)
 COURSES = 32
 COURSES_SEED = 20
@@ -64,6 +60,7 @@ class RunInput:
     spindle_rpm, spindle_angle_rad, axial_depth_mm, entry_angle_rad, exit_angle_rad: of the cut; None = nothing is cut
     coolant_on, ambient_temp_c: of the heat; None = never on, not known
     start: axis letter → the state of the axis at the first tick (`twin.servo.run`); start_temp_c: of the spindle
+    tool: number of the one in the spindle, where the machine describes several; empty = [tool]
     """
 
     t_s: Floats
@@ -77,6 +74,7 @@ class RunInput:
     ambient_temp_c: Floats | None = None
     start: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     start_temp_c: float | None = None
+    tool: str = ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,30 +83,6 @@ class Response:
 
     columns: dict[str, Floats]
     spread: dict[str, Floats]
-
-
-def check_effects(machine: MachineFile) -> None:
-    """Raises EffectError where an effect of the machine is unknown, out of bounds, doubled, or put on what there is not."""
-    seen: set[tuple[str, str]] = set()
-    for added in machine.effects:
-        effect = effect_named(added.effect)
-        effect.checked(added.parameters)
-        if (added.effect, added.on) in seen:
-            raise EffectError(f"{added.effect} on {added.on or 'the machine'} is there twice; add its parameters up")
-        seen.add((added.effect, added.on))
-        if effect.on is On.AXIS and not added.on:
-            raise EffectError(f"{added.effect} acts on an axis: say which by `on`")
-        if effect.on is On.AXIS and added.on not in machine.axes:
-            raise EffectError(f"{added.effect} is put on {added.on!r}, which is no axis; there are {', '.join(machine.axes)}")
-        if effect.on is On.MACHINE and added.on:
-            raise EffectError(f"{added.effect} is put on {added.on!r}; it acts on the machine as a whole, so `on` is empty")
-        if effect.on is On.SIGNAL and not added.on:
-            raise EffectError(f"{added.effect} acts on a signal: say which by `on`")
-        if effect.on is On.SIGNAL and not SIGNAL.match(added.on):
-            raise EffectError(
-                f"{added.effect} is put on {added.on!r}, which is no column that a machine answers with (x_pos_mm, …)"
-            )
-    check_terms(machine.learned, machine.axes)
 
 
 def respond(
@@ -130,6 +104,7 @@ def respond(
     Raises EffectError where the machine's effects do not fit it.
     """
     check_effects(machine)
+    machine = machine.with_tool(told.tool)
     chain = _Chain(machine, told, recorded or {}, reference_run)
     force = chain.process()
     temperature_c = chain.heat()
@@ -220,7 +195,9 @@ class _Chain:
                 return np.asarray(found[0])
 
             terms = terms_at(machine.learned, {LearnedSite.SPINDLE_POWER})
-            self.columns["spindle_load_pct"] = settled(terms, load, lambda shown: self.arguments(None) | {"load_pct": shown})
+            self.columns["spindle_load_pct"] = settled(
+                terms, load, lambda bare: self.arguments(None) | {"load_pct": bare}, passes_max=1
+            )
         return mean
 
     def axes(self, mean_force: Mapping[str, Floats], seed: int | None, courses: int, temperature_c: Floats | None) -> None:

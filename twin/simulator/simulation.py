@@ -113,7 +113,7 @@ def simulate(
     learned_s = seconds_of(machine.learned, planned.total_s)
     if learned_s:
         notes.append(f"{learned_s:.2f} s of the program's time are a learned term: they are in no signal of this run")
-    run = replace(_log(motion, told, response, path, name), rotary=machine.rotary)
+    run = replace(_log(motion, told, response, path, name), rotary=frozenset(machine.rotary))
     return Simulation(run, response, planned, tuple(notes), learned_s)
 
 

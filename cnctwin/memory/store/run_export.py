@@ -17,18 +17,18 @@ from sparkplug.values import Value
 from twin.errors import RunLogError
 from twin.runlog import AXIS_COLUMN, COLUMNS, TEXT_COLUMNS, RunLog, run_log, write_run
 
-_AXIS_POSITION = re.compile(r"^axis_([a-z][a-z0-9]?)_pos_mm$")
+_AXIS_POSITION = re.compile(r"^axis_([a-z][a-z0-9]?_pos_(?:mm|deg))$")
 _RENAMED = {"nc_line": "line"}
 
 
 def column_name(signal: str) -> str | None:
     """The column of a run log that a signal is; None where it is none.
 
-    >>> column_name("axis_x_pos_mm"), column_name("nc_line"), column_name("spindle_rpm"), column_name("alarm")
-    ('x_pos_mm', 'line', 'spindle_rpm', None)
+    >>> column_name("axis_x_pos_mm"), column_name("axis_c_pos_deg"), column_name("nc_line"), column_name("alarm")
+    ('x_pos_mm', 'c_pos_deg', 'line', None)
     """
     if match := _AXIS_POSITION.match(signal):
-        return f"{match[1]}_pos_mm"
+        return match[1]
     name = _RENAMED.get(signal, signal)
     return name if name in COLUMNS | TEXT_COLUMNS or AXIS_COLUMN.match(name) else None
 

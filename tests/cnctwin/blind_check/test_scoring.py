@@ -140,7 +140,7 @@ def with_another_controller(causes: Sequence[GivenCause], subsystems: Mapping[st
         ([cause(GRAVITY)], {"x controller": Verdict.HEALTHY}, False, False, False),
         ([cause(GRAVITY)], {"y controller": Verdict.UNKNOWN}, False, False, False),
         ([cause(GRAVITY), cause(("servo_gain", "x"))], {"x controller": Verdict.UNKNOWN}, False, False, True),
-        ([cause(GRAVITY), cause(("servo_gain", "x"), STRUCTURE)], {}, False, True, False),
+        ([cause(GRAVITY), cause(("servo_gain", "x"), STRUCTURE)], {}, True, True, False),
         ([cause(STRUCTURE)], {}, False, False, False),
     ],
 )

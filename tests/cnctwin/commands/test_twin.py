@@ -65,7 +65,40 @@ def test_simulate_prints_time_force_and_following_error_and_writes_the_run(folde
     assert summary["seconds"] == pytest.approx(run.t_s[-1], abs=0.002)
 
 
+LEARNED = """
+[[effects]]
+effect = "learned"
+site = "axis_force"
+on = "x"
+unit = "N"
+depends_on = ["position"]
+repeats = true
+closure = 0.81
+sentence = "a force on X"
+table = { position_mm = [0.0, 40.0], value = [50.0, 50.0], low = [40.0, 40.0], high = [60.0, 60.0] }
+"""
+OF_A_RECORDING = """
+[[effects]]
+effect = "learned"
+site = "axis_force"
+on = "x"
+table = { t_s = [0.0, 0.1], run = ["runs/1.parquet", "runs/1.parquet"], value = [0.0, 50.0] }
+"""
+
+
+def test_simulate_takes_a_learned_term_and_says_which_one_it_leaves_out(folder: Path) -> None:
+    (folder / "learned.toml").write_text((folder / "machine.toml").read_text() + LEARNED + OF_A_RECORDING)
+    bare, learned = (
+        json.loads(cnctwin("simulate", "slot.nc", "--machine", f"{name}.toml", "--json", cwd=folder).stdout)
+        for name in ("machine", "learned")
+    )
+    assert learned != bare
+    left_out = "the learned term at axis_force on x describes the time of a recording; it is left out"
+    assert [note for note in learned["notes"] if note not in bare["notes"]] == [left_out]
+
+
 def test_identify_writes_a_machine_that_can_be_read(folder: Path) -> None:
+    (folder / "machine.toml").write_text((folder / "machine.toml").read_text() + LEARNED)
     (folder / "runs").mkdir()
     air = MACHINE.model_copy(update={"axes": {"x": MACHINE.axes["x"]}, "stock": None})
     entries = ""
@@ -78,9 +111,11 @@ def test_identify_writes_a_machine_that_can_be_read(folder: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert "axes.x.mass_kg" in done.stdout
     assert "not to be known from these recordings" in done.stdout
-    assert read_machine(folder / "out.toml").axes["x"].mass_kg == pytest.approx(300.0, rel=0.02)
-    found = json.loads(cnctwin("identify", folder, "--json").stdout)
-    assert {e["path"] for e in found["estimates"]} >= {"axes.x.mass_kg", "axes.x.friction.coulomb_n"}
+    found = read_machine(folder / "out.toml")
+    assert found.axes["x"].mass_kg == pytest.approx(300.0, rel=0.02)
+    assert found.learned == read_machine(folder / "machine.toml").learned
+    answer = json.loads(cnctwin("identify", folder, "--json").stdout)
+    assert {e["path"] for e in answer["estimates"]} >= {"axes.x.mass_kg", "axes.x.friction.coulomb_n"}
 
 
 @pytest.mark.parametrize(

@@ -5,48 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.twin.learned.small_axis import FORTH_AND_BACK, MACHINE, columns, learned, same
 from twin.errors import EffectError
 from twin.learned.section import LearnedSection
 from twin.learned.sites import AXIS_SITES, READINGS
 from twin.learned.standing import moved_by, on_axes
-from twin.machine import AddedEffect, MachineFile, machine_from_toml
-from twin.simulator.response import RunInput, respond
-
-AXIS = """
-[axes.{letter}]
-mass_kg = 300.0
-screw_lead_mm = 12.0
-torque_constant_nm_per_a = 1.2
-position_gain_per_s = 40.0
-velocity_gain_a_s_per_mm = 0.3
-velocity_integral_gain_a_per_mm = 9.0
-torque_limit_a = 60.0
-[axes.{letter}.friction]
-coulomb_n = 300.0
-static_n = 300.0
-stribeck_velocity_mm_s = 6.0
-viscous_n_s_per_mm = 2.0
-"""
-MACHINE = machine_from_toml("[machine]\nname = 'small'\n" + AXIS.format(letter="x"))
-T = np.arange(800, dtype=np.float64) * 0.001
-FORTH_AND_BACK = 10.0 * (1.0 - np.cos(2.0 * np.pi * 2.5 * T))
-TOLD = RunInput(t_s=T, reference_mm={"x": FORTH_AND_BACK})
-
-
-def learned(site: str, column: str, knots: list[float], value: list[float], on: str = "x") -> LearnedSection:
-    return LearnedSection.model_validate({"site": site, "on": on, "table": {column: knots, "value": value}})
-
-
-def columns(
-    *terms: LearnedSection, effects: tuple[AddedEffect, ...] = (), machine: MachineFile = MACHINE
-) -> dict[str, np.ndarray]:
-    return respond(machine.model_copy(update={"learned": terms, "effects": effects}), TOLD).columns
-
-
-def same(one: dict[str, np.ndarray], other: dict[str, np.ndarray], tolerance: float = 0.0) -> None:
-    assert one.keys() == other.keys()
-    for name, values in one.items():
-        np.testing.assert_allclose(values, other[name], rtol=0.0, atol=tolerance, err_msg=name)
+from twin.machine import AddedEffect
 
 
 @pytest.mark.parametrize("site", [*AXIS_SITES, *READINGS])

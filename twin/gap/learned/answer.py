@@ -28,6 +28,7 @@ from twin.gap.verdict import Judged
 from twin.gap.wording import percent
 from twin.learned.section import LearnedSection, Likeness
 from twin.learned.sites import unit_at
+from twin.learned.summed import summed
 from twin.learned.term import Term
 from twin.learned.words import TIME, LearnedSite
 from twin.machine import MachineFile
@@ -77,7 +78,7 @@ def with_learned(machine: MachineFile, described: Sequence[Described]) -> Machin
     for one in described:
         machine = with_constants(machine, one.stage, one.found)
         sections += [_section(term) for term in one.learned]
-    return machine.model_copy(update={"learned": (*machine.learned, *sections)})
+    return machine.model_copy(update={"learned": summed((*machine.learned, *sections))})
 
 
 def _described(explained: Explained, likeness: Sequence[Effected], null: Null) -> Described | None:
@@ -85,7 +86,7 @@ def _described(explained: Explained, likeness: Sequence[Effected], null: Null) -
     stage, parent = explained.stage, explained.best
     learned: list[Learned] = []
     for _ in range(TERMS_MAX):
-        if not leaves_a_gap(stage, parent):
+        if learned and not leaves_a_gap(stage, parent):
             break
         shapes = free_form(stage, parent, null=null)
         if not shapes:

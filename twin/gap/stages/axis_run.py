@@ -12,6 +12,7 @@ from twin.gap.floors import Floors
 from twin.gap.labels import regime_labels
 from twin.gap.sampling.servo_ticks import DOUBT
 from twin.gap.stages.smoothed import filled, low_passed
+from twin.gap.stages.temperature_rise import temperature_rise
 from twin.learned.arguments import around, motion_arguments, other_axes
 from twin.regimes import axis_regimes, motion_stretches
 from twin.runlog import RunLog
@@ -28,7 +29,8 @@ class AxisRunData:
     """An axis in one run, or in the mean of repeated ones; (n,) each, as `twin.runlog` has them.
 
     disturbance_n: known force that resists motion in +, or None; measured: output → values; count: of the runs averaged
-    regime: number of the regime (`twin.gap.labels`); rise_k: of the spindle's temperature since the start
+    regime: number of the regime (`twin.gap.labels`)
+    rise_k: of the spindle's temperature since the start; rise_error: its standard error, relative
     others: letter → reference of the other axes; around: what a learned term may depend on of the machine as a whole
     told: whether the reference was recorded, else the measured position is it
     doubt: (n,) where the reference is not known well enough between samples, or None
@@ -48,6 +50,7 @@ class AxisRunData:
     around: Mapping[str, Floats] = field(default_factory=dict)
     told: bool = True
     doubt: NDArray[np.bool_] | None = None
+    rise_error: float = 0.0
 
     @cached_property
     def arguments(self) -> Mapping[str, Floats]:
@@ -86,6 +89,7 @@ def axis_run_data(
     floor = {o: floors.of(log, f"{letter}_{o}") for o in outputs}
     regime = regime_labels(log, f"{letter}_ref_mm", floors.machine)[1] if told else axis_regimes(log.t_s, reference)
     others = {a: log[f"{a}_ref_mm"] for a in log.axes() if a != letter and log.has(f"{a}_ref_mm")}
+    rise = temperature_rise(floors.machine, group)
     return AxisRunData(
         group[0].name,
         log.t_s,
@@ -93,7 +97,7 @@ def axis_run_data(
         measured,
         floor,
         regime,
-        _rise_k(log),
+        None if rise is None else rise.rise_k,
         disturbance_n,
         len(group),
         fitted,
@@ -101,6 +105,7 @@ def axis_run_data(
         around(log.t_s, log.columns),
         told,
         _doubt(group, letter),
+        0.0 if rise is None else rise.error,
     )
 
 
@@ -116,17 +121,6 @@ def _moved_mm(group: Sequence[Run], letter: str) -> Floats | None:
     log = group[0].log
     position = filled(np.mean([run.log[f"{letter}_pos_mm"] for run in group], axis=0))
     return low_passed(position, float(log.t_s[1] - log.t_s[0]), MOVED_HZ)
-
-
-def _rise_k(log: RunLog) -> Floats | None:
-    """Rise of the recorded temperature, held between samples; its own noise is averaged out over a second."""
-    if not log.has("spindle_temp_c"):
-        return None
-    known = np.isfinite(log["spindle_temp_c"])
-    temperature = np.interp(log.t_s, log.t_s[known], log["spindle_temp_c"][known])
-    count = max(1, min(len(temperature) // 4, round(1.0 / max(float(np.median(np.diff(log.t_s))), 1e-6))))
-    smooth = np.convolve(np.pad(temperature, (count // 2, count - 1 - count // 2), mode="edge"), np.ones(count) / count, "valid")
-    return np.asarray(smooth - smooth[0])
 
 
 def repeated_groups(runs: Sequence[Run], repeats: Sequence[tuple[Run, Run]]) -> tuple[tuple[Run, ...], ...]:

@@ -13,12 +13,13 @@ from twin.gap.dynamometer.turn_run import TurnRun
 from twin.gap.floors import Floors, repeatability
 from twin.gap.naming.specific import only_specific
 from twin.gap.null import NULL, Null
-from twin.gap.search import Explained, explain
+from twin.gap.search import Explained, bare_fit, explain
 from twin.gap.stages.axis import AxisStage, axis_constants_free, standing_of
 from twin.gap.stages.axis_run import AxisRunData, axis_run_data, repeated_groups
 from twin.gap.stages.cut import CutStage, cut_runs
 from twin.gap.stages.disturbance import disturbance_of_repeats, expected_spread
 from twin.gap.stages.heat import HeatStage, heat_runs
+from twin.gap.stages.open_loop.plan import open_stages
 from twin.gap.stages.stage import Stage
 from twin.gap.stages.turns import TurnStage, turn_data
 from twin.gap.verdict import judged
@@ -26,6 +27,7 @@ from twin.learned.standing import axis_terms
 from twin.machine import MachineFile
 from twin.runlog import RunLog
 from twin.servo.disturbance import Disturbance
+from twin.simulator.recorded import tool_of
 from twin.simulator.response import disturbance_of
 from twin.sites import Site
 
@@ -33,6 +35,8 @@ Floats = NDArray[np.float64]
 Progress = Callable[[str], None]
 SideBySide = Callable[[Callable[[Stage], Explained], Iterable[Stage]], Iterable[Explained]]
 """As `map`."""
+FAR = 60.0
+"""Gap of a closed loop, in floors, above which its controller is looked at first."""
 AXES_TO_COMPARE = 2
 """Axes from which on a clock that all share can be told from a delay of one."""
 
@@ -80,22 +84,40 @@ def explained_stages(ground: Ground, progress: Progress, side_by_side: SideBySid
     """Each stage explained: cut and spindle first, since its force pushes the axes; then axes and heat, side by side."""
     found: list[Explained] = []
     forces: dict[str, dict[str, Floats]] = {}
-    cuts = cut_runs(ground.machine, ground.runs)
-    if any(run.fitted for run in cuts):
-        stage = CutStage(ground.machine, cuts, ground.floors, ground.left_out)
-        if stage.candidates:
-            found.append(explain(stage, null=null, progress=progress))
-            forces = _pushes(stage, found[0])
-    turning = turn_data(ground.runs)
-    if any(run.fitted for run in turning):
-        turns = TurnStage(ground.machine, turning, ground.left_out)
-        found.append(only_specific(turns, explain(turns, null=null, progress=progress, doubtful=True)))
+    for tool in dict.fromkeys(tool_of(run.log, ground.machine) for run in ground.runs):
+        machine = ground.machine.with_tool(tool)
+        runs = tuple(run for run in ground.runs if tool_of(run.log, ground.machine) == tool)
+        cuts = cut_runs(machine, runs)
+        if any(run.fitted for run in cuts):
+            stage = CutStage(machine, cuts, ground.floors, ground.left_out, tool)
+            if stage.candidates:
+                found.append(explain(stage, null=null, progress=progress))
+                forces |= _pushes(stage, found[-1])
+        turning = turn_data(runs)
+        if any(run.fitted for run in turning):
+            turns = TurnStage(machine, turning, ground.left_out, tool)
+            found.append(only_specific(turns, explain(turns, null=null, progress=progress, doubtful=True)))
     stages: list[Stage] = [s for letter in ground.machine.axes if (s := axis_stage(ground, letter, forces)) is not None]
     warmups = heat_runs(ground.machine, tuple(r for r in ground.runs if not r.log.axes()))
     if any(run.fitted for run in warmups):
         stages.append(HeatStage(ground.machine, warmups, ground.floors, ground.left_out))
-    found += side_by_side(lambda stage: explain(stage, null=null, progress=progress), stages)
+    found += side_by_side(lambda stage: _explained(stage, ground, null, progress), stages)
     return with_one_clock(found, progress, null)
+
+
+def _explained(stage: Stage, ground: Ground, null: Null, progress: Progress) -> Explained:
+    """The stage explained; a closed loop that is off by orders of magnitude only where its controller is understood."""
+    if isinstance(stage, AxisStage):
+        base = bare_fit(stage)
+        if base.left.gap() > FAR:
+            loops = open_stages(stage, ground.runs, ground.repeats, ground.floors)
+            controller = next((loop for loop in loops if loop.loop.name == "controller"), None)
+            if controller is not None:
+                alone = explain(controller, null=null, progress=progress)
+                if judged(alone).verdict is Verdict.UNKNOWN:
+                    return Explained(stage, base, base, (), {}, {})
+                return explain(stage, null=null, progress=progress, known=alone.best)
+    return explain(stage, null=null, progress=progress)
 
 
 def with_one_clock(found: list[Explained], progress: Progress, null: Null) -> list[Explained]:

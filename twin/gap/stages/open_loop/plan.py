@@ -32,7 +32,7 @@ def loops_of(data: AxisRunData) -> tuple[Loop, ...]:
     moved = "pos_mm" in data.measured and _whole(data)
     found: list[Loop] = []
     if moved and "torque_a" in data.measured:
-        found += [Controller(), Mechanics()]
+        found += [Controller(), Mechanics()] if data.told else [Mechanics()]
     if moved and "table_mm" in data.measured:
         found.append(Table(("pos_mm", "torque_a") if "torque_a" in data.measured else ("pos_mm",)))
     return tuple(found)

@@ -26,7 +26,8 @@ from twin.simulator.recorded import noise_of
 Floats = NDArray[np.float64]
 ByRegime = Mapping[int, float]
 APART_S = 3.0 * ALIKE_S
-MEDIAN_TO_SIGMA = 1.482602218505602 / np.sqrt(6.0)
+MEDIAN_TO_SIGMA, MEDIAN_TO_SIGMA_FOURTH = 1.482602218505602 / np.sqrt(6.0), 1.482602218505602 / np.sqrt(70.0)
+"""From the median of differences, second and fourth ones, to the standard deviation of white noise."""
 SAMPLES_MIN = 20
 """Samples of a regime below which its own floor is not known."""
 
@@ -68,7 +69,7 @@ def _left(axis: AxisStage, loop: Loop, data: AxisRunData) -> Floats:
 def _known(machine: MachineFile, axis: AxisStage, loop: Loop, run: Run, data: AxisRunData, left: Floats) -> dict[int, float]:
     """Regime → what white noise of the sensors and the timing of samples make of the residual; of all where one is rare."""
     draw = np.random.default_rng([13, ord(axis.letter[0])])
-    sizes = {output: noise_of(machine, run.log, f"{axis.letter}_{output}") for output in data.measured}
+    sizes = {o: min(noise_of(machine, run.log, f"{axis.letter}_{o}"), _white(v)) for o, v in data.measured.items()}
     noisy = {output: v + sizes[output] * draw.standard_normal(len(v)) for output, v in data.measured.items()}
     where = places(data)
     by_timing = np.full(len(data.t_s), np.nan)
@@ -87,6 +88,12 @@ def _by_regime(differences: Sequence[tuple[Floats, NDArray[np.int8]]]) -> dict[i
         if np.isfinite(parts).sum() >= SAMPLES_MIN:
             found[regime] = _rms(parts)
     return found
+
+
+def _white(values: Floats) -> float:
+    """Standard deviation of the white part of a signal, robustly, from its fourth differences: a motion has hardly any."""
+    fourth = np.diff(values[np.isfinite(values)], 4)
+    return float(np.median(np.abs(fourth)) * MEDIAN_TO_SIGMA_FOURTH) if len(fourth) else 0.0
 
 
 def _second_differences(values: Floats, step: int) -> float:

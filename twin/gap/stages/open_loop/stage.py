@@ -16,6 +16,7 @@ from twin.gap.stages.open_loop.loop import ALIKE_S, Loop, places
 from twin.gap.stages.smoothed import sample_period_s
 from twin.gap.stages.stage import Model, Observed, observed_of
 from twin.identification.batch_fit import time_blocks
+from twin.learned.words import LearnedSite
 
 Floats = NDArray[np.float64]
 AVERAGED_S = 0.004
@@ -78,6 +79,19 @@ class OpenStage:
             elif effect.name in of_axis and self.loop.acts(effect):
                 found.append(Effected(effect.name, self.letter))
         return tuple(found)
+
+    @property
+    def term_sites(self) -> Mapping[LearnedSite, tuple[str, ...]]:
+        """The sites of learned terms that act here."""
+        return {site: on for site, on in self.closed.term_sites.items() if site in self.loop.sites}
+
+    def term_sizes(self, site: LearnedSite, on: str) -> float:
+        """Return the size of a small term, as on the axis."""
+        return self.closed.term_sizes(site, on)
+
+    def term_arguments(self, run: int) -> Mapping[str, Floats]:
+        """Return what a term may depend on in a run, over its stretches."""
+        return self.closed.term_arguments(run)
 
     def first_guesses(self, candidate: Effected) -> Guesses:
         """Return the effect's own guesses."""

@@ -1,0 +1,97 @@
+"""A robot-like axis that is not the twin's: an elastic joint with an encoder on either side, and a state feedback for controller.
+
+    m₁ a₁ = k u − spring,   m₂ a₂ = spring − F_friction(v₂),   spring = stiffness (x₁ − x₂) + damping (v₁ − v₂)
+    u = (k_x (r − x₁) + k_v (r' − v₁) − k_s spring + m r'') / k
+
+Friction, on the link, is larger in + than in −. It is sampled every 4 ms; the loops of the twin's file tick every millisecond.
+"""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.case import Case, RunAtHand, RunEntry, RunKind
+from twin.machine import machine_from_toml
+from twin.runlog import run_log
+
+Floats = NDArray[np.float64]
+MACHINE = machine_from_toml(
+    """
+[machine]
+name = "robot"
+servo_period_s = 0.001
+[axes.b]
+mass_kg = 200.0
+force_per_command_n = 60.0
+position_gain_per_s = 30.0
+velocity_gain_a_s_per_mm = 0.20
+velocity_integral_gain_a_per_mm = 4.0
+torque_limit_a = 60.0
+[axes.b.friction]
+coulomb_n = 240.0
+static_n = 250.0
+stribeck_velocity_mm_s = 4.0
+viscous_n_s_per_mm = 1.5
+[uncertainty]
+relative = 0.05
+"""
+)
+MOTOR_KG, LINK_KG, NEWTON_PER_A = 30.0, 175.0, 60.0
+STIFFNESS_N_PER_MM, DAMPING_N_S_PER_MM = 20000.0, 40.0
+ASYMMETRY = 0.15
+STEP_S, EVERY = 0.0002, 20
+
+
+def reference(seed: int, seconds: float) -> Floats:
+    """A smooth motion of several sines, at rest at both ends."""
+    draw = np.random.default_rng(seed)
+    t_s = np.arange(0.0, seconds, STEP_S)
+    envelope = np.clip((t_s - 0.5) / 0.5, 0.0, 1.0) * np.clip((seconds - 0.7 - t_s) / 0.5, 0.0, 1.0)
+    smooth = envelope**3 * (10.0 - 15.0 * envelope + 6.0 * envelope**2)
+    frequencies, sizes = draw.uniform(0.15, 0.9, 4), draw.uniform(15.0, 40.0, 4)
+    return np.asarray(smooth * sum(a * np.sin(2.0 * np.pi * f * t_s) for f, a in zip(frequencies, sizes, strict=True)))
+
+
+def robot_log(seed: int, *, noise_seed: int, seconds: float = 16.0, with_reference: bool = True) -> dict[str, Floats]:
+    """A recording of the axis."""
+    r = reference(seed, seconds)
+    rv = np.gradient(r, STEP_S)
+    ra = np.gradient(rv, STEP_S)
+    x1 = x2 = v1 = v2 = u = 0.0
+    rows = np.zeros((len(r), 3))
+    for i in range(len(r)):
+        spring = STIFFNESS_N_PER_MM * (x1 - x2) + DAMPING_N_S_PER_MM * (v1 - v2)
+        if i % 5 == 0:  # the loops of the robot tick every millisecond
+            u = (900.0 * (r[i] - x1) + 14.0 * (rv[i] - v1) - 0.2 * spring + 0.2 * ra[i]) / NEWTON_PER_A
+        rows[i] = x1, x2, u
+        curve = (240.0 + 1.5 * abs(v2)) * (1.0 + ASYMMETRY * np.sign(v2))
+        if v2 == 0.0 and abs(spring) <= 250.0:
+            a2 = 0.0
+        else:
+            direction = np.sign(v2) if v2 != 0.0 else np.sign(spring)
+            a2 = 1000.0 * (spring - direction * curve) / LINK_KG
+        new = v2 + STEP_S * a2
+        v2 = 0.0 if v2 * new < 0.0 else new
+        v1 += STEP_S * 1000.0 * (NEWTON_PER_A * u - spring) / MOTOR_KG
+        x1, x2 = x1 + STEP_S * v1, x2 + STEP_S * v2
+    draw = np.random.default_rng(noise_seed)
+    kept = rows[::EVERY] + draw.standard_normal((len(rows[::EVERY]), 3)) * [0.0005, 0.0005, 0.02]
+    log = {
+        "t_s": np.arange(len(kept)) * STEP_S * EVERY,
+        "b_pos_mm": kept[:, 0],
+        "b_table_mm": kept[:, 1],
+        "b_torque_a": kept[:, 2],
+    }
+    return log | ({"b_ref_mm": r[::EVERY]} if with_reference else {})
+
+
+def robot_case(*, with_reference: bool) -> Case:
+    """Two runs of one motion to learn from, one of another motion to be judged on."""
+    runs = []
+    for name, seed, noise_seed, repeats in (("fit", 1, 1, None), ("fit again", 1, 2, "fit"), ("check", 2, 3, None)):
+        role = "check" if name == "check" else "fit"
+        entry = RunEntry(file=name, kind=RunKind.AIR, role=role, repeats=repeats)
+        log = robot_log(seed, noise_seed=noise_seed, with_reference=with_reference)
+        runs.append(RunAtHand(entry, Path(), run_log(log, name)))
+    return Case("robot", MACHINE, tuple(runs))

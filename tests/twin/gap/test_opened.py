@@ -1,0 +1,35 @@
+"""An axis whose controller is not the twin's: its mechanics and its table are named all the same, its controller is not."""
+
+import pytest
+
+from tests.twin.gap.robot_case import ASYMMETRY, STIFFNESS_N_PER_MM, robot_case
+from twin.gap.diagnose import diagnose
+from twin.gap.diagnosis import Diagnosis, Verdict
+
+
+@pytest.fixture(scope="module", params=[True, False], ids=["with a reference", "without a reference"])
+def robot(request: pytest.FixtureRequest) -> Diagnosis:
+    return diagnose(robot_case(with_reference=request.param)).diagnosis
+
+
+def test_what_its_mechanics_and_its_table_show_is_named_and_nothing_else(robot: Diagnosis) -> None:
+    assert {(cause.effect, cause.on) for cause in robot.causes} == {("direction_friction", "b"), ("screw_compliance", "b")}
+    by_name = {cause.effect: cause for cause in robot.causes}
+    assert by_name["direction_friction"].parameters["asymmetry"].value == pytest.approx(ASYMMETRY, rel=0.02)
+    stiffness = by_name["screw_compliance"].parameters["stiffness_n_per_mm"].value
+    assert stiffness == pytest.approx(STIFFNESS_N_PER_MM, rel=0.05)
+
+
+def test_its_controller_is_said_to_be_another_one_and_the_gap_is_not_that_of_a_loop_that_nobody_believes(
+    robot: Diagnosis,
+) -> None:
+    parts = {part.subsystem: part for part in robot.subsystems}
+    assert robot.verdict is Verdict.PARTLY
+    assert robot.gap.before < 150.0
+    assert robot.gap.after < 0.1 * robot.gap.before
+    assert {"b_torque_a", "b_table_mm"} == set(robot.gap.by_signal)
+    assert any("compared alone" in note for note in robot.notes)
+    if "b controller" in parts:
+        assert parts["b controller"].verdict is Verdict.UNKNOWN
+        assert parts["b controller"].causes == ()
+    assert parts["b mechanics"].causes[0] == "direction_friction"
