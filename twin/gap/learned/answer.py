@@ -12,7 +12,10 @@ from numpy.typing import NDArray
 from twin.gap.diagnosis import Effected, Learned, LooksLike, Verdict
 from twin.gap.evidence import advantage
 from twin.gap.fitting import Fitted, Left
-from twin.gap.intervals import closure_interval
+from twin.gap.intervals import Z90, closure_interval
+from twin.gap.learned.learnable import Learnable
+from twin.gap.learned.over_time import reconstructed
+from twin.gap.learned.pushes import time_sentence
 from twin.gap.learned.search import Shaped, free_form, refined
 from twin.gap.learned.wording import sentence
 from twin.gap.null import NULL, Null
@@ -27,6 +30,7 @@ from twin.learned.section import LearnedSection, Likeness
 from twin.learned.sites import unit_at
 from twin.learned.summed import summed
 from twin.learned.term import Term
+from twin.learned.words import TIME, LearnedSite
 from twin.machine import MachineFile
 
 Floats = NDArray[np.float64]
@@ -36,6 +40,8 @@ LIKE_LEAST = 0.05
 """Part of the gap that an effect has to close to be called near."""
 CLOSES_LEAST = 0.1
 """Closure from which on a term is worth telling."""
+TIME_CLOSES_LEAST = 0.5
+"""The same of a force over time, which follows much that is no force as well."""
 REPEATS = (0.5, 1.5)
 """Size of a term in each run by itself, over that of all, within which it repeats."""
 
@@ -91,7 +97,63 @@ def _described(explained: Explained, likeness: Sequence[Effected], null: Null) -
             break
         learned.append(one)
         parent = best.found
+    if not learned and leaves_a_gap(stage, parent) and isinstance(stage, Learnable):
+        over_time = _over_time(stage, parent)
+        learned += [over_time] if over_time is not None else []
     return Described(stage, parent, tuple(learned)) if learned else None
+
+
+def _over_time(stage: Learnable, parent: Fitted) -> Learned | None:
+    """The force that is left where nothing else explains it: it goes with the time of each run; None where it closes little."""
+    runs = reconstructed(stage, parent)
+    judging = [r for r in runs if not stage.observed[r.run].fitted] or list(runs)
+    if not judging:
+        return None
+    before, after = (_squares_of_runs(stage, [(r.run, getattr(r, which)) for r in judging]) for which in ("before", "after"))
+    closure, low, high = closure_interval(before, after)
+    if closure < TIME_CLOSES_LEAST:
+        return None
+    letter = stage.term_sites[LearnedSite.AXIS_FORCE][0]
+    unit = unit_at(LearnedSite.AXIS_FORCE, letter)
+    told = []
+    for r in runs:
+        arguments = stage.term_arguments(r.run)
+        told.append((r.at_s, r.force, np.interp(r.at_s, arguments[TIME], arguments["position_mm"])))
+    names = [name for r in runs for name in [stage.observed[r.run].name] * len(r.at_s)]
+    columns = {TIME: [r.at_s for r in runs], "value": [r.force for r in runs]}
+    columns |= {"low": [r.force - Z90 * r.error for r in runs], "high": [r.force + Z90 * r.error for r in runs]}
+    table: dict[str, tuple[float | str, ...]] = {
+        name: tuple(float(f"{v:.6g}") for v in np.concatenate(parts)) for name, parts in columns.items()
+    }
+    return Learned(
+        site=LearnedSite.AXIS_FORCE.value,
+        on=letter,
+        unit=unit,
+        depends_on=("time",),
+        repeats=False,
+        closure=round(closure, 4),
+        closure_low=round(low, 4),
+        closure_high=round(high, 4),
+        table={TIME: table.pop(TIME), "run": tuple(names), **table},
+        looks_like=(),
+        sentence=time_sentence(letter, unit, told),
+    )
+
+
+def _squares_of_runs(stage: Learnable, parts: Sequence[tuple[int, Floats]]) -> dict[str, Squares]:
+    """signal → squares by time block, of residuals in floors."""
+    found: dict[str, list[tuple[Floats, Floats]]] = {}
+    for number, residual in parts:
+        observed = stage.observed[number]
+        _, block = np.unique(observed.block, return_inverse=True)
+        for index, signal in enumerate(observed.signals):
+            there = np.isfinite(residual) & (observed.signal == index)
+            many = int(block.max(initial=0)) + 1
+            counts = np.bincount(block[there], minlength=many).astype(np.float64)
+            squares = np.bincount(block[there], weights=residual[there] ** 2, minlength=many).astype(np.float64)
+            found.setdefault(signal, []).append((squares, counts))
+    joined = {signal: [np.concatenate(part) for part in zip(*own, strict=True)] for signal, own in found.items()}
+    return {signal: Squares(squares, counts, counts) for signal, (squares, counts) in joined.items()}
 
 
 def _learned(explained: Explained, parent: Fitted, best: Shaped, likeness: Sequence[Effected]) -> Learned:

@@ -64,7 +64,7 @@ class Screen:
     @staticmethod
     def of(stage: Learnable, parent: Fitted) -> "Screen":
         """Return the screen of a stage at a parent."""
-        quiet = _quiet(stage)
+        quiet = quiet_of(stage)
         together = stage.averaged
         pieces = []
         for number, observed in enumerate(stage.observed):
@@ -161,8 +161,8 @@ def _lengths(term: FreeTerm, length: float) -> dict[str, float]:
     return {c: length * float(knots[-1] - knots[0]) for c, knots in term.knots.by_column.items() if len(knots) > 2}
 
 
-def _quiet(stage: Learnable) -> Learnable:
-    """The stage without the courses of its disturbance, of which a signature needs none."""
+def quiet_of(stage: Learnable) -> Learnable:
+    """Return the stage without the courses of its disturbance, of which a signature needs none."""
     return replace(stage, disturbance=None) if getattr(stage, "disturbance", None) is not None else stage  # type: ignore[type-var]
 
 
