@@ -30,7 +30,7 @@ class Reading(NamedTuple):
 def earlier(values: Floats, since: Floats, sample: int, age_s: float) -> float:
     """Return the value of `age_s` before a sample, between those that there are; before the first one, that.
 
-    >>> earlier(np.array([0.0, 1.0, 3.0]), np.array([0.0, 0.1, 0.1]), 2, 0.05)
+    >>> float(earlier(np.array([0.0, 1.0, 3.0]), np.array([0.0, 0.1, 0.1]), 2, 0.05))
     2.0
     """
     right: float = values[sample]
@@ -52,7 +52,7 @@ def earlier(values: Floats, since: Floats, sample: int, age_s: float) -> float:
 def sense(values: Floats, since: Floats, sample: int) -> Reading:
     """One sample.
 
-    >>> sense(np.array([21.5]), np.array([0.0]), 0).reading
+    >>> float(sense(np.array([21.5]), np.array([0.0]), 0).reading)
     21.5
     """
     age_s = at(Site.SENSOR, 0.0)
