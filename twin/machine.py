@@ -281,6 +281,21 @@ class MachineFile(Section):
         """Letters of the axes that a program of the machine can have words for: x, y, z, and its rotary ones among a, b, c."""
         return ("x", "y", "z", *sorted(self.rotary.keys() & {"a", "b", "c"}))
 
+    def with_tool(self, number: str) -> Self:
+        """The machine with tool `number` in its spindle: as [tool], with what is known of it and the effects on it.
+
+        The same where no [tools.N] describes it.
+        """
+        if number not in self.tools:
+            return self
+        mine = tuple(
+            e.model_copy(update={"on": ""}) if e.on == number else e
+            for e in self.effects
+            if e.on not in self.tools or e.on == number
+        )
+        known = {path.replace(f"tools.{number}.", "tool."): v for path, v in self.uncertainty.items()}
+        return self.model_copy(update={"tool": self.tools[number], "effects": mine, "uncertainty": known})
+
     @property
     def settings(self) -> Settings:
         """The settings with which the control reads a program: [control]."""

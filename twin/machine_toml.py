@@ -1,7 +1,12 @@
 """A machine written back as `machine.toml`; beside the reading of one, since only writing needs a package of the extra `twin`."""
 
+import json
+from collections.abc import Mapping
+from typing import Any
+
 import tomli_w
 
+from twin.learned.section import LEARNED
 from twin.machine import MachineFile
 from twin.rotary_tables import tables_outside
 
@@ -16,9 +21,26 @@ def machine_to_toml(machine: MachineFile) -> str:
     True
     """
     values = machine.model_dump(mode="json", exclude_none=True)
-    learned = [{key: value for key, value in term.items() if value not in ("", [])} for term in values.pop("learned")]
+    learned = [{key: value for key, value in term.items() if value not in ("", [])} for term in values.pop(LEARNED)]
     values["effects"] += learned
     if machine.rotary:
         values = tables_outside(values, machine.rotary)
+    effects = values.pop("effects")
     values["control"] = {key: value for key, value in values["control"].items() if value not in ({}, [])}
-    return tomli_w.dumps({key: value for key, value in values.items() if value not in ({}, [])}, multiline_strings=False)
+    text = tomli_w.dumps({key: value for key, value in values.items() if value not in ({}, [])}, multiline_strings=False)
+    return text + "".join(_entry(entry) for entry in effects)
+
+
+def _entry(effect: Mapping[str, Any]) -> str:
+    """An effect or a learned term, with its parameters or its table in one line."""
+    return "\n[[effects]]\n" + "".join(f"{key} = {_in_line(value)}\n" for key, value in effect.items())
+
+
+def _in_line(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{key} = {_in_line(one)}" for key, one in value.items()) + " }" if value else "{}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(_in_line(one) for one in value) + "]"
+    if isinstance(value, float):
+        return repr(value)
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

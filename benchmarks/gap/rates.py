@@ -11,7 +11,7 @@ at 1 kHz, thinned to each rate and diagnosed. A row of the table is printed for 
     wrong    something else is named, and it is not        unknown  there is a gap without a name
     –        it is called healthy, or cannot be seen at this rate; slower ones are not tried then
 
-The machine is the twin's own simulator with other constants than its file states. All effects take some ten minutes of one core.
+The machine is the twin's own simulator with other constants than its file states. An effect takes about a minute of one core.
 """
 
 import argparse

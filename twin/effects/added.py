@@ -8,6 +8,7 @@ from twin.effects.effect import On
 from twin.errors import EffectError
 from twin.learned.standing import check_terms
 from twin.machine import MachineFile
+from twin.sites import Site
 
 SIGNAL = re.compile(r"^([a-z][a-z0-9]?_(pos_mm|table_mm|torque_a)|force_[xy]_n|spindle_load_pct|spindle_temp_c)$")
 
@@ -34,8 +35,10 @@ def check_effects(machine: MachineFile) -> None:
             raise EffectError(f"{added.effect} acts on an axis: say which by `on`")
         if effect.on is On.AXIS and added.on not in machine.axes:
             raise EffectError(f"{added.effect} is put on {added.on!r}, which is no axis; there are {', '.join(machine.axes)}")
-        if effect.on is On.MACHINE and added.on:
-            raise EffectError(f"{added.effect} is put on {added.on!r}; it acts on the machine as a whole, so `on` is empty")
+        of_a_tool = machine.tools if effect.site is Site.PROCESS_FORCE else {}
+        if effect.on is On.MACHINE and added.on and added.on not in of_a_tool:
+            tools = f", or the number of a tool ({', '.join(of_a_tool)})" if of_a_tool else ""
+            raise EffectError(f"{added.effect} is put on {added.on!r}; it acts on the machine as a whole: `on` is empty{tools}")
         if effect.on is On.SIGNAL and not added.on:
             raise EffectError(f"{added.effect} acts on a signal: say which by `on`")
         if effect.on is On.SIGNAL and not SIGNAL.match(added.on):

@@ -42,7 +42,7 @@ LASTING = (Regime.REST.title, Regime.REVERSAL.title)
 LOWER, LOWER_CHI2 = 0.25, 0.1015
 """Lower quartile, and that of χ² with one degree of freedom: a block in which the difference hardly changes has one."""
 RARE = 0.75
-"""Part of a regime up to which its worst blocks are events; where there are more, the regime repeats badly."""
+"""Part of a regime up to which samples are left out as events or their wake."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +107,7 @@ def repeatability(runs: Iterable[Run], repeats: Iterable[tuple[Run, Run]], machi
     """The floors that the runs themselves show."""
     pairs = [_Pair(one.name, one.log, other.log, 0) for one, other in repeats if len(one.log) == len(other.log)]
     if pairs:
-        return _floors(pairs, [{} for _ in pairs], machine, ())
+        return _floors(pairs, [{} for _ in pairs], {}, machine, ())
     laps = [_Pair(run.name, run.log, run.log, lag) for run in runs if (lag := lap_of(run.log))]
     usual = _usual(laps, machine)
     events = [_events(pair, usual, machine) for pair in laps]
@@ -115,11 +115,21 @@ def repeatability(runs: Iterable[Run], repeats: Iterable[tuple[Run, Run]], machi
     # the laps before and after one with an event still tell what repeats there
     over = [replace(p, lag=2 * p.lag) for p, e in zip(laps, events, strict=True) if e.samples and 3 * p.lag <= len(p.one)]
     outs = [e.samples for e in [*events, *(_events(pair, usual, machine) for pair in over)]]
-    return _floors([*laps, *over], outs, machine, notes)
+    return _floors([*laps, *over], outs, usual, machine, notes)
 
 
-def _floors(pairs: Sequence[_Pair], events: Sequence[Mapping[str, Bools]], machine: MachineFile, notes: Sequence[str]) -> Floors:
-    """The floors of pairs of recordings. events: of each, what moves together → samples, (n − lag,), that do not count"""
+def _floors(
+    pairs: Sequence[_Pair],
+    events: Sequence[Mapping[str, Bools]],
+    usual: Mapping[Key, float],
+    machine: MachineFile,
+    notes: Sequence[str],
+) -> Floors:
+    """The floors of pairs of recordings.
+
+    events: of each pair, what moves together → samples, (n − lag,), that do not count
+    usual: rms by (signal, regime) without events, for regimes that events reach into nearly everywhere
+    """
     parts: dict[Key, list[tuple[Floats, Bools, Bools]]] = {}
     for pair, event in zip(pairs, events, strict=True):
         for signal in pair.signals:
@@ -133,7 +143,7 @@ def _floors(pairs: Sequence[_Pair], events: Sequence[Mapping[str, Bools]], machi
         rare = sum(kept.sum() for _, _, kept in found) > (1.0 - RARE) * sum(here.sum() for _, here, _ in found)
         counted = [(difference, kept if rare else here) for difference, here, kept in found]
         values = [difference[there] for difference, there in counted if there.any()]
-        repeated[key] = float(np.sqrt(np.mean(np.concatenate(values) ** 2)))
+        repeated[key] = float(np.sqrt(np.mean(np.concatenate(values) ** 2))) if rare else usual[key]
         worth = sum(there.sum() / correlation_time(np.where(there, d, 0.0)) for d, there in counted if there.any())
         error[key] = float(1.0 / np.sqrt(2.0 * max(float(worth), 1.0)))
     return Floors(machine, repeated, {}, error, (*notes, *_certainty(error)))

@@ -21,6 +21,7 @@ from twin.gap.stages.cut import cut_runs
 from twin.gap.stages.heat import heat_runs
 from twin.machine import MachineFile
 from twin.runlog import AXIS_COLUMN, RunLog
+from twin.simulator.recorded import tool_of
 
 Floats = NDArray[np.float64]
 CONTRADICTION = 0.3
@@ -81,6 +82,7 @@ def _alone(log: RunLog, letter: str) -> bool:
 
 def _usable(run: Run, machine: MachineFile, notes: list[str]) -> Run:
     log = _cleaned(run, notes)
+    machine = machine.with_tool(tool_of(log, machine))
     if is_of_forces_alone(log, machine.axes):
         turned = turn_run(run, log, machine, notes)
         if turned is not None or not log.axes():

@@ -29,12 +29,14 @@ def with_constants(machine: MachineFile, stage: Stage, found: Fitted) -> Machine
         axis = identified_axis(machine.axes[stage.letter], parameters, theta)
         return machine.model_copy(update={"axes": dict(machine.axes) | {stage.letter: axis}})
     for free, value in zip(found.model.constants, theta, strict=True):
-        section, _, key = free.name.partition(".")
-        table = getattr(machine, section)
+        section, _, key = free.name.rpartition(".")
+        section, _, tool = section.partition(".")
+        table = machine.tools[tool] if tool else getattr(machine, section)
         changed = getattr(table, key) * float(np.exp(value))
         if key == "efficiency":
             changed = min(changed, 1.0)
-        machine = machine.model_copy(update={section: table.model_copy(update={key: changed})})
+        refitted = table.model_copy(update={key: changed})
+        machine = machine.model_copy(update={section: dict(machine.tools) | {tool: refitted} if tool else refitted})
     return machine
 
 

@@ -24,6 +24,7 @@ from twin.gap.naming.certain import certain_of, dropped, only
 from twin.gap.naming.instead import instead_of_constants
 from twin.gap.naming.moved import has_to_be_beyond
 from twin.gap.naming.siblings import only_completes
+from twin.gap.naming.stops import stops_are_at_odds
 from twin.gap.null import NULL, Null
 from twin.gap.screening import Guess, guesses, sensitivities
 from twin.gap.stages.stage import Model, Stage
@@ -63,6 +64,7 @@ class Explained:
     rivals: effect → what cannot be told from it; evidence: effect → its advantage over the same without it
     beyond: constants of the base have to be further from what is stated than two deviations, and no effect puts them back
     alike: what the remainder partly looks like: effects that were accepted and are not certain (`twin.gap.naming.certain`)
+    stops: the axis comes to rest with another torque than the twin's, and no effect was accepted
     """
 
     stage: Stage
@@ -73,6 +75,7 @@ class Explained:
     evidence: dict[Effected, Advantage]
     beyond: bool = False
     alike: tuple[Effected, ...] = ()
+    stops: bool = False
 
 
 def explain(
@@ -113,15 +116,16 @@ def explain(
         if len(best.effects) > 1:
             best = _swapped(stage, best, first)
     beyond = not best.effects and has_to_be_beyond(stage, base)
-    if beyond and (instead := instead_of_constants(stage, base, [t.found for t in first if t.found is not None])):
+    if beyond and (instead := instead_of_constants(stage, base)):
         best, beyond = instead[0], False
         rivals[best.effects[0]] = tuple(other.effects[0] for other in instead[1:])
     best, alike = (best, ()) if doubtful else with_certain(stage, base, best, null)
     several = len(best.effects) > 1
     evidence = {e: advantage(dropped(stage, best, e).left if several else base.left, best.left) for e in best.effects}
+    stops = not best.effects and stops_are_at_odds(stage, base)
     # what was found beside an effect is no rival of it
     others = {e: tuple(r for r in rivals[e] if r not in best.effects) for e in best.effects if e in rivals}
-    return Explained(stage, base, best, first, others, evidence, beyond, alike)
+    return Explained(stage, base, best, first, others, evidence, beyond, alike, stops)
 
 
 def with_certain(stage: Stage, base: Fitted, best: Fitted, null: Null = NULL) -> tuple[Fitted, tuple[Effected, ...]]:

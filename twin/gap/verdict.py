@@ -22,7 +22,7 @@ class Judged:
 def judged(explained: Explained) -> Judged:
     """The verdict on one stage."""
     likeness = explained.alike
-    if leaves_a_gap(explained.stage, explained.best):
+    if explained.stops or leaves_a_gap(explained.stage, explained.best):
         return Judged(explained, Verdict.PARTLY if explained.best.effects else Verdict.UNKNOWN, likeness)
     if explained.best.effects or explained.beyond:
         return Judged(explained, Verdict.EXPLAINED, likeness)

@@ -81,7 +81,8 @@ def constant_words(path: str) -> str:
     """
     keys = path.split(".")
     words = CONSTANT_WORDS.get(keys[-1], f"{keys[-1].replace('_', ' ')} in [{'.'.join(keys[:-1])}]")
-    return f"the {words}{f' of {keys[1].upper()}' if keys[0] == 'axes' and len(keys) > 1 else ''}"
+    of = {"axes": keys[1].upper(), "tools": f"tool {keys[1]}"}.get(keys[0], "") if len(keys) > 1 else ""
+    return f"the {words}{f' of {of}' if of else ''}"
 
 
 def group_of(signal: str) -> str:

@@ -45,8 +45,25 @@ def told_of(log: RunLog, machine: MachineFile) -> RunInput:
         coolant_on=column("coolant_on"),
         ambient_temp_c=column("ambient_temp_c"),
         start={a: start_of(log, a, machine.axes[a], period_s) for a in letters if a in machine.axes},
+        tool=tool_of(log, machine),
         start_temp_c=start_temperature_c(log.t_s, log["spindle_temp_c"]) if log.has("spindle_temp_c") else None,
     )
+
+
+def tool_of(log: RunLog, machine: MachineFile) -> str:
+    """The number of the tool that is in the spindle while a run cuts, of those that the machine describes; empty for [tool].
+
+    Empty as well where a run cuts with several, or does not say with which of several.
+    """
+    if not machine.tools:
+        return ""
+    if not log.has("tool_number"):
+        return next(iter(machine.tools)) if len(machine.tools) == 1 else ""
+    number = log["tool_number"]
+    cutting = np.nan_to_num(log.columns.get("axial_depth_mm", np.zeros(len(log)))) > 0.0
+    there = np.isfinite(number)
+    used = {str(int(n)) for n in np.unique(number[there & cutting if (there & cutting).any() else there])}
+    return used.pop() if len(used) == 1 and used <= set(machine.tools) else ""
 
 
 def start_of(log: RunLog, letter: str, axis: Axis, period_s: float) -> Mapping[str, float]:

@@ -60,6 +60,7 @@ class RunInput:
     spindle_rpm, spindle_angle_rad, axial_depth_mm, entry_angle_rad, exit_angle_rad: of the cut; None = nothing is cut
     coolant_on, ambient_temp_c: of the heat; None = never on, not known
     start: axis letter → the state of the axis at the first tick (`twin.servo.run`); start_temp_c: of the spindle
+    tool: number of the one in the spindle, where the machine describes several; empty = [tool]
     """
 
     t_s: Floats
@@ -73,6 +74,7 @@ class RunInput:
     ambient_temp_c: Floats | None = None
     start: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     start_temp_c: float | None = None
+    tool: str = ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,6 +104,7 @@ def respond(
     Raises EffectError where the machine's effects do not fit it.
     """
     check_effects(machine)
+    machine = machine.with_tool(told.tool)
     chain = _Chain(machine, told, recorded or {}, reference_run)
     force = chain.process()
     temperature_c = chain.heat()

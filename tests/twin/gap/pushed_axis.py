@@ -42,20 +42,20 @@ def lap_mm() -> Floats:
     return np.convolve(np.pad(place, 40, mode="edge"), np.hanning(81) / np.hanning(81).sum(), "valid")
 
 
-def pushes_n(laps: int, pushed: tuple[int, ...], seed: int) -> Floats:
-    """A force on the axis of 20 to 60 N, six times in each lap that is pushed, (laps · LAP,)."""
+def pushes_n(laps: int, pushed: tuple[int, ...], seed: int, times: int) -> Floats:
+    """A force on the axis of 20 to 60 N, some times in each lap that is pushed, (laps · LAP,)."""
     chance = np.random.default_rng([seed, 5])
     force = np.zeros(laps * LAP)
     for lap in pushed:
-        for at in chance.choice(np.arange(2, LAP // 100 - 2), 6, replace=False):
+        for at in chance.choice(np.arange(2, LAP // 100 - 2), times, replace=False):
             begin = lap * LAP + 100 * int(at) + int(chance.integers(100))
             force[begin : begin + PUSH] += chance.choice([-1.0, 1.0]) * chance.uniform(20.0, 60.0)
     return force
 
 
-def recorded(laps: int, pushed: tuple[int, ...] = (), seed: int = 1) -> RunLog:
+def recorded(laps: int, pushed: tuple[int, ...] = (), seed: int = 1, times: int = 6) -> RunLog:
     """The axis over so many laps, pushed in some of them, with a disturbance of its own and the noise of its sensors."""
-    force = Disturbance(0.4, 0.03).courses(1, laps * LAP, 0.001, [seed, 3]) + pushes_n(laps, pushed, seed)
+    force = Disturbance(0.4, 0.03).courses(1, laps * LAP, 0.001, [seed, 3]) + pushes_n(laps, pushed, seed, times)
     reference = np.tile(lap_mm(), laps)
     run = run_axes(
         {name: np.array([value]) for name, value in axis_constants(MACHINE.axes["x"]).items()},

@@ -47,10 +47,10 @@ def test_laps_of_a_run_are_repeats() -> None:
     assert {signal for signal, _ in repeatability([run], [], MACHINE).repeated} == {"z_pos_mm", "z_torque_a", "z_table_mm"}
 
 
-def laps(log: RunLog) -> Floors:
-    """The floors of one run."""
-    (run,) = case_of(pushed_axis.MACHINE, {"fit": {"t_s": log.t_s} | dict(log.columns)}).runs
-    return repeatability([run], [], pushed_axis.MACHINE)
+def laps(*logs: RunLog) -> Floors:
+    """The floors of runs that go through their laps."""
+    runs = case_of(pushed_axis.MACHINE, {f"run {i}": {"t_s": log.t_s} | dict(log.columns) for i, log in enumerate(logs)}).runs
+    return repeatability(runs, [], pushed_axis.MACHINE)
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -62,6 +62,13 @@ def test_pushes_in_one_lap_of_several_are_gap_and_not_floor(signal: str, seed: i
     in_floors = (pushed[signal] - free[signal]) / laps(pushed).of(pushed, signal)
     assert np.sqrt(np.mean(in_floors**2)) > 5.0
     assert any("laps differ by far more than elsewhere" in note for note in laps(pushed).notes)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 5, 6])
+def test_pushes_in_all_laps_of_two_runs_are_in_no_regimes_floor(seed: int) -> None:
+    runs = [[pushed_axis.recorded(2, of, one, times=2) for one in (seed, seed + 50)] for of in ((0, 1), ())]
+    pushed, free = (laps(*logs).repeated for logs in runs)
+    assert max(pushed[key] / free[key] for key in free) < 1.6
 
 
 def test_an_axis_that_repeats_badly_throughout_has_the_floor_of_that() -> None:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from tests.twin.gap.one_line import BIAS, SAMPLES, SCALE, OneLine
+from twin.gap.diagnosis import Effected
 from twin.gap.fitting import fitted
 from twin.gap.screening import guesses, sensitivities
 from twin.gap.stages.stage import Model
@@ -26,6 +27,21 @@ def test_the_signature_of_the_effect_closes_most_and_says_where_to_start() -> No
     found = screened(OneLine(bias=2.0))
     assert found[BIAS][0] > 0.9 > found[SCALE][0]
     assert found[BIAS][1] == pytest.approx(2.0, abs=0.3)
+
+
+class Suggesting(OneLine):
+    """A line whose recordings suggest a bias twenty times too large."""
+
+    def first_guesses(self, candidate: Effected) -> tuple[dict[str, float], ...]:
+        """A bias of 40."""
+        return ({"bias": 40.0},) if candidate == BIAS else ()
+
+
+def test_a_suggested_size_that_is_far_too_large_hides_no_effect() -> None:
+    closes, start = screened(Suggesting(bias=2.0))[BIAS]
+    assert closes > 0.9
+    assert start == pytest.approx(40.0)
+    assert screened(Suggesting(bias=-2.0))[BIAS][0] == 0.0, "the other way round it does not help"
 
 
 def test_what_the_constants_can_do_is_no_merit_of_a_candidate() -> None:

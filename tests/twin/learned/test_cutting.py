@@ -1,10 +1,14 @@
 """Learned terms of the cut, the spindle and its heat in a simulation, and in the stages that are judged on recordings."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from tests.twin.gap.small_case import HOT, warm_case
 from tests.twin.simulator.test_simulation import MACHINE, SLOT
+from twin.case import RunAtHand, RunEntry
+from twin.gap.floors import repeatability
 from twin.gap.stages.plan import ground_of
 from twin.gap.stages.shown import shown
 from twin.learned.section import LearnedSection
@@ -107,3 +111,19 @@ def test_a_power_over_the_load_is_over_the_load_without_it(bare: dict[str, np.nd
     """1 kW for each 100 %: the load of 11 kW is 1/11 more than it was, and no more for that."""
     shown = run(term("spindle_power", "load_pct", [0.0, 100.0], [0.0, 1.0]))
     np.testing.assert_allclose(shown["spindle_load_pct"], bare["spindle_load_pct"] * (1.0 + 1.0 / 11.0), rtol=1e-9)
+
+
+def test_a_learned_power_is_shown_beside_a_recording_as_it_is_simulated() -> None:
+    learned = (
+        term("spindle_power", "load_pct", [0.0, 4.0, 8.0], [0.0, 0.2, 0.1]),
+        term("cut_force", "x_position_mm", [0.0, 30.0], [0.0, 400.0]),
+    )
+    real = QUIET.model_copy(update={"learned": learned})
+    run = simulate(real, SLOT).run
+    entry = RunEntry.model_validate({"file": "cut", "kind": "cut", "role": "fit"})
+    at_hand = RunAtHand(entry, Path(), run)
+    found = shown(real, at_hand, repeatability((), (), real))
+    for signal in ("spindle_load_pct", "force_x_n", "force_y_n"):
+        compared = np.isfinite(found[signal])
+        assert compared.any()
+        np.testing.assert_allclose(found[signal][compared], run[signal][compared], atol=1e-6, err_msg=signal)

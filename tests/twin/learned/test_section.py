@@ -38,6 +38,19 @@ def test_an_entry_of_a_diagnosis_is_kept_as_it_is() -> None:
     assert machine_from_toml(machine_to_toml(machine)) == machine
 
 
+@given(sentence=st.text(max_size=20))
+def test_any_sentence_and_run_name_comes_back_from_a_file(sentence: str) -> None:
+    table = {"t_s": [0.0, 1e-7], "run": [f"runs/{sentence}", "b"], "value": [0.0, -1e22]}
+    section = LearnedSection.model_validate({"site": "axis_force", "on": "x", "table": table, "sentence": sentence})
+    machine = machine_from_toml("[machine]\nname = 'a'").model_copy(update={"learned": (section,)})
+    assert machine_from_toml(machine_to_toml(machine)) == machine
+
+
+def test_a_table_is_written_in_one_line() -> None:
+    text = machine_to_toml(machine_from_toml(HEAD + FORCE + TABLE))
+    assert "table = { position_mm = [2.5, 0.0], value = [43.0, 1.2], low = [40.1, -0.5], high = [45.9, 2.9] }\n" in text
+
+
 @given(values=st.lists(NUMBERS, min_size=6, max_size=6), row=st.permutations(range(6)))
 def test_a_table_over_two_arguments_comes_back_from_a_file(values: list[float], row: list[int]) -> None:
     at = [(position, side) for position in (0.0, 2.5, 7.0) for side in (-1.0, 1.0)]

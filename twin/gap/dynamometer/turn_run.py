@@ -97,6 +97,9 @@ def _as_turns(
         _stretch(number, log.t_s[s[m.at]], cut, m, signals)
         for number, (s, cut, m) in enumerate(zip(samples, cuts, means, strict=True))
     ]
+    if log.has("tool_number"):
+        number = float(log["tool_number"][np.isfinite(log["tool_number"])][0])
+        parts = [part | {"tool_number": np.full(len(part["t_s"]), number)} for part in parts]
     notes += _said(run, log, signals, cutting, [f.off for f in found], has_angle and not fits, offset)
     points, highest = means[0].force.shape[2], min(mean.highest for mean in means)
     columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}

@@ -18,13 +18,14 @@ from twin.gap.learned.wording import sentence
 from twin.gap.null import NULL, Null
 from twin.gap.refitted import with_constants
 from twin.gap.score import Squares
-from twin.gap.search import CHANCE_BLOCKS, Explained
+from twin.gap.search import Explained, leaves_a_gap
 from twin.gap.stages.free_term import FreeTerm
 from twin.gap.stages.stage import Stage
 from twin.gap.verdict import Judged
 from twin.gap.wording import percent
 from twin.learned.section import LearnedSection, Likeness
 from twin.learned.sites import unit_at
+from twin.learned.summed import summed
 from twin.learned.term import Term
 from twin.machine import MachineFile
 
@@ -71,7 +72,7 @@ def with_learned(machine: MachineFile, described: Sequence[Described]) -> Machin
     for one in described:
         machine = with_constants(machine, one.stage, one.found)
         sections += [_section(term) for term in one.learned]
-    return machine.model_copy(update={"learned": (*machine.learned, *sections)})
+    return machine.model_copy(update={"learned": summed((*machine.learned, *sections))})
 
 
 def _described(explained: Explained, likeness: Sequence[Effected], null: Null) -> Described | None:
@@ -79,7 +80,7 @@ def _described(explained: Explained, likeness: Sequence[Effected], null: Null) -
     stage, parent = explained.stage, explained.best
     learned: list[Learned] = []
     for _ in range(TERMS_MAX):
-        if not _something_left(stage, parent):
+        if learned and not leaves_a_gap(stage, parent):
             break
         shapes = free_form(stage, parent, null=null)
         if not shapes:
@@ -91,10 +92,6 @@ def _described(explained: Explained, likeness: Sequence[Effected], null: Null) -
         learned.append(one)
         parent = best.found
     return Described(stage, parent, tuple(learned)) if learned else None
-
-
-def _something_left(stage: Stage, parent: Fitted) -> bool:
-    return bool((parent.left.rms_but_worst(CHANCE_BLOCKS) > stage.healthy_rms).any())
 
 
 def _learned(explained: Explained, parent: Fitted, best: Shaped, likeness: Sequence[Effected]) -> Learned:

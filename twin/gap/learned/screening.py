@@ -173,7 +173,8 @@ def _solved(upper: Floats, right: Floats) -> Floats:
 def _averaged(values: Floats, count: int) -> Floats:
     """Sums of `count` neighbours over √count, (lanes, m); a sample that is not there is 0."""
     whole = values.shape[1] // count * count
-    return np.asarray(np.nan_to_num(values[:, :whole]).reshape(len(values), whole // count, count).sum(axis=2) / np.sqrt(count))
+    known = np.nan_to_num(values[:, :whole]).reshape(len(values), whole // count, count)
+    return np.asarray(known.sum(axis=2) / np.sqrt(count))
 
 
 def _slopes(stage: Learnable, parent: Fitted, run: int) -> Floats:

@@ -5,15 +5,14 @@ clearly the cheaper: Σ (θ / σ)² of the constants falls by more than chance a
 what one constant does (a coefficient, a mass) is no better an explanation than that constant.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from twin.effects.catalogue import effect_named
 from twin.gap.evidence import advantage
 from twin.gap.fitting import Fitted, fitted
 from twin.gap.naming.moved import cost, deviations
-from twin.gap.stages.stage import Stage
+from twin.gap.screening import guesses, sensitivities
+from twin.gap.stages.stage import Model, Stage
 
 TRIED = 4
 CHEAPER = 9.0
@@ -24,23 +23,21 @@ AS_WELL = 0.02
 STEPS_MAX = 14
 
 
-def instead_of_constants(stage: Stage, base: Fitted, tried: Sequence[Fitted]) -> tuple[Fitted, ...]:
-    """Return the machine with one effect, cheapest first; empty where none explains better than the constants.
+def instead_of_constants(stage: Stage, base: Fitted) -> tuple[Fitted, ...]:
+    """Return the machine with one effect, cheapest first; empty where none explains better than the constants of `base`.
 
-    tried: the machine with each effect that was fitted
+    Effects are screened and started on the machine as it is stated: the constants of `base` have taken up what they would show.
     """
-    near = sorted((f for f in tried if len(f.effects) == 1), key=lambda f: f.left_fit.excess() + 0.5 * cost(f))[:TRIED]
-    again = [_from_stated(stage, one) for one in near]
+    stated = fitted(stage, Model((), ()), np.zeros(0))
+    slopes = sensitivities(stage, stated)
+    likely = sorted((guesses(stage, stated, c, slopes)[0] for c in stage.candidates), key=lambda guess: -guess.closes)[:TRIED]
+    scale = np.maximum(base.left_fit.rms(), 1.0)
+    at_first = np.zeros(len(base.model.constants))
+    again = []
+    for guess in likely:
+        model = base.model.with_effect(guess.effected)
+        again.append(fitted(stage, model, np.concatenate([at_first, guess.theta]), scale=scale, steps_max=STEPS_MAX))
     return tuple(sorted((one for one in again if _is_better(one, base)), key=cost))
-
-
-def _from_stated(stage: Stage, one: Fitted) -> Fitted:
-    """The same fitted anew, its constants as stated at the start."""
-    theta = one.theta.copy()
-    theta[: len(one.model.constants)] = 0.0
-    scale = np.maximum(one.left_fit.rms(), 1.0)
-    other = fitted(stage, one.model, theta, scale=scale, steps_max=STEPS_MAX)
-    return other if other.left_fit.excess() + 0.5 * cost(other) < one.left_fit.excess() + 0.5 * cost(one) else one
 
 
 def _is_better(one: Fitted, base: Fitted) -> bool:

@@ -45,6 +45,9 @@ def _begun(told: Diagnosis, stages: Sequence[Judged]) -> str:
         )
     looks = ", ".join(str(e) for s in stages for e in s.likeness)
     partly = f"; it partly looks like {looks}, which does not explain it" if looks else ""
+    partly += "".join(
+        f"; {s.explained.stage.name} comes to rest with another torque than the twin's" for s in unknown if s.explained.stops
+    )
     return f"Unknown: a gap of {told.gap.before:.3g} × the floor in {where} that no effect of the catalogue explains{partly}"
 
 
@@ -101,10 +104,10 @@ def _clearness(interval: Interval, null: float | None) -> float:
 
 def _in_words(effect: str, on: str) -> str:
     """
-    >>> _in_words("direction_friction", "x"), _in_words("sensor_bias", "z_torque_a")
-    ('direction friction on X', 'sensor bias on z_torque_a')
+    >>> _in_words("direction_friction", "x"), _in_words("sensor_bias", "z_torque_a"), _in_words("runout", "3")
+    ('direction friction on X', 'sensor bias on z_torque_a', 'runout on tool 3')
     """
-    where = on.upper() if len(on) == 1 else on
+    where = f"tool {on}" if on.isdigit() else on.upper() if len(on) == 1 else on
     return f"{effect.replace('_', ' ')}{f' on {where}' if on else ''}"
 
 

@@ -37,6 +37,7 @@ Floats = NDArray[np.float64]
 BLOCK_S = 0.25
 FORCES = ("force_x_n", "force_y_n")
 LOAD = "spindle_load_pct"
+MATERIAL = ("tangential_coefficient_n_per_mm2", "radial_ratio")
 TERM_PART, TERM_FLOORS = 0.05, 3.0
 
 
@@ -63,6 +64,7 @@ class CutStage:
     runs: tuple[CutRun, ...]
     floors: Floors
     left_out: frozenset[str] = frozenset()
+    tool: str = ""
     name: str = "cut and spindle"
     averaged: int = 1
     healthy_rms: float = 1.3
@@ -88,11 +90,12 @@ class CutStage:
         stated = self.machine.uncertainty
         relative = stated.get("relative", 0.05)
         cuts = self.machine.tool is not None and any(run.milling for run in self.runs)
-        names = ["tool.tangential_coefficient_n_per_mm2", "tool.radial_ratio"] if cuts else []
+        names = [self._of_tool(name) for name in MATERIAL] if cuts else []
         if self.machine.spindle is not None and any(LOAD in o.signals for o in self.observed):
             names += ["spindle.efficiency"] if cuts else []
             names += ["spindle.idle_power_kw"] if self.machine.spindle.idle_power_kw > 0.0 else []
-        free = [constant(name, stated.get(name, relative)) for name in names]
+        sigma = [stated.get(name.replace(f"tools.{self.tool}.", "tool."), relative) for name in names]
+        free = [constant(name, one) for name, one in zip(names, sigma, strict=True)]
         return tuple(p for p in free if p.sigma > 0.0)
 
     @property
@@ -100,12 +103,17 @@ class CutStage:
         """Effects that forces and load can show."""
         signals = {s for o in self.observed for s in o.signals}
         there = self.left_out | set(self.standing)
-        here = acting(process_quantities()) + acting(spindle_quantities())
-        found = [Effected(e.name) for e in here if e.name not in there and set(e.shows_in) & signals]
+        here = [Effected(e.name, self.tool) for e in acting(process_quantities())]
+        here += [Effected(e.name) for e in acting(spindle_quantities())]
+        found = [e for e in here if e.effect not in there and set(effect_named(e.effect).shows_in) & signals]
         for effect in catalogue().values():
             if effect.on is On.SIGNAL and effect.name not in self.left_out:
                 found += [Effected(effect.name, signal) for signal in sorted(signals)]
         return tuple(dict.fromkeys(found))
+
+    def _of_tool(self, name: str) -> str:
+        """The path of a constant of the tool."""
+        return f"tools.{self.tool}.{name}" if self.tool else f"tool.{name}"
 
     def first_guesses(self, candidate: Effected) -> Guesses:
         """Return the effect's own guesses."""
@@ -204,7 +212,7 @@ class CutStage:
         factors = model.factors(theta)
         one = np.ones(len(theta))
         constants: dict[str, ArrayLike] = {
-            name: value * factors.get(f"tool.{name}", one) for name, value in tool_constants(self.machine.tool).items()
+            name: value * factors.get(self._of_tool(name), one) for name, value in tool_constants(self.machine.tool).items()
         }
         effects = acting(process_quantities())
         constants |= model.effect_constants(theta, effects, self.standing)
@@ -228,16 +236,14 @@ class CutStage:
         }
         effects = acting(spindle_quantities())
         constants |= model.effect_constants(theta, effects, self.standing)
-        known = added_series(self.terms, self._arguments(data)) if self.terms else {}
-        added = with_quantity_terms(known, model, theta, lambda: self._told(data))
-        return spindle_load_pct(
-            constants,
-            power_w,
-            data.log["spindle_rpm"],
-            period_s=period_s,
-            effects=tuple(e.name for e in effects),
-            added_kw=added.get("electrical_power_kw"),
-        )
+        named = tuple(e.name for e in effects)
+
+        def load(added_kw: Floats | None) -> Floats:
+            rpm = data.log["spindle_rpm"]
+            return spindle_load_pct(constants, power_w, rpm, period_s=period_s, effects=named, added_kw=added_kw)
+
+        known = added_series(self.terms, self._arguments(data) | {"load_pct": load(None)[0]}) if self.terms else {}
+        return load(with_quantity_terms(known, model, theta, lambda: self._told(data)).get("electrical_power_kw"))
 
 
 def cut_runs(machine: MachineFile, runs: tuple[Run, ...]) -> tuple[CutRun, ...]:

@@ -27,6 +27,7 @@ from twin.learned.standing import axis_terms
 from twin.machine import MachineFile
 from twin.runlog import RunLog
 from twin.servo.disturbance import Disturbance
+from twin.simulator.recorded import tool_of
 from twin.simulator.response import disturbance_of
 from twin.sites import Site
 
@@ -83,16 +84,19 @@ def explained_stages(ground: Ground, progress: Progress, side_by_side: SideBySid
     """Each stage explained: cut and spindle first, since its force pushes the axes; then axes and heat, side by side."""
     found: list[Explained] = []
     forces: dict[str, dict[str, Floats]] = {}
-    cuts = cut_runs(ground.machine, ground.runs)
-    if any(run.fitted for run in cuts):
-        stage = CutStage(ground.machine, cuts, ground.floors, ground.left_out)
-        if stage.candidates:
-            found.append(explain(stage, null=null, progress=progress))
-            forces = _pushes(stage, found[0])
-    turning = turn_data(ground.runs)
-    if any(run.fitted for run in turning):
-        turns = TurnStage(ground.machine, turning, ground.left_out)
-        found.append(only_specific(turns, explain(turns, null=null, progress=progress, doubtful=True)))
+    for tool in dict.fromkeys(tool_of(run.log, ground.machine) for run in ground.runs):
+        machine = ground.machine.with_tool(tool)
+        runs = tuple(run for run in ground.runs if tool_of(run.log, ground.machine) == tool)
+        cuts = cut_runs(machine, runs)
+        if any(run.fitted for run in cuts):
+            stage = CutStage(machine, cuts, ground.floors, ground.left_out, tool)
+            if stage.candidates:
+                found.append(explain(stage, null=null, progress=progress))
+                forces |= _pushes(stage, found[-1])
+        turning = turn_data(runs)
+        if any(run.fitted for run in turning):
+            turns = TurnStage(machine, turning, ground.left_out, tool)
+            found.append(only_specific(turns, explain(turns, null=null, progress=progress, doubtful=True)))
     stages: list[Stage] = [s for letter in ground.machine.axes if (s := axis_stage(ground, letter, forces)) is not None]
     warmups = heat_runs(ground.machine, tuple(r for r in ground.runs if not r.log.axes()))
     if any(run.fitted for run in warmups):

@@ -25,6 +25,7 @@ from twin.gap.stages.stage import Model
 from twin.gap.stages.turns import TurnStage, turn_data
 from twin.learned.standing import axis_terms
 from twin.machine import MachineFile
+from twin.simulator.recorded import tool_of
 from twin.simulator.response import disturbance_of
 from twin.sites import Site
 
@@ -40,8 +41,9 @@ def shown(machine: MachineFile, run: Run, floors: Floors) -> dict[str, Floats]:
     check_effects(machine)
     columns: dict[str, Floats] = {}
     pushes: dict[str, Floats] = {}
-    for cut in cut_runs(machine, (run,)):
-        stage = CutStage(machine, (cut,), floors)
+    with_tool = machine.with_tool(tool_of(run.log, machine))
+    for cut in cut_runs(with_tool, (run,)):
+        stage = CutStage(with_tool, (cut,), floors)
         observed = stage.observed[0]
         model, theta = _sensing(machine, set(observed.signals).__contains__)
         predicted = np.where(np.isfinite(observed.measured), stage.predict(model, theta, 0)[0], np.nan)
@@ -50,7 +52,7 @@ def shown(machine: MachineFile, run: Run, floors: Floors) -> dict[str, Floats]:
         if force is not None:
             pushes = {"x": -np.asarray(force.mean_force_x_n)[0], "y": -np.asarray(force.mean_force_y_n)[0]}
     for data in turn_data((run,)):
-        turned = TurnStage(machine, (data,))
+        turned = TurnStage(with_tool, (data,))
         columns |= turned.shown(*_sensing(machine, set(data.signals).__contains__), 0)
     for letter in machine.axes:
         columns |= _axis(machine, run, floors, letter, pushes.get(letter))

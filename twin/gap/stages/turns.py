@@ -26,7 +26,7 @@ from twin.gap.dynamometer.mean_turn import Engagement, best_phase, fine_turn, or
 from twin.gap.dynamometer.turn_floor import turn_floor
 from twin.gap.dynamometer.turn_run import TurnRun
 from twin.gap.labels import regime_labels
-from twin.gap.stages.cut import acting
+from twin.gap.stages.cut import MATERIAL, acting
 from twin.gap.stages.free import Free, constant
 from twin.gap.stages.observed_through import Sensing
 from twin.gap.stages.stage import Model, Observed, observed_of
@@ -102,6 +102,7 @@ class TurnStage:
     machine: MachineFile
     runs: tuple[TurnData, ...]
     left_out: frozenset[str] = frozenset()
+    tool: str = ""
     name: str = "cut"
     averaged: int = 1
     healthy_rms: float = 1.5
@@ -124,8 +125,7 @@ class TurnStage:
     def constants(self) -> tuple[Free, ...]:
         """K_t and K_e."""
         stated = self.machine.uncertainty
-        names = ("tool.tangential_coefficient_n_per_mm2", "tool.radial_ratio")
-        free = [constant(name, stated.get(name, stated.get("relative", 0.05))) for name in names]
+        free = [constant(self._of_tool(n), stated.get(f"tool.{n}", stated.get("relative", 0.05))) for n in MATERIAL]
         return tuple(p for p in free if p.sigma > 0.0)
 
     @property
@@ -133,11 +133,16 @@ class TurnStage:
         """Effects that forces can show."""
         signals = {signal for run in self.runs for signal in run.signals}
         there = self.left_out | set(self.standing)
-        found = [Effected(e.name) for e in acting(process_quantities()) if e.name not in there and set(e.shows_in) & signals]
+        here = [e for e in acting(process_quantities()) if e.name not in there and set(e.shows_in) & signals]
+        found = [Effected(e.name, self.tool) for e in here]
         for effect in catalogue().values():
             if effect.on is On.SIGNAL and effect.name not in self.left_out:
                 found += [Effected(effect.name, signal) for signal in sorted(signals)]
         return tuple(dict.fromkeys(found))
+
+    def _of_tool(self, name: str) -> str:
+        """The path of a constant of the tool."""
+        return f"tools.{self.tool}.{name}" if self.tool else f"tool.{name}"
 
     def first_guesses(self, candidate: Effected) -> Guesses:
         """Return the effect's own guesses."""
@@ -222,7 +227,7 @@ class TurnStage:
         assert self.machine.tool is not None
         factors, one = model.factors(theta), np.ones(len(theta))
         constants: dict[str, ArrayLike] = {
-            name: value * factors.get(f"tool.{name}", one) for name, value in tool_constants(self.machine.tool).items()
+            name: value * factors.get(self._of_tool(name), one) for name, value in tool_constants(self.machine.tool).items()
         }
         return constants | model.effect_constants(theta, acting(process_quantities()), self.standing)
 
