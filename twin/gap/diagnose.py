@@ -23,7 +23,8 @@ from twin.gap.naming.constants import moved_constants
 from twin.gap.naming.own_units import in_own_units
 from twin.gap.naming.sentence import sentence_of
 from twin.gap.null import NULL, Null
-from twin.gap.opened import combined
+from twin.gap.parts.opened import combined
+from twin.gap.parts.subsystems import subsystems_of
 from twin.gap.patterns import patterns
 from twin.gap.programs.diagnose import diagnose_programs
 from twin.gap.refitted import constant_deviations, with_constants, with_effects, with_uncertainty
@@ -31,7 +32,6 @@ from twin.gap.score import Squares, gap_of, squares_of, traces_of, unit_of
 from twin.gap.shares import shapley
 from twin.gap.stages.plan import Ground, SideBySide, explained_stages, ground_of
 from twin.gap.stages.shown import shown_by_run
-from twin.gap.subsystems import subsystems_of
 from twin.gap.verdict import Judged, judged, overall
 from twin.gap.where import where
 from twin.machine import MachineFile

@@ -4,7 +4,7 @@ A term is a description, not a cause. Its closure is of what is left beside the 
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,25 +82,33 @@ def with_learned(machine: MachineFile, described: Sequence[Described]) -> Machin
 
 
 def _described(explained: Explained, likeness: Sequence[Effected], null: Null) -> Described | None:
-    """The terms of one stage, the next on top of the last."""
+    """The terms of one stage, the next on top of the last; each as the hypothesis with all of them has it."""
     stage, parent = explained.stage, explained.best
-    learned: list[Learned] = []
+    found: list[tuple[Shaped, tuple[float, float, float]]] = []
     for _ in range(TERMS_MAX):
-        if learned and not leaves_a_gap(stage, parent):
+        if found and not leaves_a_gap(stage, parent):
             break
         shapes = free_form(stage, parent, null=null)
         if not shapes:
             break
         best = refined(stage, shapes[0], parent)
-        one = _learned(explained, parent, best, likeness)
-        if one.closure < CLOSES_LEAST:
+        closures = _closures(explained, parent, best.found)
+        if closures[0] < CLOSES_LEAST:
             break
-        learned.append(one)
+        found.append((best, closures))
         parent = best.found
+    learned = [_learned(explained, replace(one, found=parent), closures, likeness) for one, closures in found]
     if not learned and leaves_a_gap(stage, parent) and isinstance(stage, Learnable):
         over_time = _over_time(stage, parent)
         learned += [over_time] if over_time is not None else []
     return Described(stage, parent, tuple(learned)) if learned else None
+
+
+def _closures(explained: Explained, parent: Fitted, found: Fitted) -> tuple[float, float, float]:
+    """Closure of a term on top of the terms before it, with its interval."""
+    known, closes = (closure_interval(_squares(explained.best.left), _squares(f.left)) for f in (parent, found))
+    closure, low, high = (max(whole - known[0], 0.0) for whole in closes)
+    return closure, low, high
 
 
 def _over_time(stage: Learnable, parent: Fitted) -> Learned | None:
@@ -156,10 +164,9 @@ def _squares_of_runs(stage: Learnable, parts: Sequence[tuple[int, Floats]]) -> d
     return {signal: Squares(squares, counts, counts) for signal, (squares, counts) in joined.items()}
 
 
-def _learned(explained: Explained, parent: Fitted, best: Shaped, likeness: Sequence[Effected]) -> Learned:
+def _learned(explained: Explained, best: Shaped, closures: tuple[float, float, float], likeness: Sequence[Effected]) -> Learned:
     term = fitted_term(best.term, best.found)
-    known, closes = (closure_interval(_squares(explained.best.left), _squares(f.left)) for f in (parent, best.found))
-    closure, low, high = (max(whole - known[0], 0.0) for whole in closes)  # on top of the terms before
+    closure, low, high = closures
     repeats = _repeats(explained.stage, best)
     return Learned(
         site=term.site.value,

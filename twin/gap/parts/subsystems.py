@@ -6,7 +6,7 @@ import numpy as np
 
 from twin.gap.diagnosis import Subsystem, Verdict
 from twin.gap.fitting import Left
-from twin.gap.opened import Opened
+from twin.gap.parts.opened import Opened
 from twin.gap.search import CHANCE_BLOCKS
 from twin.gap.stages.axis import AxisStage
 from twin.gap.stages.open_loop.stage import OpenStage
