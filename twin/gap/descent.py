@@ -9,6 +9,7 @@ held for that step (projected Newton: Bertsekas 1982, SIAM J. Control and Optimi
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,15 +32,42 @@ class Bounds:
     high: Floats
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Minimum:
-    """The end of a descent. known: (p,) part of what is known that comes from the data; evaluations: candidates."""
+    """The end of a descent. here: (n,) residuals there; evaluations: candidates.
+
+    Most minima are only compared by what they leave, so slopes there are worked out where somebody asks how sure θ is.
+    """
 
     theta: Floats
-    covariance: Floats
-    known: Floats
     cost: float
     evaluations: int
+    here: Floats
+    residuals: Residuals
+    bounds: Bounds
+    blocks: NDArray[np.intp]
+    slope_step: float
+
+    @property
+    def covariance(self) -> Floats:
+        """Covariance of θ, (p, p)."""
+        return self._sure[0]
+
+    @property
+    def known(self) -> Floats:
+        """Part of what is known of θ that comes from the data, (p,), 0 to 1."""
+        return self._sure[1]
+
+    @cached_property
+    def _sure(self) -> tuple[Floats, Floats]:
+        slopes = _slopes(self.residuals, self.theta, self.here, self.bounds, self.slope_step)
+        weight = (1.0 + (self.here / OUTLIER) ** 2) ** -0.25
+        prior = np.diag(1.0 / self.bounds.sigma**2)
+        weighted = slopes * weight[:, None]
+        covariance = clustered_covariance(weighted, self.here * weight, self.blocks, prior)
+        information = weighted.T @ weighted + prior
+        variance = np.diag(np.linalg.pinv(information, hermitian=True))
+        return covariance, 1.0 - np.clip(variance / self.bounds.sigma**2, 0.0, 1.0)
 
 
 def descend(
@@ -60,11 +88,8 @@ def descend(
     theta = np.clip(start, bounds.low, bounds.high)
     here = residuals(theta[None, :])[0]
     cost, evaluations = _cost(here, theta, bounds), 1
-    slopes = np.zeros((len(here), len(theta)))
-    stale = True
     for _ in range(steps_max if len(theta) else 0):
         slopes = _slopes(residuals, theta, here, bounds, slope_step)
-        stale = False
         trials = np.stack([_step(slopes, here, theta, bounds, damping) for damping in DAMPINGS])
         shown = residuals(trials)
         evaluations += len(theta) + len(trials)
@@ -73,13 +98,10 @@ def descend(
         gain = cost - costs[best]
         if gain <= 0.0:
             break
-        theta, here, cost, stale = trials[best], shown[best], costs[best], True
+        theta, here, cost = trials[best], shown[best], costs[best]
         if gain < tolerance * (cost + gain):
             break
-    if stale:
-        slopes = _slopes(residuals, theta, here, bounds, slope_step)
-        evaluations += len(theta)
-    return _minimum(theta, here, slopes, bounds, blocks, cost, evaluations)
+    return Minimum(theta, cost, evaluations, np.array(here), residuals, bounds, blocks, slope_step)
 
 
 def _cost(residual: Floats, theta: Floats, bounds: Bounds) -> float:
@@ -119,15 +141,3 @@ def _step(slopes: Floats, here: Floats, theta: Floats, bounds: Bounds, damping: 
         free &= ~out
         theta = np.where(out, theta + held, theta)
     return theta
-
-
-def _minimum(
-    theta: Floats, here: Floats, slopes: Floats, bounds: Bounds, blocks: NDArray[np.intp], cost: float, evaluations: int
-) -> Minimum:
-    weight = (1.0 + (here / OUTLIER) ** 2) ** -0.25
-    prior = np.diag(1.0 / bounds.sigma**2)
-    weighted = slopes * weight[:, None]
-    covariance = clustered_covariance(weighted, here * weight, blocks, prior)
-    information = weighted.T @ weighted + prior
-    variance = np.diag(np.linalg.pinv(information, hermitian=True))
-    return Minimum(theta, covariance, 1.0 - np.clip(variance / bounds.sigma**2, 0.0, 1.0), cost, evaluations)

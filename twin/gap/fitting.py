@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.gap.descent import STEP, Bounds, descend
+from twin.gap.descent import STEP, Bounds, Minimum, descend
 from twin.gap.diagnosis import Effected
 from twin.gap.stages.stage import Model, Observed, Stage
 
@@ -52,14 +52,24 @@ class Left:
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """A hypothesis at its best. known: (p,) part of what is known of θ that comes from the recordings, 0 to 1."""
+    """A hypothesis at its best. minimum: the end of its descent; again: of another one from there, None where there was none."""
 
     model: Model
     theta: Floats
-    covariance: Floats
-    known: Floats
+    minimum: Minimum
     left: Left
     left_fit: Left
+    again: Minimum | None = None
+
+    @property
+    def covariance(self) -> Floats:
+        """Covariance of θ, (p, p)."""
+        return (self.again or self.minimum).covariance
+
+    @property
+    def known(self) -> Floats:
+        """Part of what is known of θ that comes from the recordings, (p,), 0 to 1."""
+        return self.minimum.known
 
     @property
     def effects(self) -> tuple[Effected, ...]:
@@ -134,20 +144,21 @@ def fitted(
     runs = [i for i, o in enumerate(stage.observed) if o.fitted]
     scales = [_scales(stage.observed[i], stage, scale) for i in runs]
     sampled = [_sampled(stage.observed[i]) for i in runs]
+    averaged = stage.averaged
 
     def residuals(theta: Floats) -> Floats:
         parts = []
         for i, widened, there in zip(runs, scales, sampled, strict=True):
             observed = stage.observed[i]
             away = (stage.predict(model, theta, i)[:, there] - observed.measured[there]) / (observed.sigma * widened)[there]
-            parts.append(_averaged(np.nan_to_num(away), stage.averaged))
+            parts.append(_averaged(np.nan_to_num(away), averaged))
         return np.concatenate(parts, axis=1)
 
     free = model.free
     bounds = Bounds(*(np.array([getattr(p, key) for p in free]) for key in ("sigma", "low", "high")))
     first, blocks = 0, []
     for i, there in zip(runs, sampled, strict=True):
-        blocks.append(_kept(stage.observed[i].block[there], stage.averaged) + first)
+        blocks.append(_kept(stage.observed[i].block[there], averaged) + first)
         first = int(blocks[-1].max()) + 1
     found = descend(
         residuals,
@@ -161,8 +172,7 @@ def fitted(
     return Fitted(
         model,
         found.theta,
-        found.covariance,
-        found.known,
+        found,
         left_by(stage, model, found.theta, fitted=False),
         left_by(stage, model, found.theta, fitted=True),
     )
@@ -199,6 +209,6 @@ def settled(stage: Stage, parent: Fitted, rounds: int = 3) -> Fitted:
     for _ in range(rounds):
         again = fitted(stage, parent.model, parent.theta, scale=scale)
         if parent.left_fit.excess() - again.left_fit.excess() < 1e-3:
-            return again if again.left_fit.excess() < parent.left_fit.excess() else replace(parent, covariance=again.covariance)
+            return again if again.left_fit.excess() < parent.left_fit.excess() else replace(parent, again=again.minimum)
         parent, scale = again, np.maximum(again.left_fit.rms(), 1.0)
     return parent

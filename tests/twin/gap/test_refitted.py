@@ -1,13 +1,14 @@
 """What is known of the twin that comes out: intervals of causes and constants as `[uncertainty]`, which nothing stumbles over."""
 
 import math
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 
 from tests.twin.gap.one_line import BIAS, OneLine
 from tests.twin.gap.small_case import HOT, MACHINE
+from twin.gap.descent import Minimum
 from twin.gap.diagnosis import Cause, Diagnosed, Diagnosis, GapNumbers, Interval, Verdict
 from twin.gap.experiment.run import with_constant
 from twin.gap.fitting import fitted
@@ -44,7 +45,12 @@ def test_a_constant_that_the_runs_tell_has_the_width_of_its_covariance_and_one_t
     assert constant_deviations(MACHINE, stage, found) == {
         "slope": pytest.approx(math.sqrt(found.covariance[0, 0]), rel=1e-2)  # three digits
     }
-    assert constant_deviations(MACHINE, stage, replace(found, known=np.array([0.4, 1.0]))) == {}
+    hardly = _HardlyKnown(**{f.name: getattr(found.minimum, f.name) for f in fields(Minimum)})
+    assert constant_deviations(MACHINE, stage, replace(found, minimum=hardly)) == {}
+
+
+class _HardlyKnown(Minimum):
+    known = np.array([0.4, 1.0])  # type: ignore[assignment]
 
 
 def test_the_path_of_a_constant_is_where_the_machine_has_it() -> None:
