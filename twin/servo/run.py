@@ -46,7 +46,7 @@ class AxisInput:
 
     reference_mm: (columns, ticks); disturbance_n: the same shape, or None; recorded: quantity → (columns, ticks), taken from a
     recording in place of what the model makes; added: quantity → (columns, ticks), put on top of what the model makes
-    column: (lanes,) which column a lane follows
+    column: (lanes,) which column a lane follows; what has only one goes to all lanes
     """
 
     reference_mm: Array
@@ -132,24 +132,20 @@ class _Block:
         """Fills the block's lanes of `whole`, (outputs, lanes, ticks), and the room after them; the states at the end."""
         width = _width(len(self.lanes))
         filled = np.concatenate([self.lanes, np.full(width - len(self.lanes), self.lanes[0])])
-        shared = len(set(self.inputs.column[self.lanes].tolist())) == 1
-        recorded, added = tuple(self.inputs.recorded), tuple(self.inputs.added)
-        own = ("reference_mm", "disturbance_n", *(f"recorded__{name}" for name in recorded), *(f"added__{n}" for n in added))
-        series = [self.inputs.reference_mm]
-        series += [] if self.inputs.disturbance_n is None else [self.inputs.disturbance_n]
-        series += [*self.inputs.recorded.values(), *self.inputs.added.values()]
+        column = self.inputs.column[filled]
+        shared = bool((column == column[0]).all())
+        series = self._series()
         kernel = axis_kernel(
             width,
             self.effects,
-            recorded,
-            () if shared else own,
+            tuple(self.inputs.recorded),
+            () if shared else tuple(name for name, values in series.items() if len(values) > 1),
             self.inputs.disturbance_n is not None,
             self.outputs,
             self.measured,
-            added,
+            tuple(self.inputs.added),
         )
-        column = self.inputs.column[filled]
-        fed = [np.ascontiguousarray(s[column[0]] if shared else s[column].T.reshape(-1), dtype=np.float64) for s in series]
+        fed = [np.ascontiguousarray(_fed(values, column, shared=shared), dtype=np.float64) for values in series.values()]
         ticks = whole.shape[2]
         scratch = self._scratch(kernel, filled).reshape(-1)
         straight = bool((np.diff(self.lanes) == 1).all())
@@ -163,10 +159,18 @@ class _Block:
         rows = scratch.reshape(-1, width)
         return {name: rows[row] for row, name in enumerate(kernel.scratch[: kernel.states])}
 
+    def _series(self) -> dict[str, Array]:
+        """All inputs by the names that the kernel has for them, in its order."""
+        disturbance = self.inputs.disturbance_n
+        first = {"reference_mm": self.inputs.reference_mm} | ({} if disturbance is None else {"disturbance_n": disturbance})
+        recorded = {f"recorded__{name}": values for name, values in self.inputs.recorded.items()}
+        return first | recorded | {f"added__{name}": values for name, values in self.inputs.added.items()}
+
     def _scratch(self, kernel: AxisKernel, filled: NDArray[np.intp]) -> Array:
         """States and constants, (names, width)."""
         rows = np.zeros((kernel.rows, len(filled)))
-        reference = self.inputs.reference_mm[self.inputs.column[filled], 0]
+        first_mm = self.inputs.reference_mm[:, 0]
+        reference = first_mm[self.inputs.column[filled] if len(first_mm) > 1 else np.zeros(len(filled), dtype=np.intp)]
         at_rest: dict[str, Array | float] = {"position_mm": reference, "previous_reference_mm": reference}
         at_rest |= dict.fromkeys(AxisMetrics._fields, 0.0)
         for effect in self.effects:
@@ -183,3 +187,14 @@ class _Block:
             else:
                 rows[row] = np.asarray(AXES.taken(self.constants, [name])[0])[filled]
         return rows
+
+
+def _fed(values: Array, column: NDArray[np.intp], *, shared: bool) -> Array:
+    """Return a series as the kernel takes it: (ticks,), or where lanes have their own (ticks · lanes,), lanes fastest."""
+    if shared or len(values) == 1:
+        return np.asarray(values[column[0] if len(values) > 1 else 0])
+    if values.strides[0] == 0:  # the same for all lanes
+        return np.repeat(values[0], len(column))
+    straight = bool((np.diff(column) == 1).all())
+    rows = values[column[0] : column[-1] + 1] if straight else values[column]
+    return np.asarray(rows.T.reshape(-1))

@@ -36,7 +36,8 @@ Floats = NDArray[np.float64]
 BLOCK_S = 0.5
 COURSES = 2
 """Pairs of courses, each with its opposite."""
-LANES = 32
+LANES, FEW = 32, 4
+"""Widths of the kernels that are used: of many candidates, and of one or two alone."""
 TICKS_TOGETHER = 4
 FACTORS = ("mass_kg", "newton_per_command", "coulomb_n", "static_n", "stribeck_velocity_mm_s", "viscous_n_s_per_mm")
 
@@ -246,21 +247,20 @@ class AxisStage:
         lanes = len(next(iter(constants.values())))
         many = len(courses)
         ticks = len(data.t_s[stretch])
-        fill = -(-lanes * many // LANES) * LANES
+        fill = filled(lanes * many)
         index = np.minimum(np.arange(fill) // many, lanes - 1)
         known = np.zeros(ticks) if data.disturbance_n is None else data.disturbance_n[stretch]
         force = known[None, :] + courses[:, stretch]
-        own = reference.ndim == 2 or bool(added)
-        if own:  # each lane sees a reference of its own, or is pushed by a term of its own
-            columns = np.repeat(np.broadcast_to(reference, (lanes, ticks)), many, axis=0)
-            force = np.tile(force, (lanes, 1))
+        columns = np.atleast_2d(reference)
+        if len(columns) > 1 or added:  # each lane sees a reference of its own, or is pushed by a term of its own
+            columns = _each(columns, many) if len(columns) > 1 else columns
+            force = np.tile(force, (lanes, 1)) if many > 1 else force
             column = np.minimum(np.arange(fill), lanes * many - 1)
         else:
-            columns = np.broadcast_to(reference, (many, ticks))
             column = np.arange(fill) % many
         run = run_axes(
             {name: value[index] for name, value in constants.items()},
-            AxisInput(columns, column, force, added={name: np.repeat(values, many, axis=0) for name, values in added.items()}),
+            AxisInput(columns, column, force, added={name: _each(values, many) for name, values in added.items()}),
             period_s=self.period_s,
             effects=tuple(e.name for e in axis_effects()),
             outputs=("position_mm", "torque_a", "table_mm"),
@@ -335,6 +335,23 @@ class AxisStage:
             return np.zeros((1, ticks))
         half = self.disturbance.courses(self.pairs, ticks, self.period_s, seed=[11, ord(self.letter[0])])
         return np.concatenate([half, -half])
+
+
+def _each(values: Floats, many: int) -> Floats:
+    """Return each lane `many` times, one after another; without a copy where all lanes are alike."""
+    if values.strides[0] == 0:
+        return np.broadcast_to(values[0], (len(values) * many, values.shape[1]))
+    return np.repeat(values, many, axis=0) if many > 1 else values
+
+
+def filled(lanes: int) -> int:
+    """Return the lanes that so many are filled up to, so that they fit kernels of few widths.
+
+    >>> [filled(lanes) for lanes in (1, 4, 5, 32, 36, 40)]
+    [4, 4, 32, 32, 36, 64]
+    """
+    rest = lanes % LANES
+    return lanes - rest + (0 if not rest else FEW if rest <= FEW else LANES)
 
 
 def _stamped(shown: Floats, t_s: Floats, values: Values) -> Floats:

@@ -72,6 +72,10 @@ class AxisRunData:
 
     def stretches(self) -> tuple[slice, ...]:
         """Of motion."""
+        return self._stretches
+
+    @cached_property
+    def _stretches(self) -> tuple[slice, ...]:
         return motion_stretches(self.t_s, self.reference_mm)
 
 

@@ -55,7 +55,8 @@ def series_of_terms(
             for quantity, sign in QUANTITIES[term.site].items():
                 added[quantity] = added.get(quantity, 0.0) + sign * series
     if added:  # all of them, so that any terms together run on one kernel
-        none = np.zeros_like(next(iter(added.values())))
+        first = next(iter(added.values()))
+        none = np.broadcast_to(np.zeros(first.shape[1]), first.shape)
         added = {quantity: added.get(quantity, none) for own in QUANTITIES.values() for quantity in own}
     return added
 

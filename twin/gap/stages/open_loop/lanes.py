@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.gap.stages.axis import LANES, axis_effects
+from twin.gap.stages.axis import axis_effects, filled
 from twin.servo.run import AxisInput, run_axes
 
 Floats = NDArray[np.float64]
@@ -36,16 +36,14 @@ def run_lanes(
     """Return an output of the kernel, (lanes, ticks), and the state after it, name → (lanes,)."""
     lanes = len(next(iter(constants.values())))
     series = [np.atleast_2d(one) for one in (driven.reference_mm, *driven.recorded.values(), *driven.added.values())]
-    shape = (max(len(one) for one in series), series[0].shape[1])
-    fill = -(-lanes // LANES) * LANES
-    index = np.minimum(np.arange(fill), lanes - 1)
-    whole = [np.broadcast_to(one, shape) for one in series]
-    recorded = dict(zip(driven.recorded, whole[1:], strict=False))
-    added = dict(zip(driven.added, whole[1 + len(recorded) :], strict=True))
-    disturbance = None if driven.disturbance_n is None else np.broadcast_to(driven.disturbance_n, shape)
+    columns = max(len(one) for one in series)
+    index = np.minimum(np.arange(filled(lanes)), lanes - 1)
+    recorded = dict(zip(driven.recorded, series[1:], strict=False))
+    added = dict(zip(driven.added, series[1 + len(recorded) :], strict=True))
+    disturbance = None if driven.disturbance_n is None else np.atleast_2d(driven.disturbance_n)
     run = run_axes(
         {name: value[index] for name, value in constants.items()},
-        AxisInput(whole[0], np.minimum(index, shape[0] - 1), disturbance, recorded, added),
+        AxisInput(series[0], np.minimum(index, columns - 1), disturbance, recorded, added),
         period_s=period_s,
         effects=tuple(effect.name for effect in axis_effects()),
         outputs=(output,),
