@@ -116,7 +116,7 @@ def _motion(
         not_identifiable=not_identifiable_of(stages),
         next_experiment=what_next(ground, twins.before, twins.after, stages, left),
         subsystems=subsystems_of(stages, both.opened),
-        notes=notes + both.notes + ground.floors.notes + _flattering(checked, twins.runs),
+        notes=notes + both.notes + ground.floors.notes + _flattering(checked, twins.runs) + _of_stages(stages),
         seconds=0.0,
         constants=moved_constants(ground.machine, [stage.explained for stage in stages]),
         learned=learned_of(learned),
@@ -126,6 +126,10 @@ def _motion(
     for stage in stages:
         known |= constant_deviations(twins.after, stage.explained.stage, stage.explained.best)
     return Diagnosed(diagnosis, with_learned(with_uncertainty(twins.after, known, named), learned), traces)
+
+
+def _of_stages(stages: Sequence[Judged]) -> tuple[str, ...]:
+    return tuple(note for stage in stages for note in stage.explained.notes)
 
 
 def _flattering(case: Case, runs: tuple[Run, ...]) -> tuple[str, ...]:

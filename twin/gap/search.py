@@ -67,6 +67,7 @@ class Explained:
     beyond: constants of the base have to be further from what is stated than two deviations, and no effect puts them back
     alike: what the remainder partly looks like: effects that were accepted and are not certain (`twin.gap.naming.certain`)
     stops: the axis comes to rest with another torque than the twin's, and no effect was accepted
+    notes: sentences on why an effect is not named
     """
 
     stage: Stage
@@ -78,6 +79,7 @@ class Explained:
     beyond: bool = False
     alike: tuple[Effected, ...] = ()
     stops: bool = False
+    notes: tuple[str, ...] = ()
 
 
 def explain(
