@@ -153,7 +153,7 @@ def leaves_a_gap(stage: Stage, found: Fitted) -> bool:
 
 def _quieter(stage: Stage) -> float:
     """Return by how much the means of repeated runs are quieter than one of them: what a twin leaves of them is not."""
-    return max((float(np.nanmedian(o.floor / o.sigma)) for o in stage.observed if o.fitted), default=1.0)
+    return max([1.0, *(float(np.nanmedian(o.floor / o.sigma)) for o in stage.observed if o.fitted)])
 
 
 def _with_known(stage: Stage, base: Fitted, known: Fitted, null: Null) -> Fitted:
