@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from twin.case import Case, Run, RunKind
 from twin.errors import CaseError
 from twin.gap.answer import candidates_of, causes_of, found_effects, not_identifiable_of, not_observable_of
-from twin.gap.diagnosis import Diagnosed, Diagnosis, Effected, GapNumbers, SignalGap, closure_of
+from twin.gap.diagnosis import Diagnosed, Diagnosis, Effected, GapNumbers, SignalGap, Verdict, closure_of
 from twin.gap.experiment.what_next import what_next
 from twin.gap.inspection import inspected, slow_effects
 from twin.gap.intervals import closure_interval
@@ -38,6 +38,8 @@ from twin.machine import MachineFile
 
 Floats = NDArray[np.float64]
 Shown = Mapping[str, Mapping[str, Floats]]
+FAR_ABOVE = 2.0
+"""Floors of a signal above which a machine is not healthy, though all of it may be in a few places that no stage minds."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -100,7 +102,10 @@ def _motion(
     causes = tuple(dict.fromkeys(e for s in stages for e in s.explained.best.effects))
     shares = shapley(causes, lambda some: _closed(ground, stages, twins, some))
     traces = traces_of(twins.runs, twins.shown["before"], twins.shown["after"], ground.floors)
-    numbers, verdict, named = _numbers(twins), overall(stages), causes_of(stages, shares)
+    numbers, named = _numbers(twins), causes_of(stages, shares)
+    verdict = overall(stages)
+    if verdict is Verdict.HEALTHY and any(s.before > FAR_ABOVE * s.floor for s in numbers.by_signal.values()):
+        verdict = Verdict.UNKNOWN
     learned = described_stages(stages, progress, null)
     progress("what next")
     diagnosis = Diagnosis(
@@ -116,7 +121,7 @@ def _motion(
         not_identifiable=not_identifiable_of(stages),
         next_experiment=what_next(ground, twins.before, twins.after, stages, left),
         subsystems=subsystems_of(stages, both.opened),
-        notes=notes + both.notes + ground.floors.notes + _flattering(checked, twins.runs),
+        notes=notes + both.notes + ground.floors.notes + _flattering(checked, twins.runs) + _of_stages(stages),
         seconds=0.0,
         constants=moved_constants(ground.machine, [stage.explained for stage in stages]),
         learned=learned_of(learned),
@@ -126,6 +131,10 @@ def _motion(
     for stage in stages:
         known |= constant_deviations(twins.after, stage.explained.stage, stage.explained.best)
     return Diagnosed(diagnosis, with_learned(with_uncertainty(twins.after, known, named), learned), traces)
+
+
+def _of_stages(stages: Sequence[Judged]) -> tuple[str, ...]:
+    return tuple(note for stage in stages for note in stage.explained.notes)
 
 
 def _flattering(case: Case, runs: tuple[Run, ...]) -> tuple[str, ...]:

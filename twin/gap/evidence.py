@@ -15,6 +15,8 @@ from twin.gap.fitting import Left
 
 Floats = NDArray[np.float64]
 RMS_LEAST = 0.05
+TOLD_LEAST = 0.5
+"""Floors below which one rms is as good as another where it is asked how sure an advantage is: there blocks differ by chance."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,18 +24,20 @@ class Advantage:
     """Of one hypothesis over another.
 
     gain: T; error: its standard error; closes: largest decrease of a signal's mean square, in floors²
-    share: of the gap above the floor that is gone, in the signal where most is
+    share: of the gap above the floor that is gone, in the signal where most is; told: T over its standard error without what is
+        below half a floor
     """
 
     gain: float
     error: float
     closes: float
     share: float
+    told: float = -np.inf
 
     @property
     def sigmas(self) -> float:
         """T over its standard error."""
-        return self.gain / max(self.error, 1e-6)
+        return max(self.gain / max(self.error, 1e-6), self.told)
 
 
 def advantage(one: Left, other: Left) -> Advantage:
@@ -45,16 +49,24 @@ def advantage(one: Left, other: Left) -> Advantage:
     a, b, n = one.squares[blocks][:, there], other.squares[blocks][:, there], one.counts[blocks][:, there]
     total = np.array([a.sum(axis=0), b.sum(axis=0)])
     samples = n.sum(axis=0)
-    whole = _log_ratio(total[0], total[1], samples)
-    left_out = _log_ratio(total[0] - a, total[1] - b, np.maximum(samples - n, 1.0))
-    count = len(blocks)
-    error = float(np.sqrt((count - 1) / count * np.sum((left_out - left_out.mean()) ** 2))) if count > 1 else np.inf
+    fewer = np.maximum(samples - n, 1.0)
+
+    def jackknifed(least: float) -> tuple[float, float]:
+        whole = _log_ratio(total[0], total[1], samples, least)
+        left_out = _log_ratio(total[0] - a, total[1] - b, fewer, least)
+        count = len(blocks)
+        error = np.sqrt((count - 1) / count * np.sum((left_out - left_out.mean()) ** 2)) if count > 1 else np.inf
+        return float(whole), float(error)
+
+    gain, error = jackknifed(RMS_LEAST)
+    above_half, its_error = jackknifed(TOLD_LEAST)
     decrease = (total[0] - total[1]) / samples
     best = int(np.argmax(decrease))
     above = float(total[0][best] / samples[best]) - 1.0
-    return Advantage(float(whole), error, float(decrease[best]), float(decrease[best]) / above if above > 0.0 else 0.0)
+    share = float(decrease[best]) / above if above > 0.0 else 0.0
+    return Advantage(gain, error, float(decrease[best]), share, above_half / max(its_error, 1e-6))
 
 
-def _log_ratio(one: Floats, other: Floats, samples: Floats) -> Floats:
-    least = RMS_LEAST**2
-    return np.asarray(0.5 * np.sum(np.log(np.maximum(one / samples, least) / np.maximum(other / samples, least)), axis=-1))
+def _log_ratio(one: Floats, other: Floats, samples: Floats, least: float) -> Floats:
+    one, other = (np.maximum(squares / samples, least**2) for squares in (one, other))
+    return np.asarray(0.5 * np.sum(np.log(one / other), axis=-1))

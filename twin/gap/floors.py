@@ -163,14 +163,14 @@ def _usual(pairs: Sequence[_Pair], machine: MachineFile) -> dict[Key, float]:
     usual = {}
     for (signal, regime), parts in found.items():
         mean, count = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
-        usual[signal, regime] = max(_without_events(mean, count), noise[signal])
+        usual[signal, regime] = max(without_events(mean, count), noise[signal])
     return usual
 
 
-def _without_events(mean: Floats, count: Floats) -> float:
+def without_events(mean: Floats, count: Floats) -> float:
     """The rms of blocks of these mean squares and counts, (blocks,), without those that stand out.
 
-    >>> round(_without_events(np.array([1.0, 1.2, 0.8, 1.0, 400.0]), np.full(5, 100.0)), 6)
+    >>> round(without_events(np.array([1.0, 1.2, 0.8, 1.0, 400.0]), np.full(5, 100.0)), 6)
     1.0
     """
     order = np.argsort(mean)

@@ -67,6 +67,7 @@ class Explained:
     beyond: constants of the base have to be further from what is stated than two deviations, and no effect puts them back
     alike: what the remainder partly looks like: effects that were accepted and are not certain (`twin.gap.naming.certain`)
     stops: the axis comes to rest with another torque than the twin's, and no effect was accepted
+    notes: sentences on why an effect is not named
     """
 
     stage: Stage
@@ -78,6 +79,7 @@ class Explained:
     beyond: bool = False
     alike: tuple[Effected, ...] = ()
     stops: bool = False
+    notes: tuple[str, ...] = ()
 
 
 def explain(
@@ -145,8 +147,13 @@ def leaves_a_gap(stage: Stage, found: Fitted) -> bool:
     The bare machine has to follow what it was fitted to as well: what comes and goes with time may be in no other run.
     """
     unseen = found.left.rms_but_worst(CHANCE_BLOCKS) > stage.healthy_rms
-    seen = found.left_fit.rms_but_worst(CHANCE_BLOCKS) > FITTED_WORST * stage.healthy_rms
+    seen = found.left_fit.rms_but_worst(CHANCE_BLOCKS) > FITTED_WORST * stage.healthy_rms * _quieter(stage)
     return bool(unseen.any() or (not found.effects and seen.any()))
+
+
+def _quieter(stage: Stage) -> float:
+    """Return by how much the means of repeated runs are quieter than one of them: what a twin leaves of them is not."""
+    return max([1.0, *(float(np.nanmedian(o.floor / o.sigma)) for o in stage.observed if o.fitted)])
 
 
 def _with_known(stage: Stage, base: Fitted, known: Fitted, null: Null) -> Fitted:

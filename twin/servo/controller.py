@@ -58,7 +58,6 @@ def control(
     >>> control(1.0, 0.0, 0.0, 0.0, 40.0, 0.3, 9.0, 60.0, 0.001).torque_a
     12.36
     """
-    velocity_mm_s = at(Site.MECHANICS, velocity_mm_s)
     velocity_feedback_mm_s = at(Site.CONTROLLER, velocity_mm_s)
     following_error_mm = reference_mm - position_mm
     position_gain_per_s = at(Site.CONTROLLER, position_gain_per_s)

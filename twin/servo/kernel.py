@@ -21,7 +21,7 @@ from twin.servo.lanes import CLOCKS, INPUTS, LaneLoops, Stage, names_of, read_by
 
 STATES = frozenset(
     {
-        *("position_mm", "velocity_mm_s", "bristle_mm", "drive_force_n"),
+        *("position_mm", "velocity_mm_s", "bristle_mm", "drive_force_n", "force_n", "moving_mass_kg"),
         *("torque_a", "integral_a", "previous_reference_mm", "previous_reference_velocity_mm_s"),
         *metrics.AxisMetrics._fields,
     }

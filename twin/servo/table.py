@@ -3,15 +3,25 @@
 Nominally the screw is rigid and exact, and the table is where the motor says.
 """
 
+from typing import NamedTuple
+
 from twin.sites import Site, at
 
 
-def table(position_mm: float) -> float:
+class Seen(NamedTuple):
+    """The velocity of the axis, and where the table is."""
+
+    velocity_mm_s: float
+    table_mm: float
+
+
+def table(position_mm: float, velocity_mm_s: float) -> Seen:
     """Table position, mm, from the motor's.
 
-    >>> table(12.5)
+    >>> table(12.5, 3.0).table_mm
     12.5
     """
     position_mm = at(Site.MECHANICS, position_mm)
+    velocity_mm_s = at(Site.MECHANICS, velocity_mm_s)
     table_mm = at(Site.MECHANICS, position_mm)
-    return table_mm  # noqa: RET504 - the quantity has a name that effects know
+    return Seen(velocity_mm_s, table_mm)

@@ -42,6 +42,14 @@ def test_chance_is_seldom_three_standard_errors() -> None:
     assert sum(far) <= 6
 
 
+def test_blocks_that_differ_far_below_the_floor_do_not_make_an_advantage_doubtful() -> None:
+    before = left(6.0, blocks=4)
+    after = np.array([0.4, 0.06, 0.05, 0.05])[:, None] ** 2 * before.counts
+    over = advantage(before, Left(before.signals, after, before.counts, before.cells, before.cell_counts))
+    assert over.gain < 4.0 * over.error
+    assert over.sigmas > 10.0
+
+
 def test_one_block_is_no_evidence() -> None:
     assert advantage(left(5.0, blocks=1), left(1.0, blocks=1)).sigmas == pytest.approx(0.0, abs=1e-6)
 

@@ -12,6 +12,8 @@ from twin.gap.wording import percent, regime_words, signal_words
 
 SUBSYSTEMS_MAX, TERMS_MAX = 3, 2
 """Parts of the machine and learned terms that a sentence takes."""
+FAR = 1.5
+"""Floors from which on what is compared as a whole is off."""
 
 
 def sentence_of(told: Diagnosis, stages: Sequence[Judged]) -> str:
@@ -48,7 +50,12 @@ def _begun(told: Diagnosis, stages: Sequence[Judged]) -> str:
     partly += "".join(
         f"; {s.explained.stage.name} comes to rest with another torque than the twin's" for s in unknown if s.explained.stops
     )
-    return f"Unknown: a gap of {told.gap.before:.3g} × the floor in {where} that no effect of the catalogue explains{partly}"
+    # a part that is compared alone may be far off where all that is compared as a whole is not
+    gap = told.gap.before if told.gap.before > FAR else max([told.gap.before, *(s.explained.base.left.gap() for s in unknown)])
+    place = f"in {where}" if where else _most(told.where)
+    return (
+        f"Unknown: a gap of {gap:.3g} × the floor{f' {place}' if place else ''} that no effect of the catalogue explains{partly}"
+    )
 
 
 def _most(cells: Sequence[Cell]) -> str:

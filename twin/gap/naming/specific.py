@@ -25,7 +25,7 @@ CLOSES_MIN = 2.0
 
 def only_specific(stage: Stage, found: Explained) -> Explained:
     """The same with none but specific effects, and the others among what the remainder looks like."""
-    alike: list[Effected] = []
+    alike = list(found.alike)
     while vague := {e: over for e, over in found.evidence.items() if not _is_specific(stage, found, e)}:
         worst = min(vague, key=lambda e: vague[e].gain)
         alike.append(worst)

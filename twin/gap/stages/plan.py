@@ -11,6 +11,7 @@ from twin.effects.catalogue import effect_named
 from twin.gap.diagnosis import Effected, Verdict
 from twin.gap.dynamometer.turn_run import TurnRun
 from twin.gap.floors import Floors, repeatability
+from twin.gap.naming.filtered import told_from_a_filter
 from twin.gap.naming.specific import only_specific
 from twin.gap.null import NULL, Null
 from twin.gap.search import Explained, bare_fit, explain
@@ -96,7 +97,8 @@ def explained_stages(ground: Ground, progress: Progress, side_by_side: SideBySid
         turning = turn_data(runs)
         if any(run.fitted for run in turning):
             turns = TurnStage(machine, turning, ground.left_out, tool)
-            found.append(only_specific(turns, explain(turns, null=null, progress=progress, doubtful=True)))
+            whole = told_from_a_filter(turns, explain(turns, null=null, progress=progress, doubtful=True), null)
+            found.append(only_specific(turns, whole))
     stages: list[Stage] = [s for letter in ground.machine.axes if (s := axis_stage(ground, letter, forces)) is not None]
     warmups = heat_runs(ground.machine, tuple(r for r in ground.runs if not r.log.axes()))
     if any(run.fitted for run in warmups):

@@ -22,6 +22,7 @@ from twin.effects.catalogue import catalogue, effect_named
 from twin.effects.effect import Guesses, On, Recorded
 from twin.gap.diagnosis import Effected
 from twin.gap.dynamometer.cutting import FORCES
+from twin.gap.dynamometer.low_pass import LowPass
 from twin.gap.dynamometer.mean_turn import Engagement, best_phase, fine_turn, orders_of, turn_of
 from twin.gap.dynamometer.turn_floor import turn_floor
 from twin.gap.dynamometer.turn_run import TurnRun
@@ -97,12 +98,13 @@ def _data(run: TurnRun) -> TurnData:
 
 @dataclass(frozen=True, eq=False)
 class TurnStage:
-    """The cut of a case, in mean turns."""
+    """The cut of a case, in mean turns. low_pass: in the way of both forces, where one is supposed"""
 
     machine: MachineFile
     runs: tuple[TurnData, ...]
     left_out: frozenset[str] = frozenset()
     tool: str = ""
+    low_pass: LowPass | None = None
     name: str = "cut"
     averaged: int = 1
     healthy_rms: float = 1.5
@@ -246,7 +248,7 @@ class TurnStage:
         found = type(turn)(np.stack(shown), turn.step_s).orders(data.highest)
         if not data.knows_mean:
             found[..., 0] = 0.0
-        return found
+        return found if self.low_pass is None else self.low_pass.passed(found, stretch.cut.rpm / 60.0)
 
     def _phases(self, orders: list[Complexes], data: TurnData) -> list[Floats]:
         """The phase of each stretch, (lanes,) each: one for all, within a tooth, where the angle was recorded."""

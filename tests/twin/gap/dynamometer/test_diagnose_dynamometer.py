@@ -89,3 +89,12 @@ def test_a_recording_at_the_servo_period_with_references_is_one_too() -> None:
 def test_drift_alone_is_no_cause() -> None:
     diagnosis = found(Cutter(), replace(Bench(), drift_n_per_s=25.0))
     assert diagnosis.causes == (), diagnosis.sentence
+
+
+@pytest.mark.parametrize("filtered", [Bench(resonance_hz=300.0, damping=0.71), Bench(resonance_hz=400.0, damping=1.0)])
+def test_a_filter_near_the_tooth_passing_is_no_helix(filtered: Bench) -> None:
+    diagnosis = found(Cutter(), filtered, with_angle=True)
+    assert names(diagnosis) == set(), diagnosis.sentence
+    assert any("helix is not named: a low pass of both forces" in note for note in diagnosis.notes) or (
+        diagnosis.verdict is Verdict.HEALTHY
+    )

@@ -80,3 +80,9 @@ def test_an_unknown_gap_is_said_with_its_stage_and_its_size() -> None:
     assert sentence.startswith(
         "Unknown: a gap of 8 × the floor in one line that no effect of the catalogue explains; described: "
     )
+
+
+def test_a_gap_in_places_that_no_stage_minds_is_said_without_a_stage() -> None:
+    place = Cell("x_torque_a", "reversal", 0.9, 2.0, 6.0, 1e-6, True, "")
+    said = sentence_of(told(Verdict.UNKNOWN, where=(place,)), [])
+    assert said == "Unknown: a gap of 8 × the floor in the X torque at reversals that no effect of the catalogue explains."

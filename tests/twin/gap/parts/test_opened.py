@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.twin.gap.robot_case import ASYMMETRY, STIFFNESS_N_PER_MM, robot_case
+from tests.twin.gap.robot_case import ASYMMETRY, MOVING_KG, STIFFNESS_N_PER_MM, Joint, robot_case
 from twin.gap.diagnose import diagnose
 from twin.gap.diagnosis import Diagnosis, Verdict
 
@@ -17,7 +17,7 @@ def test_what_its_mechanics_and_its_table_show_is_named_and_nothing_else(robot: 
     by_name = {cause.effect: cause for cause in robot.causes}
     assert by_name["direction_friction"].parameters["asymmetry"].value == pytest.approx(ASYMMETRY, rel=0.02)
     stiffness = by_name["screw_compliance"].parameters["stiffness_n_per_mm"].value
-    assert stiffness == pytest.approx(STIFFNESS_N_PER_MM, rel=0.05)
+    assert stiffness == pytest.approx(STIFFNESS_N_PER_MM, rel=0.01)
 
 
 def test_its_controller_is_said_to_be_another_one_and_the_gap_is_not_that_of_a_loop_that_nobody_believes(
@@ -33,3 +33,20 @@ def test_its_controller_is_said_to_be_another_one_and_the_gap_is_not_that_of_a_l
         assert parts["b controller"].verdict is Verdict.UNKNOWN
         assert parts["b controller"].causes == ()
     assert parts["b mechanics"].causes[0] == "direction_friction"
+
+
+@pytest.fixture(scope="module")
+def with_friction_on_the_motor() -> Diagnosis:
+    return diagnose(robot_case(with_reference=False, joint=Joint(on_motor=0.9))).diagnosis
+
+
+def test_a_joint_whose_friction_is_on_the_motor_is_found_to_give_and_where_its_friction_is(
+    with_friction_on_the_motor: Diagnosis,
+) -> None:
+    found = {cause.effect: cause for cause in with_friction_on_the_motor.causes}
+    assert set(found) == {"direction_friction", "screw_compliance"}
+    joint, behind = found["screw_compliance"].parameters, 1.0 - Joint().motor_kg / MOVING_KG
+    assert joint["stiffness_n_per_mm"].value == pytest.approx(STIFFNESS_N_PER_MM / behind, rel=0.05)
+    assert joint["before"].value == pytest.approx(1.0 - 0.1 / behind, abs=0.03)
+    table = next(part for part in with_friction_on_the_motor.subsystems if part.subsystem == "b table")
+    assert table.before > 3.0 > 1.3 > table.after

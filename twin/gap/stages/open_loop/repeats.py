@@ -2,9 +2,10 @@
 
     residual = answer − recorded,   floor = rms (residual₁ − residual₂) / √2, by regime
 
-What the model lacks is in both residuals and cancels. Where no run was repeated: the noise of the sensors, sent through the loop,
-and the white and slow noise of the residual itself, from the median of its second differences over a few correlation times, which
-rare events do not move.
+What the model lacks is in both residuals and cancels. Blocks in which the laps of one run differ by far more than elsewhere, as
+where somebody pushed the axis, count as gap and not as floor (`twin.gap.floors`). Where no run was repeated: the noise of the
+sensors, sent through the loop, and the white and slow noise of the residual itself, from the median of its second differences
+over a few correlation times, which rare events do not move.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.case import Run
-from twin.gap.floors import lap_of
+from twin.gap.floors import BLOCK_S, lap_of, without_events
 from twin.gap.labels import AXIS
 from twin.gap.stages.axis import AxisStage
 from twin.gap.stages.axis_run import AxisRunData
@@ -51,7 +52,8 @@ def loop_floors(
                 differences.append(((residual[lag:] - residual[:-lag]) / np.sqrt(2.0), data.regime[lag:]))
     floors = _known(machine, axis, loop, *singles[0], left[0])
     if differences:
-        found = _by_regime(differences)
+        block = max(1, round(BLOCK_S / singles[0][1].period_s))
+        found = _by_regime(differences) if pairs else _by_regime(differences, block)
         return {regime: max(found.get(regime, floors[regime]), floors[regime]) for regime in floors}
     step = max(1, round(APART_S / singles[0][1].period_s))
     slow = max(_second_differences(residual, step) for residual in left)
@@ -81,13 +83,21 @@ def _known(machine: MachineFile, axis: AxisStage, loop: Loop, run: Run, data: Ax
     return {regime: max(sizes_of.get(regime, whole), 1e-9) for regime in range(len(AXIS))}
 
 
-def _by_regime(differences: Sequence[tuple[Floats, NDArray[np.int8]]]) -> dict[int, float]:
+def _by_regime(differences: Sequence[tuple[Floats, NDArray[np.int8]]], block: int = 0) -> dict[int, float]:
+    """Return the rms in each regime. block: samples of which those that stand out are left out as events; 0 = none is"""
     found = {}
     for regime in range(len(AXIS)):
         parts = np.concatenate([values[label == regime] for values, label in differences])
-        if np.isfinite(parts).sum() >= SAMPLES_MIN:
-            found[regime] = _rms(parts)
+        parts = parts[np.isfinite(parts)]
+        if len(parts) >= SAMPLES_MIN:
+            found[regime] = _rms_without_events(parts, block) if block else _rms(parts)
     return found
+
+
+def _rms_without_events(values: Floats, block: int) -> float:
+    starts = np.arange(0, len(values), block)
+    count = np.diff([*starts, len(values)]).astype(np.float64)
+    return without_events(np.add.reduceat(values**2, starts) / count, count)
 
 
 def _white(values: Floats) -> float:

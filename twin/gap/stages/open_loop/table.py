@@ -13,11 +13,13 @@ from twin.gap.stages.free import Free
 from twin.gap.stages.observed_through import Sensing
 from twin.gap.stages.open_loop.lanes import Driven, run_lanes
 from twin.gap.stages.open_loop.loop import added_at, over_stretches
-from twin.gap.stages.smoothed import filled
+from twin.gap.stages.smoothed import filled, velocity_of
 from twin.gap.stages.stage import Model
 from twin.learned.words import LearnedSite
 
 Floats = NDArray[np.float64]
+VELOCITY_HZ = 40.0
+"""Cutoff of the measured velocity, whose changes tell the force that moves the mass."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,14 +61,18 @@ class Table:
         constants = axis.lane_constants(model, theta)
         values = model.values(theta)
         position = filled(data.measured["pos_mm"])
+        velocity = velocity_of(position, data.period_s, VELOCITY_HZ)
         torque = filled(data.measured["torque_a"]) if "torque_a" in data.measured else np.zeros(len(position))
         parts: list[Floats] = []
         carried: dict[str, Floats] = {}
         for stretch in data.stretches():
-            seen = {"position_mm": position[stretch], "torque_a": torque[stretch]}
+            seen = {"position_mm": position[stretch], "velocity_mm_s": velocity[stretch], "torque_a": torque[stretch]}
+            drive_force_n = constants["newton_per_command"] * torque[stretch][0]
             start = {
                 "position_mm": np.full(len(theta), position[stretch][0]),
-                "drive_force_n": constants["newton_per_command"] * torque[stretch][0],
+                "velocity_mm_s": np.full(len(theta), velocity[stretch][0]),
+                "drive_force_n": drive_force_n,
+                "force_n": drive_force_n,
             }
             added = added_at(self.sites, model, theta, axis, data, stretch)
             driven = Driven(data.reference_mm[stretch], None, recorded=seen, added=added)
