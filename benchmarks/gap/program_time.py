@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
 """Where recorded parts take longer than length over feed, which effects cause it, and how far the gap shrinks on other parts.
 
-    .venv/bin/python benchmarks/gap/program_time.py [--without-overrides] [--withheld] [--json]
+    .venv/bin/python benchmarks/gap/program_time.py [--without-overrides | --one-by-one] [--withheld] [--json]
 
 Recordings: ten plates of the NIST Smart Manufacturing Systems Test Bed (CNCTWIN_DATA or ../shared/data), imported as run logs
 into a case. The twin knows nothing of the control; effects are fitted on plates 13, 14 and 15 and judged on all other runs of the
 case. Those of the back face and those that were aborted are among them: the diagnosis has to say so by itself.
 
+--one-by-one: each recording is imported by itself, so that a knob that stands where the one before left it is not recorded
 --withheld: programs of a shop run by a control that has one or two of the effects, recorded every 0.15 s, and diagnosed
 """
 
@@ -50,11 +51,17 @@ WITHHELD: Mapping[str, Mapping[str, Mapping[str, float]]] = {
 
 
 def plates_case(
-    data: Path, folder: Path, names: Sequence[str] = PLATES, fitted: Sequence[str] = FITTED, *, overrides: bool = True
+    data: Path,
+    folder: Path,
+    names: Sequence[str] = PLATES,
+    fitted: Sequence[str] = FITTED,
+    *,
+    overrides: bool = True,
+    carried: bool = True,
 ) -> Case:
     """Every run in the recordings of the plates, imported into a case in `folder`, each beside the program of its plate.
 
-    overrides: keep what the knobs stood at
+    overrides: keep what the knobs stood at; carried: from one recording to the next
     """
     entries, before = [], {}
     for name in names:
@@ -68,7 +75,7 @@ def plates_case(
             columns = {name: values for name, values in run.columns.items() if overrides or name not in OVERRIDES.values()}
             write_run(run_log(columns, file), folder / file)
             entries.append(RUN.format(file, "fit" if name in fitted else "check", f"plate_{name}.nc"))
-        before |= last_values(observed.rows)
+        before |= last_values(observed.rows) if carried else {}
     return _case(folder, "plates", entries)
 
 
@@ -129,6 +136,8 @@ def show(found: Diagnosed) -> None:
     print(f"\nclosure {100 * g.closure:.2f} % ({100 * g.closure_low:.2f} to {100 * g.closure_high:.2f})")
     for name, signal in g.by_signal.items():
         print(f"  {name}: {signal.before:.3g} → {signal.after:.3g} {signal.unit}, floor {signal.floor:.3g}")
+    ends = [(t.after[-1], t.measured[-1]) for t in found.traces if t.signal == "program_time_s" and not t.fitted]
+    print(f"  whole programs: median error {100.0 * float(np.median([abs(a / m - 1.0) for a, m in ends])):.2f} %")
     for note in (*d.notes, *(f"not identifiable: {name}" for name in d.not_identifiable)):
         print(f"note: {note}")
 
@@ -155,6 +164,7 @@ def main() -> None:
     """Print the diagnosis, or its JSON."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--without-overrides", action="store_true", help="as if nobody had recorded what the knobs stood at")
+    parser.add_argument("--one-by-one", action="store_true", help="each recording imported by itself")
     parser.add_argument("--withheld", action="store_true")
     parser.add_argument("--json", action="store_true")
     arguments = parser.parse_args()
@@ -164,7 +174,7 @@ def main() -> None:
         return
     with tempfile.TemporaryDirectory() as made:
         begun = perf_counter()
-        case = plates_case(data_folder(), Path(made), overrides=not arguments.without_overrides)
+        case = plates_case(data_folder(), Path(made), overrides=not arguments.without_overrides, carried=not arguments.one_by_one)
         imported = perf_counter()
         found = diagnose_programs(case)
     if arguments.json:
