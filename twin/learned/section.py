@@ -3,15 +3,17 @@
 A term describes what recordings show; beside its table, an entry keeps what the diagnosis said of it.
 """
 
-from typing import Literal, Self
+from typing import TYPE_CHECKING, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, model_validator
 
 from twin.errors import EffectError
 from twin.learned.sites import UNITS, unit_at
-from twin.learned.table import arguments_of, checked_rows, is_recording, term_of
-from twin.learned.term import Term
+from twin.learned.table import arguments_of, checked_rows, grid_of, is_recording
 from twin.learned.words import LearnedSite, word_of
+
+if TYPE_CHECKING:
+    from twin.learned.term import Term
 
 LEARNED = "learned"
 """The name under which learned terms stand among the effects of a file."""
@@ -51,7 +53,7 @@ class LearnedSection(BaseModel):
             arguments = arguments_of(self.table)
             checked_rows(self.table)
             if not self.is_recording:
-                term_of(self.site, self.on, self.table)
+                grid_of(self.table)
         except EffectError as error:
             raise ValueError(f"the learned term at {self}: {error}") from None
         if self.depends_on and set(self.depends_on) != {word_of(column) for column in arguments}:
@@ -76,14 +78,16 @@ class LearnedSection(BaseModel):
         return is_recording(self.table)
 
     @property
-    def term(self) -> Term:
+    def term(self) -> "Term":
         """The term itself. Raises EffectError where it describes recordings only."""
+        from twin.learned.term import term_of  # noqa: PLC0415 - a machine is read without numpy
+
         if self.is_recording:
             raise EffectError(f"the learned term at {self} is over the time of a recording; it says nothing of other runs")
         return term_of(self.site, self.on, self.table)
 
     @classmethod
-    def of(cls, term: Term, *, repeats: bool | None = None, sentence: str = "") -> Self:
+    def of(cls, term: "Term", *, repeats: bool | None = None, sentence: str = "") -> Self:
         """Return the entry of a term."""
         own = {"site": term.site, "on": term.on, "unit": unit_at(term.site, term.on), "depends_on": term.depends_on}
         return cls.model_validate(own | {"repeats": repeats, "table": term.table(), "sentence": sentence})

@@ -8,12 +8,8 @@ import math
 from collections.abc import Mapping, Sequence
 from itertools import product
 
-import numpy as np
-
 from twin.errors import EffectError
-from twin.learned.knots import Knots
-from twin.learned.term import Term
-from twin.learned.words import PERIODS, TIME, LearnedSite, word_of
+from twin.learned.words import PERIODS, TIME, word_of
 
 VALUES = ("value", "low", "high")
 RUN = "run"
@@ -65,18 +61,17 @@ def checked_rows(table: Columns) -> None:
         seen.add(row)
 
 
-def term_of(site: LearnedSite, on: str, table: Columns) -> Term:
-    """Return the term of a table that is a law of the machine. A band that is not there is as wide as nothing.
+def grid_of(table: Columns) -> tuple[dict[str, tuple[float, ...]], tuple[int, ...]]:
+    """Return the knots of each argument, increasing, and the row of each knot, the last argument fastest.
 
     Raises EffectError where a table is none, or two arguments are not combined with each other.
 
-    >>> term = term_of(LearnedSite.AXIS_FORCE, "x", {"position_mm": (5.0, 0.0), "value": (3.0, 1.0)})
-    >>> term.value.tolist(), term.low.tolist()
-    ([1.0, 3.0], [1.0, 3.0])
+    >>> grid_of({"position_mm": (5.0, 0.0), "value": (3.0, 1.0)})
+    ({'position_mm': (0.0, 5.0)}, (1, 0))
     """
     arguments = arguments_of(table)
     checked_rows(table)
-    knots = {column: np.unique(np.asarray(table[column], dtype=np.float64)) for column in arguments}
+    knots = {column: tuple(sorted({float(v) for v in table[column]})) for column in arguments}
     for column, period in PERIODS.items():
         if column in knots and not (knots[column][0] >= 0.0 and knots[column][-1] < period):
             raise EffectError(
@@ -84,12 +79,11 @@ def term_of(site: LearnedSite, on: str, table: Columns) -> Term:
             )
     by_knot = {at: row for row, at in enumerate(zip(*(table[column] for column in arguments), strict=True))}
     order = []
-    for at in product(*(values.tolist() for values in knots.values())):
+    for at in product(*knots.values()):
         if at not in by_knot:
             raise EffectError(f"the table has no row for {_said(arguments, at)}; each value of one goes with each of the other")
         order.append(by_knot[at])
-    value, low, high = (np.asarray(table.get(name, table["value"]), dtype=np.float64)[order] for name in VALUES)
-    return Term(site, on, Knots(knots), value, low, high)
+    return knots, tuple(order)
 
 
 def _said(columns: Sequence[str], row: Sequence[float | str]) -> str:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from twin.errors import EffectError
 from twin.learned.knots import Knots
+from twin.learned.table import VALUES, Columns, grid_of
 from twin.learned.words import LearnedSite, word_of
 
 Floats = NDArray[np.float64]
@@ -58,6 +59,21 @@ class Term:
         grid = np.meshgrid(*self.knots.by_column.values(), indexing="ij")
         table = {column: _plain(values.ravel()) for column, values in zip(self.knots.columns, grid, strict=True)}
         return table | {"value": _plain(self.value), "low": _plain(self.low), "high": _plain(self.high)}
+
+
+def term_of(site: LearnedSite, on: str, table: Columns) -> Term:
+    """Return the term of a table that is a law of the machine. A band that is not there is as wide as nothing.
+
+    Raises EffectError where a table is none, or two arguments are not combined with each other.
+
+    >>> term = term_of(LearnedSite.AXIS_FORCE, "x", {"position_mm": (5.0, 0.0), "value": (3.0, 1.0)})
+    >>> term.value.tolist(), term.low.tolist()
+    ([1.0, 3.0], [1.0, 3.0])
+    """
+    knots, order = grid_of(table)
+    columns = (np.asarray(table.get(name, table["value"]), dtype=np.float64)[list(order)] for name in VALUES)
+    value, low, high = columns
+    return Term(site, on, Knots({column: np.array(at) for column, at in knots.items()}), value, low, high)
 
 
 def _plain(values: Floats) -> tuple[float, ...]:
