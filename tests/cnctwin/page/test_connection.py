@@ -62,6 +62,7 @@ def test_processors_that_fall_behind_are_said_above_everything(
     expect(line).to_contain_text("Processors are 18 s behind: 20 machines, one core, 105 % busy")
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
     page.reload()
+    expect(page.locator("#link")).to_have_text("live")
     expect(line).to_contain_text("18 s behind")
     shop.behind = "<img src=x onerror=alert(1)> is 19 s behind"
     expect(line).to_contain_text("<img src=x")
