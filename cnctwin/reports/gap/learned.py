@@ -56,7 +56,7 @@ def learned(diagnosis: Diagnosis) -> Markup | None:
 
 def _term(one: Learned) -> Markup:
     where = f" on {one.on.upper() if len(one.on) <= 2 else signal_name(one.on)}" if one.on else ""
-    over = " and ".join(word.replace("_", " ").replace("axis:", "axis ") for word in one.depends_on) or "nothing"
+    over = " and ".join(_words(word) for word in one.depends_on) or "nothing"
     facts = (_fact("Closes", share(one.closure)), _fact("Repeats", "yes" if one.repeats else "no"))
     told = [
         tag("dl", *facts, class_="facts"),
@@ -76,6 +76,10 @@ def _term(one: Learned) -> Markup:
     return tag("article", *told, class_="cause")
 
 
+def _words(word: str) -> str:
+    return word.replace("_", " ").replace("axis:", "the motion of axis ")
+
+
 def _fact(term: str, value: str) -> Markup:
     return tag("div", tag("dt", term), tag("dd", value))
 
@@ -83,7 +87,7 @@ def _fact(term: str, value: str) -> Markup:
 def _drawn(one: Learned) -> Markup | None:
     """The values over the first argument: a curve for each value of the second one, or for each run."""
     columns = [name for name in one.table if name not in (*VALUES, "run")]
-    if not columns or "value" not in one.table:
+    if not columns or not one.depends_on or "value" not in one.table:
         return None
     at = _numbers(one.table, columns[0])
     group = one.table.get("run") or (one.table[columns[1]] if len(columns) > 1 else ("",) * len(at))
@@ -97,7 +101,7 @@ def _drawn(one: Learned) -> Markup | None:
     unit = columns[0].split("_", 1)[1] if "_" in columns[0] else ""
     charts = [_curve(one, frame, at, here, _kind_words(columns, kind)) for kind, here in curves]
     axis = tag("div", x_axis(frame, _UNITS.get(unit, unit)), class_="panel time")
-    label = f"{_SITES.get(one.site, one.site).lower()}, {one.unit}, over {columns[0].rsplit('_', 1)[0].replace('_', ' ')}"
+    label = f"{_SITES.get(one.site, one.site).lower()}, {one.unit}, over {_words(one.depends_on[0])}"
     return tag("div", tag("p", label, class_="label"), *charts, axis, class_="charts")
 
 
