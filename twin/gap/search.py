@@ -303,7 +303,7 @@ def _swapped(stage: Stage, best: Fitted, first: tuple[Tried, ...]) -> Fitted:
             model = best.model.without(effected).with_effect(other.effected)
             place = dict(best.model.places())[effected]
             kept = np.delete(best.theta, np.arange(place.start, place.stop))
-            own = other.found.theta[len(other.found.model.constants) :]
+            own = other.found.theta[dict(other.found.model.places())[other.effected]]  # it may stand on top of known effects
             found = fitted(stage, model, np.concatenate([kept, own]), scale=scale, steps_max=STEPS_FIRST)
             over = advantage(best.left, found.left)
             if over.sigmas > SWAP_SIGMAS and over.closes > 0.0 and _is_not_null(found, other.effected):
