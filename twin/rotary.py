@@ -82,7 +82,7 @@ def scale_of(coulomb_nm: float, inertia_kg_m2: float) -> float:
 
 
 def _scaled(factor: float, scale: float) -> float:
-    """How many units inside one outside is; forces and masses are in units of the scale."""
+    """Return the number of units inside that one outside makes; forces and masses are in units of the scale."""
     return factor * scale if factor in (PER_NM, PER_NM**2) else factor
 
 

@@ -81,7 +81,7 @@ def main() -> None:
 
 
 def by_rate(effect: Effect, one: AddedEffect, make: Callable[..., Case], rates_hz: list[int]) -> list[str]:
-    """What the diagnosis says at each rate; nothing is tried after it has said nothing."""
+    """Return the answer at each rate, fastest first; below a rate at which nothing is named, nothing is tried."""
     columns = columns_of(case := make(one))
     said: list[str] = []
     for hz in rates_hz:

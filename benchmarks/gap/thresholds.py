@@ -1,4 +1,4 @@
-"""Where the thresholds of the gap diagnosis come from: healthy machines.
+"""Calibrates the thresholds of the gap diagnosis on healthy machines.
 
     .venv/bin/python benchmarks/gap/thresholds.py --healthy 16 --seed 501
 

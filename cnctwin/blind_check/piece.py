@@ -28,7 +28,7 @@ from twin.machine_toml import machine_to_toml
 Diagnose = Callable[[Case], Diagnosed]
 REDRAWS_MAX = 5
 KEPT = ("verdict", "sentence", "causes", "gap", "subsystems", "constants", "learned", "not_identifiable")
-"""What is kept of a `diagnosis.json`: what is scored, and the sentence."""
+"""The keys of a `diagnosis.json` that are kept: those that are scored, and the sentence."""
 
 
 def draft_text(draft: Draft) -> str:

@@ -102,7 +102,7 @@ def draw(count: int, seed: int, sort: Sort | None = None, effect: str | None = N
 
 
 def drafts(count: int, seed: int, sort: Sort | None = None, effect: str | None = None) -> tuple[Draft, ...]:
-    """As `draw`, not yet drawn. Only questions of all sorts have machines with other controllers among them."""
+    """Return the questions of `draw`, not drawn yet; other controllers come only among questions of all sorts."""
     chance = np.random.default_rng([seed, 77])
     sorts = [sort] * count if sort else _sorts(count, chance)
     turn = {True: _endless(names(named=True), chance), False: _endless(names(named=False), chance)}

@@ -183,7 +183,7 @@ def closures(cases: Iterable[Judged]) -> list[float]:
 
 @dataclass(frozen=True, slots=True)
 class Scored:
-    """By size, from `JUDGED_FROM` on, and of the healthy ones; by effect: of single ones from there on.
+    """The scores by size, from `JUDGED_FROM` on, and of the healthy ones; by effect: of single ones from there on.
 
     nominal, other_controller: as `judged`, of machines with the controller that they state, and of those with another one
     controller_told: of those where it shows by itself, the ones where it is named, or called not understood

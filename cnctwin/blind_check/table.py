@@ -34,7 +34,7 @@ CURVE = (
     ("outside: named", "outside_wrong"),
     ("pair: both", "pair_both"),
 )
-"""What is shown over the size of the effect."""
+"""The shares that are shown over the size of the effect."""
 
 
 def table(result: CheckResult) -> str:

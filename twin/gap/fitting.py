@@ -96,7 +96,7 @@ def lefts_by(stage: Stage, model: Model, theta: Floats, *, fitted: bool) -> tupl
 
 
 def _left(stage: Stage, shown: dict[int, Floats], fitted: bool) -> Left:
-    """What is left by what a hypothesis shows: number of the run → (n,)."""
+    """Return the remainder of a hypothesis. shown: number of the run → (n,)"""
     signals = tuple(dict.fromkeys(s for o in stage.observed for s in o.signals))
     squares, counts = [], []
     cells, cell_counts = np.zeros((len(signals), REGIMES_MAX)), np.zeros((len(signals), REGIMES_MAX))

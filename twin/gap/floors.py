@@ -150,7 +150,7 @@ def _floors(
 
 
 def _usual(pairs: Sequence[_Pair], machine: MachineFile) -> dict[Key, float]:
-    """What laps usually differ by, rms by (signal, regime), without their events; at least the noise of the sensor."""
+    """Return the usual difference of laps, rms by (signal, regime), without their events; at least the noise of the sensor."""
     found: dict[Key, list[tuple[Floats, Floats]]] = {}
     noise: dict[str, float] = {}
     for pair in pairs:

@@ -40,7 +40,7 @@ class Null:
         return self._exceeded(self.closes.get(effected.effect, self.closes_any), over, healthy_rms)
 
     def exceeded_by_any(self, over: Advantage, healthy_rms: float = SMOOTH) -> bool:
-        """As `exceeded`, of what is no effect of the catalogue."""
+        """Apply `exceeded` to something that is no effect of the catalogue."""
         return self._exceeded(self.closes_any, over, healthy_rms)
 
     def _exceeded(self, closes: float, over: Advantage, healthy_rms: float) -> bool:

@@ -152,7 +152,7 @@ def _place(guess: Floats, amplitude: Floats, offset: int, linear: list[int], ang
 
 
 def _signatures(stage: Stage, model: Model, theta: Floats, left: Unexplained) -> Floats:
-    """What each probe changes, (n, probes), weighted as the residual is."""
+    """Return the change that each probe makes, (n, probes), weighted as the residual is."""
     runs = [i for i, o in enumerate(stage.observed) if o.fitted]
     parts = [
         np.nan_to_num((stage.predict(model, theta, i) - shown).T / stage.observed[i].sigma[:, None]) * weight[:, None]

@@ -45,7 +45,7 @@ PAIR_GAP = 3.0
 PAIRS_OF = 6
 CHANCE_BLOCKS = 2
 FITTED_WORST = 1.25
-"""What a healthy twin leaves at worst of the mean of repeated runs that it was fitted to, over what it leaves of another run."""
+"""Factor by which a healthy twin may leave more of the runs that it was fitted to than of another one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

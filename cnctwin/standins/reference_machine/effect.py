@@ -32,7 +32,7 @@ class ActsAt:
 
 
 Described = Callable[[str, Parameters], tuple[ActsAt, ...]]
-"""What an effect is put on and its parameters → the descriptions of it that are equally right."""
+"""A function of the effect's place and its parameters that returns the descriptions of it that are equally right."""
 
 
 def described(*texts: str) -> Described:

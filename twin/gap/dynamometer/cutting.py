@@ -1,4 +1,4 @@
-"""Where a recording of forces cuts evenly: stretches of one speed, feed and engagement, turn by turn of the spindle.
+"""Finds the stretches in which a recording of forces cuts evenly: one speed, feed and engagement, turn by turn of the spindle.
 
 A turn is in the air where the force hardly changes within it, whatever the plan says. At the edge of the work, where the tool is
 not in yet or comes out, the engagement is not the planned one: turns whose force is far from the stretch's own are left out, and
@@ -24,9 +24,9 @@ TAU = 2.0 * np.pi
 ALIKE = 0.03
 """Part by which speed, feed and depth may change within a stretch, and rad by which angles may."""
 AIR_PART = 0.2
-"""Of the stretch's own change of force in a turn; with less, a turn is in the air."""
+"""Part of the stretch's own change of force in a turn; with less, a turn is in the air."""
 OWN = (0.6, 1.6)
-"""Of it; with less or more, a turn is at the edge of the work, or something happened."""
+"""Parts of that change; with less or more, a turn is at the edge of the work, or something happened."""
 TURNS_MIN, TURNS_MAX = 8, 4000
 """Turns of a stretch below which it says nothing, and above which no more are needed."""
 
@@ -49,7 +49,7 @@ class Turns:
     heading_rad: Floats
 
     def rows(self) -> Floats:
-        """What has to stay alike within a stretch, (5, turns)."""
+        """Return the figures that stay alike within a stretch, (5, turns)."""
         return np.stack([self.rpm, self.feed_mm_s, self.depth_mm, self.entry_rad, self.exit_rad])
 
 

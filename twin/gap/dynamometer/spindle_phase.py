@@ -30,7 +30,7 @@ GRID_PER_TURN = 8
 RUNS_AWAY_RAD = 0.06
 """Rms of the tooth's phase by which a recorded angle may depart from the forces."""
 CLEAR = 3.0
-"""By which the energy of the strongest order has to exceed the median of all, for its phase to mean something."""
+"""Factor by which the energy of the strongest order has to exceed the median of all, for its phase to mean something."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -16,9 +16,9 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 PART, LEAST = 0.02, 0.003
-"""Of the order itself in both directions, and of the whole force."""
+"""Parts of the order itself in both directions, and of the whole force."""
 RESONANCE_HZ = 1500.0
-"""Of a table with work on it, where it is low."""
+"""Resonance of a table with work on it, where it is low."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -48,7 +48,7 @@ REPEATS = (0.5, 1.5)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Described:
-    """What was learned in a stage: the terms in the order in which they were found, and the hypothesis with all of them."""
+    """The terms learned in a stage, in the order in which they were found, and the hypothesis with all of them."""
 
     stage: Stage
     found: Fitted

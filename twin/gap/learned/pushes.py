@@ -15,7 +15,7 @@ PUSHES_PART, SWING_PART = 0.6, 0.4
 """Part of the energy of a force that is in its pushes, or at one frequency, for it to be called so."""
 PUSHES_MAX = 60
 FEW_PART = 0.2
-"""Where a force is known, or not nothing, for less of the time than this, all of it is a push."""
+"""Part of the time: a force that is known, or is not nothing, for less of it is a push as a whole."""
 SPREAD_PART = 0.1
 """Spread of the places of pushes, over the range of the axis, from which on they are at no place in particular."""
 NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve")

@@ -99,7 +99,7 @@ class Screen:
 
     @cached_property
     def _unseen_at_best(self) -> float:
-        """What the parent leaves on the runs that are not fitted, its own numbers at their linear best."""
+        """Return the remainder of the parent on the runs that are not fitted, its own numbers at their linear best."""
         basis, upper = self._solved
         return self._unseen(_solved(upper, basis.T @ self._start), {})
 
@@ -130,7 +130,7 @@ class Screen:
         return total / self._root**2
 
     def _moves(self, term: FreeTerm, piece: Piece) -> Floats:
-        """What a move of each value by `size` changes, (m, knots)."""
+        """Return the change that a move of each value by `size` makes, (m, knots)."""
         observed = self.stage.observed[piece.run]
         model = self.parent.model.with_term(replace(term, lengths={}))
         count = term.knots.count

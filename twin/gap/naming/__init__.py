@@ -1,1 +1,1 @@
-"""What may be said of what a stage has found: the constants that moved, names beside a remainder, the sentence."""
+"""Decides what is said of a stage's findings: the constants that moved, names beside a remainder, the sentence."""

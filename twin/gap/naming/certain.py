@@ -29,8 +29,8 @@ NAMED_MIN = 0.6
 REMAINDER_MAX = 25.0
 """Floors. Beside a remainder of so many a name means little, whatever it closes."""
 OWN_PART, OWN_MIN = 0.7, 0.84
-"""Where most of what a cause closes lies, it has to close this much: an effect that is only the next best shape of the true one
-leaves a part of it in the same places, where a second gap lies elsewhere."""
+"""Share of what a cause closes that makes up its own cells, and the part of those that it has to close: the next best shape of
+the true one leaves a part in the same places, where a second gap lies elsewhere."""
 AS_WELL, NEARLY = 0.95, 0.7
 """Part of what the best free-form term closes that an effect has to close: with fewer numbers alone, and with NAMED_MIN."""
 ITS_OWN, SIGMAS = 0.5, 3.0

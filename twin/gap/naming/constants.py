@@ -1,4 +1,4 @@
-"""What the refitted constants take up of the gap, each by itself: a finding like a cause.
+"""The shares of the gap that the refitted constants take up, each by itself: a finding like a cause.
 
 The share of a constant is its Shapley value among those that moved and all else that was fitted, on the runs not fitted:
 
@@ -26,7 +26,7 @@ NOTABLE = 1.0
 """Stated deviations from which on a constant has moved."""
 CLOSES_LEAST = 0.02
 SAID_FROM, SAID_CLOSURE, SAID_MAX = 1.5, 0.1, 3
-"""What is worth a word in the sentence: deviations, part of the gap, and how many at most."""
+"""A constant gets a word in the sentence from these on: deviations, part of the gap; and how many do at most."""
 REST = -1
 
 

@@ -16,7 +16,7 @@ from twin.gap.stages.stage import Model, Stage
 
 TRIED = 4
 CHEAPER = 9.0
-"""By how much Σ (θ / σ)² has to fall, and by twice the number of its parameters more."""
+"""Amount by which Σ (θ / σ)² has to fall, and by twice the number of its parameters more."""
 PUT_BACK = 1.0
 """Stated deviations within which a constant is back."""
 AS_WELL = 0.02

@@ -21,7 +21,7 @@ BEYOND, NEARLY = 2.0, 1.25
 """Stated deviations that are a finding, and the factor by which a constant may exceed them before its machine is not healthy: of
 twenty constants that scatter as stated, one is beyond two."""
 SIGMAS, CLOSES = 3.0, 0.05
-"""How sure, and of how many floors² of a signal, the fit within two deviations has to be the worse."""
+"""Standard errors, and floors² of a signal, by which the fit within two deviations has to be the worse."""
 CHANCE = 0.002
 """Part of machines whose constants are, all together, further from what is stated."""
 

@@ -36,7 +36,7 @@ def _explained(causes: Sequence[Cause], moved: str) -> str:
 
 
 def _begun(told: Diagnosis, stages: Sequence[Judged]) -> str:
-    """What is named, or that nothing is, and what is left."""
+    """Return the causes, or that nothing is named, and the remainder."""
     unknown = [s for s in stages if s.verdict is Verdict.UNKNOWN]
     where = ", ".join(s.explained.stage.name for s in unknown)
     if told.causes:

@@ -32,7 +32,7 @@ TRUER = 0.5
 NEAR = 1e-6
 """Ticks by which a sample may be off a tick and be on it."""
 DOUBT_MM, RESOLUTION_MM_MAX = 3e-4, 3e-3
-"""By which a position may be off for what its reference did between samples, and what the resolution of that may add."""
+"""Distances that a position may be off for what its reference did between samples, and that its resolution may add."""
 FORGOTTEN = 4.0
 """Time constants of a position loop after which it has forgotten what it was told."""
 HOLE = 2.5

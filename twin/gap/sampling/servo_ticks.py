@@ -26,7 +26,7 @@ SETTLED_S, SAMPLES_EVEN = 0.2, 3
 GAP_SAMPLES = 4
 """Sample periods over which a reference may be interpolated."""
 EVEN_MM, RESOLUTION_MM_MAX = 3e-4, 3e-3
-"""By which an even reference may bend from sample to sample, and what its resolution may add."""
+"""Distances by which an even reference may bend from sample to sample, and that its resolution may add."""
 ANSWERS = ("force_x_n", "force_y_n", "spindle_load_pct", "spindle_power_kw", "spindle_temp_c", "vibration_rms_g")
 """Columns beside those of the axes that the machine answers with; all others are held between samples."""
 DOUBT = "doubt"
@@ -144,7 +144,7 @@ def _slow(log: RunLog, period_s: float) -> RunLog:
 
 
 def _even_here(reference: Floats | None, place: NDArray[np.intp], settled: int) -> NDArray[np.bool_]:
-    """Where the reference has gone on evenly for so many samples and does for one more, or has stood still until then.
+    """Return True where the reference has gone on evenly for so many samples and does for one more, or stood still until then.
 
     What an axis sticks at is left over from motions that slow samples may have missed; of a rest only the samples before the next
     motion are compared, which starts from them.

@@ -54,7 +54,7 @@ class AxisRunData:
 
     @cached_property
     def arguments(self) -> Mapping[str, Floats]:
-        """What a learned term of the axis may depend on, column → (n,): its own measured motion, what it is told, time."""
+        """Arguments of learned terms of the axis, column → (n,): its measured motion, its commands, the time."""
         position = self.measured.get("pos_mm", self.measured.get("table_mm", self.reference_mm))
         position = np.where(np.isfinite(position), position, self.reference_mm)
         torque = np.nan_to_num(self.measured.get("torque_a", np.zeros(len(self.t_s))))

@@ -13,7 +13,7 @@ from twin.learned.words import LearnedSite
 
 Floats = NDArray[np.float64]
 Arguments = Callable[[], Mapping[str, Floats]]
-"""What the terms depend on, asked for only where there are any."""
+"""The arguments that the terms depend on, asked for only where there are any."""
 Series = Mapping[str, Floats]
 
 

@@ -30,7 +30,7 @@ class Cutter:
 
 @dataclass(frozen=True)
 class Bench:
-    """How it is recorded."""
+    """The bench: sample rate, noise, drift and resonance of the recording."""
 
     rate_hz: float = 8_000.0
     resonance_hz: float = 1400.0
@@ -75,7 +75,7 @@ def forces(cutter: Cutter, angle: Floats, feed_mm_min: Floats, rpm: float, depth
 
 
 def shown(force: Floats, t_s: Floats, depth: Floats, bench: Bench, chance: np.random.Generator) -> Floats:
-    """What the bench makes of it, (2, n)."""
+    """Return the forces as the bench records them, (2, n)."""
     if bench.resonance_hz > 0.0:
         natural = 2.0 * np.pi * bench.resonance_hz
         over, under = bilinear([natural**2], [1.0, 2.0 * bench.damping * natural, natural**2], fs=bench.rate_hz)

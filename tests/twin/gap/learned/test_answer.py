@@ -1,4 +1,4 @@
-"""What was learned is described with figures and place, and stands in the twin."""
+"""Learned terms are described with figures and place, and stand in the twin."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""What constants take up of the gap, in the answer: listed with their shares, and said."""
+"""Constants that take up a part of the gap are listed with their shares, and named in the sentence."""
 
 from functools import cache
 
@@ -13,7 +13,7 @@ from twin.gap.naming.constants import said_of
 
 @cache
 def told(resistance: float, capacity: float) -> Diagnosis:
-    """Of a machine that is told these for 0.122 K/W and 8900 J/K."""
+    """Return the diagnosis of a machine whose file states these for 0.122 K/W and 8900 J/K."""
     assert HOT.thermal is not None
     thermal = HOT.thermal.model_copy(update={"resistance_k_per_w": resistance, "capacity_j_per_k": capacity})
     case = case_of(HOT.model_copy(update={"thermal": thermal}), columns_of(warm_case()), RunKind.WARMUP)

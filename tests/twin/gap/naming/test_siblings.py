@@ -8,7 +8,7 @@ from twin.gap.naming.siblings import above, only_completes
 
 
 def left(rms: float) -> Left:
-    """Of one signal in ten blocks of ten samples."""
+    """Return the remainder of one signal in ten blocks of ten samples."""
     squares = np.full((10, 1), 10.0 * rms**2)
     cells = np.zeros((1, 8))
     return Left(("z_torque_a",), squares, np.full((10, 1), 10.0), cells, cells)

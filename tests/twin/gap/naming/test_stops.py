@@ -15,7 +15,7 @@ from twin.gap.stages.stage import Model
 from twin.gap.verdict import judged
 
 MORE_A, RESTING = 0.08, 200
-"""What a brake adds to the torque, and the samples of rest at the end of a stretch."""
+"""The torque that a brake adds, and the samples of rest at the end of a stretch."""
 
 
 def braked(stage: AxisStage) -> AxisStage:

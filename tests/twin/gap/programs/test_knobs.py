@@ -14,7 +14,7 @@ RATE = 24000.0
 MACHINE = f"[program]\nrapid_mm_min = {RATE}\nacceleration_mm_s2 = 1e9\n"
 TOLD = "rapid_override_pct"
 SLOW = {"tool_change_time": {"change_s": 4.0}}
-"""What the control really has."""
+"""The effect that the control really has."""
 
 
 def diagnosis(folder: Path, knobs: dict[str, tuple[str, float, float, bool]], machine: str = MACHINE) -> Diagnosis:

@@ -1,4 +1,4 @@
-"""When the samples of a recording were taken, and how its series come from there to the ticks of the loops."""
+"""The times at which a recording was sampled, and the way of its series from there to the ticks of the loops."""
 
 import numpy as np
 import pytest

@@ -28,7 +28,7 @@ from twin.sites import Site
 
 Floats = NDArray[np.float64]
 BANDWIDTH_HZ, VELOCITY_OVER = 40.0, 6.0
-"""Of the comparison; cutoff of the measured velocity over it, so that it is smoothed by the comparison alone."""
+"""Bandwidth of the comparison, Hz; cutoff of the measured velocity over it, so that it is smoothed by the comparison alone."""
 TIMING = 0.05
 """Part of a sample period to which it is known when, within it, the loops looked at the velocity."""
 PARTS = {Site.REFERENCE.name, Site.CONTROLLER.name}

@@ -14,7 +14,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Driven:
-    """What drives the lanes over a stretch; each series is (ticks,), (1, ticks) for all lanes or (lanes, ticks).
+    """Series that drive the lanes over a stretch; each is (ticks,), (1, ticks) for all lanes or (lanes, ticks).
 
     recorded: quantity → series in place of it; added: quantity → series on top of it
     """

@@ -40,7 +40,7 @@ class Loop(Protocol):
 
     @property
     def sites(self) -> tuple[LearnedSite, ...]:
-        """Where a learned term may act in it."""
+        """The sites in it at which a learned term may act."""
 
     def acts(self, effect: Effect) -> bool:
         """Return True where the effect changes what it answers."""

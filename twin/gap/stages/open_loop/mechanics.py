@@ -29,7 +29,7 @@ from twin.sites import Site
 
 Floats = NDArray[np.float64]
 BANDWIDTH_HZ = 15.0
-"""Of the observer; in slower recordings a part of their rate."""
+"""Bandwidth of the observer, Hz; in slower recordings a part of their rate."""
 OF_RATE = 0.04
 VELOCITY_OVER, ANSWER_OVER = 6.0, 2.0
 """Cutoffs of the measured velocity and of the observer's torque, over its bandwidth."""

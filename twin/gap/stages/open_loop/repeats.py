@@ -28,7 +28,7 @@ Floats = NDArray[np.float64]
 ByRegime = Mapping[int, float]
 APART_S = 3.0 * ALIKE_S
 MEDIAN_TO_SIGMA, MEDIAN_TO_SIGMA_FOURTH = 1.482602218505602 / np.sqrt(6.0), 1.482602218505602 / np.sqrt(70.0)
-"""From the median of differences, second and fourth ones, to the standard deviation of white noise."""
+"""Factors from the median of differences, second and fourth ones, to the standard deviation of white noise."""
 SAMPLES_MIN = 20
 """Samples of a regime below which its own floor is not known."""
 
