@@ -16,7 +16,7 @@ from twin.gap.floors import Floors
 from twin.gap.labels import regime_labels
 from twin.gap.stages.free import Free, constant
 from twin.gap.stages.machine_terms import reading_of_terms, with_force_terms, with_quantity_terms
-from twin.gap.stages.observed_through import Sensing
+from twin.gap.stages.observed_through import Sensing, sensor_effects
 from twin.gap.stages.stage import Model, Observed, observed_of
 from twin.identification.batch_fit import time_blocks
 from twin.learned.arguments import around, other_axes
@@ -24,7 +24,7 @@ from twin.learned.cutting import cut_arguments, cut_series, milling_with_terms
 from twin.learned.standing import added_series, reading_series, terms_at
 from twin.learned.term import Term
 from twin.learned.words import LearnedSite
-from twin.machine import MachineFile
+from twin.machine import MachineFile, Tool
 from twin.process.jump import at_a_jump
 from twin.process.kernel import process_quantities
 from twin.process.milling import Milling, MillingForce, tool_constants
@@ -49,6 +49,17 @@ class CutRun:
     log: RunLog
     milling: Milling | None
     fitted: bool
+
+
+def tool_path(tool: str, name: str) -> str:
+    """Return the path in machine.toml of a constant of a tool, by its number; of the only tool where that is empty."""
+    return f"tools.{tool}.{name}" if tool else f"tool.{name}"
+
+
+def factored_tool(tool: Tool, number: str, factors: Mapping[str, Floats], lanes: int) -> dict[str, ArrayLike]:
+    """Return the constants of a tool in each lane, name → (lanes,), with the factors of a hypothesis on them, by path."""
+    one = np.ones(lanes)
+    return {name: value * factors.get(tool_path(number, name), one) for name, value in tool_constants(tool).items()}
 
 
 def acting(known: Mapping[str, str]) -> tuple[Effect, ...]:
@@ -90,7 +101,7 @@ class CutStage:
         stated = self.machine.uncertainty
         relative = stated.get("relative", 0.05)
         cuts = self.machine.tool is not None and any(run.milling for run in self.runs)
-        names = [self._of_tool(name) for name in MATERIAL] if cuts else []
+        names = [tool_path(self.tool, name) for name in MATERIAL] if cuts else []
         if self.machine.spindle is not None and any(LOAD in o.signals for o in self.observed):
             names += ["spindle.efficiency"] if cuts else []
             names += ["spindle.idle_power_kw"] if self.machine.spindle.idle_power_kw > 0.0 else []
@@ -106,14 +117,7 @@ class CutStage:
         here = [Effected(e.name, self.tool) for e in acting(process_quantities())]
         here += [Effected(e.name) for e in acting(spindle_quantities())]
         found = [e for e in here if e.effect not in there and set(effect_named(e.effect).shows_in) & signals]
-        for effect in catalogue().values():
-            if effect.on is On.SIGNAL and effect.name not in self.left_out:
-                found += [Effected(effect.name, signal) for signal in sorted(signals)]
-        return tuple(dict.fromkeys(found))
-
-    def _of_tool(self, name: str) -> str:
-        """The path of a constant of the tool."""
-        return f"tools.{self.tool}.{name}" if self.tool else f"tool.{name}"
+        return tuple(dict.fromkeys((*found, *sensor_effects(signals, self.left_out))))
 
     def first_guesses(self, candidate: Effected) -> Guesses:
         """Return the effect's own guesses."""
@@ -209,11 +213,7 @@ class CutStage:
         """The cutting force at each row of θ; None where nothing is cut."""
         if data.milling is None or self.machine.tool is None:
             return None
-        factors = model.factors(theta)
-        one = np.ones(len(theta))
-        constants: dict[str, ArrayLike] = {
-            name: value * factors.get(self._of_tool(name), one) for name, value in tool_constants(self.machine.tool).items()
-        }
+        constants = factored_tool(self.machine.tool, self.tool, model.factors(theta), len(theta))
         effects = acting(process_quantities())
         constants |= model.effect_constants(theta, effects, self.standing)
         known = cut_series(self.terms, self._arguments(data)) if self.terms else {}

@@ -9,15 +9,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from twin.case import Run
 from twin.effects.added import added_effects
-from twin.effects.catalogue import catalogue, effect_named
-from twin.effects.effect import Effect, Excitation, Guesses, On, Recorded
+from twin.effects.catalogue import effect_named
+from twin.effects.effect import Effect, Excitation, Guesses, Recorded
 from twin.gap.diagnosis import Effected
 from twin.gap.floors import Floors
 from twin.gap.labels import regime_labels
 from twin.gap.stages.cut import acting
 from twin.gap.stages.free import Free, constant
 from twin.gap.stages.machine_terms import reading_of_terms, with_quantity_terms
-from twin.gap.stages.observed_through import Sensing
+from twin.gap.stages.observed_through import Sensing, sensor_effects
 from twin.gap.stages.stage import Model, Observed, observed_of
 from twin.heat.run import Warming, spindle_temperature_c, thermal_constants, thermal_quantities
 from twin.identification.batch_fit import time_blocks
@@ -97,8 +97,7 @@ class HeatStage:
             excited = effect.excited_by is not Excitation.COOLANT_SWITCHED or switched
             if effect.name not in self.left_out | set(self.standing) and excited:
                 found.append(Effected(effect.name))
-        sensors = [e for e in catalogue().values() if e.on is On.SIGNAL and e.name not in self.left_out]
-        return tuple(found + [Effected(e.name, SIGNAL) for e in sensors])
+        return (*found, *sensor_effects((SIGNAL,), self.left_out))
 
     @property
     def term_sites(self) -> Mapping[LearnedSite, tuple[str, ...]]:

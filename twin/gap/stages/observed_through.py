@@ -1,12 +1,12 @@
 """Sensors and clocks in many candidate machines at once: `twin.sensor`, lane by lane."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.effects.catalogue import effect_named
+from twin.effects.catalogue import catalogue, effect_named
 from twin.effects.effect import On, called
 from twin.gap.diagnosis import Effected
 from twin.sensor.reading import readings
@@ -55,6 +55,12 @@ class Sensing:
                 given = {key: np.atleast_1d(value)[:, None] for key, value in self.effects[name].items()}
                 values = np.asarray(called(undo, given, values))
         return values
+
+
+def sensor_effects(signals: Collection[str], left_out: Collection[str]) -> tuple[Effected, ...]:
+    """Return the effects of the sensors of these signals, but for those that are left out."""
+    known = [effect.name for effect in catalogue().values() if effect.on is On.SIGNAL and effect.name not in left_out]
+    return tuple(Effected(name, signal) for name in known for signal in sorted(signals))
 
 
 def seen_late(series: Floats, t_s: Floats, period_s: float, values: Values, site: Site, on: str, lanes: int) -> Floats:

@@ -18,8 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from twin.case import Run
 from twin.effects.added import added_effects
-from twin.effects.catalogue import catalogue, effect_named
-from twin.effects.effect import Guesses, On, Recorded
+from twin.effects.catalogue import effect_named
+from twin.effects.effect import Guesses, Recorded
 from twin.gap.diagnosis import Effected
 from twin.gap.dynamometer.cutting import FORCES
 from twin.gap.dynamometer.low_pass import LowPass
@@ -27,16 +27,15 @@ from twin.gap.dynamometer.mean_turn import Engagement, best_phase, fine_turn, or
 from twin.gap.dynamometer.turn_floor import turn_floor
 from twin.gap.dynamometer.turn_run import TurnRun
 from twin.gap.labels import regime_labels
-from twin.gap.stages.cut import MATERIAL, acting
+from twin.gap.stages.cut import MATERIAL, acting, factored_tool, tool_path
 from twin.gap.stages.free import Free, constant
-from twin.gap.stages.observed_through import Sensing
+from twin.gap.stages.observed_through import Sensing, sensor_effects
 from twin.gap.stages.stage import Model, Observed, observed_of
 from twin.learned.standing import terms_at
 from twin.learned.term import Term
 from twin.learned.words import LearnedSite
 from twin.machine import MachineFile
 from twin.process.kernel import process_quantities
-from twin.process.milling import tool_constants
 from twin.runlog import RunLog
 
 Floats = NDArray[np.float64]
@@ -127,7 +126,7 @@ class TurnStage:
     def constants(self) -> tuple[Free, ...]:
         """K_t and K_e."""
         stated = self.machine.uncertainty
-        free = [constant(self._of_tool(n), stated.get(f"tool.{n}", stated.get("relative", 0.05))) for n in MATERIAL]
+        free = [constant(tool_path(self.tool, n), stated.get(f"tool.{n}", stated.get("relative", 0.05))) for n in MATERIAL]
         return tuple(p for p in free if p.sigma > 0.0)
 
     @property
@@ -137,14 +136,7 @@ class TurnStage:
         there = self.left_out | set(self.standing)
         here = [e for e in acting(process_quantities()) if e.name not in there and set(e.shows_in) & signals]
         found = [Effected(e.name, self.tool) for e in here]
-        for effect in catalogue().values():
-            if effect.on is On.SIGNAL and effect.name not in self.left_out:
-                found += [Effected(effect.name, signal) for signal in sorted(signals)]
-        return tuple(dict.fromkeys(found))
-
-    def _of_tool(self, name: str) -> str:
-        """The path of a constant of the tool."""
-        return f"tools.{self.tool}.{name}" if self.tool else f"tool.{name}"
+        return tuple(dict.fromkeys((*found, *sensor_effects(signals, self.left_out))))
 
     def first_guesses(self, candidate: Effected) -> Guesses:
         """Return the effect's own guesses."""
@@ -227,10 +219,7 @@ class TurnStage:
 
     def _constants(self, model: Model, theta: Floats) -> dict[str, ArrayLike]:
         assert self.machine.tool is not None
-        factors, one = model.factors(theta), np.ones(len(theta))
-        constants: dict[str, ArrayLike] = {
-            name: value * factors.get(self._of_tool(name), one) for name, value in tool_constants(self.machine.tool).items()
-        }
+        constants = factored_tool(self.machine.tool, self.tool, model.factors(theta), len(theta))
         return constants | model.effect_constants(theta, acting(process_quantities()), self.standing)
 
     def _orders(self, constants: dict[str, ArrayLike], sensing: list[Sensing], stretch: Stretch, data: TurnData) -> Complexes:
