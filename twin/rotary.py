@@ -14,7 +14,7 @@ Files, columns and answers have degrees; this module alone knows how one becomes
 
 import math
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 
 USUAL = 400.0
 """Friction in N, or mass in kg, of a feed axis."""
@@ -95,14 +95,7 @@ def outside_name(name: str, scale: float = 1.0) -> tuple[str, float]:
     >>> name, round(newton, 3)
     ('torque_per_command_nm', 17.453)
     """
-    for inside, outside, factor in ENDINGS:
-        if name.endswith(inside):
-            stem = name.removesuffix(inside)
-            for own, other in WORDS:
-                if factor != 1.0 and f"{stem}_".startswith(own):
-                    stem = other[:-1] + stem[len(own) - 1 :]
-            return stem + outside, _scaled(factor, scale)
-    return name, 1.0
+    return _renamed(name, ENDINGS, WORDS, scale)
 
 
 def inside_name(name: str, scale: float = 1.0) -> tuple[str, float]:
@@ -111,13 +104,20 @@ def inside_name(name: str, scale: float = 1.0) -> tuple[str, float]:
     >>> inside_name("inertia_kg_m2")[0], inside_name("coulomb_nm")[0], inside_name("position_gain_per_s")[0]
     ('mass_kg', 'coulomb_n', 'position_gain_per_s')
     """
-    for inside, outside, factor in ENDINGS:
-        if name.endswith(outside):
-            stem = name.removesuffix(outside)
-            for own, other in WORDS:
-                if factor != 1.0 and f"{stem}_".startswith(other):
-                    stem = own[:-1] + stem[len(other) - 1 :]
-            return stem + inside, _scaled(factor, scale)
+    return _renamed(name, [(outside, inside, factor) for inside, outside, factor in ENDINGS], [(b, a) for a, b in WORDS], scale)
+
+
+def _renamed(
+    name: str, endings: Iterable[tuple[str, str, float]], words: Iterable[tuple[str, str]], scale: float
+) -> tuple[str, float]:
+    """The name with another ending, and another word at its head where its unit is another one."""
+    for ending, instead, factor in endings:
+        if name.endswith(ending):
+            stem = name.removesuffix(ending)
+            for own, other in words:
+                if factor != 1.0 and f"{stem}_".startswith(own):
+                    stem = other[:-1] + stem[len(own) - 1 :]
+            return stem + instead, _scaled(factor, scale)
     return name, 1.0
 
 

@@ -2,26 +2,14 @@
 
 import numpy as np
 
+from tests.twin.simulator.test_simulation import AXIS
 from twin.learned.section import LearnedSection
 from twin.machine import AddedEffect, MachineFile, machine_from_toml
 from twin.simulator.response import RunInput, respond
 
-AXIS = """
-[axes.{letter}]
-mass_kg = 300.0
-screw_lead_mm = 12.0
-torque_constant_nm_per_a = 1.2
-position_gain_per_s = 40.0
-velocity_gain_a_s_per_mm = 0.3
-velocity_integral_gain_a_per_mm = 9.0
-torque_limit_a = 60.0
-[axes.{letter}.friction]
-coulomb_n = 300.0
-static_n = 300.0
-stribeck_velocity_mm_s = 6.0
-viscous_n_s_per_mm = 2.0
-"""
-MACHINE = machine_from_toml("[machine]\nname = 'small'\n" + AXIS.format(letter="x"))
+EVEN = AXIS.replace("static_n = 400.0", "static_n = 300.0")
+"""An axis without a Stribeck peak: its friction is the same at rest."""
+MACHINE = machine_from_toml("[machine]\nname = 'small'\n" + EVEN.format(letter="x"))
 T = np.arange(800, dtype=np.float64) * 0.001
 FORTH_AND_BACK = 10.0 * (1.0 - np.cos(2.0 * np.pi * 2.5 * T))
 TOLD = RunInput(t_s=T, reference_mm={"x": FORTH_AND_BACK})
