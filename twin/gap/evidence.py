@@ -11,7 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.gap.fitting import Left
+from twin.gap.diagnosis import Effected
+from twin.gap.fitting import Fitted, Left, without_effect
+from twin.gap.stages.stage import Stage
 
 Floats = NDArray[np.float64]
 RMS_LEAST = 0.05
@@ -70,3 +72,8 @@ def advantage(one: Left, other: Left) -> Advantage:
 def _log_ratio(one: Floats, other: Floats, samples: Floats, least: float) -> Floats:
     one, other = (np.maximum(squares / samples, least**2) for squares in (one, other))
     return np.asarray(0.5 * np.sum(np.log(one / other), axis=-1))
+
+
+def evidence_of(stage: Stage, base: Fitted, best: Fitted) -> dict[Effected, Advantage]:
+    """Return each effect of a hypothesis with its advantage over the same hypothesis without it."""
+    return {e: advantage(without_effect(stage, base, best, e).left, best.left) for e in best.effects}

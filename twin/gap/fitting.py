@@ -14,6 +14,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 TOLERANCE = 1e-4
 REGIMES_MAX = 8
+STEPS_WITHOUT = 14
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -212,3 +213,24 @@ def settled(stage: Stage, parent: Fitted, rounds: int = 3) -> Fitted:
             return again if again.left_fit.excess() < parent.left_fit.excess() else replace(parent, again=again.minimum)
         parent, scale = again, np.maximum(again.left_fit.rms(), 1.0)
     return parent
+
+
+def without_effect(stage: Stage, base: Fitted, best: Fitted, effected: Effected) -> Fitted:
+    """Return a hypothesis without one of its effects, refitted; `base`, the machine with none, where it was the only one."""
+    return base if len(best.effects) == 1 else dropped(stage, best, effected)
+
+
+def dropped(stage: Stage, best: Fitted, effected: Effected) -> Fitted:
+    """Return a hypothesis without one of its effects, refitted on a stage that may be another one than its own."""
+    place = dict(best.model.places())[effected]
+    theta = np.delete(best.theta, np.arange(place.start, place.stop))
+    scale = np.maximum(best.left_fit.rms(), 1.0)
+    return fitted(stage, best.model.without(effected), theta, scale=scale, steps_max=STEPS_WITHOUT)
+
+
+def with_only(stage: Stage, base: Fitted, best: Fitted, kept: tuple[Effected, ...]) -> Fitted:
+    """Return a hypothesis with only some of its effects, refitted; `base` where none is kept."""
+    for effected in best.effects if kept else ():
+        if effected not in kept:
+            best = without_effect(stage, base, best, effected)
+    return best if kept else base

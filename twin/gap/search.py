@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from twin.effects.catalogue import effect_named
 from twin.effects.effect import On
 from twin.gap.diagnosis import Effected
-from twin.gap.evidence import Advantage, advantage
-from twin.gap.fitting import Fitted, fitted, settled
-from twin.gap.naming.certain import certain_of, dropped, only
+from twin.gap.evidence import Advantage, advantage, evidence_of
+from twin.gap.fitting import Fitted, dropped, fitted, settled, with_only, without_effect
+from twin.gap.naming.certain import certain_of
 from twin.gap.naming.instead import instead_of_constants
 from twin.gap.naming.moved import has_to_be_beyond
 from twin.gap.naming.siblings import only_completes
@@ -124,8 +124,7 @@ def explain(
         best, beyond = instead[0], False
         rivals[best.effects[0]] = tuple(other.effects[0] for other in instead[1:])
     best, alike = (best, ()) if doubtful else with_certain(stage, base, best, null)
-    several = len(best.effects) > 1
-    evidence = {e: advantage(dropped(stage, best, e).left if several else base.left, best.left) for e in best.effects}
+    evidence = evidence_of(stage, base, best)
     stops = not best.effects and stops_are_at_odds(stage, base)
     # what was found beside an effect is no rival of it
     others = {e: tuple(r for r in rivals[e] if r not in best.effects) for e in best.effects if e in rivals}
@@ -138,7 +137,7 @@ def with_certain(stage: Stage, base: Fitted, best: Fitted, null: Null = NULL) ->
         return best, ()
     certain = certain_of(stage, base, best, null)
     alike = tuple(e for e in best.effects if e not in certain)
-    return (only(stage, base, best, certain) if alike else best), alike
+    return (with_only(stage, base, best, certain) if alike else best), alike
 
 
 def leaves_a_gap(stage: Stage, found: Fitted) -> bool:
@@ -166,7 +165,7 @@ def _with_known(stage: Stage, base: Fitted, known: Fitted, null: Null) -> Fitted
         return base
     found = settled(stage, fitted(stage, model, theta), rounds=1)
     for effected in found.effects:
-        without = dropped(stage, found, effected) if len(found.effects) > 1 else base
+        without = without_effect(stage, base, found, effected)
         if not null.exceeded(effected, advantage(without.left, found.left), stage.healthy_rms):
             found = without
     return found

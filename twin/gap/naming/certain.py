@@ -15,7 +15,7 @@ import numpy as np
 from twin.effects.catalogue import effect_named
 from twin.gap.diagnosis import Effected
 from twin.gap.evidence import advantage
-from twin.gap.fitting import Fitted, Left, fitted
+from twin.gap.fitting import Fitted, Left, without_effect
 from twin.gap.learned.learnable import Learnable
 from twin.gap.learned.search import free_form, refitted_beside
 from twin.gap.naming.siblings import above
@@ -36,7 +36,6 @@ AS_WELL, NEARLY = 0.95, 0.7
 ITS_OWN, SIGMAS = 0.5, 3.0
 """Part of what it takes alone that an effect has to take beside a free-form term, and how surely."""
 COMPETITORS = 2
-STEPS_MAX = 14
 S = LearnedSite
 MIMICS = {
     Site.REFERENCE: (S.CONTROLLER, S.AXIS_FORCE, S.POSITION_READING),
@@ -60,7 +59,7 @@ def certain_of(stage: Stage, base: Fitted, best: Fitted, null: Null) -> tuple[Ef
 
 
 def _is_certain(stage: Stage, base: Fitted, best: Fitted, effected: Effected, most: bool, null: Null) -> bool:
-    parent = base if len(best.effects) == 1 else dropped(stage, best, effected)
+    parent = without_effect(stage, base, best, effected)
     taken = above(parent.left) - above(best.left)
     clean = closed_where_it_acts(parent.left, best.left) >= OWN_MIN
     if taken <= 0.0:
@@ -98,21 +97,3 @@ def closed_where_it_acts(one: Left, other: Left) -> float:
     enough = np.searchsorted(np.cumsum(closed[order]), OWN_PART * closed[closed > 0].sum()) + 1
     own = order[:enough]
     return float(1.0 - after[own].sum() / before[own].sum()) if before[own].sum() > 0.0 else 0.0
-
-
-def only(stage: Stage, base: Fitted, best: Fitted, kept: tuple[Effected, ...]) -> Fitted:
-    """Return the hypothesis with only some of its effects, refitted."""
-    if not kept:
-        return base
-    for effected in best.effects:
-        if effected not in kept:
-            best = dropped(stage, best, effected)
-    return best
-
-
-def dropped(stage: Stage, best: Fitted, effected: Effected) -> Fitted:
-    """Return the hypothesis without one of its effects, refitted."""
-    place = dict(best.model.places())[effected]
-    theta = np.delete(best.theta, np.arange(place.start, place.stop))
-    scale = np.maximum(best.left_fit.rms(), 1.0)
-    return fitted(stage, best.model.without(effected), theta, scale=scale, steps_max=STEPS_MAX)

@@ -11,9 +11,8 @@ import numpy as np
 from twin.effects.catalogue import effect_named
 from twin.gap.diagnosis import Effected
 from twin.gap.dynamometer.low_pass import LowPass
-from twin.gap.evidence import Advantage, advantage
-from twin.gap.fitting import Fitted
-from twin.gap.naming.certain import dropped
+from twin.gap.evidence import Advantage, advantage, evidence_of
+from twin.gap.fitting import Fitted, dropped, without_effect
 from twin.gap.null import Null
 from twin.gap.search import Explained
 from twin.gap.stages.turns import TurnStage
@@ -34,8 +33,8 @@ def told_from_a_filter(stage: TurnStage, found: Explained, null: Null) -> Explai
         over, low_pass = _next_best(stage, found.best, effected)
         if null.exceeded(effected, over, stage.healthy_rms):
             continue
-        best = found.base if len(found.best.effects) == 1 else dropped(stage, found.best, effected)
-        evidence = {e: advantage(dropped(stage, best, e).left, best.left) for e in best.effects}
+        best = without_effect(stage, found.base, found.best, effected)
+        evidence = evidence_of(stage, found.base, best)
         rivals = {e: r for e, r in found.rivals.items() if e in evidence}
         note = (
             f"{effected} is not named: a low pass of both forces at about {low_pass.half_power_hz:.0f} Hz, in the dynamometer "

@@ -14,8 +14,8 @@ from dataclasses import replace
 
 from twin.effects.catalogue import effect_named
 from twin.gap.diagnosis import Effected
-from twin.gap.evidence import advantage
-from twin.gap.naming.certain import dropped
+from twin.gap.evidence import evidence_of
+from twin.gap.fitting import without_effect
 from twin.gap.search import Explained
 from twin.gap.stages.stage import Stage
 
@@ -29,8 +29,8 @@ def only_specific(stage: Stage, found: Explained) -> Explained:
     while vague := {e: over for e, over in found.evidence.items() if not _is_specific(stage, found, e)}:
         worst = min(vague, key=lambda e: vague[e].gain)
         alike.append(worst)
-        best = dropped(stage, found.best, worst)
-        evidence = {e: advantage(dropped(stage, best, e).left, best.left) for e in best.effects}
+        best = without_effect(stage, found.base, found.best, worst)
+        evidence = evidence_of(stage, found.base, best)
         rivals = {e: r for e, r in found.rivals.items() if e in evidence}
         found = replace(found, best=best, evidence=evidence, rivals=rivals)
     return replace(found, alike=tuple(alike))

@@ -11,10 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twin.gap.diagnosis import Effected, Verdict
-from twin.gap.evidence import advantage
-from twin.gap.fitting import Fitted, fitted, settled
+from twin.gap.evidence import evidence_of
+from twin.gap.fitting import fitted, settled, without_effect
 from twin.gap.labels import AXIS
-from twin.gap.naming.certain import dropped
 from twin.gap.null import NULL, Null
 from twin.gap.search import Explained, explain, with_certain, without
 from twin.gap.stages.axis import AxisStage
@@ -75,11 +74,6 @@ class Combined:
 
     stages: list[Judged]
     opened: tuple[Opened, ...]
-
-    @property
-    def by_open_loops(self) -> frozenset[str]:
-        """Letters of the axes that their open loops decide."""
-        return frozenset(axis.letter for axis in self.opened if axis.decides)
 
     @property
     def floors(self) -> dict[tuple[str, str], float]:
@@ -165,7 +159,7 @@ def _without_trifles(explained: Explained) -> Explained:
     if judged(explained).verdict is Verdict.EXPLAINED:
         return explained
     for effected in best.effects:
-        bare = dropped(stage, best, effected)
+        bare = without_effect(stage, explained.base, best, effected)
         if len(best.effects) > 1 and bare.left.gap() ** 2 - best.left.gap() ** 2 < TRIFLE * reducible:
             best = bare
     kept = set(best.effects)
@@ -189,14 +183,10 @@ def _confirmed(of_axis: Judged, opened: Opened, null: Null) -> Judged:
     if not model.effects:
         return of_axis
     best = settled(stage, fitted(stage, model, theta), rounds=1)
-    evidence = {e: advantage(_without(stage, best, e, base).left, best.left) for e in best.effects}
+    evidence = evidence_of(stage, base, best)
     if not all(null.exceeded(effected, over, stage.healthy_rms) for effected, over in evidence.items()):
         return of_axis
     best, alike = with_certain(stage, base, best, null)
     evidence = {e: over for e, over in evidence.items() if e in best.effects}
     again = judged(Explained(stage, base, best, of_axis.explained.tried, rivals, evidence, alike=alike))
     return of_axis if again.verdict is Verdict.UNKNOWN else again
-
-
-def _without(stage: Stage, best: Fitted, effected: Effected, base: Fitted) -> Fitted:
-    return dropped(stage, best, effected) if len(best.effects) > 1 else base
