@@ -109,6 +109,7 @@ def _given(folder: Path, diagnose: Diagnose, question: Question, answer: Answer)
 
 
 def _closure(question: Question, answer: Answer, twin_text: str) -> float | None:
+    """Return the closure on the runs that no diagnosis had; 0 where the twin cannot even run them, None where none was asked."""
     if not twin_text or not answer.effects:
         return None
     try:

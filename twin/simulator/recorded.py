@@ -1,5 +1,6 @@
 """The twin's inputs from a recorded run: those of the response, the states it starts from, the noise of its sensors."""
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -137,17 +138,26 @@ def start_temperature_c(t_s: Floats, temperature_c: Floats) -> float:
     return float(np.polyfit(t_s[first] - t_s[0], temperature_c[first], 1)[1])
 
 
-def white_noise(values: Floats) -> float:
-    """Standard deviation of the white part of a smooth signal: from its second differences, robustly.
+MEDIAN_TO_SIGMA = 1.482602218505602
+
+
+def white_noise(values: Floats, order: int = 2, step: int = 1) -> float:
+    """Return the standard deviation of the white part of a smooth signal, (n,): from its differences, robustly.
+
+    order: of the differences; fourth ones have hardly any of a motion in them; step: samples over which they are taken
 
     >>> noisy = np.random.default_rng(1).standard_normal(20000) + np.linspace(0.0, 100.0, 20000)
     >>> bool(abs(white_noise(noisy) - 1.0) < 0.05)
     True
     """
-    second = np.diff(values[np.isfinite(values)], 2)
-    if not len(second):
+    differences = values[np.isfinite(values)] if step == 1 else values
+    for _ in range(order):
+        differences = differences[step:] - differences[:-step]
+    differences = differences[np.isfinite(differences)]
+    if not len(differences):
         return 0.0
-    return float(np.median(np.abs(second - np.median(second))) * 1.482602218505602 / np.sqrt(6.0))
+    spread = float(np.median(np.abs(differences - np.median(differences))))
+    return spread * MEDIAN_TO_SIGMA / math.sqrt(math.comb(2 * order, order))
 
 
 def resolution(values: Floats) -> float:

@@ -22,13 +22,11 @@ from twin.gap.stages.axis_run import AxisRunData
 from twin.gap.stages.open_loop.loop import ALIKE_S, Loop, places
 from twin.gap.stages.stage import Model
 from twin.machine import MachineFile
-from twin.simulator.recorded import noise_of
+from twin.simulator.recorded import noise_of, white_noise
 
 Floats = NDArray[np.float64]
 ByRegime = Mapping[int, float]
 APART_S = 3.0 * ALIKE_S
-MEDIAN_TO_SIGMA, MEDIAN_TO_SIGMA_FOURTH = 1.482602218505602 / np.sqrt(6.0), 1.482602218505602 / np.sqrt(70.0)
-"""Factors from the median of differences, second and fourth ones, to the standard deviation of white noise."""
 SAMPLES_MIN = 20
 """Samples of a regime below which its own floor is not known."""
 
@@ -56,7 +54,7 @@ def loop_floors(
         found = _by_regime(differences) if pairs else _by_regime(differences, block)
         return {regime: max(found.get(regime, floors[regime]), floors[regime]) for regime in floors}
     step = max(1, round(APART_S / singles[0][1].period_s))
-    slow = max(_second_differences(residual, step) for residual in left)
+    slow = max(white_noise(residual, step=step) for residual in left)
     return {regime: max(value, slow) for regime, value in floors.items()}
 
 
@@ -71,7 +69,7 @@ def _left(axis: AxisStage, loop: Loop, data: AxisRunData) -> Floats:
 def _known(machine: MachineFile, axis: AxisStage, loop: Loop, run: Run, data: AxisRunData, left: Floats) -> dict[int, float]:
     """Regime → what white noise of the sensors and the timing of samples make of the residual; of all where one is rare."""
     draw = np.random.default_rng([13, ord(axis.letter[0])])
-    sizes = {o: min(noise_of(machine, run.log, f"{axis.letter}_{o}"), _white(v)) for o, v in data.measured.items()}
+    sizes = {o: min(noise_of(machine, run.log, f"{axis.letter}_{o}"), white_noise(v, order=4)) for o, v in data.measured.items()}
     noisy = {output: v + sizes[output] * draw.standard_normal(len(v)) for output, v in data.measured.items()}
     where = places(data)
     by_timing = np.full(len(data.t_s), np.nan)
@@ -98,21 +96,6 @@ def _rms_without_events(values: Floats, block: int) -> float:
     starts = np.arange(0, len(values), block)
     count = np.diff([*starts, len(values)]).astype(np.float64)
     return without_events(np.add.reduceat(values**2, starts) / count, count)
-
-
-def _white(values: Floats) -> float:
-    """Standard deviation of the white part of a signal, robustly, from its fourth differences: a motion has hardly any."""
-    fourth = np.diff(values[np.isfinite(values)], 4)
-    return float(np.median(np.abs(fourth)) * MEDIAN_TO_SIGMA_FOURTH) if len(fourth) else 0.0
-
-
-def _second_differences(values: Floats, step: int) -> float:
-    """Standard deviation of the noise of a series, robustly, over so many samples."""
-    if len(values) <= 2 * step:
-        return 0.0
-    second = values[: -2 * step] - 2.0 * values[step:-step] + values[2 * step :]
-    second = second[np.isfinite(second)]
-    return float(np.median(np.abs(second)) * MEDIAN_TO_SIGMA) if len(second) else 0.0
 
 
 def _rms(values: Floats) -> float:
