@@ -15,7 +15,7 @@ SMALLEST, LARGEST = 0.6, 33.0
 LINES = (
     ("single_right", "a single effect: named right", "#1b6ca8", -6.0),
     ("single_wrong", "a single effect: a wrong name", "#c1272d", -2.0),
-    ("outside_told", "outside the catalogue: called so, or taken up and said so", "#3a7d44", 2.0),
+    ("outside_told", "outside the catalogue: called so, or taken up", "#3a7d44", 2.0),
     ("pair_both", "a pair: both right", "#8a6d00", 6.0),
 )
 """Score, title, colour, and by how many pixels its points stand aside, so that intervals do not cover each other."""
