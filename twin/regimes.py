@@ -86,4 +86,5 @@ def motion_stretches(t_s: NDArray[np.float64], reference_mm: NDArray[np.float64]
     before, after = round(REST_BEFORE_S / period_s), round(REST_AFTER_S / period_s)
     breaks = np.flatnonzero(np.diff(moving) > before + after)
     firsts, lasts = moving[np.concatenate([[0], breaks + 1])], moving[np.concatenate([breaks, [len(moving) - 1]])]
-    return tuple(slice(max(0, int(f) - before), int(last) + after) for f, last in zip(firsts, lasts, strict=True))
+    ends = np.minimum(lasts + after, len(t_s))
+    return tuple(slice(max(0, int(first) - before), int(end)) for first, end in zip(firsts, ends, strict=True))

@@ -42,7 +42,9 @@ def _at_stops(stage: AxisStage, found: Fitted, number: int) -> Floats:
     measured, least = run.measured[TORQUE], SPREAD * float(np.nanmin(run.floor[TORQUE]))
     away, end = [], 0
     for stretch in run.stretches():
-        end += len(run.t_s[stretch])
-        known = measured[max(stretch.stop - count, 0) : stretch.stop]
-        away.append((np.mean(known) - np.mean(shown[max(end - count, 0) : end])) / least)
+        end += stretch.stop - stretch.start
+        if np.ptp(run.reference_mm[max(stretch.stop - count - 1, 0) : stretch.stop]) > 0.0:
+            continue  # the recording ends while the axis moves
+        known = measured[stretch.stop - count : stretch.stop]
+        away.append((np.mean(known) - np.mean(shown[end - count : end])) / least)
     return np.asarray([a for a in away if np.isfinite(a)])

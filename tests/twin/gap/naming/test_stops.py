@@ -11,6 +11,7 @@ from twin.gap.fitting import fitted
 from twin.gap.naming.stops import stops_are_at_odds
 from twin.gap.search import Explained
 from twin.gap.stages.axis import AxisStage
+from twin.gap.stages.axis_run import AxisRunData
 from twin.gap.stages.stage import Model
 from twin.gap.verdict import judged
 
@@ -45,3 +46,17 @@ def test_a_brake_shows_in_the_torque_at_the_stops() -> None:
 def test_a_stage_that_is_no_axis_has_no_stops() -> None:
     stage = OneLine()
     assert not stops_are_at_odds(stage, fitted(stage, Model(stage.constants, ()), np.zeros(1)))
+
+
+def test_a_recording_that_ends_in_motion_does_not_stop_there() -> None:
+    stage = healthy_stage()
+    cut = replace(stage, runs=tuple(cut_in_motion(run) for run in stage.runs))
+    assert not stops_are_at_odds(cut, refitted(cut))
+
+
+def cut_in_motion(run: AxisRunData) -> AxisRunData:
+    """The same until 0.1 s before it comes to rest for the last time."""
+    end = run.stretches()[-1].stop - RESTING - 100
+    measured, floor = ({name: values[:end] for name, values in whole.items()} for whole in (run.measured, run.floor))
+    known = replace(run, t_s=run.t_s[:end], reference_mm=run.reference_mm[:end], regime=run.regime[:end], measured=measured)
+    return replace(known, floor=floor, around={}, others={})
