@@ -101,19 +101,24 @@ class Judged:
         return not (self.names or self.unknown or self.taken_up)
 
     @property
+    def described(self) -> tuple[GivenTerm, ...]:
+        """The learned terms, but for those that describe the other structure of a controller."""
+        of_structure = {on for _, on in self.structure}
+        return tuple(t for t in self.given.learned if not (t.site == "controller" and t.on in of_structure))
+
+    @property
     def site_right(self) -> bool:
         """The learned term that closes most acts where one of the effects does."""
-        return any(self.given.learned and _acts_at(effect, self.given.learned[0]) for effect in self.answer.effects)
+        return any(_acts_at(effect, term) for effect in self.answer.effects for term in self.described[:1])
 
     @property
     def variables_right(self) -> bool:
         """It depends on what the effect depends on as well."""
-        terms = self.given.learned[:1]
         return any(
             term.depends_on == one.depends_on and term.site == one.site and _acts_at(effect, term)
             for effect in self.answer.effects
             for one in effect.acts_at
-            for term in terms
+            for term in self.described[:1]
         )
 
     def covered(self) -> tuple[bool, ...]:

@@ -21,7 +21,7 @@ def first_guesses(recorded: Recorded) -> Guesses:
     return tuple({"delay_s": min(periods * recorded.period_s, LONGEST_S)} for periods in (0.5, 2.0, 8.0, 30.0))
 
 
-LONGEST_S = 60.0
+LONGEST_S = 300.0
 
 EFFECT = Effect(
     name="sensor_delay",

@@ -22,6 +22,8 @@ class Null:
 
     closes, closes_any: decrease of a signal's mean square, in floors², of one candidate, of any other
     share_least: part of what is above the floor there that has to be taken away; sigmas: of the advantage
+    much_share, much_closes, much_sigmas: share of a large gap, in floors², that may be taken away less surely: it may lie in few
+        blocks, which differ
     sigmas_spread: standard deviation of those on healthy machines; rms_typical: what a healthy twin leaves of a signal, in floors
     """
 
@@ -29,6 +31,9 @@ class Null:
     closes_any: float = 0.35
     share_least: float = 0.05
     sigmas: float = 3.0
+    much_share: float = 0.8
+    much_closes: float = 10.0
+    much_sigmas: float = 2.0
     sigmas_spread: float = 1.5
     rms_typical: float = 1.1
 
@@ -45,7 +50,9 @@ class Null:
 
     def _exceeded(self, closes: float, over: Advantage, healthy_rms: float) -> bool:
         rough = max((healthy_rms**2 - 1.0) / (SMOOTH**2 - 1.0), 1.0)
-        return over.sigmas > self.sigmas and over.closes > closes * rough and over.share > self.share_least
+        much = over.share > self.much_share and over.closes > self.much_closes * rough
+        surely = over.sigmas > (self.much_sigmas if much else self.sigmas)
+        return surely and over.closes > closes * rough and over.share > self.share_least
 
     def p_value(self, over: Advantage) -> float:
         """Of a healthy machine showing so much: one-sided, with the spread that healthy machines have."""

@@ -39,6 +39,8 @@ SWAPPED_WITH = 3
 SWAP_SIGMAS = 2.0
 CHANCE = 6.0
 """Floors², summed over the judged samples, that have to tell one hypothesis from another: a likelihood ratio of 20."""
+HARDLY = 0.1
+"""Floors² in a signal by which no twin is better than another one: no machine is quite the catalogue's equation."""
 THETA_NULL = 1e-4
 """θ below which an effect is null: the fit has taken it away."""
 PAIR_GAP = 3.0
@@ -118,7 +120,8 @@ def explain(
         rivals[chosen.effected] = equals
         best = _pruned(stage, settled_with, null)
         if len(best.effects) > 1:
-            best = _swapped(stage, best, first)
+            best, as_good = _swapped(stage, best, first)
+            rivals |= {e: tuple(dict.fromkeys((*rivals.get(e, ()), *others))) for e, others in as_good.items()}
     beyond = not best.effects and has_to_be_beyond(stage, base)
     if beyond and (instead := instead_of_constants(stage, base)):
         best, beyond = instead[0], False
@@ -248,14 +251,20 @@ def _chosen(accepted: list[Tried], tried: tuple[Tried, ...]) -> tuple[Tried, tup
     half = 0.5 * best.over.closes
     equals = [t for t in accepted if t.found is not None and (t is best or _equal(t.found, best.found))]
     chosen = min(equals, key=_plainness)
+    nearly = [t for t in accepted if t not in equals and t.found is not None and _as_a_healthy_twin_may(t.found, best.found)]
     beside = [t for t in tried if t not in accepted and t.found is not None and t.over is not None and t.over.closes > half]
-    equals += [t for t in beside if t.found is not None and _within_chance(t.found, best.found)]
+    equals += [*nearly, *(t for t in beside if t.found is not None and _within_chance(t.found, best.found))]
     return chosen, tuple(t.effected for t in sorted(equals, key=_plainness) if t is not chosen)
 
 
 def _equal(one: Fitted, best: Fitted) -> bool:
     over = advantage(one.left, best.left)
     return _within_chance(one, best) or over.gain < min(max(2.0 * over.error, 0.02), 0.25)
+
+
+def _as_a_healthy_twin_may(one: Fitted, best: Fitted) -> bool:
+    """Return True where a hypothesis leaves hardly more than another one, by what the twin of a healthy machine may leave."""
+    return advantage(one.left, best.left).closes < HARDLY
 
 
 def _within_chance(one: Fitted, best: Fitted) -> bool:
@@ -289,13 +298,14 @@ def _pair(stage: Stage, parent: Fitted, tried: tuple[Tried, ...], null: Null) ->
     return best if all(null.exceeded(e, over, stage.healthy_rms) for e in best.effects) else None
 
 
-def _swapped(stage: Stage, best: Fitted, first: tuple[Tried, ...]) -> Fitted:
+def _swapped(stage: Stage, best: Fitted, first: tuple[Tried, ...]) -> tuple[Fitted, dict[Effected, tuple[Effected, ...]]]:
     """With one of its effects replaced by another one that was good alone, where that is better.
 
-    The first that was taken may have been the best single likeness of two.
+    The first that was taken may have been the best single likeness of two. With it: effect → those that are as good in its place.
     """
     others = [t for t in first if t.found is not None and t.effected not in best.effects][:SWAPPED_WITH]
     scale = np.maximum(best.left_fit.rms(), 1.0)
+    as_good: dict[Effected, tuple[Effected, ...]] = {}
     for effected in best.effects[:-1]:
         for other in others:
             assert other.found is not None
@@ -305,9 +315,13 @@ def _swapped(stage: Stage, best: Fitted, first: tuple[Tried, ...]) -> Fitted:
             own = other.found.theta[dict(other.found.model.places())[other.effected]]  # it may stand on top of known effects
             found = fitted(stage, model, np.concatenate([kept, own]), scale=scale, steps_max=STEPS_FIRST)
             over = advantage(best.left, found.left)
-            if over.sigmas > SWAP_SIGMAS and over.closes > 0.0 and _is_not_null(found, other.effected):
-                return settled(stage, found, rounds=1)
-    return best
+            if not _is_not_null(found, other.effected):
+                continue
+            if over.sigmas > SWAP_SIGMAS and over.closes > 0.0:
+                return settled(stage, found, rounds=1), {}
+            if _equal(found, best) or _as_a_healthy_twin_may(found, best):
+                as_good[effected] = (*as_good.get(effected, ()), other.effected)
+    return best, as_good
 
 
 def _pruned(stage: Stage, best: Fitted, null: Null) -> Fitted:

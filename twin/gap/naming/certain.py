@@ -7,7 +7,8 @@ term F at a site where it could mimic E in place of E, M_EF with both. E is cert
 * it is not much behind F, and all effects together close most of the stage and next to all where they act; or
 * beside F it takes away most of what it takes alone, surely, and leaves next to nothing where it acts then (M_F → M_EF).
 
-An effect that is only the next best shape of the true one leaves a part in the same places, and a free-form term does better.
+An effect that is only the next best shape of the true one leaves a part in the same places, and a free-form term does better. One
+of a sensor changes all that its signal shows, and so fits a little of anything: it must not be surely behind F at all.
 """
 
 import numpy as np
@@ -68,7 +69,10 @@ def _is_certain(stage: Stage, base: Fitted, best: Fitted, effected: Effected, mo
         return most
     shaped = free_form(stage, parent, sites=MIMICS.get(effect_named(effected.effect).site), null=null)
     behind = max((above(parent.left) - above(one.found.left) for one in shaped), default=0.0)
-    if (clean and taken >= AS_WELL * behind) or (most and taken >= NEARLY * behind):
+    if effect_named(effected.effect).is_of_measurement:
+        if clean and not any(advantage(best.left, one.found.left).sigmas > SIGMAS for one in shaped):
+            return True
+    elif (clean and taken >= AS_WELL * behind) or (most and taken >= NEARLY * behind):
         return True
     return bool(shaped) and all(_takes_its_own(stage, best, one.found, effected, taken, null) for one in shaped[:COMPETITORS])
 

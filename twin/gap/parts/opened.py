@@ -14,6 +14,7 @@ from twin.gap.diagnosis import Effected, Verdict
 from twin.gap.evidence import evidence_of
 from twin.gap.fitting import fitted, settled, without_effect
 from twin.gap.labels import AXIS
+from twin.gap.naming.certain import NAMED_MIN, closed_part
 from twin.gap.null import NULL, Null
 from twin.gap.search import Explained, explain, with_certain, without
 from twin.gap.stages.axis import AxisStage
@@ -45,14 +46,36 @@ class Opened:
         if self.closed is None:
             return True
         controller = self.loops.get("controller")
-        if self.closed.verdict in SETTLED or controller is None or controller.verdict in SETTLED:
+        if self.closed.verdict is Verdict.HEALTHY:
+            return self._hides
+        if self.closed.verdict in SETTLED or controller is None:
             return False
-        return self.closed.verdict is Verdict.UNKNOWN or self.closed.explained.best.left.gap() > FAR
+        if self._says_more:
+            return True
+        unknown = self.closed.verdict is Verdict.UNKNOWN or self.closed.explained.best.left.gap() > FAR
+        return unknown and controller.verdict not in SETTLED
+
+    @property
+    def _hides(self) -> bool:
+        """Return True where mechanics or table alone show a gap that the control holds down, so that the closed loop does not."""
+        return any(self.loops[name].verdict is not Verdict.HEALTHY for name in ON_TOP_OF if name in self.loops)
+
+    @property
+    def _says_more(self) -> bool:
+        """Return True where an open loop is explained by effects that the closed one has not got."""
+        known = self.closed.explained.best.effects if self.closed is not None else ()
+        named = {e for loop in self.loops.values() if loop.verdict is Verdict.EXPLAINED for e in loop.explained.best.effects}
+        return bool(named - set(known))
 
     @property
     def judged(self) -> tuple[Judged, ...]:
-        """The open loops as they stand in place of the closed one: a controller that is another one has no named cause."""
-        return tuple(_unnamed(loop) if name == "controller" else loop for name, loop in self.loops.items())
+        """The open loops as they stand in place of the closed one: a controller that is another one has no named cause, but for
+        those that the closed loop confirms."""
+        known = set(self.closed.explained.best.effects) if self.closed is not None else set[Effected]()
+        confirmed = {name for name, loop in self.loops.items() if known.issuperset(loop.explained.best.effects)}
+        return tuple(
+            _unnamed(loop) if name == "controller" and name not in confirmed else loop for name, loop in self.loops.items()
+        )
 
     @property
     def floors(self) -> dict[tuple[str, str], float]:
@@ -111,20 +134,24 @@ def combined(
             return _carried_over(stage, of_axis.explained)  # it has been looked at, and is another one
         if of_axis is None or of_axis.verdict not in SETTLED:
             return _without_trifles(explain(stage, null=null, progress=progress))
-        return _carried_over(stage, of_axis.explained)
+        carried = _carried_over(stage, of_axis.explained)
+        if of_axis.verdict is Verdict.HEALTHY and stage.loop.name in ON_TOP_OF and judged(carried).verdict is Verdict.UNKNOWN:
+            return _if_most(_without_trifles(explain(stage, null=null, progress=progress)))
+        return carried
 
     by_axis: dict[str, dict[str, Judged]] = {}
     for loop, answer in zip(loops, side_by_side(explained, loops), strict=True):
         by_axis.setdefault(loop.letter, {})[loop.loop.name] = judged(answer)
     opened = tuple(Opened(letter, closed[letter], own) for letter, own in by_axis.items())
     stages = [s for s in found if not isinstance(s.explained.stage, AxisStage)]
+    axes_by_letter = {axis.letter: _confirmed(axis, null) for axis in opened}
     for letter, of_axis in closed.items():
-        here = next((axis for axis in opened if axis.letter == letter), None)
+        here = axes_by_letter.get(letter)
         if here is not None and here.decides:
             stages += here.judged
         elif of_axis is not None:
-            stages.append(of_axis if here is None else _confirmed(of_axis, here, null))
-    return Combined(stages, opened)
+            stages.append(of_axis if here is None or here.closed is None else here.closed)
+    return Combined(stages, tuple(axes_by_letter.values()))
 
 
 def _unnamed(loop: Judged) -> Judged:
@@ -135,7 +162,14 @@ def _unnamed(loop: Judged) -> Judged:
 
 def _note(axis: Opened) -> str:
     compared = " and ".join(name for name in axis.loops if name in ON_TOP_OF) or "nothing"
-    why = "its reference was not recorded" if axis.closed is None else "its controller is another one than the twin's"
+    controller = axis.loops.get("controller")
+    why = "its closed loop is not explained as a whole"
+    if axis.closed is None:
+        why = "its reference was not recorded"
+    elif axis.closed.verdict is Verdict.HEALTHY:
+        why = "its control holds the gap down, so that its closed loop hardly shows it"
+    elif controller is None or controller.verdict not in SETTLED:
+        why = "its controller is another one than the twin's"
     return f"axis {axis.letter}: {why}; {compared} compared alone, driven by what was measured"
 
 
@@ -153,6 +187,13 @@ def _carried_over(stage: OpenStage, closed: Explained) -> Explained:
     return Explained(stage, base, best, (), {}, {})
 
 
+def _if_most(explained: Explained) -> Explained:
+    """The same with no effect, where they all take only a part of a gap that the closed loop does not show."""
+    if closed_part(explained.base.left, explained.best.left) >= NAMED_MIN:
+        return explained
+    return replace(without(explained), alike=explained.best.effects or explained.alike)
+
+
 def _without_trifles(explained: Explained) -> Explained:
     """The same without effects that take next to nothing of a gap of which something stays: they are shapes of what is left."""
     stage, best, reducible = explained.stage, explained.best, explained.base.left.gap() ** 2 - 1.0
@@ -167,26 +208,27 @@ def _without_trifles(explained: Explained) -> Explained:
     return replace(explained, best=best, rivals=rivals, evidence={e: a for e, a in explained.evidence.items() if e in kept})
 
 
-def _confirmed(of_axis: Judged, opened: Opened, null: Null) -> Judged:
-    """The closed loop with what its open loops have found, where it has no answer of its own and they hold in it."""
-    if of_axis.verdict is not Verdict.UNKNOWN:
-        return of_axis
-    stage, base = of_axis.explained.stage, of_axis.explained.base
-    model, theta = base.model, base.theta
-    rivals: dict[Effected, tuple[Effected, ...]] = {}
+def _confirmed(opened: Opened, null: Null) -> Opened:
+    """The axis with its closed loop as its open loops complete it, where it leaves a gap and what they have found holds in it."""
+    if opened.closed is None or opened.closed.verdict in SETTLED:
+        return opened
+    closed = opened.closed.explained
+    stage, model, theta = closed.stage, closed.best.model, closed.best.theta
+    rivals = dict(closed.rivals)
     for loop in opened.loops.values():
         best = loop.explained.best
         for effected, place in best.model.places():
             if effected in stage.candidates and effected not in model.effects:
                 model, theta = model.with_effect(effected), np.concatenate([theta, best.theta[place]])
                 rivals[effected] = loop.explained.rivals.get(effected, ())
-    if not model.effects:
-        return of_axis
+    if model.effects == closed.best.effects:
+        return opened
     best = settled(stage, fitted(stage, model, theta), rounds=1)
-    evidence = evidence_of(stage, base, best)
+    evidence = evidence_of(stage, closed.base, best)
     if not all(null.exceeded(effected, over, stage.healthy_rms) for effected, over in evidence.items()):
-        return of_axis
-    best, alike = with_certain(stage, base, best, null)
+        return opened
+    best, alike = with_certain(stage, closed.base, best, null)
+    if len(best.effects) <= len(closed.best.effects):
+        return opened
     evidence = {e: over for e, over in evidence.items() if e in best.effects}
-    again = judged(Explained(stage, base, best, of_axis.explained.tried, rivals, evidence, alike=alike))
-    return of_axis if again.verdict is Verdict.UNKNOWN else again
+    return replace(opened, closed=judged(replace(closed, best=best, rivals=rivals, evidence=evidence, alike=alike)))
