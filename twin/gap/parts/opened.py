@@ -231,4 +231,5 @@ def _confirmed(opened: Opened, null: Null) -> Opened:
     if len(best.effects) <= len(closed.best.effects):
         return opened
     evidence = {e: over for e, over in evidence.items() if e in best.effects}
-    return replace(opened, closed=judged(replace(closed, best=best, rivals=rivals, evidence=evidence, alike=alike)))
+    complete = Explained(stage, closed.base, best, closed.tried, rivals, evidence, alike=alike, notes=closed.notes)
+    return replace(opened, closed=judged(complete))
