@@ -176,6 +176,14 @@ def learned(site: str, on: str, *depends_on: str, closure: float = 0.9) -> Given
     return GivenTerm(site, on, frozenset(depends_on), closure)
 
 
+def test_a_term_for_the_structure_of_the_controller_is_not_the_one_that_is_asked_for() -> None:
+    one = with_another_controller([cause(STRUCTURE)], {}, Sort.OUTSIDE)
+    terms = (learned("controller", "x", "velocity"), learned("axis_force", "z", "position"))
+    assert Judged(one.answer, replace(one.given, learned=terms)).variables_right
+    other = Judged(one.answer, replace(one.given, learned=(replace(terms[0], on="y"), terms[1])))
+    assert not other.site_right
+
+
 @pytest.mark.parametrize(
     ("effect", "term", "site", "variables"),
     [

@@ -178,6 +178,15 @@ def shared_case(name: str) -> Case:
     return read_case(folder)
 
 
+def test_a_second_effect_of_a_sensor_stands_in_one_class_with_what_shows_the_same() -> None:
+    late = AddedEffect(effect="sensor_lag", on="spindle_temp_c", parameters={"time_constant_s": 60.0})
+    steep = AddedEffect(effect="sensor_scale", on="spindle_temp_c", parameters={"scale": 1.02})
+    found = diagnose(warm_case(late, steep)).diagnosis
+    classes = {c.effect: {c.effect, *(other.effect for other in c.indistinguishable_from)} for c in found.causes}
+    assert "sensor_lag" in classes
+    assert {"sensor_scale", "sensor_bias"} in classes.values()
+
+
 @pytest.mark.parametrize("name", ["case_13", "case_14", "case_15"])
 def test_the_heat_of_an_independent_machine_is_named_right(name: str) -> None:
     case = shared_case(name)

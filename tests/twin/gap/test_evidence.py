@@ -66,3 +66,14 @@ def test_an_effect_has_to_close_more_than_on_a_healthy_machine() -> None:
     assert null.exceeded(Effected("payload", "z"), sure)
     assert not null.exceeded(Effected("payload", "z"), Advantage(gain=0.1, error=0.05, closes=0.5, share=0.5))
     assert null.p_value(sure) < null.p_value(Advantage(0.1, 0.05, 0.5, 0.5)) < 0.5
+
+
+@pytest.mark.parametrize(
+    ("closes", "share", "sigmas", "helps"),
+    [(120.0, 0.9, 2.1, True), (120.0, 0.9, 1.9, False), (120.0, 0.5, 2.1, False), (5.0, 0.9, 2.1, False), (5.0, 0.9, 3.1, True)],
+)
+def test_what_takes_away_nearly_all_of_a_large_gap_may_do_so_less_surely(
+    closes: float, share: float, sigmas: float, helps: bool
+) -> None:
+    over = Advantage(gain=sigmas, error=1.0, closes=closes, share=share)
+    assert Null().exceeded(Effected("viscous_warmup", "z"), over) is helps
