@@ -29,6 +29,8 @@ FAR = 30.0
 STEPS_MAX = 5
 TRIFLE = 0.02
 """Part of the gap of an open loop below which an effect is no cause, where the loop is not explained."""
+MOST = 0.9
+"""Part of the gap of an open loop that its effects have to close to stand beside those of a closed loop."""
 SETTLED = {Verdict.HEALTHY, Verdict.EXPLAINED}
 
 
@@ -217,6 +219,8 @@ def _confirmed(opened: Opened, null: Null) -> Opened:
     rivals = dict(closed.rivals)
     for loop in opened.loops.values():
         best = loop.explained.best
+        if closed.best.effects and closed_part(loop.explained.base.left, best.left) < MOST:
+            continue
         for effected, place in best.model.places():
             if effected in stage.candidates and effected not in model.effects:
                 model, theta = model.with_effect(effected), np.concatenate([theta, best.theta[place]])
