@@ -48,7 +48,7 @@ class Opened:
         if self.closed is None:
             return True
         controller = self.loops.get("controller")
-        if self.closed.verdict is Verdict.HEALTHY:
+        if _names_nothing(self.closed):
             return self._hides
         if self.closed.verdict in SETTLED or controller is None:
             return False
@@ -137,7 +137,7 @@ def combined(
         if of_axis is None or of_axis.verdict not in SETTLED:
             return _without_trifles(explain(stage, null=null, progress=progress))
         carried = _carried_over(stage, of_axis.explained)
-        if of_axis.verdict is Verdict.HEALTHY and stage.loop.name in ON_TOP_OF and judged(carried).verdict is Verdict.UNKNOWN:
+        if _names_nothing(of_axis) and stage.loop.name in ON_TOP_OF and judged(carried).verdict is Verdict.UNKNOWN:
             return _if_most(_without_trifles(explain(stage, null=null, progress=progress)))
         return carried
 
@@ -156,6 +156,11 @@ def combined(
     return Combined(stages, tuple(axes_by_letter.values()))
 
 
+def _names_nothing(closed: Judged) -> bool:
+    """Return True where a closed loop is as told, or its constants explain it."""
+    return closed.verdict in SETTLED and not closed.explained.best.effects
+
+
 def _unnamed(loop: Judged) -> Judged:
     if loop.verdict in SETTLED:
         return loop
@@ -168,7 +173,7 @@ def _note(axis: Opened) -> str:
     why = "its closed loop is not explained as a whole"
     if axis.closed is None:
         why = "its reference was not recorded"
-    elif axis.closed.verdict is Verdict.HEALTHY:
+    elif _names_nothing(axis.closed):
         why = "its control holds the gap down, so that its closed loop hardly shows it"
     elif controller is None or controller.verdict not in SETTLED:
         why = "its controller is another one than the twin's"
