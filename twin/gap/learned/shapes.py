@@ -59,7 +59,8 @@ def shapes_of(stage: Learnable, sites: Collection[LearnedSite] | None = None) ->
     ranges = {
         column: (min(lows), max(highs))
         for column in seen[0]
-        if (values := [a[column][np.isfinite(a[column])] for a in seen if column in a])
+        if all(column in one for one in seen)  # a term is simulated in every run
+        and (values := [one[column][np.isfinite(one[column])] for one in seen])
         and (lows := [float(v.min()) for v in values if len(v)])
         and (highs := [float(v.max()) for v in values if len(v)])
         and max(highs) - min(lows) > FLAT

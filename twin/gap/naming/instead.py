@@ -1,8 +1,9 @@
 """Effects that explain what constants far from their stated values explain, and let them be near those again.
 
 An effect is taken where it follows the unseen runs as well, puts back more constants than it has parameters of its own, and is
-clearly the cheaper: Σ (θ / σ)² of the constants falls by more than chance and its parameters are worth. An effect that only does
-what one constant does (a coefficient, a mass) is no better an explanation than that constant.
+clearly the cheaper: Σ (θ / σ)² of the constants falls by more than chance and its parameters are worth. It has to be there for
+sure: one whose size may as well be nothing explains nothing. An effect that only does what one constant does (a coefficient, a
+mass) is no better an explanation than that constant.
 """
 
 import numpy as np
@@ -20,6 +21,8 @@ CHEAPER = 9.0
 PUT_BACK = 1.0
 """Stated deviations within which a constant is back."""
 AS_WELL = 0.02
+SURE = 2.0
+"""Standard errors by which a size of the effect has to differ from nothing."""
 STEPS_MAX = 14
 
 
@@ -45,7 +48,14 @@ def _is_better(one: Fitted, base: Fitted) -> bool:
     own = len(effect_named(one.effects[0].effect).parameters)
     back = _away(base) - _away(one)
     as_well = over.gain < max(2.0 * over.error, AS_WELL)
-    return as_well and back > own and cost(base) - cost(one) > CHEAPER + 2.0 * own
+    return as_well and back > own and cost(base) - cost(one) > CHEAPER + 2.0 * own and _is_surely_there(one)
+
+
+def _is_surely_there(found: Fitted) -> bool:
+    place = dict(found.model.places())[found.effects[0]]
+    sizes = [i for i in range(place.start, place.stop) if not (found.model.free[i].is_shape or found.model.free[i].is_angle)]
+    errors = np.sqrt(np.diagonal(found.covariance)[sizes])
+    return bool((np.abs(found.theta[sizes]) > SURE * errors).any())
 
 
 def _away(found: Fitted) -> int:

@@ -41,6 +41,16 @@ def test_an_effect_that_puts_several_constants_back_is_taken_instead() -> None:
     assert explain(stage).best.effects == (SCALE,)
 
 
+def test_an_effect_that_may_as_well_be_nothing_is_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    stage = Lifted(slope=1.15, bias=1.15 * OFFSET, candidates=(SCALE,))
+    model = Model(stage.constants, ())
+    base = fitted(stage, model, model.null_theta())
+    (found,) = instead_of_constants(stage, base)
+    sure = float(found.theta[-1] / np.sqrt(found.covariance[-1, -1]))
+    monkeypatch.setattr("twin.gap.naming.instead.SURE", 1.1 * sure)
+    assert instead_of_constants(stage, base) == ()
+
+
 def test_an_effect_that_does_what_one_constant_does_is_no_better() -> None:
     stage = OneLine(slope=1.15, candidates=(SCALE,))
     model = Model(stage.constants, ())
