@@ -125,7 +125,8 @@ class Judged:
         """For each parameter of a rightly named single effect that is said to be identifiable: does its 90 % interval hold it?"""
         if not (self.answer.sort is Sort.SINGLE and self.right):
             return ()
-        truth, cause = self.answer.effects[0], self.given.causes[0]
+        truth = self.answer.effects[0]
+        cause = next(cause for cause in self.given.causes if cause.named == (truth.effect, truth.on))
         known = [name for name in truth.exact if name in cause.intervals]
         known = [name for name in known if not any(name in sentence for sentence in self.given.not_identifiable)]
         return tuple(_within(truth, name, *cause.intervals[name]) for name in known)
