@@ -46,10 +46,8 @@ def nulls(it: EdgePairing, patience_s: float) -> None:
     """A null in the birth, a value, and a null in data."""
     name = NOTHING["name"]
     assert it.device.readings[name].value is None
-    it.tell(do="data", metrics=[{**NOTHING, "value": "5"}])
-    it.until(lambda: it.device.readings[name].value == 5, patience_s)
-    it.tell(do="data", metrics=[NOTHING])
-    it.until(lambda: it.device.readings[name].value is None, patience_s)
+    it.data({**NOTHING, "value": "5"}, lambda: it.device.readings[name].value == 5, patience_s)
+    it.data(NOTHING, lambda: it.device.readings[name].value is None, patience_s)
 
 
 def units(it: EdgePairing, _patience_s: float) -> None:
@@ -70,8 +68,7 @@ def dated(it: EdgePairing, _patience_s: float) -> None:
 
 def unretained(it: EdgePairing, patience_s: float) -> None:
     """Births and data go with QoS 0, not retained."""
-    it.tell(do="data", metrics=[{**PART, "value": "12"}])
-    it.until(lambda: it.device.readings["part"].value == 12, patience_s)
+    it.data({**PART, "value": "12"}, lambda: it.device.readings["part"].value == 12, patience_s)
     packets = [packet for verb in (Verb.NBIRTH, Verb.DBIRTH, Verb.DDATA) for packet, _ in it.sent(verb)]
     wrong = sorted(
         {f"{Topic.parse(packet.topic).verb.name} with QoS {packet.qos}" for packet in packets if packet.qos or packet.retain}
@@ -81,8 +78,7 @@ def unretained(it: EdgePairing, patience_s: float) -> None:
 
 def aliases(it: EdgePairing, patience_s: float) -> None:
     """Data by alias, without the name."""
-    it.tell(do="data", metrics=[{**PART, "value": "4711"}])
-    it.until(lambda: it.device.readings["part"].value == 4711, patience_s)
+    it.data({**PART, "value": "4711"}, lambda: it.device.readings["part"].value == 4711, patience_s)
     (*_, (_, data)) = it.sent(Verb.DDATA)
     (metric,) = data.metrics
     assert metric.alias is not None and metric.name is None
@@ -92,8 +88,7 @@ def shared(it: EdgePairing, patience_s: float) -> None:
     """A metric of the node and one of the device with the same name are two."""
     picture = it.host.picture(it.node)
     assert picture is not None and picture.own.readings["part"].value == -1
-    it.tell(do="data", metrics=[{**PART, "value": "815"}])
-    it.until(lambda: it.device.readings["part"].value == 815, patience_s)
+    it.data({**PART, "value": "815"}, lambda: it.device.readings["part"].value == 815, patience_s)
     assert picture.own.readings["part"].value == -1
     births = [payload for verb in (Verb.NBIRTH, Verb.DBIRTH) for _, payload in it.sent(verb)[-1:]]
     known = [
@@ -104,8 +99,7 @@ def shared(it: EdgePairing, patience_s: float) -> None:
 
 def names(it: EdgePairing, patience_s: float) -> None:
     """Data by name."""
-    it.tell(do="data", metrics=[{**BY_NAME, "value": "2.25"}])
-    it.until(lambda: it.device.readings["by name"].value == 2.25, patience_s)
+    it.data({**BY_NAME, "value": "2.25"}, lambda: it.device.readings["by name"].value == 2.25, patience_s)
     (*_, (_, data)) = it.sent(Verb.DDATA)
     (metric,) = data.metrics
     assert metric.alias is None and metric.name == "by name"
@@ -131,8 +125,7 @@ def devices(it: EdgePairing, patience_s: float) -> None:
     assert not it.dead and it.device.readings["part"].quality is Quality.STALE
     it.tell(do="device birth")
     it.until(lambda: it.born, patience_s)
-    it.tell(do="data", metrics=[{**PART, "value": "3"}])
-    it.until(lambda: it.device.readings["part"].value == 3, patience_s)
+    it.data({**PART, "value": "3"}, lambda: it.device.readings["part"].value == 3, patience_s)
 
 
 def wraps(it: EdgePairing, patience_s: float) -> None:
@@ -184,8 +177,7 @@ def reconnects(it: EdgePairing, patience_s: float) -> None:
     it.until(lambda: it.dead and it.host.online, patience_s)
     it.proxy.accept()
     it.until(lambda: it.born, patience_s)
-    it.tell(do="data", metrics=[{**PART, "value": "31"}])
-    it.until(lambda: it.device.readings["part"].value == 31, patience_s)
+    it.data({**PART, "value": "31"}, lambda: it.device.readings["part"].value == 31, patience_s)
 
 
 def bd_seqs(it: EdgePairing, patience_s: float) -> None:
@@ -226,8 +218,9 @@ def kills(it: EdgePairing, patience_s: float) -> None:
 
 def stops(it: EdgePairing, patience_s: float) -> None:
     """The end by its own will: an NDEATH that our host takes."""
-    it.tell(do="data", metrics=[{**PART, "value": "77"}])
-    it.until(lambda: it.device.readings["part"].value == 77, patience_s)  # it has done what it does after a birth
+    it.data(
+        {**PART, "value": "77"}, lambda: it.device.readings["part"].value == 77, patience_s
+    )  # it has done what it does after a birth
     it.tell(do="stop")
     try:
         it.until(lambda: it.dead, patience_s)

@@ -80,6 +80,23 @@ class EdgePairing(Counterpart):
             assert time.monotonic() < deadline_s, f"in vain; {self.host.counts}, {self.events[-3:]}"
             self.events += self.host.poll(0.05)
 
+    def data(self, metric: Line, shows: Callable[[], bool], timeout_s: float) -> None:
+        """Have the peer send a metric of its device until our host shows it.
+
+        QoS 0: what a peer sends while its connection is lost is lost as well, so it is told again after each birth.
+        """
+        told_at_births = -1
+
+        def is_shown() -> bool:
+            nonlocal told_at_births
+            births = self.host.counts.get("births", 0)
+            if self.born and births != told_at_births:
+                told_at_births = births
+                self.tell(do="data", metrics=[metric])
+            return self.born and shows()
+
+        self.until(is_shown, timeout_s)
+
     def ready(self, timeout_s: float) -> None:
         """Have a peer that runs and is born, whatever came before; our host is there first."""
         self.until(lambda: self.host.online, timeout_s)
