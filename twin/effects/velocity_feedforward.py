@@ -22,7 +22,7 @@ def velocity_command_mm_s(
 
 
 def first_guesses(_: Recorded) -> Guesses:
-    """From a little to nearly the whole: far from the true gain the axis saturates, and a slope leads nowhere."""
+    """Return gains from a little to the whole: far from the true one the axis saturates, and a slope leads nowhere."""
     return tuple({"gain": gain} for gain in (0.05, 0.2, 0.5, 0.8, 1.0))
 
 

@@ -67,7 +67,7 @@ RIPPLE, FORWARD = Effected("torque_ripple", "z"), Effected("velocity_feedforward
 
 
 def part(verdict: Verdict, *effects: Effected) -> Judged:
-    """What was found in a part of an axis."""
+    """Return what was found in a part of an axis."""
     stage = OneLine()
     base = fitted(stage, Model(stage.constants, ()), np.zeros(1))
     best = replace(base, model=Model(stage.constants, effects))
