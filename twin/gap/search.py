@@ -192,9 +192,7 @@ def _accepted(stage: Stage, tried: Tried, null: Null) -> bool:
 
 def _is_not_null(found: Fitted, effected: Effected) -> bool:
     """Return True unless the fit ended where the effect is nothing."""
-    place = dict(found.model.places())[effected]
-    sizes = [i for i in range(place.start, place.stop) if not (found.model.free[i].is_shape or found.model.free[i].is_angle)]
-    moved = bool((np.abs(found.theta[sizes]) > THETA_NULL).any())
+    moved = bool((np.abs(found.theta[found.model.size_places(effected)]) > THETA_NULL).any())
     return moved and not is_nothing(effected, found.values[effected])
 
 

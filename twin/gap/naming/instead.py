@@ -52,8 +52,7 @@ def _is_better(one: Fitted, base: Fitted) -> bool:
 
 
 def _is_surely_there(found: Fitted) -> bool:
-    place = dict(found.model.places())[found.effects[0]]
-    sizes = [i for i in range(place.start, place.stop) if not (found.model.free[i].is_shape or found.model.free[i].is_angle)]
+    sizes = found.model.size_places(found.effects[0])
     errors = np.sqrt(np.diagonal(found.covariance)[sizes])
     return bool((np.abs(found.theta[sizes]) > SURE * errors).any())
 

@@ -144,16 +144,15 @@ def combined(
     by_axis: dict[str, dict[str, Judged]] = {}
     for loop, answer in zip(loops, side_by_side(explained, loops), strict=True):
         by_axis.setdefault(loop.letter, {})[loop.loop.name] = judged(answer)
-    opened = tuple(Opened(letter, closed[letter], own) for letter, own in by_axis.items())
+    opened = {letter: _confirmed(Opened(letter, closed[letter], own), null) for letter, own in by_axis.items()}
     stages = [s for s in found if not isinstance(s.explained.stage, AxisStage)]
-    axes_by_letter = {axis.letter: _confirmed(axis, null) for axis in opened}
     for letter, of_axis in closed.items():
-        here = axes_by_letter.get(letter)
-        if here is not None and here.decides:
+        here = opened.get(letter) or Opened(letter, of_axis, {})
+        if here.decides:
             stages += here.judged
-        elif of_axis is not None:
-            stages.append(of_axis if here is None or here.closed is None else here.closed)
-    return Combined(stages, tuple(axes_by_letter.values()))
+        elif here.closed is not None:
+            stages.append(here.closed)
+    return Combined(stages, tuple(opened.values()))
 
 
 def _names_nothing(closed: Judged) -> bool:

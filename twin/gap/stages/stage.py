@@ -102,6 +102,11 @@ class Model:
             at += count
         return tuple(places)
 
+    def size_places(self, effected: Effected) -> list[int]:
+        """Return the places in θ of an effect's sizes: without them it is nothing, whatever its shapes and angles."""
+        place, free = dict(self.places())[effected], self.free
+        return [i for i in range(place.start, place.stop) if not (free[i].is_shape or free[i].is_angle)]
+
     def term_places(self) -> tuple[tuple[FreeTerm, slice], ...]:
         """Return the places of each learned term's values in θ."""
         at, places = len(self.free) - sum(term.knots.count for term in self.terms), []
