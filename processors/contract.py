@@ -14,6 +14,7 @@ from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 
 from processors.actions import Pin, PlainOutput
 from processors.config import ALL, CellConfig, Configuration, ProcessorConfig
+from processors.description import Description
 from processors.errors import DeclarationError
 from processors.sample import Sample, SampleKind
 from sparkplug.datatype import DataType
@@ -54,6 +55,7 @@ class OutputSpec:
 
     deadband: a number that moved by less than this since it was last published is not published again
     is_alarm: not emitted for history samples: nobody is woken up for yesterday
+    of_challenger: published for a challenger too, as `twin/challenger/…` (processors/description.py)
     """
 
     name: str
@@ -63,6 +65,7 @@ class OutputSpec:
     provenance: Provenance
     deadband: float = 0.0
     is_alarm: bool = False
+    of_challenger: bool = False
 
     def __post_init__(self) -> None:
         if not self.name.startswith(TWIN_PREFIX):
@@ -144,6 +147,8 @@ class _Declaration(Generic[C, S]):
     reads: makes what the step needs of the files that a configuration names, by machine; raises ValueError where it cannot.
         The step is given the whole configuration then, with what was read
     records: whether the runtime hands all that it hears to a recorder, as it comes, before the fold sees it
+    described: makes what the step is given out of what it would be given otherwise and the machine's description, None where
+        nobody has described it. It is called once for each description, and the state goes on
     """
 
     name: str
@@ -157,6 +162,7 @@ class _Declaration(Generic[C, S]):
     reads: Callable[[Configuration[C]], Mapping[str, Any]] | None = None
     alarms: Callable[[], tuple[str, ...]] | None = None
     records: bool = False
+    described: Callable[[Any, Description | None], Any] | None = None
 
     def __post_init__(self) -> None:
         if not is_dataclass(self.state) or not self.state.__dataclass_params__.frozen:  # type: ignore[attr-defined]
@@ -193,11 +199,11 @@ class _Declaration(Generic[C, S]):
 class Processor(_Declaration[C, S]):
     """A fold over what one machine says: a state for each machine, which is its own unit.
 
-    step: takes the values that hold for the machine; with `reads`, the whole configuration
+    step: takes the values that hold for the machine; with `reads`, the whole configuration; with `described`, what that makes
     wakes: signals whose change is folded as it comes; all others are seen at the next tick. None = every change is
     """
 
-    step: Callable[[C, S, Sample], tuple[S, Outputs]] | Callable[[Configuration[C], S, Sample], tuple[S, Outputs]]
+    step: Callable[[Any, S, Sample], tuple[S, Outputs]]
     wakes: frozenset[str] | None = None
     listens: ClassVar[tuple[str, ...]] = ()
     beats: ClassVar[bool] = False
@@ -219,9 +225,10 @@ class Processor(_Declaration[C, S]):
         """The values that hold for the stream of a machine, or the first state of a unit."""
         return configuration.of(machine)
 
-    def given(self, configuration: Configuration[C], unit: str) -> C | Configuration[C]:
-        """The configuration that the step of a unit is given."""
-        return configuration.of(unit) if self.reads is None else configuration
+    def given(self, configuration: Configuration[C], unit: str, description: Description | None = None) -> Any:
+        """Return what the step of a unit is given: the configuration, and what `described` makes of it."""
+        given = configuration.of(unit) if self.reads is None else configuration
+        return given if self.described is None else self.described(given, description)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -258,6 +265,7 @@ class CellProcessor(_Declaration[D, S]):
         """The values that hold for all: the machines of a cell share ticks and times."""
         return configuration.default
 
-    def given(self, configuration: Configuration[D], unit: str) -> Configuration[D]:
-        """The whole configuration, that of each machine at hand."""
+    def given(self, configuration: Configuration[D], unit: str, description: Description | None = None) -> Any:
+        """Return what the step of a cell is given: the whole configuration, that of each machine at hand."""
+        del unit, description
         return configuration

@@ -33,10 +33,14 @@ class Section(BaseModel):
 
 
 class Machine(Section):
-    """[machine]: its name and the period at which position and velocity loop tick."""
+    """[machine]: its name, the period at which position and velocity loop tick, and what of the file is only assumed.
+
+    assumed: sections and constants that nobody has stated or fitted, by path: `thermal`, `spindle.efficiency`
+    """
 
     name: str = Field(min_length=1)
     servo_period_s: Positive = 0.001
+    assumed: tuple[Annotated[str, Field(min_length=1)], ...] = ()
 
 
 class Friction(Section):

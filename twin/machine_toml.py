@@ -23,6 +23,7 @@ def machine_to_toml(machine: MachineFile) -> str:
     values = machine.model_dump(mode="json", exclude_none=True)
     learned = [{key: value for key, value in term.items() if value not in ("", [])} for term in values.pop(LEARNED)]
     values["effects"] += learned
+    values["machine"] = {key: value for key, value in values["machine"].items() if value != []}
     if machine.rotary:
         values = tables_outside(values, machine.rotary)
     effects = values.pop("effects")

@@ -1,0 +1,112 @@
+"""The description of a machine: what `machines/<name>.toml` says, and which of it nobody has stated.
+
+It travels on the broker as a retained message, so that every process takes it up at the same place in the order of messages, and
+a replay knows which one was live when. A machine has one that is live, and at most one challenger, which runs beside it.
+
+    cnctwin/description/<machine>/live          {"version": …, "toml": …, "t": …, "by": …, "why": …}
+    cnctwin/description/<machine>/challenger    the same; empty where there is none
+"""
+
+import hashlib
+import json
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Self
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from twin.errors import MachineError
+from twin.machine import MachineFile, machine_from_toml
+from twin.vocabulary import topics
+
+VERSION_DIGITS = 12
+
+
+class Role(StrEnum):
+    """The part that a description plays."""
+
+    LIVE = "live"
+    CHALLENGER = "challenger"
+
+
+@dataclass(frozen=True, slots=True)
+class Description:
+    """A machine as it is described.
+
+    version: the first digits of the SHA-256 of the file's text
+    """
+
+    machine: MachineFile
+    version: str
+
+    @property
+    def assumed(self) -> tuple[str, ...]:
+        """The sections and constants that nobody has stated or fitted, as the file says: `thermal`, `spindle.efficiency`."""
+        return self.machine.machine.assumed
+
+    @classmethod
+    def from_toml(cls, text: str, source: str = "machine.toml") -> Self:
+        """Return the description that a file's text is. Raises MachineError."""
+        return cls(machine_from_toml(text, source), version_of(text))
+
+
+class DescriptionMessage(BaseModel):
+    """The payload of a description on the broker.
+
+    t: when it became live, or a challenger, ms since 1970; by: who made it so; why: in words
+    """
+
+    model_config = ConfigDict(frozen=True, extra="ignore")
+
+    version: str
+    toml: str
+    t: int = 0
+    by: str = ""
+    why: str = Field(default="", max_length=2000)
+
+    def payload(self) -> bytes:
+        """Return the message as it is sent."""
+        return json.dumps(self.model_dump(), ensure_ascii=False, sort_keys=True).encode()
+
+    def description(self, machine: str) -> Description:
+        """Return what it describes. Raises MachineError."""
+        return Description.from_toml(self.toml, f"machines/{machine}.toml")
+
+
+def version_of(text: str) -> str:
+    """Return the version of a file by its text.
+
+    >>> version_of("[machine]")
+    '65e5121911d1'
+    """
+    return hashlib.sha256(text.encode()).hexdigest()[:VERSION_DIGITS]
+
+
+def topic_of(machine: str, role: Role) -> str:
+    """Return the topic of a machine's description in a role.
+
+    >>> topic_of("vmc", Role.LIVE)
+    'cnctwin/description/vmc/live'
+    """
+    return f"{topics.DESCRIPTION}{machine}/{role}"
+
+
+def machine_and_role(topic: str) -> tuple[str, Role] | None:
+    """Return whose description a topic carries, and in which role; None for another topic.
+
+    >>> machine_and_role("cnctwin/description/vmc/live"), machine_and_role("cnc/vmc/spindle_rpm")
+    (('vmc', <Role.LIVE: 'live'>), None)
+    """
+    machine, _, role = topic.removeprefix(topics.DESCRIPTION).rpartition("/")
+    if not topic.startswith(topics.DESCRIPTION) or not machine or role not in tuple(Role):
+        return None
+    return machine, Role(role)
+
+
+def read_message(payload: bytes, machine: str) -> DescriptionMessage:
+    """Return the message of a payload. Raises MachineError where it is none."""
+    try:
+        return DescriptionMessage.model_validate_json(payload)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        raise MachineError(f"description of {machine}: {'.'.join(map(str, first['loc'])) or 'payload'}: {first['msg']}") from None
