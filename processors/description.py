@@ -53,7 +53,8 @@ class Description:
 class DescriptionMessage(BaseModel):
     """The payload of a description on the broker.
 
-    t: when it became live, or a challenger, ms since 1970; by: who made it so; why: in words
+    t: when it became live, or a challenger, ms since 1970; step: how (promoted, back, filed, described); by: who made it so;
+    why: in words
     """
 
     model_config = ConfigDict(frozen=True, extra="ignore")
@@ -61,6 +62,7 @@ class DescriptionMessage(BaseModel):
     version: str
     toml: str
     t: int = 0
+    step: str = ""
     by: str = ""
     why: str = Field(default="", max_length=2000)
 

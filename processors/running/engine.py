@@ -9,6 +9,7 @@ from operator import itemgetter
 
 from processors.actions import Action, Declare, PlainOutput, Remove
 from processors.config import Configuration, ProcessorConfig
+from processors.description import Description, Role
 from processors.discovery import AnyProcessor
 from processors.errors import SnapshotError
 from processors.running.counts import Counts
@@ -59,6 +60,9 @@ class Engine:
         self._changed: dict[str, None] = {}
         self._codec = SnapshotCodec(processor)
         self._emitted_before = 0
+        self._undescribed: set[str] = set()  # machines whose new description waits for their next message
+        if before is not None:
+            self._roster.described_as(before._roster)
         for unit in processor.units_at_start(configuration):
             self._roster.unit(unit)
 
@@ -108,6 +112,8 @@ class Engine:
         if machine is not None:
             self._changed[machine.unit.name] = None
             self._silences.watch(machine)
+            if self._undescribed and device in self._undescribed and not is_twin_node(node.node):
+                actions = actions + self._take_up(machine)
         return actions
 
     def way_of(self, node: NodeId, device: str) -> Way | None:
@@ -198,6 +204,38 @@ class Engine:
             self._silences.watch(machine)
         return actions
 
+    # Descriptions.
+
+    @property
+    def is_described(self) -> bool:
+        """Return True if the descriptions of machines make a difference to the processor."""
+        return self._roster.is_described
+
+    def describe(self, machine: str, role: Role, description: Description | None) -> list[Action]:
+        """Take up the description of a machine, None where there is none any more. Do not use its ways after this.
+
+        While it is online that is behind the next message of its edge, so that the ticks of a silence, which may have been given
+        early, are of the description before. Raises what the processor raises at it; then the one before holds.
+        """
+        self._roster.describe(machine, role, description)
+        known = self._machines.get(machine)
+        if known is None:
+            return []
+        known.ways.clear()
+        if known.is_online:
+            self._undescribed.add(machine)
+            return []
+        return self._take_up(known)
+
+    def _take_up(self, machine: Machine) -> list[Action]:
+        """Fold with the descriptions that hold now."""
+        self._undescribed.discard(machine.name)
+        unit, given = machine.unit, self._roster.given(machine.name)
+        for fold in (unit.live, unit.history):
+            if fold is not None:
+                fold.describe(given)
+        return []
+
     # Snapshots.
 
     def restore(self, payload: bytes) -> str:
@@ -225,14 +263,8 @@ class Engine:
         still is, by the nodes whose births were heard: `offers` has their signals by machine and node; the first owns."""
         name = self.restore(payload)
         for machine in self._units[name].machines.values():
-            machine.live.go_on()
-            if machine.live.ticking:
-                for node, names in offers.get(machine.name, {}).items():
-                    if self._processor.listens_to(node.node) and (not machine.live.births or str(node) in machine.live.births):
-                        machine.online.add(node)
-                        clashing = frozenset(one for one in names if one in machine.owner)
-                        machine.excluded[node] = clashing
-                        machine.owner.update((one, node) for one in names if one in machine.live.row and one not in clashing)
+            own = offers.get(machine.name, {})
+            machine.go_on({node: names for node, names in own.items() if self._processor.listens_to(node.node)})
         return name
 
     def lane_of(self, machine: str) -> Lane | None:

@@ -5,7 +5,7 @@ A sample whose step fails, or returns what is not declared, changes nothing: a d
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
 from processors.actions import Action, DeadLetter, Pin, Publish
 from processors.config import Configuration, ProcessorConfig
@@ -25,6 +25,13 @@ Folded = tuple[list[Action], Fates]
 DEAD: Fates = (DropReason.DEAD_LETTER,)
 
 
+class Given(NamedTuple):
+    """What the step of a machine is given, and by which version of its description; "" where nobody has described it."""
+
+    version: str
+    given: Any
+
+
 class Fold:
     """`name` is the machine's, or the cell's; `cell` holds the rows of the cell's machines that are online."""
 
@@ -41,6 +48,7 @@ class Fold:
         "is_history",
         "name",
         "state",
+        "version",
         "wakes",
     )
 
@@ -52,14 +60,16 @@ class Fold:
         counts: Counts,
         *,
         is_history: bool,
+        given: Given | None = None,
     ) -> None:
+        """`given`: what a description has made of the configuration; None where the processor heeds none."""
         self.name, self.is_history = name, is_history
         self.state: Any = processor.initial(processor.config_of(configuration, name))
         self.emissions: dict[str, Emission] = {}
         self._processor, self._step, self._counts = processor, processor.step, counts
         self._plain = plain_topics(processor.name, processor.plain)
         self.wakes = processor.wakes
-        self._config: Any = processor.given(configuration, name)
+        self.version, self._config = Given("", processor.given(configuration, name)) if given is None else given
         self._rows: dict[str, Row] = {}
         self._quiet: Outputs = ()  # the outputs that were news of nothing, and would be of nothing again
         self.cell: Mapping[str, Row] = MappingProxyType(self._rows if processor.is_of_cells else {})
@@ -80,6 +90,11 @@ class Fold:
         """The machine is forgotten."""
         self.hide(machine)
         self.emissions.pop(machine, None)
+
+    def describe(self, given: Given) -> None:
+        """Go on with what another description makes of the configuration; the state stays."""
+        self.version, self._config = given
+        self._quiet = ()
 
     def take(self, sample: Sample, at_ms: int) -> Folded:
         """Fold a sample."""

@@ -3,9 +3,10 @@
 import itertools
 
 from processors.config import Configuration, ProcessorConfig
+from processors.description import Description, Role
 from processors.discovery import AnyProcessor
 from processors.running.counts import Counts
-from processors.running.fold import Fold
+from processors.running.fold import Fold, Given
 from processors.running.lane import Lane
 from processors.running.ledger import DropReason, Ledger
 from processors.running.picks import Picks
@@ -31,6 +32,29 @@ class Roster:
         self._processor, self._configuration, self._picks = processor, configuration, picks
         self._counts, self._ledger = counts, ledger
         self._numbers = itertools.count()
+        self._given: dict[tuple[str, Role], Given] = {}  # by the descriptions of machines
+
+    @property
+    def is_described(self) -> bool:
+        """Return True if the descriptions of machines make a difference."""
+        return self._processor.described is not None and not self._processor.is_of_cells
+
+    def describe(self, machine: str, role: Role, description: Description | None) -> None:
+        """Have a description hold for what is made of the machine from now on. Raises what the processor raises at it."""
+        if description is None:
+            self._given.pop((machine, role), None)
+        else:
+            made = self._processor.given(self._configuration, machine, description)
+            self._given[machine, role] = Given(description.version, made)
+
+    def described_as(self, before: "Roster") -> None:
+        """Take over the descriptions of the roster that this one replaces."""
+        self._given = dict(before._given)
+
+    def given(self, machine: str) -> Given:
+        """Return what the live description of a machine makes of the configuration."""
+        known = self._given.get((machine, Role.LIVE))
+        return Given("", self._processor.given(self._configuration, machine)) if known is None else known
 
     def unit(self, name: str) -> Unit:
         """Return the unit of that name, made where there is none."""
@@ -42,7 +66,8 @@ class Roster:
 
     def fold(self, name: str, *, is_history: bool) -> Fold:
         """Return a fold with the state from which it starts."""
-        return Fold(self._processor, self._configuration, name, self._counts, is_history=is_history)
+        given = self.given(name) if self.is_described else None
+        return Fold(self._processor, self._configuration, name, self._counts, is_history=is_history, given=given)
 
     def unit_name(self, machine: str) -> str:
         """Return the name of the unit that a machine belongs to by the configuration."""

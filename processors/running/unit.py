@@ -1,6 +1,6 @@
 """Units, each with a state that is saved as one: a machine or a cell of them; and the machines that the engine knows."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 
 from processors.running.fold import Fold, Folded
@@ -46,6 +46,17 @@ class Machine:
     def is_online(self) -> bool:
         """True while an edge of it is online."""
         return any(not is_twin_node(node.node) for node in self.online)
+
+    def go_on(self, offers: Mapping[NodeId, Collection[str]]) -> None:
+        """Go on with a restored lane at the message at which it was saved: who was online, by the births that were heard, still
+        is. `offers`: the signals of each node that is read; the first owns."""
+        self.live.go_on()
+        for node, names in offers.items() if self.live.ticking else ():
+            if not self.live.births or str(node) in self.live.births:
+                self.online.add(node)
+                clashing = frozenset(one for one in names if one in self.owner)
+                self.excluded[node] = clashing
+                self.owner.update((one, node) for one in names if one in self.live.row and one not in clashing)
 
     def taken(self, birth: HostEvent, inputs: frozenset[str] | None) -> list[Reading]:
         """The readings of a birth that are taken from its source. A signal belongs to the first source that is online with it;
