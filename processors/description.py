@@ -11,7 +11,7 @@ import hashlib
 import json
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Self
+from typing import Any, NamedTuple, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -54,6 +54,13 @@ class Description:
         except EffectError as error:
             raise MachineError(f"{source}: {error}") from None
         return cls(machine, version_of(text))
+
+
+class Given(NamedTuple):
+    """What a step is given for a machine, and by which version of its description; "" where nobody has described it."""
+
+    version: str
+    given: Any
 
 
 class DescriptionMessage(BaseModel):

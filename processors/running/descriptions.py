@@ -11,8 +11,8 @@ import time
 from collections.abc import Iterator, Sequence
 
 from processors.description import Description, Role, machine_and_role, read_message, topic_of
+from processors.description_folder import DescriptionFolder, FileNews, Key
 from processors.running.containment import one_line
-from processors.running.description_folder import DescriptionFolder, FileNews, Key
 from processors.running.ports import HostPort
 from processors.running.worker import Worker
 from sparkplug.host_event import HostEvent

@@ -7,16 +7,16 @@ where two offer it; and keeps the ledger. What has a state, and is saved as one,
 from collections.abc import Callable, Collection, Mapping
 from operator import itemgetter
 
-from processors.actions import Action, Declare, PlainOutput, Remove
+from processors.actions import Action, PlainOutput, Remove
 from processors.config import Configuration, ProcessorConfig
 from processors.description import Description, Role
 from processors.discovery import AnyProcessor
 from processors.errors import SnapshotError
 from processors.running.counts import Counts
 from processors.running.fold import Folded
-from processors.running.lane import Lane, Stream, stream_of
+from processors.running.lane import Lane
 from processors.running.ledger import FOLDED, DropReason, Ledger
-from processors.running.picks import Picks
+from processors.running.picks import Picks, Stream, stream_of
 from processors.running.roster import Roster
 from processors.running.silences import Silences
 from processors.running.snapshot import SnapshotCodec
@@ -112,7 +112,9 @@ class Engine:
         if machine is not None:
             self._changed[machine.unit.name] = None
             self._silences.watch(machine)
-            if self._undescribed and device in self._undescribed and not is_twin_node(node.node):
+            if is_twin_node(node.node):
+                actions = actions + machine.live.hear_challengers(event.readings)
+            elif device in self._undescribed:
                 actions = actions + self._take_up(machine)
         return actions
 
@@ -217,24 +219,20 @@ class Engine:
         While it is online that is behind the next message of its edge, so that the ticks of a silence, which may have been given
         early, are of the description before. Raises what the processor raises at it; then the one before holds.
         """
-        self._roster.describe(machine, role, description)
         known = self._machines.get(machine)
-        if known is None:
-            return []
-        known.ways.clear()
-        if known.is_online:
-            self._undescribed.add(machine)
-            return []
-        return self._take_up(known)
+        try:
+            self._roster.describe(machine, role, description)
+        finally:
+            if known is not None:
+                known.ways.clear()
+                known.live.is_challenged |= self._roster.challenger(machine) is not None
+                self._undescribed.add(machine)
+        return [] if known is None or known.is_online else self._take_up(known)
 
     def _take_up(self, machine: Machine) -> list[Action]:
         """Fold with the descriptions that hold now."""
         self._undescribed.discard(machine.name)
-        unit, given = machine.unit, self._roster.given(machine.name)
-        for fold in (unit.live, unit.history):
-            if fold is not None:
-                fold.describe(given)
-        return []
+        return self._roster.take_up(machine)
 
     # Snapshots.
 
@@ -320,7 +318,9 @@ class Engine:
         if machine is None or event.node not in machine.online:
             return [], (DropReason.BEFORE_BIRTH,)
         if event.names and machine.is_online and not machine.excluded.get(event.node):
-            way = machine.ways[event.node] = machine.live.twin if self._is_of_twin(event.node) else machine.live.stream
+            way = machine.live.twin if self._is_of_twin(event.node) else machine.live.stream
+            is_heard = machine.live.is_challenged and self._is_of_twin(event.node)
+            machine.ways[event.node] = machine.live.twin_and_challengers if is_heard else way
             return way(stream_of(event), wall_s)
         readings: tuple[Reading, ...] | list[Reading] = event.readings
         inputs = self._inputs
@@ -366,7 +366,7 @@ class Engine:
             return [], FOLDED
         declared: list[Action] = []
         if not was_online and self._processor.outputs:
-            declared.append(Declare(machine.name, machine.live.emission.known(event.timestamp_ms)))
+            declared.append(machine.declared(event.timestamp_ms))
         offered = taken if is_of_twin else event.readings
         actions, fates = machine.live.birth(offered, taken, wall_s, is_of_twin=is_of_twin)
         return declared + actions, fates

@@ -21,16 +21,16 @@ from collections import deque
 from collections.abc import Sequence
 from threading import Event
 
+from processors.description_folder import DescriptionFolder
 from processors.errors import ProcessorsFailedError
 from processors.lag_report import SPOKEN_OF_S, LagReport, topic_of
 from processors.running.backlog import Backlog
-from processors.running.description_folder import DescriptionFolder
 from processors.running.descriptions import Descriptions
 from processors.running.engine import Way
 from processors.running.lag import Lag
-from processors.running.lane import stream_of
 from processors.running.ledger import DropReason
 from processors.running.overload import Overload
+from processors.running.picks import stream_of
 from processors.running.ports import HostPort
 from processors.running.quarantine import quarantine_health
 from processors.running.worker import Shared, Worker

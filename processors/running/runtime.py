@@ -6,9 +6,9 @@ from functools import partial
 from pathlib import Path
 
 from processors.config import Configuration, ProcessorConfig, read_tables
+from processors.description_folder import DescriptionFolder
 from processors.discovery import AnyProcessor, find, module_of
 from processors.errors import ConfigurationError, UnknownProcessorError
-from processors.running.description_folder import DescriptionFolder
 from processors.running.health import node_metrics
 from processors.running.ports import Recorder
 from processors.running.runner import Runner
@@ -44,7 +44,7 @@ def run(
 
     session_dir: keeps the birth/death sequence numbers over restarts; all other state is kept on the broker
     recorder: for the processor that `records`
-    machines: folder in which people describe the machines (processors/running/description_folder.py)
+    machines: folder in which people describe the machines (processors/description_folder.py)
     """
     runner = runner_of(pairs, broker, group=group, session_dir=session_dir, recorder=recorder, limits=limits, machines=machines)
     runner.run(stop)

@@ -3,8 +3,10 @@
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 
+from processors.actions import Declare
 from processors.running.fold import Fold, Folded
-from processors.running.lane import Lane, Stream
+from processors.running.lane import Lane
+from processors.running.picks import Stream
 from sparkplug.host_session import HostEvent
 from sparkplug.metric import NodeId, Reading
 from twin.vocabulary.nodes import is_twin_node
@@ -46,6 +48,13 @@ class Machine:
     def is_online(self) -> bool:
         """True while an edge of it is online."""
         return any(not is_twin_node(node.node) for node in self.online)
+
+    def declared(self, at_ms: int) -> Declare:
+        """Return the birth of its twin device, with the challenger's metrics while it has one."""
+        known, challenger = self.live.emission.known(at_ms), self.unit.live.challenger
+        if challenger is None:
+            return Declare(self.name, known)
+        return Declare(self.name, known + challenger.emission.known(at_ms), is_challenged=True)
 
     def go_on(self, offers: Mapping[NodeId, Collection[str]]) -> None:
         """Go on with a restored lane at the message at which it was saved: who was online, by the births that were heard, still

@@ -20,6 +20,35 @@ def toml(power_kw: float, *lines: str) -> str:
     return "\n".join(['[machine]\nname = "okuma"', *lines, f"[spindle]\nrated_power_kw = {power_kw}\nefficiency = 0.9\n"])
 
 
+WHOLE = """
+[machine]
+name = "okuma"
+[tool]
+diameter_mm = 10.0
+teeth = 4
+tangential_coefficient_n_per_mm2 = 900.0
+radial_ratio = 0.4
+[spindle]
+rated_power_kw = {power_kw}
+efficiency = 0.85
+idle_power_kw = 0.25
+[thermal]
+alpha_w_per_pct_rpm2 = 2.2e-8
+beta_w_per_rpm = 1.6e-2
+resistance_k_per_w = {resistance_k_per_w}
+capacity_j_per_k = 9000.0
+[program]
+rapid_mm_min = 36000.0
+acceleration_mm_s2 = 2500.0
+"""
+"""A description with all tables that a live processor may ask for."""
+
+
+def whole(power_kw: float = 11.0, resistance_k_per_w: float = 0.12) -> Description:
+    """Return a machine that is described as a whole."""
+    return Description.from_toml(WHOLE.format(power_kw=power_kw, resistance_k_per_w=resistance_k_per_w))
+
+
 def description(power_kw: float) -> Description:
     """The description whose spindle is rated at `power_kw`."""
     return Description.from_toml(toml(power_kw))

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from processors.description import Role, topic_of
-from processors.running.description_folder import DescriptionFolder
+from processors.description_folder import DescriptionFolder
 from processors.running.runner import Runner
 from processors.running.worker import Worker
 from tests.processors.describing import DESCRIBING, SUM, VERSION, description, message, toml
@@ -209,6 +209,21 @@ def test_a_description_that_a_processor_refuses_is_its_fault_alone() -> None:
     runner.turn()
     look(runner)
     assert sent(host)[1:] == [(topic, "")]
+
+
+def test_a_twin_device_is_born_again_with_the_metrics_of_a_challenger_and_without() -> None:
+    host = FakeHost(birth(0.0, spindle_rpm=2.0), retained={LIVE: message(3.0).payload})
+    runner, edge = begun(host)
+    assert not [spec for spec in edge.devices["okuma"] if spec.name.startswith("twin/challenger/")]
+    host.give(message(4.0, Role.CHALLENGER), data(0.1, spindle_rpm=4.0), data(0.2, spindle_rpm=5.0))
+    runner.turn()
+    (own,) = (spec for spec in edge.devices["okuma"] if spec.name == "twin/challenger/sum")
+    assert own.properties is not None
+    assert own.properties["meaning"] == "by the challenger: speed times factor"
+    assert published(edge, "twin/challenger/sum") == [16.0, 36.0]
+    host.give(message(None, Role.CHALLENGER), data(0.3, spindle_rpm=4.0))
+    runner.turn()
+    assert not [spec for spec in edge.devices["okuma"] if spec.name.startswith("twin/challenger/")]
 
 
 def test_who_asks_for_no_description_hears_none() -> None:

@@ -5,7 +5,7 @@ import os
 from pathlib import Path
 
 from processors.description import Role, version_of
-from processors.running.description_folder import DescriptionFolder, FileNews
+from processors.description_folder import DescriptionFolder, FileNews
 from tests.processors.describing import toml
 
 LONG_AGO_S = 1_700_000_000.0
