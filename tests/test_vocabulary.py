@@ -79,7 +79,7 @@ def test_every_name_of_the_vocabulary_is_published_by_someone() -> None:
     assert {name for name in names if not name.endswith(("/", "_"))} <= PUBLISHED
     assert {rule.name for rule in PROCESSORS["rules"].outputs if rule.is_alarm} == set(twin_signals.RULES)
     assert {spec.name for spec in PROCESSORS["gap"].outputs if twin_signals.is_gap(spec.name)} <= {
-        twin_signals.GAP_PREFIX + name for name in (*SIGNALS, *(f"axis_{letter}_load_pct" for letter in "xyzabc"))
+        twin_signals.GAP_PREFIX + name for name in (*SIGNALS, TOOL_CHANGE, PROGRAM_TIME, *(f"axis_{letter}_load_pct" for letter in "xyzabc"))
     }
 
 
