@@ -16,7 +16,6 @@ from twin.motion.quantity import changed_quantity
 
 SECTIONS = {TEMPERATURE: "thermal", LOAD: "spindle", TOOL_CHANGE: "program"}
 """The section of a description that the twin of a signal rests on."""
-_CHANGE_KEY = "tool_change_s"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,9 +77,9 @@ def _twin(description: Description) -> Twin:
 def _tool_change_s(machine: MachineFile) -> float | None:
     """The length of a tool change from a stopped spindle on; None where nobody states one."""
     program = machine.program
-    if program is None or _CHANGE_KEY not in program.model_fields_set:
+    if program is None or TOOL_CHANGE not in program.model_fields_set:
         return None
-    return changed_quantity(machine, _CHANGE_KEY, program.tool_change_s)
+    return changed_quantity(machine, TOOL_CHANGE, program.tool_change_s)
 
 
 def _assumed(description: Description) -> frozenset[str]:

@@ -1,9 +1,10 @@
 """The signals that are compared, the regimes of each, and how finely a control commonly shows them."""
 
 from twin.vocabulary import twin_signals
+from twin.vocabulary.signals import PROGRAM_TIME_S as PROGRAM_TIME
+from twin.vocabulary.signals import TOOL_CHANGE_S as TOOL_CHANGE
 
 LOAD, TEMPERATURE, SPEED = "spindle_load_pct", "spindle_temp_c", "spindle_rpm"
-TOOL_CHANGE, PROGRAM_TIME = "tool_change_s", "program_time_s"
 AXIS_LOADS = tuple(f"axis_{letter}_load_pct" for letter in "xyzabc")
 SIGNALS = (TEMPERATURE, LOAD, SPEED, TOOL_CHANGE, PROGRAM_TIME, *AXIS_LOADS)
 REGIMES = {
