@@ -43,10 +43,11 @@ GAP_PREFIX = f"{TWIN_PREFIX}gap_"
 """Followed by a signal: its standing gap; by a signal, a slash and a regime: the gap in that regime."""
 GAP_GROWING = f"{GAP_PREFIX}growing"
 GAP_GROWING_SIGNAL = f"{GAP_PREFIX}growing_signal"
+GAP_OPEN = f"{GAP_PREFIX}open"
 GAP_WINDOW = f"{GAP_PREFIX}window"
 GAP_LEFT_OUT_PCT = f"{GAP_PREFIX}left_out_pct"
 GAP_BASIS = f"{GAP_PREFIX}basis"
-GAP_NOTES = frozenset({GAP_GROWING, GAP_GROWING_SIGNAL, GAP_WINDOW, GAP_LEFT_OUT_PCT, GAP_BASIS})
+GAP_NOTES = frozenset({GAP_GROWING, GAP_GROWING_SIGNAL, GAP_OPEN, GAP_WINDOW, GAP_LEFT_OUT_PCT, GAP_BASIS})
 """Metrics about the comparison, published beside the gaps themselves."""
 
 # rules
