@@ -1,6 +1,7 @@
 // The names of the twin's signals. Written by scripts/vocabulary from twin/vocabulary/twin_signals.py.
 
 export const TWIN_PREFIX = "twin/";
+export const CHALLENGER_PREFIX = "twin/challenger/";
 export const SPINDLE_TEMP_C = "twin/spindle_temp_c";
 export const SPINDLE_TEMP_RESIDUAL_K = "twin/spindle_temp_residual_k";
 export const SPINDLE_TEMP_RISE_K = "twin/spindle_temp_rise_k";
