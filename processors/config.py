@@ -29,6 +29,8 @@ class ProcessorConfig(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
     of_one_machine: ClassVar[frozenset[str] | None] = None
     """The keys that a machine may have a value of its own for; None = all."""
+    of_the_machine: ClassVar[Mapping[str, str]] = {}
+    """Keys of old tables that describe the machine → the section of its file (docs/machine.md) where they belong."""
 
     tick_s: float = Field(default=1.0, ge=0.001, le=3600.0, description="a tick at each multiple of this")
     gap_s_max: float = Field(default=600.0, gt=0.0, le=86_400.0, description="a longer jump forwards is a hole")
@@ -39,6 +41,18 @@ class ProcessorConfig(BaseModel):
         if self.gap_s_max / self.tick_s > TICKS_MAX:
             raise ValueError(f"gap_s_max / tick_s is more than {TICKS_MAX}: make tick_s longer or gap_s_max shorter")
         return self
+
+    def belongs_elsewhere(self, table: str) -> tuple[str, ...]:
+        """Return a sentence on each value of this table that describes the machine and not how the processor runs.
+
+        >>> ProcessorConfig().belongs_elsewhere("thermal")
+        ()
+        """
+        return tuple(
+            f"[{table}] {key} belongs in machines/<name>.toml, {section}; it is used until a machine has a file"
+            for key, section in self.of_the_machine.items()
+            if key in self.model_fields_set
+        )
 
 
 ALL = "all"

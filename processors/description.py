@@ -15,7 +15,8 @@ from typing import Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from twin.errors import MachineError
+from twin.effects.added import check_effects
+from twin.errors import EffectError, MachineError
 from twin.machine import MachineFile, machine_from_toml
 from twin.vocabulary import topics
 
@@ -46,8 +47,13 @@ class Description:
 
     @classmethod
     def from_toml(cls, text: str, source: str = "machine.toml") -> Self:
-        """Return the description that a file's text is. Raises MachineError."""
-        return cls(machine_from_toml(text, source), version_of(text))
+        """Return the description that a file's text is, its effects checked. Raises MachineError."""
+        machine = machine_from_toml(text, source)
+        try:
+            check_effects(machine)
+        except EffectError as error:
+            raise MachineError(f"{source}: {error}") from None
+        return cls(machine, version_of(text))
 
 
 class DescriptionMessage(BaseModel):
@@ -109,4 +115,4 @@ def read_message(payload: bytes, machine: str) -> DescriptionMessage:
         return DescriptionMessage.model_validate_json(payload)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
-        raise MachineError(f"description of {machine}: {'.'.join(map(str, first['loc'])) or 'payload'}: {first['msg']}") from None
+        raise MachineError(f"description of {machine}: {'.'.join(map(str, first['loc'])) or 'message'}: {first['msg']}") from None

@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping
 from twin.effects.catalogue import effect_named
 from twin.effects.effect import On
 from twin.errors import EffectError
-from twin.learned.standing import check_terms
+from twin.learned.placement import check_terms
 from twin.machine import MachineFile
 from twin.sites import Site
 

@@ -9,6 +9,8 @@ constant R C.
 from math import exp
 from typing import NamedTuple
 
+from twin.kernels.assembly import Assembly
+from twin.machine import Thermal
 from twin.sites import Site, at
 
 
@@ -64,3 +66,28 @@ def step(
     decay = exp(-duration_s * cooling_w_per_k / heat_capacity_j_per_k)
     temperature_next_c = at(Site.THERMAL, final_c + (temperature_c - final_c) * decay)
     return Temperature(final_c, temperature_next_c)
+
+
+HEAT = Assembly((heat, step), acts_on="the spindle's heat", owner="the spindle's heat")
+INPUTS = ("spindle_load_pct", "spindle_rpm", "ambient_c", "coolant_on")
+FED = (*INPUTS, "temperature_c", "duration_s", "time_s")
+
+
+def thermal_quantities() -> dict[str, str]:
+    """The quantities of the spindle's heat that an effect can change, with their sites."""
+    return HEAT.quantities()
+
+
+def thermal_constants(thermal: Thermal) -> dict[str, float]:
+    """Name → value, for the physics of `twin.heat`.
+
+    >>> thermal = Thermal(alpha_w_per_pct_rpm2=0.0, beta_w_per_rpm=0.02, resistance_k_per_w=0.2, capacity_j_per_k=5000.0)
+    >>> thermal_constants(thermal)["heat_capacity_j_per_k"]
+    5000.0
+    """
+    return {
+        "alpha_w_per_pct_rpm2": thermal.alpha_w_per_pct_rpm2,
+        "beta_w_per_rpm": thermal.beta_w_per_rpm,
+        "resistance_k_per_w": thermal.resistance_k_per_w,
+        "heat_capacity_j_per_k": thermal.capacity_j_per_k,
+    }

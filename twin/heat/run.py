@@ -12,35 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from twin.effects.effect import Effect
 from twin.errors import TwinError
-from twin.heat import network
-from twin.kernels.assembly import KERNEL, Assembly, Scalars, kernel_function, kernel_text
+from twin.heat.network import FED, HEAT, INPUTS, thermal_constants, thermal_quantities
+from twin.kernels.assembly import KERNEL, Scalars, kernel_function, kernel_text
 from twin.kernels.weave import weave
-from twin.machine import Thermal
+
+__all__ = ["Warming", "held", "spindle_temperature_c", "thermal_constants", "thermal_quantities"]
 
 Array = NDArray[np.float64]
-HEAT = Assembly((network.heat, network.step), acts_on="the spindle's heat", owner="the spindle's heat")
-INPUTS = ("spindle_load_pct", "spindle_rpm", "ambient_c", "coolant_on")
-FED = (*INPUTS, "temperature_c", "duration_s", "time_s")
-
-
-def thermal_quantities() -> dict[str, str]:
-    """The quantities of the spindle's heat that an effect can change, with their sites."""
-    return HEAT.quantities()
-
-
-def thermal_constants(thermal: Thermal) -> dict[str, float]:
-    """Name → value, for the physics of `twin.heat`.
-
-    >>> thermal = Thermal(alpha_w_per_pct_rpm2=0.0, beta_w_per_rpm=0.02, resistance_k_per_w=0.2, capacity_j_per_k=5000.0)
-    >>> thermal_constants(thermal)["heat_capacity_j_per_k"]
-    5000.0
-    """
-    return {
-        "alpha_w_per_pct_rpm2": thermal.alpha_w_per_pct_rpm2,
-        "beta_w_per_rpm": thermal.beta_w_per_rpm,
-        "resistance_k_per_w": thermal.resistance_k_per_w,
-        "heat_capacity_j_per_k": thermal.capacity_j_per_k,
-    }
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +53,7 @@ def spindle_temperature_c(
 
     100 W into 5,000 J/K behind 0.2 K/W for one time constant of 1,000 s, in two steps:
 
+    >>> from twin.machine import Thermal
     >>> thermal = Thermal(alpha_w_per_pct_rpm2=0.0, beta_w_per_rpm=0.02, resistance_k_per_w=0.2, capacity_j_per_k=5000.0)
     >>> warming = Warming([0.0, 100.0, 1000.0], 0.0, 5000.0, 20.0)
     >>> spindle_temperature_c(thermal_constants(thermal), warming, 20.0).round(3).tolist()

@@ -10,8 +10,6 @@ from dataclasses import dataclass
 from functools import cache, partial
 from typing import Any, TypeVar
 
-import numpy as np
-
 from twin.effects.catalogue import effect_named
 from twin.effects.effect import Effect
 from twin.errors import EffectError
@@ -112,9 +110,9 @@ def kernel_function(text: str, name: str, *, reference_run: bool) -> Callable[..
 
 def _interpreted(function: Callable[..., None], *arguments: Any) -> None:
     """Call the function with lists in place of arrays, which Python goes through faster, and copy back what it wrote."""
-    given = [argument.tolist() if isinstance(argument, np.ndarray) else argument for argument in arguments]
+    given = [argument.tolist() if hasattr(argument, "tolist") else argument for argument in arguments]
     lists = [list(one) if isinstance(one, list) else one for one in given]
     function(*lists)
     for argument, before, after in zip(arguments, given, lists, strict=True):
-        if isinstance(argument, np.ndarray) and after != before:
+        if hasattr(argument, "tolist") and after != before:
             argument[...] = after

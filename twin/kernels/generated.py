@@ -10,8 +10,6 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-import numba
-
 from twin.kernels.kernel_folder import KERNELS_MAX, keep_newest, kernel_folder
 
 
@@ -40,6 +38,8 @@ def in_python(text: str) -> dict[str, Any]:
 @cache
 def compiled(text: str) -> ModuleType:
     """The module of the generated text, its functions compiled when they are first called, and kept for the next process."""
+    import numba  # noqa: PLC0415 - the live twin runs the text without it
+
     text = f"# numba {numba.__version__}\nfrom numba import njit\n\n{text}"
     name = f"kernel_{hashlib.sha256(text.encode()).hexdigest()[:24]}"
     path = kernel_folder() / f"{name}.py"

@@ -1,23 +1,21 @@
 """The learned terms that a machine has already, as the series that they add to its quantities and readings."""
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.errors import EffectError
 from twin.learned.arguments import motion_arguments
+from twin.learned.placement import SINCE
 from twin.learned.section import LearnedSection
-from twin.learned.sites import AXIS_SITES, MACHINE_QUANTITIES, MACHINE_READINGS, QUANTITIES, READINGS, check_place
-from twin.learned.summed import Place, place_of
+from twin.learned.sites import AXIS_SITES, MACHINE_QUANTITIES, MACHINE_READINGS, QUANTITIES, READINGS
 from twin.learned.term import Term
 from twin.learned.words import OF_AXIS, LearnedSite
 
 Floats = NDArray[np.float64]
 Arguments = Mapping[str, Floats]
 Answer = TypeVar("Answer")
-SINCE = "time_since_start_s"
 PASSES_MAX = 24
 SETTLED = 1e-4
 """Change of a series, over its largest value, below which it is the same."""
@@ -92,21 +90,6 @@ def settled(
             break
         found, before = answer(added), added
     return found
-
-
-def check_terms(sections: Sequence[LearnedSection], axes: Iterable[str]) -> None:
-    """Raises EffectError where a learned term of a machine is put on what there is not, or is there twice."""
-    seen: set[Place] = set()
-    letters = tuple(axes)
-    for section in sections:
-        check_place(section.site, section.on, letters)
-        if section.site is LearnedSite.PROGRAM_TIME and not section.is_recording and section.arguments != (SINCE,):
-            raise EffectError(f"the learned term at {section} is over {', '.join(section.arguments)}; it has to be over {SINCE}")
-        if not section.is_recording and place_of(section) in seen:
-            raise EffectError(
-                f"the learned term at {section} over {', '.join(section.arguments)} is there twice; add the tables up"
-            )
-        seen.add(place_of(section))
 
 
 def seconds_of(sections: Sequence[LearnedSection], planned_s: float) -> float:

@@ -5,21 +5,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from twin.learned.knots import Knots
+from twin.learned.placement import Place, place_of
 from twin.learned.section import LearnedSection
 from twin.learned.term import Term
-from twin.learned.words import LearnedSite
-
-Place = tuple[LearnedSite, str, frozenset[str]]
-
-
-def place_of(section: LearnedSection) -> Place:
-    """Return the place on which a machine has one term: site, what it is on, and what it depends on."""
-    return section.site, section.on, frozenset(section.arguments)
 
 
 def summed(sections: Sequence[LearnedSection]) -> tuple[LearnedSection, ...]:
     """Return the terms with those of one place added up, over the knots of all; terms over the time of recordings as they are.
 
+    >>> from twin.learned.words import LearnedSite
     >>> tables = [{"position_mm": (0.0, at), "value": (0.0, 4.0)} for at in (10.0, 5.0)]
     >>> one, other = (LearnedSection(site=LearnedSite.FRICTION, on="x", table=table) for table in tables)
     >>> summed([one, other])[0].table["value"]

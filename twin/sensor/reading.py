@@ -1,11 +1,7 @@
-"""A sensor: its reading of a value. Nominally the value itself, at once.
-
-A series is read sample by sample, in the same woven text for all signals; samples that are not there stay away.
-"""
+"""A sensor's readings of a series (twin/sensor/sensing.py), in the same woven text for all signals; missing samples stay away."""
 
 from collections.abc import Mapping
 from functools import cache
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,61 +9,11 @@ from numpy.typing import NDArray
 from twin.effects.effect import Effect
 from twin.errors import EffectError
 from twin.kernels import elementary
-from twin.kernels.assembly import KERNEL, Assembly, Scalars, kernel_function, kernel_text
+from twin.kernels.assembly import KERNEL, Scalars, kernel_function, kernel_text
 from twin.kernels.weave import function_text, weave
-from twin.sites import Site, at
+from twin.sensor.sensing import FED, SENSOR, earlier
 
 Floats = NDArray[np.float64]
-
-
-class Reading(NamedTuple):
-    """The reading of the sensor, and the age, s, of the value that it reads."""
-
-    reading: float
-    age_s: float
-
-
-def earlier(values: Floats, since: Floats, sample: int, age_s: float) -> float:
-    """Return the value of `age_s` before a sample, between those that there are; before the first one, that.
-
-    >>> float(earlier(np.array([0.0, 1.0, 3.0]), np.array([0.0, 0.1, 0.1]), 2, 0.05))
-    2.0
-    """
-    right: float = values[sample]
-    near_s = 0.0
-    far_s = 0.0
-    while sample > 0 and near_s < age_s:
-        far_s += since[sample]
-        sample -= 1
-        left = values[sample]
-        if abs(left) >= 0.0:  # a number
-            if far_s >= age_s:
-                right = right + (left - right) * (age_s - near_s) / (far_s - near_s)
-                break
-            right = left
-            near_s = far_s
-    return right
-
-
-def sense(values: Floats, since: Floats, sample: int) -> Reading:
-    """One sample.
-
-    >>> float(sense(np.array([21.5]), np.array([0.0]), 0).reading)
-    21.5
-    """
-    age_s = at(Site.SENSOR, 0.0)
-    value = earlier(values, since, sample, age_s)
-    reading = at(Site.SENSOR, value)
-    return Reading(reading, age_s)
-
-
-SENSOR = Assembly((sense,), acts_on="a sensor", owner="a sensor")
-FED = ("values", "since", "sample", "is_first", "since_s", "temperature_rise_k")
-
-
-def sensor_quantities() -> dict[str, str]:
-    """The quantities of a sensor that an effect can change, with their sites."""
-    return SENSOR.quantities()
 
 
 def readings(

@@ -31,7 +31,8 @@ from twin.process.kernel import process_quantities
 from twin.process.milling import Milling, tool_constants
 from twin.rotary import outside_name
 from twin.sensor.clock import looked_at, resampled, stamped
-from twin.sensor.reading import readings, sensor_quantities
+from twin.sensor.reading import readings
+from twin.sensor.sensing import sensor_quantities
 from twin.servo.constants import axis_constants, effect_constants
 from twin.servo.disturbance import Disturbance
 from twin.servo.kernel import axis_quantities

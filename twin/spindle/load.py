@@ -13,33 +13,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from twin.effects.effect import Effect
 from twin.errors import TwinError
-from twin.kernels.assembly import KERNEL, Assembly, Scalars, kernel_function, kernel_text
+from twin.kernels.assembly import KERNEL, Scalars, kernel_function, kernel_text
 from twin.kernels.weave import weave
-from twin.machine import SpindleDrive
-from twin.spindle import meter
+from twin.spindle.meter import FED, SPINDLE, spindle_constants, spindle_quantities
+
+__all__ = ["Array", "spindle_constants", "spindle_load_pct", "spindle_quantities"]
 
 Array = NDArray[np.float64]
 WINDOW_S = 0.1
-SPINDLE = Assembly((meter.reading,), acts_on="the spindle", owner="the spindle")
-FED = ("cutting_power_kw", "spindle_rpm", "period_s")
-
-
-def spindle_quantities() -> dict[str, str]:
-    """The quantities of the spindle that an effect can change, with their sites."""
-    return SPINDLE.quantities()
-
-
-def spindle_constants(spindle: SpindleDrive) -> dict[str, float]:
-    """Name → value, for the physics of `twin.spindle`.
-
-    >>> spindle_constants(SpindleDrive(rated_power_kw=11.0, efficiency=0.85, idle_power_kw=0.25))
-    {'rated_power_kw': 11.0, 'efficiency': 0.85, 'idle_power_kw': 0.25}
-    """
-    return {
-        "rated_power_kw": spindle.rated_power_kw,
-        "efficiency": spindle.efficiency,
-        "idle_power_kw": spindle.idle_power_kw,
-    }
 
 
 def spindle_load_pct(
@@ -61,6 +42,7 @@ def spindle_load_pct(
 
     1,870 W of cut at an efficiency of 0.85, and 0.25 kW, are 2.45 kW of 11 kW:
 
+    >>> from twin.machine import SpindleDrive
     >>> constants = spindle_constants(SpindleDrive(rated_power_kw=11.0, efficiency=0.85, idle_power_kw=0.25))
     >>> spindle_load_pct(constants, [1870.0, 1870.0], 3000.0).round(4).tolist()
     [[22.2727, 22.2727]]

@@ -23,7 +23,7 @@ from twin.motion.plan import Plan
 from twin.motion.sampling import sampled
 from twin.process.kernel import CUT
 from twin.sensor.clock import looked_at, stamped
-from twin.sensor.reading import SENSOR
+from twin.sensor.sensing import SENSOR
 from twin.servo.kernel import AXES, axis_quantities
 from twin.servo.run import AxisInput, AxisRun, run_axes
 from twin.sites import Site

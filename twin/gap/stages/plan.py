@@ -15,6 +15,7 @@ from twin.gap.naming.filtered import told_from_a_filter
 from twin.gap.naming.specific import only_specific
 from twin.gap.null import NULL, Null
 from twin.gap.search import Explained, bare_fit, explain
+from twin.gap.stages.air import AirStage, air_runs
 from twin.gap.stages.axis import AxisStage, axis_constants_free, standing_of
 from twin.gap.stages.axis_run import AxisRunData, axis_run_data, repeated_groups
 from twin.gap.stages.cut import CutStage, cut_runs
@@ -100,6 +101,9 @@ def explained_stages(ground: Ground, progress: Progress, side_by_side: SideBySid
             whole = told_from_a_filter(turns, explain(turns, null=null, progress=progress, doubtful=True), null)
             found.append(only_specific(turns, whole))
     stages: list[Stage] = [s for letter in ground.machine.axes if (s := axis_stage(ground, letter, forces)) is not None]
+    in_air = air_runs(ground.machine, ground.runs)
+    if any(run.fitted for run in in_air):
+        stages.append(AirStage(ground.machine, in_air, ground.floors, ground.left_out))
     warmups = heat_runs(ground.machine, tuple(r for r in ground.runs if not r.log.axes()))
     if any(run.fitted for run in warmups):
         stages.append(HeatStage(ground.machine, warmups, ground.floors, ground.left_out))
