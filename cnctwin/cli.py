@@ -32,6 +32,7 @@ from cnctwin.commands.store import store_app
 from cnctwin.commands.train.app import train_app
 from cnctwin.commands.train.detector import train_detector
 from cnctwin.commands.train.residual import train_residual
+from cnctwin.commands.twin import twin_app
 from cnctwin.commands.validate import validate
 from cnctwin.commands.watch import watch
 from cnctwin.errors import ApplicationError, BrokerStartError
@@ -53,6 +54,7 @@ app.add_typer(store_app, name="store")
 app.add_typer(parts_app, name="parts")
 app.add_typer(jobs_app, name="jobs")
 app.add_typer(plan_app, name="plan")
+app.add_typer(twin_app, name="twin")
 train_app.command("detector")(train_detector)
 train_app.command("residual")(train_residual)
 app.add_typer(model_app, name="model")

@@ -18,8 +18,8 @@ from cnctwin.blind_check.given import given_of
 from cnctwin.blind_check.piece import draft_text
 from cnctwin.blind_check.question import Draft
 from cnctwin.blind_check.scoring import Judged
-from cnctwin.blind_check.sealed import Seal, opened, seal
 from cnctwin.errors import UsageError
+from cnctwin.files.sealed import Seal, opened, seal
 
 CHECK = "check.json"
 Json = dict[str, Any]

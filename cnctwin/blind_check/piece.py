@@ -18,8 +18,8 @@ import twin
 from cnctwin.blind_check.answer import Answer, answers_json
 from cnctwin.blind_check.case_folder import answer_of, check_runs, write_case
 from cnctwin.blind_check.question import Draft, Question, Sort, question_of
-from cnctwin.blind_check.sealed import Seal, opened, seal
 from cnctwin.blind_check.unseen import closure_on_unseen
+from cnctwin.files.sealed import Seal, opened, seal
 from twin.case import Case, read_case
 from twin.gap.diagnosis import Diagnosed
 from twin.machine import machine_from_toml

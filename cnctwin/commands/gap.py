@@ -15,6 +15,7 @@ from rich.console import Console
 from rich.table import Table
 
 from cnctwin.commands.extras import needed_by
+from cnctwin.commands.gap_case import case
 from cnctwin.commands.options import AsJson
 from cnctwin.errors import UsageError
 from cnctwin.files.output import write
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from twin.gap.score_of import Score
 
 gap_app = typer.Typer(no_args_is_help=True, help="The sim-to-real gap: where it lies, what causes it, how far it shrinks.")
+gap_app.command("case")(case)
 
 
 @gap_app.command()

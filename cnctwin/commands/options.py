@@ -1,5 +1,6 @@
 """Options that several commands have."""
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -7,5 +8,13 @@ import typer
 AsJson = Annotated[bool, typer.Option("--json", help="For a program to read")]
 Broker = Annotated[str | None, typer.Option(help="mqtt[s]://[user@]host[:port]; else $CNCTWIN_BROKER", show_default=False)]
 Group = Annotated[str, typer.Option(help="Sparkplug group: the plant")]
+Machines = Annotated[
+    Path | None,
+    typer.Option(
+        "--machines",
+        help="Folder of descriptions; else machines beside --config, $CNCTWIN_MACHINES, ./machines",
+        show_default=False,
+    ),
+]
 StorePlace = Annotated[str | None, typer.Option("--store", help="Folder or address; else $CNCTWIN_STORE", show_default=False)]
 Wait = Annotated[float, typer.Option("--wait", help="Seconds to wait for an answer", min=0.5, max=600.0)]

@@ -57,13 +57,21 @@ def simulate_mtconnect(
 def simulate_machine(
     speed: Speed = 1.0,
     port: HttpPort = 0,
+    effect: Annotated[
+        str | None, typer.Option(help="Hide an effect in the machine: NAME, NAME@SIGNAL, either with :SIZE, or random")
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed for drawing the hidden effect and its size")] = None,
+    sealed: Annotated[Path | None, typer.Option(help="Keep the hidden effect in this file, with the salt of its hash")] = None,
     state_file: StateFile = None,
 ) -> None:
     """Serve the simulated machine, which cuts one part after the other, as an MTConnect agent."""
+    from cnctwin.standins.simulated_machine.hidden_effect import choice_of
+    from cnctwin.standins.simulated_machine.serve import Hidden
     from cnctwin.standins.simulated_machine.serve import simulate_machine as serve
 
+    hidden = None if effect is None else Hidden(choice_of(effect), seed, sealed)
     with stopped_by_signals() as stop:
-        serve(stop, speed=speed, port=port, state_file=state_file)
+        serve(stop, speed=speed, port=port, hidden=hidden, state_file=state_file)
 
 
 @control_app.command("focas")

@@ -17,6 +17,7 @@ from twin.gap.dynamometer.cutting import is_of_forces_alone
 from twin.gap.dynamometer.turn_run import TurnRun, turn_run
 from twin.gap.labels import measured_signals
 from twin.gap.sampling.servo_ticks import SlowRun, on_servo_ticks
+from twin.gap.stages.air import air_runs
 from twin.gap.stages.cut import cut_runs
 from twin.gap.stages.heat import heat_runs
 from twin.machine import MachineFile
@@ -72,7 +73,8 @@ def _comparable(run: Run, machine: MachineFile) -> bool:
         log.has(f"{a}_ref_mm") and any(log.has(f"{a}_{measured}") for measured in ("pos_mm", "table_mm", "torque_a"))
         for a in machine.axes
     ) or any(_alone(log, a) for a in machine.axes)
-    return axes or isinstance(run, TurnRun) or bool(cut_runs(machine, (run,))) or bool(heat_runs(machine, (run,)))
+    spindle = bool(cut_runs(machine, (run,))) or bool(air_runs(machine, (run,)))
+    return axes or isinstance(run, TurnRun) or spindle or bool(heat_runs(machine, (run,)))
 
 
 def _alone(log: RunLog, letter: str) -> bool:

@@ -1,7 +1,7 @@
 """A stretch of a store as a run log (formats, section 3), for gap diagnosis, identification and training."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -49,15 +49,25 @@ def export(
     return len(run)
 
 
-def run_of(store: Store, machine: str, from_ms: int, to_ms: int, *, every_ms: int | None = None, held: bool = False) -> RunLog:
+def run_of(
+    store: Store,
+    machine: str,
+    from_ms: int,
+    to_ms: int,
+    *,
+    every_ms: int | None = None,
+    held: bool = False,
+    only: Collection[str] | None = None,
+) -> RunLog:
     """The run log of a machine in [from_ms, to_ms): a row for each time at which a signal said something.
 
     The first row also has what was known before: of each signal that says nothing in it the last value, where that was good.
 
     every_ms: windows, with the mean of each. held: a signal that says nothing keeps what it said last (controls report what
-    changes); a value that is not good ends that. Raises StoreError where there is nothing.
+    changes); a value that is not good ends that. only: these signals; else all. Raises StoreError where there is nothing.
     """
-    names = {s.signal: name for s in store.series(machine) if (name := column_name(s.signal)) is not None}
+    series = [s for s in store.series(machine) if only is None or s.signal in only]
+    names = {s.signal: name for s in series if (name := column_name(s.signal)) is not None}
     if not names:
         known = ", ".join(store.machines()) or "none"
         raise StoreError(f"{machine}: the store has no signal of it that a run log knows; machines it has: {known}")

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from itertools import takewhile
 from typing import Any
 
+from cnctwin.standins.simulated_machine.as_built import machine_as_built
 from cnctwin.standins.simulated_machine.moment import Moment
 from cnctwin.standins.simulated_machine.part import spare_part
 from cnctwin.standins.simulated_machine.working_day import working_day
@@ -109,7 +110,7 @@ class _AlreadyCut:
 
 def production_moments(seconds: float) -> Iterator[Moment]:
     """So many seconds of a working day: the same part again and again, five tool changes each, the door open in between."""
-    return takewhile(lambda moment: moment.at_s <= seconds, working_day(_AlreadyCut, spare_part, 0.0))
+    return takewhile(lambda moment: moment.at_s <= seconds, working_day(_AlreadyCut, spare_part, 0.0, machine_as_built()))
 
 
 def production(seconds: float) -> Iterator[ControlState]:

@@ -11,10 +11,12 @@ from cnctwin.standins.mtconnect_agent.ledger import ReplayLedger
 from cnctwin.standins.mtconnect_agent.replay_agent import ASSETS_MAX, BUFFER_SIZE, CLIENTS_MAX
 from cnctwin.standins.mtconnect_agent.server import AgentServer
 from cnctwin.standins.mtconnect_agent.shdr import parse_line
+from cnctwin.standins.simulated_machine.as_built import machine_as_built
 from cnctwin.standins.simulated_machine.description import DEVICES, check
 from cnctwin.standins.simulated_machine.moment import Adapter, Moment
 from cnctwin.standins.simulated_machine.part import Part, spare_part
 from cnctwin.standins.simulated_machine.working_day import Begin, Pending, working_day
+from twin.machine import MachineFile
 
 PATIENCE_S = 10.0
 """Seconds of our time for the first part; the imports and kernels that are compiled already take a few seconds."""
@@ -28,8 +30,8 @@ WAITING = "the machine waits for its next part, which is still being computed"
 class Computation:
     """A part that a thread is computing. The simulation lets other threads go on, since its kernels release the interpreter."""
 
-    def __init__(self, number: int, start_temperature_c: float, ambient_temp_c: float) -> None:
-        self._told = number, start_temperature_c, ambient_temp_c
+    def __init__(self, number: int, machine: MachineFile) -> None:
+        self._told = number, machine
         self._part: Part | None = None
         self._error: BaseException | None = None
         self._thread = threading.Thread(target=self._run, name=f"part-{number}", daemon=True)
@@ -61,7 +63,7 @@ class SimulatedMachine:
     """Serves the simulated machine on loopback.
 
     speed: 1 = real time; at 20 the machine's clock, which stamps what it tells, goes twenty times as fast as ours
-    begin: computes a part; now: seconds since 1970
+    machine: as it is; begin: computes a part; now: seconds since 1970
     """
 
     def __init__(
@@ -69,7 +71,8 @@ class SimulatedMachine:
         *,
         speed: float = 1.0,
         port: int = 0,
-        begin: Begin = Computation,
+        machine: MachineFile | None = None,
+        begin: Begin | None = None,
         now: Callable[[], float] = time.time,
     ) -> None:
         check(speed)
@@ -78,7 +81,9 @@ class SimulatedMachine:
         self.agent = Agent(model, model.devices[0], spoken, buffer_size=BUFFER_SIZE, assets_max=ASSETS_MAX, now=now)
         self.parts = 0
         self.error: BaseException | None = None
-        self._speed, self._now, self._begin = speed, now, begin
+        built = machine or machine_as_built()
+        self._speed, self._now, self._machine = speed, now, built
+        self._begin: Begin = begin or (lambda number: Computation(number, built))
         self._waiting_since_s: float | None = None
         self._pending: Pending | None = None
         self._shows_spare = False
@@ -136,7 +141,7 @@ class SimulatedMachine:
 
     def _run(self) -> None:
         try:
-            self._tell(working_day(self._begin_next, self._spare, PATIENCE_S * self._speed))
+            self._tell(working_day(self._begin_next, self._spare, PATIENCE_S * self._speed, self._machine))
         except BaseException as error:  # the thread that serves goes on; whoever runs us sees it here
             self.error = error
 
@@ -148,8 +153,8 @@ class SimulatedMachine:
     def _is_idle(self) -> bool:
         return self._pending is None or self._pending.ready
 
-    def _begin_next(self, number: int, start_temperature_c: float, ambient_temp_c: float) -> Pending:
-        self._pending = self._begin(number, start_temperature_c, ambient_temp_c)
+    def _begin_next(self, number: int) -> Pending:
+        self._pending = self._begin(number)
         return self._pending
 
     def _tell(self, moments: Iterator[Moment]) -> None:

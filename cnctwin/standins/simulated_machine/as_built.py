@@ -4,13 +4,14 @@ import tomllib
 from typing import Any
 
 from cnctwin.standins.simulated_machine.description import AS_BUILT, TOLD
-from twin.machine import MachineFile
+from twin.machine import AddedEffect, MachineFile
 
 
-def machine_as_built() -> MachineFile:
-    """The machine that is simulated."""
+def machine_as_built(hidden: AddedEffect | None = None) -> MachineFile:
+    """The machine that is simulated. hidden: an effect that it has besides"""
     told, built = (tomllib.loads(path.read_text(encoding="utf-8")) for path in (TOLD, AS_BUILT))
-    return MachineFile.model_validate(_over(told, built))
+    machine = MachineFile.model_validate(_over(told, built))
+    return machine if hidden is None else machine.model_copy(update={"effects": (*machine.effects, hidden)})
 
 
 def _over(told: dict[str, Any], built: dict[str, Any]) -> dict[str, Any]:

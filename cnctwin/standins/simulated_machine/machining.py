@@ -9,37 +9,27 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from cnctwin.standins.simulated_machine.as_built import machine_as_built
 from cnctwin.standins.simulated_machine.description import program_text
 from cnctwin.standins.simulated_machine.moment import Moment
 from cnctwin.standins.simulated_machine.part import Part
+from twin.machine import MachineFile
 from twin.runlog import RunLog
 from twin.simulator.simulation import simulate
 
 SHOWN_S = 0.1
-TEMPERATURE_SHOWN_S = 1.0
-END_S = 0.5
-"""The temperature that the next part starts from is the mean over so long: its sensor has noise."""
 
 
-def machined(number: int, start_temperature_c: float, ambient_temp_c: float) -> Part:
-    """Part `number` of the day, begun with a spindle of that temperature in surroundings of that temperature, °C."""
-    machine, text = machine_as_built(), program_text()
-    done = simulate(machine, text, seed=number, start_temperature_c=start_temperature_c, ambient_temp_c=ambient_temp_c)
+def machined(number: int, machine: MachineFile) -> Part:
+    """Part `number` of the day."""
+    text = program_text()
+    done = simulate(machine, text, seed=number)
     limits_a = {letter: axis.torque_limit_a for letter, axis in machine.axes.items()}
-    run = done.run
-    last = run.t_s > run.t_s[-1] - END_S
-    return Part(
-        moments=tuple(moments_of_run(run, text.splitlines(), limits_a)),
-        seconds=float(run.t_s[-1]),
-        temperature_c=float(run["spindle_temp_c"][last].mean()),
-    )
+    return Part(tuple(moments_of_run(done.run, text.splitlines(), limits_a)), float(done.run.t_s[-1]))
 
 
 def moments_of_run(run: RunLog, blocks: list[str], torque_limits_a: Mapping[str, float]) -> Iterator[Moment]:
     """Yield the control's states of a run every 0.1 s and at its end; `blocks`: program lines, `torque_limits_a`: by axis."""
     step = round(SHOWN_S / float(run.t_s[1] - run.t_s[0]))
-    seldom = round(TEMPERATURE_SHOWN_S / SHOWN_S)
     ticks = np.unique([*range(0, len(run), step), len(run) - 1])
     loads = {f"{a.upper()}load": _load_pct(run[f"{a}_torque_a"], ticks, limit) for a, limit in torque_limits_a.items()}
     for row, tick in enumerate(ticks):
@@ -55,8 +45,6 @@ def moments_of_run(run: RunLog, blocks: list[str], torque_limits_a: Mapping[str,
         }
         values |= {f"{a.upper()}abs": _rounded(run[f"{a}_pos_mm"][tick], 3) for a in torque_limits_a}
         values |= {key: f"{load[row]:.0f}" for key, load in loads.items()}
-        if row % seldom == 0:
-            values |= {"Stemp": f"{run['spindle_temp_c'][tick]:.1f}", "room_temp": f"{run['ambient_temp_c'][tick]:.1f}"}
         yield Moment(round(float(run.t_s[tick]), 6), values)
 
 

@@ -2,6 +2,7 @@
 
 import os
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from threading import Event
 
@@ -9,13 +10,30 @@ from cnctwin.errors import ApplicationError
 from cnctwin.processes.state_file import STATE_S, keep
 from cnctwin.standins.mtconnect_agent.errors import ReplayError
 from cnctwin.standins.simulated_machine.agent import SimulatedMachine
+from cnctwin.standins.simulated_machine.as_built import machine_as_built
 from cnctwin.standins.simulated_machine.description import PROGRAM
+from cnctwin.standins.simulated_machine.hidden_effect import Choice, sealed_effect
 
 
-def simulate_machine(stop: Event, *, speed: float = 1.0, port: int = 0, state_file: Path | None = None) -> None:
+@dataclass(frozen=True, slots=True)
+class Hidden:
+    """A choice of a hidden effect. seed: None = another one each time; sealed: the file that keeps it until it is revealed"""
+
+    choice: Choice
+    seed: int | None = None
+    sealed: Path | None = None
+
+
+def simulate_machine(
+    stop: Event, *, speed: float = 1.0, port: int = 0, hidden: Hidden | None = None, state_file: Path | None = None
+) -> None:
     """Serve until stopped; says where, and keeps `state_file` up to date for a program that started us."""
+    added = None
+    if hidden is not None:
+        added, sealed = sealed_effect(hidden.choice, hidden.seed, hidden.sealed)
+        print(f"an effect is hidden in the machine; the hash of its name, size and salt is {sealed.seal.digest}", flush=True)
     try:
-        machine = SimulatedMachine(speed=speed, port=port)
+        machine = SimulatedMachine(speed=speed, port=port, machine=machine_as_built(added))
     except ReplayError as error:
         raise ApplicationError(str(error)) from error
     machine.start()

@@ -1,24 +1,20 @@
 """A working day: one part after the other, with the door open in between, until somebody ends it.
 
-A part is computed while the one before it is cut, in a thread of its own; what it starts from (the heat left in the spindle, the
-air of the shop) is known by then. Where it is not ready in time, the machine waits for it as for an operator. Where the first one
-takes long, since the kernels have to be compiled on this computer, a spare one that was computed before is shown meanwhile.
+A part is computed while the one before it is cut, in a thread of its own. Where it is not ready in time, the machine waits for it
+as for an operator. Where the first one takes long, since the kernels have to be compiled on this computer, a spare one that was
+computed before is shown meanwhile.
 """
 
-import math
 from collections.abc import Callable, Iterator
 from random import Random
 from typing import Protocol
 
-from cnctwin.standins.simulated_machine.as_built import machine_as_built
 from cnctwin.standins.simulated_machine.description import program_text
+from cnctwin.standins.simulated_machine.heat import with_temperatures
 from cnctwin.standins.simulated_machine.moment import Moment
-from cnctwin.standins.simulated_machine.part import Part, warmer
-from twin.thermal import ThermalNetwork, rise_after
+from cnctwin.standins.simulated_machine.part import Part
+from twin.machine import MachineFile
 
-START_TEMPERATURE_C = 23.0
-SPARE_START_C = 23.0
-"""The temperature that the spare part was begun with, to the tenth that it shows."""
 CLOSED_S, COMPLETED_S, IDLE_SHOWN_S = 2.0, 1.0, 1.0
 CHANGE_S = (7.0, 12.0)
 """From READY to the closed door: an operator, or a robot."""
@@ -37,35 +33,35 @@ class Pending(Protocol):
         """It; waits for it, and raises what it raised."""
 
 
-Begin = Callable[[int, float, float], Pending]
-"""Begins to compute a part: its number, the spindle's temperature at its start, that of the air."""
+Begin = Callable[[int], Pending]
+"""Begins to compute a part, by its number."""
 
 
-def working_day(begin: Begin, spare: Callable[[], Part], patience_s: float) -> Iterator[Moment]:
+def working_day(begin: Begin, spare: Callable[[], Part], patience_s: float, machine: MachineFile) -> Iterator[Moment]:
     """Yield what the control shows, from the moment that it is switched on.
 
     spare: gives the part to show where the first one is not computed `patience_s` after the machine is ready for it
+    machine: the machine as it is, whose spindle warms
     """
-    network = network_as_built()
-    at_s, number, warm_c, pause_s = 0.0, 1, START_TEMPERATURE_C, _pause_s(1)
-    ambient_c = ambient_temp_c(pause_s)
-    start_c = cooled_c(network, warm_c, ambient_c, pause_s)
-    pending = begin(number, start_c, ambient_c)
+    return with_temperatures(_parts(begin, spare, patience_s), machine)
+
+
+def _parts(begin: Begin, spare: Callable[[], Part], patience_s: float) -> Iterator[Moment]:
+    """Yield one part after the other, with the pauses between them."""
+    at_s, number, pause_s = 0.0, 1, _pause_s(1)
+    pending = begin(number)
     yield Moment(at_s, switched_on())
     while True:
-        yield from _pause(at_s, pause_s, network, warm_c, ambient_c)
+        yield from _pause(at_s, pause_s)
         at_s += pause_s
         late_s = 0.0
         while not pending.ready and (number > 1 or late_s < patience_s):
             late_s += IDLE_SHOWN_S
-            yield Moment(at_s + late_s, _temperatures(cooled_c(network, start_c, ambient_c, late_s), ambient_c), waits=True)
-        part, expected_c = (pending.result(), start_c) if pending.ready else (spare(), SPARE_START_C)
-        part = warmer(part, cooled_c(network, start_c, ambient_c, late_s) - expected_c, network.time_constant_s)
+            yield Moment(at_s + late_s, {}, waits=True)
+        part = pending.result() if pending.ready else spare()
         begun_s = at_s + late_s
-        at_s, warm_c, pause_s = begun_s + part.seconds + COMPLETED_S, part.temperature_c, _pause_s(number + 1)
-        ambient_c = ambient_temp_c(at_s + pause_s)
-        start_c = cooled_c(network, warm_c, ambient_c, pause_s)
-        pending = begin(number + 1, start_c, ambient_c)
+        at_s, pause_s = begun_s + part.seconds + COMPLETED_S, _pause_s(number + 1)
+        pending = begin(number + 1)
         yield Moment(begun_s, {"execution": "ACTIVE"})
         yield from (shown._replace(at_s=begun_s + shown.at_s) for shown in part.moments)
         yield Moment(begun_s + part.seconds, {"execution": "PROGRAM_COMPLETED", "part_count": str(number)})
@@ -95,8 +91,8 @@ def _pause_s(number: int) -> float:
     return round(Random(number).uniform(*CHANGE_S), 1) + CLOSED_S  # noqa: S311 — no secret
 
 
-def _pause(at_s: float, seconds: float, network: ThermalNetwork, warm_c: float, ambient_c: float) -> Iterator[Moment]:
-    """The door is open, then closed, and the spindle cools."""
+def _pause(at_s: float, seconds: float) -> Iterator[Moment]:
+    """The door is open, then closed."""
     since_s, closes_s = 0.0, seconds - CLOSED_S
     yield Moment(at_s, {"door_state": "OPEN"})
     closed = False
@@ -104,32 +100,5 @@ def _pause(at_s: float, seconds: float, network: ThermalNetwork, warm_c: float, 
         if since_s >= closes_s and not closed:
             closed = True
             yield Moment(at_s + closes_s, {"door_state": "CLOSED"})
-        yield Moment(at_s + since_s, _temperatures(cooled_c(network, warm_c, ambient_c, since_s), ambient_c))
+        yield Moment(at_s + since_s, {})
         since_s += IDLE_SHOWN_S
-
-
-def ambient_temp_c(at_s: float) -> float:
-    """The air of the shop: half a degree up and down in an hour.
-
-    >>> ambient_temp_c(0.0), ambient_temp_c(900.0)
-    (21.5, 22.0)
-    """
-    return round(21.5 + 0.5 * math.sin(at_s * math.pi / 1800.0), 1)
-
-
-def _temperatures(spindle_c: float, ambient_c: float) -> dict[str, str]:
-    return {"Stemp": f"{spindle_c:.1f}", "room_temp": f"{ambient_c:.1f}"}
-
-
-def cooled_c(network: ThermalNetwork, warm_c: float, ambient_c: float, seconds: float) -> float:
-    """Temperature of a standing spindle after so long, °C."""
-    return ambient_c + rise_after(network, warm_c - ambient_c, 0.0, seconds)
-
-
-def network_as_built() -> ThermalNetwork:
-    """The heat of the spindle, as the machine is."""
-    thermal = machine_as_built().thermal
-    assert thermal is not None
-    return ThermalNetwork(
-        thermal.alpha_w_per_pct_rpm2, thermal.beta_w_per_rpm, thermal.resistance_k_per_w, thermal.capacity_j_per_k
-    )

@@ -18,7 +18,7 @@ from cnctwin.blind_check.kept import Kept, begun
 from cnctwin.blind_check.question import Draft, Sort
 from cnctwin.blind_check.rate import Rate
 from cnctwin.blind_check.scoring import Judged, scored
-from cnctwin.blind_check.sealed import seal
+from cnctwin.files.sealed import seal
 from cnctwin.standins.reference_machine.named_effects import NAMED
 from twin.gap.diagnosis import Verdict
 

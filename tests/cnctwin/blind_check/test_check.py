@@ -39,10 +39,10 @@ from cnctwin.blind_check.question import (
     question_of,
 )
 from cnctwin.blind_check.scoring import Judged, scored
-from cnctwin.blind_check.sealed import SealError, opened, seal
 from cnctwin.blind_check.table import table
 from cnctwin.blind_check.write import main
 from cnctwin.errors import UsageError
+from cnctwin.files.sealed import SealError, opened, seal
 from cnctwin.jobs.spread import spread_over
 from cnctwin.standins.reference_machine.controllers import STRUCTURES
 from cnctwin.standins.reference_machine.named_effects import NAMED

@@ -17,9 +17,11 @@ from twin.gap.labels import regime_labels
 from twin.gap.stages.cut import acting
 from twin.gap.stages.free import Free, constant
 from twin.gap.stages.machine_terms import reading_of_terms, with_quantity_terms
-from twin.gap.stages.observed_through import Sensing, sensor_effects
+from twin.gap.stages.observed_through import Sensing, sensor_effects, standing_sensors
+from twin.gap.stages.rounded import as_read, coarse_step
 from twin.gap.stages.stage import Model, Observed, observed_of
-from twin.heat.run import Warming, spindle_temperature_c, thermal_constants, thermal_quantities
+from twin.gap.stages.warming import NEEDS, SIGNAL, Stretch, Warmed, behind_k, between, from_rest, read_from, stretches_of
+from twin.heat.run import spindle_temperature_c, thermal_constants, thermal_quantities
 from twin.identification.batch_fit import time_blocks
 from twin.learned.arguments import around
 from twin.learned.standing import added_series, reading_series, terms_at
@@ -27,24 +29,32 @@ from twin.learned.term import Term
 from twin.learned.words import LearnedSite
 from twin.machine import MachineFile
 from twin.runlog import RunLog
-from twin.simulator.recorded import start_temperature_c
 
 Floats = NDArray[np.float64]
-BLOCK_S = 120.0
-SIGNAL = "spindle_temp_c"
+BLOCK_S, BLOCKS_MIN = 120.0, 12
 NAMES = ("alpha_w_per_pct_rpm2", "beta_w_per_rpm", "resistance_k_per_w", "capacity_j_per_k")
 TERM_FLOORS = 3.0
-NEEDS = (SIGNAL, "spindle_rpm", "spindle_load_pct", "ambient_temp_c")
+LATE_PART = 2.0
+"""By how much more or less than a sensor is late the spindle may be ahead of it at the start: it has not warmed evenly."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HeatRun:
-    """A run that warms up or cools down."""
+    """A run that warms up or cools down. parts: stretches without a hole in them, each of which starts as it was measured"""
 
     name: str
     log: RunLog
-    warming: Warming
+    parts: tuple[Stretch, ...]
     fitted: bool
+
+    @property
+    def t_s(self) -> Floats:
+        """Times at which it is compared, (n,)."""
+        return np.concatenate([part.at_s for part in self.parts])
+
+    def means(self, values: Floats) -> Floats:
+        """Return a column of its log as it is compared, (n,)."""
+        return np.concatenate([part.means(values) for part in self.parts])
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,13 +101,14 @@ class HeatStage:
     @property
     def candidates(self) -> tuple[Effected, ...]:
         """Return the effects that the temperature can show; those of the coolant only where it was switched."""
-        switched = any(len(set(np.nan_to_num(np.asarray(r.warming.coolant_on)).tolist())) > 1 for r in self.runs if r.fitted)
+        switched = any(part.switches_coolant for r in self.runs if r.fitted for part in r.parts)
         found = []
         for effect in self.effects:
             excited = effect.excited_by is not Excitation.COOLANT_SWITCHED or switched
             if effect.name not in self.left_out | set(self.standing) and excited:
                 found.append(Effected(effect.name))
-        return (*found, *sensor_effects((SIGNAL,), self.left_out))
+        has = standing_sensors(self.machine, SIGNAL)
+        return (*found, *(e for e in sensor_effects((SIGNAL,), self.left_out) if e.effect not in has))
 
     @property
     def term_sites(self) -> Mapping[LearnedSite, tuple[str, ...]]:
@@ -114,55 +125,93 @@ class HeatStage:
 
     def term_arguments(self, run: int) -> Mapping[str, Floats]:
         """Return what a term may depend on in a run."""
-        return around(self.runs[run].log.t_s, self.runs[run].log.columns)
+        return self._arguments(self.runs[run])
+
+    def _arguments(self, run: HeatRun) -> dict[str, Floats]:
+        told = around(run.log.t_s, run.log.columns)
+        return {name: run.means(values) for name, values in told.items()}
 
     def first_guesses(self, candidate: Effected) -> Guesses:
         """Return the effect's own guesses."""
         return effect_named(candidate.effect).first_guesses(Recorded(float(np.median(np.diff(self.runs[0].log.t_s)))))
 
     def _observed(self, run: HeatRun) -> Observed:
-        floor = self.floors.of(run.log, SIGNAL)
-        blocks = time_blocks(run.log.t_s, BLOCK_S)
+        t_s, floor = run.t_s, run.means(self.floors.of(run.log, SIGNAL))
+        blocks = time_blocks(t_s, min(BLOCK_S, float(t_s[-1] - t_s[0]) / BLOCKS_MIN))
         regime = regime_labels(run.log, SIGNAL, self.machine)[1]
-        return observed_of(run.name, [(SIGNAL, run.log[SIGNAL], floor, floor, blocks, regime)], run.fitted)
+        first = np.concatenate([part.first for part in run.parts])
+        return observed_of(run.name, [(SIGNAL, run.means(run.log[SIGNAL]), floor, floor, blocks, regime[first])], run.fitted)
 
     def predict(self, model: Model, theta: Floats, run: int) -> Floats:
         """The temperature at each row of θ, (lanes, n)."""
-        assert self.machine.thermal is not None
+        data, observed = self.runs[run], self.observed[run]
+        step = coarse_step(data.log[SIGNAL], observed.floor)
+        return as_read(np.concatenate(self._read(model, theta, data), axis=1), observed.measured, step)
+
+    def shown(self, model: Model, theta: Floats, run: int) -> Floats:
+        """Return what the twin shows at the rows of a run, (rows,), NaN where there is none that is compared."""
         data = self.runs[run]
+        column, recorded = np.full(len(data.log), np.nan), data.log[SIGNAL]
+        for part, read in zip(data.parts, self._read(model, theta, data), strict=True):
+            column[part.rows] = np.interp(data.log.t_s[part.rows], part.at_s, read[0])
+        return as_read(column, recorded, coarse_step(recorded, self.observed[run].floor))
+
+    def _read(self, model: Model, theta: Floats, data: HeatRun) -> list[Floats]:
+        """The readings of each part of a run, (lanes, n)."""
+        assert self.machine.thermal is not None
         values, factors = model.values(theta), model.factors(theta)
         constants: dict[str, ArrayLike] = {}
         for name, value in thermal_constants(self.machine.thermal).items():
             key = "capacity_j_per_k" if name == "heat_capacity_j_per_k" else name
             constants[name] = value * factors.get(f"thermal.{key}", np.ones(len(theta)))
         constants |= model.effect_constants(theta, self.effects, self.standing)
-        sensing = Sensing.of(values, SIGNAL)
-        start = sensing.value(np.full(len(theta), start_temperature_c(data.log.t_s, data.log[SIGNAL])))
-        arguments = around(data.log.t_s, data.log.columns) if self.terms or model.terms else {}
+        sensing = Sensing.of(values, SIGNAL, standing_sensors(self.machine, SIGNAL))
+        arguments = self._arguments(data) if self.terms or model.terms else {}
         added = with_quantity_terms(added_series(self.terms, arguments), model, theta, lambda: arguments)
-        shown = spindle_temperature_c(
-            constants,
-            data.warming,
-            start,
-            effects=tuple(e.name for e in self.effects),
-            added_w=added.get("heat_w"),
-        )
-        learned = reading_series(self.terms, SIGNAL, arguments)
-        period_s = float(np.median(np.diff(data.log.t_s)))
-        read = sensing.readings(np.broadcast_to(shown, (len(theta), shown.shape[1])), period_s)
-        read = read + reading_of_terms(model, theta, SIGNAL, lambda: arguments)
-        return read if learned is None else read + learned
+        learned = reading_of_terms(model, theta, SIGNAL, lambda: arguments)
+        standing = reading_series(self.terms, SIGNAL, arguments)
+        learned = learned if standing is None else learned + standing
+        step = coarse_step(data.log[SIGNAL], self.floors.of(data.log, SIGNAL))
+        found, place = [], 0
+        for part in data.parts:
+            here = slice(place, place + len(part.at_s))
+            place = here.stop
+            warmth = None if "heat_w" not in added else added["heat_w"][..., here]
+            read = self._begun(part, sensing, len(theta), step, self._warmed(model, constants, part, warmth))
+            found.append(read + (learned[..., here] if isinstance(learned, np.ndarray) else learned))
+        return found
+
+    def _warmed(self, model: Model, constants: dict[str, ArrayLike], part: Stretch, added_w: Floats | None) -> Warmed:
+        """The spindle of one part by its temperature at the start, and whether what is beside it is as cold as the air then."""
+        named = tuple(e.name for e in self.effects)
+        acting = {e.effect for e in model.effects} | set(self.standing)
+
+        def shown(start_c: Floats, *, cold: bool = False) -> Floats:
+            beside = np.full(len(start_c), part.ambient_c) if cold else None
+            found = spindle_temperature_c(constants, part.warming, start_c, effects=named, added_w=added_w, beside_c=beside)
+            return np.broadcast_to(found, (len(start_c), found.shape[1]))
+
+        return Warmed(shown, any(effect.states and effect.name in acting for effect in self.effects))
+
+    def _begun(self, part: Stretch, sensing: Sensing, lanes: int, step: float, warmed: Warmed) -> Floats:
+        """The readings of one part, (lanes, n), from the start that its recording tells."""
+        late = behind_k(sensing, part.slope_k_per_s, lanes)
+        start = sensing.value(np.full(lanes, part.start_c)) + late
+        whole = warmed.shown(start)
+        read = read_from(sensing, whole, part)
+        if warmed.keeps_heat:
+            cold = warmed.shown(start, cold=True)
+            read = between(read, read_from(sensing, cold, part) - read, part.temperature_c, 0.0)
+        unsure = np.maximum(0.5 * step, LATE_PART * np.abs(late))
+        if unsure.any():
+            warmer = warmed.shown(start + 1.0) - whole
+            read = between(read, unsure[:, None] * from_rest(sensing, warmer, part), part.temperature_c, -1.0)
+        return read
 
 
 def heat_runs(machine: MachineFile, runs: tuple[Run, ...]) -> tuple[HeatRun, ...]:
     """The runs in which the spindle's temperature is recorded beside all that drives it."""
     if machine.thermal is None:
         return ()
-    found = []
-    for run in runs:
-        log = run.log
-        if log.has(*NEEDS):
-            coolant = log["coolant_on"] if log.has("coolant_on") else np.zeros(len(log))
-            warming = Warming(log.t_s, log["spindle_load_pct"], log["spindle_rpm"], log["ambient_temp_c"], coolant)
-            found.append(HeatRun(run.name, log, warming, run.entry.role == "fit"))
-    return tuple(found)
+    there = [(run, stretches_of(run.log)) for run in runs if run.log.has(*NEEDS)]
+    return tuple(HeatRun(run.name, run.log, parts, run.entry.role == "fit") for run, parts in there if parts)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from twin.effects.catalogue import catalogue, effect_named
 from twin.effects.effect import On, called
 from twin.gap.diagnosis import Effected
+from twin.machine import MachineFile
 from twin.sensor.reading import readings
 from twin.sites import Site
 
@@ -23,15 +24,19 @@ class Sensing:
     effects: Mapping[str, Mapping[str, Floats]]
 
     @staticmethod
-    def of(values: Values, signal: str) -> "Sensing":
-        """The sensor of `signal` among the effects of a model."""
-        return Sensing({e.effect: v for e, v in values.items() if e.on == signal and effect_named(e.effect).on is On.SIGNAL})
+    def of(values: Values, signal: str, standing: Mapping[str, Mapping[str, Floats]] | None = None) -> "Sensing":
+        """The sensor of `signal` among the effects of a model, on top of those that it has already."""
+        mine = {e.effect: v for e, v in values.items() if e.on == signal and effect_named(e.effect).on is On.SIGNAL}
+        return Sensing({**(standing or {}), **mine})
 
-    def readings(self, values: Floats, period_s: float, starts: Sequence[int] = ()) -> Floats:
-        """Return the readings of values, (lanes, n). starts: samples at which the machine had come to rest, its sensors too"""
+    def readings(self, values: Floats, period_s: float | Floats, starts: Sequence[int] = ()) -> Floats:
+        """Return the readings of values, (lanes, n).
+
+        period_s: from sample to sample, one or (n,); starts: samples at which the machine had come to rest, its sensors too
+        """
         if not self.effects:
             return values
-        since = np.full(values.shape[1], period_s)
+        since = np.array(np.broadcast_to(period_s, values.shape[1]), dtype=np.float64)
         since[list(starts)] = np.inf
         since[0] = 0.0
         rows = []
@@ -55,6 +60,16 @@ class Sensing:
                 given = {key: np.atleast_1d(value)[:, None] for key, value in self.effects[name].items()}
                 values = np.asarray(called(undo, given, values))
         return values
+
+
+def standing_sensors(machine: MachineFile, signal: str) -> dict[str, dict[str, Floats]]:
+    """Return the effects of a machine on what a signal reads, effect → parameter → (1,)."""
+    there = [(e, effect_named(e.effect)) for e in machine.effects if e.on == signal]
+    return {
+        added.effect: {name: np.array([value]) for name, value in effect.checked(added.parameters).items()}
+        for added, effect in there
+        if effect.on is On.SIGNAL
+    }
 
 
 def sensor_effects(signals: Collection[str], left_out: Collection[str]) -> tuple[Effected, ...]:

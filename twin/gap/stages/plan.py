@@ -13,8 +13,10 @@ from twin.gap.dynamometer.turn_run import TurnRun
 from twin.gap.floors import Floors, repeatability
 from twin.gap.naming.filtered import told_from_a_filter
 from twin.gap.naming.specific import only_specific
+from twin.gap.naming.twins import with_twins
 from twin.gap.null import NULL, Null
 from twin.gap.search import Explained, bare_fit, explain
+from twin.gap.stages.air import AirStage, air_runs
 from twin.gap.stages.axis import AxisStage, axis_constants_free, standing_of
 from twin.gap.stages.axis_run import AxisRunData, axis_run_data, repeated_groups
 from twin.gap.stages.cut import CutStage, cut_runs
@@ -100,6 +102,9 @@ def explained_stages(ground: Ground, progress: Progress, side_by_side: SideBySid
             whole = told_from_a_filter(turns, explain(turns, null=null, progress=progress, doubtful=True), null)
             found.append(only_specific(turns, whole))
     stages: list[Stage] = [s for letter in ground.machine.axes if (s := axis_stage(ground, letter, forces)) is not None]
+    in_air = air_runs(ground.machine, ground.runs)
+    if any(run.fitted for run in in_air):
+        stages.append(AirStage(ground.machine, in_air, ground.floors, ground.left_out))
     warmups = heat_runs(ground.machine, tuple(r for r in ground.runs if not r.log.axes()))
     if any(run.fitted for run in warmups):
         stages.append(HeatStage(ground.machine, warmups, ground.floors, ground.left_out))
@@ -119,7 +124,8 @@ def _explained(stage: Stage, ground: Ground, null: Null, progress: Progress) -> 
                 if judged(alone).verdict is Verdict.UNKNOWN:
                     return Explained(stage, base, base, (), {}, {})
                 return explain(stage, null=null, progress=progress, known=alone.best)
-    return explain(stage, null=null, progress=progress)
+    found = explain(stage, null=null, progress=progress)
+    return with_twins(stage, found) if isinstance(stage, AirStage | HeatStage) else found
 
 
 def with_one_clock(found: list[Explained], progress: Progress, null: Null) -> list[Explained]:

@@ -15,6 +15,7 @@ from twin.effects.catalogue import effect_named
 from twin.effects.effect import On
 from twin.gap.diagnosis import Effected
 from twin.gap.floors import Floors
+from twin.gap.stages.air import AirStage, air_runs
 from twin.gap.stages.axis import AxisStage, standing_of
 from twin.gap.stages.axis_run import axis_run_data
 from twin.gap.stages.cut import CutStage, cut_runs
@@ -56,11 +57,14 @@ def shown(machine: MachineFile, run: Run, floors: Floors) -> dict[str, Floats]:
         columns |= turned.shown(*_sensing(machine, set(data.signals).__contains__), 0)
     for letter in machine.axes:
         columns |= _axis(machine, run, floors, letter, pushes.get(letter))
+    for idling in air_runs(machine, (run,)):
+        air = AirStage(machine, (idling,), floors)
+        columns["spindle_load_pct"] = air.shown(*_sensing(machine, set(air.observed[0].signals).__contains__), 0)
     if not run.log.axes():
         for warming in heat_runs(machine, (run,)):
             heat = HeatStage(machine, (warming,), floors)
             model, theta = _sensing(machine, set(heat.observed[0].signals).__contains__)
-            columns[heat.observed[0].signals[0]] = heat.predict(model, theta, 0)[0]
+            columns[heat.observed[0].signals[0]] = heat.shown(model, theta, 0)
     return columns
 
 

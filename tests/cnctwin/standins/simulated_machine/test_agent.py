@@ -24,7 +24,7 @@ class Ready:
 
     ready = True
 
-    def __init__(self, number: int, start_temperature_c: float, ambient_temp_c: float) -> None:
+    def __init__(self, _number: int) -> None:
         self.part = spare_part()
 
     def result(self) -> Part:

@@ -9,13 +9,6 @@ from cnctwin.standins.simulated_machine.as_built import machine_as_built
 from cnctwin.standins.simulated_machine.description import program_text
 from cnctwin.standins.simulated_machine.machining import machined, moments_of_run
 from cnctwin.standins.simulated_machine.part import Part, spare_part
-from cnctwin.standins.simulated_machine.working_day import (
-    SPARE_START_C,
-    START_TEMPERATURE_C,
-    ambient_temp_c,
-    cooled_c,
-    network_as_built,
-)
 from twin.simulator.simulation import Simulation, simulate
 
 
@@ -50,7 +43,7 @@ def test_what_is_shown_is_what_the_simulation_says(simulation: Simulation) -> No
 def test_every_tool_change_of_the_program_is_shown(simulation: Simulation) -> None:
     commanded = re.findall(r"^T\d+ M6", program_text(), re.M)
     moments = moments_of_run(simulation.run, program_text().splitlines(), {})
-    numbers = [value for _, value in course(Part(tuple(moments), 0.0, 0.0), "Tool_number")]
+    numbers = [value for _, value in course(Part(tuple(moments), 0.0), "Tool_number")]
     assert len(commanded) == 5
     assert numbers == ["", "1", "", "2", "", "3", "", "4", "", "5"]
 
@@ -72,27 +65,16 @@ def test_the_program_is_one_that_a_machinist_would_run(simulation: Simulation) -
         assert run[f"{axis}_ref_mm"][0] == run[f"{axis}_ref_mm"][-1] == 0.0, "the next part starts where this one ends"
 
 
-def test_the_spindle_warms_up_from_where_it_was(simulation: Simulation) -> None:
-    temperature = simulation.run["spindle_temp_c"]
-    assert temperature[0] == pytest.approx(30.0, abs=0.01)
-    assert simulation.run["spindle_temp_c"].max() > 30.5
-
-
 def test_two_parts_are_not_equal() -> None:
-    one, two = machined(1, 25.0, 22.0), machined(2, 25.0, 22.0)
+    one, two = machined(1, machine_as_built()), machined(2, machine_as_built())
     assert one.seconds == two.seconds
-    assert one.temperature_c == pytest.approx(two.temperature_c, abs=0.05)
     assert course(one, "Xabs") != course(two, "Xabs")
 
 
 def test_the_spare_part_is_the_first_one_as_it_is_computed() -> None:
     """Where this fails: scripts/make-recording."""
-    ambient_c = ambient_temp_c(2.0)
-    start_c = cooled_c(network_as_built(), START_TEMPERATURE_C, ambient_c, 2.0)
-    computed, spare = machined(1, start_c, ambient_c), spare_part()
-    assert start_c == pytest.approx(SPARE_START_C, abs=0.05)
+    computed, spare = machined(1, machine_as_built()), spare_part()
     assert spare.seconds == pytest.approx(computed.seconds, abs=0.01)
-    assert spare.temperature_c == pytest.approx(computed.temperature_c, abs=0.15)
     for key in ("Tool_number", "block"):
         assert course(spare, key) == course(computed, key), key
     assert course(spare, "coolant") == course(computed, "coolant")[1:], "off is what it was before"

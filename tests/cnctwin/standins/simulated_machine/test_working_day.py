@@ -1,17 +1,20 @@
 """One part after the other: time, heat, counts and the wait for what is not computed yet."""
 
 from collections.abc import Callable
-from itertools import islice, takewhile
+from itertools import islice, pairwise, takewhile
 from typing import NamedTuple
 
 import pytest
 
+from cnctwin.standins.simulated_machine.as_built import machine_as_built
+from cnctwin.standins.simulated_machine.heat import START_TEMPERATURE_C, ambient_temp_c
 from cnctwin.standins.simulated_machine.moment import Moment
 from cnctwin.standins.simulated_machine.part import Part
-from cnctwin.standins.simulated_machine.working_day import Pending, ambient_temp_c, switched_on, working_day
+from cnctwin.standins.simulated_machine.working_day import Pending, switched_on, working_day
 
-SHORT = Part((Moment(0.0, {"Tool_number": "", "Srpm": "0"}), Moment(4.0, {"Tool_number": "1", "Srpm": "8500"})), 10.0, 27.5)
-SPARE = Part((Moment(0.0, {"Srpm": "1"}),), 30.0, 25.0)
+MACHINE = machine_as_built()
+SHORT = Part((Moment(0.0, {"Tool_number": "", "Srpm": "0"}), Moment(4.0, {"Tool_number": "1", "Srpm": "8500"})), 10.0)
+SPARE = Part((Moment(0.0, {"Srpm": "1"}),), 30.0)
 
 
 class Computed(NamedTuple):
@@ -34,12 +37,12 @@ class Workshop:
     """Notes what is begun; part `late` is ready after `asks` questions only."""
 
     def __init__(self, late: int = 0, asks: int = 0) -> None:
-        self.begun: list[tuple[int, float, float]] = []
+        self.begun: list[int] = []
         self.part = SHORT
         self._late, self._asks = late, asks
 
-    def begin(self, number: int, start_temperature_c: float, ambient_temp_c: float) -> Pending:
-        self.begun.append((number, start_temperature_c, ambient_temp_c))
+    def begin(self, number: int) -> Pending:
+        self.begun.append(number)
         return Computed(self.part, [], self._asks if number == self._late else 0)
 
 
@@ -48,7 +51,7 @@ def no_spare() -> Part:
 
 
 def shown(workshop: Workshop, seconds: float, spare: Callable[[], Part] = no_spare, patience_s: float = 10.0) -> list[Moment]:
-    return list(takewhile(lambda moment: moment.at_s < seconds, working_day(workshop.begin, spare, patience_s)))
+    return list(takewhile(lambda moment: moment.at_s < seconds, working_day(workshop.begin, spare, patience_s, MACHINE)))
 
 
 def times_of(moments: list[Moment], key: str, value: str) -> list[float]:
@@ -79,23 +82,38 @@ def test_between_two_parts_the_machine_is_ready_and_its_door_opens() -> None:
     assert 8.0 < begun - ended < 16.0
 
 
-def test_the_next_part_starts_with_the_heat_that_is_left() -> None:
+def temperatures(moments: list[Moment]) -> list[tuple[float, float]]:
+    return [(moment.at_s, float(moment.values["Stemp"])) for moment in moments if "Stemp" in moment.values]
+
+
+def test_a_temperature_is_shown_each_second_and_never_jumps() -> None:
     workshop = Workshop()
-    moments = shown(workshop, 60.0)
-    (_, first_c, _), (_, second_c, air_c) = workshop.begun[:2]
-    assert 22.9 < first_c <= 23.0
-    assert air_c < second_c < SHORT.temperature_c
-    begun = times_of(moments, "execution", "ACTIVE")[1]
-    last_shown = [float(m.values["Stemp"]) for m in moments if "Stemp" in m.values and m.at_s < begun][-1]
-    assert last_shown == pytest.approx(second_c, abs=0.1), "the display shows the same temperature before and after"
+    workshop.part = Part(tuple(Moment(0.1 * step, {"Srpm": "8500"}) for step in range(300)), 30.0)
+    shown_c = temperatures(shown(workshop, 200.0))
+    assert shown_c[0][1] == pytest.approx(START_TEMPERATURE_C, abs=0.15)
+    assert max(after - before for (before, _), (after, _) in pairwise(shown_c)) < 2.01
+    assert len(shown_c) > 100
+    assert max(abs(after - before) for (_, before), (_, after) in pairwise(shown_c)) < 0.6
+
+
+def test_the_spindle_warms_while_it_turns_and_cools_while_it_stands() -> None:
+    turning, standing = (
+        Part(tuple(Moment(float(at_s), {"Srpm": rpm, "Sload": "20"}) for at_s in range(300)), 300.0) for rpm in ("8500", "0")
+    )
+    workshop = Workshop()
+    for part, sign in ((turning, 1.0), (standing, -1.0)):
+        workshop.part = part
+        (_, first_c), *_, (_, last_c) = temperatures(shown(workshop, 300.0))
+        assert sign * (last_c - first_c) > 0.3
+    assert temperatures(shown(workshop, 8000.0))[-1][1] == pytest.approx(ambient_temp_c(8000.0), abs=0.5), "as cold as the air"
 
 
 def test_each_part_is_begun_while_the_one_before_it_is_cut() -> None:
     workshop = Workshop()
-    for moment in working_day(workshop.begin, no_spare, 10.0):
+    for moment in working_day(workshop.begin, no_spare, 10.0, MACHINE):
         if moment.values.get("execution") == "ACTIVE":
             break
-    assert [number for number, *_ in workshop.begun] == [1, 2]
+    assert workshop.begun == [1, 2]
 
 
 def test_a_part_that_is_late_is_waited_for() -> None:
@@ -106,30 +124,17 @@ def test_a_part_that_is_late_is_waited_for() -> None:
     assert [moment.values.keys() for moment in late if moment.waits] == [{"Stemp", "room_temp"}] * 5, "it cools meanwhile"
 
 
-def test_a_part_that_was_waited_for_starts_with_a_spindle_that_has_cooled_meanwhile() -> None:
-    warm = Part(tuple(Moment(float(at_s), {"Stemp": f"{60.0 + at_s:.1f}"}) for at_s in range(8)), 8.0, 67.0)
-    workshop = Workshop(late=2, asks=100)
-    workshop.part = warm
-    moments = shown(workshop, 250.0)
-    waits = [float(moment.values["Stemp"]) for moment in moments if moment.waits]
-    begun = times_of(moments, "execution", "ACTIVE")[1]
-    first = next(float(m.values["Stemp"]) for m in moments if m.at_s == begun and "Stemp" in m.values and not m.waits)
-    expected_c = workshop.begun[1][1]
-    assert waits[-1] < expected_c - 3.0
-    assert first == pytest.approx(60.0 + waits[-1] - expected_c, abs=0.11)
-
-
 def test_a_first_part_that_keeps_the_machine_waiting_gives_way_to_a_spare_one() -> None:
     workshop = Workshop(late=1, asks=1000)
     moments = shown(workshop, 100.0, spare=lambda: SPARE, patience_s=7.0)
     assert times_of(moments, "execution", "ACTIVE")[0] == 2.0 + 7.0
     assert times_of(moments, "execution", "PROGRAM_COMPLETED")[0] == 2.0 + 7.0 + SPARE.seconds
-    assert workshop.begun[1][1] < SPARE.temperature_c, "the next one starts with the heat of the spare one"
 
 
-def test_what_is_shown_first_says_everything_but_temperatures() -> None:
-    first = next(iter(islice(working_day(Workshop().begin, no_spare, 1.0), 1)))
-    assert first == Moment(0.0, switched_on())
+def test_what_is_shown_first_says_everything() -> None:
+    first = next(iter(islice(working_day(Workshop().begin, no_spare, 1.0, MACHINE), 1)))
+    assert first.at_s == 0.0
+    assert first.values == {**switched_on(), **{key: first.values[key] for key in ("Stemp", "room_temp")}}
     assert first.values["block"].startswith("O1701")
 
 

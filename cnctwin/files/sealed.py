@@ -2,8 +2,10 @@
 
 import hashlib
 import hmac
+import json
 import secrets
 from dataclasses import dataclass
+from pathlib import Path
 
 from cnctwin.errors import ApplicationError
 
@@ -49,3 +51,22 @@ def opened(shown: Seal, salt: str, text: str) -> str:
 
 def _digest(text: str, salt: str) -> str:
     return hashlib.sha256(f"{salt}\n{text}".encode()).hexdigest()
+
+
+def write_sealed(sealed: Sealed, path: Path) -> None:
+    """Write salt and text to a file that only its owner may read; it appears as a whole."""
+    fresh = path.with_name(path.name + ".new")
+    fresh.touch(0o600)
+    fresh.write_text(json.dumps({"sha256": sealed.seal.digest, "salt": sealed.salt, "text": sealed.text}), encoding="utf-8")
+    fresh.replace(path)
+
+
+def read_sealed(path: Path) -> Sealed:
+    """Return what such a file holds. Raises SealError where there is none, or where it was changed."""
+    try:
+        held = json.loads(path.read_text(encoding="utf-8"))
+        found = Sealed(Seal(str(held["sha256"])), str(held["salt"]), str(held["text"]))
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise SealError(f"{path}: holds nothing sealed: {error}; name the file that `--sealed` wrote") from None
+    opened(found.seal, found.salt, found.text)
+    return found

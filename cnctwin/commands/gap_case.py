@@ -1,0 +1,160 @@
+"""`cnctwin gap case`: a case from a machine's history."""
+
+import json
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.table import Table
+
+from cnctwin.commands.extras import needed_by
+from cnctwin.commands.moment import moment_ms, moment_text
+from cnctwin.commands.options import AsJson
+from cnctwin.errors import UsageError
+from cnctwin.files.program_text import read_text
+from cnctwin.terminal.console import standard_output
+from cnctwin.terminal.spinner import working
+
+if TYPE_CHECKING:
+    from cnctwin.composing.composed import Composed
+
+MACHINES = "CNCTWIN_MACHINES"
+Machine = Annotated[str | None, typer.Option("--machine", help="Name of the machine in the store")]
+From = Annotated[str | None, typer.Option("--from", help="2026-11-22T06:00 (UTC where no zone is given), or -8h; else all")]
+To = Annotated[str | None, typer.Option("--to", help="The same; else the end of what the store has")]
+MachineFile = Annotated[
+    Path | None, typer.Option(help="machine.toml; else M.toml in $CNCTWIN_MACHINES or ./machines, else an assumed machine")
+]
+Programs = Annotated[Path | None, typer.Option(help="The folder with the NC files that the machine runs")]
+Ambient = Annotated[float | None, typer.Option("--ambient-c", help="The surroundings, °C, where no signal tells them")]
+
+
+def case(
+    out: Annotated[Path, typer.Option(help="The folder to write; a case that is there is replaced")],
+    store: Annotated[str | None, typer.Option(help="Folder or address; else $CNCTWIN_STORE", show_default=False)] = None,
+    machine: Machine = None,
+    from_: From = None,
+    to: To = None,
+    machine_file: MachineFile = None,
+    programs: Programs = None,
+    healthy_from: Annotated[str | None, typer.Option(help="Beginning of a time in which the twin was right")] = None,
+    healthy_to: Annotated[str | None, typer.Option(help="Its end")] = None,
+    ambient_c: Ambient = None,
+    as_json: AsJson = False,
+) -> None:
+    """Compose a case for `gap diagnose` out of a machine's history. Exit code 1: nothing is left to be judged on."""
+    if machine is None:
+        raise UsageError("--machine NAME is missing; `cnctwin store status` tells which machines the store has")
+    done = composed_of(
+        store, machine, out, from_, to, machine_file, programs, healthy=(healthy_from, healthy_to), ambient_c=ambient_c
+    )
+    if as_json:
+        sys.stdout.write(json.dumps(done.as_json(), ensure_ascii=False) + "\n")
+    else:
+        show(done)
+    raise typer.Exit(0 if done.has_check else 1)
+
+
+def composed_of(
+    store: str | None,
+    machine: str,
+    out: Path,
+    from_: str | None,
+    to: str | None,
+    machine_file: Path | None,
+    programs: Path | None,
+    *,
+    healthy: tuple[str | None, str | None] = (None, None),
+    ambient_c: float | None = None,
+) -> "Composed":
+    """Compose a case as the options of a command say. Raises ApplicationError, TwinError."""
+    with needed_by("a case", "twin"):
+        from cnctwin.composing.compose import compose
+    from cnctwin.memory.store.opening import default_place, open_store
+
+    description = description_of(machine, machine_file)
+    opened = open_store(store or default_place())
+    try:
+        with working("composing") as say:
+            return compose(
+                opened,
+                machine,
+                description,
+                out,
+                span_ms=_span_ms(from_, to),
+                healthy_ms=_healthy_ms(*healthy),
+                programs=programs,
+                ambient_c=ambient_c,
+                progress=say,
+            )
+    finally:
+        opened.close()
+
+
+def description_of(machine: str, machine_file: Path | None) -> str:
+    """Return the text that describes a machine: the file given, its file in the folder of machines, else an assumed one."""
+    from cnctwin.composing.assumed import assumed_description
+
+    if machine_file is not None:
+        return read_text(machine_file)
+    live = Path(os.environ.get(MACHINES) or "machines") / f"{machine}.toml"
+    return read_text(live) if live.is_file() else assumed_description(machine)
+
+
+def _span_ms(from_: str | None, to: str | None) -> tuple[int, int] | None:
+    """Return the stretch that --from and --to say; None where neither does."""
+    if from_ is None and to is None:
+        return None
+    span = moment_ms(from_, "--from") if from_ else 0, moment_ms(to or "-0s", "--to")
+    if span[1] <= span[0]:
+        raise UsageError(f"--to {to or 'now'} is not after --from {from_}; give a stretch of time")
+    return span
+
+
+def _healthy_ms(from_: str | None, to: str | None) -> tuple[int, int] | None:
+    if (from_ is None) != (to is None):
+        raise UsageError("--healthy-from and --healthy-to belong together; give both")
+    return None if from_ is None or to is None else (moment_ms(from_, "--healthy-from"), moment_ms(to, "--healthy-to"))
+
+
+def show(done: "Composed") -> None:
+    """Print the runs of a case, what they can show, and what is missing for the rest."""
+    console = standard_output()
+    runs = Table(title=f"{done.name}: {len(done.runs)} runs in {done.folder}", title_justify="left")
+    for column in ("run", "what", "kind", "role", "from", "lasted", "rows", "repeats"):
+        runs.add_column(column, justify="right" if column in ("lasted", "rows") else "left", overflow="fold")
+    for run in done.runs:
+        begun = "" if run.from_ms is None else moment_text(run.from_ms)
+        role = f"{run.role}, healthy" if run.healthy else run.role
+        name = run.file.removeprefix("runs/")
+        repeats = (run.repeats or "").removeprefix("runs/")
+        runs.add_row(name, run.what, run.kind.value, role, begun, _length(run.lasted_s), str(run.rows), repeats)
+    console.print(runs)
+    shown = [f"{one.effect} ({', '.join(one.on)})" if one.on else one.effect for one in done.effects if not one.missing]
+    console.print("\n[bold]can show[/]")
+    console.print(f"· {', '.join(shown) or 'nothing'}", markup=False, highlight=False, soft_wrap=True)
+    lacking: dict[str, list[str]] = {}
+    for one in done.effects:
+        if one.missing:
+            lacking.setdefault(one.missing, []).append(one.effect)
+    if lacking:
+        console.print("\n[bold]cannot show[/]")
+    for missing, effects in lacking.items():
+        console.print(f"· {', '.join(effects)}: {missing}", markup=False, highlight=False, soft_wrap=True)
+    if done.notes:
+        console.print("\n[bold]how it was composed[/]")
+    for note in done.notes:
+        console.print(f"· {note}", markup=False, highlight=False, soft_wrap=True)
+
+
+def _length(seconds: float) -> str:
+    """Return a length as people say it.
+
+    >>> _length(42.0), _length(600.0), _length(12_600.0)
+    ('42 s', '10 min', '3.5 h')
+    """
+    if seconds < 120.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 7200.0 else f"{seconds / 3600.0:.1f} h"

@@ -1,0 +1,164 @@
+"""The commands below `cnctwin twin`: which description of a machine is live, which challenger waits, promote it, or go back.
+
+Exit codes: 0 = done; 1 = refused, with the reason; 2 = wrong input.
+"""
+
+import getpass
+import json
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from cnctwin.commands.moment import moment_text
+from cnctwin.commands.options import AsJson, Machines
+from cnctwin.errors import UsageError
+from cnctwin.terminal.console import standard_output
+
+if TYPE_CHECKING:
+    from cnctwin.machines.change import Change, Done
+    from cnctwin.machines.folder import MachineFolder
+
+twin_app = typer.Typer(
+    no_args_is_help=True, help="The description of a machine: which is live, which challenger waits, promote it, go back."
+)
+MachineName = Annotated[str, typer.Argument(metavar="MACHINE", help="Its name on the broker")]
+By = Annotated[str | None, typer.Option(help="Who does it; else the user of this process", show_default=False)]
+Why = Annotated[str, typer.Option(help="Why, for the log")]
+Version = Annotated[str, typer.Option(help="Its digits, or the first of them", show_default=False)]
+STEPS_SHOWN = 12
+
+
+@twin_app.command()
+def show(machine: MachineName, machines: Machines = None, as_json: AsJson = False) -> None:
+    """Which description is live since when, what of it is assumed, which challenger waits and why, and the last steps."""
+    from cnctwin.machines.told import told
+
+    found = told(_folder(machine, machines))
+    if as_json:
+        sys.stdout.write(json.dumps(found, ensure_ascii=False) + "\n")
+        return
+    console = standard_output()
+    for line in _lines(found):
+        console.print(line, markup=False, highlight=False, soft_wrap=True)
+
+
+@twin_app.command()
+def promote(
+    machine: MachineName,
+    version: Version = "",
+    by: By = None,
+    why: Why = "",
+    force: Annotated[bool, typer.Option("--force", help="Whatever speaks against it; takes --why")] = False,
+    machines: Machines = None,
+    as_json: AsJson = False,
+) -> None:
+    """Make the challenger the live description, or with --version one of the history. Exit code 1: it may not be, and why."""
+    if force and not why.strip():
+        raise UsageError("--force takes --why, which the log keeps")
+    _change(machine, machines, lambda change: change.promote(_user(by), why, version, is_forced=force), as_json)
+
+
+@twin_app.command()
+def back(
+    machine: MachineName,
+    by: By = None,
+    why: Why = "",
+    machines: Machines = None,
+    as_json: AsJson = False,
+) -> None:
+    """Make the description before the live one live again; once more, the one before that. Exit code 1: there is none."""
+    _change(machine, machines, lambda change: change.back(_user(by), why), as_json)
+
+
+@twin_app.command()
+def withdraw(
+    machine: MachineName,
+    by: By = None,
+    why: Why = "",
+    machines: Machines = None,
+    as_json: AsJson = False,
+) -> None:
+    """Take the challenger away; it stays in the history."""
+    _change(machine, machines, lambda change: change.withdraw(_user(by), why), as_json)
+
+
+def _folder(machine: str, given: Path | None) -> "MachineFolder":
+    """Return the folder of a machine that is described. Raises UsageError."""
+    from cnctwin.machines.folder import MachineFolder, described
+    from cnctwin.machines.place import VARIABLE, machines_folder
+
+    folder = machines_folder(given)
+    if folder is None or not folder.is_dir():
+        where = "no folder of descriptions is here" if folder is None else f"{folder}: is no folder"
+        raise UsageError(f"{where}; give --machines DIR or ${VARIABLE}, with {machine}.toml in it (docs/loop.md)")
+    own = MachineFolder(folder, machine)
+    if machine not in (known := described(folder)):
+        raise UsageError(f"{folder}: nobody has described {machine!r}; there are {', '.join(known) or 'no machines'}")
+    return own
+
+
+def _change(machine: str, machines: Path | None, make: "Callable[[Change], Done]", as_json: bool) -> None:
+    from cnctwin.machines.change import RefusedError, changing
+
+    own = _folder(machine, machines)
+    try:
+        with changing(own, time.time_ns() // 1_000_000) as change:
+            done = make(change)
+    except RefusedError as error:
+        print(f"cnctwin: {error}", file=sys.stderr)
+        raise typer.Exit(1) from None
+    if as_json:
+        step = None if done.step is None else done.step.document
+        sys.stdout.write(json.dumps({"done": step is not None, "text": done.text, "step": step}, ensure_ascii=False) + "\n")
+    else:
+        print(done.text)
+
+
+def _user(given: str | None) -> str:
+    if given:
+        return given
+    try:
+        return getpass.getuser()
+    except (OSError, KeyError):
+        return "command line"
+
+
+def _lines(found: Mapping[str, Any]) -> Iterator[str]:
+    """The document in lines for a person."""
+    live, challenger, score = found["live"], found["challenger"], found["score"]
+    if live is None:
+        yield f"{found['machine']}: nobody has described it yet; a challenger waits"
+    else:
+        why = f": {live['why']}" if live["why"] else ""
+        yield f"{found['machine']}: {live['version']} is live since {moment_text(live['since'])} UTC, by {live['by']}{why}"
+        yield f"assumed: {', '.join(live['assumed']) or 'nothing'}"
+    if challenger is None:
+        yield "no challenger waits"
+    else:
+        said = f": {challenger['sentence']}" if challenger["sentence"] else ""
+        yield f"challenger: {challenger['version']}{said}"
+        if challenger["gap_before"] is not None and challenger["gap_after"] is not None:
+            yield f"gap by its diagnosis: {challenger['gap_before']:.3g} → {challenger['gap_after']:.3g} floors"
+        if score is not None:
+            both = f"live {score['live']:.3g}, challenger {score['challenger']:.3g} floors"
+            yield f"gap on {score['runs']} runs that were not fitted: {both}"
+        yield from _shadow(found["shadow"])
+        yield "it may be promoted" if found["may_promote"] else f"it may not be promoted: {found['why_not']}"
+    for fault in found["faults"]:
+        yield f"wrong: {fault}"
+    for step in found["steps"][-STEPS_SHOWN:]:
+        why = f": {step['why']}" if step.get("why") else ""
+        yield f"{moment_text(step['t'])}  {step['step']:<11} {step.get('version', ''):<12} by {step.get('by') or '?'}{why}"
+
+
+def _shadow(shadow: Mapping[str, Any] | None) -> Iterator[str]:
+    if shadow is None:
+        return
+    for signal, floors in shadow["live"].items():
+        if signal in shadow["challenger"]:
+            yield f"standing gap of {signal}: live {floors:.2f}, challenger {shadow['challenger'][signal]:.2f} floors"
+    yield f"beside the live one for {shadow['seconds']:.0f} s"

@@ -1,0 +1,80 @@
+"""`cnctwin gap case`: what a program and a person read, and one line for what is wrong."""
+
+import json
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from cnctwin.cli import main
+from cnctwin.standins.simulated_machine.description import TOLD
+from tests.cnctwin.composing.made_up import store_of_days
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    folder = tmp_path_factory.mktemp("history") / "store"
+    store_of_days(folder, 2).close()
+    yield str(folder)
+
+
+def run(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
+    with pytest.MonkeyPatch.context() as patched, pytest.raises(SystemExit) as ended:
+        patched.setattr(sys, "argv", ["cnctwin", "gap", "case", *(str(a) for a in arguments)])
+        main()
+    said = capsys.readouterr()
+    return int(ended.value.code or 0), said.out, said.err
+
+
+def test_a_program_reads_runs_and_what_they_can_show(place: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "case"
+    asked = ("--store", place, "--machine", "vmc", "--machine-file", TOLD, "--out", out, "--json")
+    code, told, _ = run(capsys, *asked)
+    done = json.loads(told)
+    assert code == 0 and done["case"] == str(out) and {r["role"] for r in done["runs"]} == {"fit", "check"}
+    missing = {one["effect"]: one["missing"] for one in done["effects"]}
+    assert missing["coolant_cooling"] == "" and missing["gravity"].startswith("no reference and torque of an axis")
+
+
+def test_a_person_reads_a_table_and_what_is_missing(place: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, told, _ = run(capsys, "--store", place, "--machine", "vmc", "--machine-file", TOLD, "--out", tmp_path / "case")
+    assert code == 0 and "warmup" in told and "can show" in told
+    assert "no program with its NC text (--programs DIR)" in told
+
+
+def test_a_machine_that_nobody_described_is_assumed(place: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, _, _ = run(capsys, "--store", place, "--machine", "vmc", "--out", tmp_path / "case", "--json")
+    assert code == 0 and 'assumed = ["spindle", "thermal"]' in (tmp_path / "case" / "machine.toml").read_text()
+
+
+def test_the_folder_of_machines_describes_it(
+    place: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    machines = tmp_path / "machines"
+    machines.mkdir()
+    (machines / "vmc.toml").write_text(TOLD.read_text())
+    monkeypatch.setenv("CNCTWIN_MACHINES", str(machines))
+    run(capsys, "--store", place, "--machine", "vmc", "--out", tmp_path / "case", "--json")
+    assert (tmp_path / "case" / "machine.toml").read_text() == TOLD.read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        ((), "--machine NAME is missing"),
+        (("--machine", "lathe"), "lathe: the store has no signal of it"),
+        (("--machine", "vmc", "--from", "yesterday"), "--from 'yesterday' is no moment"),
+        (("--machine", "vmc", "--from", "2026-01-02", "--to", "2026-01-01"), "is not after --from"),
+        (("--machine", "vmc", "--from", "2020-01-01", "--to", "2020-01-02"), "nothing of it in that stretch"),
+        (("--machine", "vmc", "--healthy-from", "2026-01-02"), "--healthy-from and --healthy-to belong together"),
+        (("--machine", "vmc", "--programs", "nowhere"), "nowhere: is no folder"),
+        (("--machine", "vmc", "--machine-file", "nowhere.toml"), "nowhere.toml: cannot be read"),
+    ],
+)
+def test_wrong_input_is_one_line(
+    place: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], says: str
+) -> None:
+    code, told, error = run(capsys, "--store", place, *arguments, "--out", tmp_path / "case")
+    assert code == 2 and not told and says in error and len(error.strip().splitlines()) == 1
+    assert not any(tmp_path.iterdir())
