@@ -69,6 +69,24 @@ PART_RECORD = f"{TWIN_PREFIX}part_record"
 ALERT_STATE = f"{TWIN_PREFIX}alert_state"
 
 
+def challenger_name(name: str) -> str:
+    """Return the name under which a challenger publishes a signal of the live twin.
+
+    >>> challenger_name("twin/spindle_temp_c")
+    'twin/challenger/spindle_temp_c'
+    """
+    return CHALLENGER_PREFIX + name.removeprefix(TWIN_PREFIX)
+
+
+def live_name(name: str) -> str | None:
+    """Return the signal of the live twin for one of a challenger; None for all others.
+
+    >>> live_name("twin/challenger/spindle_temp_c"), live_name("twin/spindle_temp_c")
+    ('twin/spindle_temp_c', None)
+    """
+    return TWIN_PREFIX + name.removeprefix(CHALLENGER_PREFIX) if name.startswith(CHALLENGER_PREFIX) else None
+
+
 def is_gap(name: str) -> bool:
     """Return True if a metric is the standing gap of a signal over all its regimes.
 
