@@ -86,6 +86,12 @@ class Folded:
         self.thermal = _Fold.of(THERMAL, {"tick_s": TICK_S}, self.description)
         self.gap = _Fold.of(GAP_PROCESSOR, {"tick_s": TICK_S} | self.table, self.description)
 
+    def copied(self) -> "Folded":
+        """Return another one that goes on from the same state."""
+        other = Folded(self.description, self.table, list(self.said), dict(self.latest), dict(self.row), self.at_s)
+        other.thermal.state, other.gap.state = self.thermal.state, self.gap.state
+        return other
+
     def describe(self, description: Description) -> None:
         """Go on with another description."""
         self.description = description
@@ -208,23 +214,36 @@ class Noticed(NamedTuple):
     floors: float | None
 
 
-def noticed(name: str, on: str, seed: int, days: float) -> Noticed:
-    """Return how an effect is noticed that comes at a drawn hour of the third week."""
+def hour_of(seed: int) -> float:
+    """Return the hour at which a machine gets its effect: of a working day in the third week."""
     chance = Random(seed)
-    begins_s = MONDAY_S + HEALTHY_DAYS * DAY_S + chance.randrange(3) * DAY_S + chance.uniform(7.0, 20.0) * HOUR_S
-    until_s = begins_s + days * DAY_S
-    before = machine_as_built()
-    stretches = [(begins_s, Production(before, seed)), (until_s, Production(with_effect(before, name, on), seed))]
-    folded, rows = watched(told()), 0.0
-    for day in production_days(stretches, MONDAY_S):
+    return MONDAY_S + (HEALTHY_DAYS + chance.randrange(3)) * DAY_S + chance.uniform(7.0, 20.0) * HOUR_S
+
+
+def before_effect(seed: int) -> tuple[Folded, float | None]:
+    """Return the processors as they are when the effect comes, and the temperature of the spindle then."""
+    folded, temp_c = watched(told()), None
+    for day in production_days([(hour_of(seed), Production(machine_as_built(), seed))], MONDAY_S):
+        folded.feed(day)
+        temp_c = day.end_temp_c
+    return folded, temp_c
+
+
+def noticed(name: str, on: str, seed: int, days: float, before: tuple[Folded, float | None]) -> Noticed:
+    """Return how an effect is noticed that comes at the machine's hour."""
+    folded, temp_c = before[0].copied(), before[1]
+    begins_s = hour_of(seed)
+    after = Production(with_effect(machine_as_built(), name, on), seed)
+    rows = 0.0
+    for day in production_days([(begins_s + days * DAY_S, after)], begins_s, temp_c):
         folded.feed(day)
         found = [one for one in growths(folded) if one[0] >= begins_s]
-        if day.at_s.size and day.at_s[0] >= begins_s:
-            until = found[0][0] if found else float("inf")
-            rows += sum(1.0 for at_s in day.at_s if at_s <= until)
+        until_s = found[0][0] if found else float("inf")
+        rows += float((day.at_s <= until_s).sum())
         if found:
             signal = found[0][1].split(" in ")[0]
-            return Noticed(rows / HOUR_S, found[0][1], folded.latest.get(f"{twin_signals.GAP_PREFIX}{signal}"))
+            floors = folded.latest.get(f"{twin_signals.GAP_PREFIX}{signal}")
+            return Noticed(rows / HOUR_S, found[0][1], floors)
     return Noticed(None, "", None)
 
 
@@ -257,10 +276,11 @@ def _healthy(first: int, machines: int, weeks: float) -> None:
 
 def _effects(first: int, machines: int, days: float, only: Sequence[str]) -> None:
     print(f"{'effect':<28} {'on':<18} {'noticed':<8} {'hours of production':<24} {'floors':<8} by")
+    begun = {seed: before_effect(seed) for seed in range(first, first + machines)}
     for name, on in SIZES:
         if only and name not in only:
             continue
-        found = [noticed(name, on, first + number, days) for number in range(machines)]
+        found = [noticed(name, on, seed, days, before) for seed, before in begun.items()]
         hours = [one.hours for one in found if one.hours is not None]
         floors = [one.floors for one in found if one.floors is not None]
         spread = f"{min(hours):.1f} / {statistics.median(hours):.1f} / {max(hours):.1f}" if hours else "-"

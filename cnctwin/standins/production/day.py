@@ -126,12 +126,14 @@ class Day:
         return run_log(columns | {"program": self.program, "exec_state": self.exec_state}, "production")
 
 
-def production_days(stretches: Sequence[tuple[float, Production]], start_s: float) -> Iterator[Day]:
+def production_days(
+    stretches: Sequence[tuple[float, Production]], start_s: float, start_temp_c: float | None = None
+) -> Iterator[Day]:
     """Yield the days of a machine from `start_s` on, cut at midnights and where it becomes another one.
 
-    stretches: until when, s since 1970, the machine is as stated
+    stretches: until when, s since 1970, the machine is as stated; start_temp_c: of the spindle, None = as warm as the air
     """
-    temp_c: float | None = None
+    temp_c = start_temp_c
     for until_s, production in stretches:
         while start_s < until_s:
             end_s = min((start_s // DAY_S + 1.0) * DAY_S, until_s)
