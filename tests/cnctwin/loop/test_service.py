@@ -35,7 +35,8 @@ def test_an_open_gap_is_diagnosed_promoted_by_a_person_and_taken_back(plant: Loo
     plant.until_step("promoted")
     assert (plant.machines / "vmc.toml").read_text() == BETTER
     plant.until(lambda: (plant.document["last"] or {}).get("after") == 1.0, "the gap after")
-    assert "coolant cools: gap of the temperature 3.1 → 1.0 floors since" in plant.document["last"]["text"]
+    assert plant.document["last"]["text"] == "coolant cools: gap of the temperature 3.1 → 1.0 floors"
+    assert plant.document["text"].startswith("coolant cools: gap of the temperature 3.1 → 1.0 floors since ")
     plant.ask("back", version=VB, id="third")
     plant.ask("back", version=VB, id="third")
     plant.until(lambda: plant.own.live_version() == VA, "the way back")
