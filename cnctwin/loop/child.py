@@ -29,13 +29,14 @@ def compose(order: Mapping[str, Any], paths: Paths) -> None:
     if not (paths.case / "case.toml").is_file():
         store = open_store(order["store"])
         try:
-            programs = order.get("programs")
+            programs, healthy = order.get("programs"), order.get("healthy_ms")
             done = composed(
                 store,
                 order["machine"],
                 order["description"],
                 paths.case,
                 span_ms=(order["from_ms"], order["to_ms"]),
+                healthy_ms=None if healthy is None else (healthy[0], healthy[1]),
                 programs=None if programs is None else Path(programs),
                 ambient_c=order.get("ambient_c"),
             )

@@ -73,7 +73,7 @@ class LoopService:
             wanted=lambda node: node.node == GAP,
             trusted=lambda _: True,
         )
-        self._workshop = Workshop(places, self._ask, self._cancel)
+        self._workshop = Workshop(places, self._ask, self._cancel, configuration.healthy_ms)
         self._keepers: dict[str, Keeper] = {}
         self._clocks: dict[str, _Clock] = {}
         self._requests: deque[Request] = deque(maxlen=REQUESTS_MAX)
@@ -170,6 +170,7 @@ class LoopService:
     def _send(self) -> None:
         if self._host.online and self._host.reconnects != self._reconnects:
             self._reconnects = self._host.reconnects
+            self._host.request_rebirth(NodeId(self._group, GAP))  # what stands there is not told again by itself
             self._outbox = {topics.LOOP + machine: payload for machine, payload in self._told.items()} | self._outbox
         for topic, payload in list(self._outbox.items()):
             if self._host.publish_plain(topic, payload, qos=1, retain=True):

@@ -88,11 +88,15 @@ class _Running:
 
 @dataclass
 class Workshop:
-    """See the module. ask, cancel: send a request for a job, or its end, to the broker."""
+    """See the module. ask, cancel: send a request for a job, or its end, to the broker.
+
+    healthy_ms: when somebody has stated that a machine was healthy
+    """
 
     places: Places
     ask: Callable[[Mapping[str, Any]], bool]
     cancel: Callable[[str], bool]
+    healthy_ms: Callable[[str], tuple[int, int] | None] = lambda _: None
     jobs: dict[str, dict[str, Any]] = field(default_factory=dict)
     answers: dict[str, dict[str, Any]] = field(default_factory=dict)
     _running: _Running | None = None
@@ -111,7 +115,9 @@ class Workshop:
             if (paths.case / "case.toml").is_file():
                 return Work(is_done=True)
             span = {"from_ms": state.span_at_ms[0], "to_ms": state.span_at_ms[1]}
-            given = {"programs": config.programs and str(config.programs), "ambient_c": config.ambient_c}
+            given: dict[str, Any] = {"programs": config.programs and str(config.programs), "ambient_c": config.ambient_c}
+            healthy_ms = self.healthy_ms(machine)
+            given["healthy_ms"] = healthy_ms if healthy_ms is not None and healthy_ms[1] <= state.span_at_ms[0] else None
             return self._done_by_a_child({"do": "compose", "store": self.places.store, **order, **span, **given})
         if (finding := _finding(paths)) is not None:
             return Work(finding=finding)

@@ -42,6 +42,14 @@ def test_what_is_wrong_is_named(table: dict[str, object], says: str) -> None:
     assert says in str(wrong.value)
 
 
+def test_the_healthy_period_is_that_of_the_processor_gap(tmp_path: Path) -> None:
+    file = tmp_path / "processors.toml"
+    file.write_text("[gap.machines.vmc]\nhealthy_from = 1970-01-01T01:00:00Z\nhealthy_hours = 2.0\n")
+    found = loop_configuration(file)
+    assert found.healthy_ms("vmc") == (3_600_000, 3 * 3_600_000)
+    assert found.healthy_ms("okuma") is None
+
+
 def test_the_same_file_serves_processors_and_the_loop(tmp_path: Path) -> None:
     file = tmp_path / "processors.toml"
     file.write_text("[loop]\nshadow_s = 60.0\n[thermal]\ntick_s = 2.0\n")
