@@ -9,7 +9,7 @@ per cent, temperatures in tenths) go through the processors thermal and gap, as 
 sheet, a few per cent off. The first two weeks are stated to be healthy. Signals are taken every 20 s and where a state changes.
 
 healthy   a false growth is each time that `twin/gap_growing` comes on in the weeks after that
-effects   at an hour of a working day (drawn) the machine gets the effect, at the size that a machine typically shows unless the
+effects   in a night (drawn) the machine gets the effect, at the size that a machine typically shows unless the
           table below gives another; printed is the time of production until `twin/gap_growing`, of which signal, and how large
           the standing gap became
 
@@ -108,10 +108,11 @@ class Folded:
             self._samples(SampleKind.HOLE, float(day.at_s[0]), gap_s=gap_s)
         self.at_s = float(day.at_s[0])
         before: dict[str, Any] = {}
+        tick_s = (self.at_s // TICK_S + 1.0) * TICK_S
         for at_s, values in day.thinned(TICK_S).rows():
-            while (tick_s := (self.at_s // TICK_S + 1.0) * TICK_S) < at_s:
-                self.at_s = tick_s
+            while tick_s < at_s:  # a row that comes with a tick is seen by it
                 self._tick(tick_s)
+                tick_s += TICK_S
             self.at_s = at_s
             changed = tuple(name for name, value in values.items() if name not in before or before[name] != value)
             before = values
@@ -197,6 +198,8 @@ def healthy_quarter(seed: int, weeks: float) -> list[tuple[float, str]]:
     until_s = MONDAY_S + (HEALTHY_DAYS + 7.0 * weeks) * DAY_S
     for day in production_days([(until_s, Production(machine_as_built(), seed))], MONDAY_S):
         folded.feed(day)
+    judged = [key for key, cell in folded.gap.state.cells.items() if cell.is_judged]
+    assert len(judged) >= 8, f"hardly anything was judged: {judged}"
     return growths(folded)
 
 
@@ -215,9 +218,8 @@ class Noticed(NamedTuple):
 
 
 def hour_of(seed: int) -> float:
-    """Return the hour at which a machine gets its effect: of a working day in the third week."""
-    chance = Random(seed)
-    return MONDAY_S + (HEALTHY_DAYS + chance.randrange(3)) * DAY_S + chance.uniform(7.0, 20.0) * HOUR_S
+    """Return when a machine gets its effect: in a night of the third week, as a day of the generator is worked out as a whole."""
+    return MONDAY_S + (HEALTHY_DAYS + Random(seed).randrange(4)) * DAY_S
 
 
 def before_effect(seed: int) -> tuple[Folded, float | None]:

@@ -1,10 +1,9 @@
 """The signals that are compared, the regimes of each, and how finely a control commonly shows them."""
 
-from twin.vocabulary import twin_signals
-from twin.vocabulary.signals import PROGRAM_TIME_S as PROGRAM_TIME
-from twin.vocabulary.signals import TOOL_CHANGE_S as TOOL_CHANGE
+from twin.vocabulary import signals, twin_signals
 
 LOAD, TEMPERATURE, SPEED = "spindle_load_pct", "spindle_temp_c", "spindle_rpm"
+TOOL_CHANGE, PROGRAM_TIME = signals.TOOL_CHANGE_S, signals.PROGRAM_TIME_S
 AXIS_LOADS = tuple(f"axis_{letter}_load_pct" for letter in "xyzabc")
 SIGNALS = (TEMPERATURE, LOAD, SPEED, TOOL_CHANGE, PROGRAM_TIME, *AXIS_LOADS)
 REGIMES = {

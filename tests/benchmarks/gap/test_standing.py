@@ -1,0 +1,19 @@
+"""A slice of the trials of the standing gap: a healthy machine is left in peace, and an effect is reported as what it is."""
+
+from benchmarks.gap.standing import before_effect, growths, healthy_quarter, noticed
+
+SEED = 7
+
+
+def test_two_healthy_weeks_after_the_first_two_are_silent_though_growth_was_judged() -> None:
+    """The trial itself refuses a machine of which next to nothing was judged."""
+    assert healthy_quarter(SEED, weeks=2.0) == []
+
+
+def test_a_longer_tool_change_is_noticed_as_such() -> None:
+    before = before_effect(SEED)
+    assert growths(before[0]) == []
+    change = noticed("tool_change_time", "", SEED, 4.0, before)
+    assert change.why.startswith("tool_change_s in ")
+    assert change.hours is not None
+    assert change.hours < 24.0
