@@ -23,6 +23,7 @@ from cnctwin.api.routes.past import past_routes
 from cnctwin.api.routes.people import people_routes
 from cnctwin.api.routes.plant import plant_routes
 from cnctwin.api.routes.prediction import prediction_routes
+from cnctwin.api.routes.sealed import sealed_routes
 from cnctwin.api.sources import Sources
 
 ABOUT = "A digital twin of CNC machines: state, predictions, history, gaps, alerts. Times are ms since 1970, UTC."
@@ -66,6 +67,8 @@ def create_app(sources: Sources) -> FastAPI:
         page_routes(sources.access, failures),
     ):
         app.include_router(router)
+    if sources.envelope.is_given:
+        app.include_router(sealed_routes(sources.envelope))
     serve_page(app)
     app.state.fan_out, app.state.sources = fan_out, sources
     return app

@@ -34,6 +34,7 @@ class ServeOptions:
     users: Path | None = None
     audit: Path | None = None
     registry: Path | None = None
+    sealed: Path | None = None
     proxy_header: str | None = None
     proxy: str | None = None
     allow_hosts: tuple[str, ...] = ()
@@ -53,18 +54,19 @@ def serve(options: ServeOptions, broker: BrokerAddress, stop: Event) -> None:
         raise UsageError(f"the page needs the package {missing.name}; {EXTRA}") from None
     from cnctwin.api.constants import Constants  # noqa: PLC0415
     from cnctwin.api.door.audit import AuditLog  # noqa: PLC0415
+    from cnctwin.api.envelope import Envelope  # noqa: PLC0415
     from cnctwin.api.nights import Nights  # noqa: PLC0415
     from cnctwin.api.residual import Models  # noqa: PLC0415
     from cnctwin.api.store_reader import StoreReader  # noqa: PLC0415
     from processors.running.limits import limits_of  # noqa: PLC0415
 
     access = access_of(options, os.environ.get(TOKEN_VARIABLE))
-    constants = Constants(options.config)
     live = LivePlant()
     viewer = Viewer(broker, options.group, live, limits_of(options.config))
+    constants = Constants(options.config, viewer.descriptions.of)
     store = StoreReader(options.store)
     audit = AuditLog(options.audit or state_dir() / "audit" / "page.jsonl")
-    told = (options.diagnoses, Nights(), options.jobs, access, audit, options.registry)
+    told = (options.diagnoses, Nights(), options.jobs, access, audit, options.registry, Envelope(options.sealed))
     sources = Sources(live, viewer, store, constants, Models(options.models), *told)
     app = create_app(sources)
     server = Server(app, options.host, options.port)

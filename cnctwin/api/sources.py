@@ -6,6 +6,7 @@ from pathlib import Path
 from cnctwin.api.access import Access
 from cnctwin.api.constants import Constants
 from cnctwin.api.door.audit import AuditLog
+from cnctwin.api.envelope import Envelope
 from cnctwin.api.live.plant import LivePlant
 from cnctwin.api.live.viewer import Viewer
 from cnctwin.api.nights import Nights
@@ -27,6 +28,7 @@ class Sources:
     access: who may ask
     audit: the record of who did what
     registry: the folder of models that `cnctwin model` keeps
+    envelope: the effect that the demo hides in its machine
     """
 
     live: LivePlant
@@ -40,3 +42,4 @@ class Sources:
     access: Access = field(default_factory=Access)
     audit: AuditLog = field(default_factory=AuditLog)
     registry: Path | None = None
+    envelope: Envelope = field(default_factory=lambda: Envelope(None))

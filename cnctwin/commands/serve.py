@@ -31,6 +31,9 @@ def serve(
     registry: Annotated[
         Path | None, typer.Option(help="Folder that `cnctwin model` keeps, for administrators to promote")
     ] = None,
+    sealed: Annotated[
+        Path | None, typer.Option(help="File in which the simulated machine has sealed its hidden effect", hidden=True)
+    ] = None,
     proxy_header: Annotated[str | None, typer.Option(help="Header in which the reverse proxy names the user")] = None,
     proxy: Annotated[str | None, typer.Option(help="Address that the proxy connects from")] = None,
     allow_host: Annotated[list[str] | None, typer.Option(help="One more name that this server is asked by")] = None,
@@ -55,6 +58,7 @@ def serve(
         users=users,
         audit=audit,
         registry=registry,
+        sealed=sealed,
         proxy_header=proxy_header,
         proxy=proxy,
         allow_hosts=tuple(allow_host or ()),

@@ -41,6 +41,7 @@ _TABLE = tuple(
         ("POST", "/jobs", Role.OPERATOR, "ask for job"),
         ("POST", "/jobs/([^/]+)/cancel", Role.OPERATOR, "cancel job"),
         ("POST", "/models/([^/]+/[^/]+)/promote", Role.ADMINISTRATOR, "promote model"),
+        ("POST", "/demo/reveal", Role.OPERATOR, "reveal"),
         ("GET", "/audit", Role.ADMINISTRATOR, ""),
     )
 )

@@ -9,53 +9,43 @@ from collections.abc import Iterable, Iterator
 from random import Random
 
 from cnctwin.standins.simulated_machine.moment import Moment
+from twin.live.heat import HeatInput, LiveHeat
+from twin.live.sensor import LiveSensor
 from twin.machine import MachineFile
-from twin.thermal import ThermalNetwork, heat_input_w, rise_after
 
 START_TEMPERATURE_C = 23.0
 SHOWN_S = 1.0
-NOISE = "spindle_temp_c"
+TEMPERATURE, LOAD = "spindle_temp_c", "spindle_load_pct"
 
 
 def with_temperatures(moments: Iterable[Moment], machine: MachineFile) -> Iterator[Moment]:
     """Yield the moments of a day with the temperatures of spindle and air, the first ones at its begin and then each second."""
-    spindle = SpindleHeat(machine, START_TEMPERATURE_C)
-    inputs = {"Srpm": 0.0, "Sload": 0.0}
-    coolant_on, before_s, next_s, number = False, 0.0, 0.0, 0
+    heat, meter, noise_k = LiveHeat.of(machine), LiveSensor.of(machine, LOAD), machine.noise.get(TEMPERATURE, 0.0)
+    told = HeatInput(0.0, 0.0, ambient_temp_c(0.0))
+    state, before_s, next_s = heat.started(START_TEMPERATURE_C, told), 0.0, 0.0
     for moment in moments:
-        air_c = ambient_temp_c(before_s)
-        spindle.go_on(inputs["Sload"], inputs["Srpm"], air_c, coolant_on, moment.at_s - before_s)
-        before_s = moment.at_s
-        inputs |= {key: float(moment.values[key]) for key in inputs if key in moment.values}
-        coolant_on = moment.values.get("coolant", "ON" if coolant_on else "OFF") == "ON"
+        if moment.at_s > before_s:
+            state = heat.step(state, told, moment.at_s - before_s)
+        told, before_s = _heating(told, moment, meter), moment.at_s
         if moment.at_s < next_s:
             yield moment
             continue
-        number, next_s = number + 1, math.floor(moment.at_s / SHOWN_S) * SHOWN_S + SHOWN_S
-        shown = {"Stemp": f"{spindle.shown_c(number):.1f}", "room_temp": f"{air_c:.1f}"}
-        yield moment._replace(values={**moment.values, **shown})
+        second = math.floor(moment.at_s / SHOWN_S)
+        shown_c = heat.reading(state, told) + Random(second).gauss(0.0, noise_k)  # noqa: S311 — no secret
+        next_s = (second + 1) * SHOWN_S
+        yield moment._replace(values={**moment.values, "Stemp": f"{shown_c:.1f}", "room_temp": f"{told.ambient_c:.1f}"})
 
 
-class SpindleHeat:
-    """The heat in the spindle of a machine."""
-
-    def __init__(self, machine: MachineFile, start_c: float) -> None:
-        thermal = machine.thermal
-        assert thermal is not None
-        self._network = ThermalNetwork(
-            thermal.alpha_w_per_pct_rpm2, thermal.beta_w_per_rpm, thermal.resistance_k_per_w, thermal.capacity_j_per_k
-        )
-        self._noise_k = machine.noise.get(NOISE, 0.0)
-        self._temperature_c = start_c
-
-    def go_on(self, load_pct: float, rpm: float, ambient_c: float, coolant_on: bool, seconds: float) -> None:
-        """Go on by so many seconds in which load, speed, air and coolant stay as they are."""
-        heat_w = heat_input_w(self._network, rpm, load_pct)
-        self._temperature_c = ambient_c + rise_after(self._network, self._temperature_c - ambient_c, heat_w, seconds)
-
-    def shown_c(self, number: int) -> float:
-        """Return reading `number` of the day, with the noise of the sensor."""
-        return self._temperature_c + Random(number).gauss(0.0, self._noise_k)  # noqa: S311 — no secret
+def _heating(before: HeatInput, moment: Moment, meter: LiveSensor | None) -> HeatInput:
+    """Return what heats and cools the spindle from a moment on. What the meter reads wrong heats nothing."""
+    shown = moment.values
+    load_pct = before.spindle_load_pct
+    if "Sload" in shown:
+        load_pct = float(shown["Sload"])
+        load_pct = load_pct if meter is None else meter.value_at(load_pct) or 0.0
+    rpm = float(shown.get("Srpm", before.spindle_rpm))
+    coolant_on = shown.get("coolant", "ON" if before.coolant_on else "OFF") == "ON"
+    return HeatInput(load_pct, rpm, ambient_temp_c(moment.at_s), float(coolant_on))
 
 
 def ambient_temp_c(at_s: float) -> float:

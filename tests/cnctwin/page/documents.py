@@ -296,6 +296,7 @@ def _tell_machine(shop: Shop, machine: str, is_first: bool, started: float) -> N
         ]
         return 200, {"machine": machine, "from": start, "to": end, "events": found}
 
+    shop.answers[f"/twin/{machine}"] = lambda _path, _body: (200, {"machine": machine, "step": None, "reason": "no loop runs"})
     shop.answers[f"/gap/{machine}"] = lambda _path, _body: (200, gap(machine, diagnosis() if is_first else None))
     shop.answers[f"/events/{machine}"] = events
     shop.answers[f"/parts/{machine}"] = lambda _path, _body: (

@@ -9,6 +9,7 @@ import { diagnosisSections } from "./diagnosis.js";
 import { shade } from "./gap_shade.js";
 import { machineHead } from "./machine_head.js";
 import { noMachine } from "./no_machine.js";
+import { twinLoop } from "./twin_loop.js";
 
 const AGAIN_MS = 15000;
 const REGIMES = ["warm_up", "steady", "cool_down", "air"];
@@ -183,7 +184,7 @@ function noDiagnosis(name, gap) {
     el(
       "p",
       {},
-      "Which effect makes the gap, and how far it shrinks with that effect in the twin, comes from recorded runs. Put them into a case and run:",
+      "Press Diagnose above: the loop cuts the last stretch of production out of the history and looks for the effect that makes the gap. Runs that you have recorded yourself make a case too:",
     ),
     el("pre", {}, `cnctwin gap diagnose CASE --out DIAGNOSES/${name}\ncnctwin serve --diagnoses DIAGNOSES`),
     gap?.diagnosis_reason ? el("p", { class: "note" }, `The server says: ${gap.diagnosis_reason}`) : null,
@@ -235,11 +236,14 @@ export function open(app, { machine: named }) {
     trouble = el("p", { class: "trouble", role: "alert", hidden: true }),
     asOf = el("p", { class: "note" });
   const now = nowOf(app.plant.machine(name)),
+    loop = twinLoop(app, name, () => load()),
     write = () => {
       head.write();
       now.write();
+      loop.write();
     };
-  element.append(head.element, el("section", {}, el("h2", {}, "At this moment, measured − twin"), now.host), trouble, body, asOf);
+  const present = el("section", {}, el("h2", {}, "At this moment, measured − twin"), now.host);
+  element.append(head.element, loop.element, present, trouble, body, asOf);
   now.write();
   let shown = "",
     heardAt = null;
@@ -313,13 +317,17 @@ export function open(app, { machine: named }) {
     keys: [
       [["o"], "open the report", () => body.querySelector("a.report")?.click()],
       [["l"], "load anew", load],
+      [["d"], "diagnose", () => loop.press("diagnose")],
+      [["P"], "promote the challenger", () => loop.press("promote")],
     ],
+    onMe: loop.onMe,
     update: write,
     onLink: (state) => {
       if (state === "live" && !shown) load();
     },
     close() {
       stop.abort();
+      loop.close();
       clearInterval(timer);
       clearInterval(tick);
     },

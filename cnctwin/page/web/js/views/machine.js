@@ -7,6 +7,7 @@ import { atMost, onFrame, offFrame } from "../frame.js";
 import { Panels } from "../panels.js";
 import { addBefore } from "../past.js";
 import { title } from "../text.js";
+import { loopLine } from "./loop_line.js";
 import { machineHead } from "./machine_head.js";
 import { noMachine } from "./no_machine.js";
 import { SignalTable } from "./signal_table.js";
@@ -26,6 +27,7 @@ export function open(app, { machine: named, search }) {
   machine.series.clear(); // what was kept for the fleet has holes: it is filled up anew
   const head = machineHead(app, machine, "machine");
   const stop = new AbortController(),
+    line = loopLine(app, name),
     filled = new Set();
   let windowMs = Number(search.get("window")) || 300000,
     asked = search.get("signal") ?? null,
@@ -53,6 +55,7 @@ export function open(app, { machine: named, search }) {
   const note = el("p", { class: "note", hidden: true });
   element.append(
     head.element,
+    line.element,
     el(
       "div",
       { class: "tiles" },
@@ -221,6 +224,7 @@ export function open(app, { machine: named, search }) {
     ],
     close() {
       stop.abort();
+      line.close();
       clearInterval(move);
       clearInterval(tick);
       redraw.stop();

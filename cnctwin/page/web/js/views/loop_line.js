@@ -1,0 +1,41 @@
+// One line about the twin's loop, for a view that is about something else: what it does now, and the way to it.
+
+import { get, part } from "../api.js";
+import { el, setHidden, setText } from "../dom.js";
+import { sentence } from "../text.js";
+
+const ASK_MS = 3000;
+
+export function loopLine(app, name) {
+  const said = el("span"),
+    stop = new AbortController();
+  const element = el(
+    "p",
+    { class: "loopline", hidden: true },
+    el("strong", {}, "Twin"),
+    said,
+    el("a", { href: app.address("gap", name) }, "See the gap"),
+  );
+
+  async function load() {
+    if (document.hidden) return;
+    try {
+      const loop = await get(["twin", part(name)].join("/"), { signal: stop.signal });
+      const text = loop.step === "promoted" && loop.last ? loop.last.text : loop.text;
+      setHidden(element, !text);
+      setText(said, sentence(text));
+    } catch (error) {
+      if (error.status !== -1) setHidden(element, true); // without a loop there is nothing to say here
+    }
+  }
+
+  load();
+  const timer = setInterval(load, ASK_MS);
+  return {
+    element,
+    close() {
+      stop.abort();
+      clearInterval(timer);
+    },
+  };
+}
