@@ -11,6 +11,7 @@ import pytest
 from cnctwin.cli import main
 from cnctwin.standins.simulated_machine.description import TOLD
 from tests.cnctwin.composing.made_up import store_of_days
+from twin.machine import read_machine
 from twin.runlog import run_log, write_run
 
 
@@ -142,3 +143,18 @@ def test_wrong_input_for_run_logs_is_one_line(
     code, told, error = run(capsys, *runs, *arguments, "--out", tmp_path / "case")
     assert code == 2 and not told and says in error and len(error.strip().splitlines()) == 1
     assert not (tmp_path / "case").exists()
+
+
+def test_one_command_fits_an_assumed_machine_from_the_store(
+    place: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "machine.toml"
+    with pytest.MonkeyPatch.context() as patched, pytest.raises(SystemExit) as ended:
+        patched.setattr(sys, "argv", ["cnctwin", "identify", "--store", place, "--machine", "vmc", "--out", str(out), "--json"])
+        main()
+    told = json.loads(capsys.readouterr().out)
+    assert ended.value.code == 0 and told["out"] == str(out)
+    machine = read_machine(out)
+    assert "thermal.resistance_k_per_w" not in machine.machine.assumed and "thermal" not in machine.machine.assumed
+    assert machine.thermal is not None
+    assert abs(machine.thermal.resistance_k_per_w * machine.thermal.capacity_j_per_k - 640.0) < 64.0
