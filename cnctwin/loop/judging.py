@@ -4,7 +4,7 @@ It is scored beside the live one on the check runs of the case, which neither wa
 """
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ from twin.case import Case, read_case
 from twin.errors import CaseError
 from twin.gap.diagnosis import Verdict
 from twin.gap.score_of import score_of
-from twin.gap.wording import signal_words
+from twin.gap.wording import effect_words, signal_words
 from twin.machine import MachineFile, machine_from_toml
 
 CHECK = "check"
@@ -85,14 +85,15 @@ def _score(case: Case, live: MachineFile, challenger: MachineFile) -> Score | No
 
 def _card(diagnosis: Mapping[str, Any], score: Score | None, composed: Mapping[str, Any] | None) -> Card:
     gap, causes = diagnosis.get("gap") or {}, diagnosis.get("causes") or []
-    signal = _largest(gap.get("by_signal") or {})
+    by_signal = gap.get("by_signal") or {}
+    signal = _largest(by_signal)
     fitted = [run for run in (composed or {}).get("runs", ()) if run.get("role") == "fit" and run.get("from_ms")]
     before, after = gap.get("before"), gap.get("after")
-    says = _says(causes)
+    says = _says(diagnosis)
     words = signal_words(signal) if signal else ""
-    told = f": gap {before:.1f} → {after:.1f} floors" if before is not None and after is not None else ""
+    told = _closed(words, by_signal[signal]) if signal else ""
     return Card(
-        sentence=f"{says or diagnosis.get('sentence', '')}{told if says else ''}",
+        sentence=f"{says}{told}" if says else str(diagnosis.get("sentence", "")),
         verdict=str(diagnosis.get("verdict", "")),
         causes=tuple({key: one.get(key) for key in _OF_A_CAUSE} for one in causes),
         says=says,
@@ -106,20 +107,31 @@ def _card(diagnosis: Mapping[str, Any], score: Score | None, composed: Mapping[s
     )
 
 
-def _says(causes: Sequence[Mapping[str, Any]]) -> str:
-    """Return the causes in plain words."""
-    named = [(one["effect"].replace("_", " "), one.get("on")) for one in causes[:3]]
-    return ", ".join(f"{effect} on {on}" if on else effect for effect, on in named)
+def _says(diagnosis: Mapping[str, Any]) -> str:
+    """Return the causes in plain words, with what each cannot be told from."""
+    if causes := diagnosis.get("causes"):
+        return " and ".join(_cause_words(one) for one in causes[:3])
+    return "constants differ from what was stated" if diagnosis.get("constants") else ""
+
+
+def _cause_words(cause: Mapping[str, Any]) -> str:
+    others = [effect_words(other["effect"], other.get("on", "")) for other in cause.get("indistinguishable_from") or ()]
+    return effect_words(cause["effect"], cause.get("on", "")) + (f" (or {', '.join(others)})" if others else "")
 
 
 def _largest(by_signal: Mapping[str, Mapping[str, Any]]) -> str:
     """Return the signal whose gap was largest, in floors."""
 
-    def over_floor(signal: str) -> float:
-        one = by_signal[signal]
-        return float(one.get("before") or 0.0) / max(float(one.get("floor") or 0.0), 1e-12)
+    return max(by_signal, key=lambda signal: _floors(by_signal[signal], "before"), default="")
 
-    return max(by_signal, key=over_floor, default="")
+
+def _closed(words: str, gap: Mapping[str, Any]) -> str:
+    return f": gap of {words} {_floors(gap, 'before'):.1f} → {_floors(gap, 'after'):.1f} floors"
+
+
+def _floors(gap: Mapping[str, Any], which: str) -> float:
+    floor = float(gap.get("floor") or 0.0)
+    return float(gap.get(which) or 0.0) / floor if floor > 0.0 else 0.0
 
 
 def _next(experiment: Mapping[str, Any] | None) -> str:

@@ -37,8 +37,8 @@ class Viewer:
         self.group = group
         self.on_batches: Callable[[list[Batch]], None] = lambda _: None
         self.jobs = LiveJobs()
-        self.descriptions = LiveDescriptions()
         self.loops = LiveLoops()
+        self.descriptions = LiveDescriptions()
         self._live = live
         self._host = viewer(broker, group, limits)
         for topic in (ALERT_STATE, *LiveDescriptions.filters, *LiveJobs.filters, *LiveLoops.filters):
