@@ -17,6 +17,7 @@ from cnctwin.processes.port import is_free
 from cnctwin.processes.private_broker import PrivateBroker
 from cnctwin.standins.simulated_machine import description
 from cnctwin.standins.simulated_machine.anomaly_model import place_model
+from cnctwin.standins.simulated_machine.hidden_effect import RANDOM
 from sparkplug.errors import TopicError
 from sparkplug.topics import check_id
 from twin.vocabulary.nodes import HISTORIAN_NODE
@@ -63,6 +64,8 @@ class DemoOptions:
     machine: str | None = None
     json: bool = False
     no_open: bool = False
+    effect: str = RANDOM
+    seed: int | None = None
 
 
 class Demo:
@@ -84,6 +87,7 @@ class Demo:
         self.machine = _checked(options.machine or machine_name(options.devices if options.recording else description.DEVICES))
         self.broker = PrivateBroker(folder / "broker", options.port)
         self._folder = folder
+        self.sealed = folder / "sealed.json"
         self._agent_state, self._page_state = folder / "agent.json", folder / "page.json"
         self.page_url = self.page_trouble = ""
         self.children: list[Child] = []
@@ -172,7 +176,8 @@ class Demo:
     def _agent(self) -> list[str]:
         """The command that stands in for the control."""
         if self.options.recording is None:
-            return ["simulate-control", "machine"]
+            seed = [] if self.options.seed is None else ["--seed", str(self.options.seed)]
+            return ["simulate-control", "machine", "--effect", self.options.effect, *seed, "--sealed", str(self.sealed)]
         devices = ["--devices", str(self.options.devices)] if self.options.devices else []
         return ["simulate-control", "mtconnect", str(self.options.recording), *devices, "--wait"]
 
