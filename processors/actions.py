@@ -27,10 +27,14 @@ class PlainOutput(PlainMessage):
 
 
 class Declare(NamedTuple):
-    """The machine is online: give birth to its twin device, with what is known of it already."""
+    """The machine is online: give birth to its twin device, with what is known of it already.
+
+    is_challenged: the challenger's metrics are declared too
+    """
 
     machine: str
     latest: tuple[Change, ...] = ()
+    is_challenged: bool = False
 
 
 class Remove(NamedTuple):

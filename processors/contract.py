@@ -149,6 +149,7 @@ class _Declaration(Generic[C, S]):
     records: whether the runtime hands all that it hears to a recorder, as it comes, before the fold sees it
     described: makes what the step is given out of what it would be given otherwise and the machine's description, None where
         nobody has described it. It is called once for each description, and the state goes on
+    beside: makes the state that a challenger starts from out of the live one; None = it starts from `initial`
     """
 
     name: str
@@ -163,6 +164,7 @@ class _Declaration(Generic[C, S]):
     alarms: Callable[[], tuple[str, ...]] | None = None
     records: bool = False
     described: Callable[[Any, Description | None], Any] | None = None
+    beside: Callable[[S], S] | None = None
 
     def __post_init__(self) -> None:
         if not is_dataclass(self.state) or not self.state.__dataclass_params__.frozen:  # type: ignore[attr-defined]

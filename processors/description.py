@@ -11,7 +11,7 @@ import hashlib
 import json
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Self
+from typing import Any, NamedTuple, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -56,10 +56,18 @@ class Description:
         return cls(machine, version_of(text))
 
 
+class Given(NamedTuple):
+    """What a step is given for a machine, and by which version of its description; "" where nobody has described it."""
+
+    version: str
+    given: Any
+
+
 class DescriptionMessage(BaseModel):
     """The payload of a description on the broker.
 
-    t: when it became live, or a challenger, ms since 1970; by: who made it so; why: in words
+    t: when it became live, or a challenger, ms since 1970; step: how (promoted, back, filed, described); by: who made it so;
+    why: in words
     """
 
     model_config = ConfigDict(frozen=True, extra="ignore")
@@ -67,6 +75,7 @@ class DescriptionMessage(BaseModel):
     version: str
     toml: str
     t: int = 0
+    step: str = ""
     by: str = ""
     why: str = Field(default="", max_length=2000)
 

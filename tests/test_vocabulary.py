@@ -54,6 +54,9 @@ def part_text(part: ast.expr) -> str:
     return PREFIXES.get(value.id if isinstance(value, ast.Name) else value.attr if isinstance(value, ast.Attribute) else "", "{}")
 
 
+TIMES = (signals.TOOL_CHANGE_S, signals.PROGRAM_TIME_S)
+
+
 def test_a_plain_topic_is_spelled_in_the_vocabulary_only() -> None:
     spelled = {
         (str(path.relative_to(ROOT)), found[0]) for path in SOURCES for text in texts(path) if (found := TOPIC.search(text))
@@ -79,7 +82,7 @@ def test_every_name_of_the_vocabulary_is_published_by_someone() -> None:
     assert {name for name in names if not name.endswith(("/", "_"))} <= PUBLISHED
     assert {rule.name for rule in PROCESSORS["rules"].outputs if rule.is_alarm} == set(twin_signals.RULES)
     assert {spec.name for spec in PROCESSORS["gap"].outputs if twin_signals.is_gap(spec.name)} <= {
-        twin_signals.GAP_PREFIX + name for name in (*SIGNALS, *(f"axis_{letter}_load_pct" for letter in "xyzabc"))
+        twin_signals.GAP_PREFIX + name for name in (*SIGNALS, *TIMES, *(f"axis_{letter}_load_pct" for letter in "xyzabc"))
     }
 
 
@@ -138,6 +141,6 @@ def test_a_text_that_reads_like_a_canonical_signal_is_one() -> None:
         for word in re.findall(r"(?<![\w/])[a-z_]+\b", path.read_text())
         if like.fullmatch(word)
     }
-    others = {name.removeprefix(twin_signals.TWIN_PREFIX) for name in PUBLISHED} | {signals.VIBRATION_BLOCK_G}
+    others = {name.removeprefix(twin_signals.TWIN_PREFIX) for name in PUBLISHED} | {signals.VIBRATION_BLOCK_G, *TIMES}
     assert len(found) > 15
     assert {name for name in found - others if canonical(name) is None} == set()

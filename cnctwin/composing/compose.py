@@ -123,9 +123,16 @@ def _stretch_kind(history: History, ambient_c: float | None) -> RunKind | None:
     return RunKind.AIR if history.has(RPM, LOAD) else None
 
 
+def _told(history: History, kind: RunKind | None) -> list[Stretch]:
+    """Return the stretches in which all was told that such a run needs."""
+    needed = () if kind is None else (RPM, LOAD, TEMPERATURE) if kind is RunKind.WARMUP else (RPM, LOAD)
+    known = [s for s in stretches_of(history) if needed and all(history.course(n).numbers(s.span_ms) for n in needed)]
+    return [s for s in known if history.windows_told(s.span_ms) >= ROWS_MIN]
+
+
 def _pieces(case: _Folder, history: History, texts: ProgramFolder) -> list[_Piece]:
     kind = _stretch_kind(history, case.ambient_c)
-    stretches = stretches_of(history) if kind is not None else []
+    stretches = _told(history, kind)
     executions = executions_of(history)
     division = divided(stretches, executions)
     case.notes += [division.note] if division.note else []
@@ -179,8 +186,7 @@ def _programs(case: _Folder, executions: Sequence[Execution], role: Role, texts:
 def _healthy(case: _Folder, history: History) -> list[_Piece]:
     """Return the stretches of a healthy period that tell most."""
     kind = _stretch_kind(history, case.ambient_c)
-    some = stretches_of(history) if kind is not None else []
-    kept = sorted(some, key=lambda s: worth(history, s.span_ms))[-HEALTHY_MAX:]
+    kept = sorted(_told(history, kind), key=lambda s: worth(history, s.span_ms))[-HEALTHY_MAX:]
     return [
         _Piece(s.span_ms, kind, "fit", f"{s.what} of the healthy period", WORK, "healthy", healthy=True)
         for s in sorted(kept, key=lambda s: s.from_ms)

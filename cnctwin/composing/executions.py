@@ -128,7 +128,7 @@ def _names(program: str) -> Iterator[str]:
     for one in dict.fromkeys((name, stem)):
         yield from (f"{one}{suffix}" for suffix in SUFFIXES)
         if match := re.fullmatch(r"[o:]?0*(\d+)", one):
-            yield f"o{match[1]}"
+            yield from (f"o{match[1]}{suffix}" for suffix in SUFFIXES)
 
 
 def _words(text: str) -> Iterator[str]:

@@ -82,6 +82,11 @@ class History:
         """Return the course of a signal; an empty one where it never said anything."""
         return self.courses.get(signal, Course())
 
+    def windows_told(self, span_ms: Span) -> int:
+        """Return the number of windows in a stretch in which anything was told."""
+        first, last = (bisect_right(self.told_ms, t - 1) for t in span_ms)
+        return last - first
+
     def has(self, *signals: str) -> bool:
         """Return True where each of the signals has a good value somewhere."""
         return all(any(v is not None for v in self.course(s).value) for s in signals)

@@ -1,7 +1,7 @@
 """Which part of a history is fitted and which is judged on: what came first is fitted, what came after it is the judge.
 
-One moment divides them, so that nothing is both. Where there are several days, it lies between two of them; where there is one
-stretch only, in the middle of it.
+One moment divides them, so that nothing is both. Where there are several days, it lies between two of them; else between two
+stretches, or in the middle of one where no end of a stretch divides them well.
 """
 
 from collections.abc import Sequence
@@ -14,8 +14,8 @@ from cnctwin.composing.stretches import STRETCH_S_MIN, Stretch
 
 FIT_PART = 2.0 / 3.0
 DAY_MS = 86_400_000
-NEAR = (0.4, 0.8)
-"""Part of a single stretch within which the end of a program is where it is divided."""
+BETWEEN_DAYS, BETWEEN_STRETCHES, WITHIN = (0.25, 0.9), (0.5, 0.85), (0.4, 0.8)
+"""Part of what was recorded that may be fitted: where days divide it, where stretches do, where the end of a program does."""
 ALONE_S_MIN = 2.0 * STRETCH_S_MIN
 """A stretch that is shorter cannot be divided."""
 
@@ -41,26 +41,40 @@ def divided(stretches: Sequence[Stretch], executions: Sequence[Execution]) -> Di
     spans = [s.span_ms for s in stretches] or [e.span_ms for e in executions]
     if not spans:
         return Division(None, "")
-    if len(spans) > 1:
-        lengths = [b - a for a, b in spans]
-        whole = sum(lengths)
-        before = [sum(lengths[:n]) for n in range(len(spans))]
-        later = [n for n in range(1, len(spans)) if spans[n][0] // DAY_MS > spans[n - 1][0] // DAY_MS]
-        first = min(later or range(1, len(spans)), key=lambda n: abs(before[n] - FIT_PART * whole))
-        share = 100.0 * before[first] / whole
-        how = "between two days" if later else "within one day"
-        return Division(spans[first][0], f"divided in time, {how}: the first {share:.0f} % of what was recorded are fitted")
-    begin, end = spans[0]
-    if end - begin < 1000 * ALONE_S_MIN or not stretches:
+    whole = sum(b - a for a, b in spans)
+    before = [sum(b - a for a, b in spans[:n]) / whole for n in range(len(spans))]
+    later = [n for n in range(1, len(spans)) if spans[n][0] // DAY_MS > spans[n - 1][0] // DAY_MS]
+    for some, (least, most), how in (
+        (later, BETWEEN_DAYS, "between two days"),
+        (range(1, len(spans)), BETWEEN_STRETCHES if stretches else (0.0, 1.0), "between two stretches of a day"),
+    ):
+        fair = [n for n in some if least <= before[n] <= most]
+        if fair:
+            first = min(fair, key=lambda n: abs(before[n] - FIT_PART))
+            share = 100.0 * before[first]
+            return Division(spans[first][0], f"divided in time, {how}: the first {share:.0f} % of what was recorded are fitted")
+    if whole < 1000 * ALONE_S_MIN or not stretches:
         return Division(None, "there is too little to be divided: the twin would be judged on what it was fitted to")
-    low, high = (begin + part * (end - begin) for part in NEAR)
-    wanted = begin + FIT_PART * (end - begin)
+    at_ms = _within(spans, whole, executions)
+    share = 100.0 * sum(max(0, min(b, at_ms) - a) for a, b in spans) / whole
+    which = "there is one stretch only" if len(spans) == 1 else "a single stretch is most of it"
+    return Division(at_ms, f"{which}, divided in time: the first {share:.0f} % are fitted, the rest is the judge")
+
+
+def _within(spans: Sequence[Span], whole: int, executions: Sequence[Execution]) -> int:
+    """Return a moment within a stretch, at the end of a program where there is one near."""
+    low, wanted, high = (_moment(spans, part * whole) for part in (WITHIN[0], FIT_PART, WITHIN[1]))
     ends = [e.to_ms for e in executions if low <= e.to_ms <= high]
-    at_ms = min(ends, key=lambda t: abs(t - wanted), default=round(wanted))
-    share = 100.0 * (at_ms - begin) / (end - begin)
-    return Division(
-        at_ms, f"there is one stretch only, divided in time: its first {share:.0f} % are fitted, the rest is the judge"
-    )
+    return min(ends, key=lambda t: abs(t - wanted), default=wanted)
+
+
+def _moment(spans: Sequence[Span], recorded: float) -> int:
+    """Return the moment up to which so many milliseconds were recorded."""
+    for begin, end in spans:
+        if recorded <= end - begin:
+            return round(begin + recorded)
+        recorded -= end - begin
+    return spans[-1][1]
 
 
 def cut_at(stretches: Sequence[Stretch], at_ms: int | None) -> list[Stretch]:

@@ -16,7 +16,8 @@ LEAD_S = 60.0
 SILENCE_S = 600.0
 """Nothing told for so long is a hole: a day off, a recorder that stood."""
 STRETCH_S_MAX, STRETCH_S_MIN = 28_800.0, 30.0
-TURNING_RPM = 1.0
+TURNING_RPM, TURNING_PART = 1.0, 0.05
+"""A spindle turns above this speed, and above this part of the fastest that it had: jogging is rest."""
 COOLS_PART = 0.3
 """Part of a stretch up to which a spindle that turns only at its beginning has cooled down rather than worked."""
 
@@ -53,21 +54,17 @@ class Stretch:
 def stretches_of(history: History) -> list[Stretch]:
     """Return the stretches of a history in order; none of them overlap."""
     found = []
+    turning_rpm = _turning_rpm(history)
     for part in _unbroken(history):
-        cuts, rested = _between_rests(history, part)
+        cuts, rested = _between_rests(history, part, turning_rpm)
         for (begin, end), after_rest in zip(cuts, rested, strict=True):
             pieces = max(1, -int(-(end - begin) // (1000 * STRETCH_S_MAX)))
             edges = [begin + (end - begin) * n // pieces for n in range(pieces + 1)]
             for n, (a, b) in enumerate(pairwise(edges)):
                 if b - a >= 1000 * STRETCH_S_MIN:
-                    found.append(Stretch(a, b, after_rest and n == 0, turning_part(history, (a, b))))
+                    turned = sum(d - c for c, d, turns in _turning(history, (a, b), turning_rpm) if turns)
+                    found.append(Stretch(a, b, after_rest and n == 0, turned / (b - a)))
     return found
-
-
-def turning_part(history: History, span_ms: Span) -> float:
-    """Return the part of a stretch in which the spindle turned."""
-    turned = sum(b - a for a, b, rpm in history.course(RPM).pieces(span_ms) if _turns(rpm))
-    return turned / max(span_ms[1] - span_ms[0], 1)
 
 
 def worth(history: History, span_ms: Span) -> tuple[int, float]:
@@ -77,8 +74,14 @@ def worth(history: History, span_ms: Span) -> tuple[int, float]:
     return int(switched), max(shown) - min(shown) if shown else 0.0
 
 
-def _turns(rpm: object) -> bool:
-    return isinstance(rpm, int | float) and abs(rpm) >= TURNING_RPM
+def _turning_rpm(history: History) -> float:
+    """Return the speed from which on the spindle is said to turn."""
+    fastest = max((abs(v) for v in history.course(RPM).numbers((history.from_ms, history.to_ms))), default=0.0)
+    return max(TURNING_RPM, TURNING_PART * fastest)
+
+
+def _turns(rpm: object, turning_rpm: float) -> bool:
+    return isinstance(rpm, int | float) and abs(rpm) >= turning_rpm
 
 
 def _unbroken(history: History) -> Iterator[Span]:
@@ -105,14 +108,14 @@ def _known(history: History, span_ms: Span) -> Iterator[Span]:
         yield begin, span_ms[1]
 
 
-def _between_rests(history: History, span_ms: Span) -> tuple[list[Span], list[bool]]:
+def _between_rests(history: History, span_ms: Span, turning_rpm: float) -> tuple[list[Span], list[bool]]:
     """Return the stretches of a part, each with the cool-down after it, and of each if it begins after a rest."""
     lead_ms, cooling_ms = round(1000 * LEAD_S), round(1000 * COOLING_S)
-    rests = [(a, b) for a, b, turns in _turning(history, span_ms) if not turns and b - a >= 1000 * REST_S]
+    rests = [(a, b) for a, b, turns in _turning(history, span_ms, turning_rpm) if not turns and b - a >= 1000 * REST_S]
     if rests == [span_ms]:
         return [span_ms], [False]
     cuts, rested = [], []
-    begin, after_rest = span_ms[0], _stood_before(history, span_ms[0])
+    begin, after_rest = span_ms[0], _stood_before(history, span_ms[0], turning_rpm)
     for a, b in rests:
         is_last = b >= span_ms[1]
         if a > begin:
@@ -124,19 +127,19 @@ def _between_rests(history: History, span_ms: Span) -> tuple[list[Span], list[bo
     return [*cuts, (begin, span_ms[1])], [*rested, after_rest]
 
 
-def _stood_before(history: History, at_ms: int) -> bool:
+def _stood_before(history: History, at_ms: int, turning_rpm: float) -> bool:
     """Return True where the spindle stands at a moment and stood through the hole before it."""
     before = max((t for t in history.told_ms if t < at_ms), default=None)
     if before is None or at_ms - before < 1000 * REST_S:
         return False
-    return not any(_turns(history.course(RPM).at(t)) for t in (before + history.window_ms - 1, at_ms))
+    return not any(_turns(history.course(RPM).at(t), turning_rpm) for t in (before + history.window_ms - 1, at_ms))
 
 
-def _turning(history: History, span_ms: Span) -> Iterator[tuple[int, int, bool]]:
+def _turning(history: History, span_ms: Span, turning_rpm: float) -> Iterator[tuple[int, int, bool]]:
     """Yield (from, to, turning) over a stretch; a speed that is not known for a while is what it was before."""
-    begun, turns = span_ms[0], _turns(history.course(RPM).at(span_ms[0]))
+    begun, turns = span_ms[0], _turns(history.course(RPM).at(span_ms[0]), turning_rpm)
     for a, _, rpm in history.course(RPM).pieces(span_ms):
-        now = turns if rpm is None else _turns(rpm)
+        now = turns if rpm is None else _turns(rpm, turning_rpm)
         if now != turns:
             yield begun, a, turns
             begun, turns = a, now

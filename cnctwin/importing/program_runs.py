@@ -1,5 +1,7 @@
 """From a recording in the `time|key|value` text of the NIST test bed to run logs, one for each program execution in it."""
 
+import re
+from collections.abc import Sequence
 from pathlib import Path
 
 from rich.console import Console
@@ -12,11 +14,23 @@ from twin.recording.observations import read_observations
 from twin.recording.program_run import program_runs
 from twin.runlog import run_log, write_run
 
+OBSERVATION = re.compile(rb"(?m)^\d{4}-\d\d-\d\dT[^|\r\n]{0,40}\|[^|\r\n]+\|")
 
-def import_program_runs(recording: Path, out: Path, console: Console) -> None:
-    """Write the run logs of a recording, and say what is in them. Raises UsageError."""
+
+def is_observations(recording: Path) -> bool:
+    """Return True for a file with `time|key|value` lines; one that cannot be read is none."""
+    try:
+        with recording.open("rb") as file:
+            return OBSERVATION.search(file.read(4096)) is not None
+    except OSError:
+        return False
+
+
+def import_program_runs(recordings: Sequence[Path], out: Path, console: Console) -> None:
+    """Write the run logs of a recording in one file or several, and say what is in them. Raises UsageError."""
     check_suffix(out)
-    observations = read_observations(read_text(recording), str(recording))
+    recording = recordings[0] if len(recordings) == 1 else Path(", ".join(path.name for path in recordings))
+    observations = read_observations("\n".join(map(read_text, recordings)), str(recording))
     runs = program_runs(observations)
     if not runs:
         raise UsageError(f"{recording}: no program execution in it; a run begins where Program_Status becomes ACTIVE")

@@ -8,7 +8,7 @@ became unknown has no value in a run log, as one that did not change.
 
 import math
 from collections.abc import Iterator, Sequence
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path
 from typing import NamedTuple
 from urllib.parse import urlencode
@@ -43,13 +43,19 @@ SETTLED_S = 60.0
 """Silence at the end, so that a tool change is told whose number has stood long enough."""
 
 
-def recorded_rows(recording: Path, devices: Path | None, device: str | None = None) -> Iterator[tuple[EdgeSample, ...]]:
-    """Yield what an edge would have published of a recording, a row for each moment. Raises ReplayError, EdgeError."""
+def recorded_rows(
+    recording: Path, devices: Path | None, device: str | None = None, following: Sequence[Path] = ()
+) -> Iterator[tuple[EdgeSample, ...]]:
+    """Yield what an edge would have published of a recording, a row for each moment. Raises ReplayError, EdgeError.
+
+    following: files that go on where the recording ends; what was known holds in them.
+    """
     source, spoken = Recording(recording), dialect("2.3", None)
     model, chosen = source.device_model(devices, device, spoken.schema)
     agent = Agent(model, chosen, spoken, buffer_size=BUFFER_SIZE, assets_max=1024, now=lambda: 0.0)
     config = EdgeConfig(MtconnectConfig(device=chosen.name, count=COUNT))
-    cursor, pipeline, lines = start(config), Pipeline(config), source.lines()
+    cursor, pipeline = start(config), Pipeline(config)
+    lines = chain.from_iterable(part.lines() for part in (source, *map(Recording, following)))
     is_over = False
     while not is_over:
         cursor_before = cursor
@@ -67,11 +73,13 @@ def recorded_rows(recording: Path, devices: Path | None, device: str | None = No
     yield from pipeline.take(SampleSet(), SETTLED_S).rows
 
 
-def recorded_runs(recording: Path, devices: Path | None, device: str | None = None) -> list[RunLog]:
+def recorded_runs(
+    recording: Path, devices: Path | None, device: str | None = None, following: Sequence[Path] = ()
+) -> list[RunLog]:
     """The run logs of a recording, oldest stretch as it stands in the file first. Raises ReplayError, EdgeError."""
     stretches: list[list[_Moment]] = []
     known: dict[str, EdgeSample] = {}
-    for row in recorded_rows(recording, devices, device):
+    for row in recorded_rows(recording, devices, device, following):
         told = {sample.signal: sample for sample in row if not (sample.is_baseline and sample.value is None)}
         if not told:
             continue
@@ -87,16 +95,18 @@ def recorded_runs(recording: Path, devices: Path | None, device: str | None = No
     return [_run(stretch, str(recording)) for stretch in stretches if len(stretch) > 1]
 
 
-def import_shdr(recording: Path, devices: Path, device: str | None, out: Path, console: Console) -> None:
-    """Write the run logs of a recording, and say what is in them. Raises UsageError."""
+def import_shdr(recordings: Sequence[Path], devices: Path, device: str | None, out: Path, console: Console) -> None:
+    """Write the run logs of a recording in one file or several, and say what is in them. Raises UsageError."""
     check_suffix(out)
+    recording, *following = recordings
+    names = ", ".join(path.name for path in recordings)
     try:
-        runs = recorded_runs(recording, devices, device)
+        runs = recorded_runs(recording, devices, device, following)
     except ReplayError as error:
         raise UsageError(str(error)) from None
     if not runs:
-        raise UsageError(f"{recording}: no signal of {devices.name} is in it; is it the Devices.xml that belongs to it?")
-    table = Table(title=f"{len(runs)} stretches in {recording.name}", title_justify="left")
+        raise UsageError(f"{names}: no signal of {devices.name} is in it; is it the Devices.xml that belongs to it?")
+    table = Table(title=f"{len(runs)} stretches in {names}", title_justify="left")
     for column in ("file", "lasted", "rows", "tool changes", "signals"):
         table.add_column(column)
     for number, run in enumerate(runs, start=1):

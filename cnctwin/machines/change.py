@@ -8,7 +8,7 @@ or one that the next change finishes first. What is done already is not done aga
 import fcntl
 import json
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, NamedTuple
 
@@ -20,6 +20,7 @@ from cnctwin.machines.evidence import Card, why_not
 from cnctwin.machines.folder import MachineFolder
 from cnctwin.machines.step_log import Step, StepKind, lives
 from processors.description import Description, version_of
+from twin.errors import MachineError
 
 BY_HAND = "file"
 KEPT = "keep"
@@ -94,6 +95,8 @@ class Change:
         """
         of = self._of
         live, through = of.live_version(), lives(of.steps())
+        if through and live != through[-1]:  # the file is wrong, and processors go on with what they had
+            through = (*through, live)
         if version and not live.startswith(version):
             return Done(None, f"{version} is not live any more: {of.machine} has {live or 'no description'}")
         if len(through) < 2:
@@ -136,7 +139,7 @@ class Change:
         of = self._of
         through = lives(of.steps())
         live = of.live_version()
-        if live and (not through or through[-1] != live):
+        if live and (not through or through[-1] != live) and _is_right(of.live):
             self._keep(live, disk.text_of(of.live_file) or "")
             at_ms = round(of.live_file.stat().st_mtime * 1000)
             why = "the file was written" if through else "the first description"
@@ -189,6 +192,14 @@ class Change:
         if text is None or version_of(text) != version:
             raise FolderError(f"{self._of.version_file(version)}: is not there, or not what it was; put it back")
         return text
+
+
+def _is_right(read: Callable[[], object]) -> bool:
+    try:
+        read()
+    except MachineError:
+        return False
+    return True
 
 
 @contextmanager

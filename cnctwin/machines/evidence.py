@@ -30,8 +30,9 @@ class Score(_Kept):
 class Card(_Kept):
     """The origin of a version.
 
-    sentence: of the diagnosis, in short; says: its causes in plain words; signal: in which its gap was largest
-    gap_before, gap_after: of the diagnosis; fitted_from, fitted_to: the stretch that it was fitted to, ms since 1970
+    sentence: of the diagnosis, in short; says: its causes in plain words
+    signal, words: in which its gap was largest, and how that is called; gap_before, gap_after: of the diagnosis
+    fitted_from, fitted_to: the stretch that it was fitted to, ms since 1970
     """
 
     sentence: str = ""
@@ -39,6 +40,7 @@ class Card(_Kept):
     causes: tuple[dict[str, Any], ...] = ()
     says: str = ""
     signal: str = ""
+    words: str = ""
     gap_before: float | None = None
     gap_after: float | None = None
     score: Score | None = None

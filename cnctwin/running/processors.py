@@ -25,9 +25,13 @@ def process(
     group: str,
     state_dir: Path,
     limits: Limits = DEFAULTS,
+    machines: Path | None = None,
 ) -> None:
     """Run configured processors until `stop` is set. Raises ConfigurationError where a secret is missing, StoreError where the
-    store cannot be used, AnotherRunsError where another process has one of them."""
+    store cannot be used, AnotherRunsError where another process has one of them.
+
+    machines: the folder that describes the machines
+    """
     nodes = [NodeId(group, processor.node) for processor, _ in pairs]
     with ExitStack() as stack:
         for node in nodes:  # before anything connects under a name that may be another's
@@ -35,7 +39,7 @@ def process(
         refuse_second(broker, nodes, "end that one first, or give this one other processors or another --group")
         recorder = stack.enter_context(_recorder(pairs, group))
         stack.enter_context(_courier(pairs, broker, group))
-        run(pairs, broker, stop, group=group, session_dir=state_dir, recorder=recorder, limits=limits)
+        run(pairs, broker, stop, group=group, session_dir=state_dir, recorder=recorder, limits=limits, machines=machines)
 
 
 @contextmanager

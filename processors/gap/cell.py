@@ -7,18 +7,24 @@ hours of that regime:
 
 A value further than 6 of its standard deviations from the standing mean counts as 6, so that a spike is a spike and a step is
 followed within minutes.
+
+Where a machine is described anew, its twin is another one: the standing figures and the charts begin anew, and so does the level
+that growth is judged from, learned from the next hours. What a healthy machine's samples scatter by is a property of machine and
+sensor, and stays: it is counted about the mean under each description.
 """
 
 import math
 from typing import NamedTuple
 
-from processors.gap.growth import Baseline, Chart, Rule, charted, is_enough, learned, rule_of
+from processors.gap.growth import BLOCKS_MIN, Baseline, Chart, Rule, charted, is_enough, learned, rule_of
 
 STRAY = 6.0
 STRAYS_CUT_S = 60.0
 """The time of a regime before which nothing is taken for a stray."""
 BLOCK_PART_MIN = 1.0 / 60.0
 """A block that has seen its regime for less than this part of its length is carried on into the next one."""
+ANEW_BLOCKS_MAX = 3 * BLOCKS_MIN
+"""A level that is learned anew is learned from no more blocks than this; a drift behind them is not taken for the twin."""
 SPREAD_WORTH = math.log(1.5)
 """A scatter that has grown to 1.5 times what it was is worth an alarm."""
 
@@ -74,6 +80,8 @@ class Cell(NamedTuple):
     level, spread: baselines and charts of the blocks' means, and of the logarithms of their scatter
     last_level, last_spread, last_block: figures and number of the last healthy block
     recent: the last blocks of the present growth; most: the stretch of it that departs most
+    before: healthy, as it was under descriptions before; is_anew: the level is learned from the next blocks
+    open_since_s: since when its standing gap is beyond what counts as open, None while it is not
     """
 
     is_learned: bool = False
@@ -90,6 +98,20 @@ class Cell(NamedTuple):
     spread_chart: Chart = Chart()
     recent: tuple[Stretch, ...] = ()
     most: Stretch | None = None
+    before: Moments = Moments()
+    is_anew: bool = False
+    open_since_s: float | None = None
+
+    @property
+    def deviation(self) -> float:
+        """Root mean square of the healthy samples about their mean, under each description its own."""
+        seconds = self.before.seconds + self.healthy.seconds
+        return math.sqrt(max(self.before.m2 + self.healthy.m2, 0.0) / seconds) if seconds > 0.0 else 0.0
+
+    @property
+    def has_floor(self) -> bool:
+        """Return True if the healthy samples were enough to take a floor from."""
+        return self.is_judged or (self.is_anew and self.spread.blocks >= BLOCKS_MIN)
 
     @property
     def is_judged(self) -> bool:
@@ -155,16 +177,30 @@ def closed(cell: Cell, terms: Terms, block: int, at_s: float, healthy_s: tuple[f
     spread = math.log(math.hypot(cell.block.deviation, terms.resolution / math.sqrt(12.0)))
     start_s, from_s, until_s = cell.block_start_s, *healthy_s
     emptied = cell._replace(block=Moments(), block_start_s=at_s)
-    if start_s >= from_s and at_s <= until_s:
+    is_healthy = start_s >= from_s and at_s <= until_s
+    if is_healthy or (start_s >= until_s and _learns_anew(cell)):
         follows = cell.last_block == block - 1
+        spread_known = learned(cell.spread, spread, cell.last_spread if follows else None)
         return emptied._replace(
             level=learned(cell.level, level, cell.last_level if follows else None),
-            spread=learned(cell.spread, spread, cell.last_spread if follows else None),
+            spread=spread_known if is_healthy or not is_enough(cell.spread) else cell.spread,
             last_level=level,
             last_spread=spread,
             last_block=block,
         )
     return _judged(emptied, terms, level, spread, (start_s, at_s)) if start_s >= until_s else emptied
+
+
+def described_anew(cell: Cell) -> Cell:
+    """Return the cell as it goes on where the twin that it compares with has become another one."""
+    before = cell.before
+    if cell.healthy.seconds > 0.0:
+        before = Moments(before.seconds + cell.healthy.seconds, 0.0, before.m2 + cell.healthy.m2)
+    return Cell(before=before, spread=cell.spread, is_anew=True)
+
+
+def _learns_anew(cell: Cell) -> bool:
+    return cell.is_anew and not is_enough(cell.level) and cell.level.blocks < ANEW_BLOCKS_MAX
 
 
 def _judged(cell: Cell, terms: Terms, level: float, spread: float, span_s: tuple[float, float]) -> Cell:

@@ -8,7 +8,8 @@ sender, however many of them it has waiting. Within a line the order holds; betw
     line beyond its share         data are conflated with the data of the same device that wait last (conflation.py)
     line beyond what is bounded   its oldest data are passed over, and where there are none, its oldest event
 
-A share is what can be folded in WORK_S_MAX, divided by the senders that wait.
+A share is what can be folded in WORK_S_MAX, divided by the senders that wait. The description of a machine waits behind what the
+machine's own edge has waiting, and the edge's next data behind it.
 """
 
 import heapq
@@ -16,6 +17,7 @@ import itertools
 from collections import deque
 from dataclasses import dataclass, field
 
+from processors.description import machine_and_role
 from processors.running.conflation import conflated
 from sparkplug.host_event import EventKind, HostEvent
 from twin.vocabulary.nodes import is_twin_node
@@ -65,7 +67,8 @@ class Backlog:
 
     def put(self, event: HostEvent) -> list[HostEvent]:
         """Have an event wait; return the events that are passed over for it."""
-        sender = _sender(event)
+        described = machine_and_role(event.topic) if event.kind is EventKind.PLAIN else None
+        sender = (None if described is None else self._edge_of(described[0])) or _sender(event)
         line = self._lines.get(sender)
         if line is None:
             line = self._lines[sender] = _Line(self._served_s)
@@ -79,6 +82,8 @@ class Backlog:
             line.data.append(waiting)
         if event.device is None:
             line.last.clear()  # nothing is moved across what concerns all devices
+            if described is not None:
+                line.last[described[0]] = waiting
         else:
             line.last[event.device] = waiting
         self._grow(line, _size(event))
@@ -114,6 +119,11 @@ class Backlog:
         else:
             del self._lines[self._current]
         self._current = None
+
+    def _edge_of(self, machine: str) -> Sender | None:
+        """Return the edge in whose line something of a machine waits; None where there is none."""
+        lines = self._lines.items()
+        return next((sender for sender, line in lines if machine in line.last and not is_twin_node(sender[1])), None)
 
     def _conflate(self, line: _Line, event: HostEvent) -> HostEvent | None:
         """Put an event into the one of its device that waits last; return that one, or None where it cannot be done."""

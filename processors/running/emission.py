@@ -6,7 +6,6 @@ from functools import lru_cache
 
 from processors.actions import Action, Pin
 from processors.contract import PYTHON_TYPES, Output, OutputSpec, PlainOutput, PlainSpec
-from processors.discovery import AnyProcessor
 from processors.errors import OutputError
 from sparkplug.metric import Change
 from sparkplug.quality import Quality
@@ -20,11 +19,11 @@ class Emission:
 
     __slots__ = ("_rules", "is_history", "latest", "processor_name")
 
-    def __init__(self, processor: AnyProcessor, *, is_history: bool) -> None:
-        self.processor_name = processor.name
+    def __init__(self, processor_name: str, outputs: tuple[OutputSpec, ...], *, is_history: bool = False) -> None:
+        self.processor_name = processor_name
         self.is_history = is_history
         self.latest: dict[str, Change] = {}
-        self._rules = _rules(processor.outputs)
+        self._rules = _rules(outputs)
 
     def news(self, outputs: Iterable[Output], at_ms: int) -> list[Change]:
         """Return the changes that have to be published, each beside the one before it. Changes nothing: `published` does.

@@ -7,15 +7,16 @@ where two offer it; and keeps the ledger. What has a state, and is saved as one,
 from collections.abc import Callable, Collection, Mapping
 from operator import itemgetter
 
-from processors.actions import Action, Declare, PlainOutput, Remove
+from processors.actions import Action, PlainOutput, Remove
 from processors.config import Configuration, ProcessorConfig
+from processors.description import Description, Role
 from processors.discovery import AnyProcessor
 from processors.errors import SnapshotError
 from processors.running.counts import Counts
 from processors.running.fold import Folded
-from processors.running.lane import Lane, Stream, stream_of
+from processors.running.lane import Lane
 from processors.running.ledger import FOLDED, DropReason, Ledger
-from processors.running.picks import Picks
+from processors.running.picks import Picks, Stream, stream_of
 from processors.running.roster import Roster
 from processors.running.silences import Silences
 from processors.running.snapshot import SnapshotCodec
@@ -59,6 +60,9 @@ class Engine:
         self._changed: dict[str, None] = {}
         self._codec = SnapshotCodec(processor)
         self._emitted_before = 0
+        self._undescribed: set[str] = set()  # machines whose new description waits for their next message
+        if before is not None:
+            self._roster.described_as(before._roster)
         for unit in processor.units_at_start(configuration):
             self._roster.unit(unit)
 
@@ -108,6 +112,10 @@ class Engine:
         if machine is not None:
             self._changed[machine.unit.name] = None
             self._silences.watch(machine)
+            if is_twin_node(node.node):
+                actions = actions + machine.live.hear_challengers(event.readings)
+            elif device in self._undescribed:
+                actions = actions + self._take_up(machine)
         return actions
 
     def way_of(self, node: NodeId, device: str) -> Way | None:
@@ -198,6 +206,34 @@ class Engine:
             self._silences.watch(machine)
         return actions
 
+    # Descriptions.
+
+    @property
+    def is_described(self) -> bool:
+        """Return True if the descriptions of machines make a difference to the processor."""
+        return self._roster.is_described
+
+    def describe(self, machine: str, role: Role, description: Description | None) -> list[Action]:
+        """Take up the description of a machine, None where there is none any more. Do not use its ways after this.
+
+        While it is online that is behind the next message of its edge, so that the ticks of a silence, which may have been given
+        early, are of the description before. Raises what the processor raises at it; then the one before holds.
+        """
+        known = self._machines.get(machine)
+        try:
+            self._roster.describe(machine, role, description)
+        finally:
+            if known is not None:
+                known.ways.clear()
+                known.live.is_challenged |= self._roster.challenger(machine) is not None
+                self._undescribed.add(machine)
+        return [] if known is None or known.is_online else self._take_up(known)
+
+    def _take_up(self, machine: Machine) -> list[Action]:
+        """Fold with the descriptions that hold now."""
+        self._undescribed.discard(machine.name)
+        return self._roster.take_up(machine)
+
     # Snapshots.
 
     def restore(self, payload: bytes) -> str:
@@ -225,14 +261,8 @@ class Engine:
         still is, by the nodes whose births were heard: `offers` has their signals by machine and node; the first owns."""
         name = self.restore(payload)
         for machine in self._units[name].machines.values():
-            machine.live.go_on()
-            if machine.live.ticking:
-                for node, names in offers.get(machine.name, {}).items():
-                    if self._processor.listens_to(node.node) and (not machine.live.births or str(node) in machine.live.births):
-                        machine.online.add(node)
-                        clashing = frozenset(one for one in names if one in machine.owner)
-                        machine.excluded[node] = clashing
-                        machine.owner.update((one, node) for one in names if one in machine.live.row and one not in clashing)
+            own = offers.get(machine.name, {})
+            machine.go_on({node: names for node, names in own.items() if self._processor.listens_to(node.node)})
         return name
 
     def lane_of(self, machine: str) -> Lane | None:
@@ -288,7 +318,9 @@ class Engine:
         if machine is None or event.node not in machine.online:
             return [], (DropReason.BEFORE_BIRTH,)
         if event.names and machine.is_online and not machine.excluded.get(event.node):
-            way = machine.ways[event.node] = machine.live.twin if self._is_of_twin(event.node) else machine.live.stream
+            way = machine.live.twin if self._is_of_twin(event.node) else machine.live.stream
+            is_heard = machine.live.is_challenged and self._is_of_twin(event.node)
+            machine.ways[event.node] = machine.live.twin_and_challengers if is_heard else way
             return way(stream_of(event), wall_s)
         readings: tuple[Reading, ...] | list[Reading] = event.readings
         inputs = self._inputs
@@ -334,7 +366,7 @@ class Engine:
             return [], FOLDED
         declared: list[Action] = []
         if not was_online and self._processor.outputs:
-            declared.append(Declare(machine.name, machine.live.emission.known(event.timestamp_ms)))
+            declared.append(machine.declared(event.timestamp_ms))
         offered = taken if is_of_twin else event.readings
         actions, fates = machine.live.birth(offered, taken, wall_s, is_of_twin=is_of_twin)
         return declared + actions, fates

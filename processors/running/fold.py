@@ -10,8 +10,11 @@ from typing import Any
 from processors.actions import Action, DeadLetter, Pin, Publish
 from processors.config import Configuration, ProcessorConfig
 from processors.contract import Output, Outputs, PlainOutput
+from processors.description import Given
 from processors.discovery import AnyProcessor
 from processors.errors import OutputError
+from processors.running.challenger import Challenger
+from processors.running.challenger import Row as OwnRow
 from processors.running.counts import Counts
 from processors.running.dead_letter import dead_letter
 from processors.running.emission import Emission, plain_topics
@@ -26,21 +29,27 @@ DEAD: Fates = (DropReason.DEAD_LETTER,)
 
 
 class Fold:
-    """`name` is the machine's, or the cell's; `cell` holds the rows of the cell's machines that are online."""
+    """`name` is the machine's, or the cell's; `cell` holds the rows of the cell's machines that are online.
+
+    version: of the description that the step is given; "" where nobody has described the machine
+    """
 
     __slots__ = (
         "_config",
         "_counts",
+        "_initial",
         "_plain",
         "_processor",
         "_quiet",
         "_rows",
         "_step",
         "cell",
+        "challenger",
         "emissions",
         "is_history",
         "name",
         "state",
+        "version",
         "wakes",
     )
 
@@ -52,21 +61,27 @@ class Fold:
         counts: Counts,
         *,
         is_history: bool,
+        given: Given | None = None,
     ) -> None:
+        """`given`: what a description has made of the configuration; None where the processor heeds none."""
         self.name, self.is_history = name, is_history
         self.state: Any = processor.initial(processor.config_of(configuration, name))
+        self._initial = self.state
+        self.challenger: Challenger | None = None
         self.emissions: dict[str, Emission] = {}
         self._processor, self._step, self._counts = processor, processor.step, counts
         self._plain = plain_topics(processor.name, processor.plain)
         self.wakes = processor.wakes
-        self._config: Any = processor.given(configuration, name)
+        self.version, self._config = Given("", processor.given(configuration, name)) if given is None else given
         self._rows: dict[str, Row] = {}
         self._quiet: Outputs = ()  # the outputs that were news of nothing, and would be of nothing again
         self.cell: Mapping[str, Row] = MappingProxyType(self._rows if processor.is_of_cells else {})
 
     def join(self, machine: str) -> Emission:
         """A machine is known from now on; what it is told."""
-        return self.emissions.setdefault(machine, Emission(self._processor, is_history=self.is_history))
+        return self.emissions.setdefault(
+            machine, Emission(self._processor.name, self._processor.outputs, is_history=self.is_history)
+        )
 
     def show(self, machine: str, row: Row) -> None:
         """The machine is online: its row is to be seen by the others."""
@@ -80,6 +95,27 @@ class Fold:
         """The machine is forgotten."""
         self.hide(machine)
         self.emissions.pop(machine, None)
+
+    def describe(self, given: Given) -> None:
+        """Go on with what another description makes of the configuration. The state stays, or is that of the challenger where
+        it is the challenger's description."""
+        if self.challenger is not None and given.version == self.challenger.version != self.version:
+            self.state = self.challenger.state
+        self.version, self._config = given
+        self._quiet = ()
+
+    def challenge(self, given: Given | None, rows: tuple[OwnRow, OwnRow]) -> bool:
+        """Have a challenger with this description, None for none; return True if another one, or none, was there before."""
+        if (None if self.challenger is None else self.challenger.version) == (None if given is None else given.version):
+            return False
+        self.challenger = None if given is None else Challenger(self._processor, given, self._initial, rows, self._counts)
+        return True
+
+    def take_both(self, sample: Sample, at_ms: int) -> Folded:
+        """Fold a sample, also with the challenger."""
+        actions, fates = self.take(sample, at_ms)
+        assert self.challenger is not None
+        return actions + self.challenger.take(sample, at_ms), fates
 
     def take(self, sample: Sample, at_ms: int) -> Folded:
         """Fold a sample."""

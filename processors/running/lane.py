@@ -19,13 +19,14 @@ from typing import Any
 
 from processors.actions import Action
 from processors.config import ProcessorConfig
+from processors.description import Given
+from processors.running.challenger import said_by_challengers
 from processors.running.counts import Counts
 from processors.running.fold import Fold, Folded
 from processors.running.ledger import FOLDED, DropReason, Fates
-from processors.running.picks import Picks
+from processors.running.picks import Picks, Stream
 from processors.sample import Sample, SampleKind
-from sparkplug.host_session import HostEvent
-from sparkplug.metric import NodeId, Reading
+from sparkplug.metric import Reading
 from sparkplug.quality import Quality
 
 REWIND_MESSAGES = 3  # so many messages in a row, far behind, mean that the clock was set back
@@ -37,28 +38,21 @@ _DATA, _TICK, _GOOD = SampleKind.DATA, SampleKind.TICK, Quality.GOOD  # to look 
 _new = tuple.__new__  # a named tuple's own constructor costs as much as the rest of a fold
 
 
-Stream = tuple[NodeId, tuple[Reading, ...], tuple[str, ...], int, int]
-"""A message of live data: its node, its readings, their names, their oldest and their newest stamp."""
-
-
-def stream_of(event: HostEvent) -> Stream:
-    """The data of an event whose names are given."""
-    return event.node, event.readings, event.names, event.oldest_ms, event.newest_ms
-
-
 class Lane:
     """See the module.
 
     ticking: the machine was online from clock_ms on, so that silence means that nothing changed
     births: of each edge node of the machine, the first birth that was heard since the processor was started, by its stamp: what a
         replay has to know of a life. Restored ones are of the life before, and go with the first of this one.
+    is_challenged: the machine has a challenger, which may begin with the next message only
+    others: what the challengers of other processors say, by the names of the live twin's signals
     """
 
     __slots__ = (
         "_anchor_ms", "_anchor_wall_s", "_counts", "_fold_in", "_gap_ms", "_held", "_inputs", "_late_ms", "_machine",
         "_names", "_pick", "_picks", "_tick_ms", "_view", "_wakes",
-        "births", "births_are_old", "clock_ms", "emission", "fold", "is_awaited", "is_restored", "is_silent", "last_ms", "row",
-        "ticking",
+        "births", "births_are_old", "clock_ms", "emission", "fold", "is_awaited", "is_challenged", "is_restored", "is_silent",
+        "last_ms", "others", "row", "ticking",
     )  # fmt: skip
 
     def __init__(self, fold: Fold, picks: Picks, config: ProcessorConfig, machine: str, counts: Counts) -> None:
@@ -72,6 +66,8 @@ class Lane:
         self.is_restored = False
         self.births: dict[str, int] = {}
         self.births_are_old = False
+        self.is_challenged = False
+        self.others: dict[str, Reading] = {}
         self.is_awaited = False  # its silence is watched (processors/running/silences.py)
         self._view: Mapping[str, Reading] = MappingProxyType(self.row)
         self._fold_in, self._inputs, self._machine, self._wakes = fold.take, picks.inputs, machine, fold.wakes
@@ -127,6 +123,11 @@ class Lane:
             self._names, self._pick = names, self._picks.of(names)
         pick = self._pick
         return self.data(pick.get(message[1]), wall_s, is_of_twin=True) if pick.names else ([], FOLDED)
+
+    def twin_and_challengers(self, message: Stream, wall_s: float) -> Folded:
+        """A message of another processor has come, of a machine that has a challenger."""
+        actions, fates = self.twin(message, wall_s)
+        return actions + self.hear_challengers(message[1]), fates
 
     def data(self, readings: Sequence[Reading], wall_s: float, *, is_of_twin: bool = False) -> Folded:
         """A message with changes has come. What another processor says never sets the clock back: its figures may be of a while
@@ -209,6 +210,8 @@ class Lane:
         self.ticking = self.ticking and not is_last
         for name in names:
             self.row[name] = self.row[name]._replace(quality=Quality.STALE, reason=reason)
+        for name in self.others.keys() & set(names) if self.others else ():
+            self.others[name] = self.others[name]._replace(quality=Quality.STALE, reason=reason)
         if is_last:
             self.fold.hide(self._machine)
         now_ms = at_ms if self.clock_ms is None else self.clock_ms
@@ -223,6 +226,27 @@ class Lane:
         """Signals that a new birth does not offer any more."""
         for name in names:
             self.row[name] = self.row[name]._replace(quality=Quality.STALE, reason="not offered any more")
+
+    def challenge(self, given: Given | None) -> bool:
+        """Have a challenger with this description, None for none; return True if that is another one than before."""
+        is_new = self.fold.challenge(given, (self.row, self.others))
+        self.is_challenged = given is not None
+        self._fold_in = self.fold.take_both if self.is_challenged else self.fold.take
+        if not self.is_challenged:
+            self.others.clear()
+        return is_new
+
+    def hear_challengers(self, readings: Sequence[Reading]) -> list[Action]:
+        """Keep what the challengers of another processor say in a message, and let ours see it. It tells nobody the time."""
+        if not self.is_challenged:
+            return []
+        said = said_by_challengers(readings, self._inputs or ())
+        self.others.update(said)
+        challenger, clock_ms = self.fold.challenger, self.clock_ms
+        is_awake = bool(said) and (self._wakes is None or not self._wakes.isdisjoint(said))
+        if challenger is None or clock_ms is None or not is_awake or not self.ticking:
+            return []  # the next tick sees it
+        return challenger.hear(self._machine, tuple(said), clock_ms)
 
     def go_on(self) -> None:
         """A restored lane, at the very message at which it was saved: nothing was missed, and who was online still is."""

@@ -4,9 +4,17 @@ from collections.abc import Callable, Sequence
 from operator import itemgetter
 from typing import NamedTuple
 
-from sparkplug.metric import Reading
+from sparkplug.host_event import HostEvent
+from sparkplug.metric import NodeId, Reading
 
+Stream = tuple[NodeId, tuple[Reading, ...], tuple[str, ...], int, int]
+"""A message of live data: its node, its readings, their names, their oldest and their newest stamp."""
 LAYOUTS_MAX = 20_000  # that are remembered; then all are forgotten, and found again
+
+
+def stream_of(event: HostEvent) -> Stream:
+    """The data of an event whose names are given."""
+    return event.node, event.readings, event.names, event.oldest_ms, event.newest_ms
 
 
 class Pick(NamedTuple):

@@ -2,7 +2,9 @@
 
 import itertools
 
+from processors.actions import Action
 from processors.config import Configuration, ProcessorConfig
+from processors.description import Description, Given, Role
 from processors.discovery import AnyProcessor
 from processors.running.counts import Counts
 from processors.running.fold import Fold
@@ -31,6 +33,35 @@ class Roster:
         self._processor, self._configuration, self._picks = processor, configuration, picks
         self._counts, self._ledger = counts, ledger
         self._numbers = itertools.count()
+        self._given: dict[tuple[str, Role], Given] = {}  # by the descriptions of machines
+        self._has_challengers = self.is_described and any(spec.of_challenger for spec in processor.outputs)
+
+    @property
+    def is_described(self) -> bool:
+        """Return True if the descriptions of machines make a difference."""
+        return self._processor.described is not None and not self._processor.is_of_cells
+
+    def describe(self, machine: str, role: Role, description: Description | None) -> None:
+        """Have a description hold for what is made of the machine from now on. Raises what the processor raises at it: then the
+        live one before holds, and there is no challenger."""
+        if description is None or role is Role.CHALLENGER:
+            self._given.pop((machine, role), None)
+        if description is not None and (role is Role.LIVE or self._has_challengers):
+            made = self._processor.given(self._configuration, machine, description)
+            self._given[machine, role] = Given(description.version, made)
+
+    def described_as(self, before: "Roster") -> None:
+        """Take over the descriptions of the roster that this one replaces."""
+        self._given = dict(before._given)
+
+    def challenger(self, machine: str) -> Given | None:
+        """Return what the challenger of a machine makes of the configuration; None where there is none."""
+        return self._given.get((machine, Role.CHALLENGER))
+
+    def given(self, machine: str) -> Given:
+        """Return what the live description of a machine makes of the configuration."""
+        known = self._given.get((machine, Role.LIVE))
+        return Given("", self._processor.given(self._configuration, machine)) if known is None else known
 
     def unit(self, name: str) -> Unit:
         """Return the unit of that name, made where there is none."""
@@ -40,9 +71,21 @@ class Roster:
         """Return a new unit; nobody knows of it yet."""
         return Unit(name, self.fold(name, is_history=False))
 
+    def take_up(self, machine: Machine) -> list[Action]:
+        """Have a machine folded with the descriptions that hold now; what is to be sent where a challenger comes or goes."""
+        unit, given = machine.unit, self.given(machine.name)
+        for fold in (unit.live, unit.history):
+            if fold is not None:
+                fold.describe(given)
+        if not machine.live.challenge(self.challenger(machine.name)) or not machine.is_online:
+            return []
+        at_ms, challenger = machine.live.clock_ms or 0, unit.live.challenger
+        return [machine.declared(at_ms), *(() if challenger is None else challenger.begin(machine.name, at_ms))]
+
     def fold(self, name: str, *, is_history: bool) -> Fold:
         """Return a fold with the state from which it starts."""
-        return Fold(self._processor, self._configuration, name, self._counts, is_history=is_history)
+        given = self.given(name) if self.is_described else None
+        return Fold(self._processor, self._configuration, name, self._counts, is_history=is_history, given=given)
 
     def unit_name(self, machine: str) -> str:
         """Return the name of the unit that a machine belongs to by the configuration."""
@@ -57,6 +100,7 @@ class Roster:
         """Return the machine of a unit, made where there is none; only the unit knows of it."""
         if name not in unit.machines:
             unit.machines[name] = Machine(name, next(self._numbers), unit, self._lane(unit.live, name))
+            unit.machines[name].live.challenge(self.challenger(name))
         return unit.machines[name]
 
     def history_of(self, unit: Unit, name: str) -> Lane:

@@ -21,14 +21,16 @@ from collections import deque
 from collections.abc import Sequence
 from threading import Event
 
+from processors.description_folder import DescriptionFolder
 from processors.errors import ProcessorsFailedError
 from processors.lag_report import SPOKEN_OF_S, LagReport, topic_of
 from processors.running.backlog import Backlog
+from processors.running.descriptions import Descriptions
 from processors.running.engine import Way
 from processors.running.lag import Lag
-from processors.running.lane import stream_of
 from processors.running.ledger import DropReason
 from processors.running.overload import Overload
+from processors.running.picks import stream_of
 from processors.running.ports import HostPort
 from processors.running.quarantine import quarantine_health
 from processors.running.worker import Shared, Worker
@@ -59,7 +61,8 @@ _log = logging.getLogger(__name__)
 class Runner:
     """See the module. All of it happens in the thread that calls `run`."""
 
-    def __init__(self, host: HostPort, workers: Sequence[Worker]) -> None:
+    def __init__(self, host: HostPort, workers: Sequence[Worker], folder: DescriptionFolder | None = None) -> None:
+        """`folder`: where people describe the machines."""
         self._host = host
         self.workers = tuple(sorted(workers, key=lambda worker: worker.name))
         self._recorders = tuple(worker for worker in self.workers if worker.records)
@@ -69,6 +72,7 @@ class Runner:
         self._ways: dict[str, dict[NodeId, list[tuple[Worker, Way | None]]]] = {}  # by device and node
         for worker in self.workers:
             worker.forget_ways = self._ways.clear
+        self._descriptions = Descriptions(host, self.workers, folder)
         self._waiting: deque[HostEvent] = deque()
         self._is_restored = False
         self._turned_s = time.monotonic()
@@ -90,6 +94,8 @@ class Runner:
             gc.set_threshold(*thresholds)
 
     def _run(self, stop: Event) -> None:
+        for topic_filter in self._descriptions.plain_filters():
+            self._host.subscribe_plain(topic_filter)
         for worker in self.workers:
             for topic_filter in worker.plain_filters():
                 self._host.subscribe_plain(topic_filter)
@@ -176,8 +182,10 @@ class Runner:
     # Start and end.
 
     def _restore(self, stop: Event) -> bool:
-        """Take the retained snapshots; False where `stop` came first, and nothing is known that may be saved."""
+        """Take the retained descriptions and then the snapshots; False where `stop` came first, and nothing is known that may be
+        saved."""
         marked_s: float | None = None  # when the marker was published, or the last message before it has come
+        retained: list[HostEvent] = []
         while not stop.is_set():
             if marked_s is None and self._host.publish_plain(self._marker_topic, b"all retained snapshots have come", qos=1):
                 marked_s = time.monotonic()
@@ -187,16 +195,28 @@ class Runner:
                     complete = marked_s is not None
                     continue
                 if event.kind is EventKind.PLAIN:
-                    for worker in self.workers:
-                        worker.restore(event)
+                    retained.append(event)
                     marked_s = None if marked_s is None else time.monotonic()
                 self._wait_with(event)  # a snapshot too: a recorder may want it
-            if complete:
-                return True
-            if marked_s is not None and time.monotonic() - marked_s > RESTORE_S_MAX:
+            if not complete and marked_s is not None and time.monotonic() - marked_s > RESTORE_S_MAX:
                 _log.warning("%s: the broker says nothing for %g s; what has come by now is all", self._names, RESTORE_S_MAX)
+                complete = True
+            if complete:
+                self._restore_from(retained)
                 return True
         return False
+
+    def _restore_from(self, retained: Sequence[HostEvent]) -> None:
+        """Take the first description of each topic, which was retained, and then the snapshots; what has come on a topic later
+        waits with the messages of the machines."""
+        now_s = time.monotonic()
+        first = {event.topic: event for event in reversed(retained) if event.topic.startswith(topics.DESCRIPTION)}
+        for event in first.values():
+            self._descriptions.take(event, now_s)
+        self._waiting = deque(event for event in self._waiting if event is not first.get(event.topic))
+        for event in retained:
+            for worker in self.workers:
+                worker.restore(event)
 
     def _begin(self, stop: Event) -> None:
         """Fold what has come while the snapshots were awaited."""
@@ -245,6 +265,8 @@ class Runner:
 
     def _take(self, event: HostEvent, now_s: float) -> None:
         if event.kind is _PLAIN:
+            if event.topic.startswith(topics.DESCRIPTION) and (described := self._descriptions.take(event, now_s)) is not None:
+                self._ways.pop(described, None)
             for worker in self.workers:
                 worker.take_plain(event, now_s)
             return
@@ -293,6 +315,7 @@ class Runner:
 
     def _report_due(self, now_s: float) -> None:
         self._reported_s = now_s
+        self._descriptions.look()
         self._note_dropped()
         shared = self._report(now_s)
         for worker in self.workers:

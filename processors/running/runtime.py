@@ -6,6 +6,7 @@ from functools import partial
 from pathlib import Path
 
 from processors.config import Configuration, ProcessorConfig, read_tables
+from processors.description_folder import DescriptionFolder
 from processors.discovery import AnyProcessor, find, module_of
 from processors.errors import ConfigurationError, UnknownProcessorError
 from processors.running.health import node_metrics
@@ -35,6 +36,7 @@ def run(
     session_dir: Path | None = None,
     recorder: Recorder | None = None,
     limits: Limits = DEFAULTS,
+    machines: Path | None = None,
 ) -> None:
     """Run processors whose configuration has been checked until `stop` is set. A processor that fails is restarted by itself
     (processors/running/containment.py); raises ProcessorsFailedError where all of them go on failing, so that a supervisor can
@@ -42,8 +44,10 @@ def run(
 
     session_dir: keeps the birth/death sequence numbers over restarts; all other state is kept on the broker
     recorder: for the processor that `records`
+    machines: folder in which people describe the machines (processors/description_folder.py)
     """
-    runner_of(pairs, broker, group=group, session_dir=session_dir, recorder=recorder, limits=limits).run(stop)
+    runner = runner_of(pairs, broker, group=group, session_dir=session_dir, recorder=recorder, limits=limits, machines=machines)
+    runner.run(stop)
 
 
 def runner_of(
@@ -54,6 +58,7 @@ def runner_of(
     session_dir: Path | None = None,
     recorder: Recorder | None = None,
     limits: Limits = DEFAULTS,
+    machines: Path | None = None,
 ) -> Runner:
     """Return the loop of a process, not begun: one host session and an edge node for each processor, on one MQTT loop."""
     processors = [processor for processor, _ in pairs]
@@ -80,7 +85,7 @@ def runner_of(
         )
         given = recorder if processor.records else None
         workers.append(Worker(processor, configuration, host, new_edge(), given, new_edge=new_edge))
-    return Runner(host, workers)
+    return Runner(host, workers, None if machines is None else DescriptionFolder(machines))
 
 
 def host_id(processors: Sequence[AnyProcessor]) -> str:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 from processors.actions import Action, DeadLetter, Declare, Pin, PlainOutput, Publish, Remove
 from processors.discovery import AnyProcessor
 from processors.plain_topic import topic_level
+from processors.running.challenger import challenger_specs
 from processors.running.containment import shown
 from processors.running.counts import Counts
 from processors.running.ledger import DropReason
@@ -49,6 +50,7 @@ class Sender:
         self._name, self._host, self._edge = processor.name, host, edge
         self._alarmed, self._pin = alarmed, pin
         self._specs: tuple[MetricSpec, ...] = tuple(spec.metric() for spec in processor.outputs)
+        self._challenger_specs = tuple(spec.metric() for spec in challenger_specs(processor.outputs))
         self._alarms = frozenset(spec.name for spec in processor.outputs if spec.is_alarm)
         self._letter_prefix = topics.dead_letters_of(processor.name)
         self._letters_left = DEAD_LETTERS_A_REPORT_MAX
@@ -90,7 +92,8 @@ class Sender:
 
     def _do(self, action: Declare | Remove | Pin) -> None:
         if isinstance(action, Declare):
-            self._edge.declare_device(action.machine, [_with_latest(spec, action.latest) for spec in self._specs])
+            specs = self._specs + self._challenger_specs if action.is_challenged else self._specs
+            self._edge.declare_device(action.machine, [_with_latest(spec, action.latest) for spec in specs])
             self._declared.add(action.machine)
         elif isinstance(action, Pin):
             self._pin(action)

@@ -5,13 +5,14 @@ Nothing is unpickled: what comes back is validated against the state's type.
 """
 
 import json
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 from pydantic import TypeAdapter, ValidationError
 
 from processors.discovery import AnyProcessor
 from processors.errors import SnapshotError
+from processors.running.emission import Emission
 from processors.running.fold import Fold
 from processors.running.lane import Lane
 from sparkplug.metric import Change, Reading
@@ -37,6 +38,13 @@ def decode_state(adapter: TypeAdapter[Any], dumped: Any) -> Any:
     if json.dumps(encode_state(adapter, state), sort_keys=True) != json.dumps(dumped, sort_keys=True):
         raise SnapshotError("state has another form than this version writes")
     return state
+
+
+class _ChallengerKept(NamedTuple):
+    version: str
+    state: Any
+    latest: dict[str, Change]
+    others: dict[str, Reading]
 
 
 class SnapshotCodec:
@@ -76,6 +84,7 @@ class SnapshotCodec:
         try:
             lanes = [(lane_of(name), _lane_values(entry, fold.is_history)) for name, entry in document["machines"].items()]
             state = decode_state(self._adapter, document["state"])
+            kept = self._challenger_kept(document, fold, lanes)
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise SnapshotError(f"{type(error).__name__}: {error}") from error
         for lane, (clock_ms, last_ms, ticking, is_silent, row, latest, births) in lanes:
@@ -85,12 +94,45 @@ class SnapshotCodec:
             lane.is_restored = lane.births_are_old = True
             lane.births = births
         fold.state = state
+        if kept is not None:
+            self._restore_challenger(kept, document.get("description", ""), fold, lanes[0][0])
+
+    def _challenger_kept(self, document: Any, fold: Fold, lanes: Sequence[Any]) -> _ChallengerKept | None:
+        """What a snapshot has of the challenger; None where that is of no use any more."""
+        told = document.get("challenger")
+        challenger = "" if fold.challenger is None else fold.challenger.version
+        if told is None or not lanes or told["version"] not in {challenger, fold.version}:
+            return None
+        latest = {name: _change(name, change, False) for name, change in told["latest"].items()}
+        others = {name: _reading(name, reading) for name, reading in told["others"].items()}
+        return _ChallengerKept(told["version"], decode_state(self._adapter, told["state"]), latest, others)
+
+    @staticmethod
+    def _restore_challenger(kept: _ChallengerKept, lived_by: str, fold: Fold, lane: Lane) -> None:
+        """Have the challenger go on. Where it was made live since the snapshot was saved, its state is the live one."""
+        if kept.version == fold.version != lived_by:
+            fold.state = kept.state
+        if fold.challenger is not None and fold.challenger.version == kept.version:
+            fold.challenger.state = kept.state
+            fold.challenger.emission.latest.update(kept.latest)
+            lane.others.update(kept.others)
 
     def _part(self, fold: Fold, lanes: Mapping[str, Lane]) -> dict[str, Any]:
-        return {
+        part = {
             "state": encode_state(self._adapter, fold.state),
             "machines": {name: _lane_document(lane) for name, lane in lanes.items()},
         }
+        if fold.version:
+            part["description"] = fold.version
+        if (challenger := fold.challenger) is not None:
+            (lane,) = lanes.values()
+            part["challenger"] = {
+                "version": challenger.version,
+                "state": encode_state(self._adapter, challenger.state),
+                "latest": _latest(challenger.emission),
+                "others": _rows(lane.others),
+            }
+        return part
 
 
 # The fields that a snapshot holds of each, in their order; JSON writes a quality as its number, and a tuple as a list.
@@ -106,9 +148,17 @@ def _lane_document(lane: Lane) -> dict[str, Any]:
         "is_silent": lane.is_silent,
         "births": lane.births,
         # The broker gives tables, bytes and templates again with the next birth.
-        "row": {name: reading[_TOLD_OF_READING] for name, reading in lane.row.items() if isinstance(reading[1], PLAIN_TYPES)},
-        "latest": {name: change[_TOLD_OF_CHANGE] for name, change in lane.emission.latest.items()},
+        "row": _rows(lane.row),
+        "latest": _latest(lane.emission),
     }
+
+
+def _rows(row: Mapping[str, Reading]) -> dict[str, Any]:
+    return {name: reading[_TOLD_OF_READING] for name, reading in row.items() if isinstance(reading[1], PLAIN_TYPES)}
+
+
+def _latest(emission: Emission) -> dict[str, Any]:
+    return {name: change[_TOLD_OF_CHANGE] for name, change in emission.latest.items()}
 
 
 _Values = tuple[int | None, int, bool, bool, dict[str, Reading], dict[str, Change], dict[str, int]]

@@ -1,10 +1,12 @@
 """Units, each with a state that is saved as one: a machine or a cell of them; and the machines that the engine knows."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 
+from processors.actions import Declare
 from processors.running.fold import Fold, Folded
-from processors.running.lane import Lane, Stream
+from processors.running.lane import Lane
+from processors.running.picks import Stream
 from sparkplug.host_session import HostEvent
 from sparkplug.metric import NodeId, Reading
 from twin.vocabulary.nodes import is_twin_node
@@ -46,6 +48,24 @@ class Machine:
     def is_online(self) -> bool:
         """True while an edge of it is online."""
         return any(not is_twin_node(node.node) for node in self.online)
+
+    def declared(self, at_ms: int) -> Declare:
+        """Return the birth of its twin device, with the challenger's metrics while it has one."""
+        known, challenger = self.live.emission.known(at_ms), self.unit.live.challenger
+        if challenger is None:
+            return Declare(self.name, known)
+        return Declare(self.name, known + challenger.emission.known(at_ms), is_challenged=True)
+
+    def go_on(self, offers: Mapping[NodeId, Collection[str]]) -> None:
+        """Go on with a restored lane at the message at which it was saved: who was online, by the births that were heard, still
+        is. `offers`: the signals of each node that is read; the first owns."""
+        self.live.go_on()
+        for node, names in offers.items() if self.live.ticking else ():
+            if not self.live.births or str(node) in self.live.births:
+                self.online.add(node)
+                clashing = frozenset(one for one in names if one in self.owner)
+                self.excluded[node] = clashing
+                self.owner.update((one, node) for one in names if one in self.live.row and one not in clashing)
 
     def taken(self, birth: HostEvent, inputs: frozenset[str] | None) -> list[Reading]:
         """The readings of a birth that are taken from its source. A signal belongs to the first source that is online with it;

@@ -13,12 +13,16 @@ from pydantic import TypeAdapter
 
 from processors.actions import Action, DeadLetter, PlainOutput, Publish, Remove
 from processors.config import Configuration, read_tables
+from processors.description import Description, Role
 from processors.discovery import AnyProcessor, discover, modules, sample_configuration
+from processors.running.engine import Engine
 from processors.running.snapshot import decode_state, encode_state
 from sparkplug.host_session import HostEvent
+from sparkplug.metric import Change
 from tests.depth import examples
-from tests.processors.streams import birth, data, death, engine_of, fed, unnamed, wild_streams
-from twin.vocabulary.twin_signals import TWIN_PREFIX
+from tests.processors.describing import DESCRIBING, whole
+from tests.processors.streams import EDGE, UNITS, birth, data, death, engine_of, fed, unnamed, wild_streams
+from twin.vocabulary.twin_signals import TWIN_PREFIX, live_name
 
 ROOT = Path(__file__).parents[2]
 every_processor = pytest.mark.parametrize("processor", discover().values(), ids=discover().keys())
@@ -187,6 +191,101 @@ def test_every_snapshot_can_be_restored(processor: AnyProcessor, stream: list[Ho
     for unit in engine.take_changed():
         snapshot = engine.snapshot(unit)
         again = engine_of(processor)
+        assert again.restore(snapshot) == unit
+        assert again.snapshot(unit) == snapshot
+
+
+described = pytest.mark.parametrize(
+    "processor",
+    heeding := [one for one in (*discover().values(), DESCRIBING) if one.described],
+    ids=[one.name for one in heeding],
+)
+
+
+def _engine(processor: AnyProcessor, live: Description | None, challenger: Description | None = None) -> Engine:
+    engine = engine_of(processor)
+    for machine in ("okuma", "mazak"):
+        engine.describe(machine, Role.LIVE, live)
+        engine.describe(machine, Role.CHALLENGER, challenger)
+    return engine
+
+
+def _news(actions: list[Action], processor: AnyProcessor, *, of_challenger: bool) -> list[tuple[str, Change]]:
+    """What was published live of the metrics that a challenger has too; or what the challenger published, under those names."""
+    changes = [(one.machine, change) for one in actions if isinstance(one, Publish) for change in one.changes]
+    if of_challenger:
+        return [(machine, one._replace(name=name)) for machine, one in changes if (name := live_name(one.name))]
+    names = {spec.name for spec in processor.outputs if spec.of_challenger}
+    return [(machine, one) for machine, one in changes if one.name in names and not one.is_historical]
+
+
+@described
+@given(stream=wild_streams())
+@example(stream=_day())
+@quickly
+def test_a_challenger_that_is_identical_says_the_same(processor: AnyProcessor, stream: list[HostEvent]) -> None:
+    engine = _engine(processor, whole(), whole())
+    for number, event in enumerate(stream):
+        actions = engine.feed(event, number / 3) + engine.silence(number / 3)
+        live, challenger = (_news(actions, processor, of_challenger=which) for which in (False, True))
+        assert repr(challenger) == repr(live)  # NaN equals itself here
+    assert engine.ledger.balance == 0
+
+
+@described
+@given(stream=wild_streams())
+@example(stream=_day())
+@quickly
+def test_a_challenger_changes_nothing_of_what_is_live(processor: AnyProcessor, stream: list[HostEvent]) -> None:
+    alone, challenged = _engine(processor, whole()), _engine(processor, whole(), whole(22.0, resistance_k_per_w=0.5))
+    for number, event in enumerate(stream):
+        expected, actions = alone.feed(event, number / 3), challenged.feed(event, number / 3)
+        told = [one for one in actions if isinstance(one, Publish) and not live_name(one.changes[0].name)]
+        assert repr(told) == repr([one for one in expected if isinstance(one, Publish)])
+    assert alone.ledger.metrics() == challenged.ledger.metrics()
+
+
+@described
+@pytest.mark.parametrize("cut", [1, 40, 121, 124])
+def test_a_change_in_mid_stream_is_a_restart_with_the_new_one_and_that_state(processor: AnyProcessor, cut: int) -> None:
+    stream, machine = _day(), {"okuma": {EDGE: list(UNITS)}}
+    changed, restarted = _engine(processor, whole()), _engine(processor, whole(22.0, resistance_k_per_w=0.5))
+    fed(changed, *stream[:cut])
+    changed.describe("okuma", Role.LIVE, whole(22.0, resistance_k_per_w=0.5))
+    fed(changed, stream[cut])  # behind this one it holds
+    restarted.resume(changed.snapshot("okuma"), machine)
+    assert _same(fed(restarted, *stream[cut + 1 :]), fed(changed, *stream[cut + 1 :]))
+
+
+@described
+@pytest.mark.parametrize("is_restarted", [False, True])
+def test_a_challenger_that_is_promoted_goes_on_as_the_live_one(processor: AnyProcessor, *, is_restarted: bool) -> None:
+    stream, cut, new = _day(), 60, whole(22.0, resistance_k_per_w=0.5)
+    shadow, promoted = _engine(processor, whole(), new), _engine(processor, whole(), new)
+    for engine in (shadow, promoted):
+        fed(engine, *stream[:cut])
+    if is_restarted:
+        snapshot, promoted = promoted.snapshot("okuma"), _engine(processor, new)
+        promoted.resume(snapshot, {"okuma": {EDGE: list(UNITS)}})
+    else:
+        promoted.describe("okuma", Role.LIVE, new)
+        promoted.describe("okuma", Role.CHALLENGER, None)
+    for event in stream[cut:]:
+        fed(shadow, event)
+        fed(promoted, event)
+        challenger = shadow._units["okuma"].live.challenger
+        assert challenger is not None
+        assert repr(promoted._units["okuma"].live.state) == repr(challenger.state)
+
+
+@described
+@given(stream=wild_streams())
+@quickly
+def test_every_snapshot_with_a_challenger_can_be_restored(processor: AnyProcessor, stream: list[HostEvent]) -> None:
+    engine = _engine(processor, whole(), whole(22.0, resistance_k_per_w=0.5))
+    fed(engine, *stream)
+    for unit in engine.take_changed():
+        snapshot, again = engine.snapshot(unit), _engine(processor, whole(), whole(22.0, resistance_k_per_w=0.5))
         assert again.restore(snapshot) == unit
         assert again.snapshot(unit) == snapshot
 

@@ -72,14 +72,29 @@ def diagnose(
     began = clock()
     programs = bool(case.of(RunKind.PROGRAM, "fit"))
     machine = len(case.of(RunKind.PROGRAM)) < len(case.runs)
-    answers = []
+    parts: list[Callable[[], Diagnosed]] = []
     if machine:
-        answers.append(_motion(case, without, null, progress, side_by_side))
+        parts.append(lambda: _motion(case, without, null, progress, side_by_side))
     if programs or not machine:
-        answers.append(diagnose_programs(case, without=without, progress=progress))
+        parts.append(lambda: diagnose_programs(case, without=without, progress=progress))
+    answers, refused = _answers(parts, case.name)
     found = answers[0] if len(answers) == 1 else joined(*answers)
     found = in_own_units(found, case.machine)
-    return replace(found, diagnosis=replace(found.diagnosis, seconds=round(clock() - began, 1)))
+    said = (*found.diagnosis.notes, *refused)
+    return replace(found, diagnosis=replace(found.diagnosis, notes=said, seconds=round(clock() - began, 1)))
+
+
+def _answers(parts: Sequence[Callable[[], Diagnosed]], name: str) -> tuple[list[Diagnosed], list[str]]:
+    """Return the diagnosis of each part of a case, and why others have none. Raises CaseError where none has any."""
+    answers, refused = [], []
+    for part in parts:
+        try:
+            answers.append(part())
+        except CaseError as error:
+            refused.append(str(error).removeprefix(f"{name}: "))
+    if not answers:
+        raise CaseError(f"{name}: {refused[0]}")
+    return answers, refused
 
 
 def _motion(

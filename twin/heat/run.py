@@ -42,6 +42,7 @@ def spindle_temperature_c(
     *,
     effects: Sequence[str] = (),
     added_w: ArrayLike | None = None,
+    beside_c: ArrayLike | None = None,
     reference_run: bool = False,
 ) -> Array:
     """Temperature at each sample, (lanes, samples), °C, from `start_c` at the first one.
@@ -49,6 +50,7 @@ def spindle_temperature_c(
     constants: name → a number or (lanes,), of the machine (`thermal_constants`) and of the effects (`effect__parameter`)
     start_c: a number, or (lanes,)
     effects: names of those that are in the kernel; added_w: heat on top, (samples,) or (lanes, samples), or None
+    beside_c: temperature at the start of whatever else an effect warms, a number or (lanes,); None = as the spindle
     reference_run: in plain Python, slowly, from the same text
 
     100 W into 5,000 J/K behind 0.2 K/W for one time constant of 1,000 s, in two steps:
@@ -65,11 +67,14 @@ def spindle_temperature_c(
     text, names = _kernel(HEAT.effects(effects), added_w is not None)
     given = HEAT.taken(constants, names)
     times, inputs = _held_inputs(warming)
-    columns = [np.asarray(column, dtype=np.float64).reshape(-1) for column in (start_c, *given)]
+    columns = [
+        np.asarray(column, dtype=np.float64).reshape(-1)
+        for column in (start_c, start_c if beside_c is None else beside_c, *given)
+    ]
     try:
-        start, *rest = np.broadcast_arrays(*columns)
+        start, beside, *rest = np.broadcast_arrays(*columns)
     except ValueError:
-        sizes = ", ".join(f"{name} {len(column)}" for name, column in zip(("start_c", *names), columns, strict=True))
+        sizes = ", ".join(f"{name} {len(column)}" for name, column in zip(("start_c", "beside_c", *names), columns, strict=True))
         raise TwinError(f"{sizes} do not fit each other; each has one value, or one for each lane") from None
     rows = np.array(rest).T.reshape(len(start), len(names))
     out = np.empty((len(start), len(times)))
@@ -77,7 +82,7 @@ def spindle_temperature_c(
     added = [] if added_w is None else [np.broadcast_to(np.asarray(added_w, dtype=np.float64), out.shape)]
     for lane in range(len(start)):
         own = [np.ascontiguousarray(series[lane]) for series in added]
-        warm(np.ascontiguousarray(rows[lane]), float(start[lane]), times, *inputs, *own, out[lane])
+        warm(np.ascontiguousarray(rows[lane]), float(start[lane]), float(beside[lane]), times, *inputs, *own, out[lane])
     return out
 
 
@@ -117,14 +122,14 @@ def _kernel(effects: tuple[Effect, ...], added: bool = False) -> tuple[str, tupl
     fed = (*INPUTS, *(["added__heat_w"] if added else []))
     scalars = Scalars.of(woven, effects, (*FED, *fed))
     arguments = ", ".join(f"{name}_in" for name in fed)
-    start = [*scalars.before_loop(), "temperature_c = start_c", *scalars.states_at_start()]
+    start = [*scalars.before_loop(), "temperature_c = beside_c", *scalars.states_at_start(), "temperature_c = start_c"]
     tick = ["shown_c[sample] = temperature_c", "if sample + 1 < len(t_s):"]
     body = ["time_s = t_s[sample]", "duration_s = t_s[sample + 1] - time_s"]
     body += [f"{name} = {name}_in[sample]" for name in fed] + scalars.in_loop()
     body += [*woven.body.splitlines(), "temperature_c = temperature_next_c"]
     lines = [
         KERNEL,
-        f"def warm(constants, start_c, t_s, {arguments}, shown_c):",
+        f"def warm(constants, start_c, beside_c, t_s, {arguments}, shown_c):",
         *(f"    {line}" for line in start),
         "    for sample in range(len(t_s)):",
         *(f"        {line}" for line in tick),

@@ -4,20 +4,19 @@ Each quantity is a limit of the planner or a ratio of its speeds. An effect chan
 everywhere (`twin.effects.effect`); a limit that there is not is infinite. Nothing is changed, bit for bit, at null values.
 """
 
-import inspect
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from twin.effects.catalogue import effect_named
-from twin.effects.effect import Change, Effect
+from twin.effects.effect import Effect
 from twin.machine import MachineFile, Program
 from twin.motion.limits import Limits, PerAxis
 from twin.motion.path import Path
 from twin.motion.plan import Override, Plan, plan
+from twin.motion.quantity import change_of
 from twin.sites import Site
 
 Added = Mapping[str, Mapping[str, float]]
@@ -121,17 +120,9 @@ def _stated(limits: Limits) -> dict[str, PerAxis]:
 
 
 def _change(effect: Effect, quantity: str, value: PerAxis, given: Mapping[str, float]) -> PerAxis:
-    function = effect.changes[quantity]
-    arguments = [given[name] for name in _arguments(function)]
     if isinstance(value, tuple):
-        return tuple(_number(function(one, *arguments)) for one in value)
-    return _number(function(value, *arguments))
-
-
-@cache
-def _arguments(function: Change) -> tuple[str, ...]:
-    """Return the arguments that a change takes besides the quantity."""
-    return tuple(inspect.signature(function).parameters)[1:]
+        return tuple(change_of(effect, quantity, one, given) for one in value)
+    return change_of(effect, quantity, value, given)
 
 
 def _number(value: object) -> float:

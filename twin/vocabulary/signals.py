@@ -94,6 +94,8 @@ OVERRIDES = ("feed_override_pct", "rapid_override_pct", "spindle_override_pct")
 DERIVED = ("tool_change_active", "tool_change_source", "tool_change_evidence")
 # Beside the canonical signals: raw samples of an accelerometer, an array, which the processor `vibration` reads.
 VIBRATION_BLOCK_G, VIBRATION_SAMPLE_RATE_HZ = "vibration_block_g", "vibration_sample_rate_hz"
+# Lengths that the gap takes from canonical signals: of a tool change, and of a section of a program between two of them.
+TOOL_CHANGE_S, PROGRAM_TIME_S = "tool_change_s", "program_time_s"
 
 # An axis is a letter, with a digit where a control has several of one letter (Z and Z4 on a lathe with two carriages).
 AXES = (

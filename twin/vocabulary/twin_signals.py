@@ -43,10 +43,11 @@ GAP_PREFIX = f"{TWIN_PREFIX}gap_"
 """Followed by a signal: its standing gap; by a signal, a slash and a regime: the gap in that regime."""
 GAP_GROWING = f"{GAP_PREFIX}growing"
 GAP_GROWING_SIGNAL = f"{GAP_PREFIX}growing_signal"
+GAP_OPEN = f"{GAP_PREFIX}open"
 GAP_WINDOW = f"{GAP_PREFIX}window"
 GAP_LEFT_OUT_PCT = f"{GAP_PREFIX}left_out_pct"
 GAP_BASIS = f"{GAP_PREFIX}basis"
-GAP_NOTES = frozenset({GAP_GROWING, GAP_GROWING_SIGNAL, GAP_WINDOW, GAP_LEFT_OUT_PCT, GAP_BASIS})
+GAP_NOTES = frozenset({GAP_GROWING, GAP_GROWING_SIGNAL, GAP_OPEN, GAP_WINDOW, GAP_LEFT_OUT_PCT, GAP_BASIS})
 """Metrics about the comparison, published beside the gaps themselves."""
 
 # rules
@@ -66,6 +67,24 @@ PART_RECORD = f"{TWIN_PREFIX}part_record"
 
 # alerts
 ALERT_STATE = f"{TWIN_PREFIX}alert_state"
+
+
+def challenger_name(name: str) -> str:
+    """Return the name under which a challenger publishes a signal of the live twin.
+
+    >>> challenger_name("twin/spindle_temp_c")
+    'twin/challenger/spindle_temp_c'
+    """
+    return CHALLENGER_PREFIX + name.removeprefix(TWIN_PREFIX)
+
+
+def live_name(name: str) -> str | None:
+    """Return the signal of the live twin for one of a challenger; None for all others.
+
+    >>> live_name("twin/challenger/spindle_temp_c"), live_name("twin/spindle_temp_c")
+    ('twin/spindle_temp_c', None)
+    """
+    return TWIN_PREFIX + name.removeprefix(CHALLENGER_PREFIX) if name.startswith(CHALLENGER_PREFIX) else None
 
 
 def is_gap(name: str) -> bool:

@@ -28,7 +28,8 @@ from twin.effects.catalogue import effect_named
 from twin.heat.run import Warming, spindle_temperature_c, thermal_constants, thermal_quantities
 from twin.machine import MachineFile
 from twin.runlog import RunLog, run_log
-from twin.sensor.reading import readings, sensor_quantities
+from twin.sensor.reading import readings
+from twin.sensor.sensing import sensor_quantities
 from twin.spindle.load import spindle_constants, spindle_load_pct, spindle_quantities
 
 Floats = NDArray[np.float64]

@@ -56,3 +56,18 @@ def test_a_device_model_that_does_not_belong_to_it_is_said(tmp_path: Path) -> No
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
     assert "is it the Devices.xml that belongs to it?" in done.stderr
+
+
+def test_what_a_log_said_holds_in_the_log_that_follows(tmp_path: Path) -> None:
+    lines = SPARE_PART.read_text().splitlines()
+    (tmp_path / "a.txt").write_text("\n".join(lines[:400]) + "\n")
+    (tmp_path / "b.txt").write_text("\n".join(lines[400:]) + "\n")
+    (whole,) = recorded_runs(SPARE_PART, DEVICES)
+    (joined,) = recorded_runs(tmp_path / "a.txt", DEVICES, None, [tmp_path / "b.txt"])
+    assert np.array_equal(joined.t_s, whole.t_s)
+    for name, values in whole.columns.items():
+        assert np.array_equal(joined[name], values, equal_nan=True), name
+    done = imported(tmp_path / "a.txt", tmp_path / "b.txt", "--devices", DEVICES, "--out", tmp_path / "run.csv")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "1 stretches in a.txt, b.txt" in done.stdout
+    assert len(read_run(tmp_path / "run.csv")) == len(whole)

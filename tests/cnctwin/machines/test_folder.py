@@ -169,10 +169,20 @@ def test_a_description_that_is_none_is_not_filed(own: MachineFolder) -> None:
 
 def test_a_wrong_file_is_told_and_hinders_nothing_else(own: MachineFolder) -> None:
     own.live_file.write_text("[machine]\nnome = 'vmc'")
-    filed(own, B)
     assert "nome is not known" in told(own)["faults"][0]
+    filed(own, B)
     did(own, lambda change: change.promote("anna", ""))
     assert told(own)["faults"] == []
+
+
+def test_back_leads_out_of_a_wrong_file_to_what_processors_go_on_with(own: MachineFolder) -> None:
+    filed(own, B)
+    did(own, lambda change: change.promote("anna", ""))
+    own.live_file.write_text("[machine]")
+    did(own, lambda change: change.back("anna", ""))
+    assert own.live_file.read_text() == B
+    did(own, lambda change: change.back("anna", ""))
+    assert own.live_file.read_text() == A
 
 
 def test_half_a_line_of_a_power_cut_costs_that_line_alone(own: MachineFolder) -> None:

@@ -9,7 +9,7 @@ from edge.running.receipts import spans_of
 from edge.sample import EdgeSample, observations_of
 from processors.actions import Action
 from processors.running.engine import Engine, Way
-from processors.running.lane import Stream
+from processors.running.picks import Stream
 from processors.running.ports import Receipt
 from processors.running.runner import Runner
 from sparkplug.host_session import EventKind, HostEvent
@@ -24,8 +24,8 @@ class ObservedRunner(Runner):
 
     plant: ClassVar["Plant"]
 
-    def __init__(self, host: Any, workers: Sequence[Any]) -> None:
-        super().__init__(host, workers)
+    def __init__(self, host: Any, workers: Sequence[Any], folder: Any = None) -> None:
+        super().__init__(host, workers, folder)
         self.plant.runners[self.plant.kernel.me().process.name] = self
 
     def _stream(self, event: HostEvent, now_s: float) -> None:
@@ -64,6 +64,10 @@ class ObservedEngine(Engine):
             return shortest(message, wall_s)
 
         return way
+
+    def describe(self, machine: str, role: Any, description: Any) -> list[Action]:
+        self._note(lambda engine: engine.describe(machine, role, description))
+        return super().describe(machine, role, description)
 
     def plain(self, topic: str, payload: bytes, at_ms: int) -> list[Action]:
         self._note(lambda engine: engine.plain(topic, payload, at_ms))

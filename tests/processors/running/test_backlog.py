@@ -5,10 +5,12 @@ from random import Random
 
 import pytest
 
+from processors.description import Role
 from processors.running import backlog as backlog_module
 from processors.running.backlog import Backlog
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId
+from tests.processors.describing import message
 from tests.processors.streams import birth, data, death, hole
 
 FLOOD, QUIET = NodeId("cnc", "edge-flood"), NodeId("cnc", "edge-quiet")
@@ -139,3 +141,29 @@ def test_whatever_comes_and_goes_everything_is_taken_or_passed_over_once() -> No
     for one in taken(backlog):
         gone[one.timestamp_ms] += 1
     assert came == gone
+
+
+def test_descriptions_wait_behind_the_data_of_their_machine_and_its_next_data_behind_them() -> None:
+    backlog = Backlog()
+    for number in range(200):
+        backlog.put(flood(number / 1000))
+    before, after = data(1.0, a=1.0), data(2.0, a=2.0)
+    live, challenger, of_nobody = message(1.0), message(2.0, Role.CHALLENGER), message(1.0, machine="nobody")
+    for event in (before, live, challenger, after, of_nobody):
+        backlog.put(event)
+    order = taken(backlog)
+    assert [event for event in order if event in (before, live, challenger, after)] == [before, live, challenger, after]
+    assert of_nobody in order
+
+
+def test_data_are_never_put_together_across_a_description(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(backlog_module, "WORK_S_MAX", 0.0)
+    backlog = Backlog()
+    for number in range(200):
+        backlog.put(flood(number / 1000, float(number)))
+    backlog.put(message(1.0, machine="flood"))
+    backlog.put(flood(900.0))
+    backlog.put(flood(901.0))
+    *_, described, last = taken(backlog)
+    assert described.kind is EventKind.PLAIN
+    assert last.newest_ms == flood(901.0).newest_ms

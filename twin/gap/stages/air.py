@@ -158,7 +158,7 @@ class AirStage:
     def _bare(self, run: AirRun) -> Floats:
         assert self.machine.spindle is not None
         constants: dict[str, ArrayLike] = dict(spindle_constants(self.machine.spindle))
-        return spindle_load_pct(constants, np.zeros((1, len(run.rpm))), run.rpm)[0]
+        return np.asarray(spindle_load_pct(constants, np.zeros((1, len(run.rpm))), run.rpm)[0])
 
     def first_guesses(self, candidate: Effected) -> Guesses:
         """Return the effect's own guesses."""

@@ -20,7 +20,7 @@ from twin.gap.stages.machine_terms import reading_of_terms, with_quantity_terms
 from twin.gap.stages.observed_through import Sensing, sensor_effects, standing_sensors
 from twin.gap.stages.rounded import as_read, coarse_step
 from twin.gap.stages.stage import Model, Observed, observed_of
-from twin.gap.stages.warming import NEEDS, SIGNAL, Stretch, stretches_of
+from twin.gap.stages.warming import NEEDS, SIGNAL, Stretch, Warmed, behind_k, between, from_rest, read_from, stretches_of
 from twin.heat.run import spindle_temperature_c, thermal_constants, thermal_quantities
 from twin.identification.batch_fit import time_blocks
 from twin.learned.arguments import around
@@ -34,6 +34,8 @@ Floats = NDArray[np.float64]
 BLOCK_S, BLOCKS_MIN = 120.0, 12
 NAMES = ("alpha_w_per_pct_rpm2", "beta_w_per_rpm", "resistance_k_per_w", "capacity_j_per_k")
 TERM_FLOORS = 3.0
+LATE_PART = 2.0
+"""By how much more or less than a sensor is late the spindle may be ahead of it at the start: it has not warmed evenly."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -169,17 +171,42 @@ class HeatStage:
         learned = reading_of_terms(model, theta, SIGNAL, lambda: arguments)
         standing = reading_series(self.terms, SIGNAL, arguments)
         learned = learned if standing is None else learned + standing
+        step = coarse_step(data.log[SIGNAL], self.floors.of(data.log, SIGNAL))
         found, place = [], 0
         for part in data.parts:
             here = slice(place, place + len(part.at_s))
             place = here.stop
-            start = sensing.value(np.full(len(theta), part.start_c))
             warmth = None if "heat_w" not in added else added["heat_w"][..., here]
-            named = tuple(e.name for e in self.effects)
-            shown = spindle_temperature_c(constants, part.warming, start, effects=named, added_w=warmth)
-            read = sensing.readings(np.broadcast_to(shown, (len(theta), shown.shape[1])), part.since_s)
+            read = self._begun(part, sensing, len(theta), step, self._warmed(model, constants, part, warmth))
             found.append(read + (learned[..., here] if isinstance(learned, np.ndarray) else learned))
         return found
+
+    def _warmed(self, model: Model, constants: dict[str, ArrayLike], part: Stretch, added_w: Floats | None) -> Warmed:
+        """The spindle of one part by its temperature at the start, and whether what is beside it is as cold as the air then."""
+        named = tuple(e.name for e in self.effects)
+        acting = {e.effect for e in model.effects} | set(self.standing)
+
+        def shown(start_c: Floats, *, cold: bool = False) -> Floats:
+            beside = np.full(len(start_c), part.ambient_c) if cold else None
+            found = spindle_temperature_c(constants, part.warming, start_c, effects=named, added_w=added_w, beside_c=beside)
+            return np.broadcast_to(found, (len(start_c), found.shape[1]))
+
+        return Warmed(shown, any(effect.states and effect.name in acting for effect in self.effects))
+
+    def _begun(self, part: Stretch, sensing: Sensing, lanes: int, step: float, warmed: Warmed) -> Floats:
+        """The readings of one part, (lanes, n), from the start that its recording tells."""
+        late = behind_k(sensing, part.slope_k_per_s, lanes)
+        start = sensing.value(np.full(lanes, part.start_c)) + late
+        whole = warmed.shown(start)
+        read = read_from(sensing, whole, part)
+        if warmed.keeps_heat:
+            cold = warmed.shown(start, cold=True)
+            read = between(read, read_from(sensing, cold, part) - read, part.temperature_c, 0.0)
+        unsure = np.maximum(0.5 * step, LATE_PART * np.abs(late))
+        if unsure.any():
+            warmer = warmed.shown(start + 1.0) - whole
+            read = between(read, unsure[:, None] * from_rest(sensing, warmer, part), part.temperature_c, -1.0)
+        return read
 
 
 def heat_runs(machine: MachineFile, runs: tuple[Run, ...]) -> tuple[HeatRun, ...]:

@@ -13,6 +13,7 @@ from twin.gap.dynamometer.turn_run import TurnRun
 from twin.gap.floors import Floors, repeatability
 from twin.gap.naming.filtered import told_from_a_filter
 from twin.gap.naming.specific import only_specific
+from twin.gap.naming.twins import with_twins
 from twin.gap.null import NULL, Null
 from twin.gap.search import Explained, bare_fit, explain
 from twin.gap.stages.air import AirStage, air_runs
@@ -123,7 +124,8 @@ def _explained(stage: Stage, ground: Ground, null: Null, progress: Progress) -> 
                 if judged(alone).verdict is Verdict.UNKNOWN:
                     return Explained(stage, base, base, (), {}, {})
                 return explain(stage, null=null, progress=progress, known=alone.best)
-    return explain(stage, null=null, progress=progress)
+    found = explain(stage, null=null, progress=progress)
+    return with_twins(stage, found) if isinstance(stage, AirStage | HeatStage) else found
 
 
 def with_one_clock(found: list[Explained], progress: Progress, null: Null) -> list[Explained]:

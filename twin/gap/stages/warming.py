@@ -7,13 +7,19 @@ A day at ten rows a second is more than the heat of a spindle has to say. Long r
 give the same heat, and the temperature as the mean of what was read in each:
 
     n = mean of n,   load = mean (load n²) / n²,   ambient and coolant as their means
+
+A stretch of production starts warm, and what was before it is not recorded. A sensor that is late is behind a spindle that has
+been warming at the rate that it reads. What the spindle has warmed beside itself is somewhere between the spindle and its
+surroundings: where, the stretch itself tells, as far as it does.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from twin.gap.stages.observed_through import Sensing
 from twin.heat.run import Warming, held
 from twin.runlog import RunLog
 from twin.simulator.recorded import start_temperature_c
@@ -28,14 +34,18 @@ HOLE_S, HOLE_PERIODS = 60.0, 10.0
 ROWS_MIN, SECONDS_MIN = 10, 30.0
 """Rows and seconds of a stretch below which it says nothing."""
 BINS_MAX = 20_000
+START_S, START_ROWS_MIN = 15.0, 5
+SLOPE_S, SLOPE_ROWS_MIN = 60.0, 20
+EVEN_STEP_S, EVEN_STEPS = 5.0, 240
+"""The even warming that a sensor is taken to have read before a stretch."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stretch:
     """rows: of the log; bin: (rows,) the bin of each; first: (n,) the row that each bin begins with
 
-    warming: what drives the heat from the beginning of each bin on; at_s: (n,) times of the readings; start_c: temperature at its
-    beginning; since_s: (n,) from reading to reading, 0 for the first
+    warming: what drives the heat from the beginning of each bin on; at_s, temperature_c: (n,) the readings; start_c: that at its
+    beginning, rising by slope_k_per_s, in surroundings of ambient_c; since_s: (n,) from reading to reading, 0 for the first
     """
 
     rows: slice
@@ -44,7 +54,10 @@ class Stretch:
     warming: Warming
     at_s: Floats
     since_s: Floats
+    temperature_c: Floats
     start_c: float
+    slope_k_per_s: float
+    ambient_c: float
     switches_coolant: bool
 
     def means(self, values: Floats) -> Floats:
@@ -52,6 +65,17 @@ class Stretch:
         if len(self.first) == len(self.bin):
             return values[self.rows]
         return _means(values[self.rows], self.bin)
+
+
+@dataclass(frozen=True, slots=True)
+class Warmed:
+    """A spindle in a stretch. shown: temperature at the start, (lanes,) → (lanes, n); cold: with nothing else warm then
+
+    keeps_heat: something beside the spindle warms up with it
+    """
+
+    shown: Callable[..., Floats]
+    keeps_heat: bool
 
 
 def stretches_of(log: RunLog) -> tuple[Stretch, ...]:
@@ -91,6 +115,7 @@ def _stretch(log: RunLog, part: slice, inputs: dict[str, Floats], bin_s: float) 
         heating = _means(load * rpm**2, number) / np.where(mean_rpm > 0.0, mean_rpm, 1.0) ** 2
         own = {name: _means(values, number) for name, values in own.items()}
         own |= {"spindle_rpm": mean_rpm, "spindle_load_pct": heating}
+    temperature = log[SIGNAL][part]
     at_s = _means(t_s, number) if bin_s > 0.0 else t_s
     warming = Warming(at_s, own["spindle_load_pct"], own["spindle_rpm"], own["ambient_temp_c"], own["coolant_on"])
     return Stretch(
@@ -100,9 +125,81 @@ def _stretch(log: RunLog, part: slice, inputs: dict[str, Floats], bin_s: float) 
         warming,
         at_s,
         np.diff(at_s, prepend=at_s[0]),
-        start_temperature_c(t_s, log[SIGNAL][part]),
+        temperature if bin_s <= 0.0 else _means(temperature, number),
+        _start_c(t_s, temperature),
+        _slope(t_s, temperature),
+        float(own["ambient_temp_c"][0]),
         len(np.unique(inputs["coolant_on"][part])) > 1,
     )
+
+
+def _start_c(t_s: Floats, temperature_c: Floats) -> float:
+    """Return the temperature at the first sample; of a short stretch by a line through more of it than of a long one."""
+    span_s = float(t_s[-1] - t_s[0])
+    if 0.01 * span_s >= START_S or span_s < 2.0 * START_S:
+        return start_temperature_c(t_s, temperature_c)
+    first = np.isfinite(temperature_c) & (t_s <= t_s[0] + START_S)
+    if first.sum() < START_ROWS_MIN:
+        return start_temperature_c(t_s, temperature_c)
+    return float(np.polyfit(t_s[first] - t_s[0], temperature_c[first], 1)[1])
+
+
+def _slope(t_s: Floats, temperature_c: Floats) -> float:
+    """Return the rate at which a stretch begins to warm, K/s, by a line through its first minute; 0 where that is too few."""
+    first = np.isfinite(temperature_c) & (t_s <= t_s[0] + SLOPE_S)
+    if first.sum() < SLOPE_ROWS_MIN:
+        return 0.0
+    return float(np.polyfit(t_s[first] - t_s[0], temperature_c[first], 1)[0])
+
+
+def behind_k(sensing: Sensing, slope_k_per_s: float, lanes: int) -> Floats:
+    """Return by how much the spindle is warmer than a sensor reads that is late, where it has been warming evenly, (lanes,)."""
+    if not sensing.effects or slope_k_per_s == 0.0:
+        return np.zeros(lanes)
+    return np.asarray(sensing.value(np.zeros(lanes)) - sensing.value(_ramp_read(sensing, slope_k_per_s, lanes)[:, -1]))
+
+
+def read_from(sensing: Sensing, values: Floats, part: Stretch) -> Floats:
+    """Return the readings of a stretch, (lanes, n), of a sensor that has read the even warming before it."""
+    if not sensing.effects:
+        return values
+    before = values[:, :1] + part.slope_k_per_s * (_ramp_s() - EVEN_STEP_S)
+    since = np.concatenate([np.full(EVEN_STEPS, EVEN_STEP_S), part.since_s])
+    since[EVEN_STEPS] = EVEN_STEP_S
+    return sensing.readings(np.concatenate([before, values], axis=1), since)[:, EVEN_STEPS:]
+
+
+def _ramp_read(sensing: Sensing, slope_k_per_s: float, lanes: int) -> Floats:
+    """Return the readings of an even warming up to 0 °C, (lanes, steps)."""
+    ramp = np.broadcast_to(slope_k_per_s * _ramp_s(), (lanes, EVEN_STEPS))
+    return sensing.readings(ramp, EVEN_STEP_S)
+
+
+def _ramp_s() -> Floats:
+    return EVEN_STEP_S * np.arange(1 - EVEN_STEPS, 1.0)
+
+
+def from_rest(sensing: Sensing, values: Floats, part: Stretch) -> Floats:
+    """Return by how much a sensor reads more of a spindle that is warmer by these values, (lanes, n), and was not before."""
+    if not sensing.effects:
+        return values
+    before = np.zeros((len(values), 1))
+    since = np.concatenate([[0.0, EVEN_STEP_S], part.since_s[1:]])
+    whole = np.concatenate([before, values], axis=1)
+    return (sensing.readings(whole, since) - sensing.readings(np.zeros_like(whole), since))[:, 1:]
+
+
+def between(one: Floats, away: Floats, recorded: Floats, least: float) -> Floats:
+    """Return one + part · away, (lanes, n), with the part from `least` to 1 that comes nearest to what was recorded, (n,).
+
+    >>> between(np.zeros((1, 2)), np.array([[4.0, 8.0]]), np.array([1.0, 2.0]), 0.0).tolist()
+    [[1.0, 2.0]]
+    """
+    there = np.isfinite(recorded)
+    size = np.sum(away[:, there] ** 2, axis=1)
+    along = np.sum(away[:, there] * (recorded[there] - one[:, there]), axis=1)
+    part = np.clip(along / np.maximum(size, 1e-12), least, 1.0)
+    return np.asarray(one + part[:, None] * away)
 
 
 def _means(values: Floats, bins: Ints) -> Floats:

@@ -29,6 +29,7 @@ export const SCORE_DRIFT = "twin/score_drift";
 export const GAP_PREFIX = "twin/gap_";
 export const GAP_GROWING = "twin/gap_growing";
 export const GAP_GROWING_SIGNAL = "twin/gap_growing_signal";
+export const GAP_OPEN = "twin/gap_open";
 export const GAP_WINDOW = "twin/gap_window";
 export const GAP_LEFT_OUT_PCT = "twin/gap_left_out_pct";
 export const GAP_BASIS = "twin/gap_basis";

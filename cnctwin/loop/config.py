@@ -1,0 +1,87 @@
+"""The table `[loop]` of processors.toml: what happens by itself, and by which figures. The values here are the defaults.
+
+[loop]
+promote = "by_rule"
+
+[loop.machines.okuma]
+shadow_hours = 72.0
+"""
+
+from collections.abc import Mapping
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from processors.config import MACHINES, read_tables
+from processors.errors import ConfigurationError
+
+TABLE = "loop"
+Hours = Annotated[float, Field(ge=0.0, le=8766.0)]
+Floors = Annotated[float, Field(ge=0.0, le=1000.0)]
+
+
+class Diagnose(StrEnum):
+    """The way a diagnosis begins."""
+
+    BY_ITSELF = "by_itself"
+    BY_HAND = "by_hand"
+
+
+class Promote(StrEnum):
+    """The way a challenger is promoted."""
+
+    BY_HAND = "by_hand"
+    BY_RULE = "by_rule"
+
+
+class LoopConfig(BaseModel):
+    """See docs/loop.md, which has a line on each. Times are those of the machine's own clock."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    diagnose: Diagnose = Diagnose.BY_ITSELF
+    window_hours: float = Field(default=8.0, gt=0.0, le=720.0, description="of history, where nothing says since when")
+    history_days: float = Field(default=30.0, gt=0.0, le=366.0, description="no case reaches further back")
+    again_hours: Hours = Field(default=24.0, description="after a diagnosis that led to nothing, before the next by itself")
+    shadow_s: float = Field(default=900.0, ge=0.0, le=31e6, description="beside the live one, without runs to score it on")
+    promote: Promote = Promote.BY_HAND
+    shadow_hours: Hours = Field(default=24.0, description="beside the live one, before the rule promotes")
+    promote_floors: Floors = Field(default=0.3, description="by which it has to be better, over all signals")
+    back_hours: Hours = Field(default=24.0, description="for which the gap is watched after a promotion")
+    back_floors: Floors = Field(default=0.5, description="by which it may be larger than before; more leads back")
+    cases_max: int = Field(default=5, ge=1, le=1000, description="that are kept of a machine")
+    programs: Path | None = Field(default=None, description="folder with the NC files that it runs")
+    ambient_c: float | None = Field(default=None, ge=-50.0, le=80.0, description="of the hall, where no signal tells it")
+
+
+class LoopConfiguration:
+    """The values for all machines, and for those that have their own. Raises ConfigurationError naming key and value."""
+
+    def __init__(self, table: Mapping[str, Any] | None = None) -> None:
+        shared = dict(table or {})
+        machines = shared.pop(MACHINES, {})
+        if not isinstance(machines, dict) or not all(isinstance(own, dict) for own in machines.values()):
+            raise ConfigurationError(f"[{TABLE}.{MACHINES}] has to hold one table for each machine")
+        self.default = _validated(shared, TABLE)
+        self._own = {name: _validated({**shared, **own}, f"{TABLE}.{MACHINES}.{name}") for name, own in machines.items()}
+
+    def of(self, machine: str) -> LoopConfig:
+        """Return the values that hold for a machine."""
+        return self._own.get(machine, self.default)
+
+
+def loop_configuration(config: Path | None) -> LoopConfiguration:
+    """Return what the file of processors says of the loop. Raises ConfigurationError."""
+    return LoopConfiguration({} if config is None else read_tables(config).get(TABLE))
+
+
+def _validated(table: Mapping[str, Any], where: str) -> LoopConfig:
+    try:
+        return LoopConfig.model_validate(table)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        key = ".".join(str(part) for part in first["loc"])
+        known = ", ".join(LoopConfig.model_fields)
+        raise ConfigurationError(f"[{where}] {key} = {first['input']!r}: {first['msg']} (known: {known})") from None
