@@ -5,6 +5,7 @@ Exit codes: 0 = done; 1 = refused, with the reason; 2 = wrong input.
 
 import getpass
 import json
+import logging
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -14,8 +15,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cnctwin.commands.moment import moment_text
-from cnctwin.commands.options import AsJson, Machines
+from cnctwin.commands.options import AsJson, Broker, Group, Machines, StorePlace
 from cnctwin.errors import UsageError
+from cnctwin.processes.given_broker import address, broker_or_own
+from cnctwin.processes.stopping import stopped_by_signals
 from cnctwin.terminal.console import standard_output
 
 if TYPE_CHECKING:
@@ -84,6 +87,44 @@ def withdraw(
 ) -> None:
     """Take the challenger away; it stays in the history."""
     _change(machine, machines, lambda change: change.withdraw(_user(by), why), as_json)
+
+
+@twin_app.command("run")
+def run_loop(
+    machines: Machines = None,
+    config: Annotated[Path | None, typer.Option(help="The processors' TOML, with the table [loop]")] = None,
+    store: StorePlace = None,
+    jobs_files: Annotated[
+        Path | None, typer.Option(help="The --files of `cnctwin jobs run`; else cases in the state folder", show_default=False)
+    ] = None,
+    jobs: Annotated[
+        Path | None, typer.Option(help="The --dir of `cnctwin jobs run`; else jobs in the state folder", show_default=False)
+    ] = None,
+    diagnoses: Annotated[
+        Path | None, typer.Option(help="The --diagnoses of `cnctwin serve`; else diagnoses beside the descriptions")
+    ] = None,
+    broker: Broker = None,
+    group: Group = "cnc",
+) -> None:
+    """Keep the loop of a plant until SIGTERM or Ctrl-C: an open gap is diagnosed, and the answer waits as a challenger."""
+    from cnctwin.loop.config import loop_configuration
+    from cnctwin.loop.service import LoopService
+    from cnctwin.loop.workshop import Places
+    from cnctwin.machines.place import machines_folder
+    from cnctwin.memory.store.opening import default_place
+    from edge.state_dir import state_dir
+
+    folder = machines_folder(machines, config)
+    if folder is None:
+        raise UsageError("no folder of descriptions is here; give --machines DIR or $CNCTWIN_MACHINES (docs/loop.md)")
+    files = jobs_files or state_dir() / "cases"
+    files.mkdir(parents=True, exist_ok=True)
+    places = Places(store or default_place(), files, jobs or state_dir() / "jobs", diagnoses or folder / "diagnoses")
+    logging.getLogger("cnctwin.loop").setLevel(logging.INFO)
+    with stopped_by_signals() as stop, broker_or_own(address(broker)) as where:
+        service = LoopService(folder, where, loop_configuration(config), places, group)
+        print(f"the loop of {where.url} keeps {folder}; jobs read {files}", file=sys.stderr)
+        service.run(stop)
 
 
 def _folder(machine: str, given: Path | None) -> "MachineFolder":

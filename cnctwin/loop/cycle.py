@@ -215,6 +215,8 @@ def _shadow(config: LoopConfig, state: State, world: World) -> Stepped:
 
 def _promoted(config: LoopConfig, state: State, world: World) -> Stepped:
     state = _seen(state, world)
+    if not state.promoted_at_ms:
+        state = state.now(promoted_at_ms=world.at_ms)
     if world.at_ms - state.promoted_at_ms >= config.back_hours * HOUR_MS:
         return _now(state, world, StepName.WATCHING, "watching the gap"), None
     return (state if state.last is None else state.now(text=promotion(state.last))), None
@@ -235,8 +237,8 @@ def _back_of_itself(config: LoopConfig, state: State, world: World) -> Back | No
 def _seen(state: State, world: World) -> State:
     """The state with the standing gap of the live description, also as that to which the last promotion has led."""
     now = world.standing.live
-    if dict(state.standing) == dict(now):
-        return state
+    if not now or dict(state.standing) == dict(now):
+        return state  # what was known holds until more is heard
     last = state.last
     if last is not None and last.signal in now and world.standing.at_ms > state.promoted_at_ms:
         last = last.model_copy(update={"after": now[last.signal]})
