@@ -16,6 +16,7 @@ def torque_command_a(
 
 EFFECT = Effect(
     name="acceleration_feedforward",
+    says="{on} is fed the acceleration of its reference",
     site=Site.CONTROLLER,
     on=On.AXIS,
     parameters=(Parameter("gain", "", 0.0, 0.0, 1.5, 0.3, "1 = the torque that accelerates the stated mass"),),

@@ -18,6 +18,7 @@ def table_mm(table_mm: float, engaged_mm: float, play_mm: float) -> tuple[float,
 
 EFFECT = Effect(
     name="backlash",
+    says="{on} has lost motion",
     site=Site.MECHANICS,
     on=On.AXIS,
     parameters=(Parameter("play_mm", "mm", 0.0, 0.0, 0.5, 0.01, "whole width of the play"),),

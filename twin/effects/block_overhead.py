@@ -14,6 +14,7 @@ def block_time_s(stated_s: float, block_s: float) -> float:
 
 EFFECT = Effect(
     name="block_overhead",
+    says="each block takes the control its time",
     site=Site.PROGRAM,
     on=On.MACHINE,
     parameters=(Parameter("block_s", "s", 0.0, 0.0, 2.0, 0.02, "least time of a cutting block, beyond what is stated"),),

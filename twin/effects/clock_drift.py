@@ -19,6 +19,7 @@ def late_s(time_s: float, ppm: float, offset_s: float) -> float:
 
 EFFECT = Effect(
     name="clock_drift",
+    says="the feedback is stamped by another clock",
     site=Site.CLOCK,
     on=On.MACHINE,
     parameters=(

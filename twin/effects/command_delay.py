@@ -19,6 +19,7 @@ def late_s(delay_s: float) -> float:
 
 EFFECT = Effect(
     name="command_delay",
+    says="{on} is commanded late",
     site=Site.REFERENCE,
     on=On.AXIS,
     parameters=(Parameter("delay_s", "s", 0.0, 0.0, 0.05, 0.002, "age of the reference in the loop"),),

@@ -17,6 +17,7 @@ def cooling_w_per_k(cooling_w_per_k: float, coolant_on: float, gain: float) -> f
 
 EFFECT = Effect(
     name="coolant_cooling",
+    says="coolant cools",
     site=Site.THERMAL,
     on=On.MACHINE,
     parameters=(Parameter("gain", "", 0.0, 0.0, 20.0, 0.3, "part by which the cooling is more while the coolant is on"),),

@@ -39,6 +39,7 @@ def in_position_s(stated_s: float, settle_s: float) -> float:
 
 EFFECT = Effect(
     name="corner_slowdown",
+    says="the control slows down at corners",
     site=Site.PROGRAM,
     on=On.MACHINE,
     parameters=(

@@ -14,6 +14,7 @@ def tangential_coefficient_n_per_mm2(tangential_coefficient_n_per_mm2: float, sc
 
 EFFECT = Effect(
     name="cutting_coefficient",
+    says="the material cuts with another force",
     site=Site.PROCESS_FORCE,
     on=On.MACHINE,
     parameters=(Parameter("scale", "", 1.0, 0.2, 5.0, 1.2, "K_t over the stated one"),),

@@ -14,6 +14,7 @@ def by_direction(force_n: float, direction: float, asymmetry: float) -> float:
 
 EFFECT = Effect(
     name="direction_friction",
+    says="friction of {on} differs by direction",
     site=Site.FRICTION,
     on=On.AXIS,
     parameters=(Parameter("asymmetry", "", 0.0, -0.6, 0.6, 0.1, "part by which friction is larger in + and smaller in −"),),

@@ -22,6 +22,7 @@ def radial(force_n_per_mm: float, chip_mm: float, radial_n_per_mm: float) -> flo
 
 EFFECT = Effect(
     name="edge_force",
+    says="the edge rubs",
     site=Site.PROCESS_FORCE,
     on=On.MACHINE,
     parameters=(

@@ -106,6 +106,7 @@ class Effect:
     """One effect of the catalogue.
 
     name: as in formats, section 7; the name of its file
+    says: the same in plain words, a short sentence; `{on}` stands for the axis or the signal that it is put on
     site: where it acts; on: what it is put on
     changes: quantity → the function that changes it
     states: name → its value at the start, a number or the name of a quantity
@@ -138,6 +139,7 @@ class Effect:
     """
 
     name: str
+    says: str = field(kw_only=True)
     site: Site
     on: On
     parameters: tuple[Parameter, ...]

@@ -21,6 +21,7 @@ def rapid_ratio(stated: float, rapid: float) -> float:
 
 EFFECT = Effect(
     name="feed_override",
+    says="the knobs stand elsewhere",
     site=Site.PROGRAM,
     on=On.MACHINE,
     parameters=(

@@ -20,6 +20,7 @@ def torque_command_a(
 
 EFFECT = Effect(
     name="friction_compensation",
+    says="the control of {on} compensates friction",
     site=Site.CONTROLLER,
     on=On.AXIS,
     parameters=(

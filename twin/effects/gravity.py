@@ -19,6 +19,7 @@ def load_n(force_n: float) -> float:
 
 EFFECT = Effect(
     name="gravity",
+    says="a constant force pulls on {on}",
     site=Site.MECHANICS,
     on=On.AXIS,
     parameters=(Parameter("force_n", "N", 0.0, -8000.0, 8000.0, 400.0, "load that the drive has to hold, positive towards −"),),

@@ -18,6 +18,7 @@ def lag_rad(lag_rad: float, axial_depth_mm: float, tool_diameter_mm: float, angl
 
 EFFECT = Effect(
     name="helix",
+    says="the edge has a helix",
     site=Site.PROCESS_FORCE,
     on=On.MACHINE,
     parameters=(Parameter("angle_deg", "°", 0.0, 0.0, 60.0, 30.0, "β, angle of the edge to the axis of the tool"),),

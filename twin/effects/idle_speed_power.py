@@ -17,6 +17,7 @@ def idle_power_kw(idle_power_kw: float, spindle_rpm: float, exponent: float, pow
 
 EFFECT = Effect(
     name="idle_speed_power",
+    says="idle power grows with the speed",
     site=Site.SPINDLE,
     on=On.MACHINE,
     parameters=(

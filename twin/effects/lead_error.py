@@ -15,6 +15,7 @@ def table_mm(table_mm: float, screw_lead_mm: float, amplitude_mm: float, phase_r
 
 EFFECT = Effect(
     name="lead_error",
+    says="the screw of {on} has an error that comes back with each turn",
     site=Site.MECHANICS,
     on=On.AXIS,
     parameters=(

@@ -20,6 +20,7 @@ def efficiency(efficiency: float, cutting_power_kw: float, drop: float, knee_kw:
 
 EFFECT = Effect(
     name="load_dependent_efficiency",
+    says="the spindle drive is less efficient at low load",
     site=Site.SPINDLE,
     on=On.MACHINE,
     parameters=(

@@ -26,6 +26,7 @@ def first_guesses(_: Recorded) -> Guesses:
 
 EFFECT = Effect(
     name="load_peak_hold",
+    says="the load meter holds its peaks",
     site=Site.SPINDLE,
     on=On.MACHINE,
     parameters=(Parameter("hold_s", "s", 0.0, 0.0, 20.0, 0.5, "time in which a peak falls to 37 %"),),

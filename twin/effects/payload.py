@@ -11,6 +11,7 @@ def moving_mass_kg(moving_mass_kg: float, mass_kg: float) -> float:
 
 EFFECT = Effect(
     name="payload",
+    says="{on} moves more mass",
     site=Site.MECHANICS,
     on=On.AXIS,
     parameters=(Parameter("mass_kg", "kg", 0.0, 0.0, 20000.0, 80.0, "beyond that of the machine"),),

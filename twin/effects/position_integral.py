@@ -22,6 +22,7 @@ def velocity_command_mm_s(
 
 EFFECT = Effect(
     name="position_integral",
+    says="the position loop of {on} has an integral part",
     site=Site.CONTROLLER,
     on=On.AXIS,
     parameters=(Parameter("gain_per_s", "1/s", 0.0, 0.0, 60.0, 5.0, "inverse of the reset time of the position loop"),),

@@ -30,6 +30,7 @@ def bristle_mm(held_n: float, stiffness_n_per_mm: float) -> float:
 
 EFFECT = Effect(
     name="presliding",
+    says="the contact of {on} gives before it slides",
     site=Site.FRICTION,
     on=On.AXIS,
     parameters=(

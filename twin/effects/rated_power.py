@@ -14,6 +14,7 @@ def rated_power_kw(rated_power_kw: float, scale: float) -> float:
 
 EFFECT = Effect(
     name="rated_power",
+    says="the meter's 100 % is another power",
     site=Site.SPINDLE,
     on=On.MACHINE,
     parameters=(Parameter("scale", "", 1.0, 0.1, 10.0, 1.3, "the meter's 100 % over the stated rated power"),),

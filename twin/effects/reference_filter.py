@@ -16,6 +16,7 @@ def reference_mm(reference_mm: float, previous_reference_mm: float, period_s: fl
 
 EFFECT = Effect(
     name="reference_filter",
+    says="the control smooths the reference of {on}",
     site=Site.REFERENCE,
     on=On.AXIS,
     parameters=(Parameter("time_constant_s", "s", 0.0, 0.0, 0.1, 0.005, "of the lag"),),

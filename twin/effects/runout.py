@@ -29,6 +29,7 @@ def chip_mm(chip_mm: float, radius_step_mm: float) -> float:
 
 EFFECT = Effect(
     name="runout",
+    says="the tool runs out",
     site=Site.PROCESS_FORCE,
     on=On.MACHINE,
     parameters=(

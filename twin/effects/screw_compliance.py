@@ -39,6 +39,7 @@ def first_guesses(_: Recorded) -> Guesses:
 
 EFFECT = Effect(
     name="screw_compliance",
+    says="the screw of {on} winds up",
     site=Site.MECHANICS,
     on=On.AXIS,
     parameters=(

@@ -48,6 +48,7 @@ def first_guesses(_: Recorded) -> Guesses:
 
 EFFECT = Effect(
     name="second_thermal_mass",
+    says="heat flows on into head and column",
     site=Site.THERMAL,
     on=On.MACHINE,
     parameters=(

@@ -19,6 +19,7 @@ def undo(reading: float, bias: float) -> float:
 
 EFFECT = Effect(
     name="sensor_bias",
+    says="{on} is read with an offset",
     site=Site.SENSOR,
     on=On.SIGNAL,
     parameters=(Parameter("bias", "unit of the signal", 0.0, -1e6, 1e6, 1.0, "what it reads too much"),),

@@ -25,6 +25,7 @@ LONGEST_S = 300.0
 
 EFFECT = Effect(
     name="sensor_delay",
+    says="{on} is read late",
     site=Site.SENSOR,
     on=On.SIGNAL,
     parameters=(Parameter("delay_s", "s", 0.0, 0.0, LONGEST_S, 0.002, "age of the value that is read"),),

@@ -25,6 +25,7 @@ def first_guesses(recorded: Recorded) -> Guesses:
 
 EFFECT = Effect(
     name="sensor_lag",
+    says="{on} is read by a slow sensor",
     site=Site.SENSOR,
     on=On.SIGNAL,
     parameters=(Parameter("time_constant_s", "s", 0.0, 0.0, 3600.0, 0.05, "time after which 63 % of a step is read"),),

@@ -29,6 +29,7 @@ def first_guesses(recorded: Recorded) -> Guesses:
 
 EFFECT = Effect(
     name="sensor_scale",
+    says="{on} is read on another scale",
     site=Site.SENSOR,
     on=On.SIGNAL,
     parameters=(Parameter("scale", "", 1.0, -1e4, 1e4, 1.1, "reading over value"),),

@@ -24,6 +24,7 @@ def velocity_integral_gain_a_per_mm(velocity_integral_gain_a_per_mm: float, inte
 
 EFFECT = Effect(
     name="servo_gain",
+    says="the loops of {on} have other gains",
     site=Site.CONTROLLER,
     on=On.AXIS,
     parameters=(

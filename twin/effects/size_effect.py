@@ -18,6 +18,7 @@ def tangential_coefficient_n_per_mm2(coefficient_n_per_mm2: float, chip_mm: floa
 
 EFFECT = Effect(
     name="size_effect",
+    says="thin chips take more force",
     site=Site.PROCESS_FORCE,
     on=On.MACHINE,
     parameters=(Parameter("exponent", "", 0.0, 0.0, 0.8, 0.25, "m_c, rise of the coefficient as the chip thins"),),

@@ -17,6 +17,7 @@ def cooling_w_per_k(cooling_w_per_k: float, spindle_rpm: float, gain: float, exp
 
 EFFECT = Effect(
     name="speed_convection",
+    says="turning cools the spindle",
     site=Site.THERMAL,
     on=On.MACHINE,
     parameters=(

@@ -14,6 +14,7 @@ def reading(reading: float, temperature_rise_k: float, um_per_k: float) -> float
 
 EFFECT = Effect(
     name="thermal_growth",
+    says="{on} grows as the machine warms",
     site=Site.SENSOR,
     on=On.AXIS,
     parameters=(Parameter("um_per_k", "µm/K", 0.0, -100.0, 100.0, 5.0, "growth for each kelvin of the spindle"),),

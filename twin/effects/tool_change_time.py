@@ -36,6 +36,7 @@ def axes_wait(stated: float, up_rpm_s: float) -> float:
 
 EFFECT = Effect(
     name="tool_change_time",
+    says="a tool change takes longer",
     site=Site.PROGRAM,
     on=On.MACHINE,
     parameters=(

@@ -19,6 +19,7 @@ def first_guesses(recorded: Recorded) -> Guesses:
 
 EFFECT = Effect(
     name="torque_limit",
+    says="the torque of {on} is capped below its limit",
     site=Site.CONTROLLER,
     on=On.AXIS,
     parameters=(Parameter("limit_a", "A", NONE, 0.01, 1000.0, 1.5, "of torque command and integral"),),

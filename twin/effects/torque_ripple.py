@@ -24,6 +24,7 @@ def drive_force_n(
 
 EFFECT = Effect(
     name="torque_ripple",
+    says="{on} has a force that comes back with each turn of its motor",
     site=Site.DRIVE_FORCE,
     on=On.AXIS,
     parameters=(

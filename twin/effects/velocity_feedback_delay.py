@@ -18,6 +18,7 @@ def velocity_feedback_mm_s(
 
 EFFECT = Effect(
     name="velocity_feedback_delay",
+    says="the loop of {on} is fed an old velocity",
     site=Site.CONTROLLER,
     on=On.AXIS,
     parameters=(Parameter("delay_s", "s", 0.0, 0.0, 0.005, 0.0005, "age of the velocity in the loop"),),

@@ -28,6 +28,7 @@ def first_guesses(_: Recorded) -> Guesses:
 
 EFFECT = Effect(
     name="velocity_feedforward",
+    says="{on} is fed the velocity of its reference",
     site=Site.CONTROLLER,
     on=On.AXIS,
     parameters=(

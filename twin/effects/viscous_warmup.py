@@ -17,6 +17,7 @@ def viscous_n_s_per_mm(viscous_n_s_per_mm: float, time_s: float, decay: float, t
 
 EFFECT = Effect(
     name="viscous_warmup",
+    says="friction of {on} falls as it warms",
     site=Site.FRICTION,
     on=On.AXIS,
     parameters=(

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from twin.assumed import with_fitted
 from twin.case import Case, Run, RunKind
 from twin.errors import CaseError
 from twin.gap.answer import candidates_of, causes_of, found_effects, not_identifiable_of, not_observable_of
@@ -32,6 +33,7 @@ from twin.gap.score import Squares, gap_of, squares_of, traces_of, unit_of
 from twin.gap.shares import shapley
 from twin.gap.stages.plan import Ground, SideBySide, explained_stages, ground_of
 from twin.gap.stages.shown import shown_by_run
+from twin.gap.stages.without_column import beside_columns
 from twin.gap.verdict import Judged, judged, overall
 from twin.gap.where import where
 from twin.machine import MachineFile
@@ -145,7 +147,8 @@ def _motion(
     known: dict[str, float] = {}
     for stage in stages:
         known |= constant_deviations(twins.after, stage.explained.stage, stage.explained.best)
-    return Diagnosed(diagnosis, with_learned(with_uncertainty(twins.after, known, named), learned), traces)
+    after = with_fitted(with_uncertainty(twins.after, known, named), known)
+    return Diagnosed(diagnosis, with_learned(after, learned), traces)
 
 
 def _of_stages(stages: Sequence[Judged]) -> tuple[str, ...]:
@@ -162,7 +165,7 @@ def _flattering(case: Case, runs: tuple[Run, ...]) -> tuple[str, ...]:
 def _twins(ground: Ground, stages: Sequence[Judged]) -> _Twins:
     runs = tuple(r for r in ground.runs if r.entry.role == "check")
     stated = shown_by_run(ground.machine, runs, ground.floors)
-    if not squares_of(runs, stated, ground.floors):
+    if not squares_of(runs, stated, ground.floors) and not beside_columns(stages, frozenset()):
         runs = tuple(r for r in ground.runs if r.entry.role == "fit")
         stated = shown_by_run(ground.machine, runs, ground.floors)
     before, after = ground.machine, ground.machine
@@ -173,6 +176,9 @@ def _twins(ground: Ground, stages: Sequence[Judged]) -> _Twins:
     shown = {"stated": stated}
     shown |= {name: shown_by_run(m, runs, ground.floors) for name, m in (("before", before), ("after", after))}
     squares = {name: squares_of(runs, columns, ground.floors) for name, columns in shown.items()}
+    every = frozenset(dict(found_effects(stages)))
+    for name, some in (("stated", None), ("before", frozenset[Effected]()), ("after", every)):
+        squares[name] |= beside_columns(stages, some)
     return _Twins(before, after, runs, squares, shown)
 
 
@@ -190,6 +196,7 @@ def _closed(ground: Ground, stages: Sequence[Judged], twins: _Twins, some: froze
             machine = with_constants(machine, stage.explained.stage, found)
         machine = with_effects(machine, [(e, v) for e, v in causes.items() if e in some])
         squares = squares_of(twins.runs, shown_by_run(machine, twins.runs, ground.floors), ground.floors)
+        squares |= beside_columns(stages, some)
     return closure_of(gap_of(twins.squares["before"]), gap_of(squares), 1.0)
 
 

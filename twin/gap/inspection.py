@@ -20,6 +20,7 @@ from twin.gap.sampling.servo_ticks import SlowRun, on_servo_ticks
 from twin.gap.stages.air import air_runs
 from twin.gap.stages.cut import cut_runs
 from twin.gap.stages.heat import heat_runs
+from twin.gap.stages.tool_change import change_runs
 from twin.machine import MachineFile
 from twin.runlog import AXIS_COLUMN, RunLog
 from twin.simulator.recorded import tool_of
@@ -73,8 +74,8 @@ def _comparable(run: Run, machine: MachineFile) -> bool:
         log.has(f"{a}_ref_mm") and any(log.has(f"{a}_{measured}") for measured in ("pos_mm", "table_mm", "torque_a"))
         for a in machine.axes
     ) or any(_alone(log, a) for a in machine.axes)
-    spindle = bool(cut_runs(machine, (run,))) or bool(air_runs(machine, (run,)))
-    return axes or isinstance(run, TurnRun) or spindle or bool(heat_runs(machine, (run,)))
+    seldom = any(found(machine, (run,)) for found in (cut_runs, air_runs, heat_runs, change_runs))
+    return axes or isinstance(run, TurnRun) or seldom
 
 
 def _alone(log: RunLog, letter: str) -> bool:

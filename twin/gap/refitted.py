@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
+from twin.effects.catalogue import effect_named
 from twin.gap.diagnosis import Cause, Effected
 from twin.gap.fitting import Fitted
 from twin.gap.intervals import Z90
@@ -41,11 +42,11 @@ def with_constants(machine: MachineFile, stage: Stage, found: Fitted) -> Machine
 
 
 def with_effects(machine: MachineFile, added: Iterable[tuple[Effected, dict[str, float]]]) -> MachineFile:
-    """The machine with these effects in it; a limit or stiffness that came out infinite is no effect."""
+    """The machine with these effects in it; a limit or stiffness that came out infinite is not there."""
     effects = list(machine.effects)
     for effected, values in added:
-        if all(np.isfinite(v) for v in values.values()):
-            parameters = {k: float(f"{v:.8g}") for k, v in values.items()}
+        parameters = {k: float(f"{v:.8g}") for k, v in values.items() if np.isfinite(v)}
+        if not effect_named(effected.effect).is_null(parameters):
             effects.append(AddedEffect(effect=effected.effect, on=effected.on, parameters=parameters))
     return machine.model_copy(update={"effects": tuple(effects)})
 

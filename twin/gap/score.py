@@ -23,7 +23,7 @@ from twin.gap.labels import measured_signals, regime_labels
 Floats = NDArray[np.float64]
 BLOCK_S = 0.5
 BLOCKS_MAX = 400
-UNITS = {"mm": "mm", "deg": "deg", "a": "A", "n": "N", "pct": "%", "c": "°C"}
+UNITS = {"mm": "mm", "deg": "deg", "a": "A", "n": "N", "pct": "%", "c": "°C", "s": "s"}
 
 
 def unit_of(signal: str) -> str:

@@ -198,9 +198,8 @@ def _is_not_null(found: Fitted, effected: Effected) -> bool:
 
 def is_nothing(effected: Effected, values: Mapping[str, float]) -> bool:
     """Return True where a fit ended at nothing: at the null value, or stiffer than the effect's file calls finite."""
-    effect = effect_named(effected.effect)
-    stiff = {p.name for p in effect.parameters if p.null is not None and np.isinf(p.null)}
-    return effect.is_null(values) or any(values[p.name] > p.high for p in effect.parameters if p.name in stiff)
+    sizes = [p for p in effect_named(effected.effect).parameters if p.null is not None]
+    return all(values[p.name] == p.null or (np.isinf(p.null or 0.0) and values[p.name] > p.high) for p in sizes)
 
 
 def _tried(stage: Stage, parent: Fitted, candidates: tuple[Effected, ...], null: Null) -> tuple[Tried, ...]:

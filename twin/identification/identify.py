@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from twin.assumed import with_fitted
 from twin.case import Case, Run, RunKind
 from twin.errors import CaseError
 from twin.gap.free_run import GapRow, free_run_gap
@@ -74,7 +75,8 @@ def identify(case: Case, *, free_gains: bool = False, progress: Progress = lambd
     machine = _heat(machine, fits, known, unknown)
     of_constants = [e for e in known if not e.path.endswith(("_asymmetry", "_delay"))]
     uncertainty = dict(machine.uncertainty) | {e.path: _relative(e) for e in of_constants}
-    machine = machine.model_copy(update={"uncertainty": uncertainty})
+    told = {e.path: _relative(e) for e in of_constants if e.identifiable}
+    machine = with_fitted(machine.model_copy(update={"uncertainty": uncertainty}), told)
     progress("checking")
     judged = case.of(role="check") or fits
     gaps = free_run_gap(machine, judged, case.repeats())

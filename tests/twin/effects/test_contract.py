@@ -78,6 +78,13 @@ def seconds_between(one: Plan, other: Plan) -> float:
 
 
 @pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)
+def test_an_effect_says_itself_in_plain_words(effect: Effect) -> None:
+    said = effect.says.format(on="Z")
+    assert said and "_" not in said and not said.endswith(".")
+    assert ("Z" in said) is (effect.on is not On.MACHINE), "it says what it is on, where it is on something"
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)
 def test_it_changes_quantities_that_its_site_has(effect: Effect) -> None:
     for quantity in effect.changes:
         has = sorted(QUANTITIES) if effect in ON_PROGRAMS else sorted(name for name in MARKED if MARKED[name] == effect.site.name)

@@ -30,7 +30,7 @@ def effect(name: str, quantity: str, change: object, states: dict[str, float | s
     """An effect of one parameter."""
     parameter = Parameter("factor", "", 1.0, 0.0, 10.0, 2.0, "of the stiffness")
     changes = {quantity: change}
-    return Effect(name, Site.MECHANICS, On.AXIS, (parameter,), changes, ("{a}_torque_a",), "", "", states or {})  # type: ignore[arg-type]
+    return Effect(name, Site.MECHANICS, On.AXIS, (parameter,), changes, ("{a}_torque_a",), "", "", states or {}, says=name)  # type: ignore[arg-type]
 
 
 def run(woven_body: str, functions: tuple[str, ...], **values: float) -> dict[str, object]:

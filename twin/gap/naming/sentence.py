@@ -95,7 +95,9 @@ def _causes(causes: Sequence[Cause]) -> str:
 
 def _said(cause: Cause) -> str:
     parameters = effect_named(cause.effect).parameters
-    told = max((p for p in parameters if p.null is not None), key=lambda p: _clearness(cause.parameters[p.name], p.null))
+    sizes = [p for p in parameters if p.null is not None]
+    there = [p for p in sizes if cause.parameters[p.name].value != p.null]
+    told = max(there or sizes, key=lambda p: _clearness(cause.parameters[p.name], p.null))
     figure = figure_of(cause.parameters[told.name])
     size = figure if len(parameters) == 1 else f"{told.name} {figure}"
     rivals = ", ".join(_in_words(e.effect, e.on if e.on != cause.on else "") for e in cause.indistinguishable_from)

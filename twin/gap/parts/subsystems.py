@@ -17,6 +17,7 @@ DRIVEN_BY = {
     "force_x_n": ("cut", ("spindle_angle_rad", "axial_depth_mm", "entry_angle_rad", "exit_angle_rad")),
     "force_y_n": ("cut", ("spindle_angle_rad", "axial_depth_mm", "entry_angle_rad", "exit_angle_rad")),
     "spindle_load_pct": ("spindle load", ("spindle_rpm", "axial_depth_mm", "entry_angle_rad", "exit_angle_rad")),
+    "tool_change_s": ("program", ("tool_change_active",)),
     "spindle_temp_c": ("heat", ("spindle_load_pct", "spindle_rpm", "ambient_temp_c")),
 }
 """Signal of a stage → its subsystem, and what drives it."""

@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from twin.assumed import is_assumed
 from twin.case import Run
 from twin.effects.added import added_effects
 from twin.effects.catalogue import effect_named
@@ -32,7 +33,8 @@ from twin.runlog import RunLog
 
 Floats = NDArray[np.float64]
 BLOCK_S, BLOCKS_MIN = 120.0, 12
-NAMES = ("alpha_w_per_pct_rpm2", "beta_w_per_rpm", "resistance_k_per_w", "capacity_j_per_k")
+CAPACITY = "capacity_j_per_k"
+NAMES = ("alpha_w_per_pct_rpm2", "beta_w_per_rpm", "resistance_k_per_w", CAPACITY)
 TERM_FLOORS = 3.0
 LATE_PART = 2.0
 """By how much more or less than a sensor is late the spindle may be ahead of it at the start: it has not warmed evenly."""
@@ -91,11 +93,15 @@ class HeatStage:
 
     @property
     def constants(self) -> tuple[Free, ...]:
-        """Heat by load and by speed, resistance, capacity: only their ratios show, so their priors say the rest."""
+        """Heat by load and by speed, resistance, capacity: only their ratios show, so their priors say the rest.
+
+        A capacity that is only assumed is the measure of the others, and stays.
+        """
         assert self.machine.thermal is not None
         stated, thermal = self.machine.uncertainty, self.machine.thermal.model_dump()
         relative = stated.get("relative", 0.05)
-        free = [constant(f"thermal.{n}", stated.get(f"thermal.{n}", relative)) for n in NAMES if thermal[n] > 0.0]
+        there = [n for n in NAMES if thermal[n] > 0.0 and not (n == CAPACITY and is_assumed(self.machine, f"thermal.{n}"))]
+        free = [constant(f"thermal.{n}", stated.get(f"thermal.{n}", relative)) for n in there]
         return tuple(p for p in free if p.sigma > 0.0)
 
     @property
@@ -162,7 +168,7 @@ class HeatStage:
         values, factors = model.values(theta), model.factors(theta)
         constants: dict[str, ArrayLike] = {}
         for name, value in thermal_constants(self.machine.thermal).items():
-            key = "capacity_j_per_k" if name == "heat_capacity_j_per_k" else name
+            key = CAPACITY if name == "heat_capacity_j_per_k" else name
             constants[name] = value * factors.get(f"thermal.{key}", np.ones(len(theta)))
         constants |= model.effect_constants(theta, self.effects, self.standing)
         sensing = Sensing.of(values, SIGNAL, standing_sensors(self.machine, SIGNAL))

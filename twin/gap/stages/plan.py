@@ -24,6 +24,7 @@ from twin.gap.stages.disturbance import disturbance_of_repeats, expected_spread
 from twin.gap.stages.heat import HeatStage, heat_runs
 from twin.gap.stages.open_loop.plan import open_stages
 from twin.gap.stages.stage import Stage
+from twin.gap.stages.tool_change import ToolChangeStage, change_runs
 from twin.gap.stages.turns import TurnStage, turn_data
 from twin.gap.verdict import judged
 from twin.learned.standing import axis_terms
@@ -46,7 +47,10 @@ AXES_TO_COMPARE = 2
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ground:
-    """The ground that all stages of a case stand on. machine: with the disturbance in its [noise]"""
+    """The ground that all stages of a case stand on.
+
+    machine: with the disturbance in its [noise]; has_programs: runs with their programs say how long a tool change takes
+    """
 
     machine: MachineFile
     runs: tuple[Run, ...]
@@ -54,6 +58,7 @@ class Ground:
     floors: Floors
     disturbance: Disturbance | None
     left_out: frozenset[str]
+    has_programs: bool = False
 
 
 def ground_of(case: Case, left_out: frozenset[str]) -> Ground:
@@ -80,7 +85,8 @@ def ground_of(case: Case, left_out: frozenset[str]) -> Ground:
     if disturbance is not None:
         noise = {"disturbance_force_n": disturbance.force_n, "disturbance_correlation_s": disturbance.correlation_s}
         machine = machine.model_copy(update={"noise": dict(machine.noise) | noise})
-    return Ground(machine, runs, case.repeats(), replace(floors, expected=spread), disturbance, left_out)
+    has_programs = bool(case.of(RunKind.PROGRAM, "fit"))
+    return Ground(machine, runs, case.repeats(), replace(floors, expected=spread), disturbance, left_out, has_programs)
 
 
 def explained_stages(ground: Ground, progress: Progress, side_by_side: SideBySide = map, null: Null = NULL) -> list[Explained]:
@@ -105,6 +111,9 @@ def explained_stages(ground: Ground, progress: Progress, side_by_side: SideBySid
     in_air = air_runs(ground.machine, ground.runs)
     if any(run.fitted for run in in_air):
         stages.append(AirStage(ground.machine, in_air, ground.floors, ground.left_out))
+    changes = () if ground.has_programs else change_runs(ground.machine, ground.runs)
+    if any(run.fitted for run in changes):
+        stages.append(ToolChangeStage(ground.machine, changes, ground.left_out))
     warmups = heat_runs(ground.machine, tuple(r for r in ground.runs if not r.log.axes()))
     if any(run.fitted for run in warmups):
         stages.append(HeatStage(ground.machine, warmups, ground.floors, ground.left_out))
