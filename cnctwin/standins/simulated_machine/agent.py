@@ -144,7 +144,7 @@ class SimulatedMachine:
 
     def _run(self) -> None:
         try:
-            self._tell(working_day(self._begin_next, self._spare, self._patience_s, self._machine, warms_up=True))
+            self._tell(working_day(self._begin_next, self._spare, self._patience_s, self._machine))
         except BaseException as error:  # the thread that serves goes on; whoever runs us sees it here
             self.error = error
 

@@ -29,7 +29,7 @@ class OnDemand(NamedTuple):
 def recorded_day(parts: int, spare: Callable[[], Part], hidden: AddedEffect | None = None) -> Iterator[str]:
     """Yield what the control shows until so many parts are made, from a morning of March 2026 on. hidden: an effect it has"""
     adapter, readies, machine = Adapter(START.timestamp()), 0, machine_as_built(hidden)
-    for moment in working_day(lambda number: OnDemand(number, machine), spare, 0.0, machine, warms_up=hidden is not None):
+    for moment in working_day(lambda number: OnDemand(number, machine), spare, 0.0, machine):
         if (line := adapter.line(moment)) is not None:
             yield line
         readies += moment.values.get("execution") == "READY"

@@ -13,12 +13,9 @@ from cnctwin.standins.simulated_machine.description import program_text
 from cnctwin.standins.simulated_machine.heat import with_temperatures
 from cnctwin.standins.simulated_machine.moment import Moment
 from cnctwin.standins.simulated_machine.part import Part
-from cnctwin.standins.simulated_machine.warm_up import warm_up
 from twin.machine import MachineFile
 
 CLOSED_S, COMPLETED_S, IDLE_SHOWN_S = 2.0, 1.0, 1.0
-SWITCHED_ON_S = 1.0
-PROGRAM = "O1701"
 CHANGE_S = (7.0, 12.0)
 """From READY to the closed door: an operator, or a robot."""
 AT_REST = dict.fromkeys(("Srpm", "Fact", "Xabs", "Yabs", "Zabs"), "0")
@@ -40,29 +37,20 @@ Begin = Callable[[int], Pending]
 """Begins to compute a part, by its number."""
 
 
-def working_day(
-    begin: Begin, spare: Callable[[], Part], patience_s: float, machine: MachineFile, *, warms_up: bool = False
-) -> Iterator[Moment]:
+def working_day(begin: Begin, spare: Callable[[], Part], patience_s: float, machine: MachineFile) -> Iterator[Moment]:
     """Yield what the control shows, from the moment that it is switched on.
 
     spare: gives the part to show where the first one is not computed `patience_s` after the machine is ready for it
-    machine: the machine as it is, whose spindle warms; warms_up: whether the spindle runs in air before the first part
+    machine: the machine as it is, whose spindle warms
     """
-    first = warm_up(machine) if warms_up else iter(())
-    return with_temperatures(_parts(begin, spare, patience_s, first), machine)
+    return with_temperatures(_parts(begin, spare, patience_s), machine)
 
 
-def _parts(begin: Begin, spare: Callable[[], Part], patience_s: float, first: Iterator[Moment]) -> Iterator[Moment]:
-    """Yield one part after the other, with the pauses between them, after what comes first."""
+def _parts(begin: Begin, spare: Callable[[], Part], patience_s: float) -> Iterator[Moment]:
+    """Yield one part after the other, with the pauses between them."""
     at_s, number, pause_s = 0.0, 1, _pause_s(1)
     pending = begin(number)
     yield Moment(at_s, switched_on())
-    for moment in first:
-        at_s = SWITCHED_ON_S + moment.at_s
-        yield moment._replace(at_s=at_s)
-    if at_s:
-        at_s += COMPLETED_S
-        yield Moment(at_s, {"execution": "READY", "program": PROGRAM, **AT_REST, **_rewound()})
     while True:
         yield from _pause(at_s, pause_s)
         at_s += pause_s
@@ -83,7 +71,7 @@ def _parts(begin: Begin, spare: Callable[[], Part], patience_s: float, first: It
 
 def switched_on() -> dict[str, str]:
     """Return what the control shows before the first part. The last tool of the part is in the spindle, the drives are off."""
-    modes = {"avail": "AVAILABLE", "mode": "AUTOMATIC", "execution": "READY", "program": PROGRAM, "part_count": "0"}
+    modes = {"avail": "AVAILABLE", "mode": "AUTOMATIC", "execution": "READY", "program": "O1701", "part_count": "0"}
     overrides = {"Fovr": "100", "Frapidovr": "100", "Sovr": "100"}
     rest = {"Tool_number": "5", "door_state": "OPEN", "coolant": "OFF"}
     return modes | _rewound() | overrides | rest | AT_REST | dict.fromkeys(("Sload", "Xload", "Yload", "Zload"), "0")
