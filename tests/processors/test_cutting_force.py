@@ -14,7 +14,7 @@ from tests.processors.streams import birth, data, engine_of, fed
 def force(*events: Any, **table: Any) -> tuple[Change, str]:
     """The last force and its basis."""
     engine = engine_of(PROCESSOR, **table)
-    fed(engine, *events)
+    fed(engine, *events, data(3.0, feed_mm_min=0.0, spindle_rpm_cmd=3000.0))  # the speed has been steady for a while by then
     latest = engine._machines["okuma"].live.emission.latest
     return latest[FORCE], str(latest[BASIS].value)
 
@@ -77,5 +77,5 @@ def test_a_configuration_that_makes_no_sense_is_refused_with_key_value_and_table
 def test_other_values_hold_for_one_machine() -> None:
     configuration = Configuration(Config, {"efficiency": 0.7, "machines": {"okuma": {"tool_diameter_mm": 10}}})
     assert (configuration.of("okuma").tool_diameter_mm, configuration.of("okuma").efficiency) == (10.0, 0.7)
-    assert configuration.of("mazak").tool_diameter_mm == 12.0
+    assert configuration.of("mazak").tool_diameter_mm is None
     assert configuration.machines == ("okuma",)

@@ -5,6 +5,7 @@ given is what held since the step before; what a reading is given is what holds 
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple, Self
 
 from twin.effects.added import added_effects
@@ -43,7 +44,7 @@ class HeatState(NamedTuple):
     sensor: SensorState | None = None
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class LiveHeat:
     """The heat of a machine's spindle.
 
@@ -73,10 +74,16 @@ class LiveHeat:
             said = (*said, *one.in_words, *one.left_out)
         return cls(stepper, terms, sensor, reading_terms, said, tuple(stepper.states))
 
-    @property
+    @cached_property
     def needs_ambient(self) -> bool:
         """Return True where the ambient temperature has to be known, not only the rise over it."""
         return self.terms.needs(_TEMPERATURE) or self.reading_terms.needs(_TEMPERATURE)
+
+    @cached_property
+    def needs_coolant(self) -> bool:
+        """Return True where an effect or a term depends on the coolant."""
+        own = "coolant_on" in self.stepper.reads
+        return own or self.terms.needs("coolant_on") or self.reading_terms.needs("coolant_on")
 
     def started(self, temperature_c: float, told: HeatInput) -> HeatState:
         """Return the state of a spindle that has this temperature through and through."""
