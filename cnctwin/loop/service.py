@@ -27,6 +27,7 @@ from sparkplug.broker import BrokerAddress
 from sparkplug.clock import now_ms
 from sparkplug.host import EventKind, HostApplication, HostEvent
 from sparkplug.metric import NodeId
+from sparkplug.topics import NAMESPACE
 from twin.errors import TwinError
 from twin.vocabulary import topics
 from twin.vocabulary.nodes import twin_node
@@ -68,7 +69,7 @@ class LoopService:
         self._host = HostApplication(
             broker,
             f"twin-loop-{machines.resolve().name}"[:40],
-            (f"spBv1.0/{group}/+/{GAP}/#",),
+            (f"{NAMESPACE}/{group}/+/{GAP}/#",),
             publish_state=False,
             wanted=lambda node: node.node == GAP,
             trusted=lambda _: True,

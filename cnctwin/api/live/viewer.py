@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from cnctwin.api.live.batches import Batch
 from cnctwin.api.live.documents import AlertsState, DocumentError, read_document
 from cnctwin.api.live.jobs import LiveJobs
+from cnctwin.api.live.loops import LiveLoops
 from cnctwin.api.live.plant import LivePlant
 from cnctwin.plant.watch import viewer
 from sparkplug.admission.limits import DEFAULTS, Limits
@@ -35,9 +36,10 @@ class Viewer:
         self.group = group
         self.on_batches: Callable[[list[Batch]], None] = lambda _: None
         self.jobs = LiveJobs()
+        self.loops = LiveLoops()
         self._live = live
         self._host = viewer(broker, group, limits)
-        for topic in (ALERT_STATE, *LiveJobs.filters):
+        for topic in (ALERT_STATE, *LiveJobs.filters, *LiveLoops.filters):
             self._host.subscribe_plain(topic)
         self._outbox: deque[tuple[str, bytes]] = deque(maxlen=OUTBOX_MAX)
         self._stop = threading.Event()
@@ -113,6 +115,7 @@ class Viewer:
     def _take_document(self, event: HostEvent) -> None:
         if event.topic != ALERT_STATE:
             self.jobs.take(event.topic, event.payload)
+            self.loops.take(event.topic, event.payload)
         elif event.payload:
             self._live.take_alerts(read_document(event.payload, AlertsState))
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from cnctwin.jobs.consumer import Consumer, Setting
+from cnctwin.jobs.consumer import CHILD, Consumer, Setting
 from cnctwin.jobs.job_queue import Limits
 from cnctwin.machines.folder import MachineFolder
 from processors.description import version_of
@@ -27,20 +27,31 @@ from sparkplug.metric import Change, MetricSpec, NodeId
 
 ROOT = Path(__file__).parents[3]
 PATIENCE_S = 60.0
+QUICK = (sys.executable, "-m", "tests.cnctwin.loop.quick_diagnosis")
 LIVE = '[machine]\nname = "vmc"\n[spindle]\nrated_power_kw = 11.0\nefficiency = 0.85\n'
 BETTER = LIVE.replace("11.0", "12.0")
 VA, VB = version_of(LIVE), version_of(BETTER)
-_GAP, _OPEN, _OTHER = "twin/gap_spindle_temp_c", "twin/gap_open", "twin/challenger/gap_spindle_temp_c"
-_SPECS = [MetricSpec(_GAP, DataType.DOUBLE), MetricSpec(_OPEN, DataType.STRING), MetricSpec(_OTHER, DataType.DOUBLE)]
+_GAP, _OPEN, _WINDOW = "twin/gap_spindle_temp_c", "twin/gap_open", "twin/gap_window"
+_OTHER = "twin/challenger/gap_spindle_temp_c"
+_FIGURES, _TEXTS = (DataType.DOUBLE, (_GAP, _OTHER)), (DataType.STRING, (_OPEN, _WINDOW))
+_SPECS = [MetricSpec(name, kind) for kind, names in (_FIGURES, _TEXTS) for name in names]
 
 
 @dataclass
 class LoopPlant:
-    """Use it as a context. gaps: standing gap by version, as the processor would tell it; by default the better one closes it."""
+    """Use it as a context.
+
+    gaps: standing gap by version, as the processor would tell it; of every other one it is 1
+    live: the text of the description; window: which stretch it tells to diagnose, at the machine's time `at_ms`
+    store: with one all is done as it really is; else jobs and children take no time
+    """
 
     folder: Path
     port: int
-    consumer_child: tuple[str, ...] = (sys.executable, "-m", "tests.cnctwin.loop.quick_diagnosis")
+    live: str = LIVE
+    window: str = "none"
+    at_ms: Callable[[], int] = now_ms
+    store: Path | None = None
     gaps: dict[str, float] = field(default_factory=lambda: {VA: 3.1, VB: 1.0})
     document: dict[str, Any] = field(default_factory=dict)
     service: subprocess.Popen[bytes] | None = None
@@ -49,7 +60,7 @@ class LoopPlant:
         self.machines, self.files, self.jobs = (self.folder / name for name in ("machines", "files", "jobs"))
         for made in (self.machines, self.files / "loop" / "vmc", self.jobs):
             made.mkdir(parents=True)
-        (self.machines / "vmc.toml").write_text(LIVE)
+        (self.machines / "vmc.toml").write_text(self.live)
         self.own = MachineFolder(self.machines, "vmc")
         self.broker = BrokerAddress(port=self.port)
         self._stack = ExitStack()
@@ -72,7 +83,7 @@ class LoopPlant:
     def start(self) -> None:
         """Start the service."""
         command = [sys.executable, "-m", "tests.cnctwin.loop.service_on_trial", str(self.port)]
-        command += [str(self.machines), str(self.files), str(self.jobs)]
+        command += [str(self.machines), str(self.files), str(self.jobs), *([] if self.store is None else [str(self.store)])]
         with (self.folder / "service.log").open("ab") as log:
             self.service = subprocess.Popen(
                 command, cwd=ROOT, stdout=log, stderr=log, env={**os.environ, "PYTHONPATH": str(ROOT)}
@@ -107,16 +118,17 @@ class LoopPlant:
         self.until(lambda: self.document.get("step") == step, step)
 
     def _tell_the_gap(self) -> None:
-        at_ms, live, waits = now_ms(), self.own.live_version(), self.own.challenger_version()
+        at_ms, live, waits = self.at_ms(), self.own.live_version(), self.own.challenger_version()
         gap = self.gaps.get(live, 1.0)
         changes = [Change(_GAP, gap, at_ms), Change(_OPEN, "spindle_temp_c" if gap > 2.0 else "none", at_ms)]
+        changes.append(Change(_WINDOW, self.window, at_ms))
         if waits:
             changes.append(Change(_OTHER, self.gaps.get(waits, 1.0), at_ms))
         self._edge.publish("vmc", changes)
 
     @contextmanager
     def _consumer(self) -> Iterator[None]:
-        setting = Setting(files=self.files, limits=Limits(pause_s=0.01), child=self.consumer_child)
+        setting = Setting(files=self.files, limits=Limits(pause_s=0.01), child=CHILD if self.store else QUICK)
         consumer, stop = Consumer(self.jobs, self.broker, setting), threading.Event()
         thread = threading.Thread(target=consumer.run, args=(stop,))
         thread.start()

@@ -1,4 +1,7 @@
-"""The loop's service as a process to be killed: `python -m tests.cnctwin.loop.service_on_trial PORT MACHINES FILES JOBS`."""
+"""The loop's service as a process to be killed: `python -m tests.cnctwin.loop.service_on_trial PORT MACHINES FILES JOBS [STORE]`.
+
+With a store its children are the real ones.
+"""
 
 import logging
 import sys
@@ -6,7 +9,7 @@ from pathlib import Path
 
 from cnctwin.loop import service
 from cnctwin.loop.config import LoopConfiguration
-from cnctwin.loop.workshop import Places
+from cnctwin.loop.workshop import CHILD, Places
 from cnctwin.processes.stopping import stopped_by_signals
 from sparkplug.broker import BrokerAddress
 
@@ -17,9 +20,10 @@ def main() -> None:
     """See the module."""
     logging.basicConfig(level=logging.INFO)
     port, machines, files, jobs = int(sys.argv[1]), *map(Path, sys.argv[2:5])
+    store = sys.argv[5] if len(sys.argv) > 5 else ""
     service.LOOK_S = 0.1
-    child = (sys.executable, "-m", "tests.cnctwin.loop.child_on_trial")
-    places = Places("no store", files, jobs, machines / "diagnoses", child)
+    child = CHILD if store else (sys.executable, "-m", "tests.cnctwin.loop.child_on_trial")
+    places = Places(store, files, jobs, machines / "diagnoses", child)
     with stopped_by_signals() as stop:
         service.LoopService(machines, BrokerAddress(port=port), LoopConfiguration(QUICK), places).run(stop)
 

@@ -1,12 +1,17 @@
 """The loop's service on a real broker, with the real consumer of jobs: the way round, and kill -9 in every step of it."""
 
+import json
 import time
 from collections import Counter
 from collections.abc import Iterator
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
 
+from processors.description import version_of
+from sparkplug.clock import now_ms
+from tests.cnctwin.composing.made_up import DAY_MS, DESCRIPTION, T0_MS, store_of_days
 from tests.cnctwin.loop.loop_on_trial import BETTER, LIVE, ROOT, VA, VB, LoopPlant
 from tests.wire.mosquitto import Mosquitto
 
@@ -35,7 +40,8 @@ def test_an_open_gap_is_diagnosed_promoted_by_a_person_and_taken_back(plant: Loo
     plant.until_step("promoted")
     assert (plant.machines / "vmc.toml").read_text() == BETTER
     plant.until(lambda: (plant.document["last"] or {}).get("after") == 1.0, "the gap after")
-    assert "coolant cools: gap of the temperature 3.1 → 1.0 floors since" in plant.document["last"]["text"]
+    assert plant.document["last"]["text"] == "coolant cools: gap of the temperature 3.1 → 1.0 floors"
+    assert plant.document["text"].startswith("coolant cools: gap of the temperature 3.1 → 1.0 floors since ")
     plant.ask("back", version=VB, id="third")
     plant.ask("back", version=VB, id="third")
     plant.until(lambda: plant.own.live_version() == VA, "the way back")
@@ -65,6 +71,31 @@ def test_a_description_that_makes_it_worse_goes_back_by_itself(plant: LoopPlant)
     step = next(step for step in plant.own.steps() if str(step.step) == "back")
     assert step.by == "rule" and "before it was promoted" in step.why
     assert plant.own.live_version() == VA
+
+
+def test_with_real_history_and_the_real_diagnosis_the_cause_is_named_and_the_page_finds_it(
+    tmp_path: Path, mosquitto: Mosquitto, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    store_of_days(tmp_path / "store", 2, coolant_gain=2.0).close()
+    began, ended = (datetime.fromtimestamp(ms / 1000, UTC).isoformat() for ms in (T0_MS, T0_MS + 2 * DAY_MS))
+    live = version_of(DESCRIPTION)
+    window, at_ms = f"{began}/{ended}", lambda: T0_MS + 2 * DAY_MS + now_ms() % 1_000_000
+    with LoopPlant(
+        tmp_path, mosquitto.port, gaps={live: 3.1}, live=DESCRIPTION, window=window, at_ms=at_ms, store=tmp_path / "store"
+    ) as plant:
+        plant.until_step("shadow")
+        document = plant.document
+        assert document["challenger"]["verdict"] == "explained"
+        assert document["challenger"]["causes"][0]["effect"] == "coolant_cooling"
+        assert document["score"]["runs"] > 0 and document["score"]["challenger"] < document["score"]["live"]
+        assert document["may_promote"]
+        filed = json.loads((plant.machines / "diagnoses" / "vmc" / "diagnosis.json").read_text())
+        assert filed["verdict"] == "explained" and (plant.machines / "diagnoses" / "vmc" / "report.html").is_file()
+        plant.ask("promote", id="one")
+        plant.until_step("promoted")
+        assert "coolant" in plant.own.live_file.read_text()
+        assert plant.own.card(plant.own.live_version()).fitted_to < T0_MS + DAY_MS
 
 
 HOLDS = {
