@@ -43,6 +43,7 @@ class LoopConfig(BaseModel):
 
     diagnose: Diagnose = Diagnose.BY_ITSELF
     window_hours: float = Field(default=8.0, gt=0.0, le=720.0, description="of history, where nothing says since when")
+    open_hours: Hours = Field(default=2.0, description="for which a gap is open before a diagnosis begins by itself")
     history_days: float = Field(default=30.0, gt=0.0, le=366.0, description="no case reaches further back")
     again_hours: Hours = Field(default=24.0, description="after a diagnosis that led to nothing, before the next by itself")
     shadow_s: float = Field(default=900.0, ge=0.0, le=31e6, description="beside the live one, without runs to score it on")

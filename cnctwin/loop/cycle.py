@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping
 
 from cnctwin.loop.config import Diagnose, LoopConfig, Promote
 from cnctwin.loop.request import Request, Word
-from cnctwin.loop.span import span_of
+from cnctwin.loop.span import is_long_enough, span_of
 from cnctwin.loop.state import Answer, Last, State, StepName
 from cnctwin.loop.wording import floors, hours, promotion
 from cnctwin.loop.world import Back, Deed, File, Withdraw, World
@@ -149,7 +149,8 @@ def _watching(config: LoopConfig, state: State, world: World) -> Stepped:
     if not found.is_open:
         calm = state.step is StepName.REFUSED and world.at_ms >= state.quiet_until_at_ms
         return (_now(state, world, StepName.WATCHING, "watching the gap") if calm else state), None
-    if config.diagnose is Diagnose.BY_HAND or world.at_ms < state.quiet_until_at_ms:
+    waits = world.at_ms < state.quiet_until_at_ms or not is_long_enough(config, world)
+    if config.diagnose is Diagnose.BY_HAND or waits:
         if state.step is StepName.REFUSED:
             return state, None
         return state.now(text=f"the gap is open: {found.grows or found.opens}; a diagnosis can be asked for"), None

@@ -40,6 +40,22 @@ def judged(case: Path, result: Path, live_toml: str, composed: Mapping[str, Any]
     return Finding(False, f"{reason}. {sentence}{_next(experiment)}", toml, card, experiment)
 
 
+def card_of(twin: Path, case: Path | None, live_toml: str | None) -> Card:
+    """Return what speaks for a description that a person files: the diagnosis beside it, its score on the check runs of a case.
+
+    Raises UsageError, TwinError.
+    """
+    diagnosis = _diagnosis(twin.parent) if (twin.parent / "diagnosis.json").is_file() else {}
+    score = None
+    if case is not None and live_toml is not None:
+        machines = (machine_from_toml(live_toml, "the live description"), machine_from_toml(_text(twin), str(twin)))
+        score = _score(read_case(case), *machines)
+        if score is None:
+            raise UsageError(f"{case}: no run of role check that both can be compared on; nothing can be scored")
+    known = None if score is None else score.model_copy(update={"against": version_of(live_toml or "")})
+    return _card(diagnosis, known, None).model_copy(update={"case": str(case or "")})
+
+
 def _why_not(diagnosis: Mapping[str, Any], score: Score | None) -> str | None:
     """Return why the corrected description is not filed; None where it is."""
     verdict = diagnosis.get("verdict")

@@ -21,7 +21,7 @@ from cnctwin.machines import disk
 from cnctwin.machines.change import Change, changing
 from cnctwin.machines.evidence import Shadow
 from cnctwin.machines.folder import MachineFolder
-from cnctwin.machines.step_log import StepKind
+from cnctwin.machines.step_log import StepKind, lives
 from cnctwin.machines.told import told
 from twin.errors import TwinError
 
@@ -91,6 +91,7 @@ class Keeper:
             live_card=own.card(live),
             live_since_ms=0 if step is None else step.t,
             live_said="" if step is None else f"{step.step} by {step.by}" + (f": {step.why}" if step.why else ""),
+            is_first=len(lives(steps)) <= 1,
             fault=fault,
             standing=heard.standing,
             work=self._workshop.look(own.machine, state, text, self._config),

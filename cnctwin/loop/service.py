@@ -18,6 +18,7 @@ from typing import IO, Any
 from cnctwin.errors import ApplicationError, UsageError
 from cnctwin.loop.config import LoopConfiguration
 from cnctwin.loop.keeper import Heard, Keeper
+from cnctwin.loop.listening import GAP
 from cnctwin.loop.request import Request, RequestError, read_request
 from cnctwin.loop.standing import standing_of
 from cnctwin.loop.workshop import Places, Workshop
@@ -30,12 +31,10 @@ from sparkplug.metric import NodeId
 from sparkplug.topics import NAMESPACE
 from twin.errors import TwinError
 from twin.vocabulary import topics
-from twin.vocabulary.nodes import twin_node
 
 LOOK_S = 1.0
 POLL_S = 0.1
 REQUESTS_MAX = 200
-GAP = twin_node("gap")
 _LOCK = ".loop.lock"
 _JOB = topics.state_of_job("{}").split("{}")
 _log = logging.getLogger(__name__)

@@ -32,7 +32,7 @@ CARD = Card(
 OPEN = Standing(
     at_ms=T0_MS,
     opens="spindle_temp_c since 2026-11-22T05:00:00Z",
-    since_ms=T0_MS - HOUR_MS,
+    since_ms=T0_MS - 3 * HOUR_MS,
     window_ms=(T0_MS - 2 * HOUR_MS, T0_MS),
     live={"spindle_temp_c": 3.1},
 )
@@ -59,7 +59,7 @@ def asked(word: Word, version: str = "", by: str = "anna") -> Request:
 def test_a_gap_that_stands_open_is_diagnosed_and_the_answer_becomes_a_challenger() -> None:
     state, _ = walked(BY_HAND, replace(WORLD, standing=OPEN))
     assert state.step is StepName.COMPOSING and state.case.startswith("loop-")
-    assert state.span_at_ms == (T0_MS - 2 * HOUR_MS, T0_MS)
+    assert state.span_at_ms == (T0_MS - 3 * HOUR_MS, T0_MS)
     state, _ = walked(BY_HAND, replace(WORLD, standing=OPEN, work=Work(is_done=True)), state=state)
     assert state.step is StepName.DIAGNOSING
     state, deed = walked(BY_HAND, replace(WORLD, standing=OPEN, work=Work(finding=FOUND)), state=state)
@@ -82,6 +82,23 @@ def test_nothing_begins_while_the_gap_is_closed_or_where_a_person_has_to_ask() -
 def test_where_nothing_says_since_when_the_last_hours_are_looked_at() -> None:
     state, _ = walked(LoopConfig(window_hours=3.0), replace(WORLD, request=asked(Word.DIAGNOSE)))
     assert state.span_at_ms == (T0_MS - 3 * HOUR_MS, T0_MS)
+
+
+def test_a_gap_that_has_just_opened_waits_for_history_unless_somebody_asks() -> None:
+    just = replace(OPEN, since_ms=T0_MS - HOUR_MS, window_ms=None)
+    state, _ = walked(BY_HAND, replace(WORLD, standing=just))
+    assert state.step is StepName.WATCHING and "can be asked for" in state.text
+    asked_for, _ = walked(BY_HAND, replace(WORLD, standing=just, request=asked(Word.DIAGNOSE)), state=state)
+    assert asked_for.span_at_ms == (T0_MS - HOUR_MS, T0_MS)
+
+
+def test_a_twin_that_was_never_right_is_put_to_all_of_the_last_month() -> None:
+    first = replace(WORLD, is_first=True, live_since_ms=T0_MS - HOUR_MS)
+    opened = replace(OPEN, since_ms=T0_MS - HOUR_MS + 60_000, window_ms=None)
+    assert walked(BY_HAND, replace(first, standing=opened))[0].span_at_ms == (T0_MS - 30 * 24 * HOUR_MS, T0_MS)
+    for other in (replace(first, standing=replace(opened, grows="it grows")), replace(first, standing=opened, is_first=False)):
+        state, _ = walked(BY_HAND, replace(other, request=asked(Word.DIAGNOSE)))
+        assert state.span_at_ms == (opened.since_ms, T0_MS)
 
 
 def test_no_case_reaches_further_back_than_it_may() -> None:
