@@ -17,9 +17,12 @@ from pydantic import Field
 
 from processors.config import Configuration, ProcessorConfig
 from processors.contract import Output, OutputSpec, Processor, Provenance, Sample, SampleKind
+from processors.description import Description
 from sparkplug.datatype import DataType
 from twin.errors import TwinError
+from twin.live.assumed import completed
 from twin.residual.features import AMBIENT, MEASURED, PHYSICS, SIGNALS, Memory, row_after, signals_of
+from twin.residual.physics import Physics
 from twin.vocabulary import twin_signals
 
 if TYPE_CHECKING:
@@ -29,6 +32,7 @@ CORRECTION, CORRECTED = twin_signals.SPINDLE_TEMP_CORRECTION_K, twin_signals.SPI
 LEFT, IN_REGION = twin_signals.SPINDLE_TEMP_CORRECTED_RESIDUAL_K, "twin/residual_in_region"
 GAIN, BASIS = "twin/residual_gain_pct", twin_signals.RESIDUAL_BASIS
 NO_MODEL = "no model; cnctwin train residual --machine … --out … makes one, [residual] models names its folder"
+ANEW = "cnctwin train residual makes one for it"
 BEYOND = 1e6
 """No signal of a machine is larger."""
 
@@ -59,6 +63,35 @@ def read_models(configuration: Configuration[Config]) -> "Mapping[str, ResidualM
         raise ValueError(str(error)) from error
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Described:
+    """What the step is given: the configuration with the models, and the heat of the machine's description, None without one."""
+
+    configuration: Configuration[Config]
+    physics: Physics | None
+    version: str = ""
+
+    def why_not(self, model: "ResidualModel") -> str | None:
+        """Return why a model corrects another physics than the live one; None where it corrects this one."""
+        own = model.trained.physics
+        if self.physics is None:
+            if not own.description:
+                return None
+            return f"model {model.version} corrects description {own.description}, and the machine has none; {ANEW}"
+        if own.is_as(self.physics):
+            return None
+        of = f"description {own.description}" if own.description else "constants of the configuration"
+        return f"model {model.version} corrects {of}, the live description is {self.version}; {ANEW}"
+
+
+def described(configuration: Configuration[Config], description: Description | None) -> Described:
+    """Return the configuration with the heat that the machine is described by."""
+    if description is None:
+        return Described(configuration, None)
+    physics = Physics.of(completed(description.machine, "thermal"), description=description.version)
+    return Described(configuration, physics, description.version)
+
+
 @dataclass(frozen=True, slots=True)
 class Gain:
     """Errors since, forgotten slowly: sums of squares over time, K² s, of the physics and of the corrected; seconds of both."""
@@ -77,12 +110,14 @@ class State:
     gain: Gain = field(default_factory=Gain)
 
 
-def step(configuration: Configuration[Config], state: State, sample: Sample) -> tuple[State, Sequence[Output]]:
+def step(given: Described, state: State, sample: Sample) -> tuple[State, Sequence[Output]]:
     """Correct the physics at ticks; forget the means at a long hole."""
-    config = configuration.of(sample.machine)
-    model: ResidualModel | None = configuration.read.get(sample.machine)
+    config = given.configuration.of(sample.machine)
+    model: ResidualModel | None = given.configuration.read.get(sample.machine)
     if model is None:
         return state, _UNKNOWN_WITHOUT_MODEL if sample.kind in (SampleKind.TICK, SampleKind.BIRTH) else ()
+    if (why_not := given.why_not(model)) is not None:
+        return State(), _nulls(why_not) if sample.kind in (SampleKind.TICK, SampleKind.BIRTH) else ()
     if state.version != model.version:
         state = State(model.version)
     if sample.kind is SampleKind.HOLE:
@@ -184,4 +219,5 @@ PROCESSOR = Processor(
     step=step,
     wakes=frozenset(),
     reads=read_models,
+    described=described,
 )

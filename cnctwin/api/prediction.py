@@ -1,7 +1,7 @@
 """The twin's expectation: temperature and cutting force for a planned course of speed and load.
 
-C dT/dt = alpha · load · rpm² + beta · rpm − (T − T_ambient) / R          (twin.thermal, exact in each step)
-F = η · (load/100 · P_rated − P_idle) / v_c                               (twin.cutting)
+The physics is that of the live twin, with every effect of the machine's description: heat by twin/live/heat.py, exact in each
+step, force by the load meter of twin/live/force.py.
 """
 
 import json
@@ -13,8 +13,8 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic.config import JsonDict
 
 from cnctwin.api.constants import OfMachine
-from twin.cutting import cutting_force
-from twin.thermal import ThermalNetwork, heat_input_w, rise_after
+from twin.live.heat import HeatInput, LiveHeat
+from twin.machine import SpindleDrive, Thermal
 
 STEPS_MAX = 100_000
 Celsius = Annotated[float, Field(ge=-50.0, le=80.0)]
@@ -24,7 +24,6 @@ COURSES = (
     *("ambient_temp_c", "spindle_load_pct", "spindle_rpm", "feed_mm_min"),
     *("axis_x_pos_mm", "axis_y_pos_mm", "axis_z_pos_mm"),
 )
-CONSTANTS = {"alpha_w_per_pct_rpm2", "beta_w_per_rpm", "resistance_k_per_w", "capacity_j_per_k"}
 Rpm = Annotated[float, Field(ge=0.0, le=60_000.0)]
 _EXAMPLE: JsonDict = {
     "machine": "vmc",
@@ -51,11 +50,15 @@ class Plan(BaseModel):
     axis_y_pos_mm: list[Figure] | None = Field(None, max_length=STEPS_MAX, description="likewise")
     axis_z_pos_mm: list[Figure] | None = Field(None, max_length=STEPS_MAX, description="likewise")
     dt_s: float = Field(gt=0.0, le=60.0, description="length of a step, s")
-    tool_diameter_mm: float | None = Field(None, gt=0.0, le=1000.0, description="else that of the configuration")
+    coolant_on: list[bool] | None = Field(None, max_length=STEPS_MAX, description="else it is off")
+    tool_number: int | None = Field(None, ge=0, description="whose diameter; else that of any tool")
+    tool_diameter_mm: float | None = Field(None, gt=0.0, le=1000.0, description="else that of the machine's tool")
 
     @model_validator(mode="after")
     def _lengths_agree(self) -> "Plan":
         lengths = {name: len(values) for name, values in self.signals().items()}
+        if self.coolant_on is not None:
+            lengths["coolant_on"] = len(self.coolant_on)
         if len(set(lengths.values())) > 1:
             said = ", ".join(f"{name} {length}" for name, length in lengths.items())
             raise ValueError(f"lengths differ: {said}; give each as many values as there are steps")
@@ -83,40 +86,46 @@ class Forecast(BaseModel):
     basis: dict[str, str]
 
 
-def temperatures(network: ThermalNetwork, plan: Plan) -> list[float]:
-    """The spindle's temperature at the end of each step, °C.
+def temperatures(heat: LiveHeat, plan: Plan) -> list[float]:
+    """The temperature that the spindle's sensor shows at the end of each step, °C.
 
     Without heat it goes to the ambient: after one time constant, 63.2 % of the way from 40 to 20 °C are done.
 
-    >>> still = ThermalNetwork(0.0, 0.0, 0.06, 1000.0)
+    >>> from twin.machine import Machine, MachineFile
+    >>> still = Thermal(alpha_w_per_pct_rpm2=0.0, beta_w_per_rpm=0.0, resistance_k_per_w=0.06, capacity_j_per_k=1000.0)
+    >>> heat = LiveHeat.of(MachineFile(machine=Machine(name="vmc"), thermal=still))
     >>> plan = Plan(start_temp_c=40.0, ambient_temp_c=[20.0], spindle_load_pct=[0.0], spindle_rpm=[0.0], dt_s=60.0)
-    >>> [round(value, 2) for value in temperatures(still, plan)]
+    >>> [round(value, 2) for value in temperatures(heat, plan)]
     [27.36]
     """
-    found, ambient_c = [], plan.ambient_temp_c[0]
-    rise_k = plan.start_temp_c - ambient_c
-    for now_c, load_pct, rpm in zip(plan.ambient_temp_c, plan.spindle_load_pct, plan.spindle_rpm, strict=True):
-        rise_k += ambient_c - now_c  # the spindle's temperature does not jump with the ambient's
-        ambient_c = now_c
-        rise_k = rise_after(network, rise_k, heat_input_w(network, rpm, load_pct), plan.dt_s)
-        found.append(rise_k + ambient_c)
+    coolant = [False] * len(plan.ambient_temp_c) if plan.coolant_on is None else plan.coolant_on
+    course = zip(plan.spindle_load_pct, plan.spindle_rpm, plan.ambient_temp_c, map(float, coolant), strict=True)
+    found, state = [], None
+    for told in map(HeatInput._make, course):
+        if state is None:
+            state = heat.started_at_reading(plan.start_temp_c, told) or heat.started(plan.start_temp_c, told)
+        state = heat.step(state, told, plan.dt_s)
+        found.append(heat.reading(state, told))
     return found
 
 
-def forces(of: OfMachine, plan: Plan, diameter_mm: float) -> tuple[list[float | None], list[tuple[int, int, str]]]:
-    """The mean tangential force of each step, N, and why there is none, by stretches."""
+def forces(of: OfMachine, plan: Plan) -> tuple[list[float | None], list[tuple[int, int, str]], float | None]:
+    """The mean tangential force of each step, N, why there is none, by stretches, and the diameter of the tool."""
+    force, tool = of.force.force, of.force.force.tool(plan.tool_number)
+    diameter_mm = tool.diameter_mm if plan.tool_diameter_mm is None else plan.tool_diameter_mm
     found = [
-        cutting_force(of.force.drive, load_pct, rpm, diameter_mm)
-        for load_pct, rpm in zip(plan.spindle_load_pct, plan.spindle_rpm, strict=True)
+        force.force(load_pct, rpm, diameter_mm) for load_pct, rpm in zip(plan.spindle_load_pct, plan.spindle_rpm, strict=True)
     ]
-    return [None if one.force_n is None else round(one.force_n, 1) for one in found], _stretches([one.reason for one in found])
+    reasons = [tool.reason if one.reason is not None and diameter_mm is None else one.reason for one in found]
+    return [None if one.force_n is None else round(one.force_n, 1) for one in found], _stretches(reasons), diameter_mm
 
 
 def forecast(of: OfMachine, plan: Plan, physics_c: list[float], corrected: list[float | None] | None, residual: str) -> bytes:
     """The answer, as JSON. `corrected` is what a residual model makes of the physics, `residual` says which, or why none."""
-    diameter_mm = of.force.tool_diameter_mm if plan.tool_diameter_mm is None else plan.tool_diameter_mm
-    force_n, reasons = forces(of, plan, diameter_mm)
-    drive = of.force.model_dump(include={"rated_power_kw", "efficiency", "idle_power_kw", "spindle_rpm_min"})
+    force_n, reasons, diameter_mm = forces(of, plan)
+    thermal, spindle = of.thermal.machine.thermal, of.force.machine.spindle
+    assert isinstance(thermal, Thermal) and isinstance(spindle, SpindleDrive), "what a file leaves out is assumed"
+    drive = {**spindle.model_dump(), "spindle_rpm_min": of.force.force.spindle_rpm_min}
     said = {
         "machine": plan.machine,
         "dt_s": plan.dt_s,
@@ -124,7 +133,7 @@ def forecast(of: OfMachine, plan: Plan, physics_c: list[float], corrected: list[
         "cutting_force_n": force_n,
         "force_reasons": reasons,
         "corrected_temp_c": corrected,
-        "constants": {**of.thermal.model_dump(include=CONSTANTS), **drive, "tool_diameter_mm": diameter_mm},
+        "constants": {**thermal.model_dump(), **drive, "tool_diameter_mm": diameter_mm},
         "basis": {"thermal": of.thermal_basis, "cutting_force": of.force_basis, "residual": residual},
     }
     return json.dumps(said, separators=(",", ":"), allow_nan=False).encode()

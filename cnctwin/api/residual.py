@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from cnctwin.api.answers import Part
 from cnctwin.api.constants import OfMachine
-from cnctwin.api.prediction import CONSTANTS, Plan
+from cnctwin.api.prediction import Plan
 from twin.errors import TwinError
 from twin.vocabulary import twin_signals
 
@@ -53,9 +53,10 @@ class Models:
         model = models.get(plan.machine)
         if model is None:
             return Correction(None, f"none: {trouble or f'no model of {plan.machine!r} is in the folder'}")
-        told = of.thermal.model_dump(include=CONSTANTS)
-        if any(getattr(model.trained.physics, name) != value for name, value in told.items()):
-            return Correction(None, f"none: {model.version} corrects other constants of the network; train it anew")
+        from twin.residual.physics import Physics  # noqa: PLC0415  where there are models
+
+        if not model.trained.physics.is_as(Physics.of(of.thermal.machine)):
+            return Correction(None, f"none: {model.version} corrects another heat of the spindle; train it anew")
         if len(physics_c) > STEPS_MAX:
             return Correction(None, f"none: a course of {len(physics_c)} steps is longer than the {STEPS_MAX} that are corrected")
         from twin.residual.prediction import predict_correction  # noqa: PLC0415  with the extra that it needs

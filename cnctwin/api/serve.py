@@ -61,9 +61,9 @@ def serve(options: ServeOptions, broker: BrokerAddress, stop: Event) -> None:
     from processors.running.limits import limits_of  # noqa: PLC0415
 
     access = access_of(options, os.environ.get(TOKEN_VARIABLE))
-    constants = Constants(options.config)
     live = LivePlant()
     viewer = Viewer(broker, options.group, live, limits_of(options.config))
+    constants = Constants(options.config, viewer.descriptions.of)
     store = StoreReader(options.store)
     audit = AuditLog(options.audit or state_dir() / "audit" / "page.jsonl")
     told = (options.diagnoses, Nights(), options.jobs, access, audit, options.registry, Envelope(options.sealed))

@@ -1,7 +1,7 @@
 """The twin, computed anew from what a machine told: where the store has not got what it said, and over run logs.
 
-Constants are those of machine.toml; without one, those of [thermal] and [cutting_force] in the processors' configuration, which
-is what the live twin goes by.
+The physics is that of the live twin: the machine's description, with every effect of it; without one, the constants in the old
+tables [thermal] and [cutting_force] of the processors' configuration.
 """
 
 from collections.abc import Mapping
@@ -15,10 +15,11 @@ from cnctwin.validation.track import Floats, Grid, averaged, held
 from processors import cutting_force as force_processor
 from processors import thermal as thermal_processor
 from processors.config import Configuration
-from twin.cutting import SpindleDrive, cutting_force
+from processors.description import Description
 from twin.effects.catalogue import effect_named
 from twin.effects.effect import On
 from twin.learned.standing import on_axes
+from twin.live.speed import SpindleSpeed
 from twin.machine import MachineFile
 from twin.runlog import RunLog
 from twin.simulator.recorded import told_of
@@ -27,7 +28,7 @@ from twin.simulator.response import RunInput, respond
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Twin:
-    """The twin as far as it is known. file: machine.toml; tables: of the processors' configuration"""
+    """The twin as far as it is known. file: the machine's description; tables: of the processors' configuration"""
 
     file: MachineFile | None
     tables: Mapping[str, Mapping[str, Any]]
@@ -38,8 +39,7 @@ class Twin:
             return _without_axes(self.file)
         if "thermal" not in self.tables:
             return None
-        constants = {name: getattr(self._thermal(machine), name) for name in HEAT}
-        return MachineFile.model_validate({"machine": {"name": "as configured", "servo_period_s": 0.001}, "thermal": constants})
+        return self._thermal(machine).machine
 
     def _thermal(self, machine: str) -> thermal_processor.Config:
         return Configuration(thermal_processor.Config, self.tables.get("thermal"), name="thermal").of(machine)
@@ -48,18 +48,17 @@ class Twin:
         """Return the temperature of the surroundings, where no signal tells it."""
         return self._thermal(machine).ambient_temp_c
 
-    def force(self, machine: str) -> force_processor.Config | None:
+    def force(self, machine: str) -> force_processor.Described | None:
         """Drive and tools by spindle power; None where nothing states them."""
-        if "cutting_force" in self.tables:
-            return Configuration(force_processor.Config, self.tables["cutting_force"], name="cutting_force").of(machine)
-        file = self.file
-        if file is None or file.spindle is None or file.tool is None:
-            return None
-        drive = {name: getattr(file.spindle, name) for name in ("rated_power_kw", "efficiency", "idle_power_kw")}
-        return force_processor.Config.model_validate(drive | {"tool_diameter_mm": file.tool.diameter_mm})
+        table, file = self.tables.get("cutting_force"), self.file
+        config = Configuration(force_processor.Config, table, name="cutting_force").of(machine)
+        if file is not None and file.spindle is not None and (file.tool is not None or file.tools):
+            return force_processor.described(config, Description(file, FILE))
+        return None if table is None else force_processor.described(config, None)
 
 
-HEAT = ("alpha_w_per_pct_rpm2", "beta_w_per_rpm", "resistance_k_per_w", "capacity_j_per_k")
+FILE = "machine.toml"
+"""The name of the description in a basis."""
 
 
 def _without_axes(machine: MachineFile) -> MachineFile:
@@ -130,8 +129,8 @@ def _bridged(values: Floats) -> Floats:
 
 def power_force(twin: Twin, evidence: Evidence, grid: Grid, held_s: float) -> tuple[Floats, str]:
     """The mean tangential force (count,) by spindle power; raises LookupError with the reason for none."""
-    config = twin.force(evidence.machine)
-    if config is None:
+    given = twin.force(evidence.machine)
+    if given is None:
         raise LookupError(
             "nothing states the drive: [spindle] and [tool] of machine.toml, or [cutting_force] of the configuration"
         )
@@ -139,15 +138,17 @@ def power_force(twin: Twin, evidence: Evidence, grid: Grid, held_s: float) -> tu
         raise LookupError(f"{SPEED} and {LOAD} are not recorded")
     rpm, load = (_input(evidence, name, grid, held_s) for name in (SPEED, LOAD))
     tool = held(evidence.told.get(TOOL), grid, np.inf)
-    drive: SpindleDrive = config.drive
-
-    def at(load_pct: float, speed: float, number: float) -> float:
-        listed = None if np.isnan(number) else config.tool_diameters_mm.get(f"{number:.0f}")
-        found = cutting_force(drive, load_pct, speed, config.tool_diameter_mm if listed is None else listed)
-        return np.nan if found.force_n is None else found.force_n
-
-    force = np.array([at(*row) for row in zip(load.tolist(), rpm.tolist(), tool.tolist(), strict=True)], dtype=np.float64)
-    return force, f"by spindle power: {config.drive_basis}"
+    force, speed, settle_s = np.full(grid.count, np.nan), SpindleSpeed(), given.config.settle_s
+    for place, at_s in enumerate(grid.starts_s.tolist()):
+        if not np.isfinite(rpm[place]):
+            speed = SpindleSpeed()
+            continue
+        speed = speed.seen(at_s, float(rpm[place]), None, settle_s)
+        if speed.is_steady(at_s, settle_s):
+            number = None if np.isnan(tool[place]) else float(tool[place])
+            found = given.force.force(float(load[place]), float(rpm[place]), given.force.tool(number).diameter_mm)
+            force[place] = np.nan if found.force_n is None else found.force_n
+    return force, f"by spindle power: {given.drive}"
 
 
 def milling_force(machine: MachineFile, log: RunLog) -> Floats | None:

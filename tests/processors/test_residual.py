@@ -16,16 +16,19 @@ from pydantic import TypeAdapter
 from processors.actions import Action, DeadLetter, Publish
 from processors.config import Configuration
 from processors.errors import ConfigurationError
-from processors.residual import BASIS, CORRECTED, CORRECTION, GAIN, IN_REGION, LEFT, NO_MODEL, PROCESSOR
+from processors.residual import BASIS, CORRECTED, CORRECTION, GAIN, IN_REGION, LEFT, NO_MODEL, PROCESSOR, described
 from processors.running.engine import Engine
 from processors.running.snapshot import decode_state, encode_state
 from processors.thermal import PROCESSOR as THERMAL
 from sparkplug.host_session import HostEvent
 from sparkplug.metric import NodeId
+from tests.processors.machines import described_as
 from tests.processors.streams import birth, data, engine_of, fed, hole, published, wild_stream
-from tests.twin.residual.days import TICK_S, recorded, small_model
+from tests.twin.residual.days import PHYSICS_TOLD, TICK_S, recorded, small_model
+from twin.machine import Thermal
 from twin.residual.features import MEASURED, PHYSICS, SIGNALS
 from twin.residual.model import load_models, save_model
+from twin.residual.physics import Physics
 
 TWIN = NodeId("cnc", "twin-thermal")
 HOUR = 120
@@ -176,7 +179,7 @@ def test_another_model_begins_its_gain_anew(models: Path) -> None:
     assert state.gain.seconds > 3600.0
     assert state.version == PROCESSOR.configured({"models": str(models)}).read["okuma"].version
     lean = {"okuma": small_model(feature_set="lean").model}
-    unit.live._config = Configuration(PROCESSOR.config, {"tick_s": TICK_S}, reads=lambda _: lean)
+    unit.live._config = PROCESSOR.given(Configuration(PROCESSOR.config, {"tick_s": TICK_S}, reads=lambda _: lean), "okuma")
     fed(engine, *list(_shift(begin=3 * HOUR, end=3 * HOUR + 4))[2:])
     assert unit.live.state.version == small_model(feature_set="lean").model.version
     assert unit.live.state.gain.seconds <= 4 * TICK_S
@@ -218,3 +221,40 @@ def test_scoring_does_not_import_what_trains(models: Path) -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=120)
     assert done.stdout.split() == ["False"] * 4
+
+
+HEAT = {name: getattr(PHYSICS_TOLD, name) for name in Thermal.model_fields}
+COOLANT = {"effect": "coolant_cooling", "parameters": {"gain": 0.4}}
+
+
+def test_a_model_of_another_heat_than_the_live_description_corrects_nothing_and_says_so(models: Path) -> None:
+    configuration = PROCESSOR.configured({"models": str(models)})
+    model = configuration.read["okuma"]
+    same, other = described_as(thermal=HEAT), described_as(COOLANT, thermal=HEAT)
+    assert described(configuration, None).why_not(model) is None
+    assert described(configuration, same).why_not(model) is None
+    assert described(configuration, other).why_not(model) == (
+        f"model {model.version} corrects constants of the configuration, the live description is {other.version}; "
+        "cnctwin train residual makes one for it"
+    )
+    engine = engine_of(PROCESSOR, models=str(models), tick_s=TICK_S)
+    shift = list(_shift(begin=0, end=10))
+    fed(engine, *shift[:5])
+    engine._units["okuma"].live._config = described(configuration, other)
+    fed(engine, *shift[5:])
+    unit = engine._units["okuma"].live
+    shown = unit.emissions["okuma"].latest
+    assert shown[CORRECTED].value is None
+    assert shown[CORRECTED].reason == described(configuration, other).why_not(model)
+    assert unit.state.version == ""
+
+
+def test_a_model_keeps_the_description_that_its_physics_was() -> None:
+    description = described_as(COOLANT, thermal=HEAT)
+    physics = Physics.of(description.machine, description=description.version)
+    assert Physics.model_validate(physics.model_dump(mode="json")) == physics
+    assert physics.machine.effects == description.machine.effects
+    assert not physics.is_as(PHYSICS_TOLD)
+    assert PHYSICS_TOLD.is_as(Physics.of(described_as(thermal=HEAT).machine, ambient_temp_c=30.0, description="x"))
+    old = {"alpha_w_per_pct_rpm2", "beta_w_per_rpm", "resistance_k_per_w", "capacity_j_per_k", "ambient_temp_c"}
+    assert set(PHYSICS_TOLD.model_dump()) == old  # so that a model from before keeps its version

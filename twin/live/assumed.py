@@ -15,6 +15,7 @@ TOOL_DIAMETER_MM = 12.0
 def completed(machine: MachineFile, section: str) -> MachineFile:
     """Return the machine with the assumed section, and marked so, where it has none: `thermal` or `spindle`.
 
+    >>> from twin.machine import Machine
     >>> completed(MachineFile(machine=Machine(name="vmc")), "spindle").machine.assumed
     ('spindle',)
     """
@@ -27,6 +28,7 @@ def completed(machine: MachineFile, section: str) -> MachineFile:
 def is_assumed(machine: MachineFile, path: str) -> bool:
     """Return True where nobody has stated or fitted this, or the section that it is in.
 
+    >>> from twin.machine import Machine
     >>> vmc = MachineFile(machine=Machine(name="vmc", assumed=("spindle", "tools.3")))
     >>> is_assumed(vmc, "spindle.efficiency"), is_assumed(vmc, "tools.31.diameter_mm")
     (True, False)
@@ -37,6 +39,7 @@ def is_assumed(machine: MachineFile, path: str) -> bool:
 def assumed_of(machine: MachineFile, section: str, constants: Iterable[str]) -> tuple[str, ...]:
     """Return those of the constants of a section that are assumed.
 
+    >>> from twin.machine import Machine
     >>> vmc = MachineFile(machine=Machine(name="vmc", assumed=("spindle.efficiency",)))
     >>> assumed_of(vmc, "spindle", ["rated_power_kw", "efficiency"])
     ('efficiency',)

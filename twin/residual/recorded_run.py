@@ -10,17 +10,19 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.heat.run import Warming, spindle_temperature_c
+from twin.live.heat import HeatInput, LiveHeat
 from twin.residual.errors import ResidualError
 from twin.residual.features import AMBIENT, FEED, LOAD, MEASURED, PHYSICS, POSITIONS, SPEED
 from twin.residual.physics import Physics
 from twin.residual.table import GAP_S_MAX, Recorded
 from twin.runlog import RunLog
+from twin.simulator.response import RunInput, respond
 
 Floats = NDArray[np.float64]
 COLUMNS = {name: f"{name[5]}_pos_mm" for name in POSITIONS}
 """What a run log calls them."""
-RECORDED = (SPEED, LOAD, FEED, *POSITIONS, AMBIENT, MEASURED)
+COOLANT = "coolant_on"
+RECORDED = (SPEED, LOAD, FEED, *POSITIONS, AMBIENT, MEASURED, COOLANT)
 TICKS_MAX = 20_000_000
 
 
@@ -80,8 +82,14 @@ def _stretch(told: Mapping[str, Samples], physics: Physics, live: Floats, tick_s
     if not len(ticks) or not known.any():
         modelled = np.full(len(ticks), np.nan)
     else:
-        start_c = start if np.isfinite(start) else ambient[known][0]
-        warm = spindle_temperature_c(physics.constants, Warming(grid, load, rpm, ambient), start_c)[0]
+        coolant = np.nan_to_num(told[COOLANT].held(grid)) if COOLANT in told else np.zeros(len(grid))
+        begun_c = float(ambient[known][0])
+        if np.isfinite(start):
+            first = HeatInput(float(load[0]), float(rpm[0]), begun_c, float(coolant[0]))
+            begun = LiveHeat.of(physics.machine).started_at_reading(float(start), first)
+            begun_c = begun_c if begun is None else begun.temperature_c
+        run = RunInput(grid, spindle_rpm=rpm, ambient_temp_c=ambient, coolant_on=coolant, start_temp_c=begun_c)
+        warm = respond(physics.machine, run, recorded={LOAD: load}).columns[MEASURED]
         modelled = np.where(np.isfinite(signals[AMBIENT]), warm[np.searchsorted(grid, ticks)], np.nan)
     return Recorded(ticks, np.zeros(len(ticks), dtype=np.int64), {**signals, PHYSICS: modelled})
 

@@ -7,6 +7,7 @@ from collections import deque
 from collections.abc import Callable, Mapping
 
 from cnctwin.api.live.batches import Batch
+from cnctwin.api.live.descriptions import LiveDescriptions
 from cnctwin.api.live.documents import AlertsState, DocumentError, read_document
 from cnctwin.api.live.jobs import LiveJobs
 from cnctwin.api.live.loops import LiveLoops
@@ -18,7 +19,7 @@ from sparkplug.clock import now_ms
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId
 from sparkplug.values import PropertySet
-from twin.vocabulary.topics import ALERT_STATE
+from twin.vocabulary.topics import ALERT_STATE, DESCRIPTION
 
 FLUSH_S = 0.1
 POLL_S = 0.05
@@ -37,9 +38,10 @@ class Viewer:
         self.on_batches: Callable[[list[Batch]], None] = lambda _: None
         self.jobs = LiveJobs()
         self.loops = LiveLoops()
+        self.descriptions = LiveDescriptions()
         self._live = live
         self._host = viewer(broker, group, limits)
-        for topic in (ALERT_STATE, *LiveJobs.filters, *LiveLoops.filters):
+        for topic in (ALERT_STATE, *LiveDescriptions.filters, *LiveJobs.filters, *LiveLoops.filters):
             self._host.subscribe_plain(topic)
         self._outbox: deque[tuple[str, bytes]] = deque(maxlen=OUTBOX_MAX)
         self._stop = threading.Event()
@@ -113,7 +115,9 @@ class Viewer:
                 self._live.refuse("documents_refused", f"{event.topic}: {error}")
 
     def _take_document(self, event: HostEvent) -> None:
-        if event.topic != ALERT_STATE:
+        if event.topic.startswith(DESCRIPTION):
+            self.descriptions.take(event.topic, event.payload)
+        elif event.topic != ALERT_STATE:
             self.jobs.take(event.topic, event.payload)
             self.loops.take(event.topic, event.payload)
         elif event.payload:

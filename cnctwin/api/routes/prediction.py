@@ -22,7 +22,7 @@ def prediction_routes(sources: Sources) -> APIRouter:
 
     def answer(plan: Plan) -> bytes:
         of = sources.constants.of(plan.machine)
-        physics_c = temperatures(of.thermal.network, plan)
+        physics_c = temperatures(of.thermal.heat, plan)
         corrected, residual = sources.models.corrected(of, plan, physics_c)
         return forecast(of, plan, physics_c, corrected, residual)
 
@@ -30,7 +30,7 @@ def prediction_routes(sources: Sources) -> APIRouter:
     async def predict(plan: Plan) -> Response:
         """The spindle's temperature and the cutting force for a course of ambient, load and speed.
 
-        With the constants of the machine's configuration, else the defaults; `basis` says which.
+        With the physics of the machine's live description, else of the configuration or the defaults; `basis` says which.
         """
         if places.locked():
             raise ApiError(503, f"{AT_ONCE_MAX} predictions are being made; ask again in a moment", {"Retry-After": "1"})

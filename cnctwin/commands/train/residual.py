@@ -20,6 +20,9 @@ def train_residual(
     from_: Annotated[str, typer.Option("--from", help="Begin of the stretch of the store, UTC, as 2026-11-01T06:00")] = "",
     to: Annotated[str, typer.Option(help="End of it")] = "",
     config: Annotated[Path | None, typer.Option(help="The processors' TOML: constants of [thermal]; else its defaults")] = None,
+    machines: Annotated[
+        Path | None, typer.Option(help="Folder of descriptions; else `machines` beside --config, $CNCTWIN_MACHINES, ./machines")
+    ] = None,
     hours_min: Annotated[float, typer.Option(min=0.0, help="Of cutting, that there have to be")] = 40.0,
     held_share: Annotated[float, typer.Option(help="Last part of the time, held out to judge by")] = 0.3,
     features: Annotated[str, typer.Option(help="published, remembering or lean; else chosen on held-out time")] = "",
@@ -38,9 +41,8 @@ def train_residual(
             f"{error.name} is not installed, which trains models: pip install 'cnctwin[anomaly,historian]'"
         ) from None
     given = tuple(files or ())
-    wanted = command.Wanted(
-        machine, given, "" if given else store, _moment(from_, "--from"), _moment(to, "--to"), config, hours_min
-    )
+    stretch = (_moment(from_, "--from"), _moment(to, "--to"))
+    wanted = command.Wanted(machine, given, "" if given else store, *stretch, config, machines, hours_min)
     asked = command.TrainingSettings(trees, depth, leaf, row_s, held_share, features, seed)
     raise typer.Exit(command.train_residual(wanted, asked, out, as_json=as_json, console=Console()))
 

@@ -12,6 +12,8 @@ from rich.console import Console
 from rich.table import Table as Printed
 
 from cnctwin.errors import UsageError
+from cnctwin.machines.folder import MachineFolder
+from cnctwin.machines.place import machines_folder
 from cnctwin.memory.store.opening import default_place, open_store
 from cnctwin.models.registry import add, shelf
 from cnctwin.terminal.spinner import working
@@ -20,7 +22,8 @@ from processors.config import Configuration, read_tables
 from processors.errors import ConfigurationError
 from processors.thermal import PROCESSOR as THERMAL
 from processors.thermal import Config as ThermalConfig
-from twin.errors import TwinError
+from processors.thermal import described
+from twin.errors import MachineError, TwinError
 from twin.residual.model import FOLDER, Trained, save_model
 from twin.residual.physics import Physics
 from twin.residual.table import Recorded
@@ -42,6 +45,7 @@ class Wanted:
     from_ms: int | None = None
     to_ms: int | None = None
     config: Path | None = None
+    machines: Path | None = None
     hours_min: float = HOURS_MIN
 
 
@@ -51,7 +55,7 @@ def train_residual(wanted: Wanted, asked: TrainingSettings, out: Path, *, as_jso
         raise UsageError(
             f"--held-share {asked.held_share:g}: {HELD_SHARE_MIN:g} to {HELD_SHARE_MAX:g} of the time can be held out"
         )
-    physics = physics_of(wanted.config, wanted.machine)
+    physics = physics_of(wanted.config, wanted.machine, wanted.machines)
     now = datetime.now(UTC)
     try:
         with working("reading") as say:
@@ -79,14 +83,17 @@ def train_residual(wanted: Wanted, asked: TrainingSettings, out: Path, *, as_jso
     return 0 if kept else 1
 
 
-def physics_of(config: Path | None, machine: str) -> Physics:
-    """The constants that `thermal` has for a machine, in a configuration of processors; its defaults without one."""
+def physics_of(config: Path | None, machine: str, machines: Path | None = None) -> Physics:
+    """The heat that `thermal` has for a machine: by its description, by a configuration of processors, or as is assumed."""
+    folder = machines_folder(machines, config)
     try:
         table = read_tables(config).get(THERMAL.name, {}) if config else {}
         own: ThermalConfig = Configuration(ThermalConfig, table, name=THERMAL.name).of(machine)
-    except ConfigurationError as error:
+        description = None if folder is None else MachineFolder(folder, machine).live()
+    except (ConfigurationError, MachineError) as error:
         raise UsageError(str(error)) from None
-    return Physics.model_validate({name: getattr(own, name) for name in Physics.model_fields})
+    heat = described(own, description)
+    return Physics.of(heat.machine, own.ambient_temp_c, heat.version)
 
 
 def _recorded(wanted: Wanted, physics: Physics, say: Any) -> Recorded:

@@ -17,7 +17,7 @@ from cnctwin.validation.temperature import judged_temperature
 from cnctwin.validation.track import Track
 from cnctwin.validation.vibration import judged_vibration
 from tests.cnctwin.validation.made_night import START_S, changed_twin, told_twin, warm_night, working_spindle
-from twin.cutting import SpindleDrive
+from twin.machine import SpindleDrive
 from twin.runlog import RunLog, run_log
 
 BUDGETS = Budgets()
@@ -137,7 +137,7 @@ def test_without_a_reference_nothing_is_made_up() -> None:
 def cutting(scale: float, floor_n: float = 5.0) -> tuple[Evidence, RunLog]:
     """Parts that are cut, and a dynamometer beside them that sees `scale` times what spindle power makes of it."""
     spindle = working_spindle(0.5)
-    drive = SpindleDrive(7.5, 0.85, 0.22)
+    drive = SpindleDrive(rated_power_kw=7.5, efficiency=0.85, idle_power_kw=0.22)
     power_kw = np.maximum(drive.efficiency * (spindle["spindle_load_pct"] / 100.0 * 7.5 - 0.22), 0.0)
     tangential = np.where(spindle["spindle_rpm"] > 0.0, 1000.0 * power_kw / (np.pi * 0.012 * 8500.0 / 60.0), 0.0)
     size = scale * tangential * np.hypot(1.0, 0.35) + floor_n

@@ -13,7 +13,6 @@ from tests.recordings import recording
 from twin.errors import EffectError, TwinError
 from twin.heat.run import Warming, spindle_temperature_c, thermal_constants
 from twin.machine import Thermal, read_machine
-from twin.thermal import ThermalNetwork, heat_input_w, rise_after
 
 THERMAL = Thermal(alpha_w_per_pct_rpm2=2.2e-8, beta_w_per_rpm=0.016, resistance_k_per_w=0.12, capacity_j_per_k=9000.0)
 CONSTANTS = thermal_constants(THERMAL)
@@ -32,11 +31,11 @@ def a_shift(samples: int = 200, step_s: float = 10.0) -> Warming:
 
 
 @given(st.lists(st.floats(0.1, 5000.0), min_size=1, max_size=20), st.floats(0.0, 100.0), st.floats(0.0, 8000.0))
-def test_each_step_is_that_of_the_live_estimator(steps: list[float], load: float, rpm: float) -> None:
-    network = ThermalNetwork(2.2e-8, 0.016, 0.12, 9000.0)
+def test_each_step_is_the_closed_form_of_one_mass(steps: list[float], load: float, rpm: float) -> None:
+    final_k = 0.12 * (2.2e-8 * load * rpm * rpm + 0.016 * rpm)
     rise, expected = 3.0, [3.0]
     for step in steps:
-        rise = rise_after(network, rise, heat_input_w(network, rpm, load), step)
+        rise = final_k + (rise - final_k) * math.exp(-step / (0.12 * 9000.0))
         expected.append(rise)
     warming = Warming(np.concatenate([[0.0], np.cumsum(steps)]), load, rpm, 20.0)
     assert spindle_temperature_c(CONSTANTS, warming, 23.0)[0] - 20.0 == pytest.approx(expected, abs=1e-9)

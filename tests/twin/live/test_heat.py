@@ -1,10 +1,13 @@
 """The live heat is the simulator's: sample for sample, with every effect, however irregular the samples."""
 
+import math
 import random
 from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from tests.depth import examples
 from twin.effects.catalogue import catalogue
@@ -136,6 +139,51 @@ def test_how_a_constant_stretch_is_cut_into_steps_changes_nothing() -> None:
         often = heat.step(often, WARM, 1.0)
     assert often.temperature_c == pytest.approx(once.temperature_c, abs=1e-9)
     assert often.effects == pytest.approx(once.effects, abs=1e-9)
+
+
+RISES, WATTS, TIMES = st.floats(-50.0, 200.0), st.floats(0.0, 1e4), st.floats(0.0, 1e5)
+FRICTION = LiveHeat.of(MachineFile.model_validate({"machine": {"name": "vmc"}, "thermal": {**THERMAL, "beta_w_per_rpm": 1.0}}))
+"""A watt by rev/min, so that a speed is a heat."""
+
+
+def risen_k(rise_k: float, heat_w: float, duration_s: float) -> float:
+    told = HeatInput(0.0, heat_w, 20.0)
+    return FRICTION.step(FRICTION.started(20.0 + rise_k, told), told, duration_s).temperature_c - 20.0
+
+
+def test_after_one_time_constant_63_2_percent_of_the_rise_is_there_and_after_many_all_of_it() -> None:
+    assert risen_k(0.0, 100.0, 0.12 * 9000.0) == pytest.approx(100.0 * 0.12 * (1 - math.exp(-1)))
+    assert risen_k(3.0, 250.0, 1e6) == pytest.approx(30.0)
+    assert risen_k(8.0, 0.0, math.log(2) * 0.12 * 9000.0) == pytest.approx(4.0)
+
+
+@given(RISES, WATTS, TIMES, TIMES)
+def test_two_steps_are_one_step(rise: float, heat: float, first: float, second: float) -> None:
+    in_two = risen_k(risen_k(rise, heat, first), heat, second)
+    assert in_two == pytest.approx(risen_k(rise, heat, first + second), abs=1e-9, rel=1e-9)
+
+
+@given(RISES, WATTS, TIMES)
+def test_the_rise_moves_towards_the_steady_state_and_never_past_it(rise: float, heat: float, duration: float) -> None:
+    final, after = heat * 0.12, risen_k(rise, heat, duration)
+    assert min(rise, final) - 1e-9 <= after <= max(rise, final) + 1e-9
+    assert risen_k(rise, heat, 0.0) == pytest.approx(rise, abs=1e-9)
+
+
+def test_small_euler_steps_approach_the_exact_one() -> None:
+    rise, step_s = 0.0, 0.01
+    for _ in range(60_000):
+        rise += step_s * (200.0 - rise / 0.12) / 9000.0
+    assert risen_k(0.0, 200.0, 600.0) == pytest.approx(rise, abs=1e-4)
+
+
+def test_heat_ignores_the_sense_of_rotation_and_braking() -> None:
+    heat = LiveHeat.of(machine())
+    warm = [heat.step(heat.started(24.0, told), told, 60.0) for told in (WARM, WARM._replace(spindle_rpm=-5000.0))]
+    assert warm[0] == warm[1]
+    braking = [WARM._replace(spindle_load_pct=load_pct) for load_pct in (-20.0, 0.0)]
+    cool = [heat.step(heat.started(24.0, told), told, 60.0) for told in braking]
+    assert cool[0] == cool[1] != warm[0]
 
 
 def test_it_starts_from_what_the_sensor_shows() -> None:

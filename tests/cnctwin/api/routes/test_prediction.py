@@ -9,9 +9,12 @@ from typing import Any
 import pytest
 
 from cnctwin.api.constants import Constants
+from cnctwin.api.live.descriptions import LiveDescriptions
+from processors.description import DescriptionMessage
 from processors.errors import ConfigurationError
 from tests.cnctwin.api.small_plant import Client, client_of
-from twin.thermal import ThermalNetwork, heat_input_w
+from tests.processors.machines import CUTTER, described_as
+from twin.machine_toml import machine_to_toml
 
 PLAN: dict[str, Any] = {
     "start_temp_c": 20.0,
@@ -36,8 +39,7 @@ def predict(client: Client, plan: dict[str, Any]) -> tuple[int, dict[str, Any]]:
 def test_the_answer_is_the_exact_solution_of_the_network(client: Client) -> None:
     status, told = predict(client, PLAN)
     assert status == 200
-    network = ThermalNetwork(1.8e-8, 1.2e-3, 0.18, 14_500.0)
-    final_k = heat_input_w(network, 6000.0, 50.0) * 0.18
+    final_k = (1.8e-8 * 50.0 * 6000.0**2 + 1.2e-3 * 6000.0) * 0.18
     expected = [20.0 + final_k * (1.0 - math.exp(-60.0 * step / 2610.0)) for step in (1, 2, 3)]
     assert told["spindle_temp_c"] == pytest.approx(expected, abs=1e-4)
     # 50 % of 15 kW at an efficiency of 0.85 are 6.375 kW; a 12 mm tool at 6,000 rev/min cuts at 3.770 m/s
@@ -170,3 +172,40 @@ def test_a_configuration_that_is_wrong_is_said_before_anything_is_served(tmp_pat
 async def _in_blocks(blocks: Iterator[bytes]) -> AsyncIterator[bytes]:
     for block in blocks:
         yield block
+
+
+def test_a_described_machine_is_predicted_with_its_file_and_every_effect_of_it() -> None:
+    heat = {"alpha_w_per_pct_rpm2": 0.0, "beta_w_per_rpm": 0.02, "resistance_k_per_w": 0.1, "capacity_j_per_k": 1000.0}
+    drive = {"rated_power_kw": 10.0, "efficiency": 0.8, "idle_power_kw": 0.0}
+    tools = {"3": {"diameter_mm": 20.0, **CUTTER}, "7": {"diameter_mm": 10.0, **CUTTER}}
+    coolant = {"effect": "coolant_cooling", "parameters": {"gain": 1.0}}
+    known = described_as(
+        coolant, {"effect": "rated_power", "parameters": {"scale": 1.5}}, thermal=heat, spindle=drive, tools=tools
+    )
+    descriptions = LiveDescriptions()
+    with client_of(constants=Constants(None, descriptions.of)) as client:
+        assert predict(client, {**PLAN, "machine": "vmc"})[1]["basis"]["thermal"].startswith("defaults")
+        message = DescriptionMessage(version=known.version, toml=machine_to_toml(known.machine))
+        descriptions.take("cnctwin/description/vmc/live", message.payload())
+        plan = {**PLAN, "machine": "vmc", "spindle_rpm": [3000.0] * 3, "tool_number": 3}
+        told = predict(client, plan)[1]
+        cooled = predict(client, {**plan, "coolant_on": [True] * 3})[1]
+        unknown = predict(client, {**plan, "tool_number": None})[1]
+        descriptions.take("cnctwin/description/vmc/live", b"")
+        assert predict(client, plan)[1]["basis"]["thermal"].startswith("defaults")
+    assert told["spindle_temp_c"][-1] == pytest.approx(20.0 + 6.0 * (1.0 - math.exp(-1.8)), abs=1e-4)
+    assert cooled["spindle_temp_c"][-1] == pytest.approx(20.0 + 3.0 * (1.0 - math.exp(-3.6)), abs=1e-4)
+    # 50 % of 15 kW at an efficiency of 0.8 are 6 kW; a 20 mm tool at 3,000 rev/min cuts at 3.1416 m/s
+    assert told["cutting_force_n"] == pytest.approx([6000.0 / math.pi] * 3, abs=0.1)
+    assert told["basis"]["cutting_force"] == (
+        f"description {known.version}; 10 kW rated, efficiency 0.8; with rated_power scale 1.5"
+    )
+    assert unknown["force_reasons"][0][2] == "the machine has several tools, and no tool_number says which one it is"
+
+
+def test_a_message_that_describes_nothing_changes_nothing() -> None:
+    descriptions = LiveDescriptions()
+    descriptions.take("cnctwin/description/vmc/live", b"{}")
+    descriptions.take("cnctwin/description/vmc/fault", b"{}")
+    descriptions.take("cnctwin/description/vmc/live", DescriptionMessage(version="x", toml="[machine]").payload())
+    assert descriptions.of("vmc") is None
