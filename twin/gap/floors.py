@@ -27,7 +27,7 @@ from twin.gap.significance import correlation_time
 from twin.machine import MachineFile
 from twin.regimes import Regime
 from twin.runlog import AXIS_COLUMN, RunLog
-from twin.simulator.recorded import noise_of
+from twin.simulator.recorded import noise_of, resolution
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -41,6 +41,9 @@ BLOCK_S = 0.1
 LASTING = (Regime.REST.title, Regime.REVERSAL.title)
 LOWER, LOWER_CHI2 = 0.25, 0.1015
 """Lower quartile, and that of χ² with one degree of freedom: a block in which the difference hardly changes has one."""
+AIR_K = 0.15
+"""By which the air at a spindle differs from that at its thermometer, in recordings of plain production: a temperature that a
+control shows in steps coarser than its noise. A warm-up that is measured for its own sake has a thermometer where it matters."""
 RARE = 0.75
 """Part of a regime up to which samples are left out as events or their wake."""
 
@@ -71,6 +74,8 @@ class Floors:
         if log.has(f"{signal}{SPREAD}"):  # mean turns bring their own
             return log[f"{signal}{SPREAD}"]
         noise = noise_of(self.machine, log, signal)
+        if signal.endswith("_temp_c") and resolution(log[signal]) > noise:
+            noise = float(np.hypot(noise, AIR_K))
         floor = np.full(len(log), noise)
         for regime, here in regimes_of(log, signal, self.machine):
             key = (signal, regime)

@@ -4,8 +4,8 @@
 
 A control that says speed, feed and load once a second says this much, without force, engagement or servo axes. Nothing is cut
 while the feed stands still, while an axis goes at its rapid rate, where the planned depth is 0, and during a tool change. A row
-counts where that holds for the row before it too, at the same speed: a meter takes a moment. While the spindle stands, its drive
-may be off, and nothing is compared.
+counts where the spindle has the same speed at the rows before and after it. While it stands, its drive may be off, and nothing
+is compared.
 
 Rows that follow each other at one speed are one reading, their mean, of up to half a minute. Idle power may differ from what is
 stated by two of its deviations. What is further off is an effect: in air nothing tells it from an idle power that is.
@@ -238,7 +238,7 @@ def _readings(run: Run, rows: NDArray[np.intp]) -> AirRun:
 
 
 def _counts(log: RunLog, machine: MachineFile) -> Bools:
-    """Return True where the spindle turns steadily in air, as it did at the row before, (n,)."""
+    """Return True where the spindle turns in air, at the speed of the rows before and after, (n,)."""
     rpm, load = log["spindle_rpm"], log[LOAD]
     idle = in_air(log, machine)
     turns = np.isfinite(rpm) & np.isfinite(load) & (np.abs(np.nan_to_num(rpm)) > 0.0)
@@ -246,9 +246,9 @@ def _counts(log: RunLog, machine: MachineFile) -> Bools:
     same = np.zeros(len(log), dtype=bool)
     with np.errstate(invalid="ignore"):
         same[1:] = np.abs(np.diff(rpm)) <= STEADY * np.abs(rpm[1:])
-    before, after = np.roll(here & np.append(same[1:], False), 1), np.roll(same, -1)
-    before[:1], after[-1:] = False, True
-    return np.asarray(here & same & before & after)
+    after = np.roll(same, -1)
+    after[-1:] = True
+    return np.asarray(here & same & after)
 
 
 def in_air(log: RunLog, machine: MachineFile) -> Bools:

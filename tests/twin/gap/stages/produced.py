@@ -49,7 +49,7 @@ def produced(seed: int, role: str = "fit", slope_pct: float = 0.0, factor: float
 
 def run_of(log: RunLog, role: str = "fit") -> RunAtHand:
     """Return a recording as a run of a case."""
-    entry = RunEntry(file=f"runs/{role}.parquet", kind=RunKind.WARMUP, role=role)  # type: ignore[arg-type]
+    entry = RunEntry(file=role, kind=RunKind.WARMUP, role=role)  # type: ignore[arg-type]
     return RunAtHand(entry, None, log)  # type: ignore[arg-type]
 
 
