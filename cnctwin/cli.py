@@ -24,6 +24,7 @@ from cnctwin.commands.optimise import optimise
 from cnctwin.commands.parts import parts_app
 from cnctwin.commands.plan import plan_app
 from cnctwin.commands.process import process
+from cnctwin.commands.record import record
 from cnctwin.commands.replay import replay_history
 from cnctwin.commands.serve import serve
 from cnctwin.commands.simulate import simulate
@@ -65,6 +66,7 @@ app.command()(process)
 app.command()(simulate)
 app.command()(identify)
 app.command("import")(import_recording)
+app.command()(record)
 app.command()(serve)
 app.command()(optimise)
 app.command("replay")(replay_history)

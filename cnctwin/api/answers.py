@@ -153,6 +153,7 @@ class Replayed(Answer):
     equal: bool
     compared: int
     differences: list[dict[str, Any]]
+    descriptions: list[dict[str, Any]]
     seconds: float
     speed: float
     sha256: str

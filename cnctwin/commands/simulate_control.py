@@ -113,6 +113,10 @@ def simulate_lsv2(
     clock_offset_s: ClockOffset = 0.0,
     model: Annotated[HeidenhainModel, typer.Option(help="Which control")] = HeidenhainModel.TNC640,
     program: Annotated[Path | None, typer.Option(help="Shown in place of the program that is run")] = None,
+    scope: Annotated[bool, typer.Option("--scope", help="The iTNC 530 shows its oscilloscope: servo axes X, Y, Z")] = False,
+    effect: Annotated[str | None, typer.Option(help="One that the axes have and their description does not tell")] = None,
+    on: Annotated[str, typer.Option(help="The axis of the effect")] = "x",
+    machine_out: Annotated[Path | None, typer.Option(help="Write the description of the axes there, a machine.toml")] = None,
     state_file: StateFile = None,
 ) -> None:
     """Show the simulated machine as a HEIDENHAIN control does, over LSV2."""
@@ -126,5 +130,9 @@ def simulate_lsv2(
             model=model,
             clock_offset_s=clock_offset_s,
             program=program,
+            scope=scope,
+            effect=effect,
+            on=on,
+            machine_out=machine_out,
             state_file=state_file,
         )

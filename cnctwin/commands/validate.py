@@ -10,6 +10,8 @@ from cnctwin.commands.extras import needed_by
 from cnctwin.commands.moment import TIME, moment_ms
 from cnctwin.commands.options import AsJson, Group
 from cnctwin.errors import UsageError
+from cnctwin.machines.folder import MachineFolder
+from cnctwin.machines.place import machines_folder
 from cnctwin.processes.given_broker import address
 from cnctwin.terminal.console import standard_output
 from edge.state_dir import state_dir
@@ -31,7 +33,12 @@ def validate(
     ] = None,
     programs: Annotated[Path | None, typer.Option(help="Folder with the NC files, by the names the control tells")] = None,
     config: Annotated[Path | None, typer.Option(help="The processors' TOML; [validation] in it has the budgets")] = None,
-    twin: Annotated[Path | None, typer.Option(help="machine.toml of the twin")] = None,
+    twin: Annotated[
+        Path | None, typer.Option(help="machine.toml of the twin; else the machine's live description in --machines")
+    ] = None,
+    machines: Annotated[
+        Path | None, typer.Option(help="Folder of descriptions; else `machines` beside --config, $CNCTWIN_MACHINES, ./machines")
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder of the history; else `validation` in the state folder")] = None,
     keep: Annotated[bool, typer.Option(help="Keep this night in the history")] = True,
     broker: Annotated[str | None, typer.Option(help="Publish there: mqtt[s]://[user@]host[:port]", show_default=False)] = None,
@@ -46,6 +53,9 @@ def validate(
         raise UsageError(f"--from {from_} is not before --to {to or 'now'}")
     if runs and store is not None:
         raise UsageError("--runs and --store: give one of them")
+    folder = None if twin is not None else machines_folder(machines, config)
+    if folder is not None and (live := MachineFolder(folder, machine).live_file).is_file():
+        twin = live
     with needed_by("validation", "twin,historian"):
         from cnctwin.validation import validate as command
     asked = command.ValidationRequest(

@@ -10,7 +10,7 @@ from cnctwin.composing.executions import Execution, ProgramFolder, executions_of
 from cnctwin.composing.history import AMBIENT, LOAD, RPM, TEMPERATURE, History, Span, history_of
 from cnctwin.composing.observable import observability
 from cnctwin.composing.roles import cut_at, divided
-from cnctwin.composing.rows import EXECUTED, WORK, rows_of, thinned, with_ambient
+from cnctwin.composing.rows import EXECUTED, WORK, rows_of, thinned, unbroken, with_ambient
 from cnctwin.composing.stretches import Stretch, stretches_of, worth
 from cnctwin.composing.written import CASE_FILE, MACHINE_FILE, RUNS, case_toml, complete_or_absent
 from cnctwin.errors import UsageError
@@ -20,7 +20,7 @@ from twin.case import RunKind
 from twin.machine import MachineFile, machine_from_toml
 from twin.runlog import RunLog, write_run
 
-STRETCHES_MAX: dict[Role, int] = {"fit": 6, "check": 3}
+STRETCHES_MAX: dict[Role, int] = {"fit": 4, "check": 2}
 HEALTHY_MAX = 2
 PROGRAMS_MAX, OF_ONE_PROGRAM_MAX = 12, 4
 """Executions of each role, and of one program among them: the latest."""
@@ -204,9 +204,9 @@ def _write(case: _Folder, piece: _Piece) -> None:
     if len(log) < ROWS_MIN:
         return
     if piece.execution is None:
-        log, period_s = thinned(log)
+        log, period_s = thinned(unbroken(log))
         if period_s is not None:
-            said = f"thinned to a row every {period_s:g} s: means of load, speed and feed, temperatures as read"
+            said = f"thinned to a row every {period_s:g} s: means of speed, load and feed, everything else as it was read there"
             case.notes += [said] if said not in case.notes else []
     file = f"{RUNS}/{piece.stem}-{_moment(piece.span_ms[0])}.parquet"
     write_run(log, case.folder / file)

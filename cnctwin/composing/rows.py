@@ -1,11 +1,17 @@
 """The rows of a run from history: what a machine was told and said, held where a control reports changes only.
 
-A long run is thinned: means over so many seconds of load, speed and feed, everything else as it was read at the beginning of
-each. A mean of a temperature would hide the steps in which its sensor reads, by which its floor is known.
+Where nothing changed for a while, a row says that every so often: what was told last holds there, and it is no hole. A long run
+is thinned to even windows, in which it is heated as it was:
+
+    n = mean of n,   load = mean (load n²) / mean n²,   feed and power as their means
+
+Everything else is as it was read at the beginning of each. A mean of a temperature would hide the steps in which its sensor
+reads, by which its floor is known.
 """
 
 import math
-from collections.abc import Collection, Iterable
+from collections.abc import Collection
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,8 +30,12 @@ EXECUTED = (
 )
 """Signals of a program that was run."""
 ROWS_MAX = 12_000
-PERIODS_S = (0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0)
-MEANS = ("spindle_rpm", "spindle_load_pct", "spindle_power_kw", "feed_mm_min")
+PERIODS_S = (0.2, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 30.0, 60.0)
+UNCHANGED_S = 20.0
+"""Seconds without a change after which a row says that nothing has changed."""
+RPM, LOAD = "spindle_rpm", "spindle_load_pct"
+MEANS = (RPM, "spindle_power_kw", "feed_mm_min")
+Floats = NDArray[np.float64]
 
 
 def rows_of(store: Store, machine: str, span_ms: Span, signals: Collection[str]) -> RunLog:
@@ -41,42 +51,52 @@ def with_ambient(log: RunLog, ambient_c: float | None) -> RunLog:
     return run_log(columns, log.source)
 
 
-def thinned(log: RunLog, rows_max: int = ROWS_MAX) -> tuple[RunLog, float | None]:
-    """Return a run log of so many rows at most, and the seconds that each of its means is over; None where nothing was thinned.
+def unbroken(log: RunLog) -> RunLog:
+    """Return the run log with a row every 20 s at least: what was told last holds until something else is told."""
+    gaps = np.diff(log.t_s)
+    more = [log.t_s[n] + UNCHANGED_S * np.arange(1, math.ceil(gaps[n] / UNCHANGED_S)) for n in np.flatnonzero(gaps > UNCHANGED_S)]
+    return _at(log, np.sort(np.concatenate([log.t_s, *more]))) if more else log
 
-    A stretch of time in which nothing was told gets no row.
-    """
+
+def thinned(log: RunLog, rows_max: int = ROWS_MAX) -> tuple[RunLog, float | None]:
+    """Return a run log of so many rows at most, and the seconds of each of its windows; None where nothing was thinned."""
     if len(log) <= rows_max:
         return log, None
     lasted = float(log.t_s[-1] - log.t_s[0])
     period_s = next((p for p in PERIODS_S if lasted / p < rows_max), math.ceil(lasted / rows_max))
-    number = np.floor((log.t_s - log.t_s[0]) / period_s).astype(np.int64)
-    first = np.flatnonzero(np.diff(number, prepend=-1))
-    columns: dict[str, NDArray[np.generic]] = {"t_s": number[first] * period_s}
-    at = np.searchsorted(log.t_s - log.t_s[0], columns["t_s"], side="right") - 1
-    for name, values in log.columns.items():
-        columns[name] = _means(log, values, columns["t_s"], period_s) if name in MEANS else values[at]
-    return run_log(columns | {name: values[at] for name, values in log.text.items()}, log.source), period_s
+    begin_s = log.t_s[0] + period_s * np.arange(math.floor(lasted / period_s) + 1)
+    thin = _at(log, begin_s)
+    means = {name: _means(log, log[name], begin_s, period_s) for name in MEANS if name in log.columns}
+    if LOAD in log.columns:
+        weight = log[RPM] ** 2 if RPM in log.columns else np.ones(len(log))
+        heating, turning = (_means(log, values, begin_s, period_s) for values in (log[LOAD] * weight, weight))
+        plain = _means(log, log[LOAD], begin_s, period_s)
+        means[LOAD] = np.divide(heating, turning, out=plain, where=turning > 0.0)
+    return replace(thin, columns=dict(thin.columns) | means), period_s
 
 
-def _means(log: RunLog, values: NDArray[np.float64], begin_s: Iterable[float], period_s: float) -> NDArray[np.float64]:
+def _at(log: RunLog, t_s: Floats) -> RunLog:
+    """Return the rows that hold at these times."""
+    row = np.searchsorted(log.t_s, t_s, side="right") - 1
+    columns = {name: values[row] for name, values in log.columns.items()}
+    return replace(log, t_s=t_s - t_s[0], columns=columns, text={name: values[row] for name, values in log.text.items()})
+
+
+def _means(log: RunLog, values: Floats, begin_s: Floats, period_s: float) -> Floats:
     """Return the mean over time in each window of what holds from row to row; NaN where it was not known in most of it."""
-    t_s = log.t_s - log.t_s[0]
-    begin = np.asarray(begin_s, dtype=np.float64)
-    end = np.minimum(begin + period_s, max(float(t_s[-1]), float(begin[-1]) + 1e-9))
+    end_s = np.minimum(begin_s + period_s, log.t_s[-1])
     known = np.isfinite(values)
-    lasts = np.diff(t_s, append=t_s[-1])
+    lasts = np.diff(log.t_s, append=log.t_s[-1])
     total = np.concatenate([[0.0], np.cumsum(np.where(known, values, 0.0) * lasts)])
     held = np.concatenate([[0.0], np.cumsum(known * lasts)])
 
-    def until(t: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        row = np.clip(np.searchsorted(t_s, t, side="right") - 1, 0, len(t_s) - 1)
-        since = (t - t_s[row]) * known[row]
+    def until(t_s: Floats) -> tuple[Floats, Floats]:
+        row = np.searchsorted(log.t_s, t_s, side="right") - 1
+        since = (t_s - log.t_s[row]) * known[row]
         return total[row] + np.where(known[row], values[row], 0.0) * since, held[row] + since
 
-    (sum_end, held_end), (sum_begin, held_begin) = until(end), until(begin)
+    (sum_end, held_end), (sum_begin, held_begin) = until(end_s), until(begin_s)
     seconds = held_end - held_begin
-    with np.errstate(invalid="ignore", divide="ignore"):
-        mean = (sum_end - sum_begin) / seconds
-    row = np.searchsorted(t_s, begin, side="right") - 1
-    return np.where(end - begin <= 1e-6, values[row], np.where(seconds > 0.5 * (end - begin), mean, np.nan))
+    row = np.searchsorted(log.t_s, begin_s, side="right") - 1
+    mean = np.divide(sum_end - sum_begin, seconds, out=np.full(len(begin_s), np.nan), where=seconds > 0.5 * (end_s - begin_s))
+    return np.where(end_s <= begin_s, values[row], mean)

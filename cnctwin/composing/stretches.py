@@ -15,7 +15,7 @@ REST_S, COOLING_S = 1200.0, 10_800.0
 LEAD_S = 60.0
 SILENCE_S = 600.0
 """Nothing told for so long is a hole: a day off, a recorder that stood."""
-STRETCH_S_MAX, STRETCH_S_MIN = 28_800.0, 30.0
+STRETCH_S_MAX, STRETCH_S_MIN = 14_400.0, 30.0
 TURNING_RPM, TURNING_PART = 1.0, 0.05
 """A spindle turns above this speed, and above this part of the fastest that it had: jogging is rest."""
 COOLS_PART = 0.3

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 STATE_UMASK, PRODUCT_UMASK = 0o077, 0o027
 PRODUCT_FILE, PRODUCT_FOLDER = 0o640, 0o750  # for what is made under a temporary name, which is its owner's alone
 _PRODUCTS = frozenset(
-    {"gap", "identify", "import", "model", "optimise", "plan", "replay", "simulate", "train", "twin"}
+    {"gap", "identify", "import", "model", "optimise", "plan", "record", "replay", "simulate", "train", "twin"}
     | {"store export", "parts export"}
 )
 

@@ -94,7 +94,7 @@ def import_files(paths: Sequence[Path], chosen: ColumnMap | None, out: Path) -> 
         tallies=tallies,
         left_out=_left_out(contents, taken, readings),
         faults={name: faults for name, reading in readings if (faults := reading.faults())},
-        remarks=(*remarks, *_own_units(taken), *_constant(tallies)),
+        remarks=(*remarks, *own_units(taken), *_constant(tallies)),
         written=written,
     )
 
@@ -211,7 +211,7 @@ def _left_out(
     return tuple(dict.fromkeys(one.name for content in contents for one in content.columns if one.name not in used))
 
 
-def _own_units(taken: Mapping[str, Source]) -> Iterator[str]:
+def own_units(taken: Mapping[str, Source]) -> Iterator[str]:
     """Say which torques are not in amperes: the machine's description has to know."""
     for name, source in taken.items():
         match = AXIS_COLUMN.match(inside_column(name))

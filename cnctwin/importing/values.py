@@ -58,6 +58,10 @@ class Reader:
             numbers = self._flags(told, tally)
         else:
             numbers = read_numbers(told, self.decimal, self.nulls, tally)
+        return self.scaled(numbers, tally)
+
+    def scaled(self, numbers: NDArray[np.float64], tally: Tally) -> NDArray[np.float64]:
+        """Return numbers in the unit of the run log; what is beyond the bounds of the column is none."""
         numbers = (numbers * self.convert.scale + self.convert.offset) * self.options.scale + self.options.offset
         if bounds := bounds_of(self.column):
             beyond = (numbers < bounds[0]) | (numbers > bounds[1])

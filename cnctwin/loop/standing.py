@@ -11,13 +11,13 @@ from twin.vocabulary.twin_signals import (
     CHALLENGER_PREFIX,
     GAP_GROWING,
     GAP_GROWING_SIGNAL,
+    GAP_OPEN,
     GAP_PREFIX,
     GAP_WINDOW,
     TWIN_PREFIX,
     is_gap,
 )
 
-GAP_OPEN = f"{GAP_PREFIX}open"
 NONE = "none"
 Span = tuple[int, int]
 _MOMENT = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(?:\.\d+)?(?:Z|[+-]\d\d:\d\d)")
@@ -75,7 +75,7 @@ def _gaps(readings: Iterable[Reading], prefix: str) -> dict[str, float]:
     found = {}
     for one in readings:
         name = TWIN_PREFIX + one.name.removeprefix(prefix)
-        if is_gap(name) and name != GAP_OPEN and isinstance(one.value, int | float) and not isinstance(one.value, bool):
+        if is_gap(name) and isinstance(one.value, int | float) and not isinstance(one.value, bool):
             found[name.removeprefix(GAP_PREFIX)] = float(one.value)
     return dict(sorted(found.items()))
 

@@ -14,6 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 from itertools import islice
 from typing import NamedTuple
 
+from cnctwin.memory.plain_record import DESCRIPTION_KIND, FILTERS, PlainRecord
 from cnctwin.memory.row_numbers import HOLE_S, SAVED_AS, RowNumbers, holes_text
 from cnctwin.memory.store.contract import Message, Pinned, Snapshot, Store, StoreError
 from cnctwin.memory.store.opening import default_place, open_store
@@ -26,7 +27,6 @@ from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import Reading
 from sparkplug.topics import NodeId
 from twin.vocabulary.nodes import HISTORIAN_NODE, TWIN_NODE_PREFIX
-from twin.vocabulary.topics import SNAPSHOT
 
 QUEUE_MAX, QUEUE_BYTES_MAX = 400_000, 128_000_000  # samples, and about so much memory
 SAMPLE_BYTES, ELEMENT_BYTES = 160, 32  # a reading in memory, an element of an array; texts and bytes by their length
@@ -40,8 +40,6 @@ RETRY_S_MAX = 10.0
 BEHIND_S, BEHIND_S_MAX = 1.0, REPEAT_S - 1.0  # from when on nobody is told that we are here; nor anything else
 HOUR_MS = 3_600_000
 REREAD_MAX = 100_000  # messages that a kill kept from the saved numbers of rows
-UNITS_MAX = 20_000  # of processors, whose snapshots are kept
-SNAPSHOT_BYTES_MAX = 64_000_000  # of last snapshots; of a unit without one a replay begins with the first of its hour
 _TEXTS = (str, bytes)
 _DATA, _BIRTH, _PLAIN, _DEATH = EventKind.DATA, EventKind.BIRTH, EventKind.PLAIN, EventKind.DEATH
 _new = tuple.__new__  # the constructor of a named tuple takes twice as long
@@ -122,36 +120,6 @@ class _Batch(NamedTuple):
     samples: int
 
 
-class _LastSnapshots:
-    """The last snapshot of each unit; where all are too large, those go that were heard longest ago."""
-
-    def __init__(self) -> None:
-        self._heard: dict[tuple[str, str], Snapshot] = {}  # the latest at the end
-        self._units: dict[str, set[str]] = {}
-        self._bytes = 0
-
-    def put(self, snapshot: Snapshot) -> None:
-        """Remember one in place of the one before."""
-        self._pop(snapshot.processor, snapshot.unit)
-        self._heard[snapshot.processor, snapshot.unit] = snapshot
-        self._units.setdefault(snapshot.processor, set()).add(snapshot.unit)
-        self._bytes += len(snapshot.payload)
-        while self._bytes > SNAPSHOT_BYTES_MAX:
-            oldest = next(iter(self._heard))
-            self._pop(*oldest)
-            self._units[oldest[0]].discard(oldest[1])
-
-    def _pop(self, processor: str, unit: str) -> Snapshot | None:
-        found = self._heard.pop((processor, unit), None)
-        self._bytes -= 0 if found is None else len(found.payload)
-        return found
-
-    def take(self, processor: str) -> list[Snapshot]:
-        """Return those of a processor, and forget them."""
-        units = self._units.pop(processor, ())
-        return [found for unit in sorted(units) if (found := self._pop(processor, unit)) is not None]
-
-
 class StoreRecorder:
     """A `processors.running.ports.Recorder` on a store. The store is written by its thread only; `stop` writes what waits, and
     closes it.
@@ -159,15 +127,14 @@ class StoreRecorder:
     A failure of the thread that is no StoreError is our own bug: the next `keep` raises it, and has the historian restarted.
     """
 
-    keeps_plain = SNAPSHOT + "#"
+    keeps_plain = FILTERS
 
     def __init__(self, store: Store, group: str = "cnc", hole_s: float = HOLE_S) -> None:
         self._store, self._group = store, group
         self._queue = _Queue()
         self._thread = threading.Thread(target=self._run, name="store", daemon=True)
         self._stopping = threading.Event()
-        self._kept_hours: dict[tuple[str, str], int] = {}
-        self._last_snapshots = _LastSnapshots()
+        self._plain = PlainRecord()
         self._stored = self._repeated = self._refused = self._dropped = self._pins = 0
         self._writing = 0  # samples in the hands of the thread
         self._caught_up_s = time.monotonic()  # all that was heard before it is in the store
@@ -179,13 +146,15 @@ class StoreRecorder:
     # What the worker calls.
 
     def keep(self, event: HostEvent, received_ms: int) -> None:
-        """Queue a message, or a snapshot of a processor."""
+        """Queue a message, or what is kept of a plain one."""
         if self._failure is not None:
             raise self._failure
         kind = event.kind
         if kind is _PLAIN:
-            self._hear_snapshot(event, received_ms)
+            if (snapshot := self._plain.hear(event, received_ms)) is not None:
+                self._put(snapshot)
             return
+        received_ms = self._plain.moment(received_ms)
         readings, size = event.readings, 0
         samples = len(readings)
         if samples < WEIGHED_MAX or self._queue.samples > WEIGHED_FROM:
@@ -193,7 +162,7 @@ class StoreRecorder:
         if not self._queue.put(event, received_ms, samples, size):
             self._dropped += 1
         if kind is _DEATH:
-            for snapshot in self._last_snapshots.take(event.node.node.removeprefix(TWIN_NODE_PREFIX)):
+            for snapshot in self._plain.died(event.node.node.removeprefix(TWIN_NODE_PREFIX)):
                 self._put(snapshot)
 
     def pin(self, pin: Pin) -> None:
@@ -269,19 +238,6 @@ class StoreRecorder:
     def _put(self, item: Pinned | Snapshot) -> None:
         if not self._queue.put(item, 0, 1, len(item.payload) if isinstance(item, Snapshot) else 0):
             self._dropped += 1
-
-    def _hear_snapshot(self, event: HostEvent, received_ms: int) -> None:
-        """Keep the first of each hour of a processor's unit, and remember the last."""
-        processor, _, unit = event.topic.removeprefix(SNAPSHOT).partition("/")
-        key, hour = (processor, unit), received_ms // HOUR_MS
-        kept_hour = self._kept_hours.get(key)
-        if not event.payload or not unit or (kept_hour is None and len(self._kept_hours) >= UNITS_MAX):
-            return
-        snapshot = Snapshot(processor, unit, received_ms, event.payload)
-        if kept_hour != hour:
-            self._kept_hours[key] = hour
-            self._put(snapshot)
-        self._last_snapshots.put(snapshot)
 
     def _restore_numbers(self) -> None:
         """Take up the numbers of rows as they were saved, and what was stored after that."""
@@ -379,8 +335,16 @@ class StoreRecorder:
             self._pins += 1
 
     def _keep_snapshots(self, batch: _Batch) -> None:
-        if batch.snapshots:
-            self._store.keep_snapshot(*batch.snapshots)
+        snapshots = [one for one in batch.snapshots if not self._is_kept(one)]
+        if snapshots:
+            self._store.keep_snapshot(*snapshots)
+
+    def _is_kept(self, snapshot: Snapshot) -> bool:
+        """Return True for a description that the broker retained, and that was kept before the historian was started."""
+        if snapshot.processor != DESCRIPTION_KIND:
+            return False
+        last = self._store.snapshot_before(DESCRIPTION_KIND, snapshot.unit, 1 << 62)
+        return last is not None and last.payload == snapshot.payload
 
     def _tidy(self) -> bool:
         """Tidy; return True if hours were sealed."""

@@ -108,7 +108,9 @@ class Fold:
         """Have a challenger with this description, None for none; return True if another one, or none, was there before."""
         if (None if self.challenger is None else self.challenger.version) == (None if given is None else given.version):
             return False
-        self.challenger = None if given is None else Challenger(self._processor, given, self._initial, rows, self._counts)
+        beside = self._processor.beside
+        state = self._initial if beside is None else beside(self.state)
+        self.challenger = None if given is None else Challenger(self._processor, given, state, rows, self._counts)
         return True
 
     def take_both(self, sample: Sample, at_ms: int) -> Folded:

@@ -69,8 +69,8 @@ class Recorder(Protocol):
         """Keep a stretch of a machine from being swept."""
 
     @property
-    def keeps_plain(self) -> str:
-        """The filter of the plain messages that it wants."""
+    def keeps_plain(self) -> tuple[str, ...]:
+        """The filters of the plain messages that it wants."""
 
     def receipts(self) -> Iterable[Receipt]:
         """Return what has been kept since the last call, for those who wait for it."""

@@ -94,11 +94,9 @@ class Runner:
             gc.set_threshold(*thresholds)
 
     def _run(self, stop: Event) -> None:
-        for topic_filter in self._descriptions.plain_filters():
+        of_workers = (topic_filter for worker in self.workers for topic_filter in worker.plain_filters())
+        for topic_filter in dict.fromkeys((*self._descriptions.plain_filters(), *of_workers)):
             self._host.subscribe_plain(topic_filter)
-        for worker in self.workers:
-            for topic_filter in worker.plain_filters():
-                self._host.subscribe_plain(topic_filter)
         self._host.subscribe_plain(self._marker_topic)
         self._host.start()
         for worker in self.workers:

@@ -86,7 +86,7 @@ class Worker:
         yield self._snapshot_prefix + "+"
         yield from self._listens
         if self._recorder is not None:
-            yield self._recorder.keeps_plain
+            yield from self._recorder.keeps_plain
 
     def start(self) -> None:
         """Have the edge node begin to connect."""
@@ -190,13 +190,10 @@ class Worker:
         """Have an event recorded as it comes, where the processor records it; also while its fold is down."""
         if self._recorder is None or not self._is_recording:
             return
-        received_ms = time.time_ns() // 1_000_000
-        if event.kind is EventKind.PLAIN:
-            if not _matches(self._recorder.keeps_plain, event.topic):
-                return
-            received_ms = event.timestamp_ms
+        if event.kind is EventKind.PLAIN and not any(_matches(wanted, event.topic) for wanted in self._recorder.keeps_plain):
+            return
         try:
-            self._recorder.keep(event, received_ms)
+            self._recorder.keep(event, time.time_ns() // 1_000_000)
         except Exception as error:
             self._is_recording = False
             self._go_down("the recorder", error, now_s)

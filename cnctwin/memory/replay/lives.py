@@ -12,6 +12,7 @@ from datetime import UTC, datetime
 
 from cnctwin.memory.replay.log import NODE_OFFLINE, Mark, birth_behind, is_twin
 from cnctwin.memory.store.contract import Series, Store
+from processors.description import Role
 from processors.discovery import AnyProcessor
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId
@@ -197,6 +198,13 @@ def births_of(payload: bytes) -> dict[tuple[str, str], int]:
     """The births that a snapshot tells of, by machine and node."""
     lanes = json.loads(payload)["live"]["machines"]
     return {(machine, node): at_ms for machine, lane in lanes.items() for node, at_ms in lane.get("births", {}).items()}
+
+
+def versions_of(payload: bytes) -> set[tuple[str, Role, str]]:
+    """The descriptions by which a snapshot's states were folded, of its machines."""
+    live = json.loads(payload)["live"]
+    versions = {Role.LIVE: live.get("description"), Role.CHALLENGER: live.get("challenger", {}).get("version")}
+    return {(machine, role, version) for machine in live["machines"] for role, version in versions.items() if version}
 
 
 def offers(found: Sequence[Mark], series: Mapping[str, Sequence[Series]]) -> dict[str, dict[NodeId, list[str]]]:

@@ -5,6 +5,7 @@ from datetime import UTC, datetime
 from rich.console import Console
 from rich.table import Table
 
+from cnctwin.memory.descriptions import Described
 from cnctwin.memory.replay.result import ProcessorReplayed, Replayed
 
 LISTED_MAX = 10
@@ -18,6 +19,8 @@ def shown(replayed: Replayed, console: Console) -> None:
     for one in replayed.processors:
         table.add_row(one.name, *map(str, one.totals), str(one.restarts), one.start)
     console.print(table)
+    for described in replayed.descriptions:
+        _line(console, _description(described))
     for one in replayed.processors:
         _differences(one, console)
     for note in [f"{one.name}: {note}" for one in replayed.processors for note in one.notes]:
@@ -25,6 +28,17 @@ def shown(replayed: Replayed, console: Console) -> None:
     verdict = "the same, bit for bit" if replayed.is_equal else "NOT the same"
     _line(console, f"{verdict}: {replayed.compared} values compared; {replayed.messages} messages, {replayed.samples} samples")
     _line(console, f"{replayed.seconds:.1f} s, {replayed.speed:.0f} times real time; sha256 {replayed.sha256}")
+
+
+def _description(one: Described) -> str:
+    """Return one line on a description: which, from when, and how it came to be."""
+    if one.message is None:
+        return f"no {one.role} description from {_at(one.received_ms)}"
+    message = one.message
+    how = " ".join(filter(None, (message.step, f"by {message.by}" if message.by else "")))
+    return f"{one.role} description {one.version} from {_at(one.received_ms)}" + ": ".join(
+        ("", *filter(None, (how, message.why)))
+    )
 
 
 def _differences(one: ProcessorReplayed, console: Console) -> None:

@@ -4,15 +4,20 @@ Its clock on the wall is the time at which each message was received. Before eac
 by then; a beat of a second comes where the day shows one (what was published at a beat carries its time), else at each second.
 """
 
+from collections import deque
 from collections.abc import Collection, Mapping, Sequence
 
+from cnctwin.memory.descriptions import Described
 from cnctwin.memory.replay.comparison import Comparison, as_sent
-from cnctwin.memory.replay.lives import Restart, Start, births_of
+from cnctwin.memory.replay.lives import Restart, Start, births_of, versions_of
 from cnctwin.memory.replay.log import is_twin
 from processors.actions import Action, DeadLetter, Declare, Publish, Remove
 from processors.config import Configuration, ProcessorConfig
+from processors.contract import OutputSpec
+from processors.description import Role
 from processors.discovery import AnyProcessor
 from processors.errors import SnapshotError
+from processors.running.challenger import challenger_specs
 from processors.running.engine import Engine
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import Change, NodeId, Reading
@@ -33,6 +38,7 @@ class Rerun:
     names: of the signals, by machine and node
     fed: nodes of processors whose recomputed values are fed to it, in place of what the log has
     is_chained: whether what it gives is to be fed to others
+    described: the descriptions of its machines, in order
     """
 
     def __init__(  # noqa: PLR0917
@@ -48,6 +54,7 @@ class Rerun:
         *,
         fed: Collection[str] = (),
         is_chained: bool = False,
+        described: Sequence[Described] = (),
     ) -> None:
         self.processor, self._configuration, self._machine, self._machines = processor, configuration, machine, machines
         self.start, self._restarts, self._names = start, restarts, names
@@ -56,10 +63,12 @@ class Rerun:
         self.dead_letters = self.restarts = 0
         self.notes: list[str] = []
         self._engine = Engine(processor, configuration)
+        self._to_come = deque(described)
+        self._describes: dict[tuple[str, Role], Described] = {}
         self._declared: set[str] = set()
         self._heard: set[tuple[NodeId, str | None]] | None = set() if start.is_birth else None
         self._known: set[tuple[NodeId, str | None]] = set()
-        self._window: list[tuple[int, HostEvent]] | None = None if start.snapshots is None else []
+        self._window: list[tuple[int, HostEvent | Described]] | None = None if start.snapshots is None else []
         self._snapshots: Mapping[str, bytes] = {}
         self._hears_from = start.hears_from
         self._births, self._saved_ms = start.births, start.saved_ms
@@ -69,7 +78,9 @@ class Rerun:
         self._beat_ms: int | None = None
         self._is_counted = False
         self._produced: list[HostEvent] = []
-        self._types = {spec.name: (spec.datatype, spec.unit) for spec in processor.outputs}
+        self._types = {spec.name: (spec.datatype, spec.unit) for spec in outputs_of(processor)}
+        while self._to_come and self._to_come[0].received_ms <= start.from_ms:
+            self._describe(self._to_come.popleft())
 
     def take(self, place: int, received_ms: int, event: HostEvent, *, is_counted: bool) -> list[HostEvent]:
         """One message of the log, or of another processor that is run again; what came of it, as other processors see it."""
@@ -77,6 +88,8 @@ class Rerun:
         if received_ms < self.start.from_ms or not self._is_of_unit(event):
             return []
         self._is_counted = is_counted
+        while self._to_come and self._to_come[0].received_ms <= received_ms:
+            self._hear_description(self._to_come.popleft())
         if event.node.node == self.processor.node:
             self._own(place, received_ms, event)
         elif event.node.node in self._fed or event.node.node == HISTORIAN_NODE:
@@ -131,6 +144,8 @@ class Rerun:
         self._hears_from, self._births, self._saved_ms = restart.hears_from, restart.births, restart.saved_ms
         snapshots = {unit: restart.snapshots.get(unit) or self._saved(unit) for unit in restart.units}
         self._engine = Engine(self.processor, self._configuration)
+        for described in self._describes.values():
+            self._describe(described)
         self._declared.clear()
         self._heard = set()
         self._beat_ms = None
@@ -158,6 +173,24 @@ class Rerun:
 
     # What it was given.
 
+    def _hear_description(self, described: Described) -> None:
+        if self._window is not None:
+            self._window.append((described.received_ms, described))
+            return
+        self._wall_s = max(self._wall_s, described.received_ms / 1000)
+        self._silence()
+        self._describe(described)
+
+    def _describe(self, described: Described) -> None:
+        """Give the engine a description, as the worker did then."""
+        self._describes[described.machine, described.role] = described
+        try:
+            actions = self._engine.describe(described.machine, described.role, described.description)
+        except Exception as error:  # as then: the one before goes on
+            self.notes.append(f"description {described.version} is refused: {error}")
+        else:
+            self._took(actions)
+
     def _missed(self, received_ms: int, event: HostEvent) -> None:
         """It was not there yet; but other processors that were born in the last moment may have been quicker than the edge."""
         if is_twin(event):
@@ -169,16 +202,36 @@ class Rerun:
         if self._window is None:
             return
         window, self._window = self._window, None
+        late = self._described_at_the_snapshot(window)
         for payload in (self.start.snapshots or {}).values():
             self._restored(payload, is_resumed=True)
             if births := births_of(payload):
                 nodes = {str(node): node for names in self._names.values() for node in names}
                 heard: set[tuple[NodeId, str | None]] = {(nodes[node], machine) for machine, node in births if node in nodes}
                 self._heard = heard if self._heard is None else self._heard | heard
-        seen = [number for number, (_, event) in enumerate(window) if self._has_seen(event)]
-        for received_ms, event in window[seen[-1] + 1 if seen else 0 :]:
-            if seen or received_ms > self.start.received_ms:
-                self._feed(received_ms, event)
+        for described in late:
+            self._describe(described)
+        seen = [number for number, (_, one) in enumerate(window) if isinstance(one, HostEvent) and self._has_seen(one)]
+        for received_ms, one in window[seen[-1] + 1 if seen else 0 :]:
+            if isinstance(one, Described):
+                self._hear_description(one)
+            elif seen or received_ms > self.start.received_ms:
+                self._feed(received_ms, one)
+
+    def _described_at_the_snapshot(self, window: Sequence[tuple[int, HostEvent | Described]]) -> list[Described]:
+        """Have the descriptions hold with which the states were folded; return those that were heard before the snapshot, and
+        were to hold behind the next message."""
+        heard = [*self._describes.values()]
+        heard += [one for at_ms, one in window if isinstance(one, Described) and at_ms <= self.start.received_ms]
+        held = {key for payload in (self.start.snapshots or {}).values() for key in versions_of(payload)}
+        late: list[Described] = []
+        for one in heard:
+            if (one.machine, one.role, one.version) in held or not one.version:
+                late = [later for later in late if (later.machine, later.role) != (one.machine, one.role)]
+                self._describe(one)
+            else:
+                late.append(one)
+        return late
 
     def _has_seen(self, event: HostEvent) -> bool:
         """Return True if a value that the restored state holds is of this message."""
@@ -260,3 +313,8 @@ class Rerun:
         self._produced.append(
             HostEvent(kind, node, machine, at_ms, readings, "device offline" if kind is EventKind.DEATH else "")
         )
+
+
+def outputs_of(processor: AnyProcessor) -> tuple[OutputSpec, ...]:
+    """Return all that a processor may publish, of a challenger too."""
+    return processor.outputs + challenger_specs(processor.outputs)

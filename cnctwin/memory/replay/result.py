@@ -4,6 +4,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from cnctwin.errors import ApplicationError
+from cnctwin.memory.descriptions import Described
 from sparkplug.values import Value
 
 DIFFERENCES_MAX = 100  # that are listed; all are counted
@@ -69,7 +70,10 @@ class ProcessorReplayed:
 
 @dataclass(frozen=True, slots=True)
 class Replayed:
-    """A replay of one machine. sha256: over every value that was recomputed, in order; two replays have the same."""
+    """A replay of one machine. sha256: over every value that was recomputed, in order; two replays have the same.
+
+    descriptions: those that held when it began, and those that came within it
+    """
 
     machine: str
     from_ms: int
@@ -77,6 +81,7 @@ class Replayed:
     chain: bool
     processors: tuple[ProcessorReplayed, ...]
     differences: tuple[Difference, ...]
+    descriptions: tuple[Described, ...]
     messages: int
     samples: int
     seconds: float
@@ -107,6 +112,7 @@ class Replayed:
             "equal": self.is_equal,
             "compared": self.compared,
             "differences": [asdict(one) for one in self.differences],
+            "descriptions": [_of_description(one) for one in self.descriptions],
             "messages": self.messages,
             "samples": self.samples,
             "seconds": round(self.seconds, 3),
@@ -114,6 +120,11 @@ class Replayed:
             "sha256": self.sha256,
             "processors": [_of_processor(one) for one in self.processors],
         }
+
+
+def _of_description(one: Described) -> dict[str, Any]:
+    how = {} if one.message is None else one.message.model_dump(exclude={"version", "toml", "t"})
+    return {"t": one.received_ms, "role": str(one.role), "version": one.version, **how}
 
 
 def _of_processor(one: ProcessorReplayed) -> dict[str, Any]:

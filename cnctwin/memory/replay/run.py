@@ -6,10 +6,11 @@ from collections import deque
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from cnctwin.memory.descriptions import Described, described
 from cnctwin.memory.replay.comparison import Comparison
 from cnctwin.memory.replay.lives import Start, begun_within, kept_start, offers, restarts
 from cnctwin.memory.replay.log import Mark, Stretch, marks
-from cnctwin.memory.replay.rerun import Rerun
+from cnctwin.memory.replay.rerun import Rerun, outputs_of
 from cnctwin.memory.replay.result import Difference, ProcessorReplayed, Replayed, ReplayRefusedError
 from cnctwin.memory.store.contract import Series, Store
 from processors.config import CellConfig, Configuration, ProcessorConfig
@@ -56,15 +57,23 @@ def replay(  # noqa: PLR0917
     stretch = Stretch(store, machines, min(start.from_ms for start in starts), to_ms)
     found, messages, samples = marks(stretch)
     differences: list[Difference] = []
+    descriptions = {name: described(store, name, stretch.from_ms, to_ms) for name in machines}
+    chained = [one.node for one in chosen] if chain else []
     reruns = [
-        _rerun(store, pair, machine, unit, start, found, series, differences, [one.node for one in chosen] if chain else [])
+        _rerun(store, pair, machine, unit, start, found, series, descriptions, differences, chained)
         for pair, unit, start in zip(pairs, units, starts, strict=True)
     ]
     _run(stretch, reruns, from_ms)
     results = tuple(_result(one) for one in reruns)
     digest = hashlib.sha256("\n".join(f"{one.name} {one.sha256}" for one in results).encode()).hexdigest()
     seconds = time.perf_counter() - began_s
-    return Replayed(machine, from_ms, to_ms, chain, results, tuple(differences), messages, samples, seconds, digest)
+    own = tuple(one for number, one in enumerate(descriptions[machine]) if not _is_over(descriptions[machine][number:], from_ms))
+    return Replayed(machine, from_ms, to_ms, chain, results, tuple(differences), own, messages, samples, seconds, digest)
+
+
+def _is_over(rest: Sequence[Described], from_ms: int) -> bool:
+    """Return True if the first of these descriptions had been followed by another one in its role when the stretch began."""
+    return any(one.role is rest[0].role and one.received_ms <= from_ms for one in rest[1:])
 
 
 def published_of(series: Sequence[Series]) -> list[str]:
@@ -101,6 +110,7 @@ def _rerun(  # noqa: PLR0917
     start: Start,
     found: Sequence[Mark],
     series: Mapping[str, Sequence[Series]],
+    descriptions: Mapping[str, Sequence[Described]],
     differences: list[Difference],
     chained: Sequence[str],
 ) -> Rerun:
@@ -110,10 +120,14 @@ def _rerun(  # noqa: PLR0917
     start = begun_within(store, start, processor, tuple(units), own, series[machine])
     notes: list[str] = []
     lives = restarts(store, processor, units, own, notes) if own else {}
-    comparison = Comparison(processor.name, processor.outputs, differences)
+    comparison = Comparison(processor.name, outputs_of(processor), differences)
     names = offers(own, series)
     fed = {node for node in chained if processor.listens_to(node)}
-    rerun = Rerun(processor, configuration, machine, of_units, start, lives, names, comparison, fed=fed, is_chained=bool(chained))
+    told = sorted((one for name in of_units for one in descriptions[name]), key=lambda one: one.received_ms)
+    rerun = Rerun(
+        processor, configuration, machine, of_units, start, lives, names, comparison,
+        fed=fed, is_chained=bool(chained), described=told,
+    )  # fmt: skip
     rerun.notes += notes
     return rerun
 

@@ -72,7 +72,10 @@ def sweep(db: sqlite3.Connection, chosen: Sequence[File]) -> int:
 
 
 def sweep_log(db: sqlite3.Connection, retention: Retention, now_ms: int) -> None:
-    """Births, deaths and holes past the time of the raw, and snapshots that nobody needs; within a transaction."""
+    """Births, deaths and holes past the time of the raw, and snapshots that nobody needs; within a transaction.
+
+    The descriptions of machines are few, and stay: whoever looks at a year has to know which one was live at its beginning.
+    """
     db.execute(
         """DELETE FROM events WHERE number IN (
             SELECT number FROM events LEFT JOIN machines ON machines.id = events.machine
@@ -84,7 +87,7 @@ def sweep_log(db: sqlite3.Connection, retention: Retention, now_ms: int) -> None
         (now_ms - round(retention.raw_days * DAY_MS), HOUR_MS, EVENTS_AT_ONCE),
     )
     db.execute(
-        """DELETE FROM snapshots WHERE received_ms < ?1 AND EXISTS (
+        """DELETE FROM snapshots WHERE received_ms < ?1 AND processor != 'description' AND EXISTS (
                 SELECT 1 FROM snapshots AS other
                 WHERE other.processor = snapshots.processor AND other.unit = snapshots.unit
                     AND other.received_ms / 86400000 = snapshots.received_ms / 86400000
@@ -93,7 +96,7 @@ def sweep_log(db: sqlite3.Connection, retention: Retention, now_ms: int) -> None
         (now_ms - SNAPSHOTS_FULL_DAYS * DAY_MS, 2 * HOUR_MS),
     )
     db.execute(  # those before all messages that are still there
-        """DELETE FROM snapshots WHERE received_ms < ?1
+        """DELETE FROM snapshots WHERE received_ms < ?1 AND processor != 'description'
             AND NOT EXISTS (SELECT 1 FROM pins WHERE snapshots.received_ms BETWEEN pins.from_ms - ?2 AND pins.to_ms)""",
         (now_ms - round(retention.raw_days * DAY_MS) - 2 * DAY_MS, DAY_MS),
     )

@@ -2,7 +2,7 @@
 
 The telegrams are those that the package pyLSV2 and its `docs/protocol.rst` know. Two generations are shown: the iTNC 530 tells
 the tool in the spindle and its error messages (R_RI 51, 27, 28), the TNC 640 does not. Nothing can be written: each telegram that
-would is refused and counted.
+would is refused and counted. The iTNC 530 also has an oscilloscope where it is given the signals of some axes.
 """
 
 import struct
@@ -12,6 +12,7 @@ from enum import IntEnum, StrEnum
 from importlib.resources import files
 
 from cnctwin.standins.lsv2_server import plc_memory
+from cnctwin.standins.lsv2_server.oscilloscope import Selection, ServoTrace, Sweep, details, selection, signal_descriptions
 from cnctwin.standins.lsv2_server.telegram import HEADER_BYTES, Telegram, encode
 from cnctwin.standins.simulated_control.control import SimulatedControl
 from cnctwin.standins.simulated_control.state import AXES, ControlState
@@ -38,17 +39,26 @@ class Code(IntEnum):
     NO_LOGIN = 49
     BAD_MEMORY_ADDRESS = 52
     NO_NEXT_ERROR = 57
+    OSCILLOSCOPE_CHANNELS = 83
     NO_WRITE_ACCESS = 59
+    OSCILLOSCOPE_OVERRUN = 112
 
 
 @dataclass
 class Session:
-    """One client: what it logged in to, how long its telegrams may be, and the file that it is reading."""
+    """One client: what it logged in to, how long its telegrams may be, and what it is reading: a file, a list, a recording.
+
+    due_s: machine's time before which the answer does not leave
+    """
 
     logins: set[str] = field(default_factory=set)
     block_bytes: int = 256
     unread: list[bytes] = field(default_factory=list)
     next_error: int = 0
+    unread_word: str = "S_FL"
+    selected: Selection | None = None
+    sweep: Sweep | None = None
+    due_s: float = 0.0
 
 
 @dataclass
@@ -65,6 +75,7 @@ _VERSIONS = {
 }
 _LOGINS = frozenset({"INSPECT", "DIAGNOSTICS", "PLCDEBUG", "FILE", "MONITOR", "DNC"})
 _NEEDED = {"R_VR": "INSPECT", "R_PR": "INSPECT", "R_CI": "INSPECT", "R_RI": "DNC", "R_MB": "PLCDEBUG"}
+_NEEDED |= {"R_OC": "OSZI", "R_OP": "OSZI", "R_OD": "OSZI"}
 _NEEDED |= {"R_FI": "FILE", "R_FL": "FILE", "R_DT": "DIAGNOSTICS"}
 _PROGRAM_STATES = {"ACTIVE": 0, "FEED_HOLD": 1, "OPTIONAL_STOP": 1, "PROGRAM_STOPPED": 1, "WAIT": 1, "PROGRAM_COMPLETED": 2}
 _PROGRAM_STATES |= {"STOPPED": 3, "INTERRUPTED": 4, "READY": 7}
@@ -77,11 +88,24 @@ def error(code: int) -> bytes:
 
 
 class Answers:
-    """A simulated control as this model. `has_dnc`: whether the option is set without which nobody may log in as DNC."""
+    """A simulated control as this model.
+
+    has_dnc: False where the option is missing without which nobody may log in as DNC; trace: signals of the axes, for the
+    oscilloscope; scope_password: of its log-in OSZI; packets_lost: numbers of packets that never leave
+    """
 
     def __init__(
-        self, control: SimulatedControl, model: Model = Model.TNC640, *, has_dnc: bool = True, plc_password: str = ""
+        self,
+        control: SimulatedControl,
+        model: Model = Model.TNC640,
+        *,
+        has_dnc: bool = True,
+        plc_password: str = "",
+        trace: ServoTrace | None = None,
+        scope_password: str = "",
     ) -> None:
+        self.trace, self.scope_password = trace, scope_password
+        self.packets_lost: frozenset[int] = frozenset()
         self.control, self.model, self.has_dnc, self.plc_password = control, model, has_dnc, plc_password
         self.counters = Counters()
         self.program_text = files(__package__).joinpath("base_plate.h").read_text(encoding="ascii")
@@ -100,6 +124,8 @@ class Answers:
             "R_DT": lambda _session, _payload: encode("S_DT", struct.pack("!L", int(control.calendar_s()))),
             "T_OK": self._next_part,
         }
+        if trace is not None and model is Model.ITNC530:
+            self._tells |= {"R_OC": self._scope_signals, "R_OP": self._scope_selection, "R_OD": self._scope_values}
 
     def answer(self, session: Session, telegram: Telegram) -> bytes:
         """The answer, as bytes."""
@@ -120,6 +146,9 @@ class Answers:
 
     def _log_in(self, session: Session, payload: bytes) -> bytes:
         name, _, password = payload.rstrip(b"\x00").decode("latin-1").partition("\x00")
+        if name == "OSZI" and self.trace is not None and self.model is Model.ITNC530 and password == self.scope_password:
+            session.logins.add(name)
+            return encode("T_OK")
         if name not in _LOGINS or (name == "DNC" and not self.has_dnc):
             return error(Code.NO_LOGIN)
         if name == "PLCDEBUG" and password != self.plc_password:
@@ -207,11 +236,38 @@ class Answers:
         content = text if mode == b"\x01" else text.replace(b"\n", b"\x00")
         size = session.block_bytes - HEADER_BYTES - 2
         session.unread = [content[at : at + size] for at in range(0, len(content), size)]
+        session.unread_word, session.sweep = "S_FL", None
+        return self._next_part(session, b"")
+
+    def _next_part(self, session: Session, _payload: bytes) -> bytes:
+        if session.sweep is not None:
+            return self._packet(session, session.sweep)
+        return encode(session.unread_word, session.unread.pop(0)) if session.unread else encode("T_FD")
+
+    def _scope_signals(self, session: Session, _payload: bytes) -> bytes:
+        session.unread, session.unread_word, session.sweep = signal_descriptions(), "S_OC", None
         return self._next_part(session, b"")
 
     @staticmethod
-    def _next_part(session: Session, _payload: bytes) -> bytes:
-        return encode("S_FL", session.unread.pop(0)) if session.unread else encode("T_FD")
+    def _scope_selection(session: Session, payload: bytes) -> bytes:
+        session.sweep, session.selected = None, selection(payload)
+        return error(Code.OSCILLOSCOPE_CHANNELS) if session.selected is None else encode("S_OP", details(session.selected))
+
+    def _scope_values(self, session: Session, _payload: bytes) -> bytes:
+        if session.selected is None:
+            return error(Code.OSCILLOSCOPE_CHANNELS)
+        session.sweep = Sweep(session.selected, self.control.machine_s())
+        return self._packet(session, session.sweep)
+
+    def _packet(self, session: Session, sweep: Sweep) -> bytes:
+        assert self.trace is not None, "nobody selects signals without it"
+        if sweep.is_overrun(self.control.machine_s()):
+            session.sweep = None
+            return encode("T_BD", bytes([1, Code.OSCILLOSCOPE_OVERRUN]))
+        while sweep.packet in self.packets_lost:
+            sweep.packet += 1
+        session.due_s = sweep.due_s()
+        return encode("S_OD", sweep.take(self.trace))
 
 
 def _axes(state: ControlState) -> bytes:

@@ -13,6 +13,7 @@ from enum import StrEnum
 from typing import Self
 
 from cnctwin.standins.lsv2_server.answers import Answers, Model, Session, error
+from cnctwin.standins.lsv2_server.oscilloscope import ServoTrace
 from cnctwin.standins.lsv2_server.telegram import Telegram, TelegramError, TelegramReader, encode
 from cnctwin.standins.simulated_control.control import SimulatedControl
 
@@ -47,9 +48,13 @@ class Lsv2Server:
         port: int = 0,
         has_dnc: bool = True,
         plc_password: str = "",
+        trace: ServoTrace | None = None,
+        scope_password: str = "",
         pause: Callable[[float], None] = time.sleep,
     ) -> None:
-        self.answers = Answers(control, model, has_dnc=has_dnc, plc_password=plc_password)
+        self.answers = Answers(
+            control, model, has_dnc=has_dnc, plc_password=plc_password, trace=trace, scope_password=scope_password
+        )
         self.control = control
         self.fault = Fault.NONE
         self.fault_s = 1.0
@@ -156,6 +161,8 @@ class Lsv2Server:
         if fault is Fault.SLOW:
             self._pause(self.fault_s)
         answer = self.answers.answer(session, telegram)
+        while (early_s := session.due_s - self.control.machine_s()) > 0 and not stopped.is_set():
+            self._pause(min(early_s, 0.5))
         if fault is Fault.DROP:
             client.sendall(answer[: max(1, len(answer) // 2)])
             return False

@@ -40,6 +40,7 @@ GREASE_S = 1200.0
 MEAN_AMBIENT_C = 22.0
 SEASON_S = 182.0 * DAY_S
 HEAT_S = 1.0
+ANOTHER_SPEED = 0.02
 TOLD = (
     "cutting_power_kw", "spindle_rpm", "spindle_rpm_cmd", "feed_mm_min",
     "tool_number", "tool_change_active", "coolant_on", "line",
@@ -105,6 +106,19 @@ class Day:
         for at_s, *row in zip(self.at_s.tolist(), *series, self.program, self.exec_state, strict=True):
             yield at_s, dict(zip(names, row, strict=True))
 
+    def thinned(self, every_s: float) -> "Day":
+        """Return the rows at multiples of a time, and all in which a state, a speed or a feed becomes another one."""
+        kept = np.diff(self.at_s // every_s, prepend=-1.0) != 0.0
+        for name in ("tool_number", "tool_change_active", "coolant_on"):
+            kept[1:] |= np.diff(np.nan_to_num(self.columns[name])) != 0.0
+        for texts in (self.program, self.exec_state):
+            kept[1:] |= texts[1:] != texts[:-1]
+        rpm, feed = self.columns["spindle_rpm"], self.columns["feed_mm_min"]
+        kept[1:] |= np.abs(np.diff(rpm)) > ANOTHER_SPEED * rpm[1:]
+        kept[1:] |= (feed[1:] > 0.0) != (feed[:-1] > 0.0)
+        columns = {name: values[kept] for name, values in self.columns.items()}
+        return Day(self.at_s[kept], columns, self.program[kept], self.exec_state[kept], self.end_temp_c)
+
     def run_log(self) -> RunLog:
         """Return the rows as a recording."""
         columns: dict[str, NDArray[Any]] = {name: values for name, values in self.columns.items() if name != "nc_line"}
@@ -112,12 +126,14 @@ class Day:
         return run_log(columns | {"program": self.program, "exec_state": self.exec_state}, "production")
 
 
-def production_days(stretches: Sequence[tuple[float, Production]], start_s: float) -> Iterator[Day]:
+def production_days(
+    stretches: Sequence[tuple[float, Production]], start_s: float, start_temp_c: float | None = None
+) -> Iterator[Day]:
     """Yield the days of a machine from `start_s` on, cut at midnights and where it becomes another one.
 
-    stretches: until when, s since 1970, the machine is as stated
+    stretches: until when, s since 1970, the machine is as stated; start_temp_c: of the spindle, None = as warm as the air
     """
-    temp_c: float | None = None
+    temp_c = start_temp_c
     for until_s, production in stretches:
         while start_s < until_s:
             end_s = min((start_s // DAY_S + 1.0) * DAY_S, until_s)

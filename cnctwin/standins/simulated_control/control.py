@@ -44,6 +44,10 @@ class SimulatedControl:
         """True if the last state of the day has been shown."""
         return self._coming is None
 
+    def machine_s(self) -> float:
+        """Return the machine's own seconds since it was switched on."""
+        return self._machine_s()
+
     def calendar_s(self) -> float:
         """The control's own date and time, seconds since 1970."""
         return self._switched_on_s + self._machine_s()

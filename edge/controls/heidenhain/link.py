@@ -4,7 +4,8 @@ pyLSV2 stands on this in place of its own socket. Two things are guarded here, b
 
 * Reading only. A telegram leaves if it is on the list below, and no other. Of the settings (C_CC) only those pass that agree
   how long a telegram may be, of the log-ins only those that this edge needs, and T_OK only as the call for the next part of a
-  file. * Bounds. A telegram has at most `PAYLOAD_BYTES_MAX` bytes, whatever its header says; an answer is one that belongs to
+  file, of a list of signals or of a recording.
+* Bounds. A telegram has at most `PAYLOAD_BYTES_MAX` bytes, whatever its header says; an answer is one that belongs to
   the question; all telegrams of one look together take no longer than the time that `begin` gives them, and are no more than
   `TELEGRAMS_MAX`. After anything else the connection is closed: LSV2 numbers nothing, so an answer that comes late would be
   taken for the next one.
@@ -16,10 +17,10 @@ import select
 import socket
 import struct
 import threading
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from enum import Enum
-from types import ModuleType
+from types import MappingProxyType, ModuleType
 from typing import Any
 
 from edge.errors import ConnectionLostError, EdgeError
@@ -41,6 +42,9 @@ READS = {
     "R_DT": ("S_DT",),
     "T_OK": ("S_FL", "T_FD"),
 }
+SCOPE_READS = {"R_OC": ("S_OC",), "R_OP": ("S_OP",), "R_OD": ("S_OD",), "T_OK": ("S_FL", "S_OC", "S_OD", "T_FD")}
+"""The telegrams of the oscilloscope: its signals, the selection of some, their values. Only for a link that is made for it."""
+_MORE_COMES = ("S_FL", "S_OC", "S_OD")
 _TELEGRAM_SIZES = frozenset(struct.pack("!H", number) for number in (3, 4, 5, 6, 7))
 _REFUSALS = ("T_ER", "T_BD")
 
@@ -53,9 +57,18 @@ class ReadOnlyLink:
     """Takes the place of `pyLSV2.low_level_com.LSV2TCP`. `patience_s` is the longest wait for a byte in real time."""
 
     def __init__(
-        self, host: str, port: int, *, logins: Collection[str], patience_s: float, clock: Callable[[], float], pylsv2: ModuleType
+        self,
+        host: str,
+        port: int,
+        *,
+        logins: Collection[str],
+        patience_s: float,
+        clock: Callable[[], float],
+        pylsv2: ModuleType,
+        more_reads: Mapping[str, tuple[str, ...]] = MappingProxyType({}),
     ) -> None:
         self._address = host, port
+        self._reads = READS | dict(more_reads)
         self._logins = frozenset(logins)
         self._patience_s, self._clock = patience_s, clock
         self._pylsv2: Any = pylsv2
@@ -63,7 +76,7 @@ class ReadOnlyLink:
         self._closed = threading.Event()
         self._deadline_s = clock() + patience_s
         self._telegrams = 0
-        self._is_in_file = False
+        self._more_comes = False
         self.buffer_size = 256
         self.last_response: Any = self._pylsv2.const.RSP.NONE
         self.last_error: Any = self._pylsv2.dat_cls.LSV2Error()
@@ -120,18 +133,18 @@ class ReadOnlyLink:
                 raise
             why = f"no answer to {word}" if isinstance(error, TimeoutError) else f"{word}: {error}"
             raise ConnectionLostError(why) from error
-        self._is_in_file = answer == "S_FL"
+        self._more_comes = answer in _MORE_COMES
         self._note(answer, content)
         return bytearray(content)
 
     def _check(self, word: str, data: bytes) -> None:
-        passes = word in READS
+        passes = word in self._reads
         if word == "C_CC":
             passes = data in _TELEGRAM_SIZES
         elif word == "A_LG":
             passes = data.split(b"\x00")[0].decode("latin-1") in self._logins
         elif word == "T_OK":
-            passes = self._is_in_file and not data
+            passes = self._more_comes and not data
         if not passes:
             raise WriteRefusedError(f"{word} {data[:8].hex()} is not on the list of telegrams that only read; it was not sent")
         if len(data) + 8 > self.buffer_size:
@@ -143,7 +156,7 @@ class ReadOnlyLink:
         header = self._exactly(opened, 8)
         (length,) = struct.unpack_from("!L", header)
         answer = header[4:].decode("latin-1")
-        if answer not in READS[word] and answer not in _REFUSALS:
+        if answer not in self._reads[word] and answer not in _REFUSALS:
             raise ConnectionLostError(f"answers {answer!r} to {word}, which is no LSV2")
         if length > PAYLOAD_BYTES_MAX:
             raise ConnectionLostError(f"announces {length} bytes in answer to {word}; the limit is {PAYLOAD_BYTES_MAX}")

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from cnctwin.memory import historian
+from cnctwin.memory import historian, plain_record
 from cnctwin.memory.historian import StoreRecorder
 from cnctwin.memory.store.contract import Appended, Message, Pinned, Snapshot, Status, StoreError, Tidied
 from processors.actions import Pin
@@ -160,7 +160,7 @@ def test_snapshots_do_not_break_a_batch(memory: Memory) -> None:
 
 
 def test_last_snapshots_are_bounded_and_the_latest_stay(memory: Memory, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(historian, "SNAPSHOT_BYTES_MAX", 1000)
+    monkeypatch.setattr(plain_record, "SNAPSHOT_BYTES_MAX", 1000)
     recorder = StoreRecorder(memory)  # type: ignore[arg-type]
     for time_ms in (1, 2):
         for number in range(20):

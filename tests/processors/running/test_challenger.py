@@ -1,6 +1,7 @@
 """A challenger beside the live fold: what it sees and says, when it comes and goes, and what becomes of its state."""
 
 import json
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -73,6 +74,17 @@ def test_a_machine_that_is_born_with_a_challenger_declares_its_metrics() -> None
     assert [name for name in metrics if "challenger" in name] == [
         "twin/challenger/sum", "twin/challenger/seen", "twin/challenger/version",
     ]  # fmt: skip
+
+
+def test_a_challenger_starts_anew_or_from_what_the_processor_makes_of_the_live_state() -> None:
+    from_live = replace(DESCRIBING, beside=lambda live: replace(live, total=live.total + 1000.0))
+    for processor, expected in ((DESCRIBING, 20.0), (from_live, 1030.0 + 20.0)):
+        made = engine_of(processor)
+        made.describe("okuma", Role.LIVE, description(1.0))
+        fed(made, birth(0.0, spindle_rpm=10.0))
+        made.describe("okuma", Role.CHALLENGER, description(1.0))
+        fed(made, data(0.1, spindle_rpm=20.0))
+        assert state(made) == (30.0, expected), "it begins with a birth of what is known, 20"
 
 
 def test_its_coming_and_going_are_births_of_the_twin_device() -> None:

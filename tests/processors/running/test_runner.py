@@ -22,7 +22,7 @@ THERMAL_NODE = NodeId("cnc", "twin-thermal")
 class Kept:
     """A recorder that remembers what it was handed."""
 
-    keeps_plain = "cnctwin/snapshot/#"
+    keeps_plain = ("cnctwin/snapshot/#",)
 
     def __init__(self) -> None:
         self.events: list[HostEvent] = []

@@ -4,11 +4,13 @@ What a processor does is what `processors.running.worker.Worker` does, so far as
 silence when none waits, a snapshot within two seconds; it may be killed at any moment and started again.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from random import Random
 
+from cnctwin.memory.plain_record import PlainRecord
 from cnctwin.memory.store.contract import Message, Snapshot
 from processors.actions import Action, Declare, Publish, Remove
+from processors.description import machine_and_role, read_message
 from processors.discovery import AnyProcessor
 from processors.running.engine import Engine
 from sparkplug.host_session import EventKind, HostEvent
@@ -34,9 +36,11 @@ class Living:
         self._heard: set[NodeId] = set()
         self._declared: dict[str, dict[str, Reading]] = {}
 
-    def start(self) -> None:
-        """As a new process."""
+    def start(self, retained: Iterable[HostEvent] = ()) -> None:
+        """As a new process; it is told first what the broker has retained."""
         self.engine = Engine(self.processor, self.processor.configured(self._table))
+        for event in retained:
+            self._describe(event)
         self._heard, self._declared, self.waiting = set(), {}, []
         for payload in self.snapshots.values():
             self.engine.restore(payload)
@@ -54,6 +58,8 @@ class Living:
         due = [event for at_s, event in self.waiting if at_s <= now_s]
         self.waiting = [(at_s, event) for at_s, event in self.waiting if at_s > now_s]
         for event in due:
+            if event.kind is EventKind.PLAIN:
+                actions += self._describe(event)
             if event.kind is EventKind.BIRTH:
                 self._heard.add(event.node)
             if event.node in self._heard:
@@ -64,6 +70,12 @@ class Living:
             self.saved_s = now_s
             self.snapshots |= {unit: self.engine.snapshot(unit) for unit in self.engine.units}
         return [event for action in actions for event in self._sent(action, T0_MS + round(now_s * 1000))]
+
+    def _describe(self, event: HostEvent) -> list[Action]:
+        found = machine_and_role(event.topic)
+        assert found is not None
+        description = read_message(event.payload, found[0]).description(found[0]) if event.payload else None
+        return self.engine.describe(*found, description)
 
     def _sent(self, action: Action, at_ms: int) -> list[HostEvent]:
         if isinstance(action, Declare):
@@ -89,6 +101,8 @@ class Day:
         self.living = [Living(one, table, 0.01 * number) for number, (one, table) in enumerate(processors, start=1)]
         self.store = MemoryStore()
         self._kept_hours: set[tuple[str, str, int]] = set()
+        self._retained: dict[str, HostEvent] = {}
+        self._record = PlainRecord()
 
     def run(
         self, events: Sequence[tuple[float, HostEvent]], seconds: float, kills: Sequence[tuple[float, str, float]] = ()
@@ -113,7 +127,7 @@ class Day:
                     for unit, payload in one.snapshots.items():
                         self.store.snapshots.append(Snapshot(name, unit, T0_MS + round(now_s * 1000) - 100, payload))
                 elif not one.is_alive and now_s >= at_s + pause_s:
-                    one.start()
+                    one.start(self._retained.values())
                     asked.append(now_s + 0.2)
             while asked and asked[0] <= now_s:  # what began again asks for births
                 asked.pop(0)
@@ -126,7 +140,14 @@ class Day:
                     self._keep_snapshots(one, now_s)
 
     def _on_the_broker(self, event: HostEvent, now_s: float) -> None:
-        self.store.log.append(Message(T0_MS + round(now_s * 1000), event))
+        received_ms = T0_MS + round(now_s * 1000)
+        if event.kind is EventKind.PLAIN:
+            kept = self._record.hear(event, received_ms)
+            assert kept is not None
+            self.store.snapshots.append(kept)
+            self._retained[event.topic] = event
+        else:
+            self.store.log.append(Message(self._record.moment(received_ms), event))
         for one in self.living:
             if one.is_alive and event.node != one.node:
                 one.waiting.append((now_s + one.delay_s, event))

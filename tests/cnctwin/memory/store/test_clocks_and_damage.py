@@ -106,6 +106,15 @@ def test_snapshots_go_with_the_raw_that_they_would_be_needed_for(tmp_path: Path)
     assert kept == [5, *range(18, 30)]
 
 
+def test_descriptions_of_machines_stay_whatever_goes(tmp_path: Path) -> None:
+    store = EmbeddedStore(tmp_path, writable=True, retention=Retention(raw_days=10.0))
+    for hour in range(3):
+        store.keep_snapshot(Snapshot("description", "vmc/live", T0_MS + hour * HOUR_MS, b"%d" % hour))
+    store.tidy(T0_MS + 400 * DAY_MS)
+    kept = [payload for (payload,) in store._writer.db.execute("SELECT payload FROM snapshots ORDER BY received_ms")]
+    assert kept == [b"0", b"1", b"2"]
+
+
 def sealed_store(folder: Path) -> None:
     store = EmbeddedStore(folder, writable=True)
     store.append(three_hours())

@@ -79,6 +79,13 @@ def test_rows_are_canonical_signals_and_the_run_log_holds_the_same(monday: Day) 
     assert run.ignored == ()
 
 
+def test_thinned_rows_keep_every_change_of_a_state(monday: Day) -> None:
+    few = monday.thinned(20.0)
+    assert 3 * len(few) < len(monday) < 40 * len(few)
+    assert np.array_equal(changes_s(few), changes_s(monday))
+    assert set(few.program) == set(monday.program)
+
+
 @pytest.mark.parametrize(
     ("name", "on", "parameters", "signal", "change"),
     [
