@@ -110,10 +110,8 @@ class Demo:
         edge = self._folder / "edge.toml"
         edge.write_text(self._edge_toml(url))
         settings = self._folder / "processors.toml"
-        told = _RECORDED_TOML + _NO_MODEL_TOML if self.options.recording else self._as_described()
-        kept = _HISTORIAN_TOML.format(store=json.dumps(str(self._folder / "store")))
-        settings.write_text(f"{told}late_s_max = 60.0\n{_LATE_TOML}{kept}")  # joint_anomaly's table is the last one
-        self._describe()
+        settings.write_text(self.settings())
+        self.describe()
         broker = ["--broker", self.broker.address.url]
         state = ["--state-dir", str(self._folder)]
         # The memory begins first, so that it hears what the others say from their first word on.
@@ -178,7 +176,13 @@ class Demo:
         """True where the machine has an effect that its twin was not told of."""
         return self.options.recording is None and self.options.effect != NONE
 
-    def _describe(self) -> None:
+    def settings(self) -> str:
+        """Return how processors and loop run."""
+        told = _RECORDED_TOML + _NO_MODEL_TOML if self.options.recording else self._as_described()
+        kept = _HISTORIAN_TOML.format(store=json.dumps(str(self._folder / "store")))
+        return f"{told}late_s_max = 60.0\n{_LATE_TOML}{kept}"  # joint_anomaly's table is the last one
+
+    def describe(self) -> None:
         """Write what the twin is told of the machine, where the processors and the loop look for it."""
         folder = self._folder / "machines"
         folder.mkdir()
