@@ -18,6 +18,7 @@ from threading import Event
 
 from rich.console import Console
 
+from cnctwin.demo.loop_outcome import LoopOutcome, LoopWatch
 from cnctwin.demo.parts import PROCESSORS, Demo, DemoOptions
 from cnctwin.plant.screen import ledger_table
 from cnctwin.plant.view import StageLedger, ledgers, machines, text
@@ -25,7 +26,7 @@ from cnctwin.plant.watch import show, viewer
 from cnctwin.standins.simulated_machine import description
 from sparkplug.host import EventKind, HostApplication, HostEvent
 from sparkplug.topics import NAMESPACE
-from twin.vocabulary.topics import MIRROR
+from twin.vocabulary.topics import LOOP, MIRROR
 
 GROUP = "cnc"
 QUIET_S = 1.5
@@ -34,7 +35,10 @@ SETTLE_S_MAX = 12.0
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """The account of a demo. `recording_ended` is None for the simulated machine, `parts` for a recording."""
+    """The account of a demo. `recording_ended` is None for the simulated machine, `parts` for a recording.
+
+    loop: None where nothing was hidden
+    """
 
     machine: str
     tool_changes: int
@@ -44,6 +48,7 @@ class Summary:
     parts: int | None
     restarts: dict[str, int]
     ledgers: tuple[StageLedger, ...]
+    loop: LoopOutcome | None = None
 
     @property
     def balances(self) -> bool:
@@ -81,10 +86,17 @@ def run(options: DemoOptions, stop: Event) -> int:
         stack.callback(demo.stop)
         demo.broker.start()
         host = viewer(demo.broker.address, GROUP)
+        host.subscribe_plain(f"{LOOP}+")
         host.start()
         stack.callback(host.stop)
+        begun_s = time.monotonic()
         demo.start()
-        changes = ToolChanges(demo.machine)
+        changes, loop = ToolChanges(demo.machine), LoopWatch(demo.machine, begun_s)
+
+        def see(events: list[HostEvent]) -> None:
+            changes.see(events)
+            loop.see(events)
+
         if demo.page_url and not options.no_open:
             open_browser(demo.page_url)
         console.print(greeting(demo), markup=False, highlight=False, soft_wrap=True)
@@ -100,10 +112,10 @@ def run(options: DemoOptions, stop: Event) -> int:
                 console.print(f"{demo.machine}: {notice}", markup=False, highlight=False, soft_wrap=True)
             return stop.is_set() or (ends_s is not None and time.monotonic() >= ends_s)
 
-        show(host, console, over, note=lambda: _note(demo, ends_s), on_events=changes.see)
+        show(host, console, over, note=lambda: _note(demo, loop, ends_s), on_events=see)
         ended = demo.recording_ended
         demo.stop_source()
-        _settle(host, changes.see)
+        _settle(host, see)
         summary = Summary(
             machine=demo.machine,
             tool_changes=changes.count,
@@ -113,6 +125,7 @@ def run(options: DemoOptions, stop: Event) -> int:
             parts=demo.parts,
             restarts=demo.restarts(),
             ledgers=tuple(ledgers(host)),
+            loop=loop.outcome(demo.sealed) if demo.hides else None,
         )
         _tell(summary, demo, console, as_json=options.json)
     return 0 if summary.balances else 1
@@ -160,22 +173,37 @@ def _settle(host: HostApplication, on_events: Callable[[list[HostEvent]], None])
             return
 
 
+def _told(loop: LoopOutcome) -> str:
+    """Return in a sentence what was hidden, what was named, and what that did to the gap."""
+    hidden = f"hidden: {loop.effect}{f' on {loop.on}' if loop.on else ''}"
+    if not loop.named:
+        return f"{hidden}; the loop named nothing by then"
+    others = f", not told from {', '.join(loop.not_told_from)}" if loop.not_told_from else ""
+    if not loop.promoted or loop.gap_before is None or loop.gap_after is None:
+        return f"{hidden}; named: {', '.join(loop.named)}{others}; {'promoted' if loop.promoted else 'not promoted'} by then"
+    closed = f", closed after {loop.seconds:.0f} s" if loop.seconds is not None else ""
+    gap = f"{loop.gap_before:.1f} → {loop.gap_after:.1f} floors"
+    return f"{hidden}; named: {', '.join(loop.named)}{others}; promoted, standing gap {gap}{closed}"
+
+
 def _last_tool(host: HostApplication, machine: str) -> str:
     reading = next((m.measured.get("tool_number") for m in machines(host) if m.name == machine), None)
     return "none" if reading is None or reading.value is None else text(reading)
 
 
-def _note(demo: Demo, ends_s: float | None) -> str:
+def _note(demo: Demo, loop: LoopWatch, ends_s: float | None) -> str:
     left = "Ctrl-C ends the demo" if ends_s is None else f"{max(ends_s - time.monotonic(), 0):.0f} s left, Ctrl-C ends it earlier"
     ended = " · the recording has ended" if demo.recording_ended else ""
     notice = f" · {demo.notice}" if demo.notice else ""
-    return f"{left}{ended}{notice} · mosquitto_sub -p {demo.broker.port} -t '{MIRROR}#' -v"
+    twin = f" · twin: {loop.text}" if loop.text else ""
+    return f"{left}{ended}{notice}{twin} · mosquitto_sub -p {demo.broker.port} -t '{MIRROR}#' -v"
 
 
 def _tell(summary: Summary, demo: Demo, console: Console, *, as_json: bool) -> None:
     if as_json:
         ledger = [{**asdict(stage), "balances": stage.balances} for stage in summary.ledgers]
-        whole = {**asdict(summary), "ledgers": ledger, "balances": summary.balances, "agent": demo.agent_ledger}
+        loop = None if summary.loop is None else summary.loop.as_dict()
+        whole = {**asdict(summary), "ledgers": ledger, "balances": summary.balances, "agent": demo.agent_ledger, "loop": loop}
         sys.stdout.write(json.dumps(whole) + "\n")
         return
     if summary.parts is not None:
@@ -188,6 +216,8 @@ def _tell(summary: Summary, demo: Demo, console: Console, *, as_json: bool) -> N
         highlight=False,
     )
     console.print(ledger_table(summary.ledgers))
+    if summary.loop is not None:
+        console.print(_told(summary.loop), markup=False, highlight=False, soft_wrap=True)
     if summary.restarts:
         console.print(f"started again: {summary.restarts}", markup=False)
     if not summary.balances:

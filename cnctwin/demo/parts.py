@@ -10,6 +10,7 @@ from typing import Any
 from urllib.parse import urlsplit
 from xml.etree import ElementTree
 
+from cnctwin.demo.by_itself import ByItself
 from cnctwin.errors import ApplicationError, UsageError
 from cnctwin.processes import state_file
 from cnctwin.processes.child import Child
@@ -17,6 +18,7 @@ from cnctwin.processes.port import is_free
 from cnctwin.processes.private_broker import PrivateBroker
 from cnctwin.standins.simulated_machine import description
 from cnctwin.standins.simulated_machine.anomaly_model import place_model
+from cnctwin.standins.simulated_machine.hidden_effect import RANDOM, choice_of
 from sparkplug.errors import TopicError
 from sparkplug.topics import check_id
 from twin.vocabulary.nodes import HISTORIAN_NODE
@@ -24,19 +26,13 @@ from twin.vocabulary.nodes import HISTORIAN_NODE
 PROCESSORS = ("thermal", "cutting_force", "gap", "rules", "joint_anomaly", "alerts", "events", "mirror", "historian")
 START_S_MAX = 15.0
 PAGE_PORT = 8080
+NONE = "none"
 
-_PROCESSORS_TOML = """\
-# What the twin assumes of a recorded machine in the demo. None of it is fitted to the machine that is shown.
+ASSUMED = Path(__file__).with_name("assumed.toml")
+_RECORDED_TOML = """\
+# A recording may have no sensor of the air, and its machine is nobody's to correct.
 [thermal]
-alpha_w_per_pct_rpm2 = 2.2e-8
-beta_w_per_rpm = 1.6e-2
-resistance_k_per_w = 0.12
-capacity_j_per_k = 9000.0
 ambient_temp_c = 22.0
-
-[cutting_force]
-rated_power_kw = 11.0
-tool_diameter_mm = 12.0
 
 [gap]
 shown_s_min = 5.0
@@ -44,16 +40,24 @@ shown_s_min = 5.0
 [gap.floors]
 spindle_temp_c = 0.3
 spindle_load_pct = 0.5
+
+[loop]
+diagnose = "by_hand"
 """
 # At twenty times real time, a second on the way between two processors is twenty of the machine's.
 _LATE_TOML = "\n[rules]\nlate_s_max = 60.0\n\n[alerts]\nlate_s_max = 60.0\n"
+_LOOP_TOML = 'diagnose = "{diagnose}"\npromote = "{promote}"\n'  # [loop] is the last table of the simulated machine's
 _NO_MODEL_TOML = "\n[joint_anomaly]\n"
 _HISTORIAN_TOML = "\n[historian]\nstore = {store}\nraw_days = 36500.0\n"  # a recording may be years old
 
 
 @dataclass(frozen=True, slots=True)
 class DemoOptions:
-    """A user's choices. `seconds` None runs until Ctrl-C; `port` is the private broker's; `recording` None simulates."""
+    """A user's choices. `seconds` None runs until Ctrl-C; `port` is the private broker's; `recording` None simulates.
+
+    effect: that the simulated machine hides, as `hidden_effect.choice_of` reads it; `none` hides none; seed: of the draw
+    diagnose, promote: who begins the diagnosis, and who makes its answer the live twin
+    """
 
     recording: Path | None = None
     devices: Path | None = None
@@ -63,6 +67,10 @@ class DemoOptions:
     machine: str | None = None
     json: bool = False
     no_open: bool = False
+    effect: str = RANDOM
+    seed: int | None = None
+    diagnose: ByItself = ByItself.BY_ITSELF
+    promote: ByItself = ByItself.BY_ITSELF
 
 
 class Demo:
@@ -81,9 +89,12 @@ class Demo:
             description.check(options.speed)
         elif not options.speed > 0:
             raise UsageError(f"--speed {options.speed:g} is not above 0; 1 is the recorded pace, 20 twenty times as fast")
+        if options.recording is None and options.effect != NONE:
+            choice_of(options.effect)
         self.machine = _checked(options.machine or machine_name(options.devices if options.recording else description.DEVICES))
         self.broker = PrivateBroker(folder / "broker", options.port)
         self._folder = folder
+        self.sealed = folder / "sealed.json"
         self._agent_state, self._page_state = folder / "agent.json", folder / "page.json"
         self.page_url = self.page_trouble = ""
         self.children: list[Child] = []
@@ -99,19 +110,23 @@ class Demo:
         edge = self._folder / "edge.toml"
         edge.write_text(self._edge_toml(url))
         settings = self._folder / "processors.toml"
-        told = _PROCESSORS_TOML + _NO_MODEL_TOML if self.options.recording else self._as_described()
-        kept = _HISTORIAN_TOML.format(store=json.dumps(str(self._folder / "store")))
-        settings.write_text(f"{told}late_s_max = 60.0\n{_LATE_TOML}{kept}")  # joint_anomaly's table is the last one
+        settings.write_text(self.settings())
+        self.describe()
         broker = ["--broker", self.broker.address.url]
         state = ["--state-dir", str(self._folder)]
         # The memory begins first, so that it hears what the others say from their first word on.
         self._begin("historian", ["process", "historian", "--config", str(settings), *broker, *state])
         self._await_historian()
-        jobs = str(self._folder / "jobs")
-        self._serve(["--config", str(settings), "--store", str(self._folder / "store"), "--jobs", jobs, *broker])
+        store, jobs = str(self._folder / "store"), str(self._folder / "jobs")
+        shown = ["--diagnoses", str(self._folder / "diagnoses")]
+        shown += ["--sealed", str(self.sealed)] if self.hides else []
+        self._serve(["--config", str(settings), "--store", store, "--jobs", jobs, *shown, *broker])
         others = [name for name in PROCESSORS if name != "historian"]
         self._begin("processors", ["process", *others, "--config", str(settings), *broker, *state])
-        self._begin("jobs", ["jobs", "run", "--dir", jobs, "--files", str(self._files()), *broker])
+        files = str(self._files())
+        self._begin("jobs", ["jobs", "run", "--dir", jobs, "--files", files, *broker])
+        places = ["--store", store, "--jobs", jobs, "--jobs-files", files, "--diagnoses", str(self._folder / "diagnoses")]
+        self._begin("loop", ["twin", "run", "--config", str(settings), *places, *broker])
         # The edge comes last: from its first word on somebody is there to listen.
         self._begin("edge", ["edge", "run", str(edge)])
 
@@ -156,6 +171,24 @@ class Demo:
         parts = [self.broker.child, *self.children]
         return {child.name: child.restarts for child in parts if child.restarts}
 
+    @property
+    def hides(self) -> bool:
+        """True where the machine has an effect that its twin was not told of."""
+        return self.options.recording is None and self.options.effect != NONE
+
+    def settings(self) -> str:
+        """Return how processors and loop run."""
+        told = _RECORDED_TOML + _NO_MODEL_TOML if self.options.recording else self._as_described()
+        kept = _HISTORIAN_TOML.format(store=json.dumps(str(self._folder / "store")))
+        return f"{told}late_s_max = 60.0\n{_LATE_TOML}{kept}"  # joint_anomaly's table is the last one
+
+    def describe(self) -> None:
+        """Write what the twin is told of the machine, where the processors and the loop look for it."""
+        folder = self._folder / "machines"
+        folder.mkdir()
+        text = ASSUMED.read_text(encoding="utf-8") if self.options.recording else description.description_text()
+        (folder / f"{self.machine}.toml").write_text(text, encoding="utf-8")
+
     def _files(self) -> Path:
         """The folder of what a job may read: the simulated machine and its program, to optimise on the page."""
         folder = self._folder / "files"
@@ -167,12 +200,18 @@ class Demo:
 
     def _as_described(self) -> str:
         """Return the processors' settings for the simulated machine, and for the model of its scores."""
-        return description.PROCESSORS.read_text() + place_model(self._folder / "models", self.machine)
+        settings = description.PROCESSORS.read_text() + _LOOP_TOML.format(
+            diagnose="by_itself" if self.options.diagnose is ByItself.BY_ITSELF else "by_hand",
+            promote="by_rule" if self.options.promote is ByItself.BY_ITSELF else "by_hand",
+        )
+        return settings + place_model(self._folder / "models", self.machine)
 
     def _agent(self) -> list[str]:
         """The command that stands in for the control."""
         if self.options.recording is None:
-            return ["simulate-control", "machine"]
+            seed = [] if self.options.seed is None else ["--seed", str(self.options.seed)]
+            hidden = ["--effect", self.options.effect, *seed, "--sealed", str(self.sealed)] if self.hides else []
+            return ["simulate-control", "machine", *hidden]
         devices = ["--devices", str(self.options.devices)] if self.options.devices else []
         return ["simulate-control", "mtconnect", str(self.options.recording), *devices, "--wait"]
 

@@ -63,7 +63,8 @@ class SimulatedMachine:
     """Serves the simulated machine on loopback.
 
     speed: 1 = real time; at 20 the machine's clock, which stamps what it tells, goes twenty times as fast as ours
-    machine: as it is; begin: computes a part; now: seconds since 1970
+    machine: as it is; patience_s: after which a spare part is shown in place of the first one, seconds of our time
+    begin: computes a part; now: seconds since 1970
     """
 
     def __init__(
@@ -72,6 +73,7 @@ class SimulatedMachine:
         speed: float = 1.0,
         port: int = 0,
         machine: MachineFile | None = None,
+        patience_s: float = PATIENCE_S,
         begin: Begin | None = None,
         now: Callable[[], float] = time.time,
     ) -> None:
@@ -83,6 +85,7 @@ class SimulatedMachine:
         self.error: BaseException | None = None
         built = machine or machine_as_built()
         self._speed, self._now, self._machine = speed, now, built
+        self._patience_s = patience_s * speed
         self._begin: Begin = begin or (lambda number: Computation(number, built))
         self._waiting_since_s: float | None = None
         self._pending: Pending | None = None
@@ -141,7 +144,7 @@ class SimulatedMachine:
 
     def _run(self) -> None:
         try:
-            self._tell(working_day(self._begin_next, self._spare, PATIENCE_S * self._speed, self._machine))
+            self._tell(working_day(self._begin_next, self._spare, self._patience_s, self._machine))
         except BaseException as error:  # the thread that serves goes on; whoever runs us sees it here
             self.error = error
 

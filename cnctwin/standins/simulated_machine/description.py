@@ -9,6 +9,7 @@ FOLDER = Path(__file__).parent
 PROGRAM = FOLDER / "base_plate.nc"
 TOLD = FOLDER / "machine.toml"
 AS_BUILT = FOLDER / "as_built.toml"
+TOOLS = FOLDER / "tools.toml"
 DEVICES = FOLDER / "devices.xml"
 PROCESSORS = FOLDER / "processors.toml"
 SPARE_PART = FOLDER / "spare_part.txt"
@@ -21,6 +22,11 @@ SPEED_MAX = 200.0
 def program_text() -> str:
     """The part program."""
     return PROGRAM.read_text(encoding="utf-8")
+
+
+def description_text() -> str:
+    """What the live twin is told: the machine with the tools of its program, as `machines/<name>.toml` holds it."""
+    return f"{TOLD.read_text(encoding='utf-8')}\n{TOOLS.read_text(encoding='utf-8')}"
 
 
 def check(speed: float) -> None:

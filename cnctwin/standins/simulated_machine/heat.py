@@ -13,7 +13,8 @@ from twin.live.heat import HeatInput, LiveHeat
 from twin.live.sensor import LiveSensor
 from twin.machine import MachineFile
 
-START_TEMPERATURE_C = 23.0
+START_TEMPERATURE_C = 30.0
+"""The machine has been at work before, and was switched off over lunch."""
 SHOWN_S = 1.0
 TEMPERATURE, LOAD = "spindle_temp_c", "spindle_load_pct"
 
@@ -33,7 +34,7 @@ def with_temperatures(moments: Iterable[Moment], machine: MachineFile) -> Iterat
         second = math.floor(moment.at_s / SHOWN_S)
         shown_c = heat.reading(state, told) + Random(second).gauss(0.0, noise_k)  # noqa: S311 — no secret
         next_s = (second + 1) * SHOWN_S
-        yield moment._replace(values={**moment.values, "Stemp": f"{shown_c:.1f}", "room_temp": f"{told.ambient_c:.1f}"})
+        yield moment._replace(values={**moment.values, "Stemp": f"{shown_c:.2f}", "room_temp": f"{told.ambient_c:.1f}"})
 
 
 def _heating(before: HeatInput, moment: Moment, meter: LiveSensor | None) -> HeatInput:

@@ -9,7 +9,7 @@ from cnctwin.standins.simulated_machine.machining import machined
 from cnctwin.standins.simulated_machine.moment import Adapter
 from cnctwin.standins.simulated_machine.part import Part
 from cnctwin.standins.simulated_machine.working_day import working_day
-from twin.machine import MachineFile
+from twin.machine import AddedEffect, MachineFile
 
 START = datetime(2026, 3, 2, 8, 0, 0, tzinfo=UTC)
 
@@ -26,9 +26,9 @@ class OnDemand(NamedTuple):
         return machined(self.number, self.machine)
 
 
-def recorded_day(parts: int, spare: Callable[[], Part]) -> Iterator[str]:
-    """Yield what the control shows until so many parts are made, from a morning of March 2026 on."""
-    adapter, readies, machine = Adapter(START.timestamp()), 0, machine_as_built()
+def recorded_day(parts: int, spare: Callable[[], Part], hidden: AddedEffect | None = None) -> Iterator[str]:
+    """Yield what the control shows until so many parts are made, from a morning of March 2026 on. hidden: an effect it has"""
+    adapter, readies, machine = Adapter(START.timestamp()), 0, machine_as_built(hidden)
     for moment in working_day(lambda number: OnDemand(number, machine), spare, 0.0, machine):
         if (line := adapter.line(moment)) is not None:
             yield line

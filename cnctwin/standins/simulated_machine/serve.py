@@ -3,13 +3,14 @@
 import os
 import sys
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 from threading import Event
 
 from cnctwin.errors import ApplicationError
 from cnctwin.processes.state_file import STATE_S, keep
 from cnctwin.standins.mtconnect_agent.errors import ReplayError
-from cnctwin.standins.simulated_machine.agent import SimulatedMachine
+from cnctwin.standins.simulated_machine.agent import PATIENCE_S, SimulatedMachine
 from cnctwin.standins.simulated_machine.as_built import machine_as_built
 from cnctwin.standins.simulated_machine.description import PROGRAM
 from cnctwin.standins.simulated_machine.hidden_effect import Choice, sealed_effect
@@ -33,7 +34,9 @@ def simulate_machine(
         added, sealed = sealed_effect(hidden.choice, hidden.seed, hidden.sealed)
         print(f"an effect is hidden in the machine; the hash of its name, size and salt is {sealed.seal.digest}", flush=True)
     try:
-        machine = SimulatedMachine(speed=speed, port=port, machine=machine_as_built(added))
+        machine = SimulatedMachine(
+            speed=speed, port=port, machine=machine_as_built(added), patience_s=inf if added else PATIENCE_S
+        )
     except ReplayError as error:
         raise ApplicationError(str(error)) from error
     machine.start()

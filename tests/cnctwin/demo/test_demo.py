@@ -19,6 +19,7 @@ from cnctwin.errors import UsageError
 from cnctwin.plant.view import StageLedger, ledgers
 from cnctwin.processes.private_broker import answers
 from cnctwin.standins.simulated_machine.description import DEVICES, SPARE_PART
+from cnctwin.standins.simulated_machine.hidden_effect import hidden_effects
 from sparkplug.broker import BrokerAddress
 from sparkplug.host import EventKind, HostApplication, HostEvent
 from sparkplug.metric import NodeId, Reading
@@ -34,7 +35,7 @@ STAGES = ["edge-vmc", *sorted(f"twin-{name}" for name in PROCESSORS)]
 START_S_MAX = 150.0  # with the kernels of the scores to compile, on a computer that has other things to do
 WITH_A_GIVEN_PORT = {"agent", "page"}
 """Their ports are the system's choice, which gives one to somebody else too while they are dead; then they are started again."""
-PARTS = ["edge", "historian", "jobs", "mosquitto", "process", "serve", "simulate-control"]
+PARTS = ["edge", "historian", "jobs", "mosquitto", "process", "serve", "simulate-control", "twin"]
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -95,7 +96,8 @@ def test_whatever_is_killed_comes_back_and_ctrl_c_ends_it_with_a_ledger_that_bal
         assert program.ask_to_end(signal.SIGINT) == 0, program.err
         summary = json.loads(program.out)
     assert summary["balances"] is True
-    assert summary["restarts"].keys() == {"mosquitto", *WITH_A_GIVEN_PORT, "historian", "processors", "edge", "jobs"}
+    assert summary["loop"]["effect"] in {hidden.effect for hidden in hidden_effects()}
+    assert summary["restarts"].keys() == {"mosquitto", *WITH_A_GIVEN_PORT, "historian", "processors", "edge", "jobs", "loop"}
     assert {part for part, count in summary["restarts"].items() if count > 1} <= WITH_A_GIVEN_PORT
     assert [pid for pid in last.values() if is_alive(pid)] == []
     assert not answers("127.0.0.1", port)
@@ -201,6 +203,10 @@ def test_the_summary_accounts_for_everything(whole: dict[str, Any]) -> None:
         assert stage["balances"] is True
         assert stage["buffered"] == 0
     assert whole["ledgers"][0]["received"] == whole["agent"]["observations"], "the edge took each observation once"
+
+
+def test_a_recording_hides_nothing(whole: dict[str, Any]) -> None:
+    assert whole["loop"] is None
 
 
 def test_the_summary_tells_what_the_machine_did(whole: dict[str, Any]) -> None:

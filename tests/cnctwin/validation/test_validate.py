@@ -86,7 +86,8 @@ def test_a_dynamometer_with_a_clock_of_its_own_is_put_where_it_was(store: Path, 
 
 
 def test_two_nights_over_call_for_retraining_by_exit_code_and_in_words(tmp_path: Path) -> None:
-    (tmp_path / "p.toml").write_text(PROCESSORS.read_text() + "\n[validation]\ntemperature_mae_k = 0.05\n")
+    constants = "".join(f"{name} = {value}\n" for name, value in told_twin().tables["thermal"].items())
+    (tmp_path / "p.toml").write_text(f"[thermal]\n{constants}\n[validation]\ntemperature_mae_k = 0.05\n")
     for night, at_s in ((1, START_S - 86_400.0), (2, START_S)):
         write_run(warm_night(1.5, at_s), tmp_path / f"{night}.parquet")
         code, said = run(

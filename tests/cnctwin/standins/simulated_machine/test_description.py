@@ -9,7 +9,7 @@ from typing import Any
 
 from cnctwin.standins.simulated_machine import description
 from cnctwin.standins.simulated_machine.as_built import machine_as_built
-from twin.machine import read_machine
+from twin.machine import machine_from_toml, read_machine
 
 HEAVY = ("numpy", "scipy", "numba", "pyarrow")
 LIGHT = (
@@ -43,15 +43,19 @@ def test_the_machine_differs_from_what_is_told_by_a_few_per_cent() -> None:
     assert not [name for name in changed if "gain" in name or "lead" in name], "a control knows its own parameters"
 
 
-def test_the_processors_are_told_what_the_machine_description_tells() -> None:
-    settings = tomllib.loads(description.PROCESSORS.read_text(encoding="utf-8"))
-    told = read_machine(description.TOLD).model_dump()
-    assert settings["thermal"] == told["thermal"]
-    force = settings["cutting_force"]
-    assert {key: force[key] for key in told["spindle"]} == told["spindle"]
+def test_the_live_twin_is_told_the_machine_with_the_tools_of_its_program() -> None:
+    told, alone = machine_from_toml(description.description_text()), read_machine(description.TOLD)
+    assert told.model_copy(update={"tools": {}}) == alone
     named = dict(re.findall(r"T(\d) [A-Z ]*?(?:D|M)([\d.]+)", description.program_text().partition("G21")[0]))
-    assert {key: f"{value:g}" for key, value in force["tool_diameters_mm"].items()} == named
-    assert force["tool_diameters_mm"]["1"] == force["tool_diameters_mm"]["5"] == told["tool"]["diameter_mm"]
+    assert {number: f"{tool.diameter_mm:g}" for number, tool in told.tools.items()} == named
+    assert alone.tool is not None
+    assert told.tools["1"].diameter_mm == told.tools["5"].diameter_mm == alone.tool.diameter_mm
+
+
+def test_the_processors_are_told_how_to_run_and_not_what_the_machine_is() -> None:
+    settings = tomllib.loads(description.PROCESSORS.read_text(encoding="utf-8"))
+    assert settings.keys() == {"gap", "loop"}
+    assert not {"rated_power_kw", "idle_power_kw"} & settings["gap"].keys()
 
 
 def test_start_up_imports_none_of_the_arrays() -> None:

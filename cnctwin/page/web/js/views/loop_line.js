@@ -2,7 +2,7 @@
 
 import { get, part } from "../api.js";
 import { el, setHidden, setText } from "../dom.js";
-import { sentence } from "../text.js";
+import { told } from "./twin_parts.js";
 
 const ASK_MS = 3000;
 
@@ -23,7 +23,7 @@ export function loopLine(app, name) {
       const loop = await get(["twin", part(name)].join("/"), { signal: stop.signal });
       const text = loop.step === "promoted" && loop.last ? loop.last.text : loop.text;
       setHidden(element, !text);
-      setText(said, sentence(text));
+      setText(said, told(text));
     } catch (error) {
       if (error.status !== -1) setHidden(element, true); // without a loop there is nothing to say here
     }

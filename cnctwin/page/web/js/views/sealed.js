@@ -3,8 +3,8 @@
 import { post } from "../api.js";
 import { openAsked } from "../dialogs.js";
 import { el, say, symbol } from "../dom.js";
-import { number, words } from "../text.js";
-import { called } from "./twin_parts.js";
+import { number, sentence } from "../text.js";
+import { called, parameter } from "./twin_parts.js";
 
 const SHOWN_DIGITS = 8;
 
@@ -31,7 +31,7 @@ export function sealedBox(sealed, changed) {
       "ul",
       { class: "plainlist" },
       Object.entries(revealed.parameters ?? {}).map(([name, one]) =>
-        el("li", {}, `${words(name)} `, el("strong", {}, `${number(one.value)} ${one.unit ?? ""}`.trim()), `: ${one.meaning ?? ""}`),
+        el("li", {}, `${sentence(parameter(name))} `, el("strong", {}, `${number(one.value)} ${one.unit ?? ""}`.trim()), `: ${one.meaning ?? ""}`),
       ),
     ),
     checked,

@@ -8,7 +8,7 @@ import { age, moment, sentence } from "../text.js";
 import { serverNow } from "../clock.js";
 import { CHALLENGER_PREFIX, GAP_PREFIX, TWIN_PREFIX } from "../vocabulary.js";
 import { sealedBox } from "./sealed.js";
-import { answer, bars, history, score, steps } from "./twin_parts.js";
+import { answer, bars, history, score, steps, told as inWords } from "./twin_parts.js";
 
 const ASK_MS = 1500;
 const BUSY = ["composing", "diagnosing"];
@@ -116,13 +116,13 @@ export function twinLoop(app, name, changed = () => {}) {
     version = told.live?.version ?? null;
     element.dataset.step = told.step;
     stepper.show({ step: told.step });
-    setText(said, sentence(told.text));
+    setText(said, inWords(told.text));
     setHidden(bar, !BUSY.includes(told.step));
     if (Number.isFinite(told.progress)) bar.value = told.progress;
     else bar.removeAttribute("value");
     found.show(told.challenger ? { ...told.challenger, version: null, since: null } : null);
     scored.show(told.challenger ? (told.score ?? null) : null);
-    last.show(told.last ?? null);
+    last.show(told.last && !String(told.text).startsWith(told.last.text) ? told.last : null);
     taken.show(told.steps ?? []);
     offer();
     write();

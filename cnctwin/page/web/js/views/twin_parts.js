@@ -28,6 +28,13 @@ const list = (value) => (Array.isArray(value) ? value : []);
 export const called = (one) =>
   one.on ? `${words(one.effect)} on ${one.on.length === 1 ? one.on.toUpperCase() : recorded(one.on).toLowerCase()}` : words(one.effect);
 
+/** A parameter in words, without the unit at its end. */
+export const parameter = (name) =>
+  words(name.replace(/_(s|n|k|kw|mm|rpm_s|rpm|w_per_k|j_per_k)$/, "")).toLowerCase();
+
+/** A sentence of the loop; a version that it begins with stays as it is. */
+export const told = (text) => (/^[0-9a-f]{12} /.test(text ?? "") ? text : sentence(text));
+
 /** Where the loop stands: one of five steps, or refused. */
 export function steps(loop) {
   const at = STEPS.findIndex(([name]) => name === loop.step);
@@ -54,7 +61,7 @@ export function answer(found) {
   const causes = list(found.causes),
     unit = (one) => (one.unit && one.unit !== "unit of the signal" ? ` ${one.unit}` : "");
   const gaps = [found.gap_before, found.gap_after].every(Number.isFinite)
-    ? `gap ${number(found.gap_before)} → ${number(found.gap_after)} floors, on a stretch that it was not fitted to`
+    ? `gap ${coarse(found.gap_before)} → ${coarse(found.gap_after)} floors, on a stretch that it was not fitted to`
     : "";
   return el(
     "div",
@@ -72,7 +79,7 @@ export function answer(found) {
           {},
           Object.entries(one.parameters ?? {}).map(([name, size], i) => [
             i ? "; " : "",
-            `${words(name).toLowerCase()} `,
+            `${parameter(name)} `,
             el("strong", {}, `${number(size.value)}${unit(size)}`),
             Number.isFinite(size.low) ? ` (${number(size.low)} to ${number(size.high)})` : "",
           ]),
@@ -131,7 +138,7 @@ export function bars(standing, hasChallenger) {
 export function score(found) {
   if (!found) return null;
   const runs = found.runs === 1 ? "one kept run" : `${found.runs} kept runs`;
-  return el("p", { class: "note" }, `On ${runs}: live ${number(found.live)}, challenger ${number(found.challenger)} floors.`);
+  return el("p", { class: "note" }, `On ${runs}: live ${coarse(found.live)}, challenger ${coarse(found.challenger)} floors.`);
 }
 
 /** Every step that was taken, the newest first. */

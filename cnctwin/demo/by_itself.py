@@ -1,0 +1,10 @@
+"""Who goes on with the loop of the demo."""
+
+from enum import StrEnum
+
+
+class ByItself(StrEnum):
+    """The one who goes on with the loop: the loop, or a person at the page."""
+
+    BY_ITSELF = "by-itself"
+    BY_HAND = "by-hand"
