@@ -24,6 +24,7 @@ from cnctwin.api.routes.people import people_routes
 from cnctwin.api.routes.plant import plant_routes
 from cnctwin.api.routes.prediction import prediction_routes
 from cnctwin.api.routes.sealed import sealed_routes
+from cnctwin.api.routes.twin import twin_routes
 from cnctwin.api.sources import Sources
 
 ABOUT = "A digital twin of CNC machines: state, predictions, history, gaps, alerts. Times are ms since 1970, UTC."
@@ -57,6 +58,7 @@ def create_app(sources: Sources) -> FastAPI:
         plant_routes(sources.live, fan_out),
         prediction_routes(sources),
         gap_routes(sources),
+        twin_routes(sources),
         alert_routes(sources.live, sources.viewer),
         job_routes(sources),
         history_routes(sources.live, sources.store),

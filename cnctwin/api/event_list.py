@@ -12,6 +12,7 @@ from typing import Any
 from cnctwin.api.live.documents import DocumentError, read_object
 from cnctwin.api.live.trace import Sample
 from processors.alarms import alarm_signals
+from processors.description import DescriptionMessage, Role
 from sparkplug.quality import Quality
 from twin.vocabulary import twin_signals
 
@@ -67,6 +68,18 @@ def part_records(held: Iterable[Sample]) -> list[dict[str, Any]]:
         if record is not None:
             found[json.dumps(record, sort_keys=True)] = {**record, "t": sample.t_ms}
     return list(reversed(found.values()))
+
+
+def description_text(role: Role, message: DescriptionMessage | None) -> str:
+    """Return a change of a machine's description in words.
+
+    >>> description_text(Role.LIVE, DescriptionMessage(version="3f2a", toml="", step="promoted", by="anna", why="it fits"))
+    'description 3f2a live: promoted by anna: it fits'
+    """
+    if message is None:
+        return f"no {role} description any more"
+    how = " ".join(filter(None, (message.step, f"by {message.by}" if message.by else "")))
+    return ": ".join(filter(None, (f"description {message.version} {role}", how, message.why)))
 
 
 def _stretches(kind: str, held: Sequence[Sample], text_of: Any) -> Iterator[Event]:

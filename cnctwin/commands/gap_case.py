@@ -1,8 +1,8 @@
-"""`cnctwin gap case`: a case from a machine's history."""
+"""`cnctwin gap case`: a case from a machine's history, or from run logs."""
 
 import json
-import os
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -20,7 +20,7 @@ from cnctwin.terminal.spinner import working
 if TYPE_CHECKING:
     from cnctwin.composing.composed import Composed
 
-MACHINES = "CNCTWIN_MACHINES"
+ON_SHOWN = 4
 Machine = Annotated[str | None, typer.Option("--machine", help="Name of the machine in the store")]
 From = Annotated[str | None, typer.Option("--from", help="2026-11-22T06:00 (UTC where no zone is given), or -8h; else all")]
 To = Annotated[str | None, typer.Option("--to", help="The same; else the end of what the store has")]
@@ -33,6 +33,7 @@ Ambient = Annotated[float | None, typer.Option("--ambient-c", help="The surround
 
 def case(
     out: Annotated[Path, typer.Option(help="The folder to write; a case that is there is replaced")],
+    runs: Annotated[list[Path] | None, typer.Argument(help="Run logs, .parquet or .csv; else --machine of a store")] = None,
     store: Annotated[str | None, typer.Option(help="Folder or address; else $CNCTWIN_STORE", show_default=False)] = None,
     machine: Machine = None,
     from_: From = None,
@@ -42,19 +43,56 @@ def case(
     healthy_from: Annotated[str | None, typer.Option(help="Beginning of a time in which the twin was right")] = None,
     healthy_to: Annotated[str | None, typer.Option(help="Its end")] = None,
     ambient_c: Ambient = None,
+    fit: Annotated[list[str] | None, typer.Option(help="Run log to learn from")] = None,
+    check: Annotated[list[str] | None, typer.Option(help="Run log to be judged on")] = None,
+    kind: Annotated[list[str] | None, typer.Option(help="NAME=air, cut, warmup or program, of a run log")] = None,
+    repeats: Annotated[list[str] | None, typer.Option(help="NAME=OTHER: a run log repeats another")] = None,
+    program: Annotated[list[str] | None, typer.Option(help="NAME=file.nc that a run log is of")] = None,
+    healthy: Annotated[list[str] | None, typer.Option(help="Run log made when the twin was right")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Compose a case for `gap diagnose` out of a machine's history. Exit code 1: nothing is left to be judged on."""
-    if machine is None:
-        raise UsageError("--machine NAME is missing; `cnctwin store status` tells which machines the store has")
-    done = composed_of(
-        store, machine, out, from_, to, machine_file, programs, healthy=(healthy_from, healthy_to), ambient_c=ambient_c
-    )
+    """Compose a case for `gap diagnose` from a machine's history, or from run logs.
+
+    From a store: `--machine M`, and what is fitted comes before what is judged on. From run logs: kinds, roles and repeats are
+    guessed where no option says them; on a terminal you are asked. Exit code 1: nothing is left to be judged on.
+    """
+    said = {"--fit": fit, "--check": check, "--kind": kind, "--repeats": repeats, "--program": program, "--healthy": healthy}
+    if runs:
+        if given := [
+            name for name, v in _of_store(store, machine, from_, to, programs, healthy_from, healthy_to, ambient_c) if v
+        ]:
+            raise UsageError(f"{given[0]} belongs to a case from a store; give run logs or --machine, not both")
+        done = _from_runs(runs, machine_file, out, {name: values or [] for name, values in said.items()})
+    elif machine is None:
+        raise UsageError("name run logs, or a machine of the store: --machine NAME; `cnctwin store status` tells which it has")
+    else:
+        if given := [name for name, values in said.items() if values]:
+            raise UsageError(f"{given[0]} belongs to run logs; a case from a store finds out by itself")
+        period = (healthy_from, healthy_to)
+        done = composed_of(store, machine, out, from_, to, machine_file, programs, healthy=period, ambient_c=ambient_c)
     if as_json:
         sys.stdout.write(json.dumps(done.as_json(), ensure_ascii=False) + "\n")
     else:
         show(done)
     raise typer.Exit(0 if done.has_check else 1)
+
+
+def _of_store(*values: object) -> list[tuple[str, object]]:
+    """Return the options of a case from a store, by name."""
+    names = ("--store", "--machine", "--from", "--to", "--programs", "--healthy-from", "--healthy-to", "--ambient-c")
+    return [(name, value is not None) for name, value in zip(names, values, strict=True)]
+
+
+def _from_runs(runs: list[Path], machine_file: Path | None, out: Path, said: dict[str, list[str]]) -> "Composed":
+    """Compose a case from run logs, asking on a terminal for what no option says."""
+    with needed_by("a case", "twin"):
+        from cnctwin.commands.gap_case_runs import machine_file_of, recordings_of
+        from cnctwin.composing.from_runs import compose_runs
+
+    recordings = recordings_of(runs, said)
+    description = read_text(machine_file_of(machine_file))
+    with working("composing"):
+        return compose_runs(recordings, description, out)
 
 
 def composed_of(
@@ -96,11 +134,13 @@ def composed_of(
 def description_of(machine: str, machine_file: Path | None) -> str:
     """Return the text that describes a machine: the file given, its file in the folder of machines, else an assumed one."""
     from cnctwin.composing.assumed import assumed_description
+    from cnctwin.machines.place import machines_folder
 
     if machine_file is not None:
         return read_text(machine_file)
-    live = Path(os.environ.get(MACHINES) or "machines") / f"{machine}.toml"
-    return read_text(live) if live.is_file() else assumed_description(machine)
+    folder = machines_folder()
+    live = None if folder is None else folder / f"{machine}.toml"
+    return read_text(live) if live is not None and live.is_file() else assumed_description(machine)
 
 
 def _span_ms(from_: str | None, to: str | None) -> tuple[int, int] | None:
@@ -132,7 +172,7 @@ def show(done: "Composed") -> None:
         repeats = (run.repeats or "").removeprefix("runs/")
         runs.add_row(name, run.what, run.kind.value, role, begun, _length(run.lasted_s), str(run.rows), repeats)
     console.print(runs)
-    shown = [f"{one.effect} ({', '.join(one.on)})" if one.on else one.effect for one in done.effects if not one.missing]
+    shown = [f"{one.effect}{_places(one.on)}" for one in done.effects if not one.missing]
     console.print("\n[bold]can show[/]")
     console.print(f"· {', '.join(shown) or 'nothing'}", markup=False, highlight=False, soft_wrap=True)
     lacking: dict[str, list[str]] = {}
@@ -147,6 +187,17 @@ def show(done: "Composed") -> None:
         console.print("\n[bold]how it was composed[/]")
     for note in done.notes:
         console.print(f"· {note}", markup=False, highlight=False, soft_wrap=True)
+
+
+def _places(on: Sequence[str]) -> str:
+    """Return where an effect may act, in brackets.
+
+    >>> _places(()), _places(("x", "y"))
+    ('', ' (x, y)')
+    """
+    if len(on) > ON_SHOWN:
+        return f" ({len(on)} signals)"
+    return f" ({', '.join(on)})" if on else ""
 
 
 def _length(seconds: float) -> str:

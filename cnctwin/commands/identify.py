@@ -2,6 +2,7 @@
 
 import json
 import sys
+import tempfile
 import time
 from dataclasses import asdict
 from enum import StrEnum
@@ -12,7 +13,9 @@ import typer
 from rich.table import Table
 
 from cnctwin.commands.extras import needed_by
+from cnctwin.commands.gap_case import Ambient, From, Machine, MachineFile, To, composed_of
 from cnctwin.commands.options import AsJson
+from cnctwin.errors import UsageError
 from cnctwin.files.output import write
 from cnctwin.terminal.console import standard_output
 from cnctwin.terminal.spinner import working
@@ -30,8 +33,16 @@ class Method(StrEnum):
 
 
 def identify(
-    case: Annotated[Path, typer.Argument(help="The folder with case.toml, machine.toml and the recorded runs")],
+    case: Annotated[
+        Path | None, typer.Argument(help="The folder with case.toml, machine.toml and recorded runs; else --machine of a store")
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="Write the identified machine.toml there")] = None,
+    store: Annotated[str | None, typer.Option(help="Folder or address; else $CNCTWIN_STORE", show_default=False)] = None,
+    machine: Machine = None,
+    from_: From = None,
+    to: To = None,
+    machine_file: MachineFile = None,
+    ambient_c: Ambient = None,
     method: Annotated[
         Method, typer.Option(help="least-squares, or the reference paper's genetic algorithm beside it")
     ] = Method.LSQ,
@@ -46,11 +57,18 @@ def identify(
         from twin.identification import identify as identification
         from twin.machine_toml import machine_to_toml
     if method is Method.GA:
+        if case is None:
+            raise UsageError("--method ga compares the two on a case; give its folder")
         _compare_methods(case, seed, as_json=as_json)
         return
-    question = read_case(case)
-    with working("identifying") as say:
-        found = identification.identify(question, free_gains=free_gains, progress=lambda what: say(f"identifying: {what}"))
+    with tempfile.TemporaryDirectory(prefix="identify-") as passing:
+        if case is None and machine is not None:
+            case = composed_of(store, machine, Path(passing) / "case", from_, to, machine_file, None, ambient_c=ambient_c).folder
+        elif case is None or machine is not None:
+            raise UsageError("give either the folder of a case, or a machine of the store: --machine NAME")
+        question = read_case(case)
+        with working("identifying") as say:
+            found = identification.identify(question, free_gains=free_gains, progress=lambda what: say(f"identifying: {what}"))
     code = 0 if found.estimates and not found.misfits else 1
     if out is not None:
         write(lambda: out.write_text(machine_to_toml(found.machine), encoding="utf-8"), out)

@@ -18,7 +18,9 @@ def serve(
     ] = None,
     config: Annotated[Path | None, typer.Option(help="The processors' TOML: constants of the machines for /predict")] = None,
     models: Annotated[Path | None, typer.Option(help="Folder of the models")] = None,
-    diagnoses: Annotated[Path | None, typer.Option(help="Folder with <machine>/diagnosis.json and report.html")] = None,
+    diagnoses: Annotated[
+        Path | None, typer.Option(help="Folder with <machine>/diagnosis.json; else that of the loop (twin run)")
+    ] = None,
     jobs: Annotated[Path | None, typer.Option(help="The batch consumer's folder, to offer the files of results")] = None,
     host: Annotated[str, typer.Option(help="Address to listen on; another than loopback needs a token or a proxy")] = "127.0.0.1",
     port: Annotated[int, typer.Option(help="TCP port; 0 = a free one", min=0, max=65535)] = 8080,
@@ -43,6 +45,7 @@ def serve(
     """The page and the runtime interface: state, predictions, history, gaps and alerts over HTTP."""
     from cnctwin.api.serve import ServeOptions
     from cnctwin.api.serve import serve as run_server
+    from cnctwin.machines.place import diagnoses_folder, machines_folder
     from cnctwin.memory.store.opening import default_place
 
     options = ServeOptions(
@@ -50,7 +53,7 @@ def serve(
         store=store or str(default_place()),
         config=config,
         models=models,
-        diagnoses=diagnoses,
+        diagnoses=diagnoses or diagnoses_folder(machines_folder(None, config)),
         jobs=jobs,
         host=host,
         port=port,

@@ -5,6 +5,7 @@ Exit codes: 0 = done; 1 = refused, with the reason; 2 = wrong input.
 
 import getpass
 import json
+import logging
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -13,14 +14,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from cnctwin.commands.extras import needed_by
 from cnctwin.commands.moment import moment_text
-from cnctwin.commands.options import AsJson, Machines
+from cnctwin.commands.options import AsJson, Broker, Group, Machines, StorePlace, Wait
 from cnctwin.errors import UsageError
+from cnctwin.files.program_text import read_text
+from cnctwin.processes.given_broker import address, broker_or_own
+from cnctwin.processes.stopping import stopped_by_signals
 from cnctwin.terminal.console import standard_output
 
 if TYPE_CHECKING:
     from cnctwin.machines.change import Change, Done
     from cnctwin.machines.folder import MachineFolder
+    from sparkplug.broker import BrokerAddress
 
 twin_app = typer.Typer(
     no_args_is_help=True, help="The description of a machine: which is live, which challenger waits, promote it, go back."
@@ -33,17 +39,46 @@ STEPS_SHOWN = 12
 
 
 @twin_app.command()
-def show(machine: MachineName, machines: Machines = None, as_json: AsJson = False) -> None:
-    """Which description is live since when, what of it is assumed, which challenger waits and why, and the last steps."""
+def show(
+    machine: MachineName,
+    machines: Machines = None,
+    broker: Broker = None,
+    group: Group = "cnc",
+    wait_s: Wait = 3.0,
+    as_json: AsJson = False,
+) -> None:
+    """Which description is live since when, what is assumed, which challenger waits, and what each does to the standing gap."""
     from cnctwin.machines.told import told
 
-    found = told(_folder(machine, machines))
+    own = _folder(machine, machines)
+    found = told(own) | {"standing": _standing(address(broker), group, machine, wait_s)}
     if as_json:
         sys.stdout.write(json.dumps(found, ensure_ascii=False) + "\n")
         return
     console = standard_output()
     for line in _lines(found):
         console.print(line, markup=False, highlight=False, soft_wrap=True)
+
+
+@twin_app.command()
+def challenge(
+    machine: MachineName,
+    twin: Annotated[Path, typer.Argument(help="The twin.toml of a diagnosis, or any machine.toml")],
+    case: Annotated[
+        Path | None, typer.Option(help="A case whose check runs it is scored on, beside the live one", show_default=False)
+    ] = None,
+    by: By = None,
+    why: Why = "",
+    machines: Machines = None,
+    as_json: AsJson = False,
+) -> None:
+    """Have a description wait as the challenger; the diagnosis.json beside it says where it comes from."""
+    own = _folder(machine, machines)
+    with needed_by("scoring a description", "twin"):
+        from cnctwin.loop.judging import card_of
+    live, text = own.live(), read_text(twin)
+    card = card_of(twin, case, None if live is None else own.live_file.read_text(encoding="utf-8"))
+    _change(machine, machines, lambda change: change.file(text, card, _user(by), why or card.sentence), as_json)
 
 
 @twin_app.command()
@@ -84,6 +119,44 @@ def withdraw(
 ) -> None:
     """Take the challenger away; it stays in the history."""
     _change(machine, machines, lambda change: change.withdraw(_user(by), why), as_json)
+
+
+@twin_app.command("run")
+def run_loop(
+    machines: Machines = None,
+    config: Annotated[Path | None, typer.Option(help="The processors' TOML, with the table [loop]")] = None,
+    store: StorePlace = None,
+    jobs_files: Annotated[
+        Path | None, typer.Option(help="The --files of `cnctwin jobs run`; else cases in the state folder", show_default=False)
+    ] = None,
+    jobs: Annotated[
+        Path | None, typer.Option(help="The --dir of `cnctwin jobs run`; else jobs in the state folder", show_default=False)
+    ] = None,
+    diagnoses: Annotated[
+        Path | None, typer.Option(help="The --diagnoses of `cnctwin serve`; else diagnoses beside the descriptions")
+    ] = None,
+    broker: Broker = None,
+    group: Group = "cnc",
+) -> None:
+    """Keep the loop of a plant until SIGTERM or Ctrl-C: an open gap is diagnosed, and the answer waits as a challenger."""
+    from cnctwin.loop.config import loop_configuration
+    from cnctwin.loop.service import LoopService
+    from cnctwin.loop.workshop import Places
+    from cnctwin.machines.place import machines_folder
+    from cnctwin.memory.store.opening import default_place
+    from edge.state_dir import state_dir
+
+    folder = machines_folder(machines, config)
+    if folder is None:
+        raise UsageError("no folder of descriptions is here; give --machines DIR or $CNCTWIN_MACHINES (docs/loop.md)")
+    files = jobs_files or state_dir() / "cases"
+    files.mkdir(parents=True, exist_ok=True)
+    places = Places(store or default_place(), files, jobs or state_dir() / "jobs", diagnoses or folder / "diagnoses")
+    logging.getLogger("cnctwin.loop").setLevel(logging.INFO)
+    with stopped_by_signals() as stop, broker_or_own(address(broker)) as where:
+        service = LoopService(folder, where, loop_configuration(config), places, group)
+        print(f"the loop of {where.url} keeps {folder}; jobs read {files}", file=sys.stderr)
+        service.run(stop)
 
 
 def _folder(machine: str, given: Path | None) -> "MachineFolder":
@@ -146,8 +219,9 @@ def _lines(found: Mapping[str, Any]) -> Iterator[str]:
         if score is not None:
             both = f"live {score['live']:.3g}, challenger {score['challenger']:.3g} floors"
             yield f"gap on {score['runs']} runs that were not fitted: {both}"
-        yield from _shadow(found["shadow"])
+        yield from _shadow(found["shadow"], found["standing"])
         yield "it may be promoted" if found["may_promote"] else f"it may not be promoted: {found['why_not']}"
+    yield from _gaps(found["standing"])
     for fault in found["faults"]:
         yield f"wrong: {fault}"
     for step in found["steps"][-STEPS_SHOWN:]:
@@ -155,10 +229,29 @@ def _lines(found: Mapping[str, Any]) -> Iterator[str]:
         yield f"{moment_text(step['t'])}  {step['step']:<11} {step.get('version', ''):<12} by {step.get('by') or '?'}{why}"
 
 
-def _shadow(shadow: Mapping[str, Any] | None) -> Iterator[str]:
+def _shadow(shadow: Mapping[str, Any] | None, standing: Mapping[str, Any] | None) -> Iterator[str]:
+    """What the loop has kept of the shadow; its gaps only where the broker tells none."""
     if shadow is None:
         return
-    for signal, floors in shadow["live"].items():
-        if signal in shadow["challenger"]:
-            yield f"standing gap of {signal}: live {floors:.2f}, challenger {shadow['challenger'][signal]:.2f} floors"
-    yield f"beside the live one for {shadow['seconds']:.0f} s"
+    if standing is None:
+        yield from _gaps({one: {"live": shadow["live"].get(one), "challenger": gap} for one, gap in shadow["challenger"].items()})
+    yield f"it has run beside the live one for {shadow['seconds']:.0f} s"
+
+
+def _gaps(standing: Mapping[str, Any] | None) -> Iterator[str]:
+    for signal, gaps in (standing or {}).items():
+        known = [f"{which} {gap:.2f}" for which in ("live", "challenger") if (gap := gaps[which]) is not None]
+        yield f"standing gap of {signal}: {', '.join(known)} floors"
+
+
+def _standing(broker: "BrokerAddress | None", group: str, machine: str, wait_s: float) -> dict[str, Any] | None:
+    """The standing gap by signal, of both; None where no broker is given, or it tells nothing."""
+    if broker is None:
+        return None
+    from cnctwin.loop.listening import heard_gap
+
+    found = heard_gap(broker, group, machine, wait_s)
+    if found is None:
+        return None
+    signals = sorted({*found.live, *found.challenger})
+    return {one: {"live": found.live.get(one), "challenger": found.challenger.get(one)} for one in signals}

@@ -146,12 +146,9 @@ def _load_missing(fitted: Fitted) -> str:
 
 
 def _is_fast(fitted: Fitted, column: str) -> bool:
-    """Return True where a column is recorded at the rate of the servo loops."""
-    for log in fitted.logs(program=False):
-        there = log.t_s[np.isfinite(log.columns[column])] if column in log.columns else np.zeros(0)
-        if len(there) > 1 and float(np.median(np.diff(there))) <= FAST_S:
-            return True
-    return False
+    """Return True where a run with a column is recorded at the rate of the servo loops."""
+    logs = (log for log in fitted.logs(program=False) if log.has(column) and len(log) > 1)
+    return any(float(np.median(np.diff(log.t_s))) <= FAST_S for log in logs)
 
 
 def _unexcited(effect: Effect, fitted: Fitted) -> str:

@@ -14,10 +14,11 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from processors.config import MACHINES, read_tables
+from processors.config import MACHINES, Configuration, read_tables
 from processors.errors import ConfigurationError
+from processors.gap.config import Config as GapConfig
 
-TABLE = "loop"
+TABLE, GAP = "loop", "gap"
 Hours = Annotated[float, Field(ge=0.0, le=8766.0)]
 Floors = Annotated[float, Field(ge=0.0, le=1000.0)]
 
@@ -43,6 +44,7 @@ class LoopConfig(BaseModel):
 
     diagnose: Diagnose = Diagnose.BY_ITSELF
     window_hours: float = Field(default=8.0, gt=0.0, le=720.0, description="of history, where nothing says since when")
+    open_hours: Hours = Field(default=2.0, description="for which a gap is open before a diagnosis begins by itself")
     history_days: float = Field(default=30.0, gt=0.0, le=366.0, description="no case reaches further back")
     again_hours: Hours = Field(default=24.0, description="after a diagnosis that led to nothing, before the next by itself")
     shadow_s: float = Field(default=900.0, ge=0.0, le=31e6, description="beside the live one, without runs to score it on")
@@ -57,9 +59,13 @@ class LoopConfig(BaseModel):
 
 
 class LoopConfiguration:
-    """The values for all machines, and for those that have their own. Raises ConfigurationError naming key and value."""
+    """The values for all machines, and for those that have their own. Raises ConfigurationError naming key and value.
 
-    def __init__(self, table: Mapping[str, Any] | None = None) -> None:
+    gap: the configuration of the processor `gap`, which states since when a machine was healthy
+    """
+
+    def __init__(self, table: Mapping[str, Any] | None = None, gap: Configuration[GapConfig] | None = None) -> None:
+        self._gap = gap
         shared = dict(table or {})
         machines = shared.pop(MACHINES, {})
         if not isinstance(machines, dict) or not all(isinstance(own, dict) for own in machines.values()):
@@ -71,10 +77,19 @@ class LoopConfiguration:
         """Return the values that hold for a machine."""
         return self._own.get(machine, self.default)
 
+    def healthy_ms(self, machine: str) -> tuple[int, int] | None:
+        """Return when somebody has stated that the machine was healthy; None where nobody has."""
+        stated = None if self._gap is None else self._gap.of(machine)
+        if stated is None or stated.healthy_from is None:
+            return None
+        from_ms = round(stated.healthy_from.timestamp() * 1000)
+        return from_ms, from_ms + round(stated.healthy_hours * 3_600_000)
+
 
 def loop_configuration(config: Path | None) -> LoopConfiguration:
     """Return what the file of processors says of the loop. Raises ConfigurationError."""
-    return LoopConfiguration({} if config is None else read_tables(config).get(TABLE))
+    tables = {} if config is None else read_tables(config)
+    return LoopConfiguration(tables.get(TABLE), Configuration(GapConfig, tables.get(GAP), name=GAP))
 
 
 def _validated(table: Mapping[str, Any], where: str) -> LoopConfig:

@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping
 
 from cnctwin.loop.config import Diagnose, LoopConfig, Promote
 from cnctwin.loop.request import Request, Word
-from cnctwin.loop.span import span_of
+from cnctwin.loop.span import is_long_enough, span_of
 from cnctwin.loop.state import Answer, Last, State, StepName
 from cnctwin.loop.wording import floors, hours, promotion
 from cnctwin.loop.world import Back, Deed, File, Withdraw, World
@@ -149,7 +149,8 @@ def _watching(config: LoopConfig, state: State, world: World) -> Stepped:
     if not found.is_open:
         calm = state.step is StepName.REFUSED and world.at_ms >= state.quiet_until_at_ms
         return (_now(state, world, StepName.WATCHING, "watching the gap") if calm else state), None
-    if config.diagnose is Diagnose.BY_HAND or world.at_ms < state.quiet_until_at_ms:
+    waits = world.at_ms < state.quiet_until_at_ms or not is_long_enough(config, world)
+    if config.diagnose is Diagnose.BY_HAND or waits:
         if state.step is StepName.REFUSED:
             return state, None
         return state.now(text=f"the gap is open: {found.grows or found.opens}; a diagnosis can be asked for"), None
@@ -215,6 +216,8 @@ def _shadow(config: LoopConfig, state: State, world: World) -> Stepped:
 
 def _promoted(config: LoopConfig, state: State, world: World) -> Stepped:
     state = _seen(state, world)
+    if not state.promoted_at_ms:
+        state = state.now(promoted_at_ms=world.at_ms)
     if world.at_ms - state.promoted_at_ms >= config.back_hours * HOUR_MS:
         return _now(state, world, StepName.WATCHING, "watching the gap"), None
     return (state if state.last is None else state.now(text=promotion(state.last))), None
@@ -235,8 +238,8 @@ def _back_of_itself(config: LoopConfig, state: State, world: World) -> Back | No
 def _seen(state: State, world: World) -> State:
     """The state with the standing gap of the live description, also as that to which the last promotion has led."""
     now = world.standing.live
-    if dict(state.standing) == dict(now):
-        return state
+    if not now or dict(state.standing) == dict(now):
+        return state  # what was known holds until more is heard
     last = state.last
     if last is not None and last.signal in now and world.standing.at_ms > state.promoted_at_ms:
         last = last.model_copy(update={"after": now[last.signal]})

@@ -22,6 +22,8 @@ def document_of(told: dict[str, Any], state: State, standing: Standing, work: Wo
         "standing": {one: {"live": standing.live.get(one), "challenger": standing.challenger.get(one)} for one in signals},
         "open": standing.grows or standing.opens or None,
         "next_experiment": state.next_experiment,
-        "last": None if last is None else {"text": promotion(last), **last.model_dump(include={"before", "after", "since"})},
+        "last": None
+        if last is None
+        else {"text": promotion(last, is_since=False), **last.model_dump(include={"before", "after", "since"})},
         "answers": [answer.model_dump() for answer in state.answers],
     }

@@ -58,6 +58,7 @@ class State(_Kept):
     live: the live version as it was seen last; standing: its gap by signal
     before, promoted_at_ms: that gap when the live version was promoted, and when
     quiet_until_at_ms: nothing begins by itself before
+    at_ms: the machine's time as it was heard last, which holds until it is heard again
     """
 
     step: StepName = StepName.WATCHING
@@ -76,6 +77,7 @@ class State(_Kept):
     before: Mapping[str, float] = Field(default_factory=dict)
     promoted_at_ms: int = 0
     quiet_until_at_ms: int = 0
+    at_ms: int = 0
     last: Last | None = None
     answers: tuple[Answer, ...] = ()
 

@@ -5,8 +5,10 @@ from datetime import datetime, tzinfo
 from cnctwin.loop.state import Last
 
 
-def promotion(last: Last, zone: tzinfo | None = None) -> str:
-    """Return what a promotion has led to, in one sentence; `zone` None is that of this computer.
+def promotion(last: Last, zone: tzinfo | None = None, *, is_since: bool = True) -> str:
+    """Return what a promotion has led to, in one sentence.
+
+    zone: None is that of this computer; is_since: whether it says since when
 
     >>> from datetime import UTC
     >>> found = Last(says="coolant cools", signal="t", words="the temperature", before=3.1, after=1.1, since=1_795_521_780_000)
@@ -14,13 +16,13 @@ def promotion(last: Last, zone: tzinfo | None = None) -> str:
     'coolant cools: gap of the temperature 3.1 → 1.1 floors since Tuesday 12:03'
     """
     since = datetime.fromtimestamp(last.since / 1000.0, zone).astimezone(zone)
-    when = f"since {since:%A %H:%M}"
+    when = f" since {since:%A %H:%M}" if is_since else ""
     if last.before is None:
-        return f"{last.says}: live {when}"
+        return f"{last.says}: live{when}"
     of = f" of {last.words}" if last.words else ""
     if last.after is None:
-        return f"{last.says}: live {when}; the gap{of} was {floors(last.before)} floors"
-    return f"{last.says}: gap{of} {floors(last.before)} → {floors(last.after)} floors {when}"
+        return f"{last.says}: live{when}; the gap{of} was {floors(last.before)} floors"
+    return f"{last.says}: gap{of} {floors(last.before)} → {floors(last.after)} floors{when}"
 
 
 def floors(gap: float) -> str:

@@ -47,6 +47,7 @@ class World:
     now_ms: the clock on the wall; at_ms: the machine's own, as far as it is known
     live, challenger: versions, empty = there is none; card, live_card: the evidence for each
     live_since_ms, live_said: since when the live one is live, on the wall, and how that came
+    is_first: nothing else was ever live
     fault: why the live file cannot be used
     """
 
@@ -59,6 +60,7 @@ class World:
     live_card: Card | None = None
     live_since_ms: int = 0
     live_said: str = ""
+    is_first: bool = False
     fault: str = ""
     standing: Standing = NOTHING_HEARD
     work: Work = NO_WORK

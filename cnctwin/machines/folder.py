@@ -8,6 +8,7 @@
 Reading takes no lock, since each file is replaced as a whole; cnctwin/machines/change.py changes them.
 """
 
+from functools import lru_cache
 from pathlib import Path
 
 from cnctwin.errors import UsageError
@@ -77,7 +78,12 @@ class MachineFolder:
 
     def _description(self, file: Path) -> Description | None:
         text = disk.text_of(file)
-        return None if text is None else Description.from_toml(text, str(file))
+        return None if text is None else _parsed(text, str(file))
+
+
+@lru_cache(maxsize=1000)
+def _parsed(text: str, source: str) -> Description:
+    return Description.from_toml(text, source)
 
 
 def described(folder: Path) -> tuple[str, ...]:

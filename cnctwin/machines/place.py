@@ -23,3 +23,12 @@ def machines_folder(given: Path | None = None, config: Path | None = None) -> Pa
     if named := os.environ.get(VARIABLE):
         return Path(named)
     return Path(NAME) if Path(NAME).is_dir() else None
+
+
+def diagnoses_folder(machines: Path | None) -> Path | None:
+    """Return the folder in which the loop files diagnoses for the page, where nobody names another one.
+
+    >>> diagnoses_folder(Path("machines")).as_posix()
+    'machines/diagnoses'
+    """
+    return None if machines is None else machines / "diagnoses"

@@ -9,6 +9,7 @@ stand beside them, in floors: `gap_before`, `gap_after`.
 import json
 from collections.abc import Sequence
 from enum import StrEnum
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -68,7 +69,12 @@ class Step(BaseModel):
 
 def read_steps(path: Path) -> tuple[Step, ...]:
     """Return the steps of a log, oldest first; a line that is none, as half of one after a power cut, is passed over."""
-    return tuple(step for line in (disk.text_of(path) or "").splitlines() if (step := _parsed(line)) is not None)
+    return _steps(disk.text_of(path) or "")
+
+
+@lru_cache(maxsize=200)
+def _steps(text: str) -> tuple[Step, ...]:
+    return tuple(step for line in text.splitlines() if (step := _parsed(line)) is not None)
 
 
 def lives(steps: Sequence[Step]) -> tuple[str, ...]:

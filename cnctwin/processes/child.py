@@ -17,7 +17,7 @@ RESTART_S_MIN = 0.5
 STOP_S_MAX = 8.0
 
 
-def _die_with_parent() -> None:
+def die_with_parent() -> None:
     """Have the kernel end this process when its parent ends, even by kill -9 (Linux; elsewhere the parent's stop does it)."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
@@ -45,7 +45,7 @@ class Child:
             stdin=subprocess.DEVNULL,
             stdout=self._log_file,
             stderr=subprocess.STDOUT,
-            preexec_fn=_die_with_parent,  # noqa: PLW1509 — one prctl call, and we start children from one thread
+            preexec_fn=die_with_parent,  # noqa: PLW1509 — one prctl call, and we start children from one thread
             start_new_session=True,  # Ctrl-C reaches us alone; we stop the children in order
         )
 

@@ -23,7 +23,7 @@ from sparkplug.transport.loop import Loop
 from twin.vocabulary.nodes import is_twin_node
 from twin.vocabulary.topics import RESERVED_MACHINES
 
-OTHERS = ("validation", "limits")  # tables of the same file that are for no processor
+OTHERS = ("validation", "limits", "loop")  # tables of the same file that are for no processor
 Configured = tuple[AnyProcessor, Configuration[ProcessorConfig]]
 
 

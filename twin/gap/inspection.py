@@ -34,6 +34,8 @@ TEMPERATURE = "spindle_temp_c"
 UNDRIVEN_S = 60.0
 """Time for which what heats the spindle may be unknown without being mentioned."""
 HEAT = ("spindle_rpm", "spindle_load_pct", "ambient_temp_c")
+SHORT = 0.5
+"""Part of R·C below which a run of the heat is short."""
 NEARLY_K = 4.0
 """By which a spindle that starts cold may differ from its surroundings."""
 USUAL = (("spindle_rpm", "rev/min", 150.0), ("spindle_load_pct", "%", 1.0))
@@ -122,6 +124,13 @@ def _heat_unknown(run: Run, log: RunLog, machine: MachineFile) -> list[str]:
         for name, unit, least in USUAL
         if 0.0 < np.nanmax(log[name]) < least
     ]
+    if machine.thermal is not None:
+        lasts_s, constant_s = float(log.t_s[-1]), machine.thermal.resistance_k_per_w * machine.thermal.capacity_j_per_k
+        if lasts_s < SHORT * constant_s:
+            said.append(
+                f"{run.name}: lasts {lasts_s:.0f} s, and R·C is {constant_s:.0f} s: the twin starts at the temperature that is "
+                "read, so an offset of the sensor shows only as the spindle comes nearer to its surroundings, here hardly"
+            )
     start, ambient = (float(log[n][np.isfinite(log[n])][0]) for n in (TEMPERATURE, "ambient_temp_c"))
     for one, other, name in ((ambient, start, TEMPERATURE), (start, ambient, "ambient_temp_c")):
         for unit, reading in (("°F", 1.8 * one + 32.0), ("K", one + 273.15)):

@@ -30,14 +30,15 @@ class Score:
     by_signal: Mapping[str, SignalScore]
 
 
-def score_of(machine: MachineFile, case: Case) -> Score:
-    """The gap of `machine` on the runs of `case`, over the floor that the runs of the case show.
+def score_of(machine: MachineFile, case: Case, role: str | None = None) -> Score:
+    """The gap of `machine` on the runs of `case`, or on those of one role, over the floor that the runs of the case show.
 
     Raises CaseError where no run records what the machine could be compared in.
     """
     checked, _ = inspected(replace(case, machine=machine))
     ground = ground_of(checked, frozenset())
-    squares = squares_of(ground.runs, shown_by_run(ground.machine, ground.runs, ground.floors), ground.floors)
+    runs = tuple(run for run in ground.runs if role in (None, run.entry.role))
+    squares = squares_of(runs, shown_by_run(ground.machine, runs, ground.floors), ground.floors)
     if not squares:
         raise CaseError(f"{case.name}: no run records a signal that {machine.machine.name} answers with")
     by_signal = {}

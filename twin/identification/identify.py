@@ -11,18 +11,23 @@ import numpy as np
 
 from twin.assumed import with_fitted
 from twin.case import Case, Run, RunKind
+from twin.effects.added import added_effects
 from twin.errors import CaseError
 from twin.gap.free_run import GapRow, free_run_gap
+from twin.gap.stages.air import air_runs
+from twin.gap.stages.observed_through import standing_sensors
 from twin.heat.run import Warming
 from twin.identification.axes import identified_axes
 from twin.identification.batch_fit import Fit
 from twin.identification.cutting_fit import fit_cutting, fit_spindle, force_of, with_cutting, with_spindle
 from twin.identification.estimate import INTERVAL_Z, Estimate
+from twin.identification.idle_fit import fit_idle
 from twin.identification.thermal_fit import NAMES, WarmingRun, fit_thermal, with_thermal
-from twin.machine import MachineFile
+from twin.machine import MachineFile, SpindleDrive
 from twin.rotary import outside_names, outside_text
 from twin.simulator.recorded import noise_of, told_of
 from twin.simulator.response import milling_of
+from twin.spindle.load import spindle_quantities
 
 Progress = Callable[[str], None]
 
@@ -174,12 +179,10 @@ def _spindle(machine: MachineFile, runs: tuple[Run, ...], known: list[Estimate],
         cutting = cutting or force is not None
         series.append((run.log.t_s, power, np.nan_to_num(run.log["spindle_rpm"]), run.log["spindle_load_pct"]))
         noise = noise_of(machine, run.log, "spindle_load_pct")
-    if spindle is None or not series:
-        if spindle is not None:
-            unknown.append(
-                "spindle: efficiency and idle power: no run at the servo period records spindle_load_pct and spindle_rpm"
-            )
+    if spindle is None:
         return machine
+    if not series:
+        return _idle(machine, spindle, runs, known, unknown)
     force_known = any(e.path.startswith("tool.") and e.identifiable for e in known)
     relative = stated_uncertainty(machine, "spindle.efficiency")
     found = fit_spindle(spindle, series, machine.machine.servo_period_s, noise, relative, not (force_known and cutting))
@@ -195,6 +198,26 @@ def _spindle(machine: MachineFile, runs: tuple[Run, ...], known: list[Estimate],
     )
     unknown.append("spindle.rated_power_kw: load, efficiency and idle power know it up to one factor; it stays as stated")
     return machine.model_copy(update={"spindle": fitted})
+
+
+def _idle(
+    machine: MachineFile, spindle: SpindleDrive, runs: tuple[Run, ...], known: list[Estimate], unknown: list[str]
+) -> MachineFile:
+    """Idle power from the load in air, where no run is sampled at the servo period and no effect is on the load."""
+    is_plain = not added_effects(machine, spindle_quantities()) and not standing_sensors(machine, "spindle_load_pct")
+    found = fit_idle(spindle, air_runs(machine, runs)) if is_plain else None
+    if found is None:
+        unknown.append("spindle: efficiency and idle power: no run records spindle_load_pct and spindle_rpm in a cut or in air")
+        return machine
+    unknown.append("spindle.efficiency: without a measured cutting force, it is one product with K_t")
+    unknown.append("spindle.rated_power_kw: load, efficiency and idle power know it up to one factor; it stays as stated")
+    stated = spindle.idle_power_kw
+    prior = stated_uncertainty(machine, "spindle.idle_power_kw") * stated
+    known_by = 1.0 - min(1.0, (found.deviation_kw / prior) ** 2) if prior > 0.0 else 1.0
+    known.append(estimate("spindle.idle_power_kw", found.power_kw, found.deviation_kw, "kW", stated, known_by))
+    if known_by <= 0.5:
+        return machine
+    return machine.model_copy(update={"spindle": spindle.model_copy(update={"idle_power_kw": found.power_kw})})
 
 
 def _heat(machine: MachineFile, runs: tuple[Run, ...], known: list[Estimate], unknown: list[str]) -> MachineFile:

@@ -41,6 +41,10 @@ _TABLE = tuple(
         ("POST", "/jobs", Role.OPERATOR, "ask for job"),
         ("POST", "/jobs/([^/]+)/cancel", Role.OPERATOR, "cancel job"),
         ("POST", "/models/([^/]+/[^/]+)/promote", Role.ADMINISTRATOR, "promote model"),
+        ("POST", "/twin/([^/]+)/diagnose", Role.OPERATOR, "diagnose"),
+        ("POST", "/twin/([^/]+)/promote", Role.OPERATOR, "promote twin"),
+        ("POST", "/twin/([^/]+)/back", Role.OPERATOR, "go back"),
+        ("POST", "/twin/([^/]+)/withdraw", Role.OPERATOR, "withdraw challenger"),
         ("POST", "/demo/reveal", Role.OPERATOR, "reveal"),
         ("GET", "/audit", Role.ADMINISTRATOR, ""),
     )

@@ -10,6 +10,7 @@ from cnctwin.api.live.batches import Batch
 from cnctwin.api.live.descriptions import LiveDescriptions
 from cnctwin.api.live.documents import AlertsState, DocumentError, read_document
 from cnctwin.api.live.jobs import LiveJobs
+from cnctwin.api.live.loops import LiveLoops
 from cnctwin.api.live.plant import LivePlant
 from cnctwin.plant.watch import viewer
 from sparkplug.admission.limits import DEFAULTS, Limits
@@ -37,9 +38,10 @@ class Viewer:
         self.on_batches: Callable[[list[Batch]], None] = lambda _: None
         self.jobs = LiveJobs()
         self.descriptions = LiveDescriptions()
+        self.loops = LiveLoops()
         self._live = live
         self._host = viewer(broker, group, limits)
-        for topic in (ALERT_STATE, *LiveDescriptions.filters, *LiveJobs.filters):
+        for topic in (ALERT_STATE, *LiveDescriptions.filters, *LiveJobs.filters, *LiveLoops.filters):
             self._host.subscribe_plain(topic)
         self._outbox: deque[tuple[str, bytes]] = deque(maxlen=OUTBOX_MAX)
         self._stop = threading.Event()
@@ -117,6 +119,7 @@ class Viewer:
             self.descriptions.take(event.topic, event.payload)
         elif event.topic != ALERT_STATE:
             self.jobs.take(event.topic, event.payload)
+            self.loops.take(event.topic, event.payload)
         elif event.payload:
             self._live.take_alerts(read_document(event.payload, AlertsState))
 

@@ -9,13 +9,14 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from cnctwin.api.answers import Events, Parts, Replayed, Validation
 from cnctwin.api.errors import ApiError
-from cnctwin.api.event_list import EVENTS_MAX, event_signals, events_of, part_records
+from cnctwin.api.event_list import EVENTS_MAX, description_text, event_signals, events_of, part_records
 from cnctwin.api.live.trace import Sample
 from cnctwin.api.replay_child import replayed
 from cnctwin.api.routes.history import MS_MAX, FromMs, ToMs
 from cnctwin.api.routes.plant import BUSY, UNKNOWN, Machine, unknown_machine
 from cnctwin.api.sources import Sources
 from cnctwin.api.value_object import plain
+from cnctwin.memory.descriptions import described
 from cnctwin.memory.store.contract import Query as StoreQuery
 from cnctwin.memory.store.contract import Store, StoreError
 from sparkplug.clock import now_ms
@@ -47,12 +48,13 @@ def past_routes(sources: Sources) -> APIRouter:
 
     @router.get("/events/{machine}", response_model=Events, responses={**UNKNOWN, **BUSY})
     async def events(machine: Machine, from_ms: FromMs = None, to_ms: ToMs = None) -> Any:
-        """Execution states, programs, tool changes, alarms, stops, parts, holes and pins of a stretch, a day if not said."""
+        """Execution states, programs, tool changes, alarms, stops, parts, holes, pins and descriptions; a day if not said."""
         start_ms, end_ms = _stretch(from_ms, to_ms)
         found, source = await _samples(sources, machine, None, start_ms, end_ms)
         told = events_of(found)
         if sources.store.configured and source == "store":
             told += await sources.store.ask(lambda store: _pins(store, machine, start_ms, end_ms))
+            told += await sources.store.ask(lambda store: _descriptions(store, machine, start_ms, end_ms))
         told.sort(key=lambda one: one["t"])
         left_out = max(len(told) - EVENTS_MAX, 0)
         head = {"machine": machine, "from": start_ms, "to": end_ms, "source": source}
@@ -134,6 +136,14 @@ def _stored(
         ]
         for one in columns
     }
+
+
+def _descriptions(store: Store, machine: str, from_ms: int, to_ms: int) -> list[dict[str, Any]]:
+    return [
+        {"t": one.received_ms, "until": None, "kind": "description", "text": description_text(one.role, one.message)}
+        for one in described(store, machine, from_ms, to_ms)
+        if one.received_ms >= from_ms
+    ]
 
 
 def _pins(store: Store, machine: str, from_ms: int, to_ms: int) -> list[dict[str, Any]]:

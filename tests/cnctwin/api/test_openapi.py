@@ -7,13 +7,22 @@ import pytest
 
 from tests.cnctwin.api.small_plant import client_of, small_plant
 
-OF_THE_PLANT = ("/machines", "/state/{machine}", "/stream", "/gap/{machine}", "/gap/{machine}/report", "/alerts")
+OF_THE_PLANT = (
+    "/machines",
+    "/state/{machine}",
+    "/stream",
+    "/gap/{machine}",
+    "/gap/{machine}/report",
+    "/twin/{machine}",
+    "/alerts",
+)
 OF_JOBS = ("/jobs", "/jobs/{job_id}", "/jobs/{job_id}/files/{name}")
 OF_THE_PAST = ("/history/{machine}", "/events/{machine}", "/parts/{machine}", "/validation/{machine}")
 OF_THE_SERVER = ("/health", "/livez", "/readyz", "/metrics", "/whoami", "/audit", "/models")
 ASKED = ("/silences", "/predict", "/twin/replay", "/alerts/{fingerprint}/acknowledge", "/jobs")
 OF_ITS_OWN = ("/silences/{silence_id}/end", "/models/{kind}/{machine}/promote")
-POSTS = (*ASKED, *OF_ITS_OWN, "/jobs/{job_id}/cancel", "/login", "/logout")
+OF_THE_LOOP = tuple(f"/twin/{{machine}}/{word}" for word in ("diagnose", "promote", "back", "withdraw"))
+POSTS = (*ASKED, *OF_ITS_OWN, *OF_THE_LOOP, "/jobs/{job_id}/cancel", "/login", "/logout")
 ROUTES = {f"GET {path}" for path in (*OF_THE_PLANT, *OF_JOBS, *OF_THE_PAST, *OF_THE_SERVER)} | {f"POST {path}" for path in POSTS}
 
 

@@ -8,10 +8,17 @@ from pathlib import Path
 import pytest
 
 from cnctwin.cli import main
+from cnctwin.composing.compose import compose
 from cnctwin.machines.change import changing
 from cnctwin.machines.evidence import Card, Score
 from cnctwin.machines.folder import MachineFolder
 from processors.description import version_of
+from sparkplug.broker import BrokerAddress
+from sparkplug.datatype import DataType
+from sparkplug.edge_node import EdgeNode
+from sparkplug.metric import MetricSpec, NodeId
+from tests.cnctwin.composing.made_up import DESCRIPTION, store_of_days
+from tests.wire.mosquitto import Mosquitto
 
 TOLD = '[machine]\nname = "vmc"\nassumed = ["thermal"]\n[spindle]\nrated_power_kw = 11.0\nefficiency = 0.85\n'
 COOLED = TOLD.replace("11.0", "12.0")
@@ -103,3 +110,40 @@ def test_without_a_folder_it_says_how_to_give_one(
     monkeypatch.chdir(tmp_path)
     assert ran(monkeypatch, "twin", "show", "vmc") == 2
     assert "--machines DIR" in capsys.readouterr().err
+
+
+@pytest.mark.broker
+def test_with_a_broker_it_shows_the_standing_gap_of_both(
+    machines: Path, mosquitto: Mosquitto, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    edge = EdgeNode(BrokerAddress(port=mosquitto.port), NodeId("cnc", "twin-gap"))
+    gaps = {"twin/gap_spindle_temp_c": 3.1, "twin/challenger/gap_spindle_temp_c": 1.1}
+    edge.declare_device("vmc", [MetricSpec(name, DataType.DOUBLE, value=gap) for name, gap in gaps.items()])
+    edge.start()
+    try:
+        place = ("--machines", str(machines), "--broker", f"mqtt://127.0.0.1:{mosquitto.port}")
+        assert ran(monkeypatch, "twin", "show", "vmc", *place, "--wait", "30") == 0
+    finally:
+        edge.stop()
+    assert "standing gap of spindle_temp_c: live 3.10, challenger 1.10 floors" in capsys.readouterr().out
+
+
+def test_a_diagnosis_of_ones_own_waits_as_the_challenger_with_its_score(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    store = store_of_days(tmp_path / "store", 2, coolant_gain=2.0)
+    compose(store, "vmc", DESCRIPTION, tmp_path / "case")
+    store.close()
+    described = tmp_path / "machines"
+    described.mkdir()
+    (described / "vmc.toml").write_text(DESCRIPTION)
+    cooled = tmp_path / "twin.toml"
+    cooled.write_text(DESCRIPTION + '\n[[effects]]\neffect = "coolant_cooling"\nparameters = { gain = 2.0 }\n')
+    arguments = ("twin", "challenge", "vmc", str(cooled), "--machines", str(described), "--by", "anna")
+    assert ran(monkeypatch, *arguments) == 0
+    assert ran(monkeypatch, "twin", "promote", "vmc", "--machines", str(described)) == 1
+    assert "no score on runs that it was not fitted to" in capsys.readouterr().err
+    assert ran(monkeypatch, "twin", "withdraw", "vmc", "--machines", str(described)) == 0
+    assert ran(monkeypatch, *arguments, "--case", str(tmp_path / "case")) == 0
+    assert ran(monkeypatch, "twin", "promote", "vmc", "--machines", str(described)) == 0
+    assert (described / "vmc.toml").read_text() == cooled.read_text()

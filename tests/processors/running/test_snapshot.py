@@ -78,7 +78,7 @@ def _broken_lane(**changes: Any) -> bytes:
         (b"[" * 100_000, "not JSON"),
         (b"[]", "no JSON object with a unit"),
         (_running().snapshot("okuma")[:-20], "not JSON"),
-        (_broken(version=2), "format, processor, version are"),
+        (_broken(version=99), "format, processor, version are"),
         (_broken(format=99), "format, processor, version are"),
         (_broken(processor="mirror"), "format, processor, version are"),
         (_broken(live=None), "TypeError"),

@@ -15,12 +15,13 @@ from twin.gap.naming.filtered import told_from_a_filter
 from twin.gap.naming.specific import only_specific
 from twin.gap.naming.twins import with_twins
 from twin.gap.null import NULL, Null
-from twin.gap.search import Explained, bare_fit, explain
+from twin.gap.search import Explained, bare_fit, explain, leaves_a_gap, without
 from twin.gap.stages.air import AirStage, air_runs
 from twin.gap.stages.axis import AxisStage, axis_constants_free, standing_of
 from twin.gap.stages.axis_run import AxisRunData, axis_run_data, repeated_groups
 from twin.gap.stages.cut import CutStage, cut_runs
 from twin.gap.stages.disturbance import disturbance_of_repeats, expected_spread
+from twin.gap.stages.healthy import with_healthy_floors
 from twin.gap.stages.heat import HeatStage, heat_runs
 from twin.gap.stages.open_loop.plan import open_stages
 from twin.gap.stages.stage import Stage
@@ -69,6 +70,7 @@ def ground_of(case: Case, left_out: frozenset[str]) -> Ground:
     by_run = tuple(run for run in recorded if not isinstance(run, TurnRun))
     pairs = tuple(pair for pair in case.repeats() if not any(isinstance(run, TurnRun) for run in pair))
     floors = repeatability(by_run, pairs, machine) if by_run else Floors(machine, {})
+    floors = with_healthy_floors(floors, machine, by_run)
     # what was recorded while the twin was right says how well the machine repeats, and nothing of what is wrong now
     runs = tuple(run for run in recorded if not run.entry.healthy) or recorded
     seen: dict[str, tuple[str, RunLog, AxisRunData]] = {}
@@ -134,6 +136,8 @@ def _explained(stage: Stage, ground: Ground, null: Null, progress: Progress) -> 
                     return Explained(stage, base, base, (), {}, {})
                 return explain(stage, null=null, progress=progress, known=alone.best)
     found = explain(stage, null=null, progress=progress)
+    if isinstance(stage, AirStage) and found.best.effects and not leaves_a_gap(stage, found.base):
+        return without(found)  # a few readings in whole percents always lean to one side
     return with_twins(stage, found) if isinstance(stage, AirStage | HeatStage) else found
 
 

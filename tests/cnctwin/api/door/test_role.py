@@ -48,6 +48,8 @@ def test_every_route_that_may_change_something_has_a_stated_right() -> None:
         ("POST", "/alerts/ea33a6/acknowledge", Role.OPERATOR),
         ("POST", "/jobs", Role.OPERATOR),
         ("POST", "/jobs/night-7/cancel", Role.OPERATOR),
+        ("POST", "/twin/vmc/promote", Role.OPERATOR),
+        ("POST", "/twin/vmc/back", Role.OPERATOR),
         ("POST", "/demo/reveal", Role.OPERATOR),
         ("GET", "/audit", Role.ADMINISTRATOR),
         ("DELETE", "/machines", Role.ADMINISTRATOR),

@@ -15,12 +15,26 @@ from edge.controls.heidenhain.link import SCOPE_READS, ReadOnlyLink, WriteRefuse
 from edge.controls.heidenhain.oscilloscope import Oscilloscope, ScopeError
 
 TRACE = ServoTrace({(axis, number): list(range(5000)) for axis in range(len(LABELS)) for number in range(len(CHANNELS))})
-FAST = 200.0
+
+
+class Clock:
+    """The machine's seconds, which pass when the server waits: the same course on a machine that is busy."""
+
+    def __init__(self) -> None:
+        self.now_s = 0.0
+
+    def __call__(self) -> float:
+        return self.now_s
+
+    def wait(self, seconds: float) -> None:
+        self.now_s += seconds
 
 
 @pytest.fixture
 def server() -> Iterator[Lsv2Server]:
-    with Lsv2Server(SimulatedControl([ControlState()], speed=FAST), model=Model.ITNC530, trace=TRACE) as running:
+    clock = Clock()
+    control = SimulatedControl([ControlState()], machine_s=clock)
+    with Lsv2Server(control, model=Model.ITNC530, trace=TRACE, pause=clock.wait) as running:
         yield running
 
 
@@ -56,7 +70,7 @@ def test_what_cannot_be_selected_is_said(scope: Oscilloscope) -> None:
 @pytest.mark.parametrize("fault", [Fault.HANG, Fault.DROP, Fault.GARBAGE, Fault.LENGTH, Fault.SHORT, Fault.OTHER, Fault.ERROR])
 def test_a_fault_on_the_way_is_one_line(server: Lsv2Server, fault: Fault) -> None:
     server.fault_s = 3.0
-    opened = Oscilloscope(server.url, timeout_s=1.0)
+    opened = Oscilloscope(server.url, timeout_s=2.0)
     opened.open()
     signals = opened.signals()[:2]
     opened.select(signals, 3000)

@@ -8,7 +8,7 @@ import { duration, execution, moment } from "../text.js";
 
 const EVENTS_MAX = 500;
 const QUIET_MAX = 60;
-const KINDS = lookup({ hole: "hole", alarm: "high", alert: "high", stop: "high", pin: "event" });
+const KINDS = lookup({ hole: "hole", alarm: "high", alert: "high", stop: "high", pin: "event", description: "event" });
 
 export class Happenings {
   /** seek: is called with the time of an event that was chosen */
