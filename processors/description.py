@@ -57,7 +57,7 @@ class Description:
 
 
 class Given(NamedTuple):
-    """What a step is given for a machine, and by which version of its description; "" where nobody has described it."""
+    """The means that a step is given for a machine, and the version of its description; "" where nobody has described it."""
 
     version: str
     given: Any

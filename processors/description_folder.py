@@ -115,7 +115,7 @@ class DescriptionFolder:
 
 
 def _stamp(path: Path) -> _Stamp | None:
-    """When it was written, how long it is, and which file it is; None where there is none."""
+    """Return its time of writing, its length and its number; None where there is no such file."""
     try:
         found = path.stat()
     except OSError:

@@ -1,4 +1,4 @@
-"""What the description of a machine says of the signals that are compared, worked out once for each description.
+"""The twin of the signals that are compared, worked out of a machine's description once for each description.
 
 A machine that nobody has described has the idle power of processors.toml, where it stands there, and learned baselines.
 """
@@ -37,7 +37,7 @@ class Twin:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Given:
-    """What the step is given: how to watch, and the twin."""
+    """The means of the step: the settings of the watch, and the twin."""
 
     config: Config
     twin: Twin

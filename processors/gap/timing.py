@@ -1,4 +1,4 @@
-"""What takes time on a machine: tool changes, and the sections of a program between them, as they end.
+"""The lengths that are timed on a machine: tool changes, and the sections of a program between them, as they end.
 
 A section begins at cycle start or when a tool change ends, and ends when the next one begins or the program does. One that was
 held, interrupted, resumed, or run with an override off 100 % is left out, and so is everything around a hole in the data.
@@ -38,7 +38,7 @@ class Timed(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Timing:
-    """What is being timed. A new one only where something changed.
+    """The lengths that are being timed. A new one only where something changed.
 
     change_s: since when a tool is changed, None = no change, or its begin is not known; is_stopped: the spindle stood then
     program, section, section_s: what runs, its section counted from 0 and since when; None = nothing that can be timed

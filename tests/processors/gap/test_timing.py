@@ -23,7 +23,7 @@ IDLE = {
 
 
 def ended(*events: HostEvent) -> list[Timed]:
-    """What was timed, without any tick in between."""
+    """Return the lengths that were timed, without any tick in between."""
     engine = engine_of(PROCESSOR, tick_s=600.0, gap_s_max=3600.0)
     fed(engine, birth(1.0, **IDLE), *events)
     return list(state_of(engine).timing.done)
