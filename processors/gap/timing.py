@@ -26,7 +26,7 @@ _RESUMED_FROM = frozenset({"FEED_HOLD", "INTERRUPTED", "OPTIONAL_STOP", "PROGRAM
 class Timed(NamedTuple):
     """A tool change or a section that has ended: its signal and regime, its length, and as how many seconds it counts.
 
-    is_stopped: the spindle stood when the tool change began
+    is_stopped: the spindle stood when the tool change began; program, section: which section it was
     """
 
     signal: str
@@ -34,6 +34,8 @@ class Timed(NamedTuple):
     seconds: float
     weight_s: float
     is_stopped: bool = False
+    program: str = ""
+    section: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +119,8 @@ def _section_over(timing: Timing, at_s: float) -> Timing:
     timing = replace(timing, section_s=None)
     if not SECTION_S_MIN <= seconds <= SECTION_S_MAX:
         return timing
-    return _done(timing, Timed(PROGRAM_TIME, f"section {timing.section} of {timing.program}", seconds, seconds))
+    regime = f"section {timing.section} of {timing.program}"
+    return _done(timing, Timed(PROGRAM_TIME, regime, seconds, seconds, program=timing.program, section=timing.section))
 
 
 def _done(timing: Timing, one: Timed) -> Timing:

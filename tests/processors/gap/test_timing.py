@@ -40,9 +40,9 @@ CYCLE = (
     data(63.5, exec_state="PROGRAM_COMPLETED"),
 )
 WHOLE = [
-    Timed("program_time_s", "section 0 of O1", 20.0, 20.0),
+    Timed("program_time_s", "section 0 of O1", 20.0, 20.0, program="O1", section=0),
     Timed("tool_change_s", "spindle_stopped", 3.5, 30.0, True),
-    Timed("program_time_s", "section 1 of O1", 30.0, 30.0),
+    Timed("program_time_s", "section 1 of O1", 30.0, 30.0, program="O1", section=1),
 ]
 
 

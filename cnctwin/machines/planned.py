@@ -1,0 +1,48 @@
+"""The programs that a description plans, kept beside its version: `history/<machine>/<version>.programs.json`.
+
+The live processors compare each section that has run with them. They belong to a version, since another one plans other times.
+"""
+
+import json
+from pathlib import Path
+
+from cnctwin.errors import UsageError
+from cnctwin.files.program_text import read_text
+from cnctwin.machines import disk
+from cnctwin.machines.folder import MachineFolder
+from processors.description import ENDINGS, Programs, program_key
+from processors.description_folder import PROGRAMS
+from twin.errors import TwinError
+from twin.machine import MachineFile
+
+SECONDS_DIGITS = 3
+
+
+def planned(machine: MachineFile, folder: Path) -> tuple[Programs, list[str]]:
+    """Return the seconds of the sections of each program in a folder, and why some could not be planned.
+
+    Raises UsageError where there is no such folder, MachineError where the machine states nothing of how its control moves.
+    """
+    from twin.motion.sections import section_seconds  # noqa: PLC0415  numpy comes with it
+
+    if not folder.is_dir():
+        raise UsageError(f"--programs {folder}: there is no such folder with NC files")
+    found: Programs = {}
+    faults = []
+    for path in sorted(path for path in folder.iterdir() if path.suffix.casefold() in ENDINGS and path.is_file()):
+        try:
+            seconds = section_seconds(machine, read_text(path))
+        except (TwinError, UsageError) as error:
+            if machine.program is None:
+                raise
+            faults.append(f"{path.name} is not planned: {error}")
+        else:
+            found[program_key(path.name)] = tuple(round(one, SECONDS_DIGITS) for one in seconds)
+    return found, faults
+
+
+def keep_planned(of: MachineFolder, version: str, programs: Programs) -> Path:
+    """Keep the planned programs of a version; its file. Raises FolderError."""
+    path = of.history / f"{version}{PROGRAMS}"
+    disk.put(path, json.dumps(programs, indent=1, sort_keys=True) + "\n")
+    return path
