@@ -7,10 +7,11 @@ import json
 from pathlib import Path
 
 from cnctwin.errors import UsageError
+from cnctwin.files.program_folder import ProgramFolder
 from cnctwin.files.program_text import read_text
 from cnctwin.machines import disk
 from cnctwin.machines.folder import MachineFolder
-from processors.description import ENDINGS, Programs, program_key
+from processors.description import Programs, program_key
 from processors.description_folder import PROGRAMS
 from twin.errors import TwinError
 from twin.machine import MachineFile
@@ -25,11 +26,12 @@ def planned(machine: MachineFile, folder: Path) -> tuple[Programs, list[str]]:
     """
     from twin.motion.sections import section_seconds  # noqa: PLC0415  numpy comes with it
 
-    if not folder.is_dir():
-        raise UsageError(f"--programs {folder}: there is no such folder with NC files")
+    files: dict[Path, list[str]] = {}
+    for name, path in ProgramFolder(folder).programs().items():
+        files.setdefault(path, []).append(program_key(name))
     found: Programs = {}
     faults = []
-    for path in sorted(path for path in folder.iterdir() if path.suffix.casefold() in ENDINGS and path.is_file()):
+    for path in sorted(files):
         try:
             seconds = section_seconds(machine, read_text(path))
         except (TwinError, UsageError) as error:
@@ -37,7 +39,7 @@ def planned(machine: MachineFile, folder: Path) -> tuple[Programs, list[str]]:
                 raise
             faults.append(f"{path.name} is not planned: {error}")
         else:
-            found[program_key(path.name)] = tuple(round(one, SECONDS_DIGITS) for one in seconds)
+            found |= dict.fromkeys(files[path], tuple(round(one, SECONDS_DIGITS) for one in seconds))
     return found, faults
 
 
