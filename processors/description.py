@@ -154,7 +154,7 @@ def machine_and_role(topic: str) -> tuple[str, Role] | None:
     (('vmc', <Role.LIVE: 'live'>), None)
     """
     machine, _, role = topic.removeprefix(topics.DESCRIPTION).rpartition("/")
-    if not topic.startswith(topics.DESCRIPTION) or not machine or role not in tuple(Role):
+    if not topic.startswith(topics.DESCRIPTION) or not machine or "/" in machine or role not in tuple(Role):
         return None
     return machine, Role(role)
 
