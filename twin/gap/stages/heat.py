@@ -117,6 +117,11 @@ class HeatStage:
         return (*found, *(e for e in sensor_effects((SIGNAL,), self.left_out) if e.effect not in has))
 
     @property
+    def lasts_s(self) -> float:
+        """Seconds of the longest stretch that is compared."""
+        return max((float(part.at_s[-1] - part.at_s[0]) for run in self.runs for part in run.parts), default=0.0)
+
+    @property
     def term_sites(self) -> Mapping[LearnedSite, tuple[str, ...]]:
         """The sites of learned terms that the temperature shows."""
         return {LearnedSite.HEAT_INPUT: ("",), LearnedSite.HEAT_LOSS: ("",), LearnedSite.TEMPERATURE_READING: ("",)}
