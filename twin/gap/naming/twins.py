@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 AS_MUCH = 0.9
 """Part of what the answer closes that its twin has to close."""
 BETTER_SIGMAS, BETTER = 2.0, 0.1
-"""How surely, and by how many floors², another effect has to leave less to be the answer."""
+"""The certainty, and the floors², by which another effect has to leave less to be the answer."""
 STEPS_MAX = 12
 
 

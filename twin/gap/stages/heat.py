@@ -37,7 +37,7 @@ CAPACITY = "capacity_j_per_k"
 NAMES = ("alpha_w_per_pct_rpm2", "beta_w_per_rpm", "resistance_k_per_w", CAPACITY)
 TERM_FLOORS = 3.0
 LATE_PART = 2.0
-"""By how much more or less than a sensor is late the spindle may be ahead of it at the start: it has not warmed evenly."""
+"""The factor by which a spindle may be further ahead of a late sensor, or less, at the start: it has not warmed evenly."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
