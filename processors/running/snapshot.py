@@ -98,7 +98,7 @@ class SnapshotCodec:
             self._restore_challenger(kept, document.get("description", ""), fold, lanes[0][0])
 
     def _challenger_kept(self, document: Any, fold: Fold, lanes: Sequence[Any]) -> _ChallengerKept | None:
-        """What a snapshot has of the challenger; None where that is of no use any more."""
+        """Return the challenger's part of a snapshot; None where that is of no use any more."""
         told = document.get("challenger")
         challenger = "" if fold.challenger is None else fold.challenger.version
         if told is None or not lanes or told["version"] not in {challenger, fold.version}:

@@ -216,7 +216,7 @@ def _engine(processor: AnyProcessor, live: Description | None, challenger: Descr
 
 
 def _news(actions: list[Action], processor: AnyProcessor, *, of_challenger: bool) -> list[tuple[str, Change]]:
-    """What was published live of the metrics that a challenger has too; or what the challenger published, under those names."""
+    """Return the live values of the metrics that a challenger has too; or what the challenger published, under those names."""
     changes = [(one.machine, change) for one in actions if isinstance(one, Publish) for change in one.changes]
     if of_challenger:
         return [(machine, one._replace(name=name)) for machine, one in changes if (name := live_name(one.name))]
