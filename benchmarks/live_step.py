@@ -40,7 +40,7 @@ beta_w_per_rpm = {BETA}
 resistance_k_per_w = {RESISTANCE}
 capacity_j_per_k = {CAPACITY}
 """
-REPEATS = 7
+REPEATS = 60
 
 
 def heat(temperature_c: float, load_pct: float) -> float:
@@ -93,7 +93,7 @@ def _reading(name: str, value: float) -> Reading:
 def main() -> None:
     """Print a line for each processor."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--steps", type=int, default=20_000)
+    parser.add_argument("--steps", type=int, default=2_000)
     steps = parser.parse_args().steps
     for name, formula in (("thermal", heat), ("cutting_force", force)):
         plain, ours = formula_s(formula, steps), step_s(name, steps)
