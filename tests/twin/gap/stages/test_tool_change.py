@@ -78,3 +78,8 @@ def test_a_change_begins_where_the_spindle_stands() -> None:
 
 def test_a_machine_without_a_stated_length_says_nothing_of_it() -> None:
     assert change_runs(MACHINE.model_copy(update={"program": None}), (changes(1),)) == ()
+
+
+def test_rows_too_coarse_for_a_change_do_not_tell_its_length() -> None:
+    assert len(change_runs(MACHINE, (changes(1, period_s=1.0), changes(2, period_s=3.0)))) == 1
+    assert change_runs(MACHINE, (changes(2, period_s=3.0),)) == ()
