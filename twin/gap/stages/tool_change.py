@@ -161,8 +161,8 @@ def lengths_of(log: RunLog) -> tuple[Floats, float]:
     lengths = []
     for begin in begins:
         after = ends[ends > begin]
-        if not len(after) or active[after[0]]:
-            continue
+        if not len(after) or active[after[0]] or (active[begin - 1] and not is_even):
+            continue  # it has no end, or in rows of what changed nobody told when the spindle came to rest in it
         end = int(after[0])
         if apart[begin - 1 : end].max() <= hole_s:
             # in even rows, a change begins and ends somewhere between two of them
