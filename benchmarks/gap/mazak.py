@@ -63,7 +63,7 @@ def live_of(description: str, log: RunLog) -> Live:
 
 
 def _samples(log: RunLog) -> Iterator[Sample]:
-    """Yield a tick every ten seconds, with what was told last at its time, from the first row on that tells all of it."""
+    """Yield what was told last and a tick every ten seconds, from the first row on that tells all of it."""
     told = np.all([np.isfinite(log[name]) for name in INPUTS], axis=0)
     for at_s in np.arange(float(log.t_s[told][0]), float(log.t_s[-1]), TICK_S).tolist():
         row = int(np.searchsorted(log.t_s, at_s, side="right")) - 1
@@ -72,6 +72,7 @@ def _samples(log: RunLog) -> Iterator[Sample]:
         readings = {
             name: Reading(name, value, int(1000 * at_s), Quality.GOOD, None, None, False) for name, value in known.items()
         }
+        yield Sample("mazak", SampleKind.DATA, at_s, readings, INPUTS)
         yield Sample("mazak", SampleKind.TICK, at_s, readings)
 
 
