@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from cnctwin.composing.composed import Composed, ComposedRun, Role
-from cnctwin.composing.executions import Execution, ProgramFolder, executions_of, pairs
+from cnctwin.composing.executions import Execution, executions_of, pairs
 from cnctwin.composing.history import AMBIENT, LOAD, RPM, TEMPERATURE, History, Span, history_of
 from cnctwin.composing.observable import observability
 from cnctwin.composing.roles import cut_at, divided
@@ -14,6 +14,7 @@ from cnctwin.composing.rows import EXECUTED, WORK, rows_of, thinned, unbroken, w
 from cnctwin.composing.stretches import Stretch, stretches_of, turning_of, worth
 from cnctwin.composing.written import CASE_FILE, MACHINE_FILE, RUNS, case_toml, complete_or_absent
 from cnctwin.errors import UsageError
+from cnctwin.files.program_folder import ProgramFolder
 from cnctwin.memory.store.contract import Store
 from processors.description import version_of
 from twin.case import RunKind

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
-from cnctwin.composing.history import COOLANT, RPM, TEMPERATURE, History, Span
+from cnctwin.composing.history import COOLANT, RPM, TEMPERATURE, Between, History, Span
 
 REST_S, COOLING_S = 1200.0, 10_800.0
 """Standstill after which a spindle begins anew, and as much of it as is worth keeping."""
@@ -23,23 +23,11 @@ COOLS_PART = 0.3
 
 
 @dataclass(frozen=True, slots=True)
-class Stretch:
+class Stretch(Between):
     """A stretch of history. rested: it begins with a spindle that had stood long; turning: part of it in which it turned"""
 
-    from_ms: int
-    to_ms: int
     rested: bool
     turning: float
-
-    @property
-    def span_ms(self) -> Span:
-        """Its beginning and its end."""
-        return self.from_ms, self.to_ms
-
-    @property
-    def seconds(self) -> float:
-        """Its length."""
-        return (self.to_ms - self.from_ms) / 1000.0
 
     @property
     def what(self) -> str:

@@ -26,6 +26,8 @@ RULE = "rule"
 HOUR_MS = 3_600_000.0
 EQUAL_FLOORS = 0.1
 """Standing gaps that differ by less are alike."""
+NO_GAP_FLOORS = 1.0
+"""A standing gap up to its floor is none: a challenger that leaves no more is not worse."""
 Stepped = tuple[State, Deed | None]
 
 
@@ -247,7 +249,7 @@ def _seen(state: State, world: World) -> State:
 
 
 def _worse_in(live: Mapping[str, float], challenger: Mapping[str, float]) -> list[str]:
-    return [signal for signal in live if challenger.get(signal, 0.0) > live[signal] + EQUAL_FLOORS]
+    return [signal for signal in live if challenger.get(signal, 0.0) > max(live[signal] + EQUAL_FLOORS, NO_GAP_FLOORS)]
 
 
 def _now(state: State, world: World, step: StepName, text: str, **changed: object) -> State:

@@ -130,6 +130,7 @@ class Effect:
         contact is bent, of `held_n`, the force that friction holds
     carried: states that outlast a rest
     undo: the value at which a sensor with it reads its first argument at rest
+    settles_s: time, s, of parameters, after which it shows what it is: in a stretch that is over before, it is only a trend
 
     Read by experiments and optimiser:
 
@@ -160,6 +161,7 @@ class Effect:
     at_rest: Mapping[str, Callable[..., Any]] = field(default_factory=dict)
     carried: tuple[str, ...] = ()
     undo: Callable[..., Any] | None = None
+    settles_s: Callable[..., Any] | None = None
     likely_in: Mapping[str, int] = field(default_factory=dict)
     builds_up: BuildsUp | None = None
     lowers: Mapping[str, str] = field(default_factory=dict)

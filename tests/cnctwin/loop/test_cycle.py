@@ -175,6 +175,13 @@ def test_the_rule_promotes_nothing_that_is_not_better_everywhere(
     assert walked(BY_RULE, *worlds, state=in_shadow(BY_RULE))[1] is None
 
 
+def test_a_gap_under_its_floor_is_none_and_stands_against_no_challenger() -> None:
+    live, challenger = ({"spindle_temp_c": 3.1, "spindle_load_pct": gap} for gap in (0.5, 1.0))
+    standing = replace(SHADOWED, live=live, challenger=challenger | {"spindle_temp_c": 1.0})
+    worlds = [replace(shadowed(hours, standing), card=CARD) for hours in (0.0, 2.0)]
+    assert isinstance(walked(BY_RULE, *worlds, state=in_shadow(BY_RULE))[1], MakeLive)
+
+
 def test_the_rule_withdraws_what_is_worse() -> None:
     standing = replace(SHADOWED, challenger={"spindle_temp_c": 4.0})
     deed = walked(BY_RULE, shadowed(0.0, standing), shadowed(2.0, standing), state=in_shadow(BY_RULE))[1]

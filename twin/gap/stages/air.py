@@ -188,7 +188,7 @@ class AirStage:
         return column
 
     def _read(self, model: Model, theta: Floats, run: AirRun) -> Floats:
-        """What the meter reads, (lanes, readings)."""
+        """Return the meter's readings, (lanes, readings)."""
         assert self.machine.spindle is not None
         one, factors = np.ones(len(theta)), model.factors(theta)
         constants: dict[str, ArrayLike] = {

@@ -1,10 +1,11 @@
-"""How long tool changes take, where no program says what else happens: from the stopped spindle to the tool in it.
+"""The lengths of tool changes, where no program says what else happens: from the stopped spindle to the tool in it.
 
     length = tool_change_s · factor, through the effects that change it
 
-A control that says when a tool change is in progress says this much at any rate: a length is known to a sample period at either
-end. Changes differ among themselves; by how much is their floor. One that takes several times as long as the others had a person
-in it, and is left out.
+A control that says when a tool change is in progress says this much at any rate. Where it is read at even times, a length is
+known to a sample period at either end; where it is recorded as it changes, the rows at its ends say when it changed. Changes
+differ among themselves; by how much is their floor. One that takes several times as long as the others had a person in it, and
+is left out.
 """
 
 from collections.abc import Mapping
@@ -31,13 +32,15 @@ CHANGES_MIN = 3
 LONG = 3.0
 """Times the usual length from which on somebody was in a change."""
 HOLE_PERIODS = 5.0
+EVEN = 2.0
+"""Times the short distances of two rows that the long ones are at most, where rows are even: else they are of what changed."""
 FLOOR_S = 0.05
 TURNS_RPM = 30.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ChangeRun:
-    """The tool changes of a run. lengths_s: (n,); period_s: of its rows around them"""
+    """The tool changes of a run. lengths_s: (n,); period_s: of its rows around them, 0 where it is recorded as it changes"""
 
     name: str
     lengths_s: Floats
@@ -91,7 +94,7 @@ class ToolChangeStage:
 
     @property
     def floor_s(self) -> float:
-        """By what the changes of the machine differ, and what the rows do not tell of one."""
+        """The spread of the machine's changes, and of what the rows do not tell of one."""
         spread = [run.lengths_s - np.median(run.lengths_s) for run in self.runs]
         usual = MEDIAN_TO_SIGMA * float(np.median(np.abs(np.concatenate(spread))))
         told = max(run.period_s for run in self.runs) / np.sqrt(6.0)
@@ -127,13 +130,18 @@ def change_runs(machine: MachineFile, runs: tuple[Run, ...]) -> tuple[ChangeRun,
 
 
 def lengths_of(log: RunLog) -> tuple[Floats, float]:
-    """Return the lengths of the tool changes that a run has whole, s, and the sample period of its rows.
+    """Return the lengths of the tool changes that a run has whole, s, and the period of its rows, 0 where they are not even.
 
     >>> from twin.runlog import run_log
     >>> active = np.array([0, 0, 1, 1, 1, 0, 0, 1])
     >>> lengths, period_s = lengths_of(run_log({"t_s": np.arange(8.0), "tool_change_active": active}))
     >>> lengths.tolist(), period_s
     ([3.0], 1.0)
+    >>> uneven_s = np.array([0.0, 5.0, 6.0, 9.2, 10.0, 15.0, 20.0])
+    >>> active = np.array([0, 0, 1, 0, 0, 0, 0])
+    >>> lengths, period_s = lengths_of(run_log({"t_s": uneven_s, "tool_change_active": active}))
+    >>> lengths.round(6).tolist(), period_s
+    ([3.2], 0.0)
     """
     told = np.flatnonzero(np.isfinite(log["tool_change_active"]))
     t_s, active = log.t_s[told], log["tool_change_active"][told] > 0.0
@@ -141,6 +149,9 @@ def lengths_of(log: RunLog) -> tuple[Floats, float]:
         return np.zeros(0), 0.0
     apart = np.diff(t_s)
     period_s = float(np.median(apart))
+    short_s, long_s = (float(np.quantile(apart, part)) for part in (0.2, 0.8))
+    is_even = long_s <= EVEN * short_s
+    hole_s = HOLE_PERIODS * (period_s if is_even else long_s)
     rpm = np.abs(np.nan_to_num(log["spindle_rpm"][told])) if log.has("spindle_rpm") else np.zeros(len(told))
     inside = active & (rpm < TURNS_RPM)
     begins, ends = (np.flatnonzero(np.diff(inside.astype(np.int8)) == way) + 1 for way in (1, -1))
@@ -150,7 +161,8 @@ def lengths_of(log: RunLog) -> tuple[Floats, float]:
         if not len(after) or active[after[0]]:
             continue
         end = int(after[0])
-        if apart[begin - 1 : end].max() <= HOLE_PERIODS * period_s:
-            # a change begins and ends somewhere between two rows
-            lengths.append(0.5 * (t_s[end] + t_s[end - 1]) - 0.5 * (t_s[begin] + t_s[begin - 1]))
-    return np.array(lengths), period_s
+        if apart[begin - 1 : end].max() <= hole_s:
+            # in even rows, a change begins and ends somewhere between two of them
+            half_s = 0.5 * (apart[end - 1] - apart[begin - 1]) if is_even else 0.0
+            lengths.append(t_s[end] - t_s[begin] - half_s)
+    return np.array(lengths), period_s if is_even else 0.0
