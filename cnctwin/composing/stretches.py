@@ -62,6 +62,12 @@ def worth(history: History, span_ms: Span) -> tuple[int, float]:
     return int(switched), max(shown) - min(shown) if shown else 0.0
 
 
+def turning_of(history: History) -> list[Span]:
+    """Return the spans in which the spindle turned, in order."""
+    whole = history.from_ms, history.to_ms
+    return [(a, b) for a, b, turns in _turning(history, whole, _turning_rpm(history)) if turns]
+
+
 def _turning_rpm(history: History) -> float:
     """Return the speed from which on the spindle is said to turn."""
     fastest = max((abs(v) for v in history.course(RPM).numbers((history.from_ms, history.to_ms))), default=0.0)

@@ -38,7 +38,7 @@ def compose(order: Mapping[str, Any], paths: Paths) -> None:
                 span_ms=(order["from_ms"], order["to_ms"]),
                 healthy_ms=None if healthy is None else (healthy[0], healthy[1]),
                 programs=None if programs is None else Path(programs),
-                ambient_c=order.get("ambient_c"),
+                ambient_c=order.get("surroundings_c"),
             )
         finally:
             store.close()

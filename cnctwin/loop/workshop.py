@@ -115,7 +115,7 @@ class Workshop:
             if (paths.case / "case.toml").is_file():
                 return Work(is_done=True)
             span = {"from_ms": state.span_at_ms[0], "to_ms": state.span_at_ms[1]}
-            given: dict[str, Any] = {"programs": config.programs and str(config.programs), "ambient_c": config.ambient_c}
+            given: dict[str, Any] = {"programs": config.programs and str(config.programs), "surroundings_c": config.ambient_c}
             healthy_ms = self.healthy_ms(machine)
             given["healthy_ms"] = healthy_ms if healthy_ms is not None and healthy_ms[1] <= state.span_at_ms[0] else None
             return self._done_by_a_child({"do": "compose", "store": self.places.store, **order, **span, **given})

@@ -121,6 +121,7 @@ class Effect:
     usual_on: axes where it is usual, elsewhere something else is likelier; empty = all
     excited_by: what a recording has to contain for it to show
     first_guesses: sets of values to start the fit from, where the recordings suggest them
+    same_on: signal → an input of the twin on which it does the same, where that input is assumed and not recorded
 
     Read by the stages, which compare a recording stretch by stretch:
 
@@ -155,6 +156,7 @@ class Effect:
     usual_on: tuple[str, ...] = ()
     excited_by: Excitation | None = None
     first_guesses: Callable[[Recorded], Guesses] = no_guesses
+    same_on: Mapping[str, str] = field(default_factory=dict)
     late_s: Callable[..., Any] | None = None
     at_rest: Mapping[str, Callable[..., Any]] = field(default_factory=dict)
     carried: tuple[str, ...] = ()

@@ -34,6 +34,8 @@ LONG = 3.0
 HOLE_PERIODS = 5.0
 EVEN = 2.0
 """Times the short distances of two rows that the long ones are at most, where rows are even: else they are of what changed."""
+COARSE = 1.0 / 3.0
+"""Part of a change up to which rows may be apart: in coarser ones, which hold mean speeds, no end of a change can be seen."""
 FLOOR_S = 0.05
 TURNS_RPM = 30.0
 
@@ -121,6 +123,7 @@ def change_runs(machine: MachineFile, runs: tuple[Run, ...]) -> tuple[ChangeRun,
     if machine.program is None or machine.program.tool_change_s <= 0.0:
         return ()
     found = [(run, *lengths_of(run.log)) for run in runs if not run.log.axes() and run.log.has("tool_change_active")]
+    found = [(run, some, p) for run, some, p in found if len(some) and p <= COARSE * float(np.median(some))]
     every = np.concatenate([lengths for _, lengths, _ in found]) if found else np.zeros(0)
     if not len(every):
         return ()
@@ -158,8 +161,8 @@ def lengths_of(log: RunLog) -> tuple[Floats, float]:
     lengths = []
     for begin in begins:
         after = ends[ends > begin]
-        if not len(after) or active[after[0]]:
-            continue
+        if not len(after) or active[after[0]] or (active[begin - 1] and not is_even):
+            continue  # it has no end, or in rows of what changed nobody told when the spindle came to rest in it
         end = int(after[0])
         if apart[begin - 1 : end].max() <= hole_s:
             # in even rows, a change begins and ends somewhere between two of them

@@ -78,3 +78,16 @@ def test_a_change_begins_where_the_spindle_stands() -> None:
 
 def test_a_machine_without_a_stated_length_says_nothing_of_it() -> None:
     assert change_runs(MACHINE.model_copy(update={"program": None}), (changes(1),)) == ()
+
+
+def test_rows_too_coarse_for_a_change_do_not_tell_its_length() -> None:
+    assert len(change_runs(MACHINE, (changes(1, period_s=1.0), changes(2, period_s=3.0)))) == 1
+    assert change_runs(MACHINE, (changes(2, period_s=3.0),)) == ()
+
+
+def test_in_rows_of_what_changed_a_change_counts_only_where_the_spindle_stood_as_it_began() -> None:
+    t_s = np.array([0.0, 4.0, 5.0, 8.2, 9.0, 14.0, 20.0, 21.0, 23.0, 24.2, 25.0, 30.0])
+    active = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+    rpm = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 3000.0, 3000.0, 1000.0, 0.0, 0.0, 0.0, 0.0])
+    lengths, _ = lengths_of(run_log({"t_s": t_s, "tool_change_active": active, "spindle_rpm": rpm}))
+    assert lengths.round(6).tolist() == [3.2]
