@@ -10,7 +10,7 @@ A file holds a table for each processor, so that one file can serve several:
 """
 
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import Any, ClassVar, Generic, Self, TypeVar
 
@@ -42,16 +42,20 @@ class ProcessorConfig(BaseModel):
             raise ValueError(f"gap_s_max / tick_s is more than {TICKS_MAX}: make tick_s longer or gap_s_max shorter")
         return self
 
-    def belongs_elsewhere(self, table: str) -> tuple[str, ...]:
+    def belongs_elsewhere(self, table: str, machine: str = "", keys: Collection[str] | None = None) -> tuple[str, ...]:
         """Return a sentence on each value of this table that describes the machine and not how the processor runs.
+
+        machine: whose table it is, "" = that of all; keys: those that stand in it, None = all that were given
 
         >>> ProcessorConfig().belongs_elsewhere("thermal")
         ()
         """
+        stand = self.model_fields_set if keys is None else keys
         return tuple(
-            f"[{table}] {key} belongs in machines/<name>.toml, {section}; it is used until a machine has a file"
+            f"[{table}] {key} belongs in machines/{machine or '<name>'}.toml, {section}; "
+            f"it is used until {machine or 'a machine'} has a file"
             for key, section in self.of_the_machine.items()
-            if key in self.model_fields_set
+            if key in stand
         )
 
 
@@ -103,6 +107,8 @@ class Configuration(Generic[C_co]):
             raise ConfigurationError(f"[{name}.{MACHINES}] has to hold one table for each machine")
         for machine, own in machines.items():
             _check_own(model, own, f"{name}.{MACHINES}.{machine}")
+        self._name = name
+        self._own_keys = {machine: frozenset(own) for machine, own in machines.items()}
         self.default: C_co = _validated(model, shared, name)
         self._of_machine: dict[str, C_co] = {
             machine: _validated(model, {**shared, **own}, f"{name}.{MACHINES}.{machine}") for machine, own in machines.items()
@@ -115,6 +121,13 @@ class Configuration(Generic[C_co]):
     def of(self, machine: str) -> C_co:
         """The values that hold for `machine`."""
         return self._of_machine.get(machine, self.default)
+
+    def belongs_elsewhere(self) -> tuple[str, ...]:
+        """Return a sentence on each value, of all machines and of single ones, that describes a machine."""
+        lines = list(self.default.belongs_elsewhere(self._name))
+        for machine, own in self._of_machine.items():
+            lines += own.belongs_elsewhere(f"{self._name}.{MACHINES}.{machine}", machine, self._own_keys[machine])
+        return tuple(lines)
 
     @property
     def machines(self) -> tuple[str, ...]:

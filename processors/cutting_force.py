@@ -34,7 +34,7 @@ DRIVE_WORDS = {"rated_power_kw": "rated power", "efficiency": "efficiency"}
 
 
 class Config(ProcessorConfig):
-    """When a force is given; and, of old, the drive and the tools of a machine that has no description.
+    """The conditions under which a force is given; and, of old, the drive and the tools of a machine that has no description.
 
     settle_s: the speed has to be steady for so long. A diameter of 0 is an unknown one: the force is null then.
     """

@@ -9,7 +9,8 @@ a replay knows which one was live when. A machine has one that is live, and at m
 
 import hashlib
 import json
-from dataclasses import dataclass
+import re
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any, NamedTuple, Self
 
@@ -21,6 +22,8 @@ from twin.machine import MachineFile, machine_from_toml
 from twin.vocabulary import topics
 
 VERSION_DIGITS = 12
+ENDINGS = (".nc", ".mpf", ".spf", ".h", ".eia", ".min", ".tap", ".txt")
+_NUMBER = re.compile(r"[o:]?0*(\d+)")
 
 
 class Role(StrEnum):
@@ -30,15 +33,26 @@ class Role(StrEnum):
     CHALLENGER = "challenger"
 
 
+Programs = dict[str, tuple[float, ...]]
+"""By name of a program (`program_key`), the seconds of each of its sections between tool changes, as the twin plans them."""
+
+
 @dataclass(frozen=True, slots=True)
 class Description:
     """A machine as it is described.
 
     version: the first digits of the SHA-256 of the file's text
+    programs: of this version, as far as somebody has planned them (`cnctwin twin programs`)
     """
 
     machine: MachineFile
     version: str
+    programs: Programs = field(default_factory=dict)
+
+    @property
+    def edition(self) -> str:
+        """Return the version, and that of the planned programs where there are any."""
+        return edition_of(self.version, self.programs)
 
     @property
     def assumed(self) -> tuple[str, ...]:
@@ -57,7 +71,7 @@ class Description:
 
 
 class Given(NamedTuple):
-    """What a step is given for a machine, and by which version of its description; "" where nobody has described it."""
+    """The means that a step is given for a machine, and the version of its description; "" where nobody has described it."""
 
     version: str
     given: Any
@@ -78,6 +92,12 @@ class DescriptionMessage(BaseModel):
     step: str = ""
     by: str = ""
     why: str = Field(default="", max_length=2000)
+    programs: Programs = Field(default_factory=dict)
+
+    @property
+    def edition(self) -> str:
+        """Return the version, and that of the planned programs where there are any."""
+        return edition_of(self.version, self.programs)
 
     def payload(self) -> bytes:
         """Return the message as it is sent."""
@@ -85,7 +105,7 @@ class DescriptionMessage(BaseModel):
 
     def description(self, machine: str) -> Description:
         """Return what it describes. Raises MachineError."""
-        return Description.from_toml(self.toml, f"machines/{machine}.toml")
+        return replace(Description.from_toml(self.toml, f"machines/{machine}.toml"), programs=self.programs)
 
 
 def version_of(text: str) -> str:
@@ -95,6 +115,27 @@ def version_of(text: str) -> str:
     '65e5121911d1'
     """
     return hashlib.sha256(text.encode()).hexdigest()[:VERSION_DIGITS]
+
+
+def edition_of(version: str, programs: Programs) -> str:
+    """Return a version, and that of the planned programs where there are any.
+
+    >>> edition_of("65e5121911d1", {}), edition_of("65e5121911d1", {"o1701": (31.8, 11.1)})
+    ('65e5121911d1', '65e5121911d1+af339d674746')
+    """
+    return f"{version}+{version_of(json.dumps(programs, sort_keys=True))}" if programs else version
+
+
+def program_key(name: str) -> str:
+    """Return the name under which a program is planned, of the name that a control tells or that its file has.
+
+    >>> program_key("/PRG/O01701"), program_key("O1701.nc"), program_key("PLATE-1.NC")
+    ('o1701', 'o1701', 'plate-1')
+    """
+    bare = name.strip().replace("\\", "/").rstrip("/").rpartition("/")[2].casefold()
+    stem = next((bare.removesuffix(ending) for ending in ENDINGS if bare.endswith(ending)), bare)
+    number = _NUMBER.fullmatch(stem)
+    return stem if number is None else f"o{number[1]}"
 
 
 def topic_of(machine: str, role: Role) -> str:
@@ -113,7 +154,7 @@ def machine_and_role(topic: str) -> tuple[str, Role] | None:
     (('vmc', <Role.LIVE: 'live'>), None)
     """
     machine, _, role = topic.removeprefix(topics.DESCRIPTION).rpartition("/")
-    if not topic.startswith(topics.DESCRIPTION) or not machine or role not in tuple(Role):
+    if not topic.startswith(topics.DESCRIPTION) or not machine or "/" in machine or role not in tuple(Role):
         return None
     return machine, Role(role)
 

@@ -3,6 +3,7 @@
     machines/<name>.toml                        the live description of machine <name>
     machines/challengers/<name>.toml            one that runs beside it, if any
     machines/history/<name>/steps.jsonl         who made which version live, and why: one JSON line for each step
+    machines/history/<name>/<version>.programs.json     what a version plans for programs: name → seconds of its sections
 
 It is only read. A file that is being written is left alone until it has been quiet for SETTLED_S.
 """
@@ -13,7 +14,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from processors.description import Description, DescriptionMessage, Role, version_of
+from pydantic import TypeAdapter
+
+from processors.description import Description, DescriptionMessage, Programs, Role, version_of
 from twin.errors import MachineError
 
 CHALLENGERS, HISTORY, STEPS = "challengers", "history", "steps.jsonl"
@@ -24,6 +27,8 @@ MACHINES_MAX = 1000
 BY_HAND = "file"
 Key = tuple[str, Role]
 _Stamp = tuple[int, int, int]
+PROGRAMS = ".programs.json"
+_PROGRAMS: TypeAdapter[Programs] = TypeAdapter(Programs)
 
 
 class FileNews(NamedTuple):
@@ -41,6 +46,7 @@ class DescriptionFolder:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self._stamps: dict[Key, _Stamp] = {}
+        self._planned: dict[Key, tuple[Path, _Stamp | None]] = {}  # the planned programs of the version that was read last
 
     def look(self, now_s: float | None = None) -> list[FileNews]:
         """Return what has changed since it was looked at last, the live description of a machine before its challenger.
@@ -53,7 +59,8 @@ class DescriptionFolder:
         for key in sorted({*files, *self._stamps}, key=lambda key: (key[0], key[1] is Role.CHALLENGER)):
             path = files.get(key)
             stamp = None if path is None else _stamp(path)
-            if stamp == self._stamps.get(key) or (stamp is not None and 0 <= now_s - stamp[0] / 1e9 < SETTLED_S):
+            is_same = stamp == self._stamps.get(key) and not self._is_planned_anew(key)
+            if is_same or (stamp is not None and 0 <= now_s - stamp[0] / 1e9 < SETTLED_S):
                 continue
             if path is None or stamp is None:
                 if self._stamps.pop(key, None) is not None:
@@ -91,9 +98,23 @@ class DescriptionFolder:
         version = version_of(text)
         step = self._step(key[0], version)
         try:
-            return DescriptionMessage.model_validate({"t": written_ms, "by": BY_HAND} | step | {"version": version, "toml": text})
+            described = {"version": version, "toml": text, "programs": self._programs(key, version)}
+            return DescriptionMessage.model_validate({"t": written_ms, "by": BY_HAND} | step | described)
         except ValueError:
             return DescriptionMessage(version=version, toml=text, t=written_ms, by=BY_HAND)
+
+    def _is_planned_anew(self, key: Key) -> bool:
+        path, stamp = self._planned.get(key, (None, None))
+        return path is not None and _stamp(path) != stamp
+
+    def _programs(self, key: Key, version: str) -> Programs:
+        """The programs that a version plans; none where the file is not there, or is not what it should be."""
+        path = self.folder / HISTORY / key[0] / f"{version}{PROGRAMS}"
+        self._planned[key] = path, _stamp(path)
+        try:
+            return _PROGRAMS.validate_json(path.read_bytes()[:FILE_BYTES_MAX])
+        except (OSError, ValueError):
+            return {}
 
     def _step(self, machine: str, version: str) -> dict[str, Any]:
         """The last step of a version; empty where the log has none."""
@@ -115,7 +136,7 @@ class DescriptionFolder:
 
 
 def _stamp(path: Path) -> _Stamp | None:
-    """When it was written, how long it is, and which file it is; None where there is none."""
+    """Return its time of writing, its length and its number; None where there is no such file."""
     try:
         found = path.stat()
     except OSError:

@@ -65,7 +65,7 @@ def read_models(configuration: Configuration[Config]) -> "Mapping[str, ResidualM
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Described:
-    """What the step is given: the configuration with the models, and the heat of the machine's description, None without one."""
+    """The means of the step: the configuration with the models, and the heat of the machine's description, None without one."""
 
     configuration: Configuration[Config]
     physics: Physics | None

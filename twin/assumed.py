@@ -1,4 +1,4 @@
-"""What of a machine is only assumed, and no longer is once recordings tell it: `assumed` of [machine].
+"""The constants that are only assumed, until recordings tell them: `assumed` of [machine].
 
 A constant leaves the list where it was fitted to within USEFUL of its value, a section where none of its constants is left.
 Temperatures tell heat and resistance only over the capacity, and loads tell powers only over the rated power: these two are the

@@ -35,10 +35,11 @@ class RunEntry(Section):
 
 
 class CaseTable(Section):
-    """[case]"""
+    """[case]. assumed: columns that nobody recorded and somebody stated, as the surroundings of a warm-up"""
 
     name: str
     machine: str
+    assumed: tuple[str, ...] = ()
 
 
 class CaseFile(Section):
@@ -80,11 +81,12 @@ class RunAtHand(Run):
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """The question: a machine and runs of it."""
+    """The question: a machine and runs of it. assumed: columns of the runs that nobody recorded"""
 
     name: str
     machine: MachineFile
     runs: tuple[Run, ...]
+    assumed: tuple[str, ...] = ()
 
     def of(self, kind: RunKind | None = None, role: str | None = None) -> tuple[Run, ...]:
         """The runs of a kind and a role."""
@@ -116,4 +118,4 @@ def read_case(folder: Path) -> Case:
             if named is not None and not (path.parent / named).is_file():
                 raise CaseError(f"{path}: {named} is not there")
     runs = tuple(Run(entry, path.parent) for entry in file.runs)
-    return Case(file.case.name, read_machine(path.parent / file.case.machine), runs)
+    return Case(file.case.name, read_machine(path.parent / file.case.machine), runs, file.case.assumed)

@@ -121,6 +121,27 @@ def withdraw(
     _change(machine, machines, lambda change: change.withdraw(_user(by), why), as_json)
 
 
+@twin_app.command()
+def programs(
+    machine: MachineName,
+    folder: Annotated[Path, typer.Option("--programs", help="The folder with the NC files that the machine runs")],
+    machines: Machines = None,
+) -> None:
+    """Plan the programs of a machine: live, each section between tool changes is then compared with its planned time."""
+    own = _folder(machine, machines)
+    with needed_by("planning a program", "twin"):
+        from cnctwin.machines.planned import keep_planned, planned
+    console = standard_output()
+    for description in (one for one in (own.live(), own.challenger()) if one is not None):
+        found, faults = planned(description.machine, folder)
+        keep_planned(own, description.version, found)
+        for name, seconds in found.items():
+            text = f"{description.version}  {name}: {sum(seconds):.1f} s in {len(seconds)} sections between tool changes"
+            console.print(text, markup=False, highlight=False, soft_wrap=True)
+        for fault in faults:
+            console.print(fault, markup=False, highlight=False, soft_wrap=True)
+
+
 @twin_app.command("run")
 def run_loop(
     machines: Machines = None,

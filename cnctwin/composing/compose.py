@@ -6,14 +6,15 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from cnctwin.composing.composed import Composed, ComposedRun, Role
-from cnctwin.composing.executions import Execution, ProgramFolder, executions_of, pairs
+from cnctwin.composing.executions import Execution, executions_of, pairs
 from cnctwin.composing.history import AMBIENT, LOAD, RPM, TEMPERATURE, History, Span, history_of
 from cnctwin.composing.observable import observability
 from cnctwin.composing.roles import cut_at, divided
 from cnctwin.composing.rows import EXECUTED, WORK, rows_of, thinned, unbroken, with_ambient
-from cnctwin.composing.stretches import Stretch, stretches_of, worth
+from cnctwin.composing.stretches import Stretch, stretches_of, turning_of, worth
 from cnctwin.composing.written import CASE_FILE, MACHINE_FILE, RUNS, case_toml, complete_or_absent
 from cnctwin.errors import UsageError
+from cnctwin.files.program_folder import ProgramFolder
 from cnctwin.memory.store.contract import Store
 from processors.description import version_of
 from twin.case import RunKind
@@ -56,6 +57,7 @@ class _Folder:
     ambient_c: float | None
     runs: list[tuple[ComposedRun, RunLog]] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    assumed: list[str] = field(default_factory=list)
     files: dict[Execution, ComposedRun] = field(default_factory=dict)
 
 
@@ -100,7 +102,7 @@ def compose(
         runs, name = tuple(run for run, _ in case.runs), _case_name(machine, history)
         effects = observability(described, case.runs)
         (folder / MACHINE_FILE).write_text(description, encoding="utf-8")
-        (folder / CASE_FILE).write_text(case_toml(name, runs, case.notes), encoding="utf-8")
+        (folder / CASE_FILE).write_text(case_toml(name, runs, case.notes, case.assumed), encoding="utf-8")
         return Composed(out, name, machine, version_of(description), runs, effects, tuple(case.notes))
 
 
@@ -134,10 +136,11 @@ def _pieces(case: _Folder, history: History, texts: ProgramFolder) -> list[_Piec
     kind = _stretch_kind(history, case.ambient_c)
     stretches = _told(history, kind)
     executions = executions_of(history)
-    division = divided(stretches, executions)
+    division = divided(stretches, executions, turning_of(history))
     case.notes += [division.note] if division.note else []
     if kind is RunKind.WARMUP and not history.has(AMBIENT):
         case.notes.append(f"ambient_temp_c is not recorded: {case.ambient_c:g} °C throughout is an assumption")
+        case.assumed.append(AMBIENT)
     found: list[_Piece] = []
     of_role: dict[Role, list[Stretch]] = {"fit": [], "check": []}
     for one in cut_at(stretches, division.at_ms):

@@ -4,15 +4,10 @@ An execution begins where the control becomes ACTIVE after its end or its rest, 
 never says that has ended a program where it is READY again.
 """
 
-import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cached_property
-from pathlib import Path
 
-from cnctwin.composing.history import OVERRIDES, PROGRAM, STATE, History, Span
-from cnctwin.errors import UsageError
-from cnctwin.files.program_text import read_text
+from cnctwin.composing.history import OVERRIDES, PROGRAM, STATE, Between, History, Span
 
 COMPLETED, READY, ACTIVE = "PROGRAM_COMPLETED", "READY", "ACTIVE"
 OVER = frozenset({COMPLETED, READY, "STOPPED", None})
@@ -21,34 +16,20 @@ PAUSED = frozenset({"FEED_HOLD", "INTERRUPTED", "OPTIONAL_STOP", "PROGRAM_STOPPE
 SAME_LENGTH = 0.03
 """Part of its length by which an execution that repeats another may be longer."""
 ALONE_S_MIN = 5.0
-SUFFIXES = ("", ".nc", ".mpf", ".h", ".eia", ".min", ".tap", ".txt")
-_WORD = re.compile(r"^[%\s]*([O:]\s*0*\d+|BEGIN PGM \S+)", re.IGNORECASE | re.MULTILINE)
 
 
 @dataclass(frozen=True, slots=True)
-class Execution:
+class Execution(Between):
     """A program that was run.
 
     program: its name, "" where the control did not say; completed: it came to its end; paused: somebody or something held it
     overridden: an override was moved while it ran
     """
 
-    from_ms: int
-    to_ms: int
     program: str
     completed: bool
     paused: bool
     overridden: bool
-
-    @property
-    def span_ms(self) -> Span:
-        """Its beginning and its end."""
-        return self.from_ms, self.to_ms
-
-    @property
-    def seconds(self) -> float:
-        """Its length."""
-        return (self.to_ms - self.from_ms) / 1000.0
 
     def repeats(self, other: "Execution") -> bool:
         """Return True where it is the same program, run to its end as the other was, untouched."""
@@ -95,44 +76,3 @@ def pairs(executions: Iterable[Execution]) -> dict[Execution, Execution]:
             found[one] = earlier
         seen.append(one)
     return found
-
-
-class ProgramFolder:
-    """The NC files of a plant, found by the name that the control gives a program."""
-
-    def __init__(self, folder: Path | None) -> None:
-        """Raises UsageError where it is no folder."""
-        if folder is not None and not folder.is_dir():
-            raise UsageError(f"{folder}: is no folder; give the one with the NC files of the programs")
-        self._folder = folder
-
-    @cached_property
-    def _files(self) -> dict[str, Path]:
-        files = {} if self._folder is None else {p.name.casefold(): p for p in sorted(self._folder.iterdir()) if p.is_file()}
-        by_word: dict[str, Path] = {}
-        for path in files.values():
-            if path.suffix.casefold() in SUFFIXES:
-                by_word |= dict.fromkeys(_words(read_text(path)[:2000]), path)
-        return by_word | files
-
-    def text_of(self, program: str) -> str | None:
-        """Return the text of a program; None where the folder has none of that name."""
-        path = next((self._files[name] for name in _names(program) if name in self._files), None)
-        return None if path is None else read_text(path)
-
-
-def _names(program: str) -> Iterator[str]:
-    """Yield the file names, in small letters, under which a program may be kept."""
-    name = re.split(r"[/\\]", program.strip())[-1].casefold()
-    stem = name.rpartition(".")[0] or name
-    for one in dict.fromkeys((name, stem)):
-        yield from (f"{one}{suffix}" for suffix in SUFFIXES)
-        if match := re.fullmatch(r"[o:]?0*(\d+)", one):
-            yield from (f"o{match[1]}{suffix}" for suffix in SUFFIXES)
-
-
-def _words(text: str) -> Iterator[str]:
-    """Yield the name that a program gives itself: `o1701` of O1701, as `_names` writes it."""
-    if match := _WORD.search(text):
-        digits = re.sub(r"\D", "", match[1]).lstrip("0") if not match[1].upper().startswith("BEGIN") else ""
-        yield f"o{digits}" if digits else match[1].split()[-1].casefold()

@@ -26,6 +26,24 @@ Span = tuple[int, int]
 
 
 @dataclass(frozen=True, slots=True)
+class Between:
+    """A part of the history, from its beginning to before its end."""
+
+    from_ms: int
+    to_ms: int
+
+    @property
+    def span_ms(self) -> Span:
+        """Its beginning and its end."""
+        return self.from_ms, self.to_ms
+
+    @property
+    def seconds(self) -> float:
+        """Its length."""
+        return (self.to_ms - self.from_ms) / 1000.0
+
+
+@dataclass(frozen=True, slots=True)
 class Course:
     """A signal over time: at t_ms[n] it said value[n], which holds until the next; None where it was not good."""
 

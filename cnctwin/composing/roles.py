@@ -16,6 +16,8 @@ FIT_PART = 2.0 / 3.0
 DAY_MS = 86_400_000
 BETWEEN_DAYS, BETWEEN_STRETCHES, WITHIN = (0.25, 0.9), (0.5, 0.85), (0.4, 0.8)
 """Part of what was recorded that may be fitted: where days divide it, where stretches do, where the end of a program does."""
+TURNING_MIN = 0.1
+"""Part of the time in which the spindle turned that the judge has to have."""
 ALONE_S_MIN = 2.0 * STRETCH_S_MIN
 """A stretch that is shorter cannot be divided."""
 
@@ -36,8 +38,12 @@ class Division(NamedTuple):
         return False if span_ms[0] >= self.at_ms else None
 
 
-def divided(stretches: Sequence[Stretch], executions: Sequence[Execution]) -> Division:
-    """Return the division of a history by its stretches, or by its programs where there are no stretches."""
+def divided(stretches: Sequence[Stretch], executions: Sequence[Execution], turning: Sequence[Span] = ()) -> Division:
+    """Return the division of a history by its stretches, or by its programs where there are no stretches.
+
+    turning: the spans in which the spindle turned. A judge in which it never does cannot tell how it heats, so a single stretch
+    is divided by the time that it turned where it stood at the end.
+    """
     spans = [s.span_ms for s in stretches] or [e.span_ms for e in executions]
     if not spans:
         return Division(None, "")
@@ -56,6 +62,10 @@ def divided(stretches: Sequence[Stretch], executions: Sequence[Execution]) -> Di
     if whole < 1000 * ALONE_S_MIN or not stretches:
         return Division(None, "there is too little to be divided: the twin would be judged on what it was fitted to")
     at_ms = _within(spans, whole, executions)
+    turned = [(a, b) for a, b in turning if any(c <= a and b <= d for c, d in spans)]
+    total, after = (sum(b - max(a, t) for a, b in turned if b > t) for t in (0, at_ms))
+    if after < TURNING_MIN * total:
+        at_ms = min(at_ms, _moment(turned, FIT_PART * total))
     share = 100.0 * sum(max(0, min(b, at_ms) - a) for a, b in spans) / whole
     which = "there is one stretch only" if len(spans) == 1 else "a single stretch is most of it"
     return Division(at_ms, f"{which}, divided in time: the first {share:.0f} % are fitted, the rest is the judge")

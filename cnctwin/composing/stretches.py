@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
-from cnctwin.composing.history import COOLANT, RPM, TEMPERATURE, History, Span
+from cnctwin.composing.history import COOLANT, RPM, TEMPERATURE, Between, History, Span
 
 REST_S, COOLING_S = 1200.0, 10_800.0
 """Standstill after which a spindle begins anew, and as much of it as is worth keeping."""
@@ -23,23 +23,11 @@ COOLS_PART = 0.3
 
 
 @dataclass(frozen=True, slots=True)
-class Stretch:
+class Stretch(Between):
     """A stretch of history. rested: it begins with a spindle that had stood long; turning: part of it in which it turned"""
 
-    from_ms: int
-    to_ms: int
     rested: bool
     turning: float
-
-    @property
-    def span_ms(self) -> Span:
-        """Its beginning and its end."""
-        return self.from_ms, self.to_ms
-
-    @property
-    def seconds(self) -> float:
-        """Its length."""
-        return (self.to_ms - self.from_ms) / 1000.0
 
     @property
     def what(self) -> str:
@@ -72,6 +60,12 @@ def worth(history: History, span_ms: Span) -> tuple[int, float]:
     switched = len(set(history.course(COOLANT).numbers(span_ms))) > 1
     shown = history.course(TEMPERATURE).numbers(span_ms)
     return int(switched), max(shown) - min(shown) if shown else 0.0
+
+
+def turning_of(history: History) -> list[Span]:
+    """Return the spans in which the spindle turned, in order."""
+    whole = history.from_ms, history.to_ms
+    return [(a, b) for a, b, turns in _turning(history, whole, _turning_rpm(history)) if turns]
 
 
 def _turning_rpm(history: History) -> float:

@@ -43,7 +43,7 @@ def _is_replaceable(out: Path) -> bool:
     return out.is_dir() and ((out / CASE_FILE).is_file() or not any(out.iterdir()))
 
 
-def case_toml(name: str, runs: Sequence[ComposedRun], notes: Sequence[str] = ()) -> str:
+def case_toml(name: str, runs: Sequence[ComposedRun], notes: Sequence[str] = (), assumed: Sequence[str] = ()) -> str:
     """Return the text of case.toml.
 
     >>> from twin.case import RunKind
@@ -60,6 +60,7 @@ def case_toml(name: str, runs: Sequence[ComposedRun], notes: Sequence[str] = ())
     """
     lines = [f"# {' '.join(note.split())}" for note in notes]
     lines += ["[case]", f"name = {_text(name)}", f'machine = "{MACHINE_FILE}"']
+    lines += [f"assumed = [{', '.join(map(_text, assumed))}]"] if assumed else []
     for run in runs:
         lines += ["", f"[[runs]]                     # {' '.join(run.what.split())}", f"file = {_text(run.file)}"]
         lines += [f'kind = "{run.kind.value}"', f'role = "{run.role}"']

@@ -58,9 +58,11 @@ class LoopWatch:
         self.text = str(document.get("text", ""))
         if challenger := document.get("challenger"):
             self._causes = challenger.get("causes") or ()
+        last = document.get("last") or {}
+        if not last:
+            self._found = LoopOutcome()  # nothing was promoted, or it was taken back
         if document.get("step") != PROMOTED:
             return
-        last = document.get("last") or {}
         before, after = last.get("before"), last.get("after")
         seconds = self._found.seconds
         if seconds is None and after is not None and after <= CLOSED_FLOORS_MAX:

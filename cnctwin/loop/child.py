@@ -7,7 +7,7 @@ What comes out is there as a whole or not at all; what is there already is not m
 import json
 import shutil
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -38,7 +38,7 @@ def compose(order: Mapping[str, Any], paths: Paths) -> None:
                 span_ms=(order["from_ms"], order["to_ms"]),
                 healthy_ms=None if healthy is None else (healthy[0], healthy[1]),
                 programs=None if programs is None else Path(programs),
-                ambient_c=order.get("ambient_c"),
+                ambient_c=order.get("surroundings_c"),
             )
         finally:
             store.close()
@@ -55,7 +55,17 @@ def judge(order: Mapping[str, Any], paths: Paths) -> None:
     if order.get("diagnoses"):
         _file(result, Path(order["diagnoses"]) / order["machine"])
     card = found.card.model_copy(update={"case": order["case"], "job": order["case"]})
-    write_json(paths.finding, asdict(found) | {"card": card.model_dump(mode="json")})
+    programs = _planned(found.toml, order.get("programs")) if found.is_better else {}
+    write_json(paths.finding, asdict(found) | {"card": card.model_dump(mode="json"), "programs": programs})
+
+
+def _planned(toml: str, folder: str | None) -> Mapping[str, Sequence[float]]:
+    """The programs as a corrected description plans them; none where the plant has none, or it states no [program]."""
+    from cnctwin.machines.planned import planned  # noqa: PLC0415  with all of the twin
+    from twin.machine import machine_from_toml  # noqa: PLC0415
+
+    machine = machine_from_toml(toml, "twin.toml")
+    return {} if folder is None or machine.program is None else planned(machine, Path(folder))[0]
 
 
 def _file(result: Path, folder: Path) -> None:

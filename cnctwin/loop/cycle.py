@@ -26,6 +26,8 @@ RULE = "rule"
 HOUR_MS = 3_600_000.0
 EQUAL_FLOORS = 0.1
 """Standing gaps that differ by less are alike."""
+TAKEN_UP_S, TAKEN_UP_S_MAX = 5.0, 60.0
+"""Seconds after a promotion before which its figures are not looked at, and after which they are whatever else is told."""
 NO_GAP_FLOORS = 1.0
 """A standing gap up to its floor is none: a challenger that leaves no more is not worse."""
 Stepped = tuple[State, Deed | None]
@@ -229,12 +231,19 @@ def _back_of_itself(config: LoopConfig, state: State, world: World) -> Back | No
     """Return the way back where the gap has grown since the promotion; None while it has not, or its time is over."""
     now = world.standing.live
     both = [signal for signal in state.before if signal in now]
-    if not both or not 0 < world.at_ms - state.promoted_at_ms < config.back_hours * HOUR_MS:
+    if not both or not _is_taken_up(state, world) or not 0 < world.at_ms - state.promoted_at_ms < config.back_hours * HOUR_MS:
         return None
     before, after = (sum(gaps[signal] for signal in both) for gaps in (state.before, now))
     if after - before <= config.back_floors:
         return None
     return Back(state.live, RULE, f"the standing gap is {floors(after)} floors, {floors(before)} before it was promoted")
+
+
+def _is_taken_up(state: State, world: World) -> bool:
+    """Return True where the figures are of the description that was promoted: as long as the processor tells of a challenger
+    beside the live one, it has not taken it up."""
+    since_s = (world.standing.at_ms - state.promoted_at_ms) / 1000.0
+    return since_s >= (TAKEN_UP_S_MAX if world.standing.challenger else TAKEN_UP_S)
 
 
 def _seen(state: State, world: World) -> State:
@@ -243,7 +252,7 @@ def _seen(state: State, world: World) -> State:
     if not now or dict(state.standing) == dict(now):
         return state  # what was known holds until more is heard
     last = state.last
-    if last is not None and last.signal in now and world.standing.at_ms > state.promoted_at_ms:
+    if last is not None and last.signal in now and _is_taken_up(state, world):
         last = last.model_copy(update={"after": now[last.signal]})
     return state.now(standing=dict(now), last=last)
 

@@ -21,8 +21,10 @@ from cnctwin.machines import disk
 from cnctwin.machines.change import Change, changing
 from cnctwin.machines.evidence import Shadow
 from cnctwin.machines.folder import MachineFolder
+from cnctwin.machines.planned import keep_planned
 from cnctwin.machines.step_log import StepKind, lives
 from cnctwin.machines.told import told
+from processors.description import version_of
 from twin.errors import TwinError
 
 BY = "loop"
@@ -129,6 +131,8 @@ class Keeper:
     def _carried_out(self, deed: Deed, change: Change) -> str:
         if isinstance(deed, File):
             finding = deed.finding
+            if finding.programs:  # before it is a challenger: the processors take both up together
+                keep_planned(self._folder, version_of(finding.toml), {name: tuple(s) for name, s in finding.programs.items()})
             return change.file(finding.toml, finding.card, BY, finding.card.sentence).text
         if isinstance(deed, Promote):
             self._keep_shadow(deed.shadow)

@@ -84,7 +84,7 @@ class LoopService:
 
     def run(self, stop: Event) -> None:
         """Work until `stop` is set."""
-        for topic in (f"{topics.LOOP_REQUEST}#", topics.state_of_job("+"), f"{topics.JOB_REPLY}+", f"{topics.LOOP}+"):
+        for topic in (f"{topics.LOOP_REQUEST}+", topics.state_of_job("+"), f"{topics.JOB_REPLY}+", f"{topics.LOOP}+"):
             self._host.subscribe_plain(topic)
         self._host.start()
         try:

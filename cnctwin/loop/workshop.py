@@ -115,22 +115,23 @@ class Workshop:
             if (paths.case / "case.toml").is_file():
                 return Work(is_done=True)
             span = {"from_ms": state.span_at_ms[0], "to_ms": state.span_at_ms[1]}
-            given: dict[str, Any] = {"programs": config.programs and str(config.programs), "ambient_c": config.ambient_c}
+            given: dict[str, Any] = {"programs": config.programs and str(config.programs), "surroundings_c": config.ambient_c}
             healthy_ms = self.healthy_ms(machine)
             given["healthy_ms"] = healthy_ms if healthy_ms is not None and healthy_ms[1] <= state.span_at_ms[0] else None
             return self._done_by_a_child({"do": "compose", "store": self.places.store, **order, **span, **given})
         if (finding := _finding(paths)) is not None:
             return Work(finding=finding)
-        return self._diagnosed(machine, state.case, order)
+        return self._diagnosed(machine, state.case, order, config.programs)
 
-    def _diagnosed(self, machine: str, case: str, order: Mapping[str, Any]) -> Work:
+    def _diagnosed(self, machine: str, case: str, order: Mapping[str, Any], programs: Path | None) -> Work:
         job = self.jobs.get(case)
         if job is None:
             return self._asked(machine, case)
         told = str(job.get("state"))
         if told == "done":
             result = str(self.places.jobs.resolve() / case / "result")
-            return self._done_by_a_child({"do": "judge", "result": result, "diagnoses": str(self.places.diagnoses), **order})
+            filed = {"diagnoses": str(self.places.diagnoses), "programs": programs and str(programs)}
+            return self._done_by_a_child({"do": "judge", "result": result, **filed, **order})
         if told in ("failed", "cancelled"):
             return Work(failed=str(job.get("reason") or told))
         share = float(job.get("progress_pct") or 0.0) / 100.0

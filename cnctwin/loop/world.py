@@ -1,6 +1,6 @@
 """What the loop of a machine sees in a moment: the folder, the standing gap, how the work stands, and what a person asks."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,7 +13,7 @@ from cnctwin.machines.evidence import Card, Shadow
 class Finding:
     """What a diagnosis has led to. is_better: the corrected description is worth to be filed; else `text` says why it is not.
 
-    toml: that description; next_experiment: what would tell more
+    toml: that description; programs: as it plans them; next_experiment: what would tell more
     """
 
     is_better: bool
@@ -21,6 +21,7 @@ class Finding:
     toml: str = ""
     card: Card = field(default_factory=Card)
     next_experiment: Mapping[str, Any] | None = None
+    programs: Mapping[str, Sequence[float]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,6 +5,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from cnctwin.plant.described import DescribedMachine, described_machines, sentences
+from cnctwin.plant.descriptions import LiveDescriptions
 from cnctwin.plant.lags import lag_reports
 from cnctwin.plant.quarantine import refused_lines
 from cnctwin.plant.view import StageLedger, health, ledgers, machines, own_values
@@ -12,7 +14,7 @@ from cnctwin.plant.watch import viewer
 from edge.running.awaited import LATE_S, NO_HISTORIAN
 from processors.lag_report import BEHIND_S, LagReport
 from sparkplug.broker import BrokerAddress
-from sparkplug.host import HostApplication
+from sparkplug.host import EventKind, HostApplication
 from sparkplug.metric import Reading
 from sparkplug.quality import Quality
 from twin.vocabulary.nodes import VALIDATION_NODE
@@ -35,10 +37,11 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """All findings, and the ledgers behind them."""
+    """All findings, the ledgers and the descriptions behind them."""
 
     findings: tuple[Finding, ...]
     ledgers: tuple[StageLedger, ...]
+    machines: tuple[DescribedMachine, ...] = ()
 
     @property
     def good(self) -> bool:
@@ -48,23 +51,28 @@ class Report:
     def as_json(self) -> dict[str, Any]:
         """For a program to read."""
         stages = [{**asdict(ledger), "balances": ledger.balances} for ledger in self.ledgers]
-        return {"good": self.good, "findings": [asdict(finding) for finding in self.findings], "ledgers": stages}
+        findings, machines = ([asdict(one) for one in each] for each in (self.findings, self.machines))
+        return {"good": self.good, "findings": findings, "ledgers": stages, "machines": machines}
 
 
 def examine(broker: BrokerAddress, group: str, seconds: float) -> Report:
     """Listen to a broker for a while and report; asks nodes for their births where it has to."""
-    host = viewer(broker, group)
+    host, descriptions = viewer(broker, group), LiveDescriptions()
+    for topic in descriptions.filters:
+        host.subscribe_plain(topic)
     host.start()
     try:
         deadline_s = time.monotonic() + seconds
         while time.monotonic() < deadline_s:
-            host.poll(0.1)
-        return diagnose(host, broker.url)
+            for event in host.poll(0.1):
+                if event.kind is EventKind.PLAIN:
+                    descriptions.take(event.topic, event.payload)
+        return diagnose(host, broker.url, descriptions)
     finally:
         host.stop()
 
 
-def diagnose(host: HostApplication, url: str) -> Report:
+def diagnose(host: HostApplication, url: str, descriptions: LiveDescriptions) -> Report:
     """Return what a host application that has listened for a while can say."""
     if not host.online:
         return Report((Finding(False, host.last_error or f"no connection to {url}"),), ())
@@ -83,6 +91,8 @@ def diagnose(host: HostApplication, url: str) -> Report:
         bad = [name for name, reading in machine.measured.items() if reading.quality is not Quality.GOOD]
         state = "its control is connected" if machine.online else "its control is not connected; its values are stale"
         findings.append(Finding(machine.online, f"{machine.name}: {state}; {len(machine.measured)} signals, {len(bad)} not good"))
+    described = described_machines(descriptions, [machine.name for machine in machines(host)])
+    findings += [Finding(good, text) for one in described for good, text in sentences(one)]
     for ledger in stages:
         sums = f"{ledger.received} = {ledger.emitted} emitted + {ledger.dropped} dropped + {ledger.buffered} buffered"
         findings.append(Finding(ledger.balances, f"{ledger.node}: {sums}" if ledger.balances else f"{ledger.node}: not {sums}"))
@@ -108,7 +118,7 @@ def diagnose(host: HostApplication, url: str) -> Report:
     findings += of_sloppy_peers(counts)
     order = f"{counts.get('lost', 0)} messages lost, {counts.get('malformed', 0)} malformed while listening"
     findings.append(Finding(not counts.get("lost") and not counts.get("malformed"), order))
-    return Report(tuple(findings), tuple(stages))
+    return Report(tuple(findings), tuple(stages), described)
 
 
 def of_sloppy_peers(counts: Mapping[str, int]) -> list[Finding]:

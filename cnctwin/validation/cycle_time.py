@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cnctwin.errors import UsageError
+from cnctwin.files.program_folder import ProgramFolder
 from cnctwin.validation.block_bootstrap import bootstrapped
 from cnctwin.validation.budgets import Budgets
 from cnctwin.validation.figure import Figure, Verdict, judged, unseen
@@ -28,7 +28,6 @@ from twin.recording.program_run import OVERRIDES
 from twin.runlog import RunLog
 
 QUANTITY, MEASURE, UNIT = "cycle_time", "error_pct", "%"
-ENDINGS = ("", ".nc", ".NC", ".mpf", ".MPF", ".h", ".H", ".txt")
 REFUSED_SHOWN = 2
 TITLE_MAX = 60
 LONG_LINE_S, TOLD_MIN = 1.0, 0.9
@@ -150,14 +149,5 @@ def whole_of(log: RunLog, path: Path, control: ControlModel) -> Timed | str:
 
 def texts_of(folder: Path | None, names: Sequence[str]) -> dict[str, Path]:
     """Name of a program as a control tells it → its file in a folder. Raises UsageError where there is no such folder."""
-    if folder is None:
-        return {}
-    if not folder.is_dir():
-        raise UsageError(f"--programs {folder}: there is no such folder with NC files")
-    found: dict[str, Path] = {}
-    for name in names:
-        bare = name.replace("\\", "/").rstrip("/").rpartition("/")[2]
-        path = next((folder / f"{bare}{ending}" for ending in ENDINGS if bare and (folder / f"{bare}{ending}").is_file()), None)
-        if path is not None:
-            found[name] = path
-    return found
+    files = ProgramFolder(folder)
+    return {name: path for name in names if (path := files.path_of(name)) is not None}

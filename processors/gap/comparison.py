@@ -8,7 +8,7 @@
 | spindle_rpm | turning | spindle_rpm_cmd |
 | tool_change_s | spindle_stopped: it stood when the change began | the description's `[program] tool_change_s`; else learned |
 | tool_change_s | spindle_turning | learned |
-| program_time_s | each section between tool changes, by program | learned |
+| program_time_s | each section between tool changes, by program | planned by `cnctwin twin programs`; else learned |
 | axis_{a}_load_pct | standstill: no feed, a program runs | learned |
 
 Nothing but times is compared during a tool change and until settle_s after it; load, speed and axes not until settle_s after a
@@ -99,7 +99,10 @@ def times_compared(given: Given, done: tuple[Timed, ...]) -> tuple[Compared, ...
 
 
 def _time(given: Given, one: Timed) -> Compared:
-    twin_s = given.twin.tool_change_s if one.signal == TOOL_CHANGE and one.is_stopped else None
+    if one.signal == TOOL_CHANGE:
+        twin_s = given.twin.tool_change_s if one.is_stopped else None
+    else:
+        twin_s = given.section_s(one.program, one.section)
     return Compared(one.signal, one.regime, (twin_s or 0.0) - one.seconds, twin_s is None, one.weight_s)
 
 

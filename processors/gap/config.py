@@ -1,4 +1,4 @@
-"""How the gap is watched: the healthy period, floors, how soon to raise an alarm, and when a gap counts as open."""
+"""The settings of the gap: the healthy period, floors, how soon to raise an alarm, and when a gap counts as open."""
 
 from collections.abc import Mapping
 from functools import cached_property

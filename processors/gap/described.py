@@ -1,4 +1,4 @@
-"""What the description of a machine says of the signals that are compared, worked out once for each description.
+"""The twin of the signals that are compared, worked out of a machine's description once for each description.
 
 A machine that nobody has described has the idle power of processors.toml, where it stands there, and learned baselines.
 """
@@ -7,14 +7,14 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from processors.description import Description
+from processors.description import Description, program_key
 from processors.gap.config import Config
-from processors.gap.signals import LOAD, RESOLUTIONS, TEMPERATURE, TOOL_CHANGE
+from processors.gap.signals import LOAD, PROGRAM_TIME, RESOLUTIONS, TEMPERATURE, TOOL_CHANGE
 from twin.live.spindle import LiveSpindle
 from twin.machine import MachineFile
 from twin.motion.quantity import changed_quantity
 
-SECTIONS = {TEMPERATURE: "thermal", LOAD: "spindle", TOOL_CHANGE: "program"}
+SECTIONS = {TEMPERATURE: "thermal", LOAD: "spindle", TOOL_CHANGE: "program", PROGRAM_TIME: "program"}
 """The section of a description that the twin of a signal rests on."""
 
 
@@ -23,6 +23,7 @@ class Twin:
     """The twin of a machine, as far as it is compared.
 
     version: of the description, "" where there is none; idle_load_pct: by spindle speed; tool_change_s: with a stopped spindle
+    programs: by key, the seconds of each section
     noise: by signal, one standard deviation of its sensor, as the description states it
     assumed: signals whose figures rest on what nobody has stated or fitted; effects: at work, in words
     """
@@ -30,6 +31,7 @@ class Twin:
     version: str = ""
     idle_load_pct: Callable[[float], float] | None = None
     tool_change_s: float | None = None
+    programs: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     noise: Mapping[str, float] = field(default_factory=dict)
     assumed: frozenset[str] = frozenset()
     effects: tuple[str, ...] = ()
@@ -37,10 +39,15 @@ class Twin:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Given:
-    """What the step is given: how to watch, and the twin."""
+    """The means of the step: the settings of the watch, and the twin."""
 
     config: Config
     twin: Twin
+
+    def section_s(self, program: str, section: int) -> float | None:
+        """Return how long the twin says that a section of a program takes; None where nobody has planned it."""
+        seconds = self.twin.programs.get(program_key(program), ()) if self.twin.programs else ()
+        return seconds[section] if section < len(seconds) else None
 
     def floor_until_learned(self, signal: str) -> float | None:
         """Return the floor that holds before one is learned: what the description says of the sensor, or of the display."""
@@ -68,6 +75,7 @@ def _twin(description: Description) -> Twin:
         version=description.version,
         idle_load_pct=None if spindle is None else spindle.idle_load_pct,
         tool_change_s=_tool_change_s(machine),
+        programs=description.programs,
         noise={signal: machine.noise[signal] for signal in RESOLUTIONS if machine.noise.get(signal, 0.0) > 0.0},
         assumed=_assumed(description),
         effects=() if spindle is None else spindle.in_words,

@@ -1,4 +1,4 @@
-"""What is published of the state: standing figures, growth, what stands open, the window to diagnose, and the basis of it all."""
+"""The published figures: standing figures, growth, what stands open, the window to diagnose, and the basis of it all."""
 
 import math
 from collections.abc import Mapping, Sequence

@@ -1,4 +1,4 @@
-"""What takes time on a machine: tool changes, and the sections of a program between them, as they end.
+"""The lengths that are timed on a machine: tool changes, and the sections of a program between them, as they end.
 
 A section begins at cycle start or when a tool change ends, and ends when the next one begins or the program does. One that was
 held, interrupted, resumed, or run with an override off 100 % is left out, and so is everything around a hole in the data.
@@ -26,7 +26,7 @@ _RESUMED_FROM = frozenset({"FEED_HOLD", "INTERRUPTED", "OPTIONAL_STOP", "PROGRAM
 class Timed(NamedTuple):
     """A tool change or a section that has ended: its signal and regime, its length, and as how many seconds it counts.
 
-    is_stopped: the spindle stood when the tool change began
+    is_stopped: the spindle stood when the tool change began; program, section: which section it was
     """
 
     signal: str
@@ -34,11 +34,13 @@ class Timed(NamedTuple):
     seconds: float
     weight_s: float
     is_stopped: bool = False
+    program: str = ""
+    section: int = 0
 
 
 @dataclass(frozen=True, slots=True)
 class Timing:
-    """What is being timed. A new one only where something changed.
+    """The lengths that are being timed. A new one only where something changed.
 
     change_s: since when a tool is changed, None = no change, or its begin is not known; is_stopped: the spindle stood then
     program, section, section_s: what runs, its section counted from 0 and since when; None = nothing that can be timed
@@ -117,7 +119,8 @@ def _section_over(timing: Timing, at_s: float) -> Timing:
     timing = replace(timing, section_s=None)
     if not SECTION_S_MIN <= seconds <= SECTION_S_MAX:
         return timing
-    return _done(timing, Timed(PROGRAM_TIME, f"section {timing.section} of {timing.program}", seconds, seconds))
+    regime = f"section {timing.section} of {timing.program}"
+    return _done(timing, Timed(PROGRAM_TIME, regime, seconds, seconds, program=timing.program, section=timing.section))
 
 
 def _done(timing: Timing, one: Timed) -> Timing:

@@ -1,4 +1,4 @@
-"""What holds now and since when: the spindle's speed, the feed, the tool change, the heat. From it come the regimes.
+"""The conditions of a moment and their age: the spindle's speed, the feed, the tool change, the heat. From it come the regimes.
 
 Regimes come from what the machine is told to do, as far as it is known, not from the signal that is judged: else a gap would move
 its own samples into another regime.

@@ -31,7 +31,7 @@ class Descriptions:
         self._host, self._folder = host, folder
         self._workers = tuple(worker for worker in workers if worker.engine.is_described)
         self._is_wanted = folder is not None or bool(self._workers) or any(worker.records for worker in workers)
-        self._versions: dict[Key, str] = {}  # as the broker told them
+        self._versions: dict[Key, str] = {}  # the editions that the broker told
         self._fault_topics: set[str] = set()  # that hold something
         self._file_faults: dict[Key, str] = {}
         self._outbox: dict[str, bytes] = {}  # by topic, until the broker has taken them
@@ -65,7 +65,7 @@ class Descriptions:
         return self._hand_on(event, machine, role, description, now_s)
 
     def _hand_on(self, event: HostEvent, machine: str, role: Role, description: Description | None, now_s: float) -> str | None:
-        version = "" if description is None else description.version
+        version = "" if description is None else description.edition
         if self._versions.get((machine, role), "") == version:
             return None
         if version and (machine, role) not in self._versions and len(self._versions) >= HEARD_MAX:
@@ -127,7 +127,7 @@ class Descriptions:
                 self._outbox[topic_of(machine, role)] = b""
         else:
             self._written[key] = news.message.payload()
-            if self._versions.get(key) != news.message.version:
+            if self._versions.get(key) != news.message.edition:
                 self._outbox[topic_of(machine, role)] = self._written[key]
         self._tell_fault(
             _fault_topic(machine), "; ".join(self._file_faults[machine, r] for r in Role if (machine, r) in self._file_faults)

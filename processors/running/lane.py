@@ -26,7 +26,7 @@ from processors.running.fold import Fold, Folded
 from processors.running.ledger import FOLDED, DropReason, Fates
 from processors.running.picks import Picks, Stream
 from processors.sample import Sample, SampleKind
-from sparkplug.metric import Reading
+from sparkplug.metric import NodeId, Reading
 from sparkplug.quality import Quality
 
 REWIND_MESSAGES = 3  # so many messages in a row, far behind, mean that the clock was set back
@@ -45,6 +45,7 @@ class Lane:
     births: of each edge node of the machine, the first birth that was heard since the processor was started, by its stamp: what a
         replay has to know of a life. Restored ones are of the life before, and go with the first of this one.
     is_challenged: the machine has a challenger, which may begin with the next message only
+    owner: which node each signal of the row is taken from
     others: what the challengers of other processors say, by the names of the live twin's signals
     """
 
@@ -52,11 +53,12 @@ class Lane:
         "_anchor_ms", "_anchor_wall_s", "_counts", "_fold_in", "_gap_ms", "_held", "_inputs", "_late_ms", "_machine",
         "_names", "_pick", "_picks", "_tick_ms", "_view", "_wakes",
         "births", "births_are_old", "clock_ms", "emission", "fold", "is_awaited", "is_challenged", "is_restored", "is_silent",
-        "last_ms", "others", "row", "ticking",
+        "last_ms", "others", "owner", "row", "ticking",
     )  # fmt: skip
 
     def __init__(self, fold: Fold, picks: Picks, config: ProcessorConfig, machine: str, counts: Counts) -> None:
         self.row: dict[str, Reading] = {}
+        self.owner: dict[str, NodeId] = {}
         self.fold = fold
         self.emission = fold.join(machine)
         self.clock_ms: int | None = None  # event time that the fold has seen

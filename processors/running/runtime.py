@@ -1,5 +1,6 @@
 """Running processors against a broker until they are stopped: all of a process on one host session, in one loop."""
 
+import logging
 import threading
 from collections.abc import Sequence
 from functools import partial
@@ -23,6 +24,7 @@ from sparkplug.transport.loop import Loop
 from twin.vocabulary.nodes import is_twin_node
 from twin.vocabulary.topics import RESERVED_MACHINES
 
+_log = logging.getLogger(__name__)
 OTHERS = ("validation", "limits", "loop")  # tables of the same file that are for no processor
 Configured = tuple[AnyProcessor, Configuration[ProcessorConfig]]
 
@@ -99,16 +101,23 @@ def host_id(processors: Sequence[AnyProcessor]) -> str:
 
 
 def configured(names: Sequence[str], config_path: Path | None = None) -> list[Configured]:
-    """The processors with their configuration, checked. Raises UnknownProcessorError, ConfigurationError."""
+    """The processors with their configuration, checked; a line in the log tells each value that describes the machine.
+
+    Raises UnknownProcessorError, ConfigurationError.
+    """
     tables = {} if config_path is None else read_tables(config_path)
     for table in tables:
         if table not in OTHERS:
             _check_table(table, config_path)
     processors = [find(name) for name in dict.fromkeys(names)]
     try:
-        return [(processor, processor.configured(tables.get(processor.name))) for processor in processors]
+        found = [(processor, processor.configured(tables.get(processor.name))) for processor in processors]
     except ConfigurationError as error:
         raise ConfigurationError(f"{config_path}: {error}") from error
+    for _, configuration in found:
+        for line in configuration.belongs_elsewhere():
+            _log.warning("%s: %s", config_path, line)
+    return found
 
 
 def _check_table(table: str, config_path: Path | None) -> None:

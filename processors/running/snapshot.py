@@ -15,7 +15,7 @@ from processors.errors import SnapshotError
 from processors.running.emission import Emission
 from processors.running.fold import Fold
 from processors.running.lane import Lane
-from sparkplug.metric import Change, Reading
+from sparkplug.metric import Change, NodeId, Reading
 from sparkplug.quality import Quality
 
 FORMAT = 2
@@ -87,18 +87,18 @@ class SnapshotCodec:
             kept = self._challenger_kept(document, fold, lanes)
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise SnapshotError(f"{type(error).__name__}: {error}") from error
-        for lane, (clock_ms, last_ms, ticking, is_silent, row, latest, births) in lanes:
+        for lane, (clock_ms, last_ms, ticking, is_silent, row, latest, births, owner) in lanes:
             lane.clock_ms, lane.last_ms, lane.ticking, lane.is_silent = clock_ms, last_ms, ticking, is_silent
             lane.row.update(row)
             lane.emission.latest.update(latest)
             lane.is_restored = lane.births_are_old = True
-            lane.births = births
+            lane.births, lane.owner = births, owner
         fold.state = state
         if kept is not None:
             self._restore_challenger(kept, document.get("description", ""), fold, lanes[0][0])
 
     def _challenger_kept(self, document: Any, fold: Fold, lanes: Sequence[Any]) -> _ChallengerKept | None:
-        """What a snapshot has of the challenger; None where that is of no use any more."""
+        """Return the challenger's part of a snapshot; None where that is of no use any more."""
         told = document.get("challenger")
         challenger = "" if fold.challenger is None else fold.challenger.version
         if told is None or not lanes or told["version"] not in {challenger, fold.version}:
@@ -147,10 +147,19 @@ def _lane_document(lane: Lane) -> dict[str, Any]:
         "ticking": lane.ticking,
         "is_silent": lane.is_silent,
         "births": lane.births,
+        "owners": _owners(lane.owner),
         # The broker gives tables, bytes and templates again with the next birth.
         "row": _rows(lane.row),
         "latest": _latest(lane.emission),
     }
+
+
+def _owners(owner: Mapping[str, NodeId]) -> dict[str, list[str]]:
+    """By node, the signals that are taken from it, in their order."""
+    owners: dict[str, list[str]] = {}
+    for name, node in owner.items():
+        owners.setdefault(str(node), []).append(name)
+    return owners
 
 
 def _rows(row: Mapping[str, Reading]) -> dict[str, Any]:
@@ -161,7 +170,7 @@ def _latest(emission: Emission) -> dict[str, Any]:
     return {name: change[_TOLD_OF_CHANGE] for name, change in emission.latest.items()}
 
 
-_Values = tuple[int | None, int, bool, bool, dict[str, Reading], dict[str, Change], dict[str, int]]
+_Values = tuple[int | None, int, bool, bool, dict[str, Reading], dict[str, Change], dict[str, int], dict[str, NodeId]]
 
 
 def _lane_values(entry: Any, is_history: bool) -> _Values:
@@ -169,7 +178,13 @@ def _lane_values(entry: Any, is_history: bool) -> _Values:
     latest = {name: _change(name, change, is_history) for name, change in entry["latest"].items()}
     clock_ms, last_ms = _whole(entry["clock_ms"]), _whole(entry["last_ms"]) or 0
     births = {str(node): int(stamp_ms) for node, stamp_ms in entry.get("births", {}).items()}
-    return clock_ms, last_ms, entry["ticking"] is True, entry["is_silent"] is True, row, latest, births
+    owner = {str(name): _node(node) for node, names in entry.get("owners", {}).items() for name in names}
+    return clock_ms, last_ms, entry["ticking"] is True, entry["is_silent"] is True, row, latest, births, owner
+
+
+def _node(text: str) -> NodeId:
+    group, _, node = text.partition("/")
+    return NodeId(group, node)
 
 
 def _whole(value: Any) -> int | None:

@@ -26,7 +26,7 @@ class Unit:
 
 @dataclass(slots=True)
 class Machine:
-    """A machine, the sources that are online, and which source each signal is taken from.
+    """A machine, and the sources that are online.
 
     number: in the order in which the machines became known
     ways: how the data of a node are taken, found at its first message after a birth or a death
@@ -40,9 +40,13 @@ class Machine:
     live: Lane
     history: Lane | None = None
     online: set[NodeId] = field(default_factory=set)
-    owner: dict[str, NodeId] = field(default_factory=dict)
     excluded: dict[NodeId, frozenset[str]] = field(default_factory=dict)
     ways: dict[NodeId, Callable[[Stream, float], Folded]] = field(default_factory=dict)
+
+    @property
+    def owner(self) -> dict[str, NodeId]:
+        """Return the source that each signal is taken from."""
+        return self.live.owner
 
     @property
     def is_online(self) -> bool:
@@ -58,14 +62,16 @@ class Machine:
 
     def go_on(self, offers: Mapping[NodeId, Collection[str]]) -> None:
         """Go on with a restored lane at the message at which it was saved: who was online, by the births that were heard, still
-        is. `offers`: the signals of each node that is read; the first owns."""
+        is. `offers`: the signals of each node that is read; where an old snapshot does not say who owns one, the first does."""
         self.live.go_on()
+        is_told = bool(self.owner)
         for node, names in offers.items() if self.live.ticking else ():
             if not self.live.births or str(node) in self.live.births:
                 self.online.add(node)
-                clashing = frozenset(one for one in names if one in self.owner)
+                clashing = frozenset(one for one in names if self.owner.get(one, node) != node)
                 self.excluded[node] = clashing
-                self.owner.update((one, node) for one in names if one in self.live.row and one not in clashing)
+                if not is_told:
+                    self.owner.update((one, node) for one in names if one in self.live.row and one not in clashing)
 
     def taken(self, birth: HostEvent, inputs: frozenset[str] | None) -> list[Reading]:
         """The readings of a birth that are taken from its source. A signal belongs to the first source that is online with it;

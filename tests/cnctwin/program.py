@@ -29,7 +29,7 @@ def is_alive(pid: int) -> bool:
 
 def children(pid: int) -> dict[str, int]:
     """The processes that one has started, by a word of their command line that tells which they are."""
-    words = ("mosquitto", "simulate-control", "historian", "process", "serve", "jobs", "edge")
+    words = ("mosquitto", "simulate-control", "historian", "process", "serve", "jobs", "edge", "twin")
     found = {}
     for folder in Path("/proc").iterdir():
         try:

@@ -14,6 +14,9 @@ MIRROR = ("cnc/okuma/spindle_rpm", "cnc/okuma/twin/raw_score")
 ASK_FOR_JOBS = ("cnc/jobs/request", "cnc/jobs/cancel")
 JOB = "cnc/jobs/night-7/state"
 JOBS = ("cnc/jobs/state", "cnc/jobs/reply/night-7")
+DESCRIPTIONS = tuple(f"cnctwin/description/okuma/{end}" for end in ("live", "challenger", "fault", "fault/gap/live"))
+LOOP = "cnctwin/loop/okuma"
+ASK_THE_LOOP = tuple(f"cnctwin/loop/request/{word}" for word in ("diagnose", "promote", "back", "withdraw"))
 ELSEWHERE = (
     "anything",
     "spBv1.0/other/NDATA/edge-okuma",
@@ -57,7 +60,7 @@ ALL = sorted(
         *ASK_FOR_JOBS,
         JOB,
     }
-    | {*JOBS, *ELSEWHERE}
+    | {*JOBS, *DESCRIPTIONS, LOOP, *ASK_THE_LOOP, *ELSEWHERE}
 )
 
 MAY_WRITE: dict[str, frozenset[str]] = {
@@ -67,15 +70,16 @@ MAY_WRITE: dict[str, frozenset[str]] = {
     | ASK_FOR_BIRTHS
     | RECEIPTS
     | {STATES[0], SNAPSHOT, LETTER, MARKER, LAG, *OUTBOX, ALERTS_STATE, COMMANDS[0], *MIRROR}
-    | {*ASK_FOR_JOBS, JOB, *JOBS},
+    | {*ASK_FOR_JOBS, JOB, *JOBS, *DESCRIPTIONS, LOOP},
     "viewer": frozenset(),
-    "operator": ASK_FOR_BIRTHS | set(COMMANDS) | set(ASK_FOR_JOBS),
+    "operator": ASK_FOR_BIRTHS | set(COMMANDS) | set(ASK_FOR_JOBS) | set(ASK_THE_LOOP),
 }
-READERS = SPARKPLUG | {*STATES, ALERTS_STATE, LETTER, *MIRROR, *ASK_FOR_JOBS, JOB, *JOBS, ELSEWHERE[2]}
+READERS = SPARKPLUG | {*STATES, ALERTS_STATE, LETTER, *MIRROR, *ASK_FOR_JOBS, JOB, *JOBS, *DESCRIPTIONS, LOOP, ELSEWHERE[2]}
 MAY_READ: dict[str, frozenset[str]] = {
     **{edge: told(edge) | set(STATES) for edge in EDGE_NODES},
     "processors": SPARKPLUG
-    | {*STATES, SNAPSHOT, LETTER, MARKER, LAG, *OUTBOX, ALERTS_STATE, *COMMANDS, *ASK_FOR_JOBS, JOB, ELSEWHERE[2]},
+    | {*STATES, SNAPSHOT, LETTER, MARKER, LAG, *OUTBOX, ALERTS_STATE, *COMMANDS, *ASK_FOR_JOBS, JOB, JOBS[1], ELSEWHERE[2]}
+    | {*DESCRIPTIONS, LOOP, *ASK_THE_LOOP},
     "viewer": READERS,
     "operator": READERS,
 }

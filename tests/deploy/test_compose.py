@@ -21,10 +21,12 @@ from cnctwin.api.application import create_app
 from cnctwin.api.live.plant import LivePlant
 from cnctwin.api.sources import Sources
 from cnctwin.jobs.client import JobsClient
+from cnctwin.machines.place import machines_folder
 from cnctwin.memory.store.influx.address import parse
 from cnctwin.memory.store.opening import default_place
 from edge.config_file import load
 from edge.running.run import broker_addresses
+from processors.description import Description
 from processors.discovery import discover
 from processors.running.runtime import configured
 from sparkplug.broker import BrokerAddress
@@ -170,10 +172,11 @@ def test_each_service_is_pinned_bounded_and_has_no_rights_that_it_does_not_need(
 @pytest.mark.parametrize("store", sorted(STORES))
 def test_all_of_it_fits_a_small_machine(broker: str, store: str) -> None:
     running = {name: one for name, one in SERVICES.items() if set(one.get("profiles", [broker])) & {broker, store}}
-    assert len(running) == 9
+    assert len(running) == 10
     limits = {name: int(service["mem_limit"].removesuffix("m")) for name, service in running.items()}
     # On top: where memory is short the kernel ends a job first, and that is started again.
     assert limits.pop("jobs") <= MEMORY_MB_MAX / 4
+    assert limits.pop("loop") <= MEMORY_MB_MAX / 4
     assert sum(limits.values()) <= MEMORY_MB_MAX
 
 
@@ -242,7 +245,7 @@ def test_what_the_configuration_names_is_mounted_where_it_says(prepared: Prepare
 
 
 def test_the_brokers_of_all_services_are_addresses_that_their_files_fit(prepared: Prepared) -> None:
-    for name in ("processors", "historian", "jobs", "page"):
+    for name in ("processors", "historian", "jobs", "loop", "page"):
         service = OURS[name]
         address = BrokerAddress.from_url(service["environment"]["CNCTWIN_BROKER"])
         assert (address.host, address.tls) == ("broker", True)
@@ -267,6 +270,37 @@ def test_the_page_offers_the_results_that_the_consumer_keeps_and_can_change_none
     assert dict(mounts(OURS["page"], prepared))[keeps["/var/lib/cnctwin"] / kept.relative_to("/var/lib/cnctwin")] == str(shown)
     assert f"{shown}:ro" in "\n".join(OURS["page"]["volumes"])
     assert f"{parsed(command(OURS['jobs']))['files']}:ro" in "\n".join(OURS["jobs"]["volumes"])
+
+
+def test_the_loop_alone_changes_descriptions_and_works_where_the_jobs_are(prepared: Prepared) -> None:
+    given, where = parsed(command(OURS["loop"])), {inside: source for source, inside in mounts(OURS["loop"], prepared)}
+    folder = where[str(given["machines"])]
+    assert folder == prepared.home / "etc/cnctwin/machines"
+    (file,) = folder.glob("*.toml")
+    found = Description.from_toml(file.read_text(), str(file)).machine.machine
+    assert (file.stem, found.name, found.assumed) == (MACHINE, MACHINE, ("thermal", "spindle", "tool"))
+    mounted = {name: [at for at in one["volumes"] if ":/etc/cnctwin" in at] for name, one in OURS.items()}
+    assert [name for name, each in mounted.items() if not all(at.endswith(":ro") for at in each)] == ["loop"]
+    jobs = {inside: source for source, inside in mounts(OURS["jobs"], prepared)}
+    files, kept = (parsed(command(OURS["jobs"]))[option] for option in ("files", "folder"))
+    assert where[str(given["jobs_files"])] == jobs[str(files)]
+    assert where[str(given["jobs"])] == jobs["/var/lib/cnctwin"] / kept.relative_to("/var/lib/cnctwin")
+    assert machines_folder(None, where["/etc/cnctwin"] / "processors.toml") == folder, "the others find it beside --config"
+
+
+@pytest.mark.broker
+def test_a_machine_is_described_by_the_file_of_its_folder_and_the_loop_keeps_its_document(running: Prepared) -> None:
+    services = [running.start_service(name) for name in ("processors", "loop")]
+    try:
+        with WireClient(running.page) as reader:
+            reader.subscribe("cnctwin/description/#", f"cnctwin/loop/{MACHINE}")
+            wanted = {f"cnctwin/description/{MACHINE}/live", f"cnctwin/loop/{MACHINE}"}
+            reader.until(lambda: {topic for topic, payload in reader.received if payload} >= wanted, "description and loop")
+    finally:
+        for service in services:
+            service.terminate()
+        told = [service.communicate(timeout=30)[1] for service in services]
+    assert [service.returncode for service in services] == [0, 0], told
 
 
 @pytest.mark.broker
@@ -320,7 +354,7 @@ def test_the_user_of_the_page_may_do_the_same_on_both_brokers() -> None:
     mosquitto = (DEPLOY / "mosquitto" / "people.acl").read_text().partition("user page\n")[2].strip().splitlines()
     writes = {line.removeprefix("topic write ") for line in mosquitto}
     hivemq = (DEPLOY / "hivemq" / "credentials.xml").read_text().partition("<id>page</id>\n            <permissions>")[2]
-    asks = {"cnc/jobs/request", "cnc/jobs/cancel"}
+    asks = {"cnc/jobs/request", "cnc/jobs/cancel", "cnctwin/loop/request/+"}
     assert (
         writes
         == set(re.findall(r"<topic>([^<]+)</topic>", hivemq))
@@ -338,7 +372,7 @@ def test_with_influxdb_the_store_has_its_token_and_no_other_service_has(tmp_path
     token = (tmp_path / "p" / "secrets" / "influxdb_admin_token").read_text().strip()
     assert (tmp_path / "p" / "secrets" / "store.env").read_text() == f"CNCTWIN_INFLUX_TOKEN={token}\n"
     given = {name for name, service in SERVICES.items() if any("store.env" in file for file in service.get("env_file", []))}
-    assert given == {"historian", "page", "validate"}
+    assert given == {"historian", "loop", "page", "validate"}
     assert "influx+http://influxdb:8086?org=cnctwin&also=" in (tmp_path / "p" / ".env").read_text()
 
 

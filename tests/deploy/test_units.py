@@ -15,7 +15,7 @@ from tests.deploy.plant import DEPLOY
 
 FOLDER = DEPLOY / "systemd"
 SERVICES = sorted(FOLDER.glob("*.service"))
-SHARING = ("cnctwin-historian", "cnctwin-page", "cnctwin-validate@")
+SHARING = ("cnctwin-historian", "cnctwin-jobs", "cnctwin-loop", "cnctwin-page", "cnctwin-validate@")
 
 
 def words(unit: Path) -> list[str]:
@@ -37,6 +37,18 @@ def test_every_processor_runs_in_one_unit_and_is_configured_by_the_file_that_is_
     # Needs a detector that was trained on this machine.
     assert set(discover()) - set(names) == {"tool_change_detector"}, "name it in the ExecStart of a unit in deploy/systemd/"
     assert len(configured(names, DEPLOY / "processors.toml")) == len(names)
+
+
+def test_whoever_needs_the_descriptions_reads_the_folder_that_the_loop_changes_and_the_loop_works_where_the_jobs_are() -> None:
+    given = {name: parsed(words(FOLDER / f"{name}.service")) for name in (*SHARING, "cnctwin-processors")}
+    folder = Path("/var/lib/cnctwin-history/machines")
+    for name in ("cnctwin-historian", "cnctwin-loop", "cnctwin-validate@"):
+        assert given[name]["machines"] == folder, name
+    assert given["cnctwin-page"]["diagnoses"] == folder / "diagnoses"
+    assert given["cnctwin-processors"]["machines"] is None, "another user: it takes them up from the broker"
+    jobs, loop, page = (given[f"cnctwin-{name}"] for name in ("jobs", "loop", "page"))
+    assert (loop["jobs"], loop["jobs_files"]) == (jobs["folder"], jobs["files"])
+    assert page["jobs"] == jobs["folder"]
 
 
 @pytest.mark.parametrize("name", SHARING)

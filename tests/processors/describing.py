@@ -65,7 +65,7 @@ def message(power_kw: float | None, role: Role = Role.LIVE, machine: str = "okum
 
 @dataclass(frozen=True, slots=True)
 class Gain:
-    """What the step is given: a factor, and where it is from."""
+    """The means of the step: a factor, and its origin."""
 
     factor: float
     version: str

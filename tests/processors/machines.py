@@ -43,14 +43,14 @@ class Fold:
         self.given = self.processor.given(self.configuration, "okuma", description)
 
     def at(self, at_s: float, kind: SampleKind = SampleKind.DATA, **values: Any) -> dict[str, Any]:
-        """What the sample emits: output → value, or the reason for a null."""
+        """Return the outputs of the sample: output → value, or the reason for a null."""
         self.row |= {name: reading(name, value, at_s) for name, value in values.items()}
         sample = Sample("okuma", kind, T0_MS / 1000.0 + at_s, self.row, tuple(values))
         self.state, outputs = self.processor.step(self.given, self.state, sample)
         return said(outputs)
 
     def tick(self, at_s: float) -> dict[str, Any]:
-        """What a tick emits."""
+        """Return the outputs of a tick."""
         return self.at(at_s, SampleKind.TICK)
 
 

@@ -1,4 +1,4 @@
-"""What of a machine is only assumed leaves the list once recordings tell it."""
+"""A constant that is only assumed leaves the list once recordings tell it."""
 
 import pytest
 

@@ -121,6 +121,7 @@ class Effect:
     usual_on: axes where it is usual, elsewhere something else is likelier; empty = all
     excited_by: what a recording has to contain for it to show
     first_guesses: sets of values to start the fit from, where the recordings suggest them
+    same_on: signal → an input of the twin on which it does the same, where that input is assumed and not recorded
 
     Read by the stages, which compare a recording stretch by stretch:
 
@@ -129,6 +130,7 @@ class Effect:
         contact is bent, of `held_n`, the force that friction holds
     carried: states that outlast a rest
     undo: the value at which a sensor with it reads its first argument at rest
+    settles_s: time, s, of parameters, after which it shows what it is: in a stretch that is over before, it is only a trend
 
     Read by experiments and optimiser:
 
@@ -154,10 +156,12 @@ class Effect:
     usual_on: tuple[str, ...] = ()
     excited_by: Excitation | None = None
     first_guesses: Callable[[Recorded], Guesses] = no_guesses
+    same_on: Mapping[str, str] = field(default_factory=dict)
     late_s: Callable[..., Any] | None = None
     at_rest: Mapping[str, Callable[..., Any]] = field(default_factory=dict)
     carried: tuple[str, ...] = ()
     undo: Callable[..., Any] | None = None
+    settles_s: Callable[..., Any] | None = None
     likely_in: Mapping[str, int] = field(default_factory=dict)
     builds_up: BuildsUp | None = None
     lowers: Mapping[str, str] = field(default_factory=dict)

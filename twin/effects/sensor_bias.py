@@ -26,6 +26,7 @@ EFFECT = Effect(
     changes={"reading": reading},
     shows_in=("{s}",),
     undo=undo,
+    same_on={"spindle_temp_c": "ambient_temp_c"},
     equation="reading = value + bias",
     reference="JCGM 200:2012 (VIM) 4.20, instrumental bias",
 )

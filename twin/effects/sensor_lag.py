@@ -33,6 +33,7 @@ EFFECT = Effect(
     changes={"reading": reading},
     shows_in=("{s}",),
     shows_only_fast=True,
+    settles_s=lambda time_constant_s: time_constant_s,
     first_guesses=first_guesses,
     equation="tau dreading/dt = value − reading",
     reference="JCGM 200:2012 (VIM) 4.23, step response time; first-order low pass",

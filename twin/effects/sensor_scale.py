@@ -36,6 +36,7 @@ EFFECT = Effect(
     changes={"reading": reading},
     shows_in=("{s}",),
     undo=undo,
+    same_on={"spindle_temp_c": "ambient_temp_c"},
     first_guesses=first_guesses,
     equation="reading = scale value",
     reference="JCGM 200:2012 (VIM) 4.12, sensitivity of a measuring system",

@@ -33,8 +33,8 @@ def found_effects(stages: Sequence[Judged]) -> list[tuple[Effected, dict[str, fl
     return [(e, {k: float(np.mean([v[k] for v in values])) for k in values[0]}) for e, values in found.items()]
 
 
-def causes_of(stages: Sequence[Judged], shares: Mapping[Effected, float]) -> tuple[Cause, ...]:
-    """Return the causes, largest share first."""
+def causes_of(stages: Sequence[Judged], shares: Mapping[Effected, float], assumed: Sequence[str] = ()) -> tuple[Cause, ...]:
+    """Return the causes, largest share first. assumed: columns that nobody recorded, and that may be off themselves"""
     causes: dict[Effected, Cause] = {}
     for stage in stages:
         found = stage.explained
@@ -44,9 +44,16 @@ def causes_of(stages: Sequence[Judged], shares: Mapping[Effected, float]) -> tup
                 continue
             share = float(f"{shares.get(effected, 0.0):.4g}")
             rivals = tuple(r for r in found.rivals.get(effected, ()) if r not in causes)
+            rivals += _assumed_rivals((effected, *rivals), assumed)
             one = Cause(effected.effect, effected.on, _probability(found, effected), intervals[effected], rivals, share)
             causes[effected] = one if effected not in causes else _joined(causes[effected], one)
     return tuple(sorted(causes.values(), key=lambda c: -c.closure))
+
+
+def _assumed_rivals(alike: Sequence[Effected], assumed: Sequence[str]) -> tuple[Effected, ...]:
+    """Return what would be the same on an input that is assumed: a bias of the spindle's temperature is other surroundings."""
+    inputs = [(one.effect, effect_named(one.effect).same_on.get(one.on)) for one in alike]
+    return tuple(dict.fromkeys(Effected(effect, on) for effect, on in inputs if on is not None and on in assumed))
 
 
 def _input_errors(stage: Stage) -> dict[str, float]:

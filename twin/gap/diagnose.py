@@ -119,7 +119,7 @@ def _motion(
     causes = tuple(dict.fromkeys(e for s in stages for e in s.explained.best.effects))
     shares = shapley(causes, lambda some: _closed(ground, stages, twins, some))
     traces = traces_of(twins.runs, twins.shown["before"], twins.shown["after"], ground.floors)
-    numbers, named = _numbers(twins), causes_of(stages, shares)
+    numbers, named = _numbers(twins), causes_of(stages, shares, case.assumed)
     verdict = overall(stages)
     if verdict is Verdict.HEALTHY and any(s.before > FAR_ABOVE * s.floor for s in numbers.by_signal.values()):
         verdict = Verdict.UNKNOWN

@@ -42,7 +42,7 @@ LASTING = (Regime.REST.title, Regime.REVERSAL.title)
 LOWER, LOWER_CHI2 = 0.25, 0.1015
 """Lower quartile, and that of χ² with one degree of freedom: a block in which the difference hardly changes has one."""
 AIR_K = 0.15
-"""By which the air at a spindle differs from that at its thermometer, in recordings of plain production: a temperature that a
+"""The difference of the air at a spindle from that at its thermometer, in recordings of plain production: a temperature that a
 control shows in steps coarser than its noise. A warm-up that is measured for its own sake has a thermometer where it matters."""
 RARE = 0.75
 """Part of a regime up to which samples are left out as events or their wake."""

@@ -23,6 +23,7 @@ from twin.gap.fitting import Fitted, dropped, fitted, settled, with_only, withou
 from twin.gap.naming.certain import certain_of
 from twin.gap.naming.instead import instead_of_constants
 from twin.gap.naming.moved import has_to_be_beyond
+from twin.gap.naming.outlasting import outlasts
 from twin.gap.naming.siblings import only_completes
 from twin.gap.naming.stops import stops_are_at_odds
 from twin.gap.null import NULL, Null
@@ -218,6 +219,7 @@ def _tried(stage: Stage, parent: Fitted, candidates: tuple[Effected, ...], null:
     tried = []
     for g in screened:
         found = fits.get(g[0].effected)
+        found = None if found is None or outlasts(stage, found.effects[-1], found.values[found.effects[-1]]) else found
         tried.append(Tried(g[0].effected, g[0].closes, found, None if found is None else advantage(parent.left, found.left)))
     return tuple(sorted(tried, key=lambda t: -np.inf if t.over is None else t.over.gain, reverse=True))
 

@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 
 from twin.effects.effect import Effect
 from twin.errors import EffectError
+from twin.kernels.parsing import parsed
 
 Physics = Callable[..., object]
 
@@ -85,14 +86,14 @@ class _Weaver:
 
 
 def _assignment(target: str, value: str) -> ast.Assign:
-    statement = ast.parse(f"{target} = {value}").body[0]
+    statement = parsed(f"{target} = {value}").body[0]
     assert isinstance(statement, ast.Assign)
     return statement
 
 
 def function_text(function: Physics, name: str | None = None) -> str:
     """The source of a function, without docstring and annotations, called `name`."""
-    tree = ast.parse(textwrap.dedent(inspect.getsource(function))).body[0]
+    tree = parsed(textwrap.dedent(inspect.getsource(function))).body[0]
     assert isinstance(tree, ast.FunctionDef)
     tree.name = name or tree.name
     tree.returns = None
@@ -107,7 +108,7 @@ def quantities(physics: Iterable[Physics]) -> dict[str, str]:
     """The marked quantities of a stage, with the site of each (the name of the member of Site)."""
     found: dict[str, str] = {}
     for function in physics:
-        for node in ast.walk(ast.parse(textwrap.dedent(inspect.getsource(function)))):
+        for node in ast.walk(parsed(textwrap.dedent(inspect.getsource(function)))):
             if isinstance(node, ast.Assign) and _is_mark(node.value):
                 assert isinstance(node.targets[0], ast.Name) and isinstance(node.value, ast.Call)
                 site = node.value.args[0]
@@ -135,7 +136,7 @@ def weave(
         if name not in known:
             raise EffectError(f"{name!r} is not a quantity that can be replaced or added to here; these are: {', '.join(known)}")
     for function in physics:
-        tree = ast.parse(textwrap.dedent(inspect.getsource(function))).body[0]
+        tree = parsed(textwrap.dedent(inspect.getsource(function))).body[0]
         assert isinstance(tree, ast.FunctionDef)
         for statement in tree.body:
             if isinstance(statement, ast.Assign) and _is_mark(statement.value):

@@ -9,7 +9,7 @@ from twin.learned.words import LearnedSite
 
 Place = tuple[LearnedSite, str, frozenset[str]]
 SINCE = "time_since_start_s"
-"""What a term of the program's time is over."""
+"""The argument of a term of the program's time."""
 
 
 def place_of(section: LearnedSection) -> Place:

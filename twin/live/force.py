@@ -58,9 +58,9 @@ class LiveForce:
         """Return the tool of this number, None = the control tells none."""
         named = "" if number is None else f"{number:.0f}"
         if named in self.diameters_mm:
-            return ToolUsed(named, self.diameters_mm[named])
+            return tuple.__new__(ToolUsed, (named, self.diameters_mm[named], None))
         if self.other_mm is not None:
-            return ToolUsed("", self.other_mm)
+            return tuple.__new__(ToolUsed, ("", self.other_mm, None))
         if not self.diameters_mm:
             return ToolUsed("", None, "tool diameter is not known")
         if number is not None:

@@ -80,6 +80,11 @@ class LiveHeat:
         return self.terms.needs(_TEMPERATURE) or self.reading_terms.needs(_TEMPERATURE)
 
     @cached_property
+    def _is_bare(self) -> bool:
+        """Return True where nothing but the temperature has a memory, and nothing learned is added."""
+        return not self.names and not self.terms and self.sensor is None
+
+    @cached_property
     def needs_coolant(self) -> bool:
         """Return True where an effect or a term depends on the coolant."""
         own = "coolant_on" in self.stepper.reads
@@ -107,6 +112,9 @@ class LiveHeat:
 
     def step(self, state: HeatState, told: HeatInput, duration_s: float) -> HeatState:
         """Return the state after a time over which these inputs held."""
+        if self._is_bare:  # most machines; on the hot path, a named tuple's own constructor costs as much as the physics
+            (temperature_c,) = self.stepper.step(state[0], *told, duration_s, state[1])
+            return tuple.__new__(HeatState, (temperature_c, state[1] + duration_s, (), (), None))
         added = (self.terms.at(_arguments(state.temperature_c, state.time_s, told)),) if self.terms else ()
         temperature_c, *effects = self.stepper.step(state.temperature_c, *told, duration_s, state.time_s, *added, *state.effects)
         after = HeatState(temperature_c, state.time_s + duration_s, tuple(effects), self.names)

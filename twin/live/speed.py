@@ -23,6 +23,9 @@ class SpindleSpeed(NamedTuple):
 
     def seen(self, at_s: float, rpm: float, command_rpm: float | None, settle_s: float) -> "SpindleSpeed":
         """Return the speed with what holds at this moment; itself where nothing is new."""
+        points = self.told
+        if len(points) == 1 and command_rpm is None and not self.commanded and abs(rpm - points[0][1]) <= _FINE * BAND_RPM:
+            return self  # as nearly always
         fine = _FINE * max(BAND_RPM, BAND_PART * abs(rpm))
         told = _followed(self.told, at_s, rpm, fine, settle_s)
         commanded = () if command_rpm is None else _followed(self.commanded, at_s, command_rpm, fine, settle_s)

@@ -15,6 +15,7 @@ from twin.effects.effect import Effect
 from twin.errors import EffectError
 from twin.kernels import elementary
 from twin.kernels.assembly import Assembly, kernel_text
+from twin.kernels.parsing import parsed
 from twin.kernels.weave import Physics, Woven, function_text, quantities, weave
 from twin.servo import controller, friction, mechanics, metrics, table
 from twin.servo.lanes import CLOCKS, INPUTS, LaneLoops, Stage, names_of, read_by
@@ -86,7 +87,7 @@ def _alive(woven: Woven, wanted: frozenset[str]) -> Stage:
     """The statements that `wanted` depends on."""
     live, kept = set(wanted), list[ast.stmt]()
     sets: set[str] = set()
-    for statement in reversed(ast.parse(woven.body).body):
+    for statement in reversed(parsed(woven.body).body):
         targets = names_of(statement, ast.Store)
         if targets & live:
             live = (live - targets) | read_by(statement)

@@ -6,7 +6,7 @@ from here. A name that only its own processor uses is spelled there.
 
 TWIN_PREFIX = "twin/"
 CHALLENGER_PREFIX = f"{TWIN_PREFIX}challenger/"
-"""What a challenger says; the rest of the name is that of the live twin's signal, below `twin/`."""
+"""The prefix of a challenger's signals; the rest of the name is that of the live twin's signal, below `twin/`."""
 
 # thermal, cutting_force, residual, vibration
 SPINDLE_TEMP_C = f"{TWIN_PREFIX}spindle_temp_c"

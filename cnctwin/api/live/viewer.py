@@ -7,11 +7,11 @@ from collections import deque
 from collections.abc import Callable, Mapping
 
 from cnctwin.api.live.batches import Batch
-from cnctwin.api.live.descriptions import LiveDescriptions
 from cnctwin.api.live.documents import AlertsState, DocumentError, read_document
 from cnctwin.api.live.jobs import LiveJobs
 from cnctwin.api.live.loops import LiveLoops
 from cnctwin.api.live.plant import LivePlant
+from cnctwin.plant.descriptions import LiveDescriptions
 from cnctwin.plant.watch import viewer
 from sparkplug.admission.limits import DEFAULTS, Limits
 from sparkplug.broker import BrokerAddress

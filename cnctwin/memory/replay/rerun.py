@@ -73,7 +73,7 @@ class Rerun:
         self._hears_from = start.hears_from
         self._births, self._saved_ms = start.births, start.saved_ms
         self._early: list[tuple[int, HostEvent]] = []
-        self._wall_s = 0.0
+        self._wall_s = self._said_s = 0.0
         self._beats = processor.beats
         self._beat_ms: int | None = None
         self._is_counted = False
@@ -116,8 +116,9 @@ class Rerun:
         return self._produced
 
     def end(self) -> None:
-        """The stretch is over."""
+        """The stretch is over. It had lived until it said its last: the ticks of the silence before that were given."""
         self._resume()
+        self._wall_s = max(self._wall_s, self._said_s + POLL_S)
         self._silence()
 
     def _is_of_unit(self, event: HostEvent) -> bool:
@@ -127,6 +128,7 @@ class Rerun:
 
     def _own(self, place: int, received_ms: int, event: HostEvent) -> None:
         if event.kind is EventKind.DATA:
+            self._said_s = received_ms / 1000
             if self._beats and event.readings:
                 self._beat(max(reading.timestamp_ms for reading in event.readings))
             if event.device == self._machine:

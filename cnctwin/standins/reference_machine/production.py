@@ -27,7 +27,7 @@ MEAN_BREAK_PARTS = 12.0
 
 @dataclass(frozen=True, slots=True)
 class Operation:
-    """What one tool does on each part."""
+    """The work of one tool on each part."""
 
     tool: int
     rpm: float
@@ -39,7 +39,7 @@ class Operation:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Production:
-    """What the machine is told and does, second by second, each (n,).
+    """The commands to the machine and its answer, second by second, each (n,).
 
     cut_kw: mechanical power of the cut; rated_kw: as stated, in whose percents the heat by load is
     """
@@ -57,7 +57,7 @@ class Production:
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """How a control shows it: the steps of its readings, and the part of rows that never arrive."""
+    """The display of a control: the steps of its readings, and the part of rows that never arrive."""
 
     load_step_pct: float = 1.0
     temperature_step_c: float = 0.1

@@ -25,7 +25,7 @@ def program_text() -> str:
 
 
 def description_text() -> str:
-    """What the live twin is told: the machine with the tools of its program, as `machines/<name>.toml` holds it."""
+    """Return the live twin's description: the machine with the tools of its program, as `machines/<name>.toml` holds it."""
     return f"{TOLD.read_text(encoding='utf-8')}\n{TOOLS.read_text(encoding='utf-8')}"
 
 

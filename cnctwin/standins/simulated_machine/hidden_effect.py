@@ -29,6 +29,7 @@ class HiddenEffect(BaseModel):
     """An effect that can be hidden.
 
     size: the parameter that is drawn, with its lowest and highest value; parameters: the others
+    at_random: it is among those that are drawn where nobody chooses: the loop finds it within three minutes
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -37,6 +38,7 @@ class HiddenEffect(BaseModel):
     on: str = ""
     size: dict[str, tuple[float, float]]
     parameters: dict[str, float] = {}
+    at_random: bool = True
 
     @property
     def name(self) -> str:
@@ -68,7 +70,7 @@ class Choice(NamedTuple):
     def added(self, seed: int | None) -> AddedEffect:
         """Return the effect that this choice comes to. seed: None = another one each time"""
         random = Random(seed)  # noqa: S311 — a demonstration, no secret
-        effect = self.effect or random.choice(hidden_effects())
+        effect = self.effect or random.choice([one for one in hidden_effects() if one.at_random])
         return effect.drawn(random) if self.size is None else effect.of_size(self.size)
 
 

@@ -158,3 +158,4 @@ def test_without_surroundings_there_is_no_heat_unless_somebody_states_them(tmp_p
     made.close()
     assert {r.kind for r in done.runs} == {RunKind.WARMUP, RunKind.CUT}
     assert any("21.5 °C throughout is an assumption" in note for note in done.notes)
+    assert read_case(tmp_path / "case").assumed == ("ambient_temp_c",)

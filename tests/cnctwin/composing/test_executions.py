@@ -1,12 +1,7 @@
 """Executions of programs: where they begin and end, and which of them repeat each other."""
 
-from pathlib import Path
-
-import pytest
-
-from cnctwin.composing.executions import Execution, ProgramFolder, executions_of, pairs
+from cnctwin.composing.executions import Execution, executions_of, pairs
 from cnctwin.composing.history import OVERRIDES, PROGRAM, STATE, Course, History
-from cnctwin.errors import UsageError
 from sparkplug.values import Value
 
 
@@ -61,27 +56,3 @@ def test_another_program_or_another_length_repeats_nothing() -> None:
     ):
         assert not other.repeats(one)
     assert not Execution(0, 100_000, "", True, False, False).repeats(Execution(200_000, 300_000, "", True, False, False))
-
-
-@pytest.mark.parametrize(
-    ("file", "text", "program"),
-    [
-        ("PLATE.NC", "G0", "PLATE.NC"),
-        ("plate.nc", "G0", "PLATE"),
-        ("o1701.nc", "G0", "O01701"),
-        ("base plate.txt", "%\nO1701 (BASE)\nG0\n", "1701"),
-        ("any.h", "BEGIN PGM BRACKET MM\n", "BRACKET"),
-        ("part.mpf", "G0", "/_N_MPF_DIR/PART.MPF"),
-    ],
-)
-def test_the_text_of_a_program_is_found_by_the_name_that_the_control_gives_it(
-    tmp_path: Path, file: str, text: str, program: str
-) -> None:
-    (tmp_path / file).write_text(text)
-    assert ProgramFolder(tmp_path).text_of(program) == text
-    assert ProgramFolder(tmp_path).text_of("another") is None and ProgramFolder(None).text_of(program) is None
-
-
-def test_a_folder_that_is_none_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="is no folder"):
-        ProgramFolder(tmp_path / "nowhere")

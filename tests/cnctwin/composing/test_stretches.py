@@ -107,6 +107,12 @@ def test_a_single_stretch_is_divided_at_the_end_of_a_program() -> None:
     assert divided([stretch], ()).at_ms == 2_400_000
 
 
+def test_a_spindle_that_stands_at_the_end_is_divided_by_the_time_that_it_turned() -> None:
+    stretch = Stretch(0, HOUR_MS, False, 0.3)
+    assert divided([stretch], (), [(0, 600_000), (900_000, 1_200_000)]).at_ms == 600_000
+    assert divided([stretch], (), [(0, 600_000), (2_700_000, 3_000_000)]).at_ms == 2_400_000, "the judge turns"
+
+
 def test_programs_alone_are_divided_between_two_of_them() -> None:
     runs = [Execution(n * 500_000, n * 500_000 + 480_000, "O1", True, False, False) for n in range(3)]
     division = divided([], runs)

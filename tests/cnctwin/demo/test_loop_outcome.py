@@ -53,6 +53,14 @@ def test_a_gap_that_is_still_open_after_the_promotion_has_no_seconds(sealed: Pat
     assert (found.promoted, found.gap_after, found.seconds) == (True, 1.31, None)
 
 
+def test_a_promotion_that_was_taken_back_is_none(sealed: Path) -> None:
+    watch = LoopWatch("vmc", started_s=0.0)
+    watch.take(of("promoted", last={"text": "", "before": 6.1, "after": 0.9, "since": 0}), 20.0)
+    watch.take(of("watching", last=None), 30.0)
+    outcome = watch.outcome(sealed)
+    assert (outcome.promoted, outcome.gap_before, outcome.gap_after, outcome.seconds) == (False, None, None, None)
+
+
 def test_a_demo_that_ended_before_has_named_nothing(sealed: Path) -> None:
     watch = LoopWatch("vmc", 0.0)
     watch.take(of("watching"), 10.0)

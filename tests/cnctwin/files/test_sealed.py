@@ -1,4 +1,4 @@
-"""What is sealed opens only with its own salt and text, and only its owner may read it before."""
+"""A sealed text opens only with its own salt and text, and only its owner may read it before."""
 
 import json
 import stat

@@ -10,44 +10,24 @@ import pytest
 from cnctwin.errors import UsageError
 from cnctwin.importing.column_map import ColumnMap
 from cnctwin.importing.control_recording import record, wanted
-from cnctwin.standins.lsv2_server.answers import Model
-from cnctwin.standins.lsv2_server.oscilloscope import CHANNELS, LABELS, ServoTrace
 from cnctwin.standins.lsv2_server.server import Lsv2Server
-from cnctwin.standins.simulated_control.control import SimulatedControl
-from cnctwin.standins.simulated_control.state import ControlState
 from edge.controls.heidenhain.oscilloscope import Oscilloscope
+from tests.edge.controls.heidenhain.scope_on_trial import counters, opened, scope_server
 from twin.runlog import read_run
 
-TRACE = ServoTrace({(axis, number): list(range(50_000)) for axis in range(len(LABELS)) for number in range(len(CHANNELS))})
-
-
-class Clock:
-    """The machine's seconds, which pass when the server waits: the same course on a machine that is busy."""
-
-    def __init__(self) -> None:
-        self.now_s = 0.0
-
-    def __call__(self) -> float:
-        return self.now_s
-
-    def wait(self, seconds: float) -> None:
-        self.now_s += seconds
+TRACE = counters(50_000)
 
 
 @pytest.fixture
 def server() -> Iterator[Lsv2Server]:
-    clock = Clock()
-    control = SimulatedControl([ControlState()], machine_s=clock)
-    with Lsv2Server(control, model=Model.ITNC530, trace=TRACE, pause=clock.wait) as running:
+    with scope_server(TRACE) as running:
         yield running
 
 
 @pytest.fixture
 def scope(server: Lsv2Server) -> Iterator[Oscilloscope]:
-    opened = Oscilloscope(server.url, timeout_s=5.0)
-    opened.open()
-    yield opened
-    opened.close()
+    with opened(server, 5.0) as ready:
+        yield ready
 
 
 def test_a_signal_is_asked_for_by_role_by_column_or_by_the_control_s_name(scope: Oscilloscope) -> None:

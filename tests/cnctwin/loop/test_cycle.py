@@ -201,6 +201,9 @@ def promoted(config: LoopConfig) -> State:
     return walked(config, after(0.0, SHADOWED), state=state)[0]
 
 
+HOUR_S = 3600.0
+
+
 def after(hours: float, standing: Standing = CLOSED) -> World:
     at_ms = T0_MS + 1 + round(hours * HOUR_MS)
     heard = replace(standing, at_ms=at_ms)
@@ -225,6 +228,17 @@ def test_it_goes_back_by_itself_where_the_gap_grows_and_not_after_its_time() -> 
     assert walked(BY_HAND, after(0.1, alike), state=promoted(BY_HAND))[1] is None
     state, deed = walked(BY_HAND, after(24.1, worse), state=promoted(BY_HAND))
     assert (state.step, deed) == (StepName.WATCHING, None)
+
+
+def test_figures_that_the_description_before_has_left_are_no_reason_to_go_back() -> None:
+    soon, still = 1.0 / HOUR_S, 30.0 / HOUR_S
+    left = Standing(at_ms=T0_MS, live={"spindle_temp_c": 9.9}, challenger={"spindle_temp_c": 1.0})
+    for hours, standing in ((soon, replace(left, challenger={})), (still, left)):
+        state, deed = walked(BY_HAND, after(hours, standing), state=promoted(BY_HAND))
+        assert deed is None
+        assert state.last is not None and state.last.after is None
+    assert isinstance(walked(BY_HAND, after(still, replace(left, challenger={})), state=promoted(BY_HAND))[1], Back)
+    assert isinstance(walked(BY_HAND, after(0.1, left), state=promoted(BY_HAND))[1], Back)
 
 
 def test_after_the_way_back_it_is_quiet_for_a_while() -> None:

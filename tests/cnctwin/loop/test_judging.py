@@ -1,4 +1,4 @@
-"""What a diagnosis leads to: filed where it is better on runs that it was not fitted to, else refused with its reason."""
+"""A diagnosis is judged: filed where it is better on runs that it was not fitted to, else refused with its reason."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Which plain messages a memory keeps, and when they were heard."""
+"""A memory keeps some plain messages, with the time at which they were heard."""
 
 import json
 

@@ -18,7 +18,7 @@ START_S = 1_795_219_200.0
 
 
 def told_twin() -> Twin:
-    """What the live twin of the simulated machine goes by; the tables hold the same for processors without a description."""
+    """The live description of the simulated machine; the tables hold the same for processors without a description."""
     told = read_machine(TOLD)
     assert told.thermal is not None and told.spindle is not None
     return Twin(told, {"thermal": told.thermal.model_dump(), "cutting_force": told.spindle.model_dump()})

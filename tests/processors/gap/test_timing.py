@@ -23,7 +23,7 @@ IDLE = {
 
 
 def ended(*events: HostEvent) -> list[Timed]:
-    """What was timed, without any tick in between."""
+    """Return the lengths that were timed, without any tick in between."""
     engine = engine_of(PROCESSOR, tick_s=600.0, gap_s_max=3600.0)
     fed(engine, birth(1.0, **IDLE), *events)
     return list(state_of(engine).timing.done)
@@ -40,9 +40,9 @@ CYCLE = (
     data(63.5, exec_state="PROGRAM_COMPLETED"),
 )
 WHOLE = [
-    Timed("program_time_s", "section 0 of O1", 20.0, 20.0),
+    Timed("program_time_s", "section 0 of O1", 20.0, 20.0, program="O1", section=0),
     Timed("tool_change_s", "spindle_stopped", 3.5, 30.0, True),
-    Timed("program_time_s", "section 1 of O1", 30.0, 30.0),
+    Timed("program_time_s", "section 1 of O1", 30.0, 30.0, program="O1", section=1),
 ]
 
 

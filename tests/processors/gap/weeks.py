@@ -77,6 +77,6 @@ class Weeks:
             self.growing_since_s = self.growing_since_s or self.at_s
 
     def days_to_alarm(self) -> float:
-        """From the end of the healthy period on."""
+        """The time from the end of the healthy period on."""
         assert self.growing_since_s is not None, "no alarm"
         return (self.growing_since_s - self.healthy_until_s) / DAY_S

@@ -41,7 +41,7 @@ def write(path: Path, text: str, at_s: float = 1_700_000_000.0) -> None:
 
 
 def sent(host: FakeHost) -> list[tuple[str, str]]:
-    """What was retained below cnctwin/description, by topic: the version, or the fault."""
+    """Return the messages retained below cnctwin/description, by topic: the version, or the fault."""
     told = [(topic, payload) for topic, payload, retain in host.plain if topic.startswith("cnctwin/description/") and retain]
     return [
         (topic, "" if not payload else json.loads(payload).get("version") or json.loads(payload)["text"])

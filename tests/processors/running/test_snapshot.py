@@ -104,3 +104,19 @@ def test_a_snapshot_that_is_not_ours_is_refused_and_counted(payload: bytes, culp
 def test_no_payload_crashes_a_restore(payload: bytes) -> None:
     with pytest.raises(SnapshotError):
         engine_of(PROCESSOR).restore(payload)
+
+
+def test_a_signal_that_is_not_offered_any_more_after_a_restart_is_withdrawn() -> None:
+    """Who owned it is in the snapshot: else its last value would hold for good."""
+    before, whole, after = engine_of(PROCESSOR), engine_of(PROCESSOR), engine_of(PROCESSOR)
+    opening = birth(0.0, spindle_rpm=5000.0, spindle_load_pct=40.0, ambient_temp_c=20.0, spindle_temp_c=25.0)
+    fed(before, opening)
+    fed(whole, opening)
+    after.restore(before.snapshot("okuma"))
+    again = [birth(5.0, spindle_rpm=5000.0, spindle_load_pct=40.0, ambient_temp_c=20.0), data(7.5, spindle_rpm=5100.0)]
+    for engine in (whole, after):
+        fed(engine, *again)
+        lane = engine.lane_of("okuma")
+        assert lane is not None
+        assert lane.row["spindle_temp_c"].reason == "not offered any more"
+        assert lane.emission.latest["twin/spindle_temp_residual_k"].value is None

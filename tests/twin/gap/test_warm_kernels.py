@@ -1,4 +1,4 @@
-"""What a production diagnosis needs is compiled ahead."""
+"""The kernels of a production diagnosis are compiled ahead."""
 
 import pytest
 

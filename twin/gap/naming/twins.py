@@ -15,6 +15,7 @@ from twin.effects.catalogue import effect_named
 from twin.gap.diagnosis import Effected
 from twin.gap.evidence import advantage, evidence_of
 from twin.gap.fitting import Fitted, fitted, settled
+from twin.gap.naming.outlasting import outlasts
 from twin.gap.search import CHANCE_BLOCKS, Explained, is_nothing
 from twin.gap.stages.free import Form, effect_parameters
 from twin.gap.stages.stage import Stage
@@ -23,7 +24,7 @@ Floats = NDArray[np.float64]
 AS_MUCH = 0.9
 """Part of what the answer closes that its twin has to close."""
 BETTER_SIGMAS, BETTER = 2.0, 0.1
-"""How surely, and by how many floors², another effect has to leave less to be the answer."""
+"""The certainty, and the floors², by which another effect has to leave less to be the answer."""
 STEPS_MAX = 12
 
 
@@ -54,6 +55,8 @@ def _instead(stage: Stage, found: Explained, effected: Effected, other: Effected
     kept = np.delete(best.theta, np.arange(place.start, place.stop))[len(constants) :]
     fits = [fitted(stage, model, np.concatenate([constants, kept, own]), steps_max=STEPS_MAX) for own in _starts(stage, other)]
     one = min(fits, key=lambda f: f.left_fit.gap())
+    if outlasts(stage, other, one.values[other]):
+        return None
     moved = np.abs(one.theta[model.size_places(other)]).max(initial=0.0) > 0.0
     return (other, one) if moved and not is_nothing(other, one.values[other]) else None
 

@@ -18,6 +18,7 @@ from twin.motion.limits import stops
 from twin.motion.path import EventKind, Kind, Path, path_from_moves
 from twin.recording.program_run import OVERRIDES, Ending, Pause, ProgramRun
 from twin.recording.recorded_program import NOMINAL, RecordedProgram
+from twin.recording.visits import by_visit
 from twin.runlog import RunLog
 
 Floats = NDArray[np.float64]
@@ -84,6 +85,24 @@ class Refused:
     why: str
 
 
+@dataclass(frozen=True, slots=True)
+class _Shown:
+    """The text of a program as lines, and the line of each visit of them, by which places are named."""
+
+    lines: tuple[str, ...]
+    source: Ints
+
+    def line(self, visit: int) -> int:
+        """Return the line of a visit; one that is beyond all of them is as far beyond the last line."""
+        beyond = visit - len(self.source) + 1
+        return int(self.source[visit]) if 0 <= visit < len(self.source) else int(self.source.max()) + beyond if beyond > 0 else -1
+
+    def words(self, visit: int) -> str:
+        """Return line and text of a visit, in words."""
+        line = self.line(visit)
+        return f"line {line + 1} ({self.lines[line].strip()[:24]})" if 0 <= line < len(self.lines) else "no line of the program"
+
+
 def trial_of(run: Run, settings: Settings) -> Trial | Refused:
     """The run beside its program as the control reads it, or why there is nothing to compare."""
     if run.entry.program is None:
@@ -108,19 +127,22 @@ def _compared(name: str, log: RunLog, text: str, fitted: bool, settings: Setting
         return Refused(name, "its program moves nothing")
     if not np.all(path.feed_mm_min > 0.0):
         return Refused(name, f"its program has no feed at line {int(path.line[path.feed_mm_min <= 0.0][0]) + 1}")
-    run = _run(log, text, path)
+    lines = tuple(text.splitlines())
+    path, line, source = by_visit(path, _line_indices(log["line"], text), len(lines))
+    shown = _Shown(lines, source)
+    run = _run(log, line, path)
     recorded = RecordedProgram(name, path, run)
     last = int(np.asarray(run.columns["line"]).max())
     if run.ending is Ending.ABORTED:
-        return Refused(name, _interrupted(run, last, text))
+        return Refused(name, _interrupted(run, last, shown))
     if why := recorded.refusal():
-        return Refused(name, _other(recorded, last, why, text))
+        return Refused(name, _other(recorded, last, why, shown))
     if why := _other_tools(recorded):
         return Refused(name, why)
     told = any(log.has(column) for column in OVERRIDES.values())
     if why := _other_feeds(recorded, told):
         return Refused(name, why)
-    remarks = (_paused(run, text),) if run.pauses else ()
+    remarks = (_paused(run, shown),) if run.pauses else ()
     return Trial(recorded, text, fitted, float(np.median(np.diff(log.t_s))), told, references, remarks)
 
 
@@ -135,11 +157,10 @@ def _path(text: str, settings: Settings) -> tuple[Path, bool]:
     return path_from_moves(interpret(text, settings), settings.start_mm or None), False
 
 
-def _run(log: RunLog, text: str, path: Path) -> ProgramRun:
+def _run(log: RunLog, line: Ints, path: Path) -> ProgramRun:
     """The run log as a run of a program."""
     rows = len(log)
     t = log.t_s - log.t_s[0]
-    line = _line_indices(log["line"], text)
     state = np.array(["" if s is None else str(s) for s in log.text.get("exec_state", np.full(rows, ""))], dtype=np.str_)
     columns: dict[str, NDArray[np.generic]] = {"t_s": t, "line": line, "exec_state": state}
     for column in ("feed_mm_min", *OVERRIDES.values()):
@@ -205,34 +226,29 @@ def _reason(state: NDArray[np.generic], held: NDArray[np.bool_]) -> str:
     return str(state[held][0]) if held.any() else "axes at rest"
 
 
-def _paused(run: ProgramRun, text: str) -> str:
+def _paused(run: ProgramRun, shown: _Shown) -> str:
     """In words: how often, how long, and where the longest was."""
     longest = max(run.pauses, key=lambda pause: pause.duration_s)
     row = int(np.searchsorted(run.t_s, longest.start_s + 0.5 * longest.duration_s)) - 1
     line = int(np.asarray(run.columns["line"])[max(row, 0)])
     total = sum(pause.duration_s for pause in run.pauses)
     many = f"{len(run.pauses)} times, {total:.0f} s in all; longest" if len(run.pauses) > 1 else "once,"
-    return f"was interrupted {many} {longest.duration_s:.0f} s ({longest.reason}) at {_line_words(line, text)}; taken out"
+    return f"was interrupted {many} {longest.duration_s:.0f} s ({longest.reason}) at {shown.words(line)}; taken out"
 
 
-def _line_words(line: int, text: str) -> str:
-    lines = text.splitlines()
-    return f"line {line + 1} ({lines[line].strip()[:24]})" if 0 <= line < len(lines) else "no line of the program"
-
-
-def _interrupted(run: ProgramRun, last: int, text: str) -> str:
+def _interrupted(run: ProgramRun, last: int, shown: _Shown) -> str:
     """A run that never came to its end."""
     state = [str(s) for s in np.asarray(run.columns["exec_state"]) if s not in RUNNING]
     why = f", {state[-1]} in the end" if state else ""
-    return f"was interrupted and not finished: it came to {_line_words(last, text)} in {run.duration_s:.0f} s{why}; left out"
+    return f"was interrupted and not finished: it came to {shown.words(last)} in {run.duration_s:.0f} s{why}; left out"
 
 
-def _other(recorded: RecordedProgram, last: int, why: str, text: str) -> str:
+def _other(recorded: RecordedProgram, last: int, why: str, shown: _Shown) -> str:
     """A run whose lines or tools are not those of the program."""
     end = max((event.line for event in recorded.path.events), default=0)
     if not why.startswith("ran to"):
         return f"ran another program than the one given: {why.removesuffix(': another program ran')}; left out"
-    ran = f"it ended at line {last + 1}, the program given ends at {_line_words(end, text)}"
+    ran = f"it ended at line {shown.line(last) + 1}, the program given ends at {shown.words(end)}"
     return f"ran another program than the one given: {ran}; left out"
 
 

@@ -18,7 +18,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from twin.case import Run
+from twin.case import Run, RunKind
 from twin.effects.added import added_effects
 from twin.effects.catalogue import effect_named
 from twin.effects.effect import Effect, Guesses, Recorded
@@ -41,6 +41,7 @@ from twin.spindle.load import spindle_constants, spindle_load_pct, spindle_quant
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
+ENGAGED = ("axial_depth_mm", "force_x_n", "force_y_n")
 READING_S = 30.0
 ROWS_MIN = 5
 """Rows in air below which a run says nothing."""
@@ -187,7 +188,7 @@ class AirStage:
         return column
 
     def _read(self, model: Model, theta: Floats, run: AirRun) -> Floats:
-        """What the meter reads, (lanes, readings)."""
+        """Return the meter's readings, (lanes, readings)."""
         assert self.machine.spindle is not None
         one, factors = np.ones(len(theta)), model.factors(theta)
         constants: dict[str, ArrayLike] = {
@@ -208,11 +209,16 @@ class AirStage:
 
 
 def air_runs(machine: MachineFile, runs: tuple[Run, ...]) -> tuple[AirRun, ...]:
-    """Return the runs without servo axes in which the spindle turns in air for a while."""
+    """Return the runs without servo axes in which the spindle turns in air for a while.
+
+    A program of which nothing tells what it cuts stands in the stretch around it as well (`cnctwin gap case --store`). It is a
+    run of its own for its repeats, and its load in air counts once: where other runs have it.
+    """
     if machine.spindle is None:
         return ()
+    alone = tuple(run for run in runs if run.entry.kind is not RunKind.CUT or any(run.log.has(name) for name in ENGAGED))
     found = []
-    for run in runs:
+    for run in alone or runs:
         log = run.log
         if log.axes() or not log.has(LOAD, "spindle_rpm"):
             continue

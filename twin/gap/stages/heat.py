@@ -37,7 +37,7 @@ CAPACITY = "capacity_j_per_k"
 NAMES = ("alpha_w_per_pct_rpm2", "beta_w_per_rpm", "resistance_k_per_w", CAPACITY)
 TERM_FLOORS = 3.0
 LATE_PART = 2.0
-"""By how much more or less than a sensor is late the spindle may be ahead of it at the start: it has not warmed evenly."""
+"""The factor by which a spindle may be further ahead of a late sensor, or less, at the start: it has not warmed evenly."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -115,6 +115,11 @@ class HeatStage:
                 found.append(Effected(effect.name))
         has = standing_sensors(self.machine, SIGNAL)
         return (*found, *(e for e in sensor_effects((SIGNAL,), self.left_out) if e.effect not in has))
+
+    @property
+    def lasts_s(self) -> float:
+        """Seconds of the longest stretch that is compared."""
+        return max((float(part.at_s[-1] - part.at_s[0]) for run in self.runs for part in run.parts), default=0.0)
 
     @property
     def term_sites(self) -> Mapping[LearnedSite, tuple[str, ...]]:

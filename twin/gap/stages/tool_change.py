@@ -1,4 +1,4 @@
-"""How long tool changes take, where no program says what else happens: from the stopped spindle to the tool in it.
+"""The lengths of tool changes, where no program says what else happens: from the stopped spindle to the tool in it.
 
     length = tool_change_s · factor, through the effects that change it
 
@@ -96,7 +96,7 @@ class ToolChangeStage:
 
     @property
     def floor_s(self) -> float:
-        """By what the changes of the machine differ, and what the rows do not tell of one."""
+        """The spread of the machine's changes, and of what the rows do not tell of one."""
         spread = [run.lengths_s - np.median(run.lengths_s) for run in self.runs]
         usual = MEDIAN_TO_SIGMA * float(np.median(np.abs(np.concatenate(spread))))
         told = max(run.period_s for run in self.runs) / np.sqrt(6.0)

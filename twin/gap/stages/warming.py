@@ -91,9 +91,15 @@ def stretches_of(log: RunLog) -> tuple[Stretch, ...]:
     bin_s = float(log.t_s[-1] - log.t_s[0]) / BINS_MAX if len(log) > BINS_MAX else 0.0
     inputs = {name: held(log[name], len(log), name) for name in DRIVES}
     coolant = held(log["coolant_on"], len(log), "coolant_on") if log.has("coolant_on") else np.zeros(len(log))
-    parts = [slice(int(begin), int(end)) for begin, end in zip(begins, ends, strict=True)]
+    parts = [_read(log, int(begin), int(end)) for begin, end in zip(begins, ends, strict=True)]
     alone = len(parts) == 1
     return tuple(_stretch(log, part, inputs | {"coolant_on": coolant}, bin_s) for part in parts if alone or _says(log, part))
+
+
+def _read(log: RunLog, begin: int, end: int) -> slice:
+    """Return the rows from the first reading of the temperature on: before it nobody knows where the spindle starts from."""
+    there = np.flatnonzero(np.isfinite(log[SIGNAL][begin:end]))
+    return slice(begin + int(there[0]) if len(there) else begin, end)
 
 
 def _says(log: RunLog, part: slice) -> bool:

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from cnctwin.api.constants import Constants
-from cnctwin.api.live.descriptions import LiveDescriptions
+from cnctwin.plant.descriptions import LiveDescriptions
 from processors.description import DescriptionMessage
 from processors.errors import ConfigurationError
 from tests.cnctwin.api.small_plant import Client, client_of

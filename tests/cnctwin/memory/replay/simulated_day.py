@@ -37,7 +37,7 @@ class Living:
         self._declared: dict[str, dict[str, Reading]] = {}
 
     def start(self, retained: Iterable[HostEvent] = ()) -> None:
-        """As a new process; it is told first what the broker has retained."""
+        """Begin as a new process; it is told first what the broker has retained."""
         self.engine = Engine(self.processor, self.processor.configured(self._table))
         for event in retained:
             self._describe(event)

@@ -12,7 +12,7 @@ from processors.description import Description, DescriptionMessage, Role, topic_
 from processors.discovery import find
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId
-from tests.cnctwin.memory.replay.simulated_day import T0_MS, Day
+from tests.cnctwin.memory.replay.simulated_day import EDGE, T0_MS, Day
 from tests.cnctwin.memory.replay.test_replay_of_a_day import SECONDS, machine_events, shown
 from tests.processors.describing import WHOLE
 from twin.vocabulary.twin_signals import CHALLENGER_PREFIX
@@ -68,6 +68,19 @@ def test_processors_that_are_killed_in_between_come_out_as_they_went_on(at_s: fl
     replayed = replay(day(6, PROMOTED, kills).store, "vmc", T0_MS - 1000, T0_MS + 300_000)
     assert replayed.is_equal, shown(replayed)
     assert [one.restarts for one in replayed.processors] == [1, 1, 1]
+
+
+@pytest.mark.parametrize("seed", [3, 6])
+def test_a_stretch_may_end_with_the_tick_of_a_silence(seed: int) -> None:
+    """The last that is heard is what the processor said itself, seconds after the machine fell silent."""
+    store = day(seed, PROMOTED).store
+    said_ms = [message.received_ms for message in store.log if message.event.node.node == "twin-thermal"]
+    heard_ms = [message.received_ms for message in store.log if message.event.node == EDGE]
+    ends_ms = [at_ms for at_ms in said_ms if not any(at_ms - 1500 < one_ms <= at_ms for one_ms in heard_ms)]
+    assert len(ends_ms) > 1
+    for end_ms in ends_ms:
+        replayed = replay(store, "vmc", T0_MS - 1000, end_ms + 1, ["thermal"])
+        assert replayed.is_equal, (end_ms - T0_MS, shown(replayed))
 
 
 def test_changes_in_quick_order_come_out_as_they_were() -> None:

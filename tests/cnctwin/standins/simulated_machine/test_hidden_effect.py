@@ -26,10 +26,11 @@ def test_each_one_fits_the_machine_and_shows_in_production_signals(hidden: Hidde
         assert not effect.is_null(added.parameters)
 
 
-def test_there_are_at_least_eight_and_a_draw_reaches_all_of_them() -> None:
+def test_there_are_at_least_eight_and_a_draw_reaches_all_that_are_found_within_minutes() -> None:
     drawn = [choice_of("random").added(seed) for seed in range(300)]
     names = {(added.effect, added.on) for added in drawn}
-    assert len(names) == len(hidden_effects()) >= 8
+    assert names == {(one.effect, one.on) for one in hidden_effects() if one.at_random}
+    assert len(hidden_effects()) >= 8 and len(names) >= 4
     assert choice_of("random").added(7) == drawn[7], "a seed draws the same effect again"
 
 

@@ -59,7 +59,7 @@ def test_the_tool_number_is_that_of_the_tool_in_the_spindle_or_is_not_told(hour:
 
 
 def test_where_the_builder_shows_the_tool_its_number_is_known_wherever_the_control_answers() -> None:
-    part = run(120.0, seed=9, tool_number_pmc="D100", tool_change_pmc="R100.0")
+    part = run(120.0, seed=10, tool_number_pmc="D100", tool_change_pmc="R100.0")
     assert part.reconnects
     assert judged.changes_told_wrongly(part) == judged.changes_made_up(part) == judged.tools_not_told(part) == []
     assert list(judged.tool_numbers_that_are_not_in_the_spindle(part)) == []

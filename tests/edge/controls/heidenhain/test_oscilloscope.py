@@ -6,44 +6,27 @@ from collections.abc import Iterator
 import pytest
 
 from cnctwin.standins.lsv2_server.answers import Model
-from cnctwin.standins.lsv2_server.oscilloscope import CHANNELS, LABELS, ServoTrace
 from cnctwin.standins.lsv2_server.server import Fault, Lsv2Server
 from cnctwin.standins.simulated_control.control import SimulatedControl
 from cnctwin.standins.simulated_control.state import ControlState
 from edge.controls.heidenhain.control import library
 from edge.controls.heidenhain.link import SCOPE_READS, ReadOnlyLink, WriteRefusedError
 from edge.controls.heidenhain.oscilloscope import Oscilloscope, ScopeError
+from tests.edge.controls.heidenhain.scope_on_trial import counters, opened, scope_server
 
-TRACE = ServoTrace({(axis, number): list(range(5000)) for axis in range(len(LABELS)) for number in range(len(CHANNELS))})
-
-
-class Clock:
-    """The machine's seconds, which pass when the server waits: the same course on a machine that is busy."""
-
-    def __init__(self) -> None:
-        self.now_s = 0.0
-
-    def __call__(self) -> float:
-        return self.now_s
-
-    def wait(self, seconds: float) -> None:
-        self.now_s += seconds
+TRACE = counters(5000)
 
 
 @pytest.fixture
 def server() -> Iterator[Lsv2Server]:
-    clock = Clock()
-    control = SimulatedControl([ControlState()], machine_s=clock)
-    with Lsv2Server(control, model=Model.ITNC530, trace=TRACE, pause=clock.wait) as running:
+    with scope_server(TRACE) as running:
         yield running
 
 
 @pytest.fixture
 def scope(server: Lsv2Server) -> Iterator[Oscilloscope]:
-    opened = Oscilloscope(server.url, timeout_s=2.0)
-    opened.open()
-    yield opened
-    opened.close()
+    with opened(server, 2.0) as ready:
+        yield ready
 
 
 def test_every_packet_comes_with_its_values_in_the_control_s_unit(scope: Oscilloscope) -> None:

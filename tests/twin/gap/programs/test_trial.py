@@ -133,3 +133,28 @@ def test_a_recorded_plate_beside_the_program_of_another_is_said_to_be_so(tmp_pat
     for other in ("03", "14", "19", "04"):
         refused = read(tmp_path, plate_runs("13")[0], whole_program(other))
         assert isinstance(refused, Refused) and "ran another program than the one given" in refused.why
+
+
+def with_subprogram(shift_mm: float = 0.0) -> str:
+    """The program of the shop with a pocket that stands after M30, called once for each tool."""
+    called = shop_program(2000.0, TOOLS).replace("M5\n", "M98 P9\nM5\n").removesuffix("%\n")
+    return f"{called}O9\nG91 F1200\n" + f"G1 X{12 + shift_mm} Y3\nG1 X-{12 + shift_mm} Y-3\n" * 4 + "G90\nM99\n%\n"
+
+
+def test_a_subprogram_after_m30_is_compared_where_it_is_called(tmp_path: Path) -> None:
+    text = with_subprogram()
+    trial = read(tmp_path, made(text, CHANGE), text)
+    assert isinstance(trial, Trial)
+    _, line = trial.recorded.run.line_changes()
+    highest = int(trial.recorded.path.line.max())
+    assert highest > text.splitlines().index("M30") and line[-1] > highest - 5
+    assert [name for _, name in trial.sections] == ["section T1", "section T2", "section T3"]
+
+
+def test_a_line_beyond_a_subprogram_is_another_program(tmp_path: Path) -> None:
+    text = with_subprogram()
+    recorded = made(text, CHANGE)
+    line = np.array(recorded["line"])
+    line[-20:] = len(text.splitlines()) + 40
+    refused = read(tmp_path, recorded | {"line": line}, text)
+    assert isinstance(refused, Refused) and "another program" in refused.why

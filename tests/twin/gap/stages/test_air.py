@@ -1,9 +1,12 @@
 """The spindle's load in air, from what a control says once a second."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tests.twin.gap.stages.produced import MACHINE, case_with, produced, without
+from twin.case import RunKind
 from twin.effects.catalogue import effect_named
 from twin.gap.diagnose import diagnose
 from twin.gap.diagnosis import Effected
@@ -11,6 +14,7 @@ from twin.gap.floors import Floors
 from twin.gap.stages.air import AirStage, air_runs, in_air
 from twin.gap.stages.shown import shown
 from twin.machine import AddedEffect
+from twin.runlog import run_log
 
 LOAD = "spindle_load_pct"
 CLASS = {"rated_power", "sensor_scale", "sensor_bias"}
@@ -85,3 +89,12 @@ def test_where_something_may_be_cut_nothing_is_shown() -> None:
     column = shown(MACHINE, run, Floors(MACHINE, {}))[LOAD]
     assert np.isfinite(column).sum() == 20 * 9
     assert np.isnan(column[run.log["feed_mm_min"] > 0.0]).all()
+
+
+def test_a_program_that_stands_in_a_stretch_as_well_counts_once() -> None:
+    stretch, program = produced(1), produced(2)
+    cut = replace(program, entry=program.entry.model_copy(update={"kind": RunKind.CUT, "file": "cut"}))
+    assert [run.name for run in air_runs(MACHINE, (stretch, cut))] == [stretch.name]
+    assert [run.name for run in air_runs(MACHINE, (cut,))] == ["cut"]
+    engaged = run_log({"t_s": cut.log.t_s, **cut.log.columns, "axial_depth_mm": np.zeros(len(cut.log))})
+    assert len(air_runs(MACHINE, (stretch, replace(cut, recording=engaged)))) == 2

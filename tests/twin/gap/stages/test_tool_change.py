@@ -1,4 +1,4 @@
-"""How long tool changes take, from when a control says that one is in progress."""
+"""Tool changes are compared by their lengths, from when a control says that one is in progress."""
 
 import numpy as np
 import pytest
