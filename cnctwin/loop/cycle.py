@@ -157,7 +157,9 @@ def _watching(config: LoopConfig, state: State, world: World) -> Stepped:
     if config.diagnose is Diagnose.BY_HAND or waits:
         if state.step is StepName.REFUSED:
             return state, None
-        return state.now(text=f"the gap is open: {found.grows or found.opens}; a diagnosis can be asked for"), None
+        by_hand = config.diagnose is Diagnose.BY_HAND
+        then = "a diagnosis can be asked for" if by_hand else "a diagnosis begins by itself, or when a person asks"
+        return state.now(text=f"the gap is open: {found.grows or found.opens}; {then}"), None
     return _begun(config, state, world, ""), None
 
 

@@ -87,7 +87,7 @@ def test_where_nothing_says_since_when_the_last_hours_are_looked_at() -> None:
 def test_a_gap_that_has_just_opened_waits_for_history_unless_somebody_asks() -> None:
     just = replace(OPEN, since_ms=T0_MS - HOUR_MS, window_ms=None)
     state, _ = walked(BY_HAND, replace(WORLD, standing=just))
-    assert state.step is StepName.WATCHING and "can be asked for" in state.text
+    assert state.step is StepName.WATCHING and "begins by itself, or when a person asks" in state.text
     asked_for, _ = walked(BY_HAND, replace(WORLD, standing=just, request=asked(Word.DIAGNOSE)), state=state)
     assert asked_for.span_at_ms == (T0_MS - HOUR_MS, T0_MS)
 
