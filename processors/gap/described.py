@@ -17,6 +17,10 @@ from twin.motion.quantity import changed_quantity
 SECTIONS = {TEMPERATURE: "thermal", LOAD: "spindle", TOOL_CHANGE: "program", PROGRAM_TIME: "program"}
 """The section of a description that the twin of a signal rests on."""
 
+UNTIL_LEARNED = {TEMPERATURE: 0.15}
+"""The least floor of a signal before one is learned: the air at a spindle differs so much from that at its thermometer, and no
+noise of a sensor says so (`AIR_K` in twin/gap/floors.py)."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Twin:
@@ -52,7 +56,7 @@ class Given:
     def floor_until_learned(self, signal: str) -> float | None:
         """Return the floor that holds before one is learned: what the description says of the sensor, or of the display."""
         noise = self.twin.noise.get(signal)
-        return None if noise is None else max(noise, RESOLUTIONS[signal] / math.sqrt(12.0))
+        return None if noise is None else max(noise, RESOLUTIONS[signal] / math.sqrt(12.0), UNTIL_LEARNED.get(signal, 0.0))
 
 
 def described(config: Config, description: Description | None) -> Given:
