@@ -72,7 +72,7 @@ def test_the_folder_of_machines_describes_it(
         (("--machine", "vmc", "--from", "2026-01-02", "--to", "2026-01-01"), "is not after --from"),
         (("--machine", "vmc", "--from", "2020-01-01", "--to", "2020-01-02"), "nothing of it in that stretch"),
         (("--machine", "vmc", "--healthy-from", "2026-01-02"), "--healthy-from and --healthy-to belong together"),
-        (("--machine", "vmc", "--programs", "nowhere"), "nowhere: is no folder"),
+        (("--machine", "vmc", "--programs", "nowhere"), "nowhere: there is no such folder with NC files"),
         (("--machine", "vmc", "--machine-file", "nowhere.toml"), "nowhere.toml: cannot be read"),
     ],
 )
