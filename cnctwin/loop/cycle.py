@@ -251,12 +251,13 @@ def _is_taken_up(state: State, world: World) -> bool:
 def _seen(state: State, world: World) -> State:
     """The state with the standing gap of the live description, also as that to which the last promotion has led."""
     now = world.standing.live
-    if not now or dict(state.standing) == dict(now):
+    if not now:
         return state  # what was known holds until more is heard
     last = state.last
     if last is not None and last.signal in now and _is_taken_up(state, world):
         last = last.model_copy(update={"after": now[last.signal]})
-    return state.now(standing=dict(now), last=last)
+    is_news = dict(state.standing) != dict(now) or last != state.last
+    return state.now(standing=dict(now), last=last) if is_news else state
 
 
 def _worse_in(live: Mapping[str, float], challenger: Mapping[str, float]) -> list[str]:

@@ -24,6 +24,7 @@ from sparkplug.datatype import DataType
 from sparkplug.edge_node import EdgeNode
 from sparkplug.host import EventKind, HostApplication
 from sparkplug.metric import Change, MetricSpec, NodeId
+from sparkplug.quality import Quality
 
 ROOT = Path(__file__).parents[3]
 PATIENCE_S = 60.0
@@ -124,6 +125,8 @@ class LoopPlant:
         changes.append(Change(_WINDOW, self.window, at_ms))
         if waits:
             changes.append(Change(_OTHER, self.gaps.get(waits, 1.0), at_ms))
+        else:  # the runtime declares a challenger's metrics only while there is one
+            changes.append(Change(_OTHER, None, at_ms, Quality.BAD, "no challenger"))
         self._edge.publish("vmc", changes)
 
     @contextmanager
