@@ -34,7 +34,7 @@ class Role(StrEnum):
 
 
 Programs = dict[str, tuple[float, ...]]
-"""By name of a program (`program_key`), the seconds of each of its sections between tool changes, as the twin plans them."""
+"""Name of a program (`program_key`) → the seconds of each of its sections between tool changes, as the twin plans them."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -43,7 +43,7 @@ TICK_S = 10.0
 
 @dataclass(frozen=True, slots=True)
 class Live:
-    """How a live twin did over a run, K: rms and largest difference from the reading."""
+    """The error of a live twin over a run, K: rms and largest difference from the reading."""
 
     rms_k: float
     worst_k: float

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What a diagnosis says of production recordings, blind: by effect and by how long was recorded.
+"""The diagnosis of production recordings, blind: answers by effect and by the length of the recording.
 
     .venv/bin/python benchmarks/gap/production.py [--cases 4] [--seed 1] [--windows 2min 30min 8h 5d] [--only EFFECT …]
 

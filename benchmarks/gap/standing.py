@@ -64,7 +64,7 @@ SIZES: dict[tuple[str, str], dict[str, float]] = {
 
 
 class Said(NamedTuple):
-    """What the gap said at a time: s since 1970."""
+    """The gap at a time, s since 1970, in the processor's words."""
 
     at_s: float
     name: str
@@ -210,7 +210,7 @@ def with_effect(machine: MachineFile, name: str, on: str) -> MachineFile:
 
 
 class Noticed(NamedTuple):
-    """How an effect was noticed: hours of production until it was, None = never; of what; the standing gap then, in floors."""
+    """The notice of an effect: hours of production until it came, None = never; its signal; the standing gap then, in floors."""
 
     hours: float | None
     why: str

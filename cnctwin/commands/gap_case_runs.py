@@ -1,4 +1,4 @@
-"""What the options of `cnctwin gap case` say of run logs, and what is asked on a terminal where they say nothing."""
+"""The options of `cnctwin gap case` for run logs, and the questions on a terminal where they say nothing."""
 
 import sys
 from collections.abc import Mapping, Sequence

@@ -47,7 +47,7 @@ def show(
     wait_s: Wait = 3.0,
     as_json: AsJson = False,
 ) -> None:
-    """Which description is live since when, what is assumed, which challenger waits, and what each does to the standing gap."""
+    """Show the live description, what of it is assumed, the challenger that waits, and what each does to the standing gap."""
     from cnctwin.machines.told import told
 
     own = _folder(machine, machines)
@@ -251,7 +251,7 @@ def _lines(found: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _shadow(shadow: Mapping[str, Any] | None, standing: Mapping[str, Any] | None) -> Iterator[str]:
-    """What the loop has kept of the shadow; its gaps only where the broker tells none."""
+    """Yield what the loop has kept of the shadow; its gaps only where the broker tells none."""
     if shadow is None:
         return
     if standing is None:

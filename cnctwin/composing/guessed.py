@@ -1,4 +1,4 @@
-"""What a recording seems to be, by its columns: the kind of run, and the recordings that it repeats."""
+"""A guess at a recording by its columns: the kind of run, and the recordings that it repeats."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -83,7 +83,7 @@ class Course:
 
 @dataclass(frozen=True, slots=True)
 class History:
-    """What a machine did in [from_ms, to_ms), looked over.
+    """The course of a machine in [from_ms, to_ms), looked over.
 
     courses: by signal, of all that said anything; told_ms: when anything was told, in order, to the window; window_ms: of those
     that change often

@@ -1,4 +1,4 @@
-"""Which effects of the catalogue the runs of a case can show, and what the others lack: by what effects declare of themselves."""
+"""The effects that the runs of a case can show, and what the others lack, by what effects declare of themselves."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ RECORD = "record at the servo period (docs/gap.md)"
 
 @dataclass(frozen=True, slots=True)
 class Fitted:
-    """What the fitted runs of a case have: their logs by kind, and the machine that they are compared with."""
+    """The fitted runs of a case: their logs by kind, and the machine that they are compared with."""
 
     machine: MachineFile
     runs: Sequence[tuple[ComposedRun, RunLog]]

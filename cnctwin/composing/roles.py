@@ -1,4 +1,4 @@
-"""Which part of a history is fitted and which is judged on: what came first is fitted, what came after it is the judge.
+"""The parts of a history that are fitted and judged on: what came first is fitted, what came after it is the judge.
 
 One moment divides them, so that nothing is both. Where there are several days, it lies between two of them; else between two
 stretches, or in the middle of one where no end of a stretch divides them well.

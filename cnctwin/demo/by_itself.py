@@ -1,4 +1,4 @@
-"""Who goes on with the loop of the demo."""
+"""The choice of who goes on with the loop of the demo: a person, or the loop by itself."""
 
 from enum import StrEnum
 

@@ -56,7 +56,7 @@ Finite = Annotated[float, AfterValidator(_finite)]
 
 
 class TimeOptions(_Table):
-    """Where the times are: in a column, or in a steady rate."""
+    """The place of the times: a column, or a steady rate."""
 
     column: str | None = None
     unit: str | None = None
@@ -83,7 +83,7 @@ class TimeOptions(_Table):
 
 
 class ColumnOptions(_Table):
-    """Where one column comes from and how it becomes the run log's."""
+    """The source of one column, and how it becomes the run log's."""
 
     source: str = Field(alias="from")
     unit: str | None = None

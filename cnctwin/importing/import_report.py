@@ -1,4 +1,4 @@
-"""What an import says of itself: a table for a person, or JSON for a program."""
+"""The report of an import: a table for a person, or JSON for a program."""
 
 import json
 from collections.abc import Iterator

@@ -35,7 +35,7 @@ class MapNeededError(UsageError):
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """Where a column of the run log came from."""
+    """The origin of a column of the run log."""
 
     name: str
     unit: str
@@ -45,7 +45,7 @@ class Source:
 
 @dataclass(frozen=True, slots=True)
 class Account:
-    """What an import took and what it left out.
+    """The account of an import: what it took and what it left out.
 
     files: name → dialect; rows: read of each file; columns: of the run log, by name; tallies: their values; left_out: columns of
     the files that are not taken; faults: file → what was left out and how often; remarks: one line each

@@ -30,7 +30,7 @@ class Block(NamedTuple):
 
 
 class Clock(NamedTuple):
-    """Where a track has its times: a column with unit or format, or a period."""
+    """The times of a track: a column with unit or format, or a period."""
 
     column: str | None
     unit: str = "s"
@@ -40,7 +40,7 @@ class Clock(NamedTuple):
 
 @dataclass(slots=True)
 class Reading:
-    """What a file gives: its content, what is taken of it, and the count of what was met. rows: of all tracks, as read."""
+    """The yield of a file: its content, what is taken of it, and the count of what was met. rows: of all tracks, as read."""
 
     content: Content
     clocks: Sequence[Clock]

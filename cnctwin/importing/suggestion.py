@@ -19,7 +19,7 @@ COLUMNS_SHOWN = 60
 
 
 class Suggestion(NamedTuple):
-    """What a file probably holds. doubts: what a person has to check, one line each; empty where nothing is doubtful."""
+    """A guess at the content of a file. doubts: what a person has to check, one line each; empty where nothing is doubtful."""
 
     map: ColumnMap
     doubts: tuple[str, ...]

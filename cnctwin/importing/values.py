@@ -1,4 +1,4 @@
-"""From what stands in a file to numbers, flags and texts of a run log. What cannot be read is no value, and is counted."""
+"""Numbers, flags and texts of a run log out of what stands in a file. What cannot be read is no value, and is counted."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -39,7 +39,7 @@ class Tally:
 
 @dataclass(frozen=True, slots=True)
 class Reader:
-    """How one column of a file becomes one of a run log. decimal, nulls: as the file writes numbers and missing values."""
+    """The conversion of a column of a file to one of a run log. decimal, nulls: as the file writes numbers and missing values."""
 
     column: str
     options: ColumnOptions

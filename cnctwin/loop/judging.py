@@ -1,4 +1,4 @@
-"""What a diagnosis has led to: whether the corrected description is worth to be filed, and what speaks for it.
+"""The judgement of a diagnosis: whether the corrected description is worth filing, and what speaks for it.
 
 It is scored beside the live one on the check runs of the case, which neither was fitted to.
 """

@@ -37,7 +37,7 @@ _NOTED = {StepName.COMPOSING: StepKind.COMPOSING, StepName.DIAGNOSING: StepKind.
 
 @dataclass(frozen=True, slots=True)
 class Heard:
-    """What the service has heard of a machine: its standing gap, and its own time by now."""
+    """The news of a machine: its standing gap, and its own time by now."""
 
     standing: Standing = NOTHING_HEARD
     at_ms: int = 0

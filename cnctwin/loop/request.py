@@ -1,4 +1,4 @@
-"""What a person asks of the loop: diagnose, promote, back or withdraw; JSON on a topic of its own.
+"""A person's request of the loop: diagnose, promote, back or withdraw; JSON on a topic of its own.
 
     cnctwin/loop/request/promote    {"machine": "vmc", "by": "anna", "version": "3f2a…", "id": "…"}
 

@@ -25,7 +25,7 @@ _MOMENT = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(?:\.\d+)?(?:Z|[+-]\d\d:\d\
 
 @dataclass(frozen=True, slots=True)
 class Standing:
-    """What was heard of a machine.
+    """The gap of a machine as it was heard.
 
     at_ms: the newest time of the machine, 0 before anything was heard; grows, opens: what stands there in words, empty = nothing
     window_ms: the stretch to diagnose; since_ms: when what grows or stands open began, as far as it is told

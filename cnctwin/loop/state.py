@@ -10,7 +10,7 @@ ANSWERS_MAX = 20
 
 
 class StepName(StrEnum):
-    """Where the loop is.
+    """The step of the loop.
 
     refused: a diagnosis led to no challenger; promoted: a new description is live, and its gap is watched
     """
@@ -28,7 +28,7 @@ class _Kept(BaseModel):
 
 
 class Answer(_Kept):
-    """What became of a request. id: its own; t: ms since 1970."""
+    """The answer to a request. id: its own; t: ms since 1970."""
 
     id: str
     request: str

@@ -51,12 +51,12 @@ class Paths:
 
     @property
     def composed(self) -> Path:
-        """What it was made of."""
+        """The account of what it was made of."""
         return self.folder / f"{self.name}.composed.json"
 
     @property
     def finding(self) -> Path:
-        """What its diagnosis has led to."""
+        """The finding of its diagnosis."""
         return self.folder / f"{self.name}.finding.json"
 
     @property

@@ -1,4 +1,4 @@
-"""What the loop of a machine sees in a moment: the folder, the standing gap, how the work stands, and what a person asks."""
+"""The world as the loop of a machine sees it: the folder, the standing gap, the state of the work, and a person's request."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -11,7 +11,7 @@ from cnctwin.machines.evidence import Card, Shadow
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What a diagnosis has led to. is_better: the corrected description is worth to be filed; else `text` says why it is not.
+    """The finding of a diagnosis. is_better: the corrected description is worth filing; else `text` says why it is not.
 
     toml: that description; programs: as it plans them; next_experiment: what would tell more
     """
@@ -26,7 +26,7 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Work:
-    """How the work of the step stands. progress: 0 to 1, None = not known; is_done: composing is through
+    """The state of the step's work. progress: 0 to 1, None = not known; is_done: composing is through
 
     failed: why nothing will come of it; finding: of a diagnosis
     """
@@ -104,4 +104,4 @@ class Withdraw:
 
 
 Deed = File | Promote | Back | Withdraw
-"""What is to be done to the folder; each of them done twice is done once."""
+"""A change to the folder; one that is made twice is made once."""

@@ -24,7 +24,7 @@ from twin.errors import MachineError
 
 BY_HAND = "file"
 KEPT = "keep"
-"""In a plan: this file stays what it is."""
+"""A mark in a plan: this file stays what it is."""
 LOCK_S_MAX = 10.0
 _LOOK_S = 0.02
 

@@ -1,4 +1,4 @@
-"""What the folder tells of a machine, as one document: the command line shows it, and the loop publishes it with what it adds."""
+"""The folder's account of a machine, as one document: the command line shows it, and the loop publishes it with its own."""
 
 from collections.abc import Sequence
 from typing import Any

@@ -27,7 +27,7 @@ class Described:
 
     @property
     def description(self) -> Description | None:
-        """What it describes; None at its end, and where the memory holds what this version cannot read."""
+        """Return the description; None at its end, and where the memory holds what this version cannot read."""
         try:
             return None if self.message is None else self.message.description(self.machine)
         except MachineError:

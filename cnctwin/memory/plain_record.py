@@ -16,7 +16,7 @@ from twin.vocabulary.topics import DESCRIPTION, LOOP, SNAPSHOT
 
 FILTERS = (SNAPSHOT + "#", DESCRIPTION + "#", LOOP + "+")
 DESCRIPTION_KIND, LOOP_KIND = "description", "loop"
-"""In the place of a processor's name."""
+"""The word in the place of a processor's name."""
 HOUR_MS = 3_600_000
 UNITS_MAX = 20_000  # of processors, whose snapshots are kept
 SNAPSHOT_BYTES_MAX = 64_000_000  # of last snapshots; of a unit without one a replay begins with the first of its hour

@@ -155,7 +155,7 @@ def _lane_document(lane: Lane) -> dict[str, Any]:
 
 
 def _owners(owner: Mapping[str, NodeId]) -> dict[str, list[str]]:
-    """By node, the signals that are taken from it, in their order."""
+    """Return the signals that are taken from each node, in their order."""
     owners: dict[str, list[str]] = {}
     for name, node in owner.items():
         owners.setdefault(str(node), []).append(name)

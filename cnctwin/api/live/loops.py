@@ -13,7 +13,7 @@ MACHINES_MAX = 5000
 
 
 class LoopAnswer(Answer):
-    """What became of a request."""
+    """The answer to a request."""
 
     id: str
     request: str
@@ -23,7 +23,7 @@ class LoopAnswer(Answer):
 
 
 class LoopDocument(Answer):
-    """Where the loop of a machine is (docs/loop.md); times are ms since 1970, UTC, gaps in floors."""
+    """The loop of a machine as it stands (docs/loop.md); times are ms since 1970, UTC, gaps in floors."""
 
     machine: str = Field(examples=["vmc"])
     step: str | None = Field(description="watching, composing, diagnosing, shadow, promoted or refused", examples=["shadow"])

@@ -11,7 +11,7 @@ from cnctwin.api.errors import ApiError
 
 
 class Revealed(Answer):
-    """What was sealed. SHA-256 of `salt`, a line feed and `text` is the hash that was shown from the start."""
+    """The sealed text, opened. SHA-256 of `salt`, a line feed and `text` is the hash that was shown from the start."""
 
     added: dict[str, Any] = Field(description="the effect, as a machine file has it")
     equation: str

@@ -48,7 +48,7 @@ def twin_routes(sources: Sources) -> APIRouter:
 
     @router.get("/twin/{machine}", response_model=Twin, response_model_exclude_unset=True, responses={404: {"model": Problem}})
     async def twin(machine: Machine) -> Any:
-        """Which description is live, which challenger waits, what each does to the standing gap, and what the loop is doing."""
+        """Return the live description, the challenger, what each does to the standing gap, and what the loop is doing."""
         return _shown(sources, machine)
 
     @router.post("/twin/{machine}/diagnose", response_model=Twin, response_model_exclude_unset=True, responses=refusals)

@@ -36,7 +36,7 @@ class SourceColumn(NamedTuple):
 
 
 class Times(NamedTuple):
-    """Where a track has its times: in a column, in a steady rate, or unknown (both None)."""
+    """The times of a track: a column, a steady rate, or unknown (both None)."""
 
     column: str | None = None
     unit: str = ""
@@ -52,7 +52,7 @@ class Piece(NamedTuple):
 
 @dataclass(slots=True)
 class Faults:
-    """What a dialect met and left out: what it was → how often. Filled while the pieces are read."""
+    """The count of what a dialect met and left out: what it was → how often. Filled while the pieces are read."""
 
     counts: dict[str, int] = field(default_factory=dict)
 

@@ -59,7 +59,7 @@ def signal_descriptions() -> list[bytes]:
 
 
 class Selection(NamedTuple):
-    """What a client has selected. signals: (axis, channel)."""
+    """The selection of a client. signals: (axis, channel)."""
 
     interval_us: int
     signals: tuple[tuple[int, int], ...]

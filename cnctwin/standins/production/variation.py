@@ -1,4 +1,4 @@
-"""What differs from day to day and part to part on a healthy machine, and what no description of it tells."""
+"""The variation of a healthy machine from day to day and part to part, of which no description tells."""
 
 from dataclasses import dataclass
 

@@ -18,7 +18,7 @@ from cnctwin.standins.reference_machine.physics import Physics, SensorPhysics
 Floats = NDArray[np.float64]
 RAPID_MM_MIN = 24000.0
 TOOL_CHANGE_S = 6.0
-"""As stated: from the stopped spindle to the tool in it."""
+"""The stated length of a tool change, from the stopped spindle to the tool in it."""
 SPREAD_S = 0.15
 """One standard deviation of a tool change from the next."""
 DAY_S, SHIFT_S = 86400.0, 57600.0

@@ -22,7 +22,7 @@ SHOWN = {"Srpm": "spindle_rpm", "Sload": "spindle_load_pct", "Tool_number": "too
 
 
 def rows_of(moments: tuple[Moment, ...], ramp_load_pct: float | None = None) -> list[tuple[float, dict[str, float]]]:
-    """What the control shows of a part: (s, what is new), with this load while the spindle changes its speed."""
+    """Return the control's display of a part: (s, what is new), with this load while the spindle changes its speed."""
     rows, before_rpm = [], 0.0
     for moment in moments:
         told = {name: float(text) for key, name in SHOWN.items() if (text := moment.values.get(key))}
@@ -36,7 +36,7 @@ def rows_of(moments: tuple[Moment, ...], ramp_load_pct: float | None = None) -> 
 
 
 def as_of_old(rows: list[tuple[float, dict[str, float]]], description: Description) -> dict[int, float]:
-    """By tool, the largest force where power over speed is taken for the cut whatever the speed does."""
+    """Return the largest force by tool where power over speed is taken for the cut whatever the speed does."""
     spindle, tools = description.machine.spindle, description.machine.tools
     assert spindle is not None
     row: dict[str, float] = {"spindle_rpm": 0.0, "spindle_load_pct": 0.0, "tool_number": 1.0}

@@ -107,7 +107,7 @@ def test_no_payload_crashes_a_restore(payload: bytes) -> None:
 
 
 def test_a_signal_that_is_not_offered_any_more_after_a_restart_is_withdrawn() -> None:
-    """Who owned it is in the snapshot: else its last value would hold for good."""
+    """The snapshot says who owned it: else its last value would hold for good."""
     before, whole, after = engine_of(PROCESSOR), engine_of(PROCESSOR), engine_of(PROCESSOR)
     opening = birth(0.0, spindle_rpm=5000.0, spindle_load_pct=40.0, ambient_temp_c=20.0, spindle_temp_c=25.0)
     fed(before, opening)

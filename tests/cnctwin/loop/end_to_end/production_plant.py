@@ -40,7 +40,7 @@ BEGINS_S = MONDAY_S + 6 * 3600.0
 """The first shift begins."""
 DAY_S, HOUR_S, TICK_S = 86_400.0, 3600.0, 5.0
 AHEAD_S = 300.0
-"""By which the machine may be ahead of what the processors have said."""
+"""The time by which the machine may be ahead of what the processors have said."""
 HEALTHY_HOURS = 5.0
 PATIENCE_S = 120.0
 GROUP, NAME = "cnc", "vmc"

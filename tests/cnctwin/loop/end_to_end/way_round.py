@@ -20,7 +20,7 @@ Found = tuple[str, str]
 
 @dataclass(frozen=True, slots=True)
 class WayRound:
-    """What came of an effect; None = it did not come so far. noticed_h, promoted_h: hours of production since it came
+    """The outcome of an effect; None = it did not come so far. noticed_h, promoted_h: hours of production since it came
 
     named: the causes; classes: what they cannot be told from; before, after: the standing gap of the worst signal, in floors
     text: what the loop said last; promotions: how often something was made live

@@ -98,7 +98,7 @@ def test_where_telegrams_of_real_controls_are_public_it_sends_the_same_bytes() -
 
 def test_each_block_of_the_program_has_the_number_under_which_it_is_shown() -> None:
     numbers = [line.split()[0] for line in Answers(control()).program_text.splitlines() if not line.startswith(" ")]
-    assert numbers == [str(number) for number in range(154)]
+    assert numbers == [str(number) for number in range(162)]
 
 
 def test_every_write_is_refused_and_counted(tmp_path: Path) -> None:

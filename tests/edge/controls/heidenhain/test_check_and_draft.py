@@ -32,7 +32,7 @@ def test_check_shows_each_signal_with_its_source_and_its_value_or_why_there_is_n
         rows = {row.signal: row for row in describe(EdgeConfig(source=source))}
     assert (rows["tool_number"].value, rows["tool_number"].source) == (1, "program text")
     assert (rows["spindle_rpm"].value, rows["spindle_rpm"].source, rows["spindle_rpm"].unit) == (8500.0, "PLC D1004", "rev/min")
-    assert rows["nc_block"].value == "L Z+0 F2000"
+    assert rows["nc_block"].value == "L Z+2 FMAX"
     assert rows["alarm"].reason == "only the iTNC 530 tells it over LSV2"
     assert rows["feed_mm_min"].reason == "no telegram of LSV2 tells it; name its PLC address in [heidenhain.plc]"
     assert "this control has no M99999" in str(rows["coolant_on"].reason)
