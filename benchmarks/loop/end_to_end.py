@@ -3,7 +3,7 @@
 
     .venv/bin/python -m benchmarks.loop.end_to_end [--only EFFECT …] [--seed 7] [--kill PART …]
 
-Each effect has a plant of its own (tests/cnctwin/loop/end_to_end/production_plant.py): Mosquitto, an edge node that tells what
+Each effect has a plant of its own (tests/cnctwin/loop/production_plant.py): Mosquitto, an edge node that tells what
 the control shows, `cnctwin process` with thermal and gap, the historian, `cnctwin twin run` that promotes by rule, and
 `cnctwin jobs run`.
 Hours are those of production. A line is printed for each effect as soon as it is through:
@@ -22,8 +22,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from tests.cnctwin.loop.end_to_end.production_plant import PARTS, ProductionPlant
-from tests.cnctwin.loop.end_to_end.way_round import WayRound, way_round
+from tests.cnctwin.loop.production_plant import PARTS, ProductionPlant
+from tests.cnctwin.loop.way_round import WayRound, way_round
 from tests.wire.mosquitto import Mosquitto
 
 BROKER = "broker"

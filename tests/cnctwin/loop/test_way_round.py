@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.cnctwin.loop.end_to_end.way_round import CLOSED_FLOORS, way_round
+from tests.cnctwin.loop.way_round import CLOSED_FLOORS, way_round
 from tests.wire.mosquitto import Mosquitto
 
 pytestmark = pytest.mark.broker

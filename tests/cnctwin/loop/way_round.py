@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cnctwin.standins.simulated_machine.as_built import machine_as_built
-from tests.cnctwin.loop.end_to_end.production_plant import HEALTHY_HOURS, ProductionPlant, with_effect
+from tests.cnctwin.loop.production_plant import HEALTHY_HOURS, ProductionPlant, with_effect
 from tests.wire.mosquitto import Mosquitto
 
 UNTOLD_HOURS = 0.62
