@@ -13,6 +13,7 @@ from cnctwin.standins.lsv2_server.oscilloscope import BUFFER_S, CHANNELS, LABELS
 from cnctwin.standins.lsv2_server.server import Lsv2Server
 from cnctwin.standins.simulated_control.control import SimulatedControl
 from cnctwin.standins.simulated_control.state import ControlState
+from tests.edge.controls.heidenhain.scope_on_trial import Clock
 
 TRACE = ServoTrace(
     {
@@ -21,19 +22,6 @@ TRACE = ServoTrace(
         for number in range(len(CHANNELS))
     }
 )
-
-
-class Clock:
-    """The machine's seconds, which pass when the server waits."""
-
-    def __init__(self) -> None:
-        self.now_s = 0.0
-
-    def __call__(self) -> float:
-        return self.now_s
-
-    def wait(self, seconds: float) -> None:
-        self.now_s += seconds
 
 
 @pytest.fixture
