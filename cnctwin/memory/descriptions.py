@@ -40,12 +40,6 @@ def described(store: Store, machine: str, from_ms: int, to_ms: int) -> tuple[Des
     return tuple(sorted(found, key=lambda one: (one.received_ms, one.role is Role.CHALLENGER)))
 
 
-def live_at(store: Store, machine: str, at_ms: int) -> Described | None:
-    """Return the description that was live at a moment; None where nobody had described the machine."""
-    found = next(_heard(store, machine, Role.LIVE, at_ms, at_ms + 1), None)
-    return None if found is None or found.message is None else found
-
-
 def _heard(store: Store, machine: str, role: Role, from_ms: int, to_ms: int) -> Iterator[Described]:
     """The descriptions in a role, oldest first; one that says the same again is left out."""
     kept: list[Described] = []

@@ -3,7 +3,6 @@
 import math
 
 from twin.effects.catalogue import effect_named
-from twin.gap.diagnosis import Cause, Diagnosis, SignalGap, Verdict
 from twin.runlog import AXIS_COLUMN
 
 MINUS = "−"
@@ -146,31 +145,3 @@ def effect_words(effect: str, on: str = "") -> str:
     ('coolant cools', 'a constant force pulls on Z', 'the spindle temperature is read with an offset')
     """
     return effect_named(effect).says.format(on=on.upper() if len(on) <= 2 else signal_words(on))
-
-
-def in_short(told: Diagnosis) -> str:
-    """A diagnosis in a line: what was found, and what that does to the signal in which the gap was largest.
-
-    `coolant cools: gap of the spindle temperature 3.1 → 1.1 floors`
-    """
-    name, gap = max(told.gap.by_signal.items(), key=lambda item: _floors(item[1])[0], default=("", None))
-    before, after = (digits(one) for one in _floors(gap))
-    of = f"gap of {signal_words(name)}" if name else "gap"
-    if told.verdict is Verdict.HEALTHY:
-        return f"as told: {of} {before} floors"
-    if not told.causes:
-        found = "constants differ from what is stated" if told.verdict is Verdict.EXPLAINED else "no effect explains it"
-        return f"{found}: {of} {before} floors" if before == after else f"{found}: {of} {before} → {after} floors"
-    return f"{' and '.join(_cause_words(cause) for cause in told.causes)}: {of} {before} → {after} floors"
-
-
-def _cause_words(cause: Cause) -> str:
-    others = [effect_words(other.effect, other.on) for other in cause.indistinguishable_from]
-    return effect_words(cause.effect, cause.on) + (f" (or {', '.join(others)})" if others else "")
-
-
-def _floors(gap: SignalGap | None) -> tuple[float, float]:
-    """Return the gap of a signal before and after, in floors."""
-    if gap is None or gap.floor <= 0.0:
-        return 0.0, 0.0
-    return gap.before / gap.floor, gap.after / gap.floor

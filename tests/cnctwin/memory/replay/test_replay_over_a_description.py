@@ -5,7 +5,7 @@ from random import Random
 
 import pytest
 
-from cnctwin.memory.descriptions import described, live_at
+from cnctwin.memory.descriptions import described
 from cnctwin.memory.replay import replay
 from cnctwin.memory.replay.run import published_of
 from processors.description import Description, DescriptionMessage, Role, topic_of
@@ -105,8 +105,10 @@ def test_the_answer_says_which_was_live_from_when() -> None:
 def test_of_a_moment_the_memory_knows_the_live_one() -> None:
     store = day(9, PROMOTED).store
     first, second = (Description.from_toml(text).version for text in (FIRST, SECOND))
-    found = [live_at(store, "vmc", T0_MS + at_ms) for at_ms in (0, 60, 70_010, 70_020, 90_000)]  # type: ignore[arg-type]
-    assert [one and one.version for one in found] == [None, first, first, second, second]
+    moments = [T0_MS + at_ms for at_ms in (0, 60, 70_010, 70_020, 90_000)]
+    found = [described(store, "vmc", at_ms, at_ms + 1) for at_ms in moments]  # type: ignore[arg-type]
+    live = [[one.version for one in held if one.role == "live"][:1] for held in found]
+    assert live == [[], [first], [first], [second], [second]]
     assert described(store, "mazak", T0_MS, T0_MS + 1000) == ()  # type: ignore[arg-type]
 
 
