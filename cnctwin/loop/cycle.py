@@ -71,7 +71,7 @@ def _after_the_folder(config: LoopConfig, state: State, world: World) -> State:
         state = _another_is_live(config, state, world)
     if world.challenger and world.challenger != state.challenger:
         said = (world.card or Card()).sentence or "it was filed by hand"
-        text = f"{world.challenger} runs beside the live description: {said}"
+        text = f"a challenger runs beside the live description: {said}"
         state = _now(state, world, StepName.SHADOW, text, challenger=world.challenger, case="", shadow_from_at_ms=0)
         return state.now(shadow_entry_at_ms=world.at_ms)
     if state.challenger and not world.challenger:
