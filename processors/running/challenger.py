@@ -56,6 +56,10 @@ class Challenger:
         self._processor, self._counts = processor, counts
         self._names = {spec.name: challenger_name(spec.name) for spec in processor.outputs if spec.of_challenger}
 
+    def describe(self, given: Given) -> None:
+        """Go on with what the same version makes of the configuration, its programs planned by now."""
+        self.version, self._given = given
+
     def take(self, sample: Sample, at_ms: int) -> list[Action]:
         """Fold a sample of the live fold, less what other live folds say in it where their challengers say it too."""
         if sample.kind is _DATA and self._others and not self._others.keys().isdisjoint(sample.changed):

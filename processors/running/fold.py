@@ -107,6 +107,8 @@ class Fold:
     def challenge(self, given: Given | None, rows: tuple[OwnRow, OwnRow]) -> bool:
         """Have a challenger with this description, None for none; return True if another one, or none, was there before."""
         if (None if self.challenger is None else self.challenger.version) == (None if given is None else given.version):
+            if self.challenger is not None and given is not None:
+                self.challenger.describe(given)
             return False
         beside = self._processor.beside
         state = self._initial if beside is None else beside(self.state)

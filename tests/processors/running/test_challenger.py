@@ -194,6 +194,14 @@ def test_another_challenger_begins_anew() -> None:
     assert state(one)[1] == 8.0
 
 
+def test_more_that_is_known_of_the_same_version_is_taken_up_and_the_state_goes_on() -> None:
+    one = engine()
+    fed(one, birth(0.0, spindle_rpm=10.0))
+    one.describe("okuma", Role.CHALLENGER, replace(description(3.0), version=description(2.0).version))
+    fed(one, data(0.3, spindle_rpm=20.0), data(0.6, spindle_rpm=100.0))
+    assert state(one) == (130.0, 2.0 * 10.0 + 2.0 * 20.0 + 3.0 * 100.0)
+
+
 def test_one_that_is_refused_is_none() -> None:
     one = engine(1.0, 3.0)
     fed(one, birth(0.0, spindle_rpm=10.0))
