@@ -33,12 +33,19 @@ def opened(given: Given, state: State, at_s: float) -> State:
 
 
 def _is_beyond(given: Given, state: State, key: str, at_s: float) -> bool:
-    """Return True for a cell of the described twin whose mean is more floors than a twin that is right leaves."""
+    """Return True for a cell of the described twin whose mean is more floors than a twin that is right leaves.
+
+    Once a healthy machine's baseline is there, its growth is judged by that: then only a gap that was there from the first day
+    stands open, since a warm-up on another morning than those before is no fault of the twin.
+    """
     cell, config = state.cells[key], given.config
     if cell.is_learned or cell.standing.seconds < config.shown_s_min:
         return False
     floor = floor_of(given, state, key.partition("/")[0], cell, at_s)
-    return floor is not None and abs(cell.mean) > config.open_floors * floor.value
+    if floor is None or abs(cell.mean) <= config.open_floors * floor.value:
+        return False
+    is_judged_by_growth = cell.is_judged and at_s >= healthy_s(given, state)[1]
+    return not is_judged_by_growth or abs(cell.level.mean) > config.open_floors * floor.value
 
 
 def outputs(given: Given, state: State, missing: Mapping[str, str], at_s: float) -> list[Output]:

@@ -164,6 +164,19 @@ def test_a_twin_that_was_wrong_from_its_first_day_stands_open_though_nothing_gre
     assert wrong.shown[OPEN] == "none", "at once"
 
 
+def test_once_a_baseline_is_there_only_a_gap_from_the_first_day_stands_open_and_growth_judges_the_rest() -> None:
+    def later(signal: str, since_s: float) -> float:
+        return 6.0 if signal == "spindle_load_pct" and since_s > 0.0 else 0.0
+
+    wrong, right = weeks(description(0.45)), weeks(description(0.24))
+    for found in (wrong, right):
+        found.run(14 * DAY_S)
+    assert wrong.shown[OPEN].startswith("spindle_load_pct in air: the twin is above what is measured since 2026-06-01")
+    right.run(5 * DAY_S, later)
+    assert right.shown[OPEN] == "none"
+    assert right.shown[GROWING] is True
+
+
 def test_what_a_challenger_publishes_is_the_gap_of_each_signal_its_mean_and_its_basis() -> None:
     own = {spec.name for spec in PROCESSOR.outputs if spec.of_challenger}
     assert {LOAD, f"{LOAD}/mean", TEMPERATURE, f"{TEMPERATURE}/mean", BASIS} <= own
