@@ -95,6 +95,7 @@ class Keeper:
             live_said="" if step is None else f"{step.step} by {step.by}" + (f": {step.why}" if step.why else ""),
             is_first=len(lives(steps)) <= 1,
             fault=fault,
+            healthy_until_ms=(self._workshop.healthy_ms(own.machine) or (0, 0))[1],
             standing=heard.standing,
             work=self._workshop.look(own.machine, state, text, self._config),
             request=request,

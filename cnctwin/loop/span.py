@@ -28,8 +28,11 @@ def span_of(config: LoopConfig, world: World) -> Span:
 
 
 def is_long_enough(config: LoopConfig, world: World) -> bool:
-    """Return True where there is enough history for a diagnosis that nobody has asked for."""
+    """Return True where there is enough history for a diagnosis that nobody has asked for, and nobody has stated that the machine
+    is healthy."""
     since_ms = world.standing.since_ms
+    if world.at_ms < world.healthy_until_ms:
+        return False
     return since_ms is None or was_never_right(world) or world.at_ms - since_ms >= config.open_hours * HOUR_MS
 
 

@@ -50,6 +50,7 @@ class World:
     live_since_ms, live_said: since when the live one is live, on the wall, and how that came
     is_first: nothing else was ever live
     fault: why the live file cannot be used
+    healthy_until_ms: end of the time in which somebody has stated that the machine is healthy, 0 where nobody has
     """
 
     machine: str
@@ -63,6 +64,7 @@ class World:
     live_said: str = ""
     is_first: bool = False
     fault: str = ""
+    healthy_until_ms: int = 0
     standing: Standing = NOTHING_HEARD
     work: Work = NO_WORK
     request: Request | None = None

@@ -92,6 +92,13 @@ def test_a_gap_that_has_just_opened_waits_for_history_unless_somebody_asks() -> 
     assert asked_for.span_at_ms == (T0_MS - HOUR_MS, T0_MS)
 
 
+def test_while_the_machine_is_stated_to_be_healthy_nothing_begins_by_itself() -> None:
+    stated = replace(WORLD, standing=OPEN, healthy_until_ms=T0_MS + 1)
+    assert walked(BY_HAND, stated)[0].step is StepName.WATCHING
+    assert walked(BY_HAND, replace(stated, request=asked(Word.DIAGNOSE)))[0].step is StepName.COMPOSING
+    assert walked(BY_HAND, replace(stated, at_ms=T0_MS + 1))[0].step is StepName.COMPOSING
+
+
 def test_a_twin_that_was_never_right_is_put_to_all_of_the_last_month() -> None:
     first = replace(WORLD, is_first=True, live_since_ms=T0_MS - HOUR_MS)
     opened = replace(OPEN, since_ms=T0_MS - HOUR_MS + 60_000, window_ms=None)
