@@ -46,6 +46,7 @@ class Stretch:
 
     warming: what drives the heat from the beginning of each bin on; at_s, temperature_c: (n,) the readings; start_c: that at its
     beginning, rising by slope_k_per_s, in surroundings of ambient_c; since_s: (n,) from reading to reading, 0 for the first
+    begun_c: (n,) the readings that a short stretch begins with, NaN all others
     """
 
     rows: slice
@@ -56,6 +57,7 @@ class Stretch:
     since_s: Floats
     temperature_c: Floats
     start_c: float
+    begun_c: Floats
     slope_k_per_s: float
     ambient_c: float
     switches_coolant: bool
@@ -122,6 +124,7 @@ def _stretch(log: RunLog, part: slice, inputs: dict[str, Floats], bin_s: float) 
         own = {name: _means(values, number) for name, values in own.items()}
         own |= {"spindle_rpm": mean_rpm, "spindle_load_pct": heating}
     temperature = log[SIGNAL][part]
+    readings = temperature if bin_s <= 0.0 else _means(temperature, number)
     at_s = _means(t_s, number) if bin_s > 0.0 else t_s
     warming = Warming(at_s, own["spindle_load_pct"], own["spindle_rpm"], own["ambient_temp_c"], own["coolant_on"])
     return Stretch(
@@ -131,8 +134,9 @@ def _stretch(log: RunLog, part: slice, inputs: dict[str, Floats], bin_s: float) 
         warming,
         at_s,
         np.diff(at_s, prepend=at_s[0]),
-        temperature if bin_s <= 0.0 else _means(temperature, number),
+        readings,
         _start_c(t_s, temperature),
+        _begun_c(t_s, temperature) if bin_s <= 0.0 else np.full(len(at_s), np.nan),
         _slope(t_s, temperature),
         float(own["ambient_temp_c"][0]),
         len(np.unique(inputs["coolant_on"][part])) > 1,
@@ -141,13 +145,17 @@ def _stretch(log: RunLog, part: slice, inputs: dict[str, Floats], bin_s: float) 
 
 def _start_c(t_s: Floats, temperature_c: Floats) -> float:
     """Return the temperature at the first sample; of a short stretch by a line through more of it than of a long one."""
-    span_s = float(t_s[-1] - t_s[0])
-    if 0.01 * span_s >= START_S or span_s < 2.0 * START_S:
+    first = np.isfinite(begun_c := _begun_c(t_s, temperature_c))
+    if not first.any():
         return start_temperature_c(t_s, temperature_c)
-    first = np.isfinite(temperature_c) & (t_s <= t_s[0] + START_S)
-    if first.sum() < START_ROWS_MIN:
-        return start_temperature_c(t_s, temperature_c)
-    return float(np.polyfit(t_s[first] - t_s[0], temperature_c[first], 1)[1])
+    return float(np.polyfit(t_s[first] - t_s[0], begun_c[first], 1)[1])
+
+
+def _begun_c(t_s: Floats, temperature_c: Floats) -> Floats:
+    """Return the readings that a short stretch begins with, (n,), NaN after them; NaN throughout of a long one, or of too few."""
+    is_short = 2.0 * START_S <= float(t_s[-1] - t_s[0]) < 100.0 * START_S
+    first = np.where(is_short & (t_s <= t_s[0] + START_S), temperature_c, np.nan)
+    return first if np.isfinite(first).sum() >= START_ROWS_MIN else np.full(len(t_s), np.nan)
 
 
 def _slope(t_s: Floats, temperature_c: Floats) -> float:
@@ -162,7 +170,7 @@ def behind_k(sensing: Sensing, slope_k_per_s: float, lanes: int) -> Floats:
     """Return by how much the spindle is warmer than a sensor reads that is late, where it has been warming evenly, (lanes,)."""
     if not sensing.effects or slope_k_per_s == 0.0:
         return np.zeros(lanes)
-    return np.asarray(sensing.value(np.zeros(lanes)) - sensing.value(_ramp_read(sensing, slope_k_per_s, lanes)[:, -1]))
+    return np.asarray(-sensing.value(_ramp_read(sensing, slope_k_per_s, lanes)[:, -1]))
 
 
 def read_from(sensing: Sensing, values: Floats, part: Stretch) -> Floats:
