@@ -31,21 +31,21 @@ STEPS_MAX = 12
 def with_twins(stage: Stage, found: Explained) -> Explained:
     """Return the same with all that cannot be told from each of its effects."""
     for effected in found.best.effects:
-        instead = [one for c in stage.candidates if (one := _instead(stage, found, effected, c)) is not None]
+        instead = [one for c in stage.candidates if (one := instead_of(stage, found, effected, c)) is not None]
         clearer = [f for c, f in instead if _is_clearer(f, found.best)]
         if clearer:
             best = settled(stage, min(clearer, key=lambda f: f.left.excess()), rounds=1)
             rivals = {e: r for e, r in found.rivals.items() if e in best.effects}
             found = replace(found, best=best, rivals=rivals, evidence=evidence_of(stage, found.base, best))
             return with_twins(stage, found)
-        twins = tuple(c for c, f in instead if _leaves_no_more(stage, f, found))
+        twins = tuple(c for c, f in instead if leaves_no_more(stage, f, found))
         known = tuple(e for e in found.rivals.get(effected, ()) if e not in twins)
         found = replace(found, rivals={**found.rivals, effected: (*known, *twins)})
     return found
 
 
-def _instead(stage: Stage, found: Explained, effected: Effected, other: Effected) -> tuple[Effected, Fitted] | None:
-    """The answer with another effect in place of one of its own; None where that comes to nothing."""
+def instead_of(stage: Stage, found: Explained, effected: Effected, other: Effected) -> tuple[Effected, Fitted] | None:
+    """Return the answer with another effect in place of one of its own; None where that comes to nothing."""
     best = found.best
     if other in best.effects:
         return None
@@ -81,7 +81,7 @@ def _is_clearer(one: Fitted, best: Fitted) -> bool:
     return over.sigmas > BETTER_SIGMAS and over.closes > BETTER and one.left_fit.gap() <= best.left_fit.gap() + BETTER
 
 
-def _leaves_no_more(stage: Stage, one: Fitted, found: Explained) -> bool:
+def leaves_no_more(stage: Stage, one: Fitted, found: Explained) -> bool:
     """Return True where a hypothesis leaves what a healthy twin may, and closes about as much as the answer."""
     unseen, seen = one.left.rms_but_worst(CHANCE_BLOCKS), one.left_fit.rms_but_worst(CHANCE_BLOCKS)
     allowed = np.maximum(stage.healthy_rms, found.best.left.rms_but_worst(CHANCE_BLOCKS))
