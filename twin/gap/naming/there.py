@@ -21,7 +21,7 @@ from twin.gap.evidence import evidence_of
 from twin.gap.fitting import Fitted, without_effect
 from twin.gap.intervals import parameter_intervals, uncertainty_of
 from twin.gap.naming.moved import has_to_be_beyond
-from twin.gap.naming.twins import instead_of, leaves_no_more
+from twin.gap.naming.twins import instead_of, is_known, leaves_no_more
 from twin.gap.search import Explained
 
 CERTAINTY = 0.9
@@ -63,7 +63,7 @@ def _with_another(found: Explained, unsure: Effected) -> Explained | None:
     sure = [(r, f) for r, f in fits if is_there(f, r) and leaves_no_more(stage, f, found)]
     if not sure:
         return None
-    leader, best = min(sure, key=lambda one: one[1].left.excess())
+    leader, best = min(sure, key=lambda one: (not is_known(one[1], one[0]), one[1].left.excess()))
     others = {e: r for e, r in found.rivals.items() if e in best.effects}
     others[leader] = (*(r for r in rivals if r != leader), unsure)
     return replace(found, best=best, rivals=others, evidence=evidence_of(stage, found.base, best))
