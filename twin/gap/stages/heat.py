@@ -39,7 +39,7 @@ TERM_FLOORS = 3.0
 LATE_PART = 2.0
 """The factor by which a spindle may be further ahead of a late sensor, or less, at the start: it has not warmed evenly."""
 BENT_PART = 2.0
-"""Standard deviations of the readings that a short stretch begins with by which its start may be off a line through them."""
+"""Standard deviations of the readings that a stretch begins with by which its start may be off a line through them."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -157,9 +157,15 @@ class HeatStage:
 
     def predict(self, model: Model, theta: Floats, run: int) -> Floats:
         """The temperature at each row of θ, (lanes, n)."""
-        data, observed = self.runs[run], self.observed[run]
-        step = coarse_step(data.log[SIGNAL], observed.floor)
-        return as_read(np.concatenate(self._read(model, theta, data), axis=1), observed.measured, step)
+        return as_read(self.unrounded(model, theta, run), self.observed[run].measured, self.step_of(run))
+
+    def unrounded(self, model: Model, theta: Floats, run: int) -> Floats:
+        """The same as it is between the steps of the reading."""
+        return np.concatenate(self._read(model, theta, self.runs[run]), axis=1)
+
+    def step_of(self, run: int) -> float:
+        """Return the step in which the temperature was read."""
+        return coarse_step(self.runs[run].log[SIGNAL], self.observed[run].floor)
 
     def shown(self, model: Model, theta: Floats, run: int) -> Floats:
         """Return what the twin shows at the rows of a run, (rows,), NaN where there is none that is compared."""
