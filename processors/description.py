@@ -117,6 +117,15 @@ def version_of(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:VERSION_DIGITS]
 
 
+def in_words(version: str) -> str:
+    """Return the words by which the basis of a figure names a description.
+
+    >>> in_words("3f2a9c01d5e7")
+    'description 3f2a9c01d5e7'
+    """
+    return f"description {version}"
+
+
 def edition_of(version: str, programs: Programs) -> str:
     """Return a version, and that of the planned programs where there are any.
 

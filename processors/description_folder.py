@@ -5,7 +5,8 @@
     machines/history/<name>/steps.jsonl         who made which version live, and why: one JSON line for each step
     machines/history/<name>/<version>.programs.json     what a version plans for programs: name → seconds of its sections
 
-It is only read. A file that is being written is left alone until it has been quiet for SETTLED_S.
+It is only read. A file that is being written is left alone until it has been quiet for SETTLED_S, and the challenger's as long as
+the live one is: a promotion takes the challenger away, whose state the processors hand over when they hear the live one first.
 """
 
 import json
@@ -56,11 +57,14 @@ class DescriptionFolder:
         now_s = time.time() if now_s is None else now_s
         files = dict(self._files())
         news: list[FileNews] = []
+        unsettled: set[str] = set()
         for key in sorted({*files, *self._stamps}, key=lambda key: (key[0], key[1] is Role.CHALLENGER)):
             path = files.get(key)
             stamp = None if path is None else _stamp(path)
             is_same = stamp == self._stamps.get(key) and not self._is_planned_anew(key)
-            if is_same or (stamp is not None and 0 <= now_s - stamp[0] / 1e9 < SETTLED_S):
+            if not is_same and stamp is not None and 0 <= now_s - stamp[0] / 1e9 < SETTLED_S:
+                unsettled.add(key[0])
+            if is_same or key[0] in unsettled:
                 continue
             if path is None or stamp is None:
                 if self._stamps.pop(key, None) is not None:

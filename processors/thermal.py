@@ -17,7 +17,7 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from processors.config import ProcessorConfig
 from processors.contract import Output, OutputSpec, Processor, Provenance, Sample, SampleKind
-from processors.description import Description
+from processors.description import Description, in_words
 from sparkplug.datatype import DataType
 from sparkplug.quality import Quality
 from twin.live.assumed import THERMAL, assumed_of, completed
@@ -70,7 +70,7 @@ def described(config: Config, description: Description | None) -> Described:
     machine = config.machine if description is None else completed(description.machine, "thermal")
     heat = LiveHeat.of(machine)
     assumed = assumed_of(machine, "thermal", CONSTANTS)
-    said = [] if description is None else [f"description {description.version}"]
+    said = [] if description is None else [in_words(description.version)]
     if assumed:
         said.append(f"{'heat constants' if len(assumed) == len(CONSTANTS) else ', '.join(assumed)} assumed")
     words = "; ".join((*said, *heat.in_words))
@@ -263,7 +263,9 @@ PROCESSOR = Processor(
         ),
         OutputSpec(RESIDUAL, _DOUBLE, "K", "measured minus modelled spindle temperature", _INFERRED, 0.05, of_challenger=True),
         OutputSpec(RISE, _DOUBLE, "K", "modelled rise of the spindle over ambient", _MODELLED, 0.05, of_challenger=True),
-        OutputSpec(BASIS, DataType.STRING, None, "what the estimate rests on: start, ambient, constants", _INFERRED),
+        OutputSpec(
+            BASIS, DataType.STRING, None, "what the estimate rests on: start, ambient, constants", _INFERRED, of_challenger=True
+        ),
     ),
     config=Config,
     state=State,

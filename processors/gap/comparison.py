@@ -25,6 +25,7 @@ from processors.gap.watch import (
     EXECUTION,
     FEED,
     GAP_MAX,
+    HEAT_BASIS,
     PROGRAM,
     PROGRAM_CHARACTERS_MAX,
     RISE,
@@ -32,6 +33,7 @@ from processors.gap.watch import (
     Feeding,
     ToolChange,
     Watch,
+    is_heat_of,
 )
 from processors.sample import Sample
 from processors.tool_change_detector.context import ACTIVE as CHANGE
@@ -43,7 +45,7 @@ COMMAND = "spindle_rpm_cmd"
 RESIDUAL = twin_signals.SPINDLE_TEMP_RESIDUAL_K
 INPUTS = frozenset(
     {
-        *(SPEED, COMMAND, FEED, LOAD, RESIDUAL, RISE, CHANGE, DETECTED, CHANGE_SOURCE, EXECUTION, PROGRAM),
+        *(SPEED, COMMAND, FEED, LOAD, RESIDUAL, RISE, HEAT_BASIS, CHANGE, DETECTED, CHANGE_SOURCE, EXECUTION, PROGRAM),
         *OVERRIDES,
         *AXIS_LOADS,
     }
@@ -76,7 +78,7 @@ def comparison(watch: Watch, given: Given, sample: Sample) -> Comparison:
     if watch.change is ToolChange.UNKNOWN:
         return Comparison((), dict.fromkeys(SIGNALS, f"{CHANGE} is not known: the samples cannot be gated"), True)
     found = {
-        TEMPERATURE: _temperature(watch, sample),
+        TEMPERATURE: _temperature(watch, given, sample),
         LOAD: _load(watch, given, sample),
         SPEED: _speed(watch, given, sample),
         TOOL_CHANGE: f"{CHANGE} is not offered" if watch.change is ToolChange.ABSENT else None,
@@ -106,7 +108,9 @@ def _time(given: Given, one: Timed) -> Compared:
     return Compared(one.signal, one.regime, (twin_s or 0.0) - one.seconds, twin_s is None, one.weight_s)
 
 
-def _temperature(watch: Watch, sample: Sample) -> Compared | str | None:
+def _temperature(watch: Watch, given: Given, sample: Sample) -> Compared | str | None:
+    if not is_heat_of(given.twin.version, sample):
+        return f"{RESIDUAL} is of another description as yet"
     residual_k, why = sample.number(RESIDUAL)
     rise_k, no_rise = sample.number(RISE)
     if residual_k is None or rise_k is None or watch.rise_mean_k is None:

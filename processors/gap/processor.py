@@ -38,7 +38,7 @@ def step(given: Given, state: State, sample: Sample) -> tuple[State, Sequence[Ou
     if sample.kind is not _TICK:
         timing = timed(timing, before, watch, sample)
         return (state if watch is before and timing is state.timing else state.watching(watch, timing)), ()
-    watch = heated(watch, sample, config.tick_s)
+    watch = heated(watch, given.twin.version, sample, config.tick_s)
     times = times_compared(given, timing.done)
     if times:
         timing = replace(timing, done=())

@@ -70,7 +70,8 @@ def taken_up(given: Given, state: State, at_s: float) -> State:
         return state
     cells = {key: described_anew(cell) if key.startswith(OF_DESCRIPTION) else cell for key, cell in state.cells.items()}
     is_first = not cells and not state.version
-    return replace(state, version=version, described_s=None if is_first else at_s, cells=cells)
+    watch = replace(state.watch, rise_mean_k=None)
+    return replace(state, watch=watch, version=version, described_s=None if is_first else at_s, cells=cells)
 
 
 def healthy_s(given: Given, state: State) -> tuple[float, float]:

@@ -2,6 +2,8 @@
 
 A section begins at cycle start or when a tool change ends, and ends when the next one begins or the program does. One that was
 held, interrupted, resumed, or run with an override off 100 % is left out, and so is everything around a hole in the data.
+Lengths are between the stamps of what the control says, not between the moments at which it came: a message that was late takes
+nothing longer.
 """
 
 from dataclasses import dataclass, replace
@@ -10,6 +12,7 @@ from typing import NamedTuple
 from processors.gap.signals import PROGRAM_TIME, TOOL_CHANGE
 from processors.gap.watch import EXECUTION, PROGRAM, PROGRAM_CHARACTERS_MAX, TURNING_RPM_MIN, ToolChange, Watch
 from processors.sample import Sample, SampleKind
+from processors.tool_change_detector.context import tool_change_context
 from sparkplug.quality import Quality
 
 OVERRIDES = ("feed_override_pct", "rapid_override_pct")
@@ -75,18 +78,19 @@ _HEARD = frozenset({EXECUTION, PROGRAM, *OVERRIDES})
 
 def _changing(timing: Timing, was: ToolChange, now: Watch, sample: Sample) -> Timing:
     """The timing where a tool change begins or ends."""
+    at_s = tool_change_context(sample.row).since_s
     if now.change is ToolChange.ACTIVE and was is ToolChange.NONE:
         rpm, _ = sample.number("spindle_rpm")
-        timing = _section_over(timing, sample.at_s)
+        timing = _section_over(timing, at_s)
         is_stopped = rpm is not None and abs(rpm) < TURNING_RPM_MIN
-        return replace(timing, change_s=sample.at_s, is_stopped=is_stopped)
+        return replace(timing, change_s=at_s, is_stopped=is_stopped)
     if now.change is ToolChange.NONE and was is ToolChange.ACTIVE and timing.change_s is not None:
-        seconds = sample.at_s - timing.change_s
+        seconds = at_s - timing.change_s
         regime = "spindle_stopped" if timing.is_stopped else "spindle_turning"
         if 0.0 < seconds < CHANGE_S_MAX:
             timing = _done(timing, Timed(TOOL_CHANGE, regime, seconds, CHANGE_WEIGHT_S, timing.is_stopped))
         goes_on = timing.program and timing.section < SECTIONS_MAX
-        section_s = sample.at_s if goes_on else None
+        section_s = at_s if goes_on else None
         return replace(timing, change_s=None, section=timing.section + 1, section_s=section_s)
     return replace(timing, change_s=None, program="", section_s=None)
 
@@ -96,15 +100,15 @@ def _running(timing: Timing, sample: Sample) -> Timing:
     execution, program = _text(sample, EXECUTION), _text(sample, PROGRAM)[:PROGRAM_CHARACTERS_MAX]
     was = timing.execution
     if execution != was:
-        timing = replace(timing, execution=execution)
+        timing, at_s = replace(timing, execution=execution), _said_s(sample, EXECUTION)
         if execution == _ACTIVE:
             starts = was is not None and was != "" and was not in _RESUMED_FROM and program != ""
-            section_s = sample.at_s if starts and timing.change_s is None else None
+            section_s = at_s if starts and timing.change_s is None else None
             timing = replace(timing, program=program if starts else "", section=0, section_s=section_s)
         elif execution in _RESUMED_FROM or execution == "":
             timing = replace(timing, program="", section_s=None)
         else:
-            timing = replace(_section_over(timing, sample.at_s), program="")
+            timing = replace(_section_over(timing, at_s), program="")
     elif timing.program and program != timing.program:
         timing = replace(timing, program="", section_s=None)
     if timing.section_s is not None and _is_overridden(sample):
@@ -125,6 +129,12 @@ def _section_over(timing: Timing, at_s: float) -> Timing:
 
 def _done(timing: Timing, one: Timed) -> Timing:
     return replace(timing, done=(*timing.done, one)[-DONE_MAX:])
+
+
+def _said_s(sample: Sample, name: str) -> float:
+    """The time at which a signal was said to be what it is; that of the sample where it is not offered."""
+    reading = sample.row.get(name)
+    return sample.at_s if reading is None else reading.timestamp_ms / 1000
 
 
 def _text(sample: Sample, name: str) -> str:

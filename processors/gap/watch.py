@@ -8,6 +8,7 @@ import math
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
+from processors.description import in_words
 from processors.sample import Sample, SampleKind
 from processors.tool_change_detector.context import ACTIVE as CHANGE
 from processors.tool_change_detector.context import DETECTED, STALE, tool_change_context
@@ -15,7 +16,7 @@ from processors.tool_change_detector.context import NONE as NOBODY
 from twin.vocabulary import twin_signals
 
 SPEED, FEED = "spindle_rpm", "feed_mm_min"
-RISE = twin_signals.SPINDLE_TEMP_RISE_K
+RISE, HEAT_BASIS = twin_signals.SPINDLE_TEMP_RISE_K, twin_signals.SPINDLE_TEMP_BASIS
 CHANGE_SOURCE = "tool_change_source"
 EXECUTION, PROGRAM = "exec_state", "program"
 TURNING_RPM_MIN, FEED_MM_MIN_MIN = 50.0, 1.0
@@ -94,8 +95,17 @@ def _is_another_speed(rpm: float, known: float) -> bool:
     return step > TURNING_RPM_MIN / 2 and step > SPEED_CHANGE * abs(known)
 
 
-def heated(watch: Watch, sample: Sample, seconds: float) -> Watch:
-    """The watch with the modelled rise held for `seconds` more."""
+def is_heat_of(version: str, sample: Sample) -> bool:
+    """Return True if what processor thermal says is of this description. Where one is promoted, or a challenger begins, it is a
+    moment behind; then what the row holds is still of the one before. What says nothing of a description is believed."""
+    basis = sample.row.get(HEAT_BASIS)
+    return not version or basis is None or not isinstance(basis.value, str) or in_words(version) in basis.value
+
+
+def heated(watch: Watch, version: str, sample: Sample, seconds: float) -> Watch:
+    """The watch with the modelled rise of this description held for `seconds` more."""
+    if not is_heat_of(version, sample):
+        return watch
     rise_k, _ = sample.number(RISE)
     if rise_k is None or abs(rise_k) > GAP_MAX:
         return watch if watch.rise_mean_k is None else replace(watch, rise_mean_k=None)

@@ -51,6 +51,17 @@ def test_a_file_that_is_being_written_is_left_alone(tmp_path: Path) -> None:
     assert seen(folder.look(LONG_AGO_S + 0.3)) == [("a", Role.LIVE, version)]
 
 
+def test_a_promotion_is_told_before_the_challenger_is_gone(tmp_path: Path) -> None:
+    folder = DescriptionFolder(tmp_path)
+    written(tmp_path / "a.toml", toml(1.0))
+    written(tmp_path / "challengers" / "a.toml", toml(2.0))
+    folder.look()
+    promoted = written(tmp_path / "a.toml", toml(2.0), LONG_AGO_S + 1.0)
+    (tmp_path / "challengers" / "a.toml").unlink()
+    assert folder.look(LONG_AGO_S + 1.1) == []
+    assert seen(folder.look(LONG_AGO_S + 2.1)) == [("a", Role.LIVE, promoted), ("a", Role.CHALLENGER, None)]
+
+
 def test_a_wrong_file_names_itself_and_the_fault(tmp_path: Path) -> None:
     folder = DescriptionFolder(tmp_path)
     written(tmp_path / "a.toml", toml(-1.0))

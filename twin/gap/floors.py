@@ -109,8 +109,11 @@ class _Pair:
 
 
 def repeatability(runs: Iterable[Run], repeats: Iterable[tuple[Run, Run]], machine: MachineFile) -> Floors:
-    """The floors that the runs themselves show."""
-    pairs = [_Pair(one.name, one.log, other.log, 0) for one, other in repeats if len(one.log) == len(other.log)]
+    """The floors that the runs themselves show.
+
+    Runs that were read at other times, as of a control that reports changes only, do not tell by their samples what repeats.
+    """
+    pairs = [_Pair(one.name, one.log, other.log, 0) for one, other in repeats if _are_in_step(one.log, other.log)]
     if pairs:
         return _floors(pairs, [{} for _ in pairs], {}, machine, ())
     laps = [_Pair(run.name, run.log, run.log, lag) for run in runs if (lag := lap_of(run.log))]
@@ -121,6 +124,14 @@ def repeatability(runs: Iterable[Run], repeats: Iterable[tuple[Run, Run]], machi
     over = [replace(p, lag=2 * p.lag) for p, e in zip(laps, events, strict=True) if e.samples and 3 * p.lag <= len(p.one)]
     outs = [e.samples for e in [*events, *(_events(pair, usual, machine) for pair in over)]]
     return _floors([*laps, *over], outs, usual, machine, notes)
+
+
+def _are_in_step(one: RunLog, other: RunLog) -> bool:
+    """Return True where two runs have as many samples, at the same times after their start."""
+    if len(one) != len(other) or len(one) < 2:
+        return False
+    apart_s = np.abs((one.t_s - one.t_s[0]) - (other.t_s - other.t_s[0]))
+    return bool(apart_s.max() <= 0.5 * np.median(np.diff(one.t_s)))
 
 
 def _floors(

@@ -79,7 +79,8 @@ def test_what_was_composed_is_diagnosed_and_the_effect_is_named(store: EmbeddedS
     compose(store, "vmc", DESCRIPTION, tmp_path / "case")
     found = in_threads(read_case(tmp_path / "case")).diagnosis
     causes = {Effected(cause.effect, cause.on): cause for cause in found.causes}
-    assert causes.keys() == {Effected("coolant_cooling"), Effected("tool_change_time")}  # 4 s, of 3.2 that are stated
+    # a change takes 4 s, of 3.2 that are stated; the idle load is 3 % and 1 % more for each 4000 rev/min, where one is stated
+    assert causes.keys() == {Effected("coolant_cooling"), Effected("tool_change_time"), Effected("idle_speed_power")}
     assert abs(causes[Effected("coolant_cooling")].parameters["gain"].value - 1.0) < 0.1
 
 

@@ -50,6 +50,11 @@ def test_a_cycle_has_its_sections_and_its_tool_changes() -> None:
     assert ended(*CYCLE) == WHOLE
 
 
+def test_a_message_that_is_late_takes_nothing_longer() -> None:
+    on_its_way = data(45.0, spindle_rpm=0.0)
+    assert ended(*CYCLE[:2], on_its_way, *CYCLE[2:]) == WHOLE
+
+
 def test_a_cycle_that_starts_with_a_tool_change_has_no_section_before_it() -> None:
     start = data(10.0, exec_state="ACTIVE", tool_change_active=True)
     assert [one.regime for one in ended(start, *CYCLE[2:])] == ["spindle_stopped", "section 1 of O1"]

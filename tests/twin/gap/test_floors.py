@@ -39,6 +39,17 @@ def test_runs_of_one_recording_twice_do_not_lower_the_floor_below_the_sensor() -
     assert floors.of(case.runs[0].log, "z_torque_a").min() == pytest.approx(MACHINE.noise["torque_a"])
 
 
+def test_runs_that_were_read_at_other_times_say_nothing_of_each_other() -> None:
+    columns = columns_of(air_case())
+    rng = np.random.default_rng(1)
+    columns["fit again"]["t_s"] = np.sort(rng.uniform(0.0, columns["fit"]["t_s"][-1], len(columns["fit"]["t_s"])))
+    columns["fit again"]["t_s"] -= columns["fit again"]["t_s"][0]
+    case = case_of(MACHINE, columns)
+    floors = repeatability(case.runs, case.repeats(), MACHINE)
+    assert not floors.repeated
+    assert "no run was repeated" in floors.notes[0]
+
+
 def test_laps_of_a_run_are_repeats() -> None:
     lap = "G1 Z10 F3000\nG4 P300\nG1 Z0 F3000\nG4 P300\n"
     log = simulate(plant(), "G4 P300\n" + 5 * lap + "M30\n", seed=3).run
