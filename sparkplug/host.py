@@ -274,6 +274,13 @@ class HostApplication:
         self._connection.send((self._session.rebirth_request(node, now_ms()),))
         return True
 
+    def want_birth(self, node: NodeId) -> None:
+        """Have a node that was known before this host was started asked for its births, unless it is online or is born by itself.
+
+        Asked again at a growing interval; nothing else would make a node speak that has nothing to say.
+        """
+        self._session.want_birth(node, now_ms())
+
     def _take(self) -> list[HostEvent]:
         events: list[HostEvent] = []
         inbox, session = self._inbox, self._session

@@ -176,6 +176,12 @@ class HostSession:
         self.counts["rebirths_requested"] += 1
         return rebirth_request(node, now_ms)
 
+    def want_birth(self, node: NodeId, now_ms: int) -> None:
+        """Have a node asked for its births unless it is online, or is born by itself in a moment."""
+        known = self._nodes.get(node)
+        if known is None or not known.picture.online:
+            self._requests.want(node, now_ms)
+
     # How it is done.
 
     def _state(self, *, online: bool, timestamp_ms: int) -> Publish:

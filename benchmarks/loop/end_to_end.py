@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The loop end to end, effect by effect: a production machine on a real broker, from the hour that nobody told to the closed gap.
 
-    .venv/bin/python -m benchmarks.loop.end_to_end [--only EFFECT …] [--seed 7] [--kill PART …]
+    .venv/bin/python -m benchmarks.loop.end_to_end [--only EFFECT …] [--seed 7] [--kill PART … | --kill-each]
 
 Each effect has a plant of its own (tests/cnctwin/loop/production_plant.py): Mosquitto, an edge node that tells what
 the control shows, `cnctwin process` with thermal and gap, the historian, `cnctwin twin run` that promotes by rule, and
@@ -13,8 +13,10 @@ Hours are those of production. A line is printed for each effect as soon as it i
     gap              standing gap of the worst signal as the diagnosis began, and after the promotion, in floors
     made             how often something was made live: once
 
---kill    kill -9 these parts (historian, processors, jobs, loop, broker) as the loop comes to each of its steps, and start
-          them again
+--kill        kill -9 these parts (historian, processors, jobs, loop, broker, child) as the loop comes to each of its steps, and
+              start them again; the child is the one that composes, then the one that diagnoses
+--kill-each   the same with one part after the other, each on a plant of its own; a line for each part, with the steps in which it
+              was killed
 """
 
 import argparse
@@ -22,11 +24,14 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from tests.cnctwin.loop.production_plant import PARTS, ProductionPlant
+from tests.cnctwin.loop.production_plant import ProductionPlant
 from tests.cnctwin.loop.way_round import WayRound, way_round
 from tests.wire.mosquitto import Mosquitto
 
-BROKER = "broker"
+BROKER, CHILD = "broker", "child"
+KILLED = ("processors", "jobs", "loop", BROKER, CHILD, "historian")
+CHILD_OF = {"composing": "loop", "diagnosing": "jobs"}
+"""The part whose child works in a step."""
 TEMPERATURE, LOAD = "spindle_temp_c", "spindle_load_pct"
 SIZES: dict[tuple[str, str], dict[str, float]] = {
     ("rated_power", ""): {"scale": 0.5},
@@ -49,30 +54,48 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", nargs="+", default=())
     parser.add_argument("--seed", type=int, default=7)
-    parser.add_argument("--kill", nargs="+", default=(), choices=(*PARTS, BROKER))
+    parser.add_argument("--kill", nargs="+", default=(), choices=KILLED)
+    parser.add_argument("--kill-each", action="store_true")
     given = parser.parse_args()
     print(
         f"{'effect':<22}{'on':<18}{'size':<24}{'noticed':<9}{'live':<7}{'named':<7}{'class':<7}{'gap':<14}{'made':<6}{'s':<6}text"
     )
-    for (name, on), size in SIZES.items():
+    for name, on in SIZES:
         if given.only and name not in given.only:
             continue
-        with TemporaryDirectory(prefix="loop-") as folder, Mosquitto(persistent=True) as broker:
-            found = way_round(Path(folder) / "plant", broker, name, on, size, given.seed, killer(broker, given.kill))
-        print(_line(name, on, size, found), flush=True)
+        for parts in [[part] for part in KILLED] if given.kill_each else [list(given.kill)]:
+            _gone_round(name, on, given.seed, parts)
 
 
-def killer(broker: Mosquitto, parts: Sequence[str]) -> Callable[[ProductionPlant, str], None]:
-    """Return what kills these parts, one after the other, and starts them again."""
+def _gone_round(name: str, on: str, seed: int, parts: Sequence[str]) -> None:
+    """Go round once while these parts are killed, and print how it ended."""
+    killed: list[tuple[str, str]] = []
+    with TemporaryDirectory(prefix="loop-") as folder, Mosquitto(persistent=True) as broker:
+        try:
+            found = way_round(Path(folder) / "plant", broker, name, on, SIZES[name, on], seed, killer(broker, parts, killed))
+            print(_line(name, on, SIZES[name, on], found), flush=True)
+        except AssertionError as error:
+            print(f"{name:<22}{on:<18}did not come to an end: {str(error)[:200]}", flush=True)
+    for part in parts:
+        print(f"    {part} killed in: {', '.join(step for one, step in killed if one == part)}", flush=True)
 
-    def kill(plant: ProductionPlant, _step: str) -> None:
+
+def killer(broker: Mosquitto, parts: Sequence[str], killed: list[tuple[str, str]]) -> Callable[[ProductionPlant, str], None]:
+    """Return what kills these parts, one after the other, and starts them again; `killed` is told which, and in which step."""
+
+    def kill(plant: ProductionPlant, step: str) -> None:
         for part in parts:
             if part == BROKER:
                 broker.kill()
                 broker.start()
-            else:
+            elif part != CHILD:
                 plant.kill(part)
                 plant.start(part)
+            elif step in CHILD_OF:
+                plant.kill_child(CHILD_OF[step])
+            else:
+                continue
+            killed.append((part, step))
 
     return kill
 

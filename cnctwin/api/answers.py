@@ -41,6 +41,7 @@ class State(Answer):
     online: bool
     behind: str | None = Field(None, description="which processors are behind, and how far: the twin's values are so old")
     refused: str | None = Field(None, description="which devices are in quarantine, and why: nothing of them is taken")
+    described: str | None = Field(None, description="which machines' descriptions have a fault: what was live before stays so")
     measured: dict[str, ValueObject]
     twin: dict[str, ValueObject]
 
@@ -117,12 +118,16 @@ class History(BaseModel):
 
 
 class Events(Answer):
-    """The events of a machine, oldest first. `left_out` oldest ones there was no room for."""
+    """The events of a machine, oldest first. `left_out` oldest ones there was no room for.
+
+    `descriptions`: those that held at the beginning, and each that came later, where there is a store
+    """
 
     machine: MachineName
     source: Literal["store", "memory"]
     left_out: int
     events: list[dict[str, Any]]
+    descriptions: list[dict[str, Any]] = Field(default_factory=list)
 
 
 class Parts(Answer):

@@ -12,6 +12,7 @@ from cnctwin.composing.composed import Composed, ComposedRun, Role
 from cnctwin.composing.guessed import is_repeat, kind_of
 from cnctwin.composing.observable import observability
 from cnctwin.composing.roles import FIT_PART
+from cnctwin.composing.shared_motion import shared_motion
 from cnctwin.composing.written import CASE_FILE, MACHINE_FILE, RUNS, case_toml, complete_or_absent
 from cnctwin.errors import UsageError
 from cnctwin.files.program_text import read_text
@@ -74,6 +75,11 @@ def compose_runs(recordings: Sequence[Recording], description: str, out: Path) -
         raise UsageError("there is no recording; name run logs, or a machine of a store")
     repeats = _repeats(read, notes)
     roles = _roles(read, repeats, notes)
+    if "check" not in roles.values() and not any(one.kind is RunKind.WARMUP for one in read):
+        notes.append("nothing is left to judge on: record another program too, or the same a third time")
+    said = {one.name for one in read if one.recording.repeats is not None}
+    repeats = {name: earlier for name, earlier in repeats.items() if name in said or roles[name] == roles[earlier]}
+    read = _lined_up(read, repeats, notes)
     with complete_or_absent(out) as folder:
         runs: list[tuple[ComposedRun, RunLog]] = []
         for one in read:
@@ -144,7 +150,7 @@ def _repeats(read: Sequence[_Read], notes: list[str]) -> dict[str, str]:
             continue
         alike = (e for e in read[:n] if e.kind is one.kind and e.recording.healthy is one.recording.healthy)
         together = (e for e in alike if {one.role, e.role} != {"fit", "check"})
-        first = next((e for e in together if is_repeat(one.log, e.log, one.kind)), None)
+        first = next((e for e in together if is_repeat(one.log, e.log, one.kind) or shared_motion(e.log, one.log)), None)
         if first is not None:
             found[one.name] = first.name
             notes.append(f"{one.name} repeats {first.name}: they went through the same")
@@ -167,7 +173,36 @@ def _roles(read: Sequence[_Read], repeats: Mapping[str, str], notes: list[str]) 
         found |= {name: "check" if name in judges else "fit" for name in silent}
         if judge is not None:
             notes.append(f"{judge} is kept to judge on: it is the last of kind {kind.value}")
+        elif "check" not in stated and (again := _one_too_many(silent, repeats)):
+            found[again] = "check"
+            notes.append(f"{again} is kept to judge on: another time, but no other motion; record one that goes through another")
     return found
+
+
+def _one_too_many(names: Sequence[str], repeats: Mapping[str, str]) -> str | None:
+    """Return the last of three or more recordings of the same, two of which are enough to tell what repeats."""
+    followers = [name for name in names if name in repeats and name not in repeats.values()]
+    return next((name for name in reversed(followers) if list(repeats.values()).count(repeats[name]) > 1), None)
+
+
+def _lined_up(read: Sequence[_Read], repeats: Mapping[str, str], notes: list[str]) -> list[_Read]:
+    """Return the recordings, those that repeat one another cut to the motion that they share."""
+    by_name = {one.name: one for one in read}
+    for first in dict.fromkeys(repeats.values()):
+        logs = {name: by_name[name].log for name, earlier in repeats.items() if earlier == first}
+        shared = {name: found for name, log in logs.items() if (found := shared_motion(by_name[first].log, log))}
+        begin = max((s.one for s in shared.values()), default=0)
+        end = min((s.one + s.rows for s in shared.values()), default=0)
+        whole = all(s.one == s.other and len(logs[name]) == len(by_name[first].log) == s.rows for name, s in shared.items())
+        if whole or end - begin < ROWS_MIN:
+            continue
+        cuts = {first: begin} | {name: begin - s.one + s.other for name, s in shared.items()}
+        for name, row in cuts.items():
+            one = by_name[name]
+            by_name[name] = replace(one, log=_rows(one.log, slice(row, row + end - begin)))
+        lasts_s = float(by_name[first].log.t_s[-1])
+        notes.append(f"{', '.join(cuts)} did not begin at the same moment: they are cut to the {lasts_s:.3g} s that they share")
+    return [by_name[one.name] for one in read]
 
 
 def _named_role(name: str) -> Role | None:

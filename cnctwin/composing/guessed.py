@@ -46,7 +46,7 @@ def is_repeat(one: RunLog, other: RunLog, kind: RunKind) -> bool:
         return _same_lines(one, other)
     references = [c for c in one.columns if (m := AXIS_COLUMN.match(c)) and m[2] == "ref_mm"]
     if references:
-        return all(other.has(c) for c in references) and all(_near(one[c], other[c]) for c in references)
+        return all(other.has(c) for c in references) and all(near_references(one[c], other[c]) for c in references)
     if kind is not RunKind.WARMUP or not (one.has("spindle_rpm") and other.has("spindle_rpm")):
         return False
     a, b = _first(one["spindle_rpm"], other["spindle_rpm"])
@@ -63,7 +63,8 @@ def _same_lines(one: RunLog, other: RunLog) -> bool:
     return ends[0] == ends[1] and abs(lasted[0] - lasted[1]) <= SAME_LENGTH * max(lasted)
 
 
-def _near(one: Floats, other: Floats) -> bool:
+def near_references(one: Floats, other: Floats) -> bool:
+    """Return True where two references never lie further apart than what resolution and rounding make."""
     a, b = _first(one, other)
     apart = np.abs(a - b)
     if not np.isfinite(apart).any():

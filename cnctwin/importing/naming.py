@@ -43,7 +43,8 @@ ACTUAL = {
 }
 TABLE = {"table", "direct", "scale", "linear", "secondary", "2nd", "enc2", "encoder2", "glass"}
 POSITION = {"pos", "position", "posn", "actpos", "setpos", "sollpos", "istpos", "poserr", "lage"}
-TORQUES = {"torque", "trq", "tcmd", "moment", "drehmoment", "current", "curr", "strom", "iq", "isq"}
+CURRENTS = {"current", "curr", "strom", "iq", "isq"}
+TORQUES = {"torque", "trq", "tcmd", "moment", "drehmoment"} | CURRENTS
 OTHER_MOTION = {
     "vel",
     "velo",
@@ -74,6 +75,8 @@ TIME = {"time", "t", "timestamp", "zeit", "datetime", "date", "stamp", "ts", "el
 _WORDS = REFERENCE | ACTUAL | TABLE | POSITION | TORQUES | {"load", "force", "temp", "power"}
 _LONGEST = "|".join(sorted(map(re.escape, _WORDS), key=len, reverse=True))
 _JOINED = re.compile(rf"^(?:([xyz])({_LONGEST})|({_LONGEST})([xyz]))$")
+_SECOND = re.compile(r"(?i)2nd|(?:enc|encoder|geber|messsystem|measuring system)[ _.-]?2(?!\d)")
+"""Words for the second measuring system, which is on the table's side."""
 _UNIT_INDEX = re.compile(r"\[\s*u?\d+\s*,\s*(\d+)\s*\]|\[\s*(\d+)\s*\]")
 _PLAIN: tuple[tuple[set[str], set[str], str], ...] = (
     ({"feed", "feedrate", "vorschub", "fact"}, set(), "feed_mm_min"),
@@ -114,7 +117,7 @@ def guess(column: SourceColumn, units: Mapping[str, str]) -> Guess | None:
     stated = column.unit if column.unit and into and conversion(column.unit, into) else ""
     if column.unit and unit_named(column.unit) and into and not stated:
         return None  # of another quantity
-    unit = stated or units.get(into) or None
+    unit = stated or units.get("A" if into == TORQUE and _is_current(column) else into) or None
     return Guess(target, unit, is_named and (unit is not None or not into))
 
 
@@ -152,9 +155,17 @@ def _target(column: SourceColumn) -> tuple[str | None, bool]:
     told = axis is not None
     if axis is None and index is not None and 1 <= int(index[1] or index[2]) <= 3:
         axis = "xyz"[int(index[1] or index[2]) - 1]
+    words |= {"2nd"} if _SECOND.search(text) else set()
     if axis is not None and (of_axis := _of_axis(axis, words, column.unit)):
         return of_axis, told
     return next((name for some, more, name in _PLAIN if words & some and (not more or words & more)), None), True
+
+
+def _is_current(column: SourceColumn) -> bool:
+    """Return True where a torque command is told as a current: by its name, else by its description."""
+    name = {word.rstrip("0123456789") for word in words_of(named(column.name)[0])}
+    words = name if name & TORQUES else {*words_of(column.description)}
+    return bool(words & CURRENTS) and not words & (TORQUES - CURRENTS)
 
 
 def _axis(words: list[str]) -> str | None:
@@ -177,7 +188,7 @@ def _of_axis(axis: str, words: set[str], unit: str) -> str | None:
         return f"{axis}_torque_a"
     if into is not None and not conversion(into, ending):
         return None
-    if words & TABLE or ({"encoder", "2"} <= words) or ({"enc", "2"} <= words):
+    if words & TABLE:
         return f"{axis}_table_{ending}"
     if words & REFERENCE:
         return f"{axis}_ref_{ending}"

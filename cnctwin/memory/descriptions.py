@@ -1,5 +1,6 @@
 """The descriptions of a machine as the memory heard them: which was live when, and which was its challenger."""
 
+import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -34,10 +35,48 @@ class Described:
             return None
 
 
+@dataclass(frozen=True, slots=True)
+class Faulty:
+    """A stretch in which the files that describe a machine had a fault; until_ms: when it was mended, None = not yet."""
+
+    from_ms: int
+    until_ms: int | None
+    text: str
+
+
 def described(store: Store, machine: str, from_ms: int, to_ms: int) -> tuple[Described, ...]:
     """Return the descriptions that held when a stretch began, as of before it, and all that were heard within it, in order."""
     found = [one for role in Role for one in _heard(store, machine, role, from_ms, to_ms)]
     return tuple(sorted(found, key=lambda one: (one.received_ms, one.role is Role.CHALLENGER)))
+
+
+def faults(store: Store, machine: str, from_ms: int, to_ms: int) -> tuple[Faulty, ...]:
+    """Return the faults of a machine's files that stood in a stretch, oldest first; one that began earlier with its beginning."""
+    heard: list[Snapshot] = []
+    before_ms = to_ms
+    while len(heard) < CHANGES_MAX and (snapshot := store.snapshot_before(DESCRIPTION_KIND, f"{machine}/fault", before_ms)):
+        heard.append(snapshot)
+        before_ms = snapshot.received_ms
+        if before_ms < from_ms:
+            break
+    found: list[Faulty] = []
+    for one in reversed(heard):
+        text = _fault_text(one.payload)
+        if found and found[-1].until_ms is None:
+            if text == found[-1].text:
+                continue
+            found[-1] = Faulty(found[-1].from_ms, one.received_ms, found[-1].text)
+        if text:
+            found.append(Faulty(one.received_ms, None, text))
+    return tuple(one for one in found if one.until_ms is None or one.until_ms >= from_ms)
+
+
+def _fault_text(payload: bytes) -> str:
+    try:
+        document = json.loads(payload) if payload else {}
+    except (ValueError, RecursionError):
+        return ""
+    return str(document.get("text") or "") if isinstance(document, dict) else ""
 
 
 def _heard(store: Store, machine: str, role: Role, from_ms: int, to_ms: int) -> Iterator[Described]:

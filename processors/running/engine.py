@@ -72,6 +72,11 @@ class Engine:
         return tuple(name for name, machine in self._machines.items() if machine.is_online)
 
     @property
+    def awaited(self) -> set[NodeId]:
+        """The nodes whose births restored machines wait for."""
+        return self._roster.awaited
+
+    @property
     def units(self) -> tuple[str, ...]:
         """The machines, or the cells, that have a state to be kept."""
         return tuple(dict.fromkeys(machine.unit.name for machine in self._machines.values() if machine.is_online))
@@ -107,8 +112,7 @@ class Engine:
             else:
                 actions, fates = self._death(machine, event)
             self.ledger.count(fates)
-        if machine is None:
-            machine = self._machines.get(device)
+        machine = machine or self._machines.get(device)
         if machine is not None:
             self._changed[machine.unit.name] = None
             self._silences.watch(machine)
@@ -364,12 +368,10 @@ class Engine:
         if not machine.is_online and self._inputs is not None:  # another processor is quicker than the edge
             machine.live.note(taken)
             return [], FOLDED
-        declared: list[Action] = []
-        if not was_online and self._processor.outputs:
-            declared.append(machine.declared(event.timestamp_ms))
+        declared = [machine.declared(event.timestamp_ms)] if not was_online and self._processor.outputs else []
         offered = taken if is_of_twin else event.readings
         actions, fates = machine.live.birth(offered, taken, wall_s, is_of_twin=is_of_twin)
-        return declared + actions, fates
+        return [*declared, *actions], fates
 
     def _death(self, machine: Machine | None, event: HostEvent) -> Folded:
         if machine is None or event.node not in machine.online:

@@ -12,6 +12,7 @@ from processors.running.lane import Lane
 from processors.running.ledger import DropReason, Ledger
 from processors.running.picks import Picks
 from processors.running.unit import Machine, Unit
+from sparkplug.metric import NodeId
 
 
 class Roster:
@@ -81,6 +82,12 @@ class Roster:
             return []
         at_ms, challenger = machine.live.clock_ms or 0, unit.live.challenger
         return [machine.declared(at_ms), *(() if challenger is None else challenger.begin(machine.name, at_ms))]
+
+    @property
+    def awaited(self) -> set[NodeId]:
+        """The nodes whose signals restored machines have, of machines that were not born again yet."""
+        restored = (machine for machine in self.machines.values() if machine.live.is_restored)
+        return {node for machine in restored for node in machine.owner.values()}
 
     def fold(self, name: str, *, is_history: bool) -> Fold:
         """Return a fold with the state from which it starts."""

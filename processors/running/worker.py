@@ -107,8 +107,10 @@ class Worker:
             _log.info("%s: restored %s", self.name, unit)
 
     def begin(self, now_s: float) -> None:
-        """All snapshots have come."""
+        """All snapshots have come: whoever told what was known is asked for its births, also a machine that stands still."""
         self._unborn_until_s = now_s + UNBORN_S_MAX
+        for node in self.engine.awaited:
+            self._host.want_birth(node)
         self._reconnects = self._host.reconnects
 
     def turn(self, now_s: float) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from random import Random
 
 import pytest
 
@@ -15,6 +16,7 @@ from sparkplug.edge_node import EdgeNode
 from sparkplug.edge_session import EdgeNodeSession
 from sparkplug.errors import TopicError
 from sparkplug.host import EventKind, HostApplication, HostEvent
+from sparkplug.host_session import HostSession
 from sparkplug.metric import Change, MetricSpec, NodeId
 from sparkplug.transport.loop import Loop
 from tests.wire.mosquitto import Mosquitto
@@ -43,6 +45,20 @@ def values_of(events: list[HostEvent]) -> list[object]:
 
 def unconnected(**options: object) -> HostApplication:
     return HostApplication(BrokerAddress(), "test", **options)  # type: ignore[arg-type]
+
+
+def test_a_node_that_was_known_before_the_start_is_asked_once_unless_it_is_online() -> None:
+    session = HostSession("test", chance=Random(0))
+    session.connected(0)
+    for message in life(NODE, 0):
+        session.message(message.topic, message.payload, 1)
+    session.actions.clear()
+    session.want_birth(NODE, 2)
+    session.want_birth(OTHER, 2)
+    session.want_birth(OTHER, 3)
+    for now_ms in range(2, 1000):
+        session.tick(now_ms)
+    assert [action.topic for action in session.actions if isinstance(action, Publish)] == ["spBv1.0/cnc/NCMD/edge-okuma"]
 
 
 @pytest.mark.parametrize(

@@ -86,6 +86,7 @@ class Parameter:
     null: the value at which the effect is not there; None = it has no say while the others are null (a phase, a time constant)
     low, high: bounds of what a machine can have; the null value may be one of them
     typical: a size that a machine tool shows, to start a search from
+    known_max: the largest size that machines are known to have; of a larger one, another effect that shows the same is likelier
     """
 
     name: str
@@ -95,6 +96,7 @@ class Parameter:
     high: float
     typical: float
     meaning: str
+    known_max: float = math.inf
 
     def __post_init__(self) -> None:
         if not self.low <= self.typical <= self.high:
@@ -175,6 +177,10 @@ class Effect:
     def is_usual_on(self, on: str) -> bool:
         """Return True where a machine usually has it on `on`."""
         return not self.usual_on or on in self.usual_on
+
+    def is_known_of(self, values: Mapping[str, float]) -> bool:
+        """Return True where machines are known to have parameters of these sizes."""
+        return all(abs(values[p.name]) <= p.known_max for p in self.parameters)
 
     def is_null(self, values: Mapping[str, float]) -> bool:
         """Return True where these parameters make it nothing."""

@@ -21,14 +21,15 @@ def first_guesses(recorded: Recorded) -> Guesses:
     return tuple({"delay_s": min(periods * recorded.period_s, LONGEST_S)} for periods in (0.5, 2.0, 8.0, 30.0))
 
 
-LONGEST_S = 300.0
+LONGEST_S, POLLED_S = 300.0, 10.0
+"""The longest delay that is looked for, and the longest in which a gateway asks each of its devices once."""
 
 EFFECT = Effect(
     name="sensor_delay",
     says="{on} is read late",
     site=Site.SENSOR,
     on=On.SIGNAL,
-    parameters=(Parameter("delay_s", "s", 0.0, 0.0, LONGEST_S, 0.002, "age of the value that is read"),),
+    parameters=(Parameter("delay_s", "s", 0.0, 0.0, LONGEST_S, 0.002, "age of the value that is read", POLLED_S),),
     changes={"age_s": age_s},
     shows_in=("{s}",),
     first_guesses=first_guesses,

@@ -37,6 +37,7 @@ class Minimum:
     """The end of a descent. here: (n,) residuals there; evaluations: candidates.
 
     Most minima are only compared by what they leave, so slopes there are worked out where somebody asks how sure θ is.
+    told: residuals that say so, where those that were minimised stand still within the steps of a reading
     """
 
     theta: Floats
@@ -47,6 +48,7 @@ class Minimum:
     bounds: Bounds
     blocks: NDArray[np.intp]
     slope_step: float
+    told: Residuals | None = None
 
     @property
     def covariance(self) -> Floats:
@@ -60,11 +62,13 @@ class Minimum:
 
     @cached_property
     def _sure(self) -> tuple[Floats, Floats]:
-        slopes = _slopes(self.residuals, self.theta, self.here, self.bounds, self.slope_step)
-        weight = (1.0 + (self.here / OUTLIER) ** 2) ** -0.25
+        told = self.told or self.residuals
+        here = self.here if self.told is None else told(self.theta[None, :])[0]
+        slopes = _slopes(told, self.theta, here, self.bounds, self.slope_step)
+        weight = (1.0 + (here / OUTLIER) ** 2) ** -0.25
         prior = np.diag(1.0 / self.bounds.sigma**2)
         weighted = slopes * weight[:, None]
-        covariance = clustered_covariance(weighted, self.here * weight, self.blocks, prior)
+        covariance = clustered_covariance(weighted, here * weight, self.blocks, prior)
         information = weighted.T @ weighted + prior
         variance = np.diag(np.linalg.pinv(information, hermitian=True))
         return covariance, 1.0 - np.clip(variance / self.bounds.sigma**2, 0.0, 1.0)

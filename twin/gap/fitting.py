@@ -1,5 +1,6 @@
 """Fits a hypothesis to the runs that may be learned from, and keeps what it leaves on those it is judged on."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -8,7 +9,7 @@ from numpy.typing import NDArray
 
 from twin.gap.descent import STEP, Bounds, Minimum, descend
 from twin.gap.diagnosis import Effected
-from twin.gap.stages.stage import Model, Observed, Stage
+from twin.gap.stages.stage import Model, Observed, Stage, Stepped
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -147,13 +148,18 @@ def fitted(
     sampled = [_sampled(stage.observed[i]) for i in runs]
     averaged = stage.averaged
 
-    def residuals(theta: Floats) -> Floats:
+    def apart(shown: Callable[[Model, Floats, int], Floats], theta: Floats, unsure: Sequence[float]) -> Floats:
         parts = []
-        for i, widened, there in zip(runs, scales, sampled, strict=True):
+        for i, widened, there, more in zip(runs, scales, sampled, unsure, strict=True):
             observed = stage.observed[i]
-            away = (stage.predict(model, theta, i)[:, there] - observed.measured[there]) / (observed.sigma * widened)[there]
-            parts.append(_averaged(np.nan_to_num(away), averaged))
+            sigma = (np.hypot(observed.sigma, more) * widened)[there]
+            parts.append(
+                _averaged(np.nan_to_num((shown(model, theta, i)[:, there] - observed.measured[there]) / sigma), averaged)
+            )
         return np.concatenate(parts, axis=1)
+
+    def residuals(theta: Floats) -> Floats:
+        return apart(stage.predict, theta, [0.0] * len(runs))
 
     free = model.free
     bounds = Bounds(*(np.array([getattr(p, key) for p in free]) for key in ("sigma", "low", "high")))
@@ -170,6 +176,9 @@ def fitted(
         tolerance=tolerance,
         slope_step=max((stage.observed[i].slope_step for i in runs), default=STEP),
     )
+    if isinstance(stage, Stepped) and any(steps := [stage.step_of(i) / np.sqrt(12.0) for i in runs]):
+        unrounded = stage.unrounded
+        found = replace(found, told=lambda theta: apart(unrounded, theta, steps))
     return Fitted(
         model,
         found.theta,

@@ -29,7 +29,7 @@ def parameter_intervals(found: Fitted, input_errors: Mapping[str, float] = Mappi
     """
     intervals: Intervals = {}
     free = found.model.free
-    deviation = np.hypot(WIDER * np.sqrt(np.maximum(np.diag(found.covariance), 0.0)), FORM * _size(found))
+    deviation = np.sqrt(np.diag(uncertainty_of(found)))
     for effected, place in found.model.places():
         effect = effect_named(effected.effect)
         parameters = effect.parameters
@@ -43,6 +43,13 @@ def parameter_intervals(found: Fitted, input_errors: Mapping[str, float] = Mappi
                 low, high = (value + sign * float(np.hypot(end - value, also * value)) for sign, end in ((-1, low), (1, high)))
             intervals[effected][p.name] = Interval(value, low, high, p.unit)
     return intervals
+
+
+def uncertainty_of(found: Fitted) -> Floats:
+    """Return the covariance of θ that intervals come from, (p, p): that of the fit, wider, and what an equation is off by."""
+    covariance = WIDER**2 * found.covariance
+    covariance[np.diag_indices_from(covariance)] = np.maximum(np.diag(covariance), 0.0) + (FORM * _size(found)) ** 2
+    return np.asarray(covariance)
 
 
 def _size(found: Fitted) -> Floats:

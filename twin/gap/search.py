@@ -271,12 +271,14 @@ def _within_chance(one: Fitted, best: Fitted) -> bool:
     return float(one.left.squares.sum() - best.left.squares.sum()) < CHANCE
 
 
-def _plainness(tried: Tried) -> tuple[bool, int, bool, float]:
-    """The machine's own before its sensors, and what a loop acts on last: a drive does not misread its own command."""
+def _plainness(tried: Tried) -> tuple[bool, bool, int, bool, float]:
+    """The machine's own before its sensors, and last what no machine is known to have so large, or what a loop acts on: a drive
+    does not misread its own command."""
     effect, on = effect_named(tried.effected.effect), tried.effected.on
+    unheard_of = tried.found is not None and not effect.is_known_of(tried.found.values[tried.effected])
     in_the_loop = effect.on is On.SIGNAL and on.endswith(("_pos_mm", "_torque_a"))
     unlikely = effect.is_of_measurement or not effect.is_usual_on(on)
-    return (in_the_loop, len(effect.parameters), unlikely, -(tried.over.gain if tried.over else 0.0))
+    return (in_the_loop, unheard_of, len(effect.parameters), unlikely, -(tried.over.gain if tried.over else 0.0))
 
 
 def _pair(stage: Stage, parent: Fitted, tried: tuple[Tried, ...], null: Null) -> Fitted | None:

@@ -1,12 +1,14 @@
 """The verdict: what may be said of what was found.
 
-Beside a remainder only those effects are causes that are certain (`twin.gap.naming.certain`). A stage whose constants had to move
+An effect that may as well not be there is no cause (`twin.gap.naming.there`), and beside a remainder only those are that are
+certain (`twin.gap.naming.certain`). A stage whose constants had to move
 by more than two stated deviations is explained by them, and not healthy.
 """
 
 from dataclasses import dataclass
 
 from twin.gap.diagnosis import Effected, Verdict
+from twin.gap.naming.there import only_there
 from twin.gap.search import Explained, leaves_a_gap
 
 
@@ -20,7 +22,8 @@ class Judged:
 
 
 def judged(explained: Explained) -> Judged:
-    """The verdict on one stage."""
+    """The verdict on one stage, with those of its effects that are there for sure."""
+    explained = only_there(explained)
     likeness = explained.alike
     if explained.stops or leaves_a_gap(explained.stage, explained.best):
         return Judged(explained, Verdict.PARTLY if explained.best.effects else Verdict.UNKNOWN, likeness)

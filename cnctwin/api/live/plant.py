@@ -52,6 +52,7 @@ class LivePlant:
     def __init__(self) -> None:
         self.counts: Counter[str] = Counter()
         self.refused = ""  # what was kept out last, in words
+        self.description_faults: tuple[tuple[str, str], ...] = ()  # machine and fault
         self._lock = threading.Lock()
         self._machines: dict[str, dict[NodeId, Owner]] = {}
         self._nodes: dict[NodeId, Owner] = {}
@@ -213,7 +214,8 @@ class LivePlant:
 
     def _noticed(self) -> Notices:
         own = ((node.node, owner) for node, owner in self._nodes.items() if owner.online and is_twin_node(node.node))
-        return notices_of((node, {name: one.reading.value for name, one in owner.signals.items()}) for node, owner in own)
+        metrics = ((node, {name: one.reading.value for name, one in owner.signals.items()}) for node, owner in own)
+        return notices_of(metrics, self.description_faults)
 
     def _owner(self, event: HostEvent) -> Owner | None:
         if event.device is None:

@@ -117,6 +117,7 @@ class Viewer:
     def _take_document(self, event: HostEvent) -> None:
         if event.topic.startswith(DESCRIPTION):
             self.descriptions.take(event.topic, event.payload)
+            self._live.description_faults = tuple((machine, fault.text) for machine, fault in self.descriptions.faults())
         elif event.topic != ALERT_STATE:
             self.jobs.take(event.topic, event.payload)
             self.loops.take(event.topic, event.payload)

@@ -16,7 +16,7 @@ from cnctwin.api.routes.history import MS_MAX, FromMs, ToMs
 from cnctwin.api.routes.plant import BUSY, UNKNOWN, Machine, unknown_machine
 from cnctwin.api.sources import Sources
 from cnctwin.api.value_object import plain
-from cnctwin.memory.descriptions import described
+from cnctwin.memory.descriptions import described, faults
 from cnctwin.memory.store.contract import Query as StoreQuery
 from cnctwin.memory.store.contract import Store, StoreError
 from sparkplug.clock import now_ms
@@ -52,13 +52,16 @@ def past_routes(sources: Sources) -> APIRouter:
         start_ms, end_ms = _stretch(from_ms, to_ms)
         found, source = await _samples(sources, machine, None, start_ms, end_ms)
         told = events_of(found)
+        descriptions: list[dict[str, Any]] = []
         if sources.store.configured and source == "store":
             told += await sources.store.ask(lambda store: _pins(store, machine, start_ms, end_ms))
-            told += await sources.store.ask(lambda store: _descriptions(store, machine, start_ms, end_ms))
+            descriptions = await sources.store.ask(lambda store: _descriptions(store, machine, start_ms, end_ms))
+            told += [_change(one) for one in descriptions if one["t"] >= start_ms]
+            told += await sources.store.ask(lambda store: _faults(store, machine, start_ms, end_ms))
         told.sort(key=lambda one: one["t"])
         left_out = max(len(told) - EVENTS_MAX, 0)
         head = {"machine": machine, "from": start_ms, "to": end_ms, "source": source}
-        return {**head, "left_out": left_out, "events": told[left_out:]}
+        return {**head, "left_out": left_out, "events": told[left_out:], "descriptions": descriptions}
 
     @router.get("/parts/{machine}", response_model=Parts, responses={**UNKNOWN, **BUSY})
     async def parts(
@@ -140,9 +143,19 @@ def _stored(
 
 def _descriptions(store: Store, machine: str, from_ms: int, to_ms: int) -> list[dict[str, Any]]:
     return [
-        {"t": one.received_ms, "until": None, "kind": "description", "text": description_text(one.role, one.message)}
+        {"t": one.received_ms, "role": str(one.role), "version": one.version, "text": description_text(one.role, one.message)}
         for one in described(store, machine, from_ms, to_ms)
-        if one.received_ms >= from_ms
+    ]
+
+
+def _change(one: dict[str, Any]) -> dict[str, Any]:
+    return {"t": one["t"], "until": None, "kind": "description", "text": one["text"]}
+
+
+def _faults(store: Store, machine: str, from_ms: int, to_ms: int) -> list[dict[str, Any]]:
+    return [
+        {"t": max(one.from_ms, from_ms), "until": one.until_ms, "kind": "description_fault", "text": one.text}
+        for one in faults(store, machine, from_ms, to_ms)
     ]
 
 

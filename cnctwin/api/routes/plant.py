@@ -43,7 +43,8 @@ def plant_routes(live: LivePlant, fan_out: FanOut) -> APIRouter:
         Of a machine: `state` (as /state), then `rows`: `{"now", "rows": [[t, signal, value, quality, reason]], "online"}`, and
         `state` again where signals or the connection have changed. Without a machine: `fleet`, then `fleet_rows`:
         `{"now", "rows": [[machine, t, signal, value, quality]]}`. On both: `alerts`, as /alerts, and `processors`:
-        `{"now", "behind", "refused"}`, on change: the sentences on processors that fall behind and on what is refused, or null.
+        `{"now", "behind", "refused", "described"}`, on change: the sentences on processors that fall behind, on what is refused,
+        and on descriptions that have a fault, or null.
         """
         if machine is not None:
             known_state(live, machine)

@@ -55,7 +55,7 @@ def simulate_lsv2(
         raise ApplicationError(f"port {port} cannot be used: {error.strerror}; give another with --port") from error
     try:
         shows = "which runs O1701.H" if trace is None else "which runs O1701.H and shows X, Y and Z on its oscilloscope"
-        print(f"{server.url} is a {server.answers.model}, {shows}; Ctrl-C ends it", flush=True)
+        print(f"{server.url} stands in for a control {server.answers.model}, {shows}; Ctrl-C ends it", flush=True)
         while not stop.wait(STATE_S):
             keep(state_file, _state(server))
         keep(state_file, _state(server))
@@ -73,6 +73,7 @@ def _trace(model: str, effect: str | None, on: str, machine_out: Path | None) ->
     servo_axes = importlib.import_module("cnctwin.standins.lsv2_server.servo_axes")  # with numba, which other controls don't need
     if machine_out is not None:
         write(lambda: machine_out.write_text(servo_axes.told_machine(), encoding="utf-8"), machine_out)
+    print("the servo axes go through their program; this takes some seconds", flush=True)
     try:
         hidden = None if effect is None else servo_axes.hidden_effect(effect, on)
         trace: ServoTrace = servo_axes.servo_trace(hidden)

@@ -1,6 +1,7 @@
 """The servo axes behind the oscilloscope: the twin's own loops on the simulated machine as it is built, at 0.6 ms.
 
-They go several times through an air program that begins where it ends, and that is shown again and again.
+They go several times through an air program that begins where it ends, and that is shown again and again. It is one run without
+its first pass, so an axis that rests at the end of a pass begins the next one, and the first one shown, as it stopped.
 """
 
 from importlib.resources import files
@@ -17,8 +18,10 @@ from twin.machine import AddedEffect
 from twin.simulator.simulation import simulate
 
 SEED = 530
-PASSES = 4
-"""Each with noise of its own, so that two recordings of one motion are not the same to the last digit."""
+PASSES = 8
+"""Those that are shown, each with noise of its own, so that two recordings of one motion are not the same to the last digit."""
+AROUND = ("%", "M30")
+"""Lines around a program that stay out where it goes on."""
 
 
 def told_machine() -> str:
@@ -39,14 +42,15 @@ def servo_trace(hidden: AddedEffect | None = None, seed: int = SEED) -> ServoTra
     machine = machine_as_built(hidden)
     machine = machine.model_copy(update={"machine": machine.machine.model_copy(update={"servo_period_s": PERIOD_US / 1e6})})
     check_effects(machine)
-    program = files(__package__).joinpath("air.nc").read_text(encoding="ascii")
+    program = files(__package__).joinpath("air.nc").read_text(encoding="ascii").splitlines()
+    passes = [line for line in program if line not in AROUND] * (PASSES + 1)
+    run = simulate(machine, "\n".join(passes), seed=seed, name="air.nc").run
+    first = len(run) // (PASSES + 1)
     raw: dict[tuple[int, int], list[int]] = {}
-    for number in range(PASSES):
-        run = simulate(machine, program, seed=seed + number, name="air.nc").run
-        for axis, label in enumerate(LABELS):
-            letter = label.lower()
-            diff = run[f"{letter}_ref_mm"] - run[f"{letter}_pos_mm"]
-            for channel, shown in enumerate(CHANNELS):
-                values = diff if shown.column == "diff_mm" else run[f"{letter}_{shown.column}"]
-                raw.setdefault((axis, channel), []).extend(int(one) for one in np.round(values / shown.factor))
+    for axis, label in enumerate(LABELS):
+        letter = label.lower()
+        diff = run[f"{letter}_ref_mm"] - run[f"{letter}_pos_mm"]
+        for channel, shown in enumerate(CHANNELS):
+            values = diff if shown.column == "diff_mm" else run[f"{letter}_{shown.column}"]
+            raw[axis, channel] = [int(one) for one in np.round(values[first:] / shown.factor)]
     return ServoTrace(raw)

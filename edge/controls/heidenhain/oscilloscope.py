@@ -90,7 +90,9 @@ class Oscilloscope:
         try:
             self._client.connect()
         except OSError as error:
-            raise ScopeError(f"{self._url}: {error.strerror or error}; is the control on, and port 19000 open?") from None
+            raise ScopeError(
+                f"{self._url}: {error.strerror or error}; is the control on, and this port open (19000 where none is named)?"
+            ) from None
         except ConnectionLostError as error:
             raise ScopeError(f"{self._url}: {error}") from None
         except Exception as error:

@@ -1,5 +1,6 @@
 """A case from recordings: what their columns and names tell, what options say, and what cannot be known."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -118,3 +119,34 @@ def test_what_cannot_be_told_is_asked_for_in_one_line(tmp_path: Path) -> None:
     with pytest.raises(RunLogError, match="there is no such file"):
         compose_runs([Recording(tmp_path / "gone.parquet")], DESCRIPTION, tmp_path / "case")
     assert sorted(p.name for p in tmp_path.iterdir()) == ["nothing.parquet"]
+
+
+def strolled(folder: Path, name: str, begins: int, seed: int) -> Recording:
+    """Return a recording of one long motion that begins at another row of it, with noise of its own."""
+    ticks = np.arange(begins, begins + 2000)
+    motion = np.round(40.0 * np.sin(ticks / 300.0) * np.sin(ticks / 1700.0), 4)
+    noise = np.random.default_rng(seed).normal(0.0, 1e-4, len(ticks))
+    return air(folder, name, motion, x_pos_mm=motion + noise)
+
+
+def test_recordings_that_began_at_other_moments_of_one_motion_are_lined_up(tmp_path: Path) -> None:
+    runs = [strolled(tmp_path, name, begins, n) for n, (name, begins) in enumerate((("a", 300), ("b", 0), ("c", 500)))]
+    done = compose_runs(runs, DESCRIPTION, tmp_path / "case")
+    assert roles(done) == {"a": ("air", "fit", None), "b": ("air", "fit", "a"), "c": ("air", "check", None)}
+    a, b, c = (run.log for run in read_case(tmp_path / "case").runs)
+    assert len(a) == len(b) == 1700 and len(c) == 2000
+    assert np.array_equal(a["x_ref_mm"], b["x_ref_mm"]) and not np.array_equal(a["x_pos_mm"], b["x_pos_mm"])
+    assert any(note.startswith("a, b did not begin at the same moment: they are cut to the 1.7 s") for note in done.notes)
+    assert any(note.startswith("c is kept to judge on: another time, but no other motion") for note in done.notes)
+
+
+def test_all_that_repeat_one_recording_share_one_stretch_of_it(tmp_path: Path) -> None:
+    runs = [strolled(tmp_path, name, begins, n) for n, (name, begins) in enumerate((("a", 300), ("b", 0), ("c", 500)))]
+    compose_runs([replace(one, role="fit") for one in runs], DESCRIPTION, tmp_path / "case")
+    a, b, c = (run.log["x_ref_mm"] for run in read_case(tmp_path / "case").runs)
+    assert len(a) == 1500 and np.array_equal(a, b) and np.array_equal(a, c)
+
+
+def test_what_shares_less_than_its_half_is_no_repeat(tmp_path: Path) -> None:
+    runs = [strolled(tmp_path, "a", 0, 1), strolled(tmp_path, "b", 1500, 2)]
+    assert roles(compose_runs(runs, DESCRIPTION, tmp_path / "case"))["b"] == ("air", "check", None)

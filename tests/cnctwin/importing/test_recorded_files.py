@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -45,6 +46,59 @@ def test_a_value_that_a_sinumerik_trace_leaves_out_is_that_of_the_record_before(
     (faults,) = account.faults.values()
     assert sum(faults.values()) == 3  # no number, a repeated time, a time that goes back
     assert any("force_per_command_n" in remark for remark in account.remarks)
+
+
+THREE_AXES = (
+    ("nckServoDataCmdPos64[u1,{n}]", "{A}1: Position setpoint", "{a}_ref_mm"),
+    ("nckServoDataActPos1stEnc64[u1,{n}]", "{A}1: Position actual value encoder 1 (64 bit)", "{a}_pos_mm"),
+    ("nckServoDataActPos2ndEnc64[u1,{n}]", "{A}1: Lageistwert Messsystem 2", "{a}_table_mm"),
+    ("nckServoDataActVelMot64[u1,{n}]", "{A}1: Velocity actual value motor", ""),
+    ("nckServoDataVelCmd[u1,{n}]", "{A}1: Velocity setpoint", ""),
+)
+"""Name, description and column of the signals of an axis."""
+AS_TORQUE = ("vaTorqueAtMotor[u1,{n}]", "{A}1: torque at motor, current value", "{a}_torque_a")
+AS_CURRENT = ("nckServoDataActCurr32[u1,{n}]", "{A}1: Actual current value (torque-generating)", "{a}_torque_a")
+
+
+def trace_of(path: Path, axes: dict[str, int], signals: Sequence[tuple[str, str, str]]) -> dict[str, float]:
+    """Write a SINUMERIK trace, its columns in another order than its signals; return the first value of each known column."""
+    told = [(name, text, column, axis, n) for axis, n in axes.items() for name, text, column in signals]
+    keys = [str(100 + 7 * at) for at in range(len(told))]
+    described = [
+        f'<signal key="{key}" name="/Nck/!SD/{name.format(n=n)}" description="{text.format(A=axis.upper())}"/>'
+        for key, (name, text, _, axis, n) in zip(keys, told, strict=True)
+    ]
+    columns = "".join(f'<dataSignal key="{key}"/>' for key in reversed(keys))
+    values = [float(at + 1) for at in range(len(told))]
+    shown = " ".join(f'f{f}="{value}"' for f, value in enumerate(reversed(values), start=1))
+    rows = f'<rec time="0.000" {shown}/><rec time="0.002" f1="{values[-1] + 0.5}"/><rec time="0.004"/>'
+    frame = f"<traceData><dataFrame>{columns}{rows}</dataFrame></traceData>"
+    written(path, f"<trace><traceDisplaySetup><signals>{''.join(described)}</signals></traceDisplaySetup>{frame}</trace>")
+    return {column.format(a=axis): value for (_, _, column, axis, _), value in zip(told, values, strict=True) if column}
+
+
+@pytest.mark.parametrize(("last", "unit"), [(AS_TORQUE, "N m"), (AS_CURRENT, "A")])
+def test_a_trace_of_three_axes_gives_each_axis_its_own_columns_in_their_units(
+    last: tuple[str, str, str], unit: str, tmp_path: Path
+) -> None:
+    """The axes are numbered otherwise than x, y, z: the description says which letter a number has."""
+    expected = trace_of(tmp_path / "trace.xml", {"x": 1, "z": 2, "y": 3}, (*THREE_AXES, last))
+    run, account = imported(tmp_path, tmp_path / "trace.xml")
+    assert {column: run[column][0] for column in run.columns} == expected
+    assert len(expected) == 3 * 4 and set(account.columns) == set(expected)
+    assert {account.columns[f"{axis}_torque_a"].unit for axis in "xyz"} == {unit}
+    assert {source.unit for column, source in account.columns.items() if column.endswith("_mm")} == {"mm"}
+    assert held(run["y_torque_a"]) == [18.0, 18.5, 18.5]
+    assert len(account.left_out) == 3 * 2
+    assert any("force_per_command_n" in remark for remark in account.remarks) is (unit == "N m")
+
+
+def test_a_trace_that_tells_axes_by_number_alone_is_drafted_to_be_checked(tmp_path: Path) -> None:
+    nameless = tuple((name, text.removeprefix("{A}1: "), column) for name, text, column in (*THREE_AXES, AS_TORQUE))
+    trace_of(tmp_path / "trace.xml", {"x": 1, "y": 2}, nameless)
+    with pytest.raises(MapNeededError) as refused:
+        imported(tmp_path, tmp_path / "trace.xml")
+    assert '[columns.y_table_mm]\nfrom = "nckServoDataActPos2ndEnc64[u1,2]"' in refused.value.draft
 
 
 def test_each_group_of_twincat_channels_keeps_its_own_rate(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ that takes seconds, which would be days of production here.
 """
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -155,6 +156,17 @@ class ProductionPlant:
             process.send_signal(signal.SIGKILL)
         process.wait()
 
+    def kill_child(self, name: str) -> None:
+        """kill -9 the child of a part, once there is one."""
+        pid = self.processes[name].pid
+        until_s = time.monotonic() + PATIENCE_S
+        while not (found := _children(pid)):
+            assert time.monotonic() < until_s, f"waited for a child of {name}"
+            time.sleep(0.02)
+        for child in found:
+            with suppress(ProcessLookupError):
+                os.kill(child, signal.SIGKILL)
+
     # The machine.
 
     def work(self, machine: MachineFile, hours: float) -> None:
@@ -260,6 +272,11 @@ class ProductionPlant:
         told = {key: self.document.get(key) for key in ("step", "text", "why_not", "standing", "open")}
         logs = {name: (self.folder / f"{name}.log").read_text(errors="replace")[-600:] for name in PARTS}
         return json.dumps({"at": str(datetime.fromtimestamp(self.at_s, UTC)), **told, **logs}, indent=1)
+
+
+def _children(pid: int) -> list[int]:
+    tasks = Path(f"/proc/{pid}/task").glob("*/children")
+    return [int(child) for task in tasks for child in task.read_text().split()]
 
 
 def with_effect(name: str, on: str, **parameters: float) -> MachineFile:

@@ -1,5 +1,9 @@
-"""The process of a job that diagnoses in no time, and waits where a file says so: the job's folder has `hold` above it."""
+"""The process of a job that diagnoses in no time, and waits where a file says so: the job's folder has `hold` above it.
 
+Its process id is in `pid` beside that.
+"""
+
+import os
 import time
 from pathlib import Path
 from typing import Any
@@ -12,6 +16,7 @@ from cnctwin.jobs.work import Bench
 def diagnose(parameters: CaseParameters, bench: Bench) -> dict[str, Any]:
     """Find that the spindle's rated power is another one."""
     case, machine = bench.files.case(parameters.case, "case")
+    (bench.folder.parent / "pid").write_text(str(os.getpid()))
     bench.progress(0.5, "comparing")
     while (bench.folder.parent / "hold").exists():
         time.sleep(0.02)

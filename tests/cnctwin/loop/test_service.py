@@ -1,6 +1,8 @@
 """The loop's service on a real broker, with the real consumer of jobs: the way round, and kill -9 in every step of it."""
 
 import json
+import os
+import signal
 import time
 from collections import Counter
 from collections.abc import Iterator
@@ -132,4 +134,19 @@ def test_killed_in_every_step_it_comes_to_the_same_end_and_nothing_is_promoted_t
     kinds = Counter(str(step.step) for step in plant.own.steps())
     assert kinds == {"described": 1, "composing": 1, "diagnosing": 1, "filed": 1, "promoted": 1}
     assert (plant.own.live_version(), plant.own.challenger_version()) == (VB, "")
+    assert len([path for path in plant.jobs.iterdir() if path.name.startswith("loop-")]) == 1
+
+
+def test_the_diagnosing_child_killed_is_begun_again_and_one_challenger_comes_of_it(plant: LoopPlant) -> None:
+    hold, pid = plant.folder / HOLDS["diagnosing"], plant.jobs / "pid"
+    hold.touch()
+    plant.until_step("diagnosing")
+    first = plant.until(lambda: pid.is_file() and pid.read_text(), "the child")
+    os.kill(int(first), signal.SIGKILL)
+    plant.until(lambda: pid.read_text() not in ("", first), "the child of the next attempt")
+    hold.unlink()
+    plant.until_step("shadow")
+    kinds = Counter(str(step.step) for step in plant.own.steps())
+    assert kinds == {"described": 1, "composing": 1, "diagnosing": 1, "filed": 1}
+    assert (plant.own.live_version(), plant.own.challenger_version()) == (VA, VB)
     assert len([path for path in plant.jobs.iterdir() if path.name.startswith("loop-")]) == 1

@@ -50,6 +50,7 @@ def way_round(
         plant.look(1.0)
         noticed_h = plant.work_until(machine, lambda: plant.document.get("open"), NOTICED_HOURS)
         if noticed_h is not None:
+            in_step(plant, "watching")
             answered_h = plant.work_until(machine, lambda: plant.document.get("step") != "watching", ANSWERED_HOURS)
             before = _worst(plant)
             waited_h = plant.work_until(machine, lambda: plant.steps("promoted"), PROMOTED_HOURS)

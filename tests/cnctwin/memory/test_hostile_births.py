@@ -109,6 +109,7 @@ class Broker:
         self.take([Publish(*message) for message in messages])
         return True
 
+    def want_birth(self, _: NodeId) -> None: ...
     def send_command(self, *_: Any) -> bool:
         return True
 

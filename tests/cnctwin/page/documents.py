@@ -284,6 +284,10 @@ def tell_all(shop: Shop) -> None:
     shop.answers["/twin/replay"] = lambda _path, body: (200, _replayed(body or {}))
 
 
+CHANGED = "description 9b1c77aa2e01 live: promoted by anna: coolant cools"
+FAULTY = "machines/vmc.toml: thermal.resistance_k_per_w: should be greater than 0"
+
+
 def _tell_machine(shop: Shop, machine: str, is_first: bool, started: float) -> None:
     def events(_path: str, asked: dict[str, Any] | None) -> Answer:
         start, end = int((asked or {})["from"]), int((asked or {})["to"])
@@ -291,10 +295,17 @@ def _tell_machine(shop: Shop, machine: str, is_first: bool, started: float) -> N
         found = [
             {"t": start + 20_000, "until": None, "kind": "tool_change", "text": "T2 in the spindle"},
             {"t": middle, "until": middle + 4000, "kind": "alert", "text": "spindle overload: load 131 % for 4 s"},
+            {"t": middle + 10_000, "until": None, "kind": "description", "text": CHANGED},
+            {"t": middle + 20_000, "until": end - 30_000, "kind": "description_fault", "text": FAULTY},
             {"t": middle + 30_000, "until": middle + 39_000, "kind": "stop", "text": "feed hold, 9 s, by the operator"},
             {"t": end - 40_000, "until": None, "kind": "hole", "text": "12 messages lost between edge and broker"},
         ]
-        return 200, {"machine": machine, "from": start, "to": end, "events": found}
+        live = [(start - 60_000, "description 3f2a1bc4d5e6 live: described"), (middle + 10_000, CHANGED)]
+        descriptions = [{"t": t, "role": "live", "version": text.split()[1], "text": text} for t, text in live]
+        descriptions.append(
+            {"t": middle + 5_000, "role": "challenger", "version": "9b1c", "text": "description 9b1c challenger: filed"}
+        )
+        return 200, {"machine": machine, "from": start, "to": end, "events": found, "descriptions": descriptions}
 
     shop.answers[f"/twin/{machine}"] = lambda _path, _body: (200, {"machine": machine, "step": None, "reason": "no loop runs"})
     shop.answers[f"/gap/{machine}"] = lambda _path, _body: (200, gap(machine, diagnosis() if is_first else None))

@@ -43,6 +43,7 @@ class Shop:
         self.me: dict[str, Any] = {"user": None, "role": "administrator", "logs_out": False}
         self.broker = True
         self.behind: str | None = None
+        self.described: str | None = None
         self.posted: list[tuple[str, Any]] = []
 
     def told(self, machine: str, t_ms: int) -> tuple[dict[str, SignalValue], int]:
@@ -54,7 +55,7 @@ class Shop:
         """As the stream begins."""
         now = now_ms()
         items = [fleet_item(name, *self.told(name, now), online=name not in self.offline_since) for name in self.numbers]
-        return {"now": now, "behind": self.behind, "machines": items}
+        return {"now": now, "behind": self.behind, "described": self.described, "machines": items}
 
     def state(self, machine: str) -> dict[str, Any]:
         """All of a machine."""
@@ -65,7 +66,8 @@ class Shop:
         for name, one in told.items():
             said = value_object(one, t_ms)
             sides["twin" if name.startswith("twin/") else "measured"][name] = said if online else {**said, "quality": "stale"}
-        return {"machine": machine, "now": now, "online": online, "behind": self.behind, **sides}
+        notices = {"behind": self.behind, "described": self.described}
+        return {"machine": machine, "now": now, "online": online, **notices, **sides}
 
     def history(self, machine: str, names: list[str], start: int, end: int, every: int) -> dict[str, Any]:
         """Columns, from the same function of time as the stream."""
@@ -239,12 +241,12 @@ class _Handler(BaseHTTPRequestHandler):
         self.close_connection = True
         self._event("fleet" if machine is None else "state", shop.fleet() if machine is None else shop.state(machine))
         before: dict[tuple[str, str], SignalValue] = {}
-        offline, behind = dict(shop.offline_since), shop.behind
+        offline, notices = dict(shop.offline_since), (shop.behind, shop.described)
         while not self.stop.wait(shop.period_s):
             now = now_ms()
-            if behind != shop.behind:
-                behind = shop.behind
-                self._event("processors", {"now": now, "behind": behind})
+            if notices != (shop.behind, shop.described):
+                notices = shop.behind, shop.described
+                self._event("processors", {"now": now, "behind": shop.behind, "described": shop.described})
             if offline != shop.offline_since:
                 offline = dict(shop.offline_since)
                 self._event("fleet" if machine is None else "state", shop.fleet() if machine is None else shop.state(machine))

@@ -72,6 +72,21 @@ def test_processors_that_fall_behind_are_said_above_everything(
     visit.context.close()
 
 
+@pytest.mark.parametrize("place", ["#/fleet", "#/gap/vmc"])
+def test_a_description_that_has_a_fault_is_said_until_it_is_mended(visit: Visit, shop: Shop, place: str) -> None:
+    page = visit.open(place)
+    line = page.locator("#described")
+    expect(page.locator("#link")).to_have_text("live")
+    expect(line).to_be_hidden()
+    shop.described = "vmc: machines/vmc.toml: line 7: no value; <b>no markup</b>"
+    expect(line).to_contain_text("Not taken up.")
+    expect(line).to_contain_text("The description of vmc: machines/vmc.toml: line 7: no value; <b>no markup</b>.")
+    page.reload()
+    expect(line).to_contain_text("line 7")
+    shop.described = None
+    expect(line).to_be_hidden()
+
+
 def test_a_hole_in_the_connection_is_a_hole_in_the_line_and_is_filled_from_the_store(visit: Visit) -> None:
     visit.open("")
     script = """

@@ -6,7 +6,7 @@ import time
 from playwright.sync_api import Browser, Page, expect
 
 from tests.cnctwin.page.conftest import SIZES, WAIT_MS_MAX, Visit
-from tests.cnctwin.page.documents import alerts, job
+from tests.cnctwin.page.documents import CHANGED, FAULTY, alerts, job
 from tests.cnctwin.page.fake_server import FakeServer, Shop, now_ms
 from tests.cnctwin.page.simulated_shop import SignalValue
 
@@ -193,6 +193,19 @@ def test_an_incident_is_gone_through_with_the_slider(visit: Visit) -> None:
     expect(slider).to_have_value("1000")
     page.locator(".events button").first.click()
     expect(page.locator(".events tr.here")).to_contain_text("T2 in the spindle")
+
+
+def test_the_replay_shows_which_description_was_live_then_and_what_was_wrong_with_its_file(visit: Visit) -> None:
+    page = visit.open("#/replay/vmc")
+    then, slider = page.locator(".then"), page.get_by_label("Moment")
+    expect(page.locator(".events")).to_contain_text("description fault")
+    expect(page.locator(".events")).to_contain_text(FAULTY)
+    slider.fill("400")
+    expect(then).to_contain_text("3f2a1bc4d5e6 live: described")
+    slider.fill("1000")
+    expect(then).to_contain_text("9b1c77aa2e01 live: promoted by anna: coolant cools")
+    expect(then).not_to_contain_text("challenger")
+    expect(page.locator(".events tr", has_text=CHANGED)).to_have_count(1)
 
 
 def test_what_is_recomputed_is_said_to_be_equal_or_not(visit: Visit, shop: Shop) -> None:

@@ -23,7 +23,7 @@ from sparkplug.admission.refusal import Quarantined
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import Change, MetricSpec, NodeId
 from tests.processors.recorder import RECORDER
-from tests.processors.streams import birth, data, death, engine_of, fed
+from tests.processors.streams import EDGE, birth, data, death, engine_of, fed
 
 NOWHERE = NodeId("", "")
 
@@ -41,6 +41,7 @@ class FakeHost:
         self.thinned: dict[NodeId, int] = {}
         self.plain: list[tuple[str, bytes, bool]] = []
         self.subscriptions: list[str] = []
+        self.wanted: list[NodeId] = []
         self.born: dict[tuple[NodeId, str | None], HostEvent] = {}  # a birth of each device that is online
         self._marker = marker
         self._events: deque[HostEvent] = deque(live)
@@ -63,6 +64,9 @@ class FakeHost:
     def subscribe_plain(self, topic_filter: str) -> None:
         assert not self.started, "subscriptions come first"
         self.subscriptions.append(topic_filter)
+
+    def want_birth(self, node: NodeId) -> None:
+        self.wanted.append(node)
 
     def take_thinned(self) -> dict[NodeId, int]:
         thinned, self.thinned = self.thinned, {}
@@ -196,6 +200,15 @@ def test_the_state_is_retained_at_the_end_and_carries_over() -> None:
     second = FakeHost(retained=snapshots(first))
     other, _ = worked(THERMAL, second)
     assert other.engine._machines["okuma"].live.state == one.engine._machines["okuma"].live.state
+
+
+def test_who_told_what_a_snapshot_holds_is_asked_for_births_also_a_machine_that_stands_still() -> None:
+    before = FakeHost(birth(0.0, spindle_rpm=5000.0, spindle_load_pct=10.0))
+    worked(THERMAL, before)
+    assert before.wanted == [], "nothing was known before"
+    still = FakeHost(retained=snapshots(before))
+    worked(THERMAL, still)
+    assert still.wanted == [EDGE]
 
 
 def test_a_twin_device_is_born_with_units_and_dies_with_its_machine() -> None:

@@ -3,7 +3,8 @@
 The search fits what its signatures suggest. Where a machine goes through the same cycle again and again, constants take up much
 of what an effect does, and a signature says little. So each effect of an answer is replaced by each other candidate, fitted from
 the machine as it is stated. One that closes about as much, and leaves no more than a healthy machine's twin does, is not told
-from it. One that leaves clearly less takes its place.
+from it. One that leaves clearly less takes its place, and so does one that is not told from it where machines are not known to
+have the first as large as it would have to be.
 """
 
 from dataclasses import replace
@@ -31,21 +32,24 @@ STEPS_MAX = 12
 def with_twins(stage: Stage, found: Explained) -> Explained:
     """Return the same with all that cannot be told from each of its effects."""
     for effected in found.best.effects:
-        instead = [one for c in stage.candidates if (one := _instead(stage, found, effected, c)) is not None]
-        clearer = [f for c, f in instead if _is_clearer(f, found.best)]
-        if clearer:
-            best = settled(stage, min(clearer, key=lambda f: f.left.excess()), rounds=1)
+        instead = [one for c in stage.candidates if (one := instead_of(stage, found, effected, c)) is not None]
+        likelier = [f for c, f in instead if _is_clearer(f, found.best)]
+        if not likelier and not is_known(found.best, effected):
+            known = [f for c, f in instead if is_known(f, c) and leaves_no_more(stage, f, found)]
+            likelier = [f for f in known if not _is_clearer(found.best, f)]
+        if likelier:
+            best = settled(stage, min(likelier, key=lambda f: f.left.excess()), rounds=1)
             rivals = {e: r for e, r in found.rivals.items() if e in best.effects}
             found = replace(found, best=best, rivals=rivals, evidence=evidence_of(stage, found.base, best))
             return with_twins(stage, found)
-        twins = tuple(c for c, f in instead if _leaves_no_more(stage, f, found))
-        known = tuple(e for e in found.rivals.get(effected, ()) if e not in twins)
-        found = replace(found, rivals={**found.rivals, effected: (*known, *twins)})
+        twins = tuple(c for c, f in instead if leaves_no_more(stage, f, found))
+        before = tuple(e for e in found.rivals.get(effected, ()) if e not in twins)
+        found = replace(found, rivals={**found.rivals, effected: (*before, *twins)})
     return found
 
 
-def _instead(stage: Stage, found: Explained, effected: Effected, other: Effected) -> tuple[Effected, Fitted] | None:
-    """The answer with another effect in place of one of its own; None where that comes to nothing."""
+def instead_of(stage: Stage, found: Explained, effected: Effected, other: Effected) -> tuple[Effected, Fitted] | None:
+    """Return the answer with another effect in place of one of its own; None where that comes to nothing."""
     best = found.best
     if other in best.effects:
         return None
@@ -76,12 +80,17 @@ def _starts(stage: Stage, effected: Effected) -> list[Floats]:
     return starts
 
 
+def is_known(found: Fitted, effected: Effected) -> bool:
+    """Return True where machines are known to have an effect as large as it is in a hypothesis."""
+    return effect_named(effected.effect).is_known_of(found.values[effected])
+
+
 def _is_clearer(one: Fitted, best: Fitted) -> bool:
     over = advantage(best.left, one.left)
     return over.sigmas > BETTER_SIGMAS and over.closes > BETTER and one.left_fit.gap() <= best.left_fit.gap() + BETTER
 
 
-def _leaves_no_more(stage: Stage, one: Fitted, found: Explained) -> bool:
+def leaves_no_more(stage: Stage, one: Fitted, found: Explained) -> bool:
     """Return True where a hypothesis leaves what a healthy twin may, and closes about as much as the answer."""
     unseen, seen = one.left.rms_but_worst(CHANCE_BLOCKS), one.left_fit.rms_but_worst(CHANCE_BLOCKS)
     allowed = np.maximum(stage.healthy_rms, found.best.left.rms_but_worst(CHANCE_BLOCKS))

@@ -174,9 +174,16 @@ class AirStage:
 
     def predict(self, model: Model, theta: Floats, run: int) -> Floats:
         """The load in air at each row of θ, (lanes, readings)."""
-        data, observed = self.runs[run], self.observed[run]
-        step = coarse_step(data.log[LOAD][data.rows], observed.floor)
-        return as_read(self._read(model, theta, data), data.load, step)
+        return as_read(self.unrounded(model, theta, run), self.runs[run].load, self.step_of(run))
+
+    def unrounded(self, model: Model, theta: Floats, run: int) -> Floats:
+        """The same as it is between the steps of the meter."""
+        return self._read(model, theta, self.runs[run])
+
+    def step_of(self, run: int) -> float:
+        """Return the step in which the meter was read."""
+        data = self.runs[run]
+        return coarse_step(data.log[LOAD][data.rows], self.observed[run].floor)
 
     def shown(self, model: Model, theta: Floats, run: int) -> Floats:
         """Return what the twin shows at the rows of the run that count, (n,), NaN at all others."""

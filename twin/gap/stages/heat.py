@@ -38,6 +38,8 @@ NAMES = ("alpha_w_per_pct_rpm2", "beta_w_per_rpm", "resistance_k_per_w", CAPACIT
 TERM_FLOORS = 3.0
 LATE_PART = 2.0
 """The factor by which a spindle may be further ahead of a late sensor, or less, at the start: it has not warmed evenly."""
+BENT_PART = 2.0
+"""Standard deviations of the readings that a stretch begins with by which its start may be off a line through them."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -155,9 +157,15 @@ class HeatStage:
 
     def predict(self, model: Model, theta: Floats, run: int) -> Floats:
         """The temperature at each row of θ, (lanes, n)."""
-        data, observed = self.runs[run], self.observed[run]
-        step = coarse_step(data.log[SIGNAL], observed.floor)
-        return as_read(np.concatenate(self._read(model, theta, data), axis=1), observed.measured, step)
+        return as_read(self.unrounded(model, theta, run), self.observed[run].measured, self.step_of(run))
+
+    def unrounded(self, model: Model, theta: Floats, run: int) -> Floats:
+        """The same as it is between the steps of the reading."""
+        return np.concatenate(self._read(model, theta, self.runs[run]), axis=1)
+
+    def step_of(self, run: int) -> float:
+        """Return the step in which the temperature was read."""
+        return coarse_step(self.runs[run].log[SIGNAL], self.observed[run].floor)
 
     def shown(self, model: Model, theta: Floats, run: int) -> Floats:
         """Return what the twin shows at the rows of a run, (rows,), NaN where there is none that is compared."""
@@ -213,10 +221,14 @@ class HeatStage:
         if warmed.keeps_heat:
             cold = warmed.shown(start, cold=True)
             read = between(read, read_from(sensing, cold, part) - read, part.temperature_c, 0.0)
-        unsure = np.maximum(0.5 * step, LATE_PART * np.abs(late))
-        if unsure.any():
-            warmer = warmed.shown(start + 1.0) - whole
-            read = between(read, unsure[:, None] * from_rest(sensing, warmer, part), part.temperature_c, -1.0)
+        unsure, begins = np.maximum(0.5 * step, LATE_PART * np.abs(late)), np.isfinite(part.begun_c)
+        if unsure.any() or begins.any():
+            warmer = from_rest(sensing, warmed.shown(start + 1.0) - whole, part)
+            if begins.any():  # a line says little of a spindle that begins to turn meanwhile
+                bent_k = BENT_PART * float(np.std(part.begun_c[begins]))
+                read = between(read, bent_k * warmer, part.begun_c, -1.0)
+            if unsure.any():
+                read = between(read, unsure[:, None] * warmer, part.temperature_c, -1.0)
         return read
 
 

@@ -12,6 +12,7 @@ from twin.gap.diagnosis import Effected, Verdict
 from twin.gap.dynamometer.turn_run import TurnRun
 from twin.gap.floors import Floors, repeatability
 from twin.gap.naming.filtered import told_from_a_filter
+from twin.gap.naming.of_the_air import unless_of_the_air
 from twin.gap.naming.specific import only_specific
 from twin.gap.naming.twins import with_twins
 from twin.gap.null import NULL, Null
@@ -138,6 +139,8 @@ def _explained(stage: Stage, ground: Ground, null: Null, progress: Progress) -> 
     found = explain(stage, null=null, progress=progress)
     if isinstance(stage, AirStage) and found.best.effects and not leaves_a_gap(stage, found.base):
         return without(found)  # a few readings in whole percents always lean to one side
+    if isinstance(stage, HeatStage):
+        found = unless_of_the_air(stage, found)
     return with_twins(stage, found) if isinstance(stage, AirStage | HeatStage) else found
 
 

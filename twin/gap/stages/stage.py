@@ -6,7 +6,7 @@ the spindle's load, each axis, the spindle's heat. What is wrong in one then isn
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,6 +77,17 @@ class Stage(Protocol):
 
     def first_guesses(self, candidate: Effected) -> Guesses:
         """Sets of values to start an effect's parameters from, where the recordings suggest them."""
+
+
+@runtime_checkable
+class Stepped(Protocol):
+    """A stage whose recordings may come in steps that are coarser than their noise (`twin.gap.stages.rounded`)."""
+
+    def step_of(self, run: int) -> float:
+        """Return the step of the recording of run number `run`; 0 where it hides nothing."""
+
+    def unrounded(self, model: "Model", theta: Floats, run: int) -> Floats:
+        """Return what `predict` returns, as it is between the steps."""
 
 
 @dataclass(frozen=True, slots=True)

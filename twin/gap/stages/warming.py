@@ -34,7 +34,8 @@ HOLE_S, HOLE_PERIODS = 60.0, 10.0
 ROWS_MIN, SECONDS_MIN = 10, 30.0
 """Rows and seconds of a stretch below which it says nothing."""
 BINS_MAX = 20_000
-START_S, START_ROWS_MIN = 15.0, 5
+START_S, START_PART, START_S_MAX, START_ROWS_MIN = 15.0, 0.01, 60.0, 5
+"""The readings that a stretch begins with: those of a hundredth of it, within these bounds, if they are so many."""
 SLOPE_S, SLOPE_ROWS_MIN = 60.0, 20
 EVEN_STEP_S, EVEN_STEPS = 5.0, 240
 """The even warming that a sensor is taken to have read before a stretch."""
@@ -46,6 +47,7 @@ class Stretch:
 
     warming: what drives the heat from the beginning of each bin on; at_s, temperature_c: (n,) the readings; start_c: that at its
     beginning, rising by slope_k_per_s, in surroundings of ambient_c; since_s: (n,) from reading to reading, 0 for the first
+    begun_c: (n,) the readings that it begins with, NaN all others
     """
 
     rows: slice
@@ -56,6 +58,7 @@ class Stretch:
     since_s: Floats
     temperature_c: Floats
     start_c: float
+    begun_c: Floats
     slope_k_per_s: float
     ambient_c: float
     switches_coolant: bool
@@ -122,6 +125,7 @@ def _stretch(log: RunLog, part: slice, inputs: dict[str, Floats], bin_s: float) 
         own = {name: _means(values, number) for name, values in own.items()}
         own |= {"spindle_rpm": mean_rpm, "spindle_load_pct": heating}
     temperature = log[SIGNAL][part]
+    readings = temperature if bin_s <= 0.0 else _means(temperature, number)
     at_s = _means(t_s, number) if bin_s > 0.0 else t_s
     warming = Warming(at_s, own["spindle_load_pct"], own["spindle_rpm"], own["ambient_temp_c"], own["coolant_on"])
     return Stretch(
@@ -131,8 +135,9 @@ def _stretch(log: RunLog, part: slice, inputs: dict[str, Floats], bin_s: float) 
         warming,
         at_s,
         np.diff(at_s, prepend=at_s[0]),
-        temperature if bin_s <= 0.0 else _means(temperature, number),
+        readings,
         _start_c(t_s, temperature),
+        _begun_c(at_s, readings),
         _slope(t_s, temperature),
         float(own["ambient_temp_c"][0]),
         len(np.unique(inputs["coolant_on"][part])) > 1,
@@ -140,14 +145,19 @@ def _stretch(log: RunLog, part: slice, inputs: dict[str, Floats], bin_s: float) 
 
 
 def _start_c(t_s: Floats, temperature_c: Floats) -> float:
-    """Return the temperature at the first sample; of a short stretch by a line through more of it than of a long one."""
+    """Return the temperature at the first sample, by a line through the readings that the stretch begins with."""
+    first = np.isfinite(begun_c := _begun_c(t_s, temperature_c))
+    if not first.any():
+        return start_temperature_c(t_s, temperature_c)
+    return float(np.polyfit(t_s[first] - t_s[0], begun_c[first], 1)[1])
+
+
+def _begun_c(t_s: Floats, temperature_c: Floats) -> Floats:
+    """Return the readings that a stretch begins with, (n,), NaN after them; NaN throughout where they are too few."""
     span_s = float(t_s[-1] - t_s[0])
-    if 0.01 * span_s >= START_S or span_s < 2.0 * START_S:
-        return start_temperature_c(t_s, temperature_c)
-    first = np.isfinite(temperature_c) & (t_s <= t_s[0] + START_S)
-    if first.sum() < START_ROWS_MIN:
-        return start_temperature_c(t_s, temperature_c)
-    return float(np.polyfit(t_s[first] - t_s[0], temperature_c[first], 1)[1])
+    begins_s = min(max(START_S, START_PART * span_s), START_S_MAX) if span_s >= 2.0 * START_S else 0.0
+    first = np.where(t_s <= t_s[0] + begins_s, temperature_c, np.nan)
+    return first if np.isfinite(first).sum() >= START_ROWS_MIN else np.full(len(t_s), np.nan)
 
 
 def _slope(t_s: Floats, temperature_c: Floats) -> float:
@@ -162,7 +172,7 @@ def behind_k(sensing: Sensing, slope_k_per_s: float, lanes: int) -> Floats:
     """Return by how much the spindle is warmer than a sensor reads that is late, where it has been warming evenly, (lanes,)."""
     if not sensing.effects or slope_k_per_s == 0.0:
         return np.zeros(lanes)
-    return np.asarray(sensing.value(np.zeros(lanes)) - sensing.value(_ramp_read(sensing, slope_k_per_s, lanes)[:, -1]))
+    return np.asarray(-sensing.value(_ramp_read(sensing, slope_k_per_s, lanes)[:, -1]))
 
 
 def read_from(sensing: Sensing, values: Floats, part: Stretch) -> Floats:

@@ -35,6 +35,7 @@ const main = document.getElementById("main"),
   banner = document.getElementById("banner");
 const behindBanner = document.getElementById("behind");
 const refusedBanner = document.getElementById("refused");
+const describedBanner = document.getElementById("described");
 const whom = document.getElementById("me");
 const pill = document.getElementById("link"),
   pillWord = pill.querySelector(".word");
@@ -154,10 +155,11 @@ app.stream.addEventListener("alerts", ({ detail }) => heardAlerts(detail));
 app.stream.addEventListener("processors", ({ detail }) => heardNotices(detail));
 
 /** What stands above every view: processors that fall behind (what the twin says is late, and looks live all the same), and
- * devices of which nothing is taken. */
-function heardNotices({ behind, refused }) {
+ * devices of which nothing is taken, and descriptions that have a fault. */
+function heardNotices({ behind, refused, described }) {
   notice(behindBanner, "Late.", behind);
   notice(refusedBanner, "Refused.", refused);
+  notice(describedBanner, "Not taken up.", described && `the description of ${described}`);
 }
 
 function notice(banner, word, sentence) {

@@ -105,3 +105,23 @@ def test_part_records_of_any_shape_are_told_or_passed_over() -> None:
         parts = client.get(f"/parts/vmc?{end}")
         assert (parts.status_code, {one.get("program") for one in parts.json()["parts"]}) == (200, {"O1", None})
         assert client.get(f"/events/vmc?{end}").status_code == 200
+
+
+def test_a_fault_of_a_description_stands_above_every_view_until_it_is_mended() -> None:
+    live = LivePlant()
+    viewer = Viewer(BrokerAddress(), "cnc", live)
+    live.take([birth({"spindle_load_pct": 0.0}, now())], now())
+    said = [
+        ("cnctwin/description/vmc/fault", {"t": 1, "text": "machines/vmc.toml: line 7: no value"}, "line 7: no value"),
+        ("cnctwin/description/vmc/fault/thermal/live", {"t": 2, "text": "thermal cannot"}, "no value; vmc: thermal cannot"),
+        ("cnctwin/description/vmc/fault", b"", "vmc: thermal cannot"),
+    ]
+    with client_of(live, viewer=viewer) as client:
+        for number, (topic, document, ending) in enumerate(said):
+            viewer._take([plain(topic, document)])
+            told = [batch.payload for batch in live.flush(now() + 2000 * number)]
+            assert any(payload.startswith(b"event: processors") for payload in told)
+            assert client.get("/state/vmc").json()["described"].endswith(ending)
+        viewer._take([plain("cnctwin/description/vmc/fault/thermal/live", b"")])
+        live.flush(now() + 20_000)
+        assert client.get("/state/vmc").json()["described"] is None

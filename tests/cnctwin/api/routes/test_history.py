@@ -10,9 +10,10 @@ import pytest
 from cnctwin.api.event_list import event_signals, events_of, part_records
 from cnctwin.api.live.trace import AGE_MS_MAX, SAMPLES_MAX, Sample, Trace
 from cnctwin.api.store_reader import StoreReader
-from cnctwin.memory.store.contract import Message, Pinned
+from cnctwin.memory.store.contract import Message, Pinned, Snapshot
 from cnctwin.memory.store.opening import open_store
 from processors.alarms import alarm_signals
+from processors.description import DescriptionMessage
 from sparkplug.quality import Quality
 from tests.cnctwin.api.small_plant import Client, birth, client_of, data, death, now, small_plant
 
@@ -40,6 +41,16 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     ]
     events.sort(key=lambda event: event.timestamp_ms)
     store.append([Message(event.timestamp_ms, event) for event in events])
+    said = DescriptionMessage(version="3f2a", toml="", step="promoted", by="anna", why="it fits")
+    store.keep_snapshot(
+        Snapshot(
+            "description", "vmc/live", T0 - 60_000, said.model_copy(update={"version": "11aa", "step": "described"}).payload()
+        ),
+        Snapshot("description", "vmc/live", T0 + 200_000, said.payload()),
+        Snapshot("description", "vmc/fault", T0 + 210_000, b'{"t": 1, "text": "machines/vmc.toml: line 7: no value"}'),
+        Snapshot("description", "vmc/fault", T0 + 220_000, b'{"t": 2, "text": "machines/vmc.toml: [axes] is missing"}'),
+        Snapshot("description", "vmc/fault", T0 + 230_000, b""),
+    )
     store.pin(Pinned("vmc", T0 + 15_000, T0 + 35_000, "anomaly"))
     store.close()
     return folder
@@ -119,8 +130,26 @@ def test_events_are_what_the_signals_say(client: Client) -> None:
         ("alarm", "spindle hot", 20_000, 30_000),
         ("tool_change", "tool change", 40_000, 46_000),
         ("part", "part made: O1000", 100_000, None),
+        ("description", "description 3f2a live: promoted by anna: it fits", 200_000, None),
+        ("description_fault", "machines/vmc.toml: line 7: no value", 210_000, 220_000),
+        ("description_fault", "machines/vmc.toml: [axes] is missing", 220_000, 230_000),
         ("hole", "edge node offline", 600_000, 700_000),
         ("execution", "READY", 700_000, None),
+    ]
+
+
+def test_the_description_that_held_when_a_stretch_began_is_told_with_those_that_came_later(client: Client) -> None:
+    told = client.get(f"/events/vmc?from={T0}&to={T0 + 800_000}").json()["descriptions"]
+    assert [(one["t"] - T0, one["role"], one["version"]) for one in told] == [
+        (-60_000, "live", "11aa"),
+        (200_000, "live", "3f2a"),
+    ]
+    later = client.get(f"/events/vmc?from={T0 + 215_000}&to={T0 + 225_000}").json()
+    assert [(one["version"], one["t"] - T0) for one in later["descriptions"]] == [("3f2a", 200_000)]
+    faults = [(one["text"], one["t"] - T0, one["until"]) for one in later["events"] if one["kind"] == "description_fault"]
+    assert faults == [
+        ("machines/vmc.toml: line 7: no value", 215_000, T0 + 220_000),
+        ("machines/vmc.toml: [axes] is missing", 220_000, None),
     ]
 
 

@@ -54,6 +54,14 @@ def test_whole_percents_are_no_gap() -> None:
     assert diagnose(case_with(factor=1.08, step_pct=1.0)).diagnosis.verdict.value == "healthy"
 
 
+def test_steps_of_the_reading_do_not_hide_how_sure_a_size_is() -> None:
+    (cause,) = diagnose(case_with(factor=1.6, step_pct=1.0)).diagnosis.causes
+    (size,) = cause.parameters.values()
+    assert cause.effect in CLASS
+    assert size.low < 1.0 / 1.6 < size.high < 1.0
+    assert size.high - size.low < 0.3
+
+
 @pytest.mark.parametrize("step_pct", [0.1, 1.0])
 def test_idle_power_that_grows_with_the_speed_is_named(step_pct: float) -> None:
     told = diagnose(case_with(slope_pct=6.0, step_pct=step_pct)).diagnosis

@@ -8,21 +8,32 @@ import { duration, execution, moment } from "../text.js";
 
 const EVENTS_MAX = 500;
 const QUIET_MAX = 60;
-const KINDS = lookup({ hole: "hole", alarm: "high", alert: "high", stop: "high", pin: "event", description: "event" });
+const KINDS = lookup({
+  hole: "hole",
+  alarm: "high",
+  alert: "high",
+  stop: "high",
+  pin: "event",
+  description: "event",
+  description_fault: "high",
+});
 
 export class Happenings {
   /** seek: is called with the time of an event that was chosen */
   constructor(seek) {
     this.seek = seek;
     this.events = [];
+    this.descriptions = [];
     this.element = el("div");
   }
 
   async load(past, from, to, signal) {
     let reason = "";
+    this.descriptions = [];
     try {
       const found = await get(query(`events/${part(past.name)}`, { from, to }), { signal, limitMs: 30000 });
       this.events = (found.events ?? []).slice(-EVENTS_MAX);
+      this.descriptions = (found.descriptions ?? []).filter((one) => one.role === "live");
       if (found.left_out) reason = `The ${found.left_out} oldest are left out.`;
     } catch (error) {
       if (error.status === -1) return;
@@ -61,6 +72,12 @@ export class Happenings {
       if (one.t <= at) here = i;
     });
     this.rows?.forEach((row, i) => row.classList.toggle("here", i === here));
+  }
+
+  /** What the live description was at a moment, in words; null where it is not known. */
+  description(at) {
+    const held = this.descriptions.findLast((one) => one.t <= at);
+    return held ? String(held.text).replace(/^description /, "") : null;
   }
 
   next(at) {

@@ -1,4 +1,4 @@
-// A moment of the past: state, program, tool, gate and figures.
+// A moment of the past: state, program, tool, gate, figures, and the description that was live.
 
 import { SCORES } from "../charted.js";
 import { el, setText } from "../dom.js";
@@ -36,10 +36,12 @@ export class MomentShown {
       named("feed_mm_min", "Feed"),
       named("score", "Adjusted score"),
       named("alert", "Alert"),
+      named("description", "Description", "wide"),
     );
   }
 
-  write(past, t) {
+  /** description: the one that was live then, in words; null where it is not known */
+  write(past, t, description = null) {
     const at = (signal) => valueAt(past, signal, t),
       { parts } = this;
     const put = (key, text) => {
@@ -57,6 +59,7 @@ export class MomentShown {
     put("spindle_load_pct", unit("spindle_load_pct", "%"));
     put("feed_mm_min", unit("feed_mm_min", "mm/min"));
     put("score", at(SCORES.adjusted) === null ? null : number(at(SCORES.adjusted)));
+    put("description", description);
     put("alert", at("alarm") || (at(ALERT_STATE) ?? null));
   }
 }

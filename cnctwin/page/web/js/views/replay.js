@@ -250,7 +250,7 @@ export function open(app, { machine: named, search }) {
     if (!past) return;
     setText(clock, moment(at));
     slider.setAttribute("aria-valuetext", moment(at));
-    then.write(past, at);
+    then.write(past, at, happenings.description(at));
     panels?.pointAt(at);
     happenings.mark(at);
   }
