@@ -72,7 +72,7 @@ class Engine:
         return tuple(name for name, machine in self._machines.items() if machine.is_online)
 
     @property
-    def awaited(self) -> set[NodeId]:
+    def awaited(self) -> tuple[NodeId, ...]:
         """The nodes whose births restored machines wait for."""
         return self._roster.awaited
 

@@ -84,10 +84,10 @@ class Roster:
         return [machine.declared(at_ms), *(() if challenger is None else challenger.begin(machine.name, at_ms))]
 
     @property
-    def awaited(self) -> set[NodeId]:
+    def awaited(self) -> tuple[NodeId, ...]:
         """The nodes whose signals restored machines have, of machines that were not born again yet."""
         restored = (machine for machine in self.machines.values() if machine.live.is_restored)
-        return {node for machine in restored for node in machine.owner.values()}
+        return tuple(dict.fromkeys(node for machine in restored for node in machine.owner.values()))
 
     def fold(self, name: str, *, is_history: bool) -> Fold:
         """Return a fold with the state from which it starts."""
