@@ -52,15 +52,8 @@ def described(store: Store, machine: str, from_ms: int, to_ms: int) -> tuple[Des
 
 def faults(store: Store, machine: str, from_ms: int, to_ms: int) -> tuple[Faulty, ...]:
     """Return the faults of a machine's files that stood in a stretch, oldest first; one that began earlier with its beginning."""
-    heard: list[Snapshot] = []
-    before_ms = to_ms
-    while len(heard) < CHANGES_MAX and (snapshot := store.snapshot_before(DESCRIPTION_KIND, f"{machine}/fault", before_ms)):
-        heard.append(snapshot)
-        before_ms = snapshot.received_ms
-        if before_ms < from_ms:
-            break
     found: list[Faulty] = []
-    for one in reversed(heard):
+    for one in _snapshots(store, f"{machine}/fault", from_ms, to_ms):
         text = _fault_text(one.payload)
         if found and found[-1].until_ms is None:
             if text == found[-1].text:
@@ -81,18 +74,24 @@ def _fault_text(payload: bytes) -> str:
 
 def _heard(store: Store, machine: str, role: Role, from_ms: int, to_ms: int) -> Iterator[Described]:
     """The descriptions in a role, oldest first; one that says the same again is left out."""
-    kept: list[Described] = []
-    before_ms = to_ms
-    while len(kept) < CHANGES_MAX and (snapshot := store.snapshot_before(DESCRIPTION_KIND, f"{machine}/{role}", before_ms)):
-        kept.append(_described(machine, role, snapshot))
-        before_ms = snapshot.received_ms
-        if before_ms < from_ms:
-            break
     version = None
-    for one in reversed(kept):
+    for snapshot in _snapshots(store, f"{machine}/{role}", from_ms, to_ms):
+        one = _described(machine, role, snapshot)
         if one.version != version:
             yield one
         version = one.version
+
+
+def _snapshots(store: Store, name: str, from_ms: int, to_ms: int) -> list[Snapshot]:
+    """Return what was heard under a name in a stretch, and the last before it, oldest first."""
+    found: list[Snapshot] = []
+    before_ms = to_ms
+    while len(found) < CHANGES_MAX and (snapshot := store.snapshot_before(DESCRIPTION_KIND, name, before_ms)):
+        found.append(snapshot)
+        before_ms = snapshot.received_ms
+        if before_ms < from_ms:
+            break
+    return found[::-1]
 
 
 def _described(machine: str, role: Role, snapshot: Snapshot) -> Described:

@@ -107,7 +107,7 @@ class Worker:
             _log.info("%s: restored %s", self.name, unit)
 
     def begin(self, now_s: float) -> None:
-        """All snapshots have come: whoever told what was known is asked for its births, also a machine that stands still."""
+        """Begin once all snapshots have come, and ask whoever told what they hold for births: a machine at rest says nothing."""
         self._unborn_until_s = now_s + UNBORN_S_MAX
         for node in self.engine.awaited:
             self._host.want_birth(node)

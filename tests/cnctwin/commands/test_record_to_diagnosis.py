@@ -17,7 +17,7 @@ from twin.case import read_case
 
 PASS_S = 34.0
 BEGINS_S = {"run": 5.0, "again": PASS_S + 6.5, "other": 2 * PASS_S + 22.0}
-"""When each recording begins, in the machine's time: two at about one place of the air program, the third elsewhere in it."""
+"""The start of each recording, in the machine's time: two at about one place of the air program, the third elsewhere in it."""
 
 
 class Machine:

@@ -177,7 +177,7 @@ class AirStage:
         return as_read(self.unrounded(model, theta, run), self.runs[run].load, self.step_of(run))
 
     def unrounded(self, model: Model, theta: Floats, run: int) -> Floats:
-        """The same as it is between the steps of the meter."""
+        """Return what `predict` returns, as it is between the steps of the meter."""
         return self._read(model, theta, self.runs[run])
 
     def step_of(self, run: int) -> float:

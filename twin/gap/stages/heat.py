@@ -160,7 +160,7 @@ class HeatStage:
         return as_read(self.unrounded(model, theta, run), self.observed[run].measured, self.step_of(run))
 
     def unrounded(self, model: Model, theta: Floats, run: int) -> Floats:
-        """The same as it is between the steps of the reading."""
+        """Return what `predict` returns, as it is between the steps of the reading."""
         return np.concatenate(self._read(model, theta, self.runs[run]), axis=1)
 
     def step_of(self, run: int) -> float:

@@ -1,4 +1,4 @@
-"""What cannot be told apart stands in one class, led by what machines are known to have."""
+"""Effects that cannot be told apart share one class, led by one that machines are known to have."""
 
 from dataclasses import dataclass
 
