@@ -1,0 +1,30 @@
+"""The score of a machine beside its peers, in tails of healthy parts, and the reason of it."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from twin.anomaly.parts.model import PartsModel
+from twin.anomaly.parts.own import Own
+from twin.anomaly.parts.why import Why
+
+
+class Judged(NamedTuple):
+    """score: in tails of healthy parts, None where it is not known, for `reason`; own_score: before the peers
+    is_idle: nothing new was told at this tick (a gate, a spindle that stands), so it counts neither for nor against an alarm
+    why: what the score rests on most; None where the score is next to nothing
+    knows: what is known of the operation that runs, as "12 parts", "the twin only", "nothing: program O12 is new"
+    signature: the score's parts by signal and scale, signed
+    """
+
+    score: float | None
+    own_score: float | None
+    reason: str | None = None
+    is_idle: bool = False
+    why: Why | None = None
+    knows: str = ""
+    signature: tuple[float, ...] = ()
+
+
+def judged(model: PartsModel, own: Own, peers: Sequence[Own]) -> Judged:
+    """Judge a machine as of a tick that its peers have come to as well."""
+    return Judged(0.0, 0.0)
