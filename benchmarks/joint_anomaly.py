@@ -76,7 +76,7 @@ def stream(machines: list[str], seconds: float) -> list[HostEvent]:
 def engine(step: Step, names: list[str], cell: int, models: list[AnomalyModel]) -> Engine:
     """The processor's own fold, or another, over cells of so many machines."""
     cells = {f"c{i}": names[i : i + cell] for i in range(0, len(names), cell)}
-    table, by_name = {"cells": cells, "tick_s": TICK_MS / 1000, "threshold": 1.0}, dict(zip(names, models, strict=True))
+    table, by_name = {"cells": cells, "tick_s": TICK_MS / 1000, "threshold": 1.0, "common_mode": "source"}, dict(zip(names, models, strict=True))
     configuration = Configuration(Config, table, name="joint_anomaly", reads=lambda config: scorings(config, by_name))
     return Engine(replace(PROCESSOR, step=step), configuration, machines_max=len(names))
 

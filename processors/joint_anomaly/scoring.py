@@ -2,34 +2,54 @@
 models that it names."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from processors.config import Configuration
 from processors.joint_anomaly.config import FITTED_WITH, NUMBERS, Config
+from processors.joint_anomaly.moment import Expectation
 from twin.anomaly.alarm import AlarmRule
 from twin.anomaly.common_mode import Method
+from twin.anomaly.parts.own import Own, begun
 from twin.errors import TwinError
 
 if TYPE_CHECKING:
     from twin.anomaly.model import AnomalyModel, Calibration
+    from twin.anomaly.parts.model import PartsModel
 
 
 @dataclass(frozen=True)
 class Scoring:
-    """The model and the alarm of one machine; rule: None where it has no threshold."""
+    """The model and the alarm of one machine; rule: None where it has no threshold; expectations: of the twin, by program."""
 
     machine: str
     model: "AnomalyModel | None"
     rule: AlarmRule | None
     tick_s: float
+    expectations: Mapping[str, Expectation] = field(default_factory=dict)
 
     @cached_property
     def calibration(self) -> "Calibration | None":
         """The calibration of the model."""
         return None if self.model is None else self.model.calibration
+
+    @cached_property
+    def parts(self) -> "PartsModel | None":
+        """The usual values of the machine's parts, where its model compares parts."""
+        return None if self.model is None else self.model.parts
+
+    @cached_property
+    def parts_id(self) -> str:
+        """The first digits of the checksum of these; "" = there are none."""
+        return "" if self.model is None else self.model.parts_id
+
+    @cached_property
+    def begun(self) -> Own:
+        """The state of the machine's parts before anything was told."""
+        assert self.parts is not None
+        return begun(self.parts)
 
     @cached_property
     def calm_below(self) -> float:

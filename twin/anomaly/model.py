@@ -54,7 +54,7 @@ class AnomalyModel:
     def score_one(self, values: Sequence[float]) -> float:
         """Return how unusual one row is: 0 = at the contamination share of training, larger = worse.
 
-        Raises TwinError where it has not one finite number for each feature, or parts are compared: a row alone says nothing then.
+        Raises TwinError where it has not one finite number for each feature, or parts are compared, where a row has no score.
         """
         return self.scorer.score_one(values)
 
@@ -72,13 +72,20 @@ class AnomalyModel:
         return self.scorer.model if isinstance(self.scorer, PartsScorer) else None
 
     @property
+    def parts_id(self) -> str:
+        """The first digits of the checksum of `parts`; "" = there are none."""
+        return self.scorer.sha256[:12] if isinstance(self.scorer, PartsScorer) else ""
+
+    @property
     def in_words(self) -> str:
         """Describe the model in one line."""
         scorer = self.scorer
         if isinstance(scorer, PartsScorer):
             name = "parts beside parts"
         else:
-            name = f"isolation forest of {scorer.forest.trees} trees" if isinstance(scorer, IsolationScorer) else scorer.about.name
+            name = (
+                f"isolation forest of {scorer.forest.trees} trees" if isinstance(scorer, IsolationScorer) else scorer.about.name
+            )
         when = f", trained {self.trained.at}" if self.trained.at else ", trained"
         return f"{name} on {', '.join(self.features)}{when} on {self.trained.rows} rows"
 

@@ -6,6 +6,7 @@ It has no score of a row alone: what a tick means depends on where it is in its 
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
@@ -24,11 +25,16 @@ PARTS = "parts.json"
 NO_ROW = "parts are compared with parts, tick by tick: a row alone has no score"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class PartsScorer:
-    """model: what is usual, by operation and section"""
+    """model: the usual values by operation and section"""
 
     model: PartsModel
+
+    @cached_property
+    def sha256(self) -> str:
+        """The checksum of the file."""
+        return digest(parts_text(self.model))
 
     def score_one(self, values: Sequence[float]) -> NoReturn:
         """Raise ModelError: a row alone has no score."""
