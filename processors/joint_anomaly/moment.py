@@ -47,11 +47,8 @@ def moment_of(signals: tuple[str, ...], sample: Sample) -> Moment:
         if type(value) is not float or not -math.inf < value < math.inf:  # a float is what nearly every reading is
             value, _ = sample.number(name)
         values.append(value)
-    program = row.get(PROGRAM)
-    name = None if program is None or program[_QUALITY] is not _GOOD or program[_VALUE] in (None, "") else str(program[_VALUE])
-    return Moment(
-        tuple(values), name, _whole(row, TOOL), _whole(row, LINE), _number(row, FEED_OVERRIDE), _number(row, SPINDLE_OVERRIDE)
-    )
+    overrides = _number(row, FEED_OVERRIDE), _number(row, SPINDLE_OVERRIDE)
+    return Moment(tuple(values), _text(row, PROGRAM), _whole(row, TOOL), _whole(row, LINE), *overrides)
 
 
 def told_of(moment: Moment, expectations: Mapping[str, Expectation], tick: int, is_gated: bool) -> Told:
@@ -60,6 +57,12 @@ def told_of(moment: Moment, expectations: Mapping[str, Expectation], tick: int, 
     expectation = None if program is None else expectations.get(program)
     expected = None if expectation is None else expectation.at(line)
     return Told(tick, values, program, tool, line, feed_pct, spindle_pct, expected, is_gated)
+
+
+def _text(row: Mapping[str, Reading], name: str) -> str | None:
+    reading = row.get(name)
+    value = None if reading is None or reading[_QUALITY] is not _GOOD else reading[_VALUE]
+    return None if value is None or value == "" else str(value)
 
 
 def _number(row: Mapping[str, Reading], name: str) -> float | None:

@@ -1,7 +1,7 @@
 """The parts of one machine: its state between ticks, and what is published of it once the alarm is known.
 
 The raw score is the machine's own, before its peers. The reason that is published is the strongest since the alarm came on; it
-takes the place of the one before where it is `STRONGER` times as far from what was expected, so that it is read and not a flicker.
+replaces the one before where it is `STRONGER` times as far from what was expected, so that a person can read it.
 """
 
 from typing import TYPE_CHECKING, NamedTuple

@@ -37,9 +37,10 @@ def train_anomaly(
     common_mode: Annotated[
         str,
         typer.Option(
-            help="source: the published ratio rule; residual: spreads over the peers; features: each one beside the peers'"
+            help="parts: each cut beside earlier parts, the twin and the peers; features: each one beside the peers'; "
+            "source: the published ratio rule; residual: spreads over the peers"
         ),
-    ] = "source",
+    ] = "parts",
     common_mode_factor: Annotated[float, typer.Option(min=0.001, help="A peer with this share of a score makes it common")] = 0.5,
     exclude_gated_peers: Annotated[bool, typer.Option(help="Peers in a tool change are no peers")] = False,
     tail_s: Annotated[float, typer.Option(min=0.0, max=600.0, help="Gated after the end of a tool change")] = 8.0,

@@ -13,6 +13,7 @@ from rich.console import Console
 from cnctwin.errors import UsageError
 from cnctwin.terminal.spinner import working
 from cnctwin.training.anomaly.calibrated_cell import Calibrated, TrainingSettings, calibrated_cell
+from cnctwin.training.anomaly.calibrated_parts import calibrated_parts
 from cnctwin.training.anomaly.frozen_week import segments
 from cnctwin.training.anomaly.recorded_cell import recorded_cell, shared_features
 from cnctwin.training.anomaly.replayed_cell import replayed
@@ -40,7 +41,8 @@ def train_anomaly(arguments: Sequence[str], asked: TrainingSettings, out: Path, 
     cell = recorded_cell(arguments, asked.features, asked.tick_s)
     try:
         with working("training") as say:
-            found = calibrated_cell(cell, asked, say)
+            calibrated = calibrated_parts if asked.common_mode is Method.PARTS else calibrated_cell
+            found = calibrated(cell, asked, say)
         lines = [_kept(one, out) for one in found]
     except TwinError as error:
         raise UsageError(str(error)) from None
@@ -55,7 +57,8 @@ def train_anomaly(arguments: Sequence[str], asked: TrainingSettings, out: Path, 
 
 def configuration(asked: TrainingSettings, out: Path) -> str:
     """Return what belongs in the processor's configuration: a threshold holds for the settings that it was fitted with."""
-    lines = [f"{name} = {json.dumps(value)}" for name, value in {"models": str(out), **asked.settings}.items()]
+    expected = {"expectations": asked.expectations_from} if asked.expectations_from else {}
+    lines = [f"{name} = {json.dumps(value)}" for name, value in {"models": str(out), **expected, **asked.settings}.items()]
     return "\n".join(["[joint_anomaly]", *lines])
 
 
@@ -116,6 +119,7 @@ def _kept(one: Calibrated, out: Path) -> dict[str, Any]:
         "gated_share": one.gated_share,
         "alerts": one.alerts,
         "drift_hours": len(found.hourly_means),
+        "missing": list(one.missing),
     }
 
 
@@ -139,6 +143,8 @@ def _sentences(line: dict[str, Any]) -> list[str]:
     ]
     if not line["has_tool_changes"]:
         told.append("  nothing tells of tool changes (no tool_change_active): none of its scores is gated")
+    if line["missing"]:
+        told.append(f"  the recordings tell no {', '.join(line['missing'])}: a part is known as far as the others go")
     if line["not_promoted"]:
         told.append(
             f"  NOT promoted: on the golden week of {line['before']}: {line['not_promoted']}; cnctwin train promote does it"

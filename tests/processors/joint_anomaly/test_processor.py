@@ -12,7 +12,8 @@ from processors.config import Configuration
 from processors.errors import ConfigurationError
 from processors.joint_anomaly.config import Config
 from processors.joint_anomaly.member import ADJUSTED, ALARM, COMMON, GATE, GATE_SOURCE, NO_MODEL, PEERS
-from processors.joint_anomaly.processor import PROCESSOR, RAW
+from processors.joint_anomaly.parts_member import RAW
+from processors.joint_anomaly.processor import PROCESSOR
 from processors.joint_anomaly.scoring import scorings
 from processors.running.engine import Engine
 from sparkplug.host_session import EventKind, HostEvent
