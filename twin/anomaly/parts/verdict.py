@@ -48,6 +48,9 @@ TEXT_MAX = 200
 MESSAGE_CHARACTERS_MAX = 4096
 
 
+LINE = r"^[^\x00-\x1f\x7f]*$"
+
+
 class Verdict(BaseModel):
     """A message on `cnctwin/verdict/<machine>`.
 
@@ -61,11 +64,11 @@ class Verdict(BaseModel):
     version: Literal[1] = 1
     alarm_at_s: float = Field(ge=0.0, le=1e11)
     verdict: Literal["true", "false", "known"]
-    label: Annotated[str, Field(max_length=60)] = ""
-    by: Annotated[str, Field(min_length=1, max_length=100)]
+    label: Annotated[str, Field(max_length=60, pattern=LINE)] = ""
+    by: Annotated[str, Field(min_length=1, max_length=100, pattern=LINE)]
     at_s: float = Field(ge=0.0, le=1e11)
     ends: bool = False
-    id: Annotated[str, Field(max_length=64)] = ""
+    id: Annotated[str, Field(max_length=64, pattern=LINE)] = ""
 
 
 def verdict_of(text: str) -> Verdict:
@@ -77,7 +80,7 @@ def verdict_of(text: str) -> Verdict:
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"])) or "the message"
-        given = repr(first["input"])[:40]
+        given = "missing" if first["type"] == "missing" else repr(first["input"])[:40]
         raise ValueError(f"{where}: {first['msg']}, but it is {given}; docs/anomaly.md shows a verdict") from None
 
 

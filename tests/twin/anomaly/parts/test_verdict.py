@@ -127,6 +127,8 @@ BAD = {
     "no JSON": ("{", "the message"),
     "another word": (GOOD.replace('"true"', '"maybe"'), "verdict"),
     "nobody": (GOOD.replace('"ada"', '""'), "by"),
+    "a name of two lines": (GOOD.replace('"ada"', '"a\\nb"'), "by"),
+    "no time": (GOOD.replace('"alarm_at_s":1000.0,', ""), "alarm_at_s"),
     "a time that is none": (GOOD.replace("1000.0", "NaN"), "alarm_at_s"),
     "a field too many": (GOOD.replace('"by"', '"colour":1,"by"'), "colour"),
     "a later version": (GOOD.replace('"version":1', '"version":2'), "version"),
