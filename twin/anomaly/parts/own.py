@@ -2,19 +2,23 @@
 
 from typing import NamedTuple
 
+from twin.anomaly.parts.episodes import Memory
 from twin.anomaly.parts.model import PartsModel
 
 NEVER = -(10**12)
 
 
 class Own(NamedTuple):
-    """tick: the last one told; program, tool, line: as last told; part: how many parts of the program have begun"""
+    """tick: the last one told; program, tool, line: as last told; part: how many parts of the program have begun
+    memory: the alarms that are remembered, and what people have said of them
+    """
 
     tick: int = NEVER
     program: str | None = None
     tool: int | None = None
     line: int | None = None
     part: int = 0
+    memory: Memory = Memory()
 
 
 def begun(model: PartsModel) -> Own:

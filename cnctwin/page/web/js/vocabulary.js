@@ -28,6 +28,7 @@ export const GATED_SHARE_PCT = "twin/gated_share_pct";
 export const SCORE_DRIFT = "twin/score_drift";
 export const ANOMALY_WHY = "twin/anomaly_why";
 export const ANOMALY_KNOWS = "twin/anomaly_knows";
+export const ANOMALY_VERDICTS = "twin/anomaly_verdicts";
 export const CUT_RECORD = "twin/cut_record";
 export const GAP_PREFIX = "twin/gap_";
 export const GAP_GROWING = "twin/gap_growing";
