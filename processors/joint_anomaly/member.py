@@ -129,8 +129,10 @@ def after(scoring: Scoring, member: Member, adjustment: Adjustment, outputs: lis
     raw = scored.raw
     if adjustment.parts is not None:
         raw = adjustment.parts[1].own_score
-        parts, said = learnt(scoring, parts, adjustment.parts, alarm.is_on, at_s)
+        parts, is_published, said = learnt(scoring, parts, adjustment.parts, alarm.is_on, at_s)
         outputs += said
+        if scoring.rule is not None:
+            is_on, why = (is_published, "") if is_published or unknown is None else (None, unknown)
     share_pct = min(round(200.0 * gated_s / total_s) / 2.0, 100.0)
     now = Published(label, adjustment.is_common, unknown, adjustment.peer, adjustment.peers, is_on, why, share_pct)
     if now != told:

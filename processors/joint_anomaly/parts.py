@@ -40,8 +40,11 @@ def _adjustment(scoring: Scoring, frame: Frame, owns: Mapping[str, Own]) -> Adju
     own, (scored, label) = owns.get(name), frame[name]
     if own is None or scoring.parts is None:
         return Adjustment(None, False, NO_PEER, 0, why=scored.reason or NO_PARTS)
-    peers = [other for peer, other in owns.items() if peer != name]
-    found = judged(scoring.parts, own, peers)
+    peers = {peer: other for peer, other in owns.items() if peer != name}
+    found = judged(scoring.parts, own, tuple(peers.values()))
+    if found.why is not None and found.why.peers:
+        names = tuple(peers)
+        found = found._replace(why=found.why._replace(peers=tuple(names[int(place)] for place in found.why.peers)))
     threshold = None if scoring.rule is None else scoring.rule.threshold
     score, alone = found.score, found.own_score
     is_common = threshold is not None and score is not None and alone is not None and score < threshold <= alone

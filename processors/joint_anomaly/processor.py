@@ -44,17 +44,20 @@ from processors.joint_anomaly.member import (
 )
 from processors.joint_anomaly.moment import MOMENT_INPUTS, moment_of
 from processors.joint_anomaly.parts import NO_PARTS, adjusted_by_parts
-from processors.joint_anomaly.parts_member import CUT_RECORD, KNOWS, RAW, WHY, told_of_parts
+from processors.joint_anomaly.parts_member import CUT_RECORD, KNOWS, RAW, VERDICTS, WHY, introduced, spoken
 from processors.joint_anomaly.score_drift import DRIFT, NO_GOLDEN_WEEK
 from processors.joint_anomaly.scoring import Scoring, read_scorings, scoring_of
+from processors.plain_topic import topic_level
 from processors.tool_change_detector.context import INPUTS as CONTEXT_INPUTS
 from processors.tool_change_detector.context import tool_change_context
 from sparkplug.datatype import DataType
 from sparkplug.metric import Reading
 from sparkplug.quality import Quality
 from twin.anomaly.common_mode import Method, adjust_frame, standardised
+from twin.anomaly.parts.verdict import verdict_of
 from twin.anomaly.preparation import CONTEXT, Preparation, standardised_row
 from twin.vocabulary import twin_signals
+from twin.vocabulary.topics import VERDICT
 
 THRESHOLD, BASIS = twin_signals.ANOMALY_THRESHOLD, twin_signals.ANOMALY_BASIS
 CLOCK_OFFSET, STAMP_CLOCK = "clock_offset_s", "stamp_clock"
@@ -79,6 +82,8 @@ def step(config: Configuration[Config], state: State, sample: Sample) -> tuple[S
         return state, ()
     if sample.kind is SampleKind.TICK:
         return _ticked(config, state, sample)
+    if sample.kind is SampleKind.PLAIN:
+        return _spoken(config, state, sample)
     rule, machine, at_s = config.default.gate_rule, sample.machine, sample.at_s
     member = state.members.get(machine) or Member()
     member = member._replace(gate=followed(member.gate, rule, tool_change_context(sample.row), at_s))
@@ -123,6 +128,23 @@ def _by_name(members: dict[str, Member], online: Container[str]) -> dict[str, Me
     """Sort the members, lest their order be that of arrival; where they are too many, forget those that are offline."""
     kept = sorted(members if len(members) <= MEMBERS_MAX else [name for name in members if name in online])
     return {name: members[name] for name in kept}
+
+
+def _spoken(config: Configuration[Config], state: State, sample: Sample) -> tuple[State, Sequence[Output]]:
+    """Take a person's verdict on an alarm. Raises ValueError where it is none; one on a machine of another cell is passed by."""
+    level = sample.topic.removeprefix(VERDICT)
+    machine = next((name for name in state.members if topic_level(name) == level), "")
+    scoring = scoring_of(config, machine)
+    parts = state.members[machine].parts if machine else None
+    if parts is None or scoring.parts is None or parts.model != scoring.parts_id:
+        return state, ()
+    member = state.members[machine]
+    at_s = (member.judged + member.offset_ticks) * config.default.tick_s
+    parts, is_alarm, outputs = spoken(scoring, parts, verdict_of(sample.detail), at_s)
+    told = member.told if member.told.alarm is None else member.told._replace(alarm=is_alarm)
+    if told != member.told:
+        outputs.append(Output(ALARM, is_alarm, machine=machine, at_s=at_s))
+    return State({**state.members, machine: member._replace(parts=parts, told=told)}, state.in_step), outputs
 
 
 def _together(config: Configuration[Config], members: dict[str, Member], outputs: list[Output]) -> tuple[State, list[Output]]:
@@ -228,7 +250,7 @@ def _introduced(config: Configuration[Config], machine: str, member: Member) -> 
     """Return the outputs that explain a machine's scores, once."""
     shared, scoring = config.default, scoring_of(config, machine)
     model, rule = scoring.model, scoring.rule
-    parts = told_of_parts(scoring, member.parts, shared.common_mode is Method.PARTS, NO_MODEL)
+    parts = introduced(scoring, member.parts, shared.common_mode is Method.PARTS, NO_MODEL)
     if model is None:
         return [Output.null(THRESHOLD, NO_MODEL), Output(BASIS, NO_MODEL), *parts]
     fitted = "configured" if config.of(machine).threshold is not None else "not fitted"
@@ -274,6 +296,7 @@ def _specs() -> tuple[OutputSpec, ...]:
         OutputSpec(
             CUT_RECORD, text, None, "JSON, at the end of an operation: its load, vibration, feed over earlier parts", inferred
         ),
+        OutputSpec(VERDICTS, text, None, "JSON: the last alarms, what people have said of them, and what came of it", inferred),
         OutputSpec(THRESHOLD, number, None, "of the adjusted score", inferred),
         OutputSpec(BASIS, text, None, "what the score and its threshold rest on", inferred),
         OutputSpec(
@@ -292,5 +315,6 @@ PROCESSOR = CellProcessor(
     initial=lambda _: State(),
     step=step,
     wakes=CONTEXT_INPUTS,
+    listens=(f"{VERDICT}+",),
     reads=read_scorings,
 )

@@ -16,8 +16,8 @@ from cnctwin.training.anomaly.frozen_week import frozen_week, segments
 from cnctwin.training.anomaly.recorded_cell import TOOL_CHANGE, RecordedCell, Stretch
 from cnctwin.training.anomaly.regimes import Ticks, fitted_preparation, held_run, standardised, tailed_preparations
 from cnctwin.training.anomaly.replayed_cell import replayed
-from cnctwin.training.anomaly.track import Track
 from cnctwin.training.anomaly.time_split import split
+from cnctwin.training.anomaly.track import Track
 from processors.joint_anomaly.config import Config
 from processors.joint_anomaly.moment import Expectation
 from twin.anomaly.calibration import Calibration
