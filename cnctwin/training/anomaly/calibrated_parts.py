@@ -1,6 +1,6 @@
 """A cell's recordings become models that compare parts: learned on the first part of the time, thresholds fitted on the rest.
 
-What a part teaches depends on whether it alarmed, and so on the threshold. The rest is judged twice: with no threshold of its own,
+A part that alarms teaches nothing, so what is learned depends on the threshold. The rest is judged twice: with no threshold,
 which gives a first one, and with that; the threshold that is kept is fitted on the second.
 """
 
