@@ -102,7 +102,7 @@ class Expectation:
             own = found if along_mm is None else self._placed.get(key, found)
         stretches = own.stretches
         if not stretches:
-            return tuple.__new__(Expected, (None, None, own.feed_mm_min, own.spindle_rpm, None, own.time_s))
+            return tuple.__new__(Expected, (math.nan, math.nan, own.feed_mm_min, own.spindle_rpm, math.nan, own.time_s))
         place = 0 if len(stretches) == 1 or along_mm is None else _place(stretches, along_mm)
         forces_n = stretches[place].forces_n
         cut_pct, load_pct, force_n = self._loads(own, forces_n, feed_mm_min, rpm)
@@ -130,7 +130,7 @@ class Expectation:
             last = _place(run.stretches, to_mm)
             for stretch in run.stretches[min(_place(run.stretches, from_mm), last) : last + 1]:
                 cut_pct = self._loads(run, stretch.forces_n, feed_mm_min, rpm)[0]
-                if cut_pct is None:
+                if math.isnan(cut_pct):
                     return None
                 least, most = min(least, cut_pct), max(most, cut_pct)
         return (least, most) if runs else None
@@ -148,7 +148,7 @@ class Expectation:
 
     def _loads(
         self, run: Run, forces_n: Sequence[float], feed_mm_min: float | None, rpm: float | None
-    ) -> tuple[float | None, float | None, float]:
+    ) -> tuple[float, float, float]:
         """Return the load of the cut, the load, and the force."""
         turns = run.spindle_rpm if rpm is None else abs(rpm)
         force_n = 0.0
@@ -156,7 +156,7 @@ class Expectation:
             ratio = (1.0 if feed_mm_min is None else feed_mm_min / run.feed_mm_min) * run.spindle_rpm / turns
             force_n = force_at(forces_n, ratio)
         if self.meter is None:
-            return None, None, force_n
+            return math.nan, math.nan, force_n
         return (*self.meter.at(WATTS * force_n * run.diameter_mm * turns, turns), force_n)
 
 
