@@ -67,6 +67,7 @@ class Member(NamedTuple):
     young, ready: scores that wait for what a late label may say of them; and then for those of the peers
     judged: the last tick that was
     total_s, gated_s: of the last week, forgotten slowly
+    description: the version that is live, as far as it was needed
     """
 
     tick: int | None = None
@@ -82,6 +83,7 @@ class Member(NamedTuple):
     told: Published = Published()
     smoothed: Smoothed | None = None
     parts: PartsMember | None = None
+    description: str = ""
 
     def waiting_with(self, scored: Scored, rule: GateRule, look_back_ticks: int) -> "Member":
         """The machine with one more score. One that is older than the look-back is ready: whether it is gated stands."""
@@ -108,7 +110,7 @@ def after(scoring: Scoring, member: Member, adjustment: Adjustment, outputs: lis
 
     The dwell counts ticks in a row: one that is missing interrupts it like one that is gated.
     """
-    tick, offset_ticks, young, ready, gate, judged, alarm, total_s, gated_s, drift, told, _, parts = member
+    tick, offset_ticks, young, ready, gate, judged, alarm, total_s, gated_s, drift, told, _, parts, description = member
     scored, label = ready[0]
     name, tick_s, at_s, adjusted, is_gated = scoring.machine, scoring.tick_s, scored.at_s, adjustment.score, label.is_on is True
     unknown, is_on, why = None, None, NO_MODEL if scoring.model is None else NO_THRESHOLD
@@ -139,7 +141,7 @@ def after(scoring: Scoring, member: Member, adjustment: Adjustment, outputs: lis
         outputs += _news(name, at_s, now)
     drift, news = drifted(drift, scoring.calibration, None if is_gated else raw, at_s)
     outputs += [one._replace(machine=name) for one in news]
-    news_and_state = (drift, now, adjustment.smoothed, parts)
+    news_and_state = (drift, now, adjustment.smoothed, parts, description)
     return Member(tick, offset_ticks, young, ready[1:], gate, scored.tick, alarm, total_s, gated_s, *news_and_state)
 
 

@@ -2,24 +2,18 @@
 
 import math
 from collections.abc import Mapping
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
+from processors.joint_anomaly.expectations import Expectations, expected_at
 from processors.sample import Sample
 from sparkplug.metric import Reading
 from sparkplug.quality import Quality
-from twin.anomaly.parts.told import Expects, Told
+from twin.anomaly.parts.told import Told
 
 PROGRAM, TOOL, LINE = "program", "tool_number", "nc_line"
 FEED_OVERRIDE, SPINDLE_OVERRIDE = "feed_override_pct", "spindle_override_pct"
 MOMENT_INPUTS = frozenset({PROGRAM, TOOL, LINE, FEED_OVERRIDE, SPINDLE_OVERRIDE})
 WHOLE_MAX = 2.0**53
-
-
-class Expectation(Protocol):
-    """The twin's expectation of one program (`twin/expected/`)."""
-
-    def at(self, line: int | None) -> Expects | None:
-        """Return what it expects at a line, at programmed feed and speed."""
 
 
 _VALUE, _QUALITY = Reading._fields.index("value"), Reading._fields.index("quality")
@@ -51,11 +45,10 @@ def moment_of(signals: tuple[str, ...], sample: Sample) -> Moment:
     return Moment(tuple(values), _text(row, PROGRAM), _whole(row, TOOL), _whole(row, LINE), *overrides)
 
 
-def told_of(moment: Moment, expectations: Mapping[str, Expectation], tick: int, is_gated: bool) -> Told:
+def told_of(moment: Moment, expectations: Expectations, tick: int, is_gated: bool) -> Told:
     """Return a tick as the scores take it, with what the twin expects at its line; expectations: by program."""
     values, program, tool, line, feed_pct, spindle_pct = moment
-    expectation = None if program is None else expectations.get(program)
-    expected = None if expectation is None else expectation.at(line)
+    expected = expected_at(expectations, program, line, tool)
     return Told(tick, values, program, tool, line, feed_pct, spindle_pct, expected, is_gated)
 
 

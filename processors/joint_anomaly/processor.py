@@ -23,9 +23,11 @@ from dataclasses import dataclass, field
 from processors.config import Configuration
 from processors.contract import CellProcessor, Output, OutputSpec, Provenance, Sample, SampleKind
 from processors.joint_anomaly.config import NUMBERS, Config
+from processors.joint_anomaly.expectations import DESCRIBED_BY, live_description
 from processors.joint_anomaly.features import adjusted_by_features
 from processors.joint_anomaly.frames import Frame, InStep, Scored, frames, in_step
 from processors.joint_anomaly.gate import followed
+from processors.joint_anomaly.introduction import BASIS, THRESHOLD, basis, introduction
 from processors.joint_anomaly.member import (
     ADJUSTED,
     ALARM,
@@ -35,7 +37,6 @@ from processors.joint_anomaly.member import (
     GATED_SHARE,
     NO_MODEL,
     NO_PEER,
-    NO_THRESHOLD,
     PEER,
     PEERS,
     Adjustment,
@@ -44,8 +45,8 @@ from processors.joint_anomaly.member import (
 )
 from processors.joint_anomaly.moment import MOMENT_INPUTS, moment_of
 from processors.joint_anomaly.parts import NO_PARTS, adjusted_by_parts
-from processors.joint_anomaly.parts_member import CUT_RECORD, KNOWS, RAW, VERDICTS, WHY, introduced, spoken
-from processors.joint_anomaly.score_drift import DRIFT, NO_GOLDEN_WEEK
+from processors.joint_anomaly.parts_member import CUT_RECORD, KNOWS, RAW, VERDICTS, WHY, spoken
+from processors.joint_anomaly.score_drift import DRIFT
 from processors.joint_anomaly.scoring import Scoring, read_scorings, scoring_of
 from processors.plain_topic import topic_level
 from processors.tool_change_detector.context import INPUTS as CONTEXT_INPUTS
@@ -56,10 +57,8 @@ from sparkplug.quality import Quality
 from twin.anomaly.common_mode import Method, adjust_frame, standardised
 from twin.anomaly.parts.verdict import verdict_of
 from twin.anomaly.preparation import CONTEXT, Preparation, standardised_row
-from twin.vocabulary import twin_signals
 from twin.vocabulary.topics import VERDICT
 
-THRESHOLD, BASIS = twin_signals.ANOMALY_THRESHOLD, twin_signals.ANOMALY_BASIS
 CLOCK_OFFSET, STAMP_CLOCK = "clock_offset_s", "stamp_clock"
 BY_EDGE = "edge"  # the control gives no stamps: its samples carry the edge's time, whatever its own clock shows
 _VALUE, _QUALITY = Reading._fields.index("value"), Reading._fields.index("quality")
@@ -91,7 +90,7 @@ def step(config: Configuration[Config], state: State, sample: Sample) -> tuple[S
     if sample.kind is SampleKind.BIRTH:
         member = _placed(config.default, member, sample)
         member = member._replace(tick=_tick(config.default, member, at_s))
-        outputs = _introduced(config, machine, member)
+        outputs = introduction(config, machine, member)
     elif sample.kind is SampleKind.DEATH and machine not in sample.cell:
         member = member.offline(rule)
     elif sample.kind is SampleKind.HOLE and member.tick is not None and _tick(config.default, member, at_s) < member.tick:
@@ -114,6 +113,9 @@ def _ticked(config: Configuration[Config], state: State, sample: Sample) -> tupl
     scored = _told(scoring, sample, tick) if is_by_parts else _scored(scoring, sample, tick)
     members = {**state.members, machine: member.waiting_with(scored, shared.gate_rule, shared.look_back_ticks)}
     outputs = []
+    if scoring.expectations and is_by_parts and (description := live_description(sample.row)) != member.description:
+        members[machine] = members[machine]._replace(description=description)
+        outputs.append(basis(config, scoring, description))
     if scored.moment is None:
         outputs.append(Output.null(RAW, scored.reason or "") if scored.raw is None else Output(RAW, scored.raw))
     step_now = step_before.moved(before, tick)
@@ -246,23 +248,6 @@ def _on_the_scale(shared: Config, scoring: Scoring, raw: float | None) -> float 
     return None if calibration is None else standardised(raw, calibration.raw_center, calibration.raw_spread)
 
 
-def _introduced(config: Configuration[Config], machine: str, member: Member) -> list[Output]:
-    """Return the outputs that explain a machine's scores, once."""
-    shared, scoring = config.default, scoring_of(config, machine)
-    model, rule = scoring.model, scoring.rule
-    parts = introduced(scoring, member.parts, shared.common_mode is Method.PARTS, NO_MODEL)
-    if model is None:
-        return [Output.null(THRESHOLD, NO_MODEL), Output(BASIS, NO_MODEL), *parts]
-    fitted = "configured" if config.of(machine).threshold is not None else "not fitted"
-    if fitted == "not fitted" and model.calibration is not None:
-        fitted = model.calibration.in_words
-    common = f"common mode by {shared.common_mode.value}, factor {shared.common_mode_factor:g}"
-    basis = f"{model.in_words}; threshold {fitted}; {common}; gate tail {shared.tail_s:g} s, look-back {shared.look_back_s:g} s"
-    threshold = Output.null(THRESHOLD, NO_THRESHOLD) if rule is None else Output(THRESHOLD, rule.threshold)
-    drift = [Output.null(DRIFT, NO_GOLDEN_WEEK)] if model.calibration is None else []
-    return [threshold, Output(BASIS, basis), *drift, *parts]
-
-
 def _specs() -> tuple[OutputSpec, ...]:
     inferred, text, number = Provenance.INFERRED, DataType.STRING, DataType.DOUBLE
     return (
@@ -308,7 +293,7 @@ def _specs() -> tuple[OutputSpec, ...]:
 PROCESSOR = CellProcessor(
     name="joint_anomaly",
     version=2,
-    inputs=NUMBERS | CONTEXT_INPUTS | {CLOCK_OFFSET, STAMP_CLOCK, *CONTEXT} | MOMENT_INPUTS,
+    inputs=NUMBERS | CONTEXT_INPUTS | {CLOCK_OFFSET, STAMP_CLOCK, *CONTEXT, DESCRIBED_BY} | MOMENT_INPUTS,
     outputs=_specs(),
     config=Config,
     state=State,

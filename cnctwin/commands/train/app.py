@@ -47,6 +47,9 @@ def train_anomaly(
     look_back_s: Annotated[
         float, typer.Option(min=0.0, max=600.0, help="Gated before its begin, where the control tells late")
     ] = 0.0,
+    expectations: Annotated[
+        Path | None, typer.Option(help="Folder with what the twin expects of the programs: what `cnctwin expect --out` wrote")
+    ] = None,
     train_share: Annotated[
         float, typer.Option(min=0.05, max=0.95, help="First part of the time, trained on; the rest calibrates")
     ] = 0.5,
@@ -72,6 +75,8 @@ def train_anomaly(
         exclude_gated_peers=exclude_gated_peers,
         tail_s=tail_s,
         look_back_s=look_back_s,
+        expectations=training.expectations_in(expectations),
+        expectations_from="" if expectations is None else str(expectations),
         at=datetime.now(UTC).isoformat(timespec="seconds"),
     )
     training.train_anomaly(files, asked, out, as_json=as_json, console=Console())

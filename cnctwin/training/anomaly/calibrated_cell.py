@@ -19,7 +19,7 @@ from cnctwin.training.anomaly.replayed_cell import replayed
 from cnctwin.training.anomaly.time_split import split
 from cnctwin.training.anomaly.track import Track
 from processors.joint_anomaly.config import Config
-from processors.joint_anomaly.moment import Expectation
+from processors.joint_anomaly.expectations import Expectations
 from twin.anomaly.calibration import Calibration
 from twin.anomaly.common_mode import Method
 from twin.anomaly.detector import Detector, trained_model
@@ -41,7 +41,7 @@ MAD_TO_SD = 1.4826
 class TrainingSettings:
     """The settings of a training. Durations in s; the settings of the processor are to be the same on the day.
 
-    expectations: of the twin, by machine and program, where parts are compared; expectations_from: the folder that has them
+    expectations: of the twin, by machine, where parts are compared; expectations_from: the folder that has them
     """
 
     features: tuple[str, ...]
@@ -57,7 +57,7 @@ class TrainingSettings:
     tail_s: float = 8.0
     look_back_s: float = 0.0
     at: str = ""
-    expectations: Mapping[str, Mapping[str, Expectation]] = field(default_factory=dict)
+    expectations: Mapping[str, Expectations] = field(default_factory=dict)
     expectations_from: str = ""
 
     @property

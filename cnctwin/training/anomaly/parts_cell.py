@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from cnctwin.training.anomaly.held_rows import held_rows, held_text
 from cnctwin.training.anomaly.recorded_cell import TOOL_CHANGE, Stretch
 from cnctwin.training.anomaly.track import Track
-from processors.joint_anomaly.moment import FEED_OVERRIDE, PROGRAM, SPINDLE_OVERRIDE, TOOL, Expectation
+from processors.joint_anomaly.expectations import Expectations, expected_at
+from processors.joint_anomaly.moment import FEED_OVERRIDE, PROGRAM, SPINDLE_OVERRIDE, TOOL
 from twin.anomaly.alarm import AlarmRule
 from twin.anomaly.gate import gate
 from twin.anomaly.parts.model import PartsModel
@@ -26,20 +27,18 @@ Whole = NDArray[np.int64]
 LINE = "line"
 TELLS = (PROGRAM, TOOL, LINE)
 APART_S = 3600.0
-Expectations = Mapping[str, Mapping[str, Expectation]]
-"""By machine and program."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PartTicks:
-    """The way recordings become ticks of parts. All in s, but tick and gap; expectations: of the twin, by machine and program."""
+    """The way recordings become ticks of parts. All in s, but tick and gap; expectations: of the twin, by machine."""
 
     signals: tuple[str, ...]
     tick_ms: int
     gap_ms: int
     tail_s: float
     look_back_s: float
-    expectations: Expectations = field(default_factory=dict)
+    expectations: Mapping[str, Expectations] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,7 +109,7 @@ def _recorded(machine: str, runs: Sequence[tuple[int, _Ticks]], grid: tuple[int,
         feed_override_pct=feed_pct,
         spindle_override_pct=spindle_pct,
         gated=gated,
-        expected=_expected(own, programs, program, line) if own else None,
+        expected=_expected(own, programs, np.column_stack([program, line, tool])) if own else None,
         is_known=is_known,
         first_tick=first,
     )
@@ -120,18 +119,16 @@ def _whole(column: NDArray[np.generic]) -> Whole:
     return np.nan_to_num(np.asarray(column, dtype=np.float64), nan=-1.0).astype(np.int64)
 
 
-def _expected(own: Mapping[str, Expectation], programs: Sequence[str], program: Whole, line: Whole) -> Floats:
-    """Return (T, 6) of what the twin expects at each tick, NaN where it expects nothing; looked up once for each line."""
-    found = np.full((len(program), len(EXPECTED)), np.nan)
-    pairs, place = np.unique(np.column_stack([program, line]), axis=0, return_inverse=True)
-    rows = np.full((len(pairs), len(EXPECTED)), np.nan)
-    for row, (of, number) in zip(rows, pairs.tolist(), strict=True):
-        expectation = own.get(programs[of]) if of >= 0 else None
-        at = None if expectation is None else expectation.at(number if number >= 0 else None)
-        if at is not None:
-            row[:] = [getattr(at, name) for name in EXPECTED]
-    found[:] = rows[place.ravel()]
-    return found
+def _expected(own: Expectations, programs: Sequence[str], at: Whole) -> Floats:
+    """Return (T, 6) of what the twin expects at each tick, NaN where nothing; at: (T, 3) program, line, tool."""
+    places, which = np.unique(at, axis=0, return_inverse=True)
+    rows = np.full((len(places), len(EXPECTED)), np.nan)
+    for row, (program, line, tool) in zip(rows, places.tolist(), strict=True):
+        name = programs[program] if program >= 0 else None
+        found = expected_at(own, name, line if line >= 0 else None, tool if tool >= 0 else None)
+        if found is not None:
+            row[:] = [getattr(found, name) for name in EXPECTED]
+    return np.asarray(rows[which.ravel()])
 
 
 def tracks_of_parts(

@@ -18,6 +18,7 @@ from cnctwin.training.anomaly.frozen_week import segments
 from cnctwin.training.anomaly.recorded_cell import recorded_cell, shared_features
 from cnctwin.training.anomaly.replayed_cell import replayed
 from processors.joint_anomaly.config import FITTED_WITH
+from processors.joint_anomaly.expectations import Expectations, read_expectations
 from twin.anomaly.alarm import AlarmRule, is_alarm, onsets
 from twin.anomaly.common_mode import Method
 from twin.anomaly.detector import Detector
@@ -31,7 +32,7 @@ from twin.forest.artefact import MANIFEST
 
 FEATURES = ("spindle_load_pct", "spindle_rpm", "feed_mm_min", "spindle_temp_c", "vibration_rms_g")
 """The published ones, of which those are taken that all files have."""
-__all__ = ["Detector", "Method", "TrainingSettings", "check_models", "promote_model", "train_anomaly"]
+__all__ = ["Detector", "Method", "TrainingSettings", "check_models", "expectations_in", "promote_model", "train_anomaly"]
 
 
 def train_anomaly(arguments: Sequence[str], asked: TrainingSettings, out: Path, *, as_json: bool, console: Console) -> None:
@@ -53,6 +54,14 @@ def train_anomaly(arguments: Sequence[str], asked: TrainingSettings, out: Path, 
         for sentence in _sentences(line):
             console.print(sentence, markup=False, highlight=False, soft_wrap=True)
     console.print(f"\n{configuration(asked, out)}", markup=False, highlight=False, soft_wrap=True)
+
+
+def expectations_in(folder: Path | None) -> dict[str, Expectations]:
+    """Return what the twin expects, by machine. Raises UsageError where a file cannot be read."""
+    try:
+        return read_expectations("" if folder is None else str(folder))
+    except ValueError as error:
+        raise UsageError(f"--expectations: {error}") from None
 
 
 def configuration(asked: TrainingSettings, out: Path) -> str:
