@@ -12,7 +12,8 @@ from processors.config import Configuration
 from processors.errors import ConfigurationError
 from processors.joint_anomaly.config import Config
 from processors.joint_anomaly.member import ADJUSTED, ALARM, COMMON, GATE, GATE_SOURCE, NO_MODEL, PEERS
-from processors.joint_anomaly.processor import PROCESSOR, RAW
+from processors.joint_anomaly.parts_member import RAW
+from processors.joint_anomaly.processor import PROCESSOR
 from processors.joint_anomaly.scoring import scorings
 from processors.running.engine import Engine
 from sparkplug.host_session import EventKind, HostEvent
@@ -37,7 +38,8 @@ class PlainModel:
 
 
 def engine_with(models: Mapping[str, Any], table: dict[str, Any]) -> Engine:
-    """An engine whose machines have these models."""
+    """An engine whose machines have these models; judged by the published rule, where the table says nothing else."""
+    table = {"common_mode": "source"} | table
     configuration = Configuration(Config, table, name="joint_anomaly", reads=lambda config: scorings(config, models))
     return Engine(PROCESSOR, configuration)
 
