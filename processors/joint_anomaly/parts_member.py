@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from processors.contract import Output
 from twin.anomaly.parts import scales
-from twin.anomaly.parts.episodes import Memory, Seen, alarm_of, followed, part_ended
+from twin.anomaly.parts.episodes import Memory, Seen, alarm_of, followed, is_excused, part_ended
 from twin.anomaly.parts.feedback import told_of
 from twin.anomaly.parts.judging import Judged
 from twin.anomaly.parts.learning import learned
@@ -61,7 +61,12 @@ def learnt(scoring: "Scoring", before: PartsMember | None, found: tuple[Own, Jud
     (own, judged), name = found, scoring.machine
     before = PartsMember(own, scoring.parts_id) if before is None else before
     memory = _remembered(scoring, before, found, is_on, at_s)
-    own, record = learned(scoring.parts, own._replace(memory=memory) if memory is not own.memory else own, judged, is_on)
+    own, record = learned(
+        scoring.parts,
+        own._replace(memory=memory) if memory is not own.memory else own,
+        judged,
+        is_on and not is_excused(memory),
+    )
     raw, is_alarm = judged.own_score, alarm_of(memory)
     outputs = [Output.null(RAW, judged.reason or "", name, at_s) if raw is None else Output(RAW, raw, machine=name, at_s=at_s)]
     why, is_shown = before.why, is_on or is_alarm

@@ -31,7 +31,7 @@ class Ear:
     def publish(self, topic: str, payload: bytes, *, retain: bool = False) -> bool:
         """Take a verdict, and tell the memory after it."""
         self.sent.append((topic, payload.decode(), retain))
-        self.memory = corrected_memory(self.memory, verdict_of(payload.decode()))
+        self.memory = corrected_memory(self.memory, verdict_of(payload.decode()), 2000.0)
         self.live.take([data({"twin/anomaly_verdicts": told_of(self.memory, 3000.0)}, now(), NODE)], now())
         return True
 
