@@ -2,8 +2,8 @@
 
     residual = measured load − expected load        cut = measured load − load in air        (twin/expected, `cnctwin expect`)
 
-Between two samples a machine is somewhere in a line, so the expected cut has a least and a greatest value, over the places where it
-may be at this sample and was at the one before. What is not known is null, with the reason.
+Between two samples a machine is somewhere in a line, so the expected cut has a least and a greatest value, over the places where
+it may be at this sample and was at the one before. What is not known is null, with the reason.
 """
 
 import math
@@ -113,7 +113,7 @@ def step(given: Described, state: State, sample: Sample) -> tuple[State, Sequenc
         return _lost(state), _nulls(no_line)
     tool = _whole(sample, TOOL)[0]
     feed, rpm = _bounded(sample, FEED), _bounded(sample, SPEED)
-    place = placed(state.place, program, line, tool, sample.at_s, feed)
+    place = placed(state.place, (program, line, tool), sample.at_s, feed)
     window = window_mm(place)
     along_mm = None if window is None else 0.5 * (window[0] + window[1])
     run_feed = feed if feed is not None else _overridden(expectation, line, tool, sample)
@@ -186,12 +186,8 @@ def _compared(ratio_cut_pct_min: float, state: State, now: _Now) -> tuple[State,
         if most_shown <= 0.0 and is_steady and sample.kind is not SampleKind.BIRTH:
             air = air_after(air, load_pct - idle_pct, abs(rpm))
         cut_pct = load_pct - idle_pct - offset_at(air, abs(rpm))
-        if (
-            is_steady
-            and least_shown >= ratio_cut_pct_min
-            and most_shown <= EVEN * least_shown
-            and cut_pct >= CUTS_SHARE * least_shown
-        ):
+        is_even = ratio_cut_pct_min <= least_shown and most_shown <= EVEN * least_shown
+        if is_steady and is_even and cut_pct >= CUTS_SHARE * least_shown:
             since_s = min(max(at_s - state.bounds_s, 0.0), WITHIN_S)
             ratios = ratios_after(ratios, tool, cut_pct, math.sqrt(least_shown * most_shown), since_s)
         outputs += [
@@ -262,41 +258,26 @@ _OF_LOAD = (
 _ALL = (*_OF_LOAD, twin_signals.EXPECTED_FEED_MM_MIN, twin_signals.EXPECTED_LINE_S, twin_signals.EXPECTED_BASIS)
 
 _DOUBLE, _MODELLED, _INFERRED = DataType.DOUBLE, Provenance.MODELLED, Provenance.INFERRED
+_OUTPUTS = tuple(
+    OutputSpec(name, datatype, unit, meaning, provenance, deadband)
+    for name, datatype, unit, meaning, provenance, deadband in (
+        (twin_signals.EXPECTED_SPINDLE_LOAD_PCT, _DOUBLE, "%", "spindle load by the twin at this place", _MODELLED, 0.1),
+        (twin_signals.EXPECTED_FEED_MM_MIN, _DOUBLE, "mm/min", "mean feed of the line, with the override", _MODELLED, 1.0),
+        (twin_signals.EXPECTED_CUTTING_FORCE_N, _DOUBLE, "N", "mean tangential force by the twin", _MODELLED, 1.0),
+        (twin_signals.EXPECTED_LINE_S, _DOUBLE, "s", "time that the line takes as planned", _MODELLED, 0.001),
+        (twin_signals.EXPECTED_CUT_LEAST_PCT, _DOUBLE, "%", "least load of the cut that the twin expects now", _MODELLED, 0.1),
+        (twin_signals.EXPECTED_CUT_MOST_PCT, _DOUBLE, "%", "greatest load of the cut that the twin expects now", _MODELLED, 0.1),
+        (twin_signals.SPINDLE_CUT_LOAD_PCT, _DOUBLE, "%", "measured load without what the spindle takes in air", _INFERRED, 0.1),
+        (twin_signals.SPINDLE_LOAD_RESIDUAL_PCT, _DOUBLE, "%", "measured − expected spindle load", _INFERRED, 0.1),
+        (twin_signals.EXPECTED_RATIO, _DOUBLE, None, "measured over expected cut of this tool, of late", _INFERRED, 0.01),
+        (twin_signals.EXPECTED_BASIS, DataType.STRING, None, "what it rests on, and what is left out", _INFERRED, 0.0),
+    )
+)
 PROCESSOR = Processor(
     name="expected",
     version=1,
     inputs=frozenset({PROGRAM, LINE, TOOL, LOAD, SPEED, FEED, OVERRIDE}),
-    outputs=(
-        OutputSpec(
-            twin_signals.EXPECTED_SPINDLE_LOAD_PCT,
-            _DOUBLE,
-            "%",
-            "spindle load by the twin, at this place of the program",
-            _MODELLED,
-            0.1,
-        ),
-        OutputSpec(
-            twin_signals.EXPECTED_FEED_MM_MIN, _DOUBLE, "mm/min", "mean feed of the line, with the override", _MODELLED, 1.0
-        ),
-        OutputSpec(twin_signals.EXPECTED_CUTTING_FORCE_N, _DOUBLE, "N", "mean tangential force by the twin", _MODELLED, 1.0),
-        OutputSpec(twin_signals.EXPECTED_LINE_S, _DOUBLE, "s", "time that the line takes as planned", _MODELLED, 0.001),
-        OutputSpec(
-            twin_signals.EXPECTED_CUT_LEAST_PCT, _DOUBLE, "%", "least load of the cut that the twin expects now", _MODELLED, 0.1
-        ),
-        OutputSpec(
-            twin_signals.EXPECTED_CUT_MOST_PCT, _DOUBLE, "%", "greatest load of the cut that the twin expects now", _MODELLED, 0.1
-        ),
-        OutputSpec(
-            twin_signals.SPINDLE_CUT_LOAD_PCT, _DOUBLE, "%", "measured load without what the spindle takes in air", _INFERRED, 0.1
-        ),
-        OutputSpec(twin_signals.SPINDLE_LOAD_RESIDUAL_PCT, _DOUBLE, "%", "measured − expected spindle load", _INFERRED, 0.1),
-        OutputSpec(
-            twin_signals.EXPECTED_RATIO, _DOUBLE, None, "measured over expected cut of this tool, of late", _INFERRED, 0.01
-        ),
-        OutputSpec(
-            twin_signals.EXPECTED_BASIS, DataType.STRING, None, "what the expectation rests on, what is left out", _INFERRED
-        ),
-    ),
+    outputs=_OUTPUTS,
     config=Config,
     state=State,
     initial=lambda _: State(),

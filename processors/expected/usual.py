@@ -3,8 +3,8 @@
     cut = load − idle of the twin − offset        offset ← load − idle of the twin, in air, at about this speed
     ratio = measured over expected cut, of late, of a tool
 
-The constants of a twin are off by some percent, grease is cold in the morning and tools wear: what is usual is followed slowly, so
-that what comes at once stands out. One sample counts for no more than a factor of 1.35.
+The constants of a twin are off by some percent, grease is cold in the morning and tools wear: what is usual is followed slowly,
+so that what comes at once stands out. One sample counts for no more than a factor of 1.35.
 """
 
 import math

@@ -4,7 +4,7 @@
     over:    cut > over_expected_ratio · usual ratio · most + over_expected_margin_pct
 
 cut, least and most are those of processor `expected`: the measured load without what the spindle takes in air, and the least and
-the greatest cut that the twin expects where the machine may be. In air nothing shows whether a tool is broken, so an alarm stays then.
+the greatest cut that the twin expects where the machine may be. In air nothing shows whether a tool is broken: an alarm stays.
 """
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat

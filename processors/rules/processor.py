@@ -81,7 +81,7 @@ class Given(NamedTuple):
 class Rule:
     """One rule: it is published as `twin/rule_<name>`.
 
-    is_of_programs: it needs an NC program, which not every machine has, so `twin/rule_detail` does not name it where it can't judge
+    is_of_programs: it needs an NC program, which not every machine has: `twin/rule_detail` does not name it where it can't judge
     """
 
     name: str

@@ -123,7 +123,7 @@ class Expectation:
 
         None where no such line runs, or where its load is not known in one of its runs.
         """
-        runs = self._runs_by.get((line, tool)) or self._runs_by.get((line, None), ())
+        runs = self._runs_by.get((line, tool)) or self._runs_by.get((line, None)) or []
         least, most = math.inf, -math.inf
         for run in (self.runs[k] for k in runs):
             if not run.stretches:

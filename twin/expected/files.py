@@ -56,7 +56,7 @@ class ByProgram(Mapping[str, Expectation]):
     """
 
     def __init__(self, expectations: Iterable[Expectation]) -> None:
-        """Keep expectations by the key of their program and by its O word; a later one of a program takes the place of an earlier one."""
+        """Keep expectations by the key of their program and by its O word; a later one replaces an earlier one."""
         self._own: dict[str, Expectation] = {}
         for one in expectations:
             self._own |= {program_key(name): one for name in (one.o_word, one.program) if name}
