@@ -48,6 +48,37 @@ def driven_after(driven: Sequence[float], drivers: Sequence[float], shares: Sequ
     )
 
 
+def explained(coefficients: Sequence[float], driven: Sequence[float]) -> float:
+    """Return the part of a temperature that speed and load explain."""
+    return sum([b * h for b, h in zip(coefficients, driven, strict=True)])
+
+
+def warmed(
+    before: Heat,
+    places: tuple[int, int],
+    coefficients: Sequence[Sequence[float]],
+    values: Sequence[float | None],
+    shares: tuple[tuple[float, ...], float],
+    *,
+    is_held: bool,
+) -> Heat:
+    """Return the heat after a tick; places: of speed and load, −1 = none; shares: of a tick in each time constant, and in the base.
+
+    A base follows its temperature slowly, and not at all while the score is suspicious.
+    """
+    speed, load = (values[at] if at >= 0 else None for at in places)
+    driven = driven_after(before.driven, ((speed or 0.0) * SCALES[SPEED], (load or 0.0) * SCALES[LOAD]), shares[0])
+    base: list[float | None] = []
+    for known, own, value in zip(before.base, coefficients, values, strict=True):
+        if value is None or not own:
+            base.append(known)
+        elif known is None:
+            base.append(value - explained(own, driven))
+        else:
+            base.append(known if is_held else known + shares[1] * (value - explained(own, driven) - known))
+    return Heat(driven, tuple(base))
+
+
 def fit_heat(
     speed: "NDArray[np.float64]", load: "NDArray[np.float64]", temperature: "NDArray[np.float64]", tick_s: float
 ) -> tuple[float, ...]:

@@ -30,10 +30,17 @@ class Kind(IntEnum):
 FLOORS = {"spindle_load_pct": 2.0, "spindle_power_kw": 0.1, "spindle_current_a": 0.5, "feed_mm_min": 20.0, "spindle_rpm": 20.0}
 VIBRATION_FLOOR = 0.02
 LOAD_FLOOR = 3.0
+RPM_MAX = 60_000.0
 UNITS = {
     **{Kind.LOAD: "%", Kind.VIBRATION: "g", Kind.FEED: "mm/min", Kind.SPEED: "rpm", Kind.TEMPERATURE: "K"},
     Kind.PLAIN: None,
 }
+SPREADS = {Kind.LOAD: 0.1, Kind.VIBRATION: 0.2, Kind.FEED: 0.2, Kind.SPEED: 0.02, Kind.TEMPERATURE: 1.0, Kind.PLAIN: 1.0}
+"""Spreads of a tick before training knows better."""
+SPREAD_LEAST = {Kind.LOAD: 0.02, Kind.VIBRATION: 0.03, Kind.FEED: 0.01, Kind.SPEED: 0.003, Kind.TEMPERATURE: 0.1, Kind.PLAIN: 1e-6}
+"""Least spreads: a signal that is rounded, or that a control repeats, has none in some sections."""
+POWERS = {Kind.LOAD: 0.75, Kind.VIBRATION: 0.5}
+"""Powers of the feed override, before training knows better."""
 
 
 def kind_of(signal: str) -> Kind:

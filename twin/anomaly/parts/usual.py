@@ -114,3 +114,14 @@ def learned_section(
         variance.append(round(v + share * (min(square, limit * limit) - v), 6))
         parts.append(min(n + 1, 1000))
     return tuple(centre), tuple(variance), tuple(parts), weights(variance, parts, prior, floor)
+
+
+def froze(before: float | None, parts: int, now: float) -> float | None:
+    """Return the frozen quantity of a section: the mean of its first parts, whatever wear and material were then.
+
+    >>> froze(0.2, 1, 0.4), froze(0.2, 3, 9.0)
+    (0.3, 0.2)
+    """
+    if parts >= FROZEN_PARTS:
+        return before
+    return round(now if before is None else (before * parts + now) / (parts + 1), 4)
