@@ -26,7 +26,7 @@ USE_S_MIN = 20
 """A fault of one tool begins where that tool goes on cutting for so long."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Cell:
     """seed: of everything in it. Faults are planted from `faults_from_day` on."""
 
