@@ -26,8 +26,10 @@ class Place(NamedTuple):
     doubt_mm: float = 0.0
 
 
-def placed(before: Place, where: tuple[str, int | None, int | None], at_s: float, feed_mm_min: float | None) -> Place:
-    """Return the place after one more sample. where: program, line, tool
+def placed(
+    before: Place, where: tuple[str, int | None, int | None], at_s: float, feed_mm_min: float | None, planned_mm_min: float = 0.0
+) -> Place:
+    """Return the place after one more sample. where: program, line, tool; planned_mm_min: of the line
 
     >>> begun = placed(Place("O1", 6, 3, 10.0, 600.0), ("O1", 7, 3), 11.0, 1200.0)
     >>> begun.along_mm, begun.doubt_mm, placed(begun, ("O1", 7, 3), 12.0, 1200.0).along_mm
@@ -36,7 +38,7 @@ def placed(before: Place, where: tuple[str, int | None, int | None], at_s: float
     since_s = min(max(at_s - before.at_s, 0.0), DT_S_MAX)
     feeds = [one for one in (before.feed_mm_min, feed_mm_min) if one is not None]
     if where != (before.program, before.line, before.tool):
-        return tuple.__new__(Place, (*where, at_s, feed_mm_min, 0.0, max(feeds, default=0.0) / 60.0 * since_s))
+        return tuple.__new__(Place, (*where, at_s, feed_mm_min, 0.0, max(feed_mm_min or 0.0, planned_mm_min) / 60.0 * since_s))
     went_mm = sum(feeds) / len(feeds) / 60.0 * since_s if feeds else 0.0
     return tuple.__new__(Place, (*where, at_s, feed_mm_min, before.along_mm + went_mm, before.doubt_mm))
 

@@ -18,7 +18,7 @@ from processors.config import Configuration, ProcessorConfig
 from processors.contract import Output, OutputSpec, Processor, Provenance, Sample, SampleKind
 from processors.description import Description
 from processors.expected.place import BEYOND, Place, placed, window_mm
-from processors.expected.usual import Air, Ratio, air_after, offset_at, ratios_after
+from processors.expected.usual import Air, Ratio, air_after, ratios_after
 from processors.sample import why_unknown
 from sparkplug.datatype import DataType
 from twin.errors import ExpectationError
@@ -30,7 +30,7 @@ from twin.vocabulary import twin_signals
 PROGRAM, LINE, TOOL, LOAD = "program", "nc_line", "tool_number", "spindle_load_pct"
 SPEED, FEED, OVERRIDE = "spindle_rpm", "feed_mm_min", "feed_override_pct"
 NO_FOLDER = "no expectations; cnctwin expect makes them, [expected] expectations names their folder"
-TURNING_RPM, STEADY, WITHIN_S = 100.0, 0.02, 2.5
+TURNING_RPM, STEADY, WITHIN_S, SETTLED_S = 100.0, 0.005, 2.5, 0.7
 CUTS_SHARE, EVEN = 0.3, 1.5
 """A cut tells of the ratio where it is no less than this share of what is expected, and what is expected is known so well."""
 BEYOND_MAX = 1e6
@@ -89,7 +89,7 @@ class State:
     most_pct: float | None = None
     bounds_s: float = 0.0
     rpm: float | None = None
-    air: Air | None = None
+    air: Air = field(default_factory=Air)
     ratios: Mapping[str, Ratio] = field(default_factory=dict)
 
 
@@ -113,13 +113,15 @@ def step(given: Described, state: State, sample: Sample) -> tuple[State, Sequenc
         return _lost(state), _nulls(no_line)
     tool = _whole(sample, TOOL)[0]
     feed, rpm = _bounded(sample, FEED), _bounded(sample, SPEED)
-    place = placed(state.place, (program, line, tool), sample.at_s, feed)
+    planned = expectation.at(line, tool=tool)
+    if planned is None:
+        return _lost(state), _nulls(f"program {program} has no move in this line")
+    planned_mm_min = planned.feed_mm_min * _override(sample)
+    place = placed(state.place, (program, line, tool), sample.at_s, feed, planned_mm_min)
     window = window_mm(place)
     along_mm = None if window is None else 0.5 * (window[0] + window[1])
-    run_feed = feed if feed is not None else _overridden(expectation, line, tool, sample)
-    expected = expectation.at(line, run_feed, rpm, tool=tool, along_mm=along_mm)
-    if expected is None:
-        return _lost(state, place), _nulls(f"program {program} has no move in this line")
+    run_feed = planned_mm_min if feed is None else feed
+    expected = expectation.at(line, run_feed, rpm, tool=tool, along_mm=along_mm) or planned
     ratio_cut_pct_min = given.configuration.of(sample.machine).ratio_cut_pct_min
     now = _Now(expectation, expected, place, window, run_feed, rpm, sample)
     return _compared(ratio_cut_pct_min, state, now)
@@ -160,7 +162,8 @@ def _compared(ratio_cut_pct_min: float, state: State, now: _Now) -> tuple[State,
         Output(twin_signals.EXPECTED_LINE_S, round(expected.time_s, DIGITS)),
         Output(twin_signals.EXPECTED_BASIS, "; ".join(now.expectation.basis)),
     ]
-    bounds = now.bounds(state.place.feed_mm_min if at_s - state.place.at_s <= WITHIN_S else None)
+    is_on = now.place.along_mm > 0.0 and at_s - state.place.at_s <= WITHIN_S
+    bounds = now.bounds(state.place.feed_mm_min if is_on else None)
     if bounds is None or math.isnan(expected.load_pct):
         why = now.expectation.why_not(now.place.line, now.place.tool) or "no load is expected of this line"
         return _lost(state, now.place), (*outputs, *_nulls(why, _OF_LOAD))
@@ -183,9 +186,10 @@ def _compared(ratio_cut_pct_min: float, state: State, now: _Now) -> tuple[State,
     else:
         idle_pct = expected.load_pct - expected.cut_load_pct
         is_steady = state.rpm is not None and abs(rpm - state.rpm) <= STEADY * abs(rpm) and abs(rpm) >= TURNING_RPM
-        if most_shown <= 0.0 and is_steady and sample.kind is not SampleKind.BIRTH:
+        is_air = most <= 0.0 and (most_shown <= 0.0 or at_s - state.bounds_s >= SETTLED_S)
+        if is_air and is_steady and sample.kind is not SampleKind.BIRTH:
             air = air_after(air, load_pct - idle_pct, abs(rpm))
-        cut_pct = load_pct - idle_pct - offset_at(air, abs(rpm))
+        cut_pct = load_pct - idle_pct - air.beyond_pct(rpm)
         is_even = ratio_cut_pct_min <= least_shown and most_shown <= EVEN * least_shown
         if is_steady and is_even and cut_pct >= CUTS_SHARE * least_shown:
             since_s = min(max(at_s - state.bounds_s, 0.0), WITHIN_S)
@@ -212,13 +216,6 @@ def _lost(state: State, place: Place | None = None) -> State:
 def _override(sample: Sample) -> float:
     percent, _ = sample.number(OVERRIDE)
     return 1.0 if percent is None or not 0.0 <= percent <= 500.0 else percent / 100.0
-
-
-def _overridden(expectation: Expectation, line: int, tool: int | None, sample: Sample) -> float | None:
-    """Return the planned feed times the override, for a control that tells no feed; None where that is the planned one."""
-    share = _override(sample)
-    planned = expectation.at(line, tool=tool)
-    return None if share == 1.0 or planned is None else planned.feed_mm_min * share
 
 
 def _bounded(sample: Sample, name: str) -> float | None:

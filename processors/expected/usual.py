@@ -1,27 +1,59 @@
 """The spindle as it is beside the twin: what it takes in air beyond the twin, and what its cuts take over the twin's, by tool.
 
-    cut = load − idle of the twin − offset        offset ← load − idle of the twin, in air, at about this speed
-    ratio = measured over expected cut, of late, of a tool
+    beyond = load in air − idle of the twin ≈ a + b (n / n₁)²        by least squares that forgets, over samples in air
+    cut = load − idle of the twin − beyond        ratio = measured over expected cut, of late, of a tool
 
-The constants of a twin are off by some percent, grease is cold in the morning and tools wear: what is usual is followed slowly,
-so that what comes at once stands out. One sample counts for no more than a factor of 1.35.
+The constants of a twin are off by some percent, bearings and grease take more at speed and when cold, tools wear: what is usual
+is followed slowly, so that what comes at once stands out. One sample of a cut counts for no more than a factor of 1.35.
 """
 
 import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
-AIR_WEIGHT, OFFSET_PCT_MAX, SPEEDS_ALIKE = 0.3, 10.0, 0.1
+SPEED_RPM = 10_000.0
+FORGETS, SURE, STRAY_PCT, BEYOND_PCT_MAX = 0.995, 10.0, 6.0, 25.0
+"""Share that is kept at each sample; the weight after which one that is STRAY_PCT off is none of air."""
+PRIOR = 0.05
 RATIO_OVER_S, RATIO_KNOWN_S, STEP_MAX = 3600.0, 20.0, 0.3
 RATIO_MAX = math.log(4.0)
 TOOLS_MAX = 64
 
 
 class Air(NamedTuple):
-    """What the spindle takes in air beyond the twin, %, at a speed."""
+    """Sums over samples in air, x = (n / n₁)², y = load beyond the twin, %."""
 
-    offset_pct: float
-    rpm: float
+    weight: float = 0.0
+    x: float = 0.0
+    xx: float = 0.0
+    y: float = 0.0
+    xy: float = 0.0
+
+    def beyond_pct(self, rpm: float) -> float:
+        """Return what the spindle takes in air beyond the twin at a speed, 0 where nothing has been seen.
+
+        >>> air = Air()
+        >>> for rpm, pct in [(2000.0, 1.4), (10000.0, 11.0)] * 50:
+        ...     air = air_after(air, pct, rpm)
+        >>> round(air.beyond_pct(6000.0), 1)
+        4.6
+        """
+        if self.weight <= 0.0:
+            return 0.0
+        x, mean_x, mean_y = (rpm / SPEED_RPM) ** 2, self.x / self.weight, self.y / self.weight
+        spread = self.xx - self.weight * mean_x**2 + PRIOR * mean_x**2
+        slope = (self.xy - self.weight * mean_x * mean_y + PRIOR * mean_x * mean_y) / spread if spread > 0.0 else 0.0
+        return max(-BEYOND_PCT_MAX, min(BEYOND_PCT_MAX, mean_y + slope * (x - mean_x)))
+
+
+def air_after(air: Air, beyond_pct: float, rpm: float) -> Air:
+    """Return the sums after one more sample in air; one that is far from what is known is left out."""
+    if abs(beyond_pct) > BEYOND_PCT_MAX or (air.weight > SURE and abs(beyond_pct - air.beyond_pct(rpm)) > STRAY_PCT):
+        return air
+    x = (rpm / SPEED_RPM) ** 2
+    weight, xs, xx, y, xy = air
+    k = FORGETS
+    return Air(k * weight + 1.0, k * xs + x, k * xx + x * x, k * y + beyond_pct, k * xy + x * beyond_pct)
 
 
 class Ratio(NamedTuple):
@@ -34,23 +66,6 @@ class Ratio(NamedTuple):
     def value(self) -> float | None:
         """Return the ratio; None while too little has been seen."""
         return math.exp(self.log) if self.seen_s >= RATIO_KNOWN_S else None
-
-
-def offset_at(air: Air | None, rpm: float) -> float:
-    """Return the offset that holds at a speed, 0 where it is not known."""
-    return air.offset_pct if air is not None and abs(rpm - air.rpm) <= SPEEDS_ALIKE * air.rpm else 0.0
-
-
-def air_after(air: Air | None, beyond_pct: float, rpm: float) -> Air:
-    """Return the offset after one more sample in air.
-
-    >>> air_after(air_after(None, 2.0, 4000.0), 3.0, 4010.0)
-    Air(offset_pct=2.3, rpm=4010.0)
-    """
-    beyond_pct = min(max(beyond_pct, -OFFSET_PCT_MAX), OFFSET_PCT_MAX)
-    if air is None or abs(rpm - air.rpm) > SPEEDS_ALIKE * air.rpm:
-        return Air(beyond_pct, rpm)
-    return Air(air.offset_pct + AIR_WEIGHT * (beyond_pct - air.offset_pct), rpm)
 
 
 def ratios_after(ratios: Mapping[str, Ratio], tool: str, measured: float, expected: float, since_s: float) -> Mapping[str, Ratio]:

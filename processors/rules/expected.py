@@ -37,9 +37,9 @@ class ExpectedLimits(ProcessorConfig):
     tool_broken_cut_pct: PositiveFloat = 5.0
     tool_broken_s: NonNegativeFloat = 1.0
     tool_broken_clear_s: NonNegativeFloat = 2.0
-    over_expected_ratio: float = Field(default=1.6, gt=1.0)
-    over_expected_ratio_new: float = Field(default=2.5, gt=1.0)
-    over_expected_margin_pct: PositiveFloat = 8.0
+    over_expected_ratio: float = Field(default=2.0, gt=1.0)
+    over_expected_ratio_new: float = Field(default=3.0, gt=1.0)
+    over_expected_margin_pct: PositiveFloat = 10.0
     over_expected_s: NonNegativeFloat = 1.0
     over_expected_clear_s: NonNegativeFloat = 2.0
 
