@@ -63,7 +63,7 @@ def residuals(
             base = own.heat.base[at]
             y = 0.0 if base is None else (value - explained(model.heat[at], own.heat.driven) - base) * plan.over_spread[at]
             d.append(None)
-            is_told.append(base is not None)
+            is_told.append(base is not None and own.heat.is_settled)
         else:
             if kind == _LOAD:
                 cut = value - idle_of(plan, told.values) if at == plan.load_at else value
