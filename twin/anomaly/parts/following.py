@@ -7,7 +7,6 @@ twin's expectation where no earlier part has the section; level follows wear and
 gated, while the spindle stands or changes its speed, or while the feed is held.
 """
 
-import math
 from twin.anomaly.parts import heat, scales
 from twin.anomaly.parts.levels import another_material
 from twin.anomaly.parts.model import LEVELLED, PartsModel, Plan
@@ -187,4 +186,3 @@ def with_levels(model: PartsModel, own: Own) -> Own:
     rows = zip(kinds, own.material.values, tool.values, model.plan.prior, strict=True)
     both = [(m + l, (1.0 + variance / v) ** -0.5) if k in LEVELLED else (0.0, 1.0) for k, m, l, v in rows]
     return own._replace(level=tuple([one[0] for one in both]), calm=tuple([one[1] for one in both]))
-

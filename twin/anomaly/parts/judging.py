@@ -87,7 +87,7 @@ def _tolerated(model: PartsModel, own: Own, u: list[float]) -> list[float]:
     ]
 
 
-def _knows(own: Own, is_new: bool, parts: int) -> str:  # noqa: FBT001
+def _knows(own: Own, is_new: bool, parts: int) -> str:
     if own.place.key is None:
         return "nothing: the control tells neither program nor tool"
     if not is_new:

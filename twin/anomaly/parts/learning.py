@@ -20,7 +20,7 @@ OPERATIONS_OF_PART_MAX = 40
 TICKS_MIN = 3
 
 
-def learned(model: PartsModel, own: Own, judged: Judged, is_alarm: bool) -> tuple[Own, CutRecord | None]:  # noqa: FBT001
+def learned(model: PartsModel, own: Own, judged: Judged, is_alarm: bool) -> tuple[Own, CutRecord | None]:
     """Return the state once the alarm is known, and the record of an operation that has ended at this tick."""
     ended = own.ended
     is_high = judged.score is not None and judged.score >= SUSPICIOUS
@@ -46,7 +46,10 @@ def _taken_back(model: PartsModel, own: Own) -> Own:
     if own.kept is None:
         return own
     material, tools = own.kept
-    levels = {name: tool._replace(level=tools[name].level if name in tools else model.tool_level(name)) for name, tool in own.tools.items()}
+    levels = {
+        name: tool._replace(level=tools[name].level if name in tools else model.tool_level(name))
+        for name, tool in own.tools.items()
+    }
     return with_levels(model, own._replace(material=material, tools=levels))
 
 
@@ -66,9 +69,7 @@ def _operation_ended(model: PartsModel, own: Own, ended: Ended) -> tuple[Own, Cu
     if not own.is_part_bad:
         for one in own.waiting:
             own = _sections_learned(model, own, one)
-    return own._replace(
-        waiting=(), is_part_bad=False, skipped=min(skipped, SKIPPED_MAX), kept=(own.material, own.tools)
-    ), cut
+    return own._replace(waiting=(), is_part_bad=False, skipped=min(skipped, SKIPPED_MAX), kept=(own.material, own.tools)), cut
 
 
 def _levels_followed(model: PartsModel, own: Own, ended: Ended, usual: Usual | None) -> Own:
@@ -107,10 +108,10 @@ def _sections_learned(model: PartsModel, own: Own, ended: Ended) -> Own:
     if usual is None:
         if not place.is_whole or not place.forming or len(own.usual) + len(model.usual) >= 2 * OPERATIONS_MAX:
             return own
-        usual = begun_usual(place.forming, place.end, count, plan.flat)
+        usual = begun_usual(place.forming, place.end, count)
     elif place.is_whole:
         beyond = tuple([mark for mark in place.forming if is_beyond(usual.end, *mark)])
-        usual = extended(usual, beyond, place.end, count, plan.flat) if beyond else usual
+        usual = extended(usual, beyond, place.end, count) if beyond else usual
     merged = _merged(ended, len(usual.marks))
     centre, variance = list(usual.centre), list(usual.variance)
     told, weight, frozen = list(usual.told), list(usual.weight), list(usual.frozen)
@@ -151,5 +152,3 @@ def _merged(ended: Ended, known: int) -> dict[int, Sums]:
 
 def _plus(one: Sums, other: Sums) -> Sums:
     return Sums(*(tuple([a + b for a, b in zip(x, y, strict=True)]) for x, y in zip(one, other, strict=True)))
-
-

@@ -37,7 +37,14 @@ UNITS = {
 }
 SPREADS = {Kind.LOAD: 0.1, Kind.VIBRATION: 0.2, Kind.FEED: 0.2, Kind.SPEED: 0.02, Kind.TEMPERATURE: 1.0, Kind.PLAIN: 1.0}
 """Spreads of a tick before training knows better."""
-SPREAD_LEAST = {Kind.LOAD: 0.02, Kind.VIBRATION: 0.03, Kind.FEED: 0.01, Kind.SPEED: 0.003, Kind.TEMPERATURE: 0.1, Kind.PLAIN: 1e-6}
+SPREAD_LEAST = {
+    Kind.LOAD: 0.02,
+    Kind.VIBRATION: 0.03,
+    Kind.FEED: 0.01,
+    Kind.SPEED: 0.003,
+    Kind.TEMPERATURE: 0.1,
+    Kind.PLAIN: 1e-6,
+}
 """Least spreads: a signal that is rounded, or that a control repeats, has none in some sections."""
 POWERS = {Kind.LOAD: 0.75, Kind.VIBRATION: 0.5}
 """Powers of the feed override, before training knows better."""

@@ -1,6 +1,6 @@
 """The reason of a score: the signal and the scale that it rests on most, what was measured there and what was expected.
 
-    measured = expected · exp(s / weight)        of a ratio; expected + s / weight of a temperature
+measured = expected · exp(s / weight)        of a ratio; expected + s / weight of a temperature
 """
 
 import math
@@ -40,7 +40,9 @@ def why_of(model: PartsModel, own: Own, peers: Sequence[Own], left: Sequence[flo
         weight = usual.weight[section][at] or weight
     away = s / (weight * own.calm[at])
     expected, measured = _in_units(model, own, at, centre, away)
-    shows = [str(n) for n, peer in enumerate(peers) if peer.smooth[index] * s > 0.0 and abs(peer.smooth[index]) > PEER_SHOWS * abs(s)]
+    shows = [
+        str(n) for n, peer in enumerate(peers) if peer.smooth[index] * s > 0.0 and abs(peer.smooth[index]) > PEER_SHOWS * abs(s)
+    ]
     signature = signature_of(shares_of(model.signals, scales.SCALES, left), place.key or "", place.program, place.tool)
     return Why(
         model.signals[at],

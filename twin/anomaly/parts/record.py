@@ -46,7 +46,7 @@ CUT_PCT_MIN = 1.0
 """A section with less cutting load than that is air."""
 
 
-def recorded(model: PartsModel, ended: Ended, usual: Usual | None, is_alarmed: bool) -> CutRecord:  # noqa: FBT001
+def recorded(model: PartsModel, ended: Ended, usual: Usual | None, is_alarmed: bool) -> CutRecord:
     """Return the record of an operation that has ended; usual: its usual course before it."""
     place, plan = ended.place, model.plan
     parts = 0 if usual is None else usual.parts

@@ -18,7 +18,7 @@ _LOAD, _VIBRATION, _FEED, _SPEED, _TEMPERATURE = (int(k) for k in list(Kind)[:5]
 _RPM_STEP = 1.0 / 500.0
 
 
-def quantities(model: PartsModel, told: Told, override: float, settled: bool) -> list[float | None]:  # noqa: FBT001
+def quantities(model: PartsModel, told: Told, override: float, settled: bool) -> list[float | None]:
     """Return the quantity of each signal, None where this tick does not tell of it; temperatures as they are told."""
     plan = model.plan
     found: list[float | None] = []

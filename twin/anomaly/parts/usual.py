@@ -21,7 +21,8 @@ FROZEN_PARTS = 3
 class Usual(NamedTuple):
     """marks: where sections begin; end: the furthest moment; parts: that were learned; duration_ticks: usual number that tell
     centre, variance, parts_told, weight: by section, each by signal; weight = 1 / spread with what is not known yet
-    frozen: centre of the load with the levels it was learned at, by section, from the first parts; is_twin: centres are beside the twin
+    frozen: centre of the load with the levels it was learned at,
+        by section, from the first parts
     """
 
     marks: tuple[Mark, ...]
@@ -33,7 +34,6 @@ class Usual(NamedTuple):
     told: tuple[tuple[int, ...], ...]
     weight: tuple[tuple[float, ...], ...]
     frozen: tuple[float | None, ...]
-    is_twin: bool
 
 
 class Sums(NamedTuple):
@@ -57,7 +57,7 @@ def weights(variance: Sequence[float], told: Sequence[int], prior: Sequence[floa
     return tuple(found)
 
 
-def begun_usual(marks: tuple[Mark, ...], end: Mark, signals: int, is_twin: bool, offset: Sequence[float]) -> Usual:
+def begun_usual(marks: tuple[Mark, ...], end: Mark, signals: int) -> Usual:
     """Return the usual course before any part: sections without parts."""
     count = len(marks)
     zero = (0.0,) * signals
@@ -66,18 +66,17 @@ def begun_usual(marks: tuple[Mark, ...], end: Mark, signals: int, is_twin: bool,
         end,
         0,
         0.0,
-        (tuple(offset),) * count,
+        (zero,) * count,
         (zero,) * count,
         ((0,) * signals,) * count,
         (zero,) * count,
         (None,) * count,
-        is_twin,
     )
 
 
-def extended(usual: Usual, marks: tuple[Mark, ...], end: Mark, signals: int, offset: Sequence[float]) -> Usual:
+def extended(usual: Usual, marks: tuple[Mark, ...], end: Mark, signals: int) -> Usual:
     """Return the course with the sections that a part formed beyond it."""
-    new = begun_usual(marks, end, signals, usual.is_twin, offset)
+    new = begun_usual(marks, end, signals)
     return usual._replace(
         marks=usual.marks + new.marks,
         end=max(usual.end, end),
