@@ -119,7 +119,7 @@ def _nist_part(path: Path, number: int, run: ProgramRun) -> Part:
         NIST_SIGNALS,
         np.column_stack([columns[name].astype(np.float64) for name in NIST_SIGNALS]),
         _held_tool(columns["tool_number"].astype(np.int64)),
-        columns["line"].astype(np.int64),
+        _line(columns["line"].astype(np.int64)),
         columns["feed_override_pct"].astype(np.float64),
         columns["spindle_override_pct"].astype(np.float64),
         columns["exec_state"].astype(np.str_),
@@ -131,6 +131,12 @@ def _held_tool(tool: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return the tool in the spindle: the last one where 0 is told, which is a change."""
     at = np.maximum.accumulate(np.where(tool > 0, np.arange(len(tool)), 0))
     return np.where(tool[at] > 0, tool[at], -1)
+
+
+def _line(line: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the line, of which the control tells nothing for the first second or two of a run."""
+    first = int(np.argmax(line >= 0))
+    return np.where(np.arange(len(line)) < first, line[first], line)
 
 
 def _changes(tool: NDArray[np.int64]) -> NDArray[np.bool_]:

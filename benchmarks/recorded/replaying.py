@@ -1,4 +1,4 @@
-"""Parts one after another as a machine tells them, judged as on the stream; a gap between two of them.
+"""Parts one after another as a machine tells them, judged as on the stream; between two of them it stands for `STAND_TICKS`.
 
 A model is taught by parts of other programs: what repeats from part to part, and tails. It keeps no course of any program, so a
 program is judged from its second part, or against the twin in its first.
@@ -18,7 +18,7 @@ from twin.anomaly.parts.model import PartsModel
 from twin.anomaly.parts.replay import Recorded, fit, replayed
 from twin.anomaly.parts.why import Why
 
-GAP_TICKS = 60
+STAND_TICKS = 60
 
 
 class Span(NamedTuple):
@@ -61,21 +61,24 @@ def recorded(parts: Sequence[Part], folder: Path | None) -> tuple[Recorded, list
     spans, at = [], 0
     for part in parts:
         spans.append(Span(part, at, at + part.ticks))
-        at += part.ticks + GAP_TICKS
-    ticks, signals = max(at - GAP_TICKS, 0), parts[0].signals
+        at += part.ticks + STAND_TICKS
+    ticks, signals = max(at - STAND_TICKS, 0), parts[0].signals
     values, expected = np.full((ticks, len(signals)), np.nan), np.full((ticks, 6), np.nan)
     program, tool, line = (np.full(ticks, -1, dtype=np.int64) for _ in range(3))
     feed, speed = np.full(ticks, np.nan), np.full(ticks, np.nan)
-    gated, known = np.zeros(ticks, dtype=np.bool_), np.zeros(ticks, dtype=np.bool_)
+    gated = np.zeros(ticks, dtype=np.bool_)
     for part, begin, end in spans:
+        stands = slice(end, min(end + STAND_TICKS, ticks))  # the program that has ended is still there
+        values[stands], tool[stands], line[stands] = 0.0, part.tool[-1], part.line[-1]
+        program[stands] = labels.index(part.label)
         own = slice(begin, end)
         values[own], tool[own], line[own], gated[own] = part.values, part.tool, part.line, part.gated
         feed[own], speed[own] = part.feed_override_pct, part.spindle_override_pct
-        program[own], known[own] = labels.index(part.label), True
+        program[own] = labels.index(part.label)
         if folder is not None:
             expected[own] = expected_rows(folder, part)
     return Recorded(
-        parts[0].machine, TICK_S, signals, values, labels, program, tool, line, feed, speed, gated, expected, known
+        parts[0].machine, TICK_S, signals, values, labels, program, tool, line, feed, speed, gated, expected
     ), spans
 
 
