@@ -1,6 +1,7 @@
 """The twin's expectations of the NC programs that came with the recordings: feed, speed and time of each line, and no load.
 
 The machine is `hurco.toml`, fitted on plates 13, 14 and 15. The control counts the lines of a text from 0. A text is worked out once.
+Nothing is expected of a line in which the spindle is told to stop: it runs down for seconds.
 """
 
 from functools import cache
@@ -10,6 +11,7 @@ import numpy as np
 
 from benchmarks.programs.plates import PLATES
 from benchmarks.recorded.parts import Floats, Part
+from twin.anomaly.parts.quantity import TURNS_RPM_MIN
 from twin.anomaly.parts.replay import EXPECTED
 from twin.expected.expectation import Expectation
 from twin.expected.lines import Numbering
@@ -43,6 +45,6 @@ def expected_rows(folder: Path, part: Part) -> Floats:
         return rows
     for line in np.unique(part.line[part.line >= 0]).tolist():
         one = program.at(line)
-        if one is not None and one.feed_mm_min > 0.0:
+        if one is not None and one.feed_mm_min > 0.0 and one.spindle_rpm >= TURNS_RPM_MIN:
             rows[part.line == line] = [np.nan if getattr(one, name) is None else getattr(one, name) for name in EXPECTED]
     return rows

@@ -45,8 +45,8 @@ TEXTS = {
     18765: "BOX OP5",
 }
 """Highest line of a run → the job it was for; some runs ended early."""
-ENDED_EARLY = {2796: 5163, 2795: 5163, 18765: 18764}
-"""Highest line of a run that ended early, or whose last line was not seen in others → that of its text."""
+ENDED_EARLY = {2796: 5163, 2795: 5163}
+"""Highest line of a run that ended early → that of its text."""
 
 
 @dataclass(frozen=True)
