@@ -1,7 +1,7 @@
 """The temperature that speed and load explain, and the slow drift that weather explains.
 
-    h_i ← h_i + (tick / τ_i) · (driver_i − h_i)          drivers: speed, load; τ: 10 min, 40 min, 2 h
-    x = value − Σ b_i h_i − base                         base ← base + (tick / 3 h) · (value − Σ b_i h_i − base), unless suspicious
+    h_i ← h_i + (10 s / τ_i) · (driver_i − h_i)          drivers: speed, load; τ: 10 min, 40 min, 2 h
+    x = value − Σ b_i h_i − base                         base ← base + (10 s / 3 h) · (value − Σ b_i h_i − base), unless suspicious
 
 The coefficients come from training, by least squares on values from which the same slow drift was taken.
 """
@@ -19,6 +19,8 @@ TAUS_S = (600.0, 2400.0, 7200.0)
 DRIVERS = (SPEED, LOAD)
 BASE_S = 10_800.0
 RIDGE = 1e-3
+EVERY_S = 10.0
+"""Heat is slow: it is followed so often."""
 SCALES = {SPEED: 1e-3, LOAD: 1e-2}
 
 

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from twin.anomaly.calibration import Finite, NotNegative, Positive, Record
 from twin.anomaly.parts import quantity, scales
-from twin.anomaly.parts.heat import BASE_S, TAUS_S
+from twin.anomaly.parts.heat import BASE_S, EVERY_S, TAUS_S
 from twin.anomaly.parts.levels import BATCH_VAR, TOOL_VAR, Level
 from twin.anomaly.parts.quantity import Kind
 from twin.anomaly.parts.usual import Usual
@@ -27,6 +27,8 @@ class Plan:
     kinds: tuple[int, ...]
     floors: tuple[float, ...]
     shares: tuple[float, ...]
+    heat_every: int
+    powers: tuple[float, ...]
     heat_shares: tuple[tuple[float, ...], float]
     drivers_at: tuple[int, int]
     speed_at: int
@@ -91,12 +93,15 @@ class PartsModel(Record):
         def at(name: str) -> int:
             return self.signals.index(name) if name in self.signals else -1
 
+        every = max(1, round(EVERY_S / self.tick_s))
         steps = range(int(quantity.RPM_MAX / RPM_STEP) + 1)
         return Plan(
             kinds=tuple(map(int, kinds)),
             floors=tuple(quantity.floor_of(signal) for signal in self.signals),
+            powers=self.powers,
             shares=scales.shares(self.tick_s),
-            heat_shares=(tuple(self.tick_s / tau_s for tau_s in TAUS_S), self.tick_s / BASE_S),
+            heat_every=every if any(self.heat) else 0,
+            heat_shares=(tuple(every * self.tick_s / tau_s for tau_s in TAUS_S), every * self.tick_s / BASE_S),
             drivers_at=(at(quantity.SPEED), at(quantity.LOAD)),
             speed_at=at(quantity.SPEED),
             feed_at=at(quantity.FEED),

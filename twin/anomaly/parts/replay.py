@@ -34,6 +34,8 @@ SEEN_S = 5.0
 SPREAD_PARTS_MIN = 2
 LOOSE_TAILS = (6.0, 3.0, 1.5, 2.5)
 CUT = 1
+STEADY_QUANTILE = 0.35
+"""About half of the sections are edges, which spread further."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -255,7 +257,7 @@ def _with_spreads(model: PartsModel, own: Own, seen: "list[tuple[int, tuple[floa
     """Return the model with the spreads of a tick that its first parts had."""
     import numpy as np  # noqa: PLC0415
 
-    spread = list(1.0 / value for value in model.plan.over_spread)
+    spread = [1.0 / value for value in model.plan.over_spread]
     rows = np.array([row for _, row in seen]) if seen else np.zeros((0, len(spread) * scales.COUNT))
     for at, kind in enumerate(model.plan.kinds):
         known = [
@@ -265,7 +267,7 @@ def _with_spreads(model: PartsModel, own: Own, seen: "list[tuple[int, tuple[floa
             if told[at] >= SPREAD_PARTS_MIN
         ]
         if known:
-            spread[at] = max(float(np.median(known)) ** 0.5, model.plan.least[at] ** 0.5)
+            spread[at] = max(float(np.quantile(known, STEADY_QUANTILE)) ** 0.5, model.plan.least[at] ** 0.5)
         elif kind == Kind.TEMPERATURE and len(rows):
             away = rows[:, at * scales.COUNT + CUT] * LOOSE_TAILS[CUT]
             spread[at] = max(float(np.sqrt(np.mean(away**2))) * spread[at], model.plan.least[at] ** 0.5)

@@ -3,6 +3,7 @@ twin's error. All of it is plain least squares and quantiles over arrays (T,); w
 replay itself (`replay.py`).
 """
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,6 +22,7 @@ IDLE_QUANTILE = 0.05
 IDLE_TICKS_MIN = 60
 LINES_OVERRIDDEN_MIN = 3
 POWER_MAX = 1.2
+CUTS_PCT_MIN = 8.0
 TWIN_TICKS_MIN = 300
 VIBRATION_POWER = 0.5
 
@@ -99,9 +101,13 @@ def _power(one: "Recorded", x: Floats, kind: int) -> float:
         return usual
     group, y, log_override = _groups(one)[known], x[known], np.log(one.feed_override_pct[known] / 100.0)
     count = np.maximum(np.bincount(group), 1)
+    if kind == Kind.LOAD:
+        cuts = (np.bincount(group, y) / count > math.log(CUTS_PCT_MIN))[group]
+        group, y, log_override = group[cuts], y[cuts], log_override[cuts]
+        count = np.maximum(np.bincount(group), 1)
     y, log_override = (column - (np.bincount(group, column) / count)[group] for column in (y, log_override))
     moved = np.bincount(group, np.abs(log_override) > 0.1) > 0
-    if moved.sum() < LINES_OVERRIDDEN_MIN:
+    if len(y) == 0 or moved.sum() < LINES_OVERRIDDEN_MIN:
         return usual
     return float(np.clip((y * log_override).sum() / (log_override**2).sum(), 0.0, POWER_MAX))
 
