@@ -1,7 +1,7 @@
 """The twin's expectations of the NC programs that came with the recordings: feed, speed and time of each line, and no load.
 
-The machine is `hurco.toml`, fitted on plates 13, 14 and 15. The control counts the lines of a text from 0. A text is worked out once.
-Nothing is expected of a line in which the spindle is told to stop: it runs down for seconds.
+The machine is `hurco.toml`, fitted on plates 13, 14 and 15. The control counts the lines of a text from 0. Nothing is expected of
+a line in which the spindle is told to stop: it runs down for seconds.
 """
 
 from functools import cache

@@ -1,4 +1,4 @@
-"""Parts one after another as a machine tells them, judged as on the stream; between two of them it stands for `STAND_TICKS`.
+"""Parts one after another as a machine tells them, judged as on the stream; it stands before the first and after each.
 
 A model is taught by parts of other programs: what repeats from part to part, and tails. It keeps no course of any program, so a
 program is judged from its second part, or against the twin in its first.
@@ -58,7 +58,7 @@ class Judgement(NamedTuple):
 def recorded(parts: Sequence[Part], folder: Path | None) -> tuple[Recorded, list[Span]]:
     """Return parts as one recording of one machine; folder: of the NC programs, None = without the twin."""
     labels = tuple(dict.fromkeys(part.label for part in parts))
-    spans, at = [], 0
+    spans, at = [], STAND_TICKS
     for part in parts:
         spans.append(Span(part, at, at + part.ticks))
         at += part.ticks + STAND_TICKS
@@ -67,6 +67,7 @@ def recorded(parts: Sequence[Part], folder: Path | None) -> tuple[Recorded, list
     program, tool, line = (np.full(ticks, -1, dtype=np.int64) for _ in range(3))
     feed, speed = np.full(ticks, np.nan), np.full(ticks, np.nan)
     gated = np.zeros(ticks, dtype=np.bool_)
+    values[:STAND_TICKS] = 0.0
     for part, begin, end in spans:
         stands = slice(end, min(end + STAND_TICKS, ticks))  # the program that has ended is still there
         values[stands], tool[stands], line[stands] = 0.0, part.tool[-1], part.line[-1]
@@ -77,9 +78,7 @@ def recorded(parts: Sequence[Part], folder: Path | None) -> tuple[Recorded, list
         program[own] = labels.index(part.label)
         if folder is not None:
             expected[own] = expected_rows(folder, part)
-    return Recorded(
-        parts[0].machine, TICK_S, signals, values, labels, program, tool, line, feed, speed, gated, expected
-    ), spans
+    return Recorded(parts[0].machine, TICK_S, signals, values, labels, program, tool, line, feed, speed, gated, expected), spans
 
 
 def taught(parts: Sequence[Part], folder: Path | None) -> PartsModel:
