@@ -69,9 +69,8 @@ def recorded(parts: Sequence[Part], folder: Path | None) -> tuple[Recorded, list
     gated = np.zeros(ticks, dtype=np.bool_)
     values[:STAND_TICKS] = 0.0
     for part, begin, end in spans:
-        stands = slice(end, min(end + STAND_TICKS, ticks))  # the program that has ended is still there
+        stands = slice(end, min(end + STAND_TICKS, ticks))  # no program is active
         values[stands], tool[stands], line[stands] = 0.0, part.tool[-1], part.line[-1]
-        program[stands] = labels.index(part.label)
         own = slice(begin, end)
         values[own], tool[own], line[own], gated[own] = part.values, part.tool, part.line, part.gated
         feed[own], speed[own] = part.feed_override_pct, part.spindle_override_pct
