@@ -68,7 +68,8 @@ def told_after(model: PartsModel, own: Own, told: Told) -> Own:
         return own._replace(tick=tick, place=place, rpm=rpm or 0.0, is_idle=True, heat=warm)
     if place.stood_ticks * model.tick_s >= BATCH_S:
         own = with_levels(model, own._replace(material=another_material(own.material)))
-    moved = (place.moved_mm if line == place.line else 0.0) + (feed or 0.0) * model.tick_s / 60.0
+    step = (feed or 0.0) * model.tick_s / 60.0 if line >= 0 else override * model.tick_s
+    moved = (place.moved_mm if line == place.line else 0.0) + step
     return _cut(model, own._replace(heat=warm) if warm is not own.heat else own, told, place, (line, moved), override)
 
 

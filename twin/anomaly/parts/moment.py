@@ -1,8 +1,10 @@
 """The moment of a part: operation (program, tool, n-th use of that tool) and section of it (line, and distance along the line).
 
-    moved ← moved + feed · tick          along the line; from the beginning of the operation where the control tells no line
+    moved ← moved + feed · tick          along the line, mm
+    moved ← moved + override · tick      since the operation began, s as programmed, where the control tells no line
 
-Distance is the integral of the feed that was run, so overrides and holds do not shift a section. A part begins where the program
+Overrides and holds do not shift a section. Without a line, distance would: a feed that is read once a second tells the length of
+rapids badly (benchmarks/recorded/alignment.py). A part begins where the program
 changes or goes back to its beginning; where no line is told, where the first tool comes back, or a single one after a standstill.
 The first part notes a mark each second; sections are made of them when it has ended (`sectioning.py`), and looked up from then on.
 """
