@@ -49,15 +49,15 @@ def judged(model: PartsModel, own: Own, peers: Sequence[Own]) -> Judged:
     if max(own.told_at) == NEVER:
         return Judged(None, None, NOTHING_TOLD, True, None, knows)
     u = [s * up if s > 0.0 else s * down for s, up, down in zip(own.smooth, plan.over_up, plan.over_down, strict=True)]
-    most = max(max(u), -min(u))
-    if most < SMALL:
+    most, least = max(u), min(u)
+    if most < SMALL and least > -SMALL:
+        most = max(most, -least)
         return Judged(most, most, None, own.is_idle, None, knows, tuple(u))
     own_score = _length(u)
     if peers:
-        for index, value in enumerate(u):
-            if value > SMALL or value < -SMALL:
-                left = left_over(own, peers, index, model.tick_s)
-                u[index] = left * (plan.over_up[index] if left > 0.0 else plan.over_down[index])
+        for index in [at for at, value in enumerate(u) if value > SMALL or value < -SMALL]:
+            left = left_over(own, peers, index, plan.memory_ticks)
+            u[index] = left * (plan.over_up[index] if left > 0.0 else plan.over_down[index])
     left_in_tails = tuple(u)
     if own.memory.tolerated and own.place.key is not None:
         u = _tolerated(model, own, u)

@@ -9,6 +9,7 @@ from typing import Annotated
 from pydantic import Field
 
 from twin.anomaly.calibration import Finite, NotNegative, Positive, Record
+from twin.anomaly.common_features import MEMORY_S
 from twin.anomaly.parts import quantity, scales
 from twin.anomaly.parts.heat import BASE_S, EVERY_S, TAUS_S
 from twin.anomaly.parts.levels import BATCH_VAR, TOOL_VAR, Level
@@ -28,6 +29,7 @@ class Plan:
     floors: tuple[float, ...]
     shares: tuple[float, ...]
     heat_every: int
+    memory_ticks: int
     powers: tuple[float, ...]
     heat_shares: tuple[tuple[float, ...], float]
     drivers_at: tuple[int, int]
@@ -82,6 +84,10 @@ class PartsModel(Record):
         (x0, y0), (x1, y1) = points[at - 1], points[at]
         return y0 + (y1 - y0) * (rpm - x0) / (x1 - x0)
 
+    def changed(self, **fields: object) -> "PartsModel":
+        """Return the model with other values of some fields, checked; the plan is another one then."""
+        return PartsModel.model_validate({**{name: getattr(self, name) for name in PartsModel.model_fields}, **fields})
+
     @cached_property
     def plan(self) -> Plan:
         """What a step needs."""
@@ -100,6 +106,7 @@ class PartsModel(Record):
             floors=tuple(quantity.floor_of(signal) for signal in self.signals),
             powers=self.powers,
             shares=scales.shares(self.tick_s),
+            memory_ticks=round(MEMORY_S / self.tick_s),
             heat_every=every if any(self.heat) else 0,
             heat_shares=(tuple(every * self.tick_s / tau_s for tau_s in TAUS_S), every * self.tick_s / BASE_S),
             drivers_at=(at(quantity.SPEED), at(quantity.LOAD)),

@@ -45,7 +45,7 @@ def prepared(one: "Recorded") -> PartsModel:
     heat = tuple(
         fit_heat(rpm, load, columns[name], one.tick_s) if kind_of(name) is Kind.TEMPERATURE else () for name in one.signals
     )
-    offset, spread = _twin_error(first.model_copy(update={"power": powers}), one, settled)
+    offset, spread = _twin_error(first.changed(power=powers), one, settled)
     return PartsModel(
         signals=one.signals, tick_s=one.tick_s, idle=idle, power=powers, heat=heat, twin_offset=offset, twin_spread=spread
     )
