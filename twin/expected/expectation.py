@@ -26,6 +26,7 @@ class Expectation:
     """The expectation of a program on a machine. basis: sentences on what it rests on and what is left out
 
     program_sha256, description: of the texts that it was worked out from; runs: in the order in which they are run
+    o_word: the number that the program gives itself; empty = none
     meter: None where the machine has no [spindle], so that no load is known
     """
 
@@ -37,6 +38,7 @@ class Expectation:
     basis: tuple[str, ...]
     program_sha256: str = ""
     description: str = ""
+    o_word: str = ""
 
     @cached_property
     def runs_of_line(self) -> dict[int, tuple[int, ...]]:
@@ -102,7 +104,7 @@ class Expectation:
             own = found if along_mm is None else self._placed.get(key, found)
         stretches = own.stretches
         if not stretches:
-            return tuple.__new__(Expected, (None, None, own.feed_mm_min, own.spindle_rpm, None, own.time_s))
+            return tuple.__new__(Expected, (math.nan, math.nan, own.feed_mm_min, own.spindle_rpm, math.nan, own.time_s))
         place = 0 if len(stretches) == 1 or along_mm is None else _place(stretches, along_mm)
         forces_n = stretches[place].forces_n
         cut_pct, load_pct, force_n = self._loads(own, forces_n, feed_mm_min, rpm)
@@ -121,19 +123,33 @@ class Expectation:
 
         None where no such line runs, or where its load is not known in one of its runs.
         """
-        runs = [self.runs[k] for k in self.runs_of_line.get(line, ())]
-        runs = [run for run in runs if tool is None or run.tool == tool] or runs
+        runs = self._runs_by.get((line, tool)) or self._runs_by.get((line, None)) or []
         least, most = math.inf, -math.inf
-        for run in runs:
+        for run in (self.runs[k] for k in runs):
             if not run.stretches:
                 return None
             last = _place(run.stretches, to_mm)
             for stretch in run.stretches[min(_place(run.stretches, from_mm), last) : last + 1]:
                 cut_pct = self._loads(run, stretch.forces_n, feed_mm_min, rpm)[0]
-                if cut_pct is None:
+                if math.isnan(cut_pct):
                     return None
                 least, most = min(least, cut_pct), max(most, cut_pct)
         return (least, most) if runs else None
+
+    def length_mm(self, line: int, tool: int | None = None) -> float:
+        """Return the greatest length of a run of a line, 0 where it does not run."""
+        return self._lengths.get((line, tool)) or self._lengths.get((line, None), 0.0)
+
+    @cached_property
+    def _lengths(self) -> dict[tuple[int, int | None], float]:
+        return {key: max(self.runs[k].length_mm for k in own) for key, own in self._runs_by.items()}
+
+    def why_not(self, line: int | None, tool: int | None = None) -> str:
+        """Return why the load of a line is not known; empty = it is, or no such line runs."""
+        if line is None:
+            return ""
+        own = self.lines.get((line, tool)) or self.lines.get((line, None))
+        return "" if own is None else own.why_not
 
     def followed(self, run: int | None, line: int, tool: int | None = None) -> int | None:
         """Return the run that a control is in at `line`, after it was in `run`: the next of this line, else the first again."""
@@ -146,9 +162,14 @@ class Expectation:
         fitting = (k for k in (*later, *own) if tool is None or self.runs[k].tool == tool)
         return next(fitting, (later or own)[0])
 
+    def peak_of(self, run: Run) -> tuple[float, float] | None:
+        """Return the greatest load and force of a run as planned; None where they are not known."""
+        found = [self._loads(run, stretch.forces_n, None, None) for stretch in run.stretches]
+        return max(((load, force) for _, load, force in found), key=lambda pair: pair[1], default=None)
+
     def _loads(
         self, run: Run, forces_n: Sequence[float], feed_mm_min: float | None, rpm: float | None
-    ) -> tuple[float | None, float | None, float]:
+    ) -> tuple[float, float, float]:
         """Return the load of the cut, the load, and the force."""
         turns = run.spindle_rpm if rpm is None else abs(rpm)
         force_n = 0.0
@@ -156,7 +177,7 @@ class Expectation:
             ratio = (1.0 if feed_mm_min is None else feed_mm_min / run.feed_mm_min) * run.spindle_rpm / turns
             force_n = force_at(forces_n, ratio)
         if self.meter is None:
-            return None, None, force_n
+            return math.nan, math.nan, force_n
         return (*self.meter.at(WATTS * force_n * run.diameter_mm * turns, turns), force_n)
 
 

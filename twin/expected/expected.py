@@ -16,15 +16,15 @@ RATIOS = (0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0)
 class Expected(NamedTuple):
     """The expectation at a line. feed_mm_min, spindle_rpm, time_s: as planned, whatever is run.
 
-    cut_load_pct, load_pct, force_n: at the feed and speed that are run, mean tangential force; None where they are not known
+    cut_load_pct, load_pct, force_n: at the feed and speed that are run, mean tangential force; NaN where they are not known
     time_s: of the line from its beginning to its end; feed_mm_min: its mean, with starts and stops in it
     """
 
-    cut_load_pct: float | None
-    load_pct: float | None
+    cut_load_pct: float
+    load_pct: float
     feed_mm_min: float
     spindle_rpm: float
-    force_n: float | None
+    force_n: float
     time_s: float
 
 

@@ -17,7 +17,8 @@ from twin.anomaly.parts.usual import Usual
 
 _LOAD, _VIBRATION, _FEED, _SPEED, _TEMPERATURE = (int(k) for k in list(Kind)[:5])
 _RPM_STEP = 1.0 / RPM_STEP
-_CLIP = scales.CLIP
+TWIN_CLIP = 2.5
+"""A line of a program has air in it that the twin, line by line, does not tell from the cut."""
 
 
 def idle_of(plan: Plan, values: Sequence[float | None]) -> float:
@@ -44,9 +45,9 @@ def residuals(
     learned = plan.flat if usual is None else usual.centre[section]
     if usual is not None and model.follows_parts:
         centre: Sequence[float | None] = learned
-        weight = usual.weight[section]
+        weight, clip = usual.weight[section], scales.CLIP
     else:
-        centre, weight = beside_twin(plan, model, told.expected), plan.over_twin
+        centre, weight, clip = beside_twin(plan, model, told.expected), plan.over_twin, TWIN_CLIP
     z: list[float] = []
     d: list[float | None] = []
     is_told: list[bool] = []
@@ -62,7 +63,7 @@ def residuals(
             base = own.heat.base[at]
             y = 0.0 if base is None else (value - explained(model.heat[at], own.heat.driven) - base) * plan.over_spread[at]
             d.append(None)
-            is_told.append(base is not None)
+            is_told.append(base is not None and own.heat.is_settled)
         else:
             if kind == _LOAD:
                 cut = value - idle_of(plan, told.values) if at == plan.load_at else value
@@ -79,7 +80,7 @@ def residuals(
             d.append(x - usually)
             is_told.append(middle is not None and w > 0.0)
             y = 0.0 if middle is None else (x - middle) * w * calm
-        z.append(_CLIP if y > _CLIP else -_CLIP if y < -_CLIP else y)
+        z.append(clip if y > clip else -clip if y < -clip else y)
     return z, tuple(d), is_told
 
 

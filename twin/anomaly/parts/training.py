@@ -25,6 +25,7 @@ POWER_MAX = 1.2
 CUTS_PCT_MIN = 8.0
 TWIN_TICKS_MIN = 300
 VIBRATION_POWER = 0.5
+TWIN_CLIP = 3.0
 
 
 def prepared(one: "Recorded") -> PartsModel:
@@ -130,5 +131,7 @@ def _twin_error(model: PartsModel, one: "Recorded", settled: NDArray[np.bool_]) 
         off = off[~np.isnan(off)]
         if len(off) * one.tick_s >= TWIN_TICKS_MIN:
             low, middle, high = np.percentile(off, [16.0, 50.0, 84.0])
-            offset[at], spread[at] = float(middle), max(float(high - low) / 2.0, quantity.SPREAD_LEAST[kind])
+            half = max(float(high - low) / 2.0, quantity.SPREAD_LEAST[kind])
+            cut_off = np.clip(off - middle, -TWIN_CLIP * half, TWIN_CLIP * half)
+            offset[at], spread[at] = float(middle + cut_off.mean()), max(float(cut_off.std()), quantity.SPREAD_LEAST[kind])
     return tuple(offset), tuple(spread)
