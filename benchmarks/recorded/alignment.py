@@ -1,127 +1,109 @@
 #!/usr/bin/env python3
-"""The section of an operation without a line number: how far off, by progress alone and put right by the signals.
+"""The place in an operation without a line number: how far off, by distance, by programmed seconds, and put right by the signals.
 
     PYTHONPATH=. .venv/bin/python benchmarks/recorded/alignment.py
 
-Recorded parts of one text, each operation placed in the course of the same one in every other part; the truth is the line, which
-the method is not given. A section is four seconds. Progress is the distance run (feed as last told, once a second), the seconds
-in which the feed is not 0, or these times the feed override. The plates are of texts of their own: those operations are taken
-whose programmed feed and speed agree.
+Recorded parts of one text, two by two: the second is followed as on the stream, without its lines, after the first has taught the
+course. The truth is the line, which the method is not given: the place of that line in the first part. Ticks in a gate or a
+standstill are left out. `untold`: the feed override is kept from the method as well.
 """
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import NamedTuple
+from unittest.mock import patch
 
 import numpy as np
+from numpy.typing import NDArray
 
 from benchmarks.programs.plates import data_folder
 from benchmarks.recorded.parts import TICK_S, Floats, Part, by_text, nist_parts, operations
-from twin.anomaly.parts.alignment import BEGUN, Course, Moved, aligned, by_progress, course_of, progress_s
+from benchmarks.recorded.replaying import recorded, taught
+from twin.anomaly.parts import alignment
+from twin.anomaly.parts.following import told_after
+from twin.anomaly.parts.judging import judged
+from twin.anomaly.parts.learning import learned
+from twin.anomaly.parts.model import PartsModel
+from twin.anomaly.parts.own import begun
 
 TICKS_MIN = 40
-ALIKE = ("T5|1", "T4|1", "T23|1", "T23|2", "T15|1", "T7|1")
-"""Operations of plates 1, 10 and 19 with the same feed and speed."""
-MEASURES = ("distance", "seconds", "seconds · override")
+FAR_S = 5.0
 
 
-class Placed(NamedTuple):
-    """Mean |section error| by progress alone and with alignment, and the share of ticks more than one section off."""
+class Apart(NamedTuple):
+    """Mean error in s of the place, by distance, by seconds, and put right; share of ticks that are far off then."""
 
-    plain: float
-    aligned: float
-    plain_far: float
-    aligned_far: float
-
-
-class Ticked(NamedTuple):
-    """The ticks of an operation that moved, and the line of each, counted from its first."""
-
-    ticks: Sequence[Moved]
-    lines: Floats
+    by_distance_s: float
+    by_seconds_s: float
+    aligned_s: float
+    far: float
 
 
-def ticked(part: Part, at: Floats, measure: str) -> Ticked:
-    """Return the ticks of an operation that moved, with progress in one of `MEASURES`."""
-    feed, speed = part.feed, np.nan_to_num(part.values[:, part.signals.index("spindle_rpm")])
-    told = np.nan_to_num(part.feed_override_pct, nan=100.0)
-    ticks, lines = [], []
-    for tick in at.tolist():
-        if part.line[tick] < 0 or feed[tick] <= 0.0:
+def followed(model: PartsModel, first: Part, second: Part) -> tuple[Floats, NDArray[np.bool_]]:
+    """Return the progress in its operation at each tick of a part that follows another, and whether the tick told of anything."""
+    one, spans = recorded([first, second], None)
+    own, progress, works = begun(model), np.zeros(len(one.values)), np.zeros(len(one.values), dtype=np.bool_)
+    for tick, told in enumerate(one.told()):
+        if told is not None:
+            own = told_after(model, own, told)
+            own, _ = learned(model, own, judged(model, own, ()), is_alarm=False)
+            progress[tick], works[tick] = own.place.moved_mm, not own.is_idle
+    span = spans[1]
+    return progress[span.begin : span.end], works[span.begin : span.end]
+
+
+def pair(model: PartsModel, first: Part, second: Part) -> Iterator[Apart]:
+    """Yield how far off the place is in each operation that two parts have."""
+    bare = first.without_lines(), second.without_lines()
+    right, works = followed(model, *bare)
+    with patch.object(alignment, "STAY", np.inf):
+        plain, _ = followed(model, *bare)
+        usual, _ = followed(model, bare[0], bare[0])
+    before = dict(operations(first))
+    for name, ticks in operations(second):
+        if name not in before or min(len(ticks), len(before[name])) < TICKS_MIN:
             continue
-        override = max(float(told[tick]), 5.0)
-        moved = {
-            "distance": feed[tick] * TICK_S / 60.0,
-            "seconds": progress_s(feed[tick], None, TICK_S),
-            "seconds · override": progress_s(feed[tick], override, TICK_S),
-        }[measure]
-        ticks.append(Moved(float(moved), (float(feed[tick] / override * 100.0), float(speed[tick]))))
-        lines.append(part.line[tick])
-    ascending = np.maximum.accumulate(np.array(lines or [0], dtype=np.float64))
-    return Ticked(ticks, ascending - ascending[0])
+        here, there = ticks[works[ticks]], before[name]
+        there = there[first.feed[there] >= 1.0]
+        if min(len(here), len(there)) < TICKS_MIN:
+            continue
+        true = _place_of_lines(first.line[there], usual[there], second.line[here])
+        run, ran = (np.cumsum(part.feed[at]) * TICK_S / 60.0 for part, at in ((second, here), (first, there)))
+        errors = [np.abs(found - true) for found in (np.interp(run, ran, usual[there]), plain[here], right[here])]
+        yield Apart(*(float(one.mean()) for one in errors), float((errors[2] > FAR_S).mean()))
 
 
-def placed(usual: Ticked, other: Ticked) -> Placed:
-    """Return how far off the sections of an operation are in the course of the same one in another part."""
-    course, place, progress = course_of(usual.ticks), BEGUN, 0.0
-    apart = []
-    for tick, true in zip(other.ticks, _true_sections(course, usual.lines, other.lines), strict=True):
-        place, section = aligned(course, place, tick.values, tick.moved)
-        progress += tick.moved
-        apart.append((abs(by_progress(course, progress) - true), abs(section - true)))
-    found = np.array(apart)
-    return Placed(*found.mean(axis=0).tolist(), *(found > 1).mean(axis=0).tolist())
+def _place_of_lines(usual: NDArray[np.int64], progress: Floats, lines: NDArray[np.int64]) -> Floats:
+    """Return the progress at which each line stood in the first part; within a line, by the share of its ticks so far."""
+    usual, lines = (np.maximum.accumulate(one - one[0]) for one in (usual, lines))
+    first, last = (np.searchsorted(usual, lines, side=side) for side in ("left", "right"))
+    begin, end = (np.searchsorted(lines, lines, side=side) for side in ("left", "right"))
+    at = first + (last - first) * (np.arange(len(lines)) - begin) / (end - begin)
+    return np.interp(at, np.arange(len(progress)), progress)
 
 
-def _true_sections(course: Course, usual: Floats, other: Floats) -> list[int]:
-    """Return the section in which each tick lies by its line; within a line, by the share of its ticks that have passed."""
-    first, last = (np.searchsorted(usual, other, side=side) for side in ("left", "right"))
-    begin, end = (np.searchsorted(other, other, side=side) for side in ("left", "right"))
-    cells = first + (last - first) * (np.arange(len(other)) - begin) / (end - begin)
-    return [int(cell) // course.section_cells for cell in np.minimum(cells, len(usual) - 1)]
-
-
-def pairs(parts: Sequence[Part], only: Sequence[str] = ()) -> Iterator[tuple[Part, Part, str]]:
-    """Yield two parts and an operation that both have."""
-    for usual in parts:
-        for other in parts:
-            if usual is not other:
-                common = {name for name, _ in operations(usual)} & {name for name, _ in operations(other)}
-                yield from ((usual, other, name) for name in sorted(common) if not only or name in only)
-
-
-def table(parts: Sequence[Part], measure: str, only: Sequence[str] = ()) -> tuple[Placed, int] | None:
+def table(model: PartsModel, parts: Sequence[Part], *, is_untold: bool = False) -> tuple[Apart, int] | None:
     """Return the mean over all pairs of parts and operations, and how many there are."""
-    found = []
-    for usual, other, name in pairs(parts, only):
-        both = [ticked(one, dict(operations(one))[name], measure) for one in (usual, other)]
-        if min(len(one.ticks) for one in both) >= TICKS_MIN:
-            found.append(placed(*both))
-    return (Placed(*np.mean(found, axis=0).tolist()), len(found)) if found else None
-
-
-def groups() -> Iterator[tuple[str, Sequence[Part], Sequence[str]]]:
-    """Yield the groups of parts that were made alike."""
-    folder = data_folder()
-    plates = [part for part in nist_parts(folder, "plate") if part.text.startswith(("PLATE-1 ", "PLATE-10 ", "PLATE-19 (4160"))]
-    yield "plates 1, 10, 19", plates, ALIKE
-    for group in ("cover", "box"):
-        for text, parts in by_text(nist_parts(folder, group)).items():
-            if len(parts) > 1:
-                yield text, parts, ()
+    nothing = [replace(one, feed_override_pct=np.full(one.ticks, np.nan)) if is_untold else one for one in parts]
+    found = [row for first in nothing for second in nothing if first is not second for row in pair(model, first, second)]
+    return (Apart(*np.mean(found, axis=0).tolist()), len(found)) if found else None
 
 
 def main() -> None:
     """Print the table."""
-    print(f"{'made from':26} {'progress':20} {'pairs':>5}  |section error|, and share of ticks > 1 section off")
-    for name, parts, only in groups():
-        for measure in MEASURES:
-            row = table(parts, measure, only)
-            if row is not None:
-                one, count = row
-                print(
-                    f"{name:26} {measure:20} {count:5}  alone {one.plain:.2f} ({one.plain_far:.0%}), "
-                    f"aligned {one.aligned:.2f} ({one.aligned_far:.0%})"
-                )
+    folder = data_folder()
+    groups = {name: nist_parts(folder, name) for name in ("plate", "cover", "box")}
+    for name in ("cover", "box"):
+        others = [part.labelled(part.text).without_lines() for group, parts in groups.items() if group != name for part in parts]
+        model = taught(sorted(others, key=lambda part: part.started_s), None)
+        for text, parts in by_text(groups[name]).items():
+            for is_untold in (False, True):
+                row = table(model, parts, is_untold=is_untold) if len(parts) > 1 else None
+                if row is not None:
+                    one, count = row
+                    ways = f"{one.by_distance_s:5.1f} s by distance, {one.by_seconds_s:4.1f} s by programmed seconds"
+                    far = f"{one.aligned_s:4.1f} s put right ({one.far:.0%} of ticks more than {FAR_S:g} s)"
+                    print(f"{text:24} {'untold' if is_untold else 'told':6} {count:3} operations: off by {ways}, {far}")
 
 
 if __name__ == "__main__":

@@ -1,116 +1,97 @@
-"""The place in an operation by progress and signals: what shifts it, what does not, and the recursion beside a plain one."""
+"""The place in an operation without a line: what puts its progress right, what does not, and the recursion beside a plain one."""
 
 import json
-import math
 import random
 from collections.abc import Sequence
 
 import pytest
 
 from twin.anomaly.parts import alignment
-from twin.anomaly.parts.alignment import BAND, BEGUN, Moved, Place, aligned, by_progress, course_of, progress_s
+from twin.anomaly.parts.alignment import BAND, SHIFT, Costs, put_right
+from twin.anomaly.parts.usual import Usual, begun_usual
 
-TICKS = 400
+SECONDS = 400
 
 
-def operation(seed: int = 1, ticks: int = TICKS) -> list[Moved]:
-    """An operation of cuts of 3 to 12 ticks with a load and a feed of their own."""
+def course(seed: int = 1) -> Usual:
+    """An operation of cuts of 3 to 12 seconds, each with a load and a feed of its own."""
     chance = random.Random(seed)
-    steps: list[Moved] = []
-    while len(steps) < ticks:
-        load, feed = chance.uniform(10.0, 60.0), chance.choice((300.0, 600.0, 1200.0, 3000.0))
-        steps += [Moved(1.0, (load + chance.gauss(0.0, 1.0), feed)) for _ in range(chance.randint(3, 12))]
-    return steps[:ticks]
+    starts = [0]
+    while starts[-1] < SECONDS - 12:
+        starts.append(starts[-1] + chance.randint(3, 12))
+    usual = begun_usual(tuple((-1, float(start)) for start in starts), (-1, float(SECONDS)), 2)
+    centre = tuple((chance.uniform(2.0, 4.0), chance.choice((6.0, 7.0, 8.0))) for _ in starts)
+    return usual._replace(centre=centre, weight=((10.0, 10.0),) * len(starts))
 
 
-def errors(steps: Sequence[Moved], places: Sequence[float], section_cells: int = 4) -> tuple[float, float]:
-    """Mean error of the section without and with alignment; `places`: true cell of each step."""
-    course, place = course_of(operation(), section_cells=section_cells), BEGUN
-    off, put_right, progress = 0, 0, 0.0
-    for step, true in zip(steps, places, strict=True):
-        place, section = aligned(course, place, step.values, step.moved)
-        progress += step.moved
-        section_true = min(int(true), TICKS - 1) // section_cells
-        off += abs(by_progress(course, progress) - section_true)
-        put_right += abs(section - section_true)
-    return off / len(steps), put_right / len(steps)
+def told(usual: Usual, second: float) -> tuple[float, ...]:
+    """The quantities at a second of the operation."""
+    place = sum(second >= start for _, start in usual.marks) - 1
+    return usual.centre[max(0, place)]
 
 
-def test_the_same_part_again_is_in_its_own_sections() -> None:
-    steps = operation()
-    assert errors(steps, range(1, TICKS + 1)) == (0.0, 0.0)
+def errors(usual: Usual, truth: Sequence[float], factor: float = 0.0) -> tuple[float, float]:
+    """Mean error of the place without and with the signals; truth: second of the operation that each second is; factor: on the load"""
+    costs: Costs = ()
+    progress = off = put = 0.0
+    for second, true in enumerate(truth):
+        load, feed = told(usual, true)
+        costs, shift_s = put_right(usual, costs, progress, (load + factor, feed))
+        progress += shift_s
+        off += abs(second - true)
+        put += abs(progress - true)
+        progress += 1.0
+    return off / len(truth), put / len(truth)
+
+
+def test_the_same_part_again_is_not_moved() -> None:
+    assert errors(course(), range(SECONDS)) == (0.0, 0.0)
 
 
 def test_a_start_that_is_late_is_put_right() -> None:
-    steps = operation()
-    late = [steps[0]] * 7 + steps
-    off, put_right = errors(late, [*([1.0] * 7), *range(1, TICKS + 1)])
-    assert off > 1.5
-    assert put_right < 0.2
+    off, put = errors(course(), [max(0, second - 7) for second in range(SECONDS)])
+    assert off > 6.5
+    assert put < 1.0
 
 
-def test_an_override_that_the_control_does_not_tell_is_followed_beyond_the_band() -> None:
-    steps = operation()
-    slow = [steps[int(at * 0.93)] for at in range(int(TICKS / 0.93))]
-    off, put_right = errors(slow, [1.0 + at * 0.93 for at in range(len(slow))])
-    assert off * 4 > BAND / 2
-    assert put_right < 0.5 < off
+def test_an_override_that_is_not_told_is_followed_beyond_the_band() -> None:
+    off, put = errors(course(), [0.9 * second for second in range(SECONDS)])
+    assert off > 2 * BAND
+    assert put < 2.0
 
 
-@pytest.mark.parametrize("factor", [0.5, 1.5, 3.0])
-def test_a_load_that_is_wrong_all_along_shifts_nothing(factor: float) -> None:
-    faulty = [step._replace(values=(factor * (step.values[0] or 0.0), step.values[1])) for step in operation()]
-    assert errors(faulty, range(1, TICKS + 1))[1] < 0.05
+@pytest.mark.parametrize("factor", [-0.5, 0.3, 1.0])
+def test_a_load_that_is_wrong_all_along_moves_nothing(factor: float) -> None:
+    assert errors(course(), range(SECONDS), factor)[1] < 0.1
 
 
-def test_what_is_not_known_counts_neither_way() -> None:
-    silent = [step._replace(values=(None, None)) for step in operation()]
-    assert errors(silent, range(1, TICKS + 1)) == (0.0, 0.0)
-
-
-def test_a_hold_does_not_move_the_place() -> None:
-    course, place = course_of(operation()), BEGUN
-    for step in operation()[:100]:
-        place, section = aligned(course, place, step.values, step.moved)
-    for _ in range(50):
-        assert aligned(course, place, (0.0, 0.0), progress_s(0.0, 100.0, 1.0)) == (place, section)
-
-
-def test_overrides_and_holds_do_not_shift_the_programmed_seconds() -> None:
-    assert sum(progress_s(400.0, 50.0, 1.0) for _ in range(20)) == pytest.approx(10.0)
-    assert progress_s(0.0, 50.0, 1.0) == 0.0
-    assert progress_s(None, None, 0.5) == 0.5
+def test_what_is_not_told_moves_nothing() -> None:
+    costs: Costs = ()
+    for second in range(50):
+        costs, shift_s = put_right(course(), costs, float(second), (None, None))
+        assert shift_s == 0.0
 
 
 def test_the_state_is_json_and_bounded() -> None:
-    course, place = course_of(operation()), BEGUN
-    for step in operation(seed=2, ticks=2000):
-        place, section = aligned(course, place, step.values, step.moved)
-        assert len(place.costs) == 2 * BAND + 1
-        assert 0 <= section < course.sections
-    text = json.loads(json.dumps(place, allow_nan=False))
-    assert Place(*(tuple(one) if isinstance(one, list) else one for one in text)) == place
+    usual, costs = course(), ()
+    for second in range(2 * SECONDS):
+        costs, _ = put_right(usual, costs, float(second), told(course(2), second % SECONDS))
+        assert len(costs) == 2 * BAND + 1
+        assert min(costs) == 0.0
+    assert tuple(json.loads(json.dumps(costs, allow_nan=False))) == costs
 
 
 def test_the_recursion_is_that_of_a_plain_dynamic_programme(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(alignment, "STAY", math.inf)  # the band stays about the diagonal
-    usual, steps = operation(), operation(seed=3, ticks=60)
-    course, place = course_of(usual), BEGUN
-    plain = [alignment.SHIFT * abs(offset) for offset in range(-BAND, BAND + 1)]
-    for at, step in enumerate(steps):
-        place, _ = aligned(course, place, step.values, step.moved)
-        ways = [min(plain[k] + alignment.SHIFT * abs(k - o) for k in range(max(o - 1, 0), min(o + 2, 17))) for o in range(17)]
-        plain = [0.99 * way + _apart(course, at + o - BAND, step.values) for o, way in enumerate(ways)]
-    least = min(plain)
-    assert place.costs == pytest.approx([cost - least for cost in plain])
-
-
-def _apart(course: alignment.Course, cell: int, values: Sequence[float | None]) -> float:
-    cell = min(max(cell, 0), len(course.ends) - 1)
-    apart = [abs((value or 0.0) - levels[cell]) for value, levels in zip(values, course.levels, strict=True)]
-    return sum(min(one / spread, 4.0) for one, spread in zip(apart, course.spreads, strict=True))
-
-
-def test_an_operation_in_which_nothing_moved_is_refused() -> None:
-    with pytest.raises(ValueError, match="nothing moved"):
-        course_of([Moved(0.0, (1.0,))])
+    monkeypatch.setattr(alignment, "STAY", 1e9)  # the band stays about the diagonal
+    usual, other, costs = course(), course(3), ()
+    plain = [SHIFT * abs(offset) for offset in range(-BAND, BAND + 1)]
+    for second in range(100):
+        values = told(other, second)
+        costs, _ = put_right(usual, costs, float(second), values)
+        ways = [
+            min(plain[k] + SHIFT * abs(k - o) for k in range(max(o - 1, 0), min(o + 2, len(plain)))) for o in range(len(plain))
+        ]
+        beside = [told(usual, second + offset) for offset in range(-BAND, BAND + 1)]
+        apart = [sum(min(abs(a - b) * 10.0, 4.0) for a, b in zip(values, centre, strict=True)) for centre in beside]
+        plain = [0.99 * way + one for way, one in zip(ways, apart, strict=True)]
+        assert costs == pytest.approx([cost - min(plain) for cost in plain])
