@@ -2,12 +2,13 @@
 
     cost'(o) = (1 − forget) · min(cost(o), cost(o ± 1) + shift) + Σ min(|x − centre(progress + o)| · weight(progress + o), 4)
 
-Progress is the integral of the feed override while the feed is not 0: seconds as programmed. Holds and overrides do not shift it,
-nor does sampling once a second; the integral of feed, in mm, is off by metres after a few rapids. An override that is not told, or
-a late start, shows in the signals: o = −band … band are the seconds by which progress may be wrong, centre and weight those of the
-section there (`usual.py`), x the quantities of the tick. The recursion is exact over the band, as that of dynamic time warping over
-a band around the diagonal is. Where the best offset is better than none by `STAY`, progress is put right and the band goes along.
-The cost of a signal is capped, so a fault costs every offset the same and shifts nothing; an edge has little weight.
+Progress is the integral of the feed override while the feed is not 0: seconds as programmed. Holds and overrides do not shift
+it, nor does sampling once a second; the integral of feed, in mm, is off by metres after a few rapids. An override that is not
+told, or a late start, shows in the signals: o = −band … band are the seconds by which progress may be wrong, centre and
+weight those of the section there (`usual.py`), x the quantities of the tick. The recursion is exact over the band, as that of
+dynamic time warping over a band around the diagonal is. Where the best offset is better than none by `STAY`, progress is put
+right and the band goes along. The cost of a signal is capped, so a fault costs every offset the same and shifts nothing; an
+edge has little weight.
 """
 
 from collections.abc import Sequence

@@ -31,7 +31,7 @@ def told(usual: Usual, second: float) -> tuple[float, ...]:
 
 
 def errors(usual: Usual, truth: Sequence[float], factor: float = 0.0) -> tuple[float, float]:
-    """Mean error of the place without and with the signals; truth: second of the operation that each second is; factor: on the load"""
+    """Mean error of the place without and with the signals; truth: the true place in each second; factor: on the load."""
     costs: Costs = ()
     progress = off = put = 0.0
     for second, true in enumerate(truth):
