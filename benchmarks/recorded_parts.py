@@ -58,8 +58,7 @@ def show(title: str, found: Judgement, folder: Path | None) -> tuple[int, float]
     for span in found.spans:
         judged_s = found.judged_s(span)
         if judged_s:
-            own = found.scores[span.begin : span.end]
-            print(f"  {span.part.name:11} {span.part.text:27} judged {judged_s:5.0f} s  largest score {np.nanmax(own):5.2f}")
+            print(f"  {span.part.name:11} {span.part.text:27} judged {judged_s:5.0f} s  largest score {found.largest(span):5.2f}")
         hours += judged_s / 3600.0
         for alert in found.alerts:
             if alert.part is span.part:
@@ -84,7 +83,8 @@ def told(one: Outcome, folder: Path | None = None) -> str:
     if one.stranger_s is not None:
         verdict += f", a tool that is new to it after {one.stranger_s:.0f} s"
     truth = "right" if one.trial.is_right else "WRONG"
-    line = f"  {truth}  label {label:16} ran {part.text:27} ({part.name:11}) judged {one.judged_s:5.0f} s  {verdict}"
+    judged = f"judged {one.judged_s:5.0f} s, largest {one.most:5.2f}: {verdict}"
+    line = f"  {truth}  label {label:15} ran {part.text:27} ({part.name:11}) {judged}"
     if alert is None:
         return line
     earlier = one.trial.history[-1] if one.trial.history else None

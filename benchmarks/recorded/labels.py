@@ -28,12 +28,14 @@ class Trial(NamedTuple):
 
 class Outcome(NamedTuple):
     """alert: the first one in the part, None = none; judged_s: for how long the part was judged
+    most: the largest score in it, NaN = none
     stranger_s: when a tool came that no earlier part of the label has, so that nothing is known of it; None = never
     """
 
     trial: Trial
     alert: Alert | None
     judged_s: float
+    most: float
     stranger_s: float | None
 
 
@@ -41,7 +43,8 @@ def outcome(model: PartsModel, trial: Trial, rule: AlarmRule, folder: Path) -> O
     """Return what the scores make of a trial."""
     parts = [*(part.labelled(trial.label) for part in trial.history), trial.part.labelled(trial.label)]
     found = judgement(model, parts, rule, folder if trial.has_twin else None)
-    return Outcome(trial, found.first_alert(found.spans[-1]), found.judged_s(found.spans[-1]), _stranger_s(trial))
+    span = found.spans[-1]
+    return Outcome(trial, found.first_alert(span), found.judged_s(span), found.largest(span), _stranger_s(trial))
 
 
 def _stranger_s(trial: Trial) -> float | None:

@@ -49,6 +49,12 @@ class Judgement(NamedTuple):
         """Return the first alert of a part."""
         return next((one for one in self.alerts if one.part is span.part), None)
 
+    def largest(self, span: Span) -> float:
+        """Return the largest score of a part, NaN where it was not judged."""
+        own = slice(span.begin, span.end)
+        known = self.scores[own][~self.is_idle[own].astype(bool)]
+        return float(np.nanmax(known)) if np.isfinite(known).any() else float("nan")
+
     def judged_s(self, span: Span) -> float:
         """Return for how long a part was judged."""
         own = slice(span.begin, span.end)

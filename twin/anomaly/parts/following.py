@@ -35,8 +35,8 @@ BATCH_S = 240.0
 """After so long a standstill the material may be another one."""
 OVERRIDE_MIN = 0.01
 FEED_MIN = 1.0
-SETTLED = 0.03
-SETTLED_RPM = 20.0
+SETTLED = 0.006
+SETTLED_RPM = 5.0
 EXPECTED_PCT_MIN = 0.5
 ROWS_MAX = 30
 REST = Own._fields.index("expected") + 1
@@ -92,17 +92,17 @@ def _cut(model: PartsModel, own: Own, told: Told, place: Place, here: Mark, over
         sections, rows = with_rows(sections, before, rows), ()
     rpm = told.values[plan.speed_at] if plan.speed_at >= 0 else None
     settled = rpm is None or -SETTLED * rpm - SETTLED_RPM <= rpm - own.rpm <= SETTLED * rpm + SETTLED_RPM
-    z, d, is_told = residuals(model, own, told, override, settled, None if is_new else usual, place.section)
+    z, tells, d = residuals(model, own, told, override, settled, None if is_new else usual, place.section)
     if here[0] < 0 and usual is not None and not is_new and told.tick % max(1, round(CELL_S / model.tick_s)) == 0:
         place = _put_right(usual, place, d)
     expected = own.expected if told.expected is None else _expected_after(plan, own.expected, told, override, model)
-    if False in is_told:
-        told_at = tuple([told.tick if t else last for t, last in zip(is_told, own.told_at, strict=True)])
+    if 0.0 in tells:
+        told_at = tuple([told.tick if t else last for t, last in zip(tells, own.told_at, strict=True)])
     else:
-        told_at = (told.tick,) * len(is_told)
-    smooth = scales.smoothed(own.smooth, z, is_told, plan.shares)
+        told_at = (told.tick,) * len(tells)
+    smooth = scales.smoothed(own.smooth, z, tells, plan.shares)
     rest = own[REST:]
-    return Own(told.tick, place, rpm or 0.0, smooth, told_at, True not in is_told, is_new, (*rows, d), sections, expected, *rest)
+    return Own(told.tick, place, rpm or 0.0, smooth, told_at, not any(tells), is_new, (*rows, d), sections, expected, *rest)
 
 
 def _put_right(usual: Usual, place: Place, d: Sequence[float | None]) -> Place:

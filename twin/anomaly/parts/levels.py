@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 BATCH_VAR = 0.06**2
 MATERIAL_DRIFT = 0.003**2
-TOOL_DRIFT = 0.008**2
+TOOL_DRIFT = 0.005**2
 TOOL_VAR = 0.05**2
 """Variance of the level of a tool that has not been followed yet."""
 NOISE = 0.02**2
