@@ -9,12 +9,12 @@ from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 
-from processors.description import program_key
 from sparkplug.metric import Reading
 from twin.errors import ExpectationError
 from twin.expected import Expectation, Expected
 from twin.expected.files import load_expectations
 from twin.vocabulary import twin_signals
+from twin.vocabulary.program_names import program_key
 
 LINES_KEPT = 20_000
 NAMED_MAX = 5
