@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from processors.contract import Output
 from twin.anomaly.parts import scales
-from twin.anomaly.parts.episodes import Memory, Seen, alarm_of, followed, is_excused, part_ended
+from twin.anomaly.parts.episodes import Memory, Seen, alarm_of, followed, is_excused, nearest, part_ended
 from twin.anomaly.parts.feedback import told_of
 from twin.anomaly.parts.judging import Judged
 from twin.anomaly.parts.learning import learned
@@ -71,7 +71,7 @@ def learnt(scoring: "Scoring", before: PartsMember | None, found: tuple[Own, Jud
     outputs = [Output.null(RAW, judged.reason or "", name, at_s) if raw is None else Output(RAW, raw, machine=name, at_s=at_s)]
     why, is_shown = before.why, is_on or is_alarm
     if is_shown and (not before.is_shown or _is_stronger(judged.why, why)):
-        why = judged.why
+        why = judged.why and judged.why._replace(like=nearest(memory, _signature(scoring, own, judged)))
         outputs.append(_published(why, NO_REASON, name, at_s))
     elif before.is_shown and not is_shown:
         why = None
