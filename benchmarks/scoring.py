@@ -62,9 +62,9 @@ def answer(asked: Asked) -> Answer:
     took_s: dict[str, float] = {}
     own = [method for method in asked.methods if method in ABLATIONS]
     others = [method for method in asked.methods if method not in ABLATIONS]
-    recordings = [recorded(cell, place) for place in range(asked.machines)] if own else []
     for method in own:
         began = time.perf_counter()
+        recordings = [recorded(cell, place, has_twin=ABLATIONS[method].has_twin) for place in range(asked.machines)]
         found[method] = judged_parts(cell, asked.days, recordings, ABLATIONS[method], asked.alerts_per_week)
         took_s[method] = time.perf_counter() - began
     framed = by_frames.framed(cell, asked.days) if others else None

@@ -14,15 +14,18 @@ from benchmarks.scored.judged import CLEAR, DWELL, Judged, outcome, threshold_of
 from benchmarks.simulated_cell.cell import Cell, machine_readings
 from benchmarks.simulated_cell.machine import Machine
 from benchmarks.simulated_cell.schedule import DAY_S
-from benchmarks.simulated_cell.signals import FEATURES
+from benchmarks.simulated_cell.signals import FEATURES, Readings
 from twin.anomaly.alarm import AlarmRule
 from twin.anomaly.gate import gate
 from twin.anomaly.parts.replay import ALL, EXPECTED, Ablation, Recorded, fit, replayed
 from twin.expected import Expectation
 from twin.expected.making import expectation_of
+from twin.heat.run import Warming, spindle_temperature_c, thermal_constants
 from twin.machine import machine_from_toml
 
 Floats = NDArray[np.float64]
+RESIDUAL = "twin/spindle_temp_residual_k"
+SIGNALS = tuple(RESIDUAL if name == "spindle_temp_c" else name for name in FEATURES)
 TICK_S, TAIL_S, LATE_LOOK_BACK_S = 1, 8.0, 26.0
 ABLATIONS = {
     "parts": ALL,
@@ -41,16 +44,19 @@ def expectations(machine: Machine, name: str) -> list[Expectation]:
     ]
 
 
-def recorded(cell: Cell, place: int) -> Recorded:
-    """The recording of one machine of the cell, as its control tells it, with what the twin expects at each line."""
+def recorded(cell: Cell, place: int, *, has_twin: bool = True) -> Recorded:
+    """The recording of one machine of the cell, as its control tells it, with what the twin expects at each line.
+
+    The spindle's temperature is that beside the twin's, which knows speed, load, coolant and the air as the control tells them.
+    """
     machine, schedule, name = cell.machines[place], cell.schedules[place], f"vmc{place + 1}"
     found = machine_readings(cell, place)
     look_back_s = LATE_LOOK_BACK_S if machine.label_late_s else 0.0
     return Recorded(
         machine=name,
         tick_s=float(TICK_S),
-        signals=FEATURES,
-        values=found.rows,
+        signals=SIGNALS if has_twin else FEATURES,
+        values=_beside_twin(machine, name, found) if has_twin else found.rows,
         programs=schedule.names,
         program=schedule.program,
         tool=schedule.tool_number,
@@ -60,6 +66,18 @@ def recorded(cell: Cell, place: int) -> Recorded:
         gated=gate(schedule.tool_change_active, float(TICK_S), TAIL_S, look_back_s),
         expected=_by_line(expectations(machine, name), schedule.program, schedule.nc_line),
     )
+
+
+def _beside_twin(machine: Machine, name: str, found: Readings) -> Floats:
+    """The rows with the temperature less the twin's."""
+    load, rpm, _, measured_c, _ = found.rows.T
+    stated = machine_from_toml(machine.toml(machine.programs[0], name), name)
+    assert stated.thermal is not None, "a machine of the cell states its heat"
+    warming = Warming(np.arange(len(load), dtype=np.float64), load, rpm, found.ambient_c, found.coolant_on.astype(np.float64))
+    modelled_c = spindle_temperature_c(thermal_constants(stated.thermal), warming, found.ambient_c[0])[0]
+    rows = found.rows.copy()
+    rows[:, FEATURES.index("spindle_temp_c")] = measured_c - modelled_c
+    return rows
 
 
 def _by_line(known: Sequence[Expectation], program: NDArray[np.integer], line: NDArray[np.integer]) -> Floats:

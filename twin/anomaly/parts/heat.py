@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 TAUS_S = (600.0, 2400.0, 7200.0)
 DRIVERS = (SPEED, LOAD)
-BASE_S = 10_800.0
+BASE_S, RESIDUAL_BASE_S = 10_800.0, 86_400.0
 SETTLE_S = 7200.0
 RIDGE = 1e-3
 HELD = 0.05
@@ -75,33 +75,48 @@ def warmed(
     places: tuple[int, int],
     coefficients: Sequence[Sequence[float]],
     values: Sequence[float | None],
-    shares: tuple[tuple[float, ...], float],
+    shares: tuple[tuple[float, ...], tuple[float, ...]],
     *,
     is_held: bool,
 ) -> Heat:
-    """Return the heat after a tick; places: of speed and load, −1 = none; shares: of a tick in each time constant and the base.
+    """Return the heat after a tick; places: of speed and load, −1 = none; shares: of a tick in each time constant, and in the base of each signal.
 
     A base follows its temperature slowly, and next to not at all while the score is suspicious.
     """
     speed, load = (values[at] if at >= 0 else None for at in places)
     driven = driven_after(before.driven, ((speed or 0.0) * SCALES[SPEED], (load or 0.0) * SCALES[LOAD]), shares[0])
     base: list[float | None] = []
-    share = shares[1] if before.is_settled else max(shares[1], 1.0 / (before.steps + 1))
-    is_held = is_held and before.is_settled
-    for known, own, value in zip(before.base, coefficients, values, strict=True):
+    first = 0.0 if before.is_settled else 1.0 / (before.steps + 1)
+    slower = HELD if is_held and before.is_settled else 1.0
+    for known, own, value, usual in zip(before.base, coefficients, values, shares[1], strict=True):
         if value is None or not own:
             base.append(known)
         elif known is None:
             base.append(value - explained(own, driven))
         else:
-            base.append(known + (HELD * share if is_held else share) * (value - explained(own, driven) - known))
+            base.append(known + slower * max(usual, first) * (value - explained(own, driven) - known))
     return Heat(driven, tuple(base), min(before.steps + 1, STEPS))
 
 
+def base_s(signal: str) -> float:
+    """Return the time in which the base of a temperature follows it.
+
+    >>> base_s("spindle_temp_c"), base_s("twin/spindle_temp_residual_k")
+    (10800.0, 86400.0)
+    """
+    return RESIDUAL_BASE_S if signal.endswith("_residual_k") else BASE_S
+
+
 def fit_heat(
-    speed: "NDArray[np.float64]", load: "NDArray[np.float64]", temperature: "NDArray[np.float64]", tick_s: float
+    speed: "NDArray[np.float64]",
+    load: "NDArray[np.float64]",
+    temperature: "NDArray[np.float64]",
+    tick_s: float,
+    follows_s: float = BASE_S,
 ) -> tuple[float, ...]:
     """Return the coefficients of the smoothed drivers for a recorded temperature, in its unit; gaps are held.
+
+    follows_s: the time in which its base follows.
 
     Where it was hardly ever told, all are 0.
     """
@@ -126,8 +141,8 @@ def fit_heat(
     wanted = filled(temperature)
     first = float(wanted[np.argmax(known)])
     every = slice(0, None, max(1, round(30.0 / tick_s)))
-    shifted = np.stack([(column - smooth(column, BASE_S, 0.0))[every] for column in columns], axis=1)
-    target = (wanted - smooth(wanted, BASE_S, first))[every]
+    shifted = np.stack([(column - smooth(column, follows_s, 0.0))[every] for column in columns], axis=1)
+    target = (wanted - smooth(wanted, follows_s, first))[every]
     scale = np.maximum(shifted.std(axis=0), 1e-9)
     within = shifted / scale
     gram = within.T @ within / len(within) + RIDGE * np.eye(count)

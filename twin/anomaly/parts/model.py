@@ -11,7 +11,7 @@ from pydantic import Field
 from twin.anomaly.calibration import Finite, NotNegative, Positive, Record
 from twin.anomaly.common_features import MEMORY_S
 from twin.anomaly.parts import quantity, scales
-from twin.anomaly.parts.heat import BASE_S, EVERY_S, TAUS_S
+from twin.anomaly.parts.heat import EVERY_S, TAUS_S, base_s
 from twin.anomaly.parts.levels import BATCH_VAR, TOOL_VAR, Level
 from twin.anomaly.parts.quantity import Kind
 from twin.anomaly.parts.usual import Usual
@@ -33,7 +33,7 @@ class Plan:
     heat_every: int
     memory_ticks: int
     powers: tuple[float, ...]
-    heat_shares: tuple[tuple[float, ...], float]
+    heat_shares: tuple[tuple[float, ...], tuple[float, ...]]
     drivers_at: tuple[int, int]
     speed_at: int
     feed_at: int
@@ -111,7 +111,10 @@ class PartsModel(Record):
             shares=scales.shares(self.tick_s),
             memory_ticks=round(MEMORY_S / self.tick_s),
             heat_every=every if any(self.heat) else 0,
-            heat_shares=(tuple(every * self.tick_s / tau_s for tau_s in TAUS_S), every * self.tick_s / BASE_S),
+            heat_shares=(
+                tuple(every * self.tick_s / tau_s for tau_s in TAUS_S),
+                tuple(every * self.tick_s / base_s(name) for name in self.signals),
+            ),
             drivers_at=(at(quantity.SPEED), at(quantity.LOAD)),
             speed_at=at(quantity.SPEED),
             feed_at=at(quantity.FEED),

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.anomaly.parts import quantity
-from twin.anomaly.parts.heat import fit_heat
+from twin.anomaly.parts.heat import base_s, fit_heat
 from twin.anomaly.parts.model import RPM_STEP, PartsModel
 from twin.anomaly.parts.quantity import FEED, LOAD, SPEED, TURNS_RPM_MIN, Kind, floor_of, kind_of
 
@@ -48,7 +48,7 @@ def prepared(one: "Recorded") -> PartsModel:
     x = _quantities(first, one, settled)
     powers = tuple(_power(one, x[:, at], first.plan.kinds[at]) for at in range(len(one.signals)))
     heat = tuple(
-        fit_heat(rpm, load, columns[name], one.tick_s) if kind_of(name) is Kind.TEMPERATURE else () for name in one.signals
+        fit_heat(rpm, load, columns[name], one.tick_s, base_s(name)) if kind_of(name) is Kind.TEMPERATURE else () for name in one.signals
     )
     offset, spread = _twin_error(first.changed(power=powers), one, settled)
     return PartsModel(
