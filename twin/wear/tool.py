@@ -1,0 +1,183 @@
+"""A tool of a machine over its parts: the level of each of its operations when it is sharp, its trend, and when it is replaced.
+
+    level of the tool in a part = Σ (log ratio_o − sharp_o) / σ_o² / Σ 1 / σ_o²      over its operations o
+
+The sharp level of an operation is the mean of its first SHARP_USES uses after a replacement, of the first two lives, and stands still
+from then on. Until the first replacement, levels are counted from the first parts that were seen. σ_o is learned.
+"""
+
+from collections.abc import Mapping
+from math import sqrt
+from typing import NamedTuple
+
+from twin.wear.curve import LINE, slope
+from twin.wear.life import LIVES_MAX, Course, Known, Life, ended, followed, known
+from twin.wear.terms import Terms
+from twin.wear.trend import Trend, Wander, advanced, updated
+
+SHARP_USES, SHARP_LIVES = 5, 2
+NOISE, NOISE_MIN, NOISE_MAX = 0.03, 0.004, 0.3
+NOISE_PRIOR, NOISE_COUNT = 10, 200
+LIMIT_ASSUMED = 0.3
+"""The scale of a trend while no limit is known; nothing that is published depends on it."""
+RATE_WIDE, RATE_UNKNOWN = 4.0, 0.05
+SHARE_WANDER, RATE_WANDER = 0.03, 0.3
+WIDE_IS_BETTER = 5.0
+STEPPED_USES, REPLACED_USES = 3, 2
+OPERATIONS_MAX = 40
+MEMORY_USES = 10.0
+
+
+class Base(NamedTuple):
+    """The sharp level of an operation, learned from so many uses; the variance of its level from part to part, from so many."""
+
+    level: float
+    uses: int
+    noise: float
+    count: int = 0
+
+
+class Tool(NamedTuple):
+    """The state of a tool. uses: parts of the life that runs; is_whole: it was seen from its beginning
+
+    wide: the trend without earlier lives; sharp_lives: lives whose first uses are in the bases
+    low, high: uses in a row at which it seemed to be replaced, or far above what was expected; has_stepped: a sudden rise was taken
+    in; replaced_part, fell: of the last replacement, and by how much the level fell at it; vibration: mean of its log ratio
+    """
+
+    trend: Trend
+    wide: Trend
+    bases: Mapping[str, Base] = {}
+    uses: int = 0
+    is_whole: bool = False
+    sharp_lives: int = 0
+    low: int = 0
+    high: int = 0
+    has_stepped: bool = False
+    is_fast: bool = False
+    course: Course = Course()
+    lives: tuple[Life, ...] = ()
+    seen_s: float = 0.0
+    replaced_part: int = -1
+    fell: float = 0.0
+    vibration: float | None = None
+
+    def known(self, terms: Terms) -> Known:
+        """Return what is known of its lives; by assumption where that is nothing."""
+        return known(self.lives, terms.wear_limit) or Known(LIMIT_ASSUMED, 0.0, 0.0, 0.0, 0.0, LINE, 0)
+
+    @property
+    def is_learning(self) -> bool:
+        """True while the sharp level is still being learned, so that a level means nothing yet."""
+        return self.sharp_lives == 0 and self.uses < SHARP_USES
+
+
+class Level(NamedTuple):
+    """The level of a tool in a part over that of a sharp one, and its variance."""
+
+    level: float
+    noise: float
+
+
+def begun(life: Known, terms: Terms) -> tuple[Trend, Trend]:
+    """Return the trend of a sharp tool by what earlier lives say, and the one that lets it wear as it likes."""
+    sharp = (terms.sharp / (life.end * slope(life.curve, 0.0))) ** 2
+    if life.uses <= 0.0:
+        trend = Trend(0.0, 0.0, sharp, 0.0, RATE_UNKNOWN**2)
+        return trend, trend
+    rate = 1.0 / life.uses
+    return Trend(0.0, rate, sharp, 0.0, (rate * life.uses_spread) ** 2), Trend(0.0, rate, sharp, 0.0, (RATE_WIDE * rate) ** 2)
+
+
+def new_tool(terms: Terms) -> Tool:
+    """Return a tool that is seen for the first time, in the middle of a life."""
+    return Tool(*begun(Tool(_NONE, _NONE).known(terms), terms))
+
+
+_NONE = Trend(0.0, 0.0, 1.0, 0.0, 1.0)
+
+
+def wander_of(life: Known, trend: Trend) -> Wander:
+    """Return by how much share and rate wander in a use: by so much of themselves over a life."""
+    rate = min(1.0 / life.uses if life.uses > 0.0 else max(trend.rate, 0.001), 0.1)
+    return Wander(SHARE_WANDER**2 * rate * 10.0, (RATE_WANDER * rate) ** 2 * rate)
+
+
+def level_of(tool: Tool, logs: Mapping[str, float]) -> Level | None:
+    """Return the level of a tool by the log ratios of its operations in a part; None where none was seen before."""
+    weight = total = 0.0
+    for operation, value in logs.items():
+        base = tool.bases.get(operation)
+        if base is not None and base.uses:
+            own = 1.0 / (base.noise * (1.0 + 1.0 / base.uses))
+            weight += own
+            total += own * (value - base.level)
+    return Level(total / weight, 1.0 / weight) if weight else None
+
+
+def used(tool: Tool, terms: Terms, level: Level | None, material: float, material_var: float) -> Tool:
+    """Return the tool after a part in which it cut: its trend by the level less the material's."""
+    life = tool.known(terms)
+    wander = wander_of(life, tool.trend)
+    trend, wide = advanced(tool.trend, 1.0, wander), advanced(tool.wide, 1.0, wander)
+    course = tool.course
+    if level is not None and not tool.is_learning:
+        own, noise = level.level - material, level.noise + material_var
+        trend = updated(trend, own, noise, life.end, life.curve)
+        wide = updated(wide, own, noise, life.end, life.curve)
+        if wide.fit - trend.fit > WIDE_IS_BETTER:
+            trend, wide = wide._replace(fit=0.0), wide._replace(fit=0.0)
+        if tool.is_whole:
+            course = followed(course, tool.uses, own)
+    tool = tool._replace(trend=trend, wide=wide, course=course, uses=tool.uses + 1)
+    if tool.uses == SHARP_USES and tool.is_whole and tool.sharp_lives < SHARP_LIVES:
+        tool = tool._replace(sharp_lives=tool.sharp_lives + 1)
+    return tool._replace(is_fast=tool.is_fast or _is_fast(tool, life, terms))
+
+
+def _is_fast(tool: Tool, life: Known, terms: Terms) -> bool:
+    """Return True where even the slow end of the rate is so many times the fastest of earlier lives."""
+    if not (tool.is_whole and life.uses_least > 0.0 and tool.uses >= 4):
+        return False
+    wide = tool.wide
+    is_worn = wide.share - 2.0 * sqrt(wide.var) > 0.1
+    return is_worn and (wide.rate - 3.0 * sqrt(wide.rate_var)) * life.uses_least > terms.fast
+
+
+def learned(tool: Tool, logs: Mapping[str, float], material: float, wear: float, spreads: Mapping[str, float]) -> Tool:
+    """Return the tool with what a part tells of its operations: sharp levels while it is sharp, and their noise.
+
+    spreads: of the ratio over healthy parts, as the record tells it, by operation
+    """
+    bases = dict(tool.bases)
+    is_sharp = tool.uses < SHARP_USES and (tool.sharp_lives < SHARP_LIVES or not tool.is_whole)
+    for operation, value in logs.items():
+        base, own = bases.get(operation), value - material - wear
+        if base is None:
+            if len(bases) < OPERATIONS_MAX:
+                noise = min(max(spreads.get(operation, NOISE), NOISE_MIN), NOISE_MAX) ** 2
+                bases[operation] = Base(own, 1, noise)
+            continue
+        off = own - base.level
+        noise = base.noise
+        if base.uses > 1:
+            count = min(base.count + NOISE_PRIOR, NOISE_COUNT)
+            noise += (min(off * off, 9.0 * noise) - noise) / (count + 1)
+        level, uses = base.level, base.uses
+        if is_sharp and uses < SHARP_USES * SHARP_LIVES:
+            level, uses = level + off / (uses + 1), uses + 1
+        bases[operation] = Base(level, uses, max(noise, NOISE_MIN**2), base.count + 1)
+    return tool._replace(bases=bases)
+
+
+def replaced(tool: Tool, terms: Terms, part: int, fell: float) -> Tool:
+    """Return the tool with a new life, which has just begun; the life before is remembered if it was seen as a whole."""
+    life = ended(tool.course) if tool.is_whole and not tool.has_stepped else None
+    lives = tool.lives if life is None else (*tool.lives, life)[-LIVES_MAX:]
+    bases = tool.bases if tool.sharp_lives else {name: base._replace(uses=0) for name, base in tool.bases.items()}
+    fresh = tool._replace(lives=lives)
+    trend, wide = begun(fresh.known(terms), terms)
+    return Tool(
+        trend, wide, bases, is_whole=True, sharp_lives=tool.sharp_lives, lives=lives, seen_s=tool.seen_s,
+        replaced_part=part, fell=fell, vibration=None,
+    )  # fmt: skip
