@@ -18,6 +18,7 @@ from twin.wear.tool import (
     REPLACED_USES,
     STEPPED_USES,
     Level,
+    Told,
     Tool,
     learned,
     level_of,
@@ -70,20 +71,25 @@ def judged(wear: Wear, terms: Terms) -> Wear:
         return wear._replace(cuts=())
     at_s = max(cut.ended_s for cut in wear.cuts)
     tools = {name: wear.tools.get(name) or new_tool(terms) for name in cuts}
-    logs = {name: {cut.operation: log(cut.load_ratio) for cut in own if cut.load_ratio} for name, own in cuts.items()}
-    levels = {name: level_of(tools[name], logs[name]) for name in cuts}
+    told = {name: _told(own) for name, own in cuts.items()}
+    levels = {name: level_of(tools[name], told[name].logs) for name in cuts}
     names = [name for name in cuts if levels[name] is not None]
     found = explained([_seen(tools[name], levels[name], terms) for name in names], wear.material, terms)
     anchors = sum(tools[name].sharp_lives > 0 for name in names)
     for name, own in cuts.items():
         place = names.index(name) if name in names else None
-        tools[name] = _after(tools[name], terms, logs[name], levels[name], found, place, wear.parts)
+        tools[name] = _after(tools[name], terms, told[name], levels[name], found, place, wear.parts)
         tools[name] = _shaken(tools[name]._replace(seen_s=at_s), own)
     all_tools = {**wear.tools, **tools}
     for name in sorted(all_tools, key=lambda one: all_tools[one].seen_s)[: max(len(all_tools) - TOOLS_MAX, 0)]:
         del all_tools[name]
     material = followed(wear.material, found, terms) if names else wear.material
     return Wear(all_tools, material, (), wear.parts + 1, at_s, anchors)
+
+
+def _told(cuts: list[Cut]) -> Told:
+    logs = {cut.operation: log(cut.load_ratio) for cut in cuts if cut.load_ratio}
+    return Told(logs, {cut.operation: cut.load_ratio_sd for cut in cuts if cut.load_ratio_sd})
 
 
 def _seen(tool: Tool, level: Level | None, terms: Terms) -> Seen:
@@ -102,7 +108,7 @@ def _seen(tool: Tool, level: Level | None, terms: Terms) -> Seen:
 def _after(
     tool: Tool,
     terms: Terms,
-    logs: Mapping[str, float],
+    told: Told,
     level: Level | None,
     found: Explained,
     place: int | None,
@@ -110,7 +116,7 @@ def _after(
 ) -> Tool:
     """Return a tool after a part of which this much is shared."""
     if place is None or level is None:
-        return used(learned(tool, logs, found.level, _wear(tool, terms), {}), terms, None, found.level, found.var)
+        return used(learned(tool, told, found.level, _wear(tool, terms)), terms, None, found.level, found.var)
     off = found.off(place)
     if place in found.replaced or (off < -ODD_OFF and not tool.is_learning):
         low = tool.low + 1
@@ -120,7 +126,7 @@ def _after(
         fresh = replaced(tool, terms, part - low + 1, fell)
         for _ in range(low):
             fresh = used(fresh, terms, None, 0.0, 0.0)
-        return learned(fresh, logs, found.level, 0.0, {}) if not fresh.sharp_lives else fresh
+        return learned(fresh, told, found.level, 0.0) if not fresh.sharp_lives else fresh
     if off > ODD_OFF and not tool.is_learning:
         if tool.high + 1 < STEPPED_USES:
             return tool._replace(high=tool.high + 1, low=0)
@@ -132,7 +138,7 @@ def _after(
     shared, shared_var = found.without(place)
     after = used(tool, terms, level, shared, shared_var)
     wear = 0.0 if tool.is_learning else _wear(after, terms)
-    return learned(after._replace(uses=tool.uses), logs, found.level, wear, {})._replace(uses=after.uses, low=0, high=0)
+    return learned(after._replace(uses=tool.uses), told, found.level, wear)._replace(uses=after.uses, low=0, high=0)
 
 
 def _wear(tool: Tool, terms: Terms) -> float:

@@ -72,6 +72,13 @@ class Tool(NamedTuple):
         return self.sharp_lives == 0 and self.uses < SHARP_USES
 
 
+class Told(NamedTuple):
+    """The records of a tool's operations in a part: log ratios, and the spreads of the ratio over healthy parts where they are known."""
+
+    logs: Mapping[str, float]
+    spreads: Mapping[str, float]
+
+
 class Level(NamedTuple):
     """The level of a tool in a part over that of a sharp one, and its variance."""
 
@@ -144,18 +151,15 @@ def _is_fast(tool: Tool, life: Known, terms: Terms) -> bool:
     return is_worn and (wide.rate - 3.0 * sqrt(wide.rate_var)) * life.uses_least > terms.fast
 
 
-def learned(tool: Tool, logs: Mapping[str, float], material: float, wear: float, spreads: Mapping[str, float]) -> Tool:
-    """Return the tool with what a part tells of its operations: sharp levels while it is sharp, and their noise.
-
-    spreads: of the ratio over healthy parts, as the record tells it, by operation
-    """
+def learned(tool: Tool, told: Told, material: float, wear: float) -> Tool:
+    """Return the tool with what a part tells of its operations: sharp levels while it is sharp, and their noise."""
     bases = dict(tool.bases)
     is_sharp = tool.uses < SHARP_USES and (tool.sharp_lives < SHARP_LIVES or not tool.is_whole)
-    for operation, value in logs.items():
+    for operation, value in told.logs.items():
         base, own = bases.get(operation), value - material - wear
         if base is None:
             if len(bases) < OPERATIONS_MAX:
-                noise = min(max(spreads.get(operation, NOISE), NOISE_MIN), NOISE_MAX) ** 2
+                noise = min(max(told.spreads.get(operation, NOISE), NOISE_MIN), NOISE_MAX) ** 2
                 bases[operation] = Base(own, 1, noise)
             continue
         off = own - base.level
