@@ -85,7 +85,7 @@ def played(seed: int, days: float, fast: float, terms: Terms) -> Result:
             if mark is None and key in first:
                 continue
             status = status_of(name, tool, wear, terms)
-            if status.left is not None and key not in first:
+            if status.left is not None and key not in first and tool.uses <= truth.uses:
                 first[key] = truth.uses
             if mark is not None and len(tool.lives) >= 2 and not truth.is_fast:
                 uses = length[key][0]

@@ -4,12 +4,14 @@ A life that began at a replacement and ended at one gives its length T in parts,
 
     log T ~ N(mean, s²),   s² = (K·k² + Σ (log T − mean)²) / (K + L − 1) · (1 + 1/L)
 
-with K lives' worth of the usual spread k, and log R likewise: the predictive spread of a normal with an inverse-gamma prior, its mean
-shrunk to nothing (Gelman et al., Bayesian Data Analysis, 3rd ed., section 3.3).
+with K lives' worth of the usual spread k, and log R likewise: the predictive spread of a normal with an inverse-gamma prior (Gelman et
+al., Bayesian Data Analysis, 3rd ed., section 3.3). The mean is the median, and a deviation counts as at most FAR usual spreads, since a
+replacement that was not seen makes two lives one.
 """
 
 from collections.abc import Sequence
 from math import exp, log, sqrt
+from statistics import median
 from typing import NamedTuple
 
 from twin.wear.curve import KNOTS, LINE, Curve, mean_curve
@@ -19,6 +21,7 @@ LIVES_MIN = 2
 BINS_MAX = 24
 USUAL_LIVES, LENGTH_SPREAD, END_SPREAD = 2.0, 0.3, 0.2
 END_SHARE = 0.15
+FAR = 2.0
 USES_OF_A_LIFE_MIN = 6
 
 
@@ -112,6 +115,6 @@ def known(lives: Sequence[Life], limit: float | None) -> Known | None:
 
 def _pooled(values: Sequence[float], usual: float) -> tuple[float, float]:
     count = len(values)
-    mean = sum(values) / count
-    squares = USUAL_LIVES * usual**2 + sum((value - mean) ** 2 for value in values)
+    mean = median(values)
+    squares = USUAL_LIVES * usual**2 + sum(min(abs(value - mean), FAR * usual) ** 2 for value in values)
     return mean, sqrt(squares / (USUAL_LIVES + count - 1.0) * (1.0 + 1.0 / count))

@@ -72,7 +72,7 @@ def judged(wear: Wear, terms: Terms) -> Wear:
     at_s = max(cut.ended_s for cut in wear.cuts)
     tools = {name: wear.tools.get(name) or new_tool(terms) for name in cuts}
     told = {name: _told(own) for name, own in cuts.items()}
-    levels = {name: level_of(tools[name], told[name].logs) for name in cuts}
+    levels = {name: level_of(tools[name], told[name].logs, _wear(tools[name], terms)) for name in cuts}
     names = [name for name in cuts if levels[name] is not None]
     found = explained([_seen(tools[name], levels[name], terms) for name in names], wear.material, terms)
     anchors = sum(tools[name].sharp_lives > 0 for name in names)
@@ -102,7 +102,7 @@ def _seen(tool: Tool, level: Level | None, terms: Terms) -> Seen:
     if tool.is_learning:
         return Seen(level.level, level.noise, 0.0, terms.sharp**2)
     can_be_new = tool.sharp_lives > 0 and wear > REPLACED_MIN
-    return Seen(level.level, level.noise, wear, var, terms.sharp**2 if can_be_new else None, trend.share > DUE)
+    return Seen(level.level, level.noise, level.gain * wear, level.gain**2 * var, terms.sharp**2 if can_be_new else None, trend.share > DUE)
 
 
 def _after(
@@ -122,7 +122,7 @@ def _after(
         low = tool.low + 1
         if low < (REPLACED_USES if place in found.replaced else STEPPED_USES):
             return tool._replace(low=low, high=0, trend=advanced(tool.trend, 1.0, wander_of(tool.known(terms), tool.trend)))
-        fell = _wear(tool, terms) - (level.level - found.level)
+        fell = _wear(tool, terms) - (level.level - found.level) / level.gain
         fresh = replaced(tool, terms, part - low + 1, fell)
         for _ in range(low):
             fresh = used(fresh, terms, None, 0.0, 0.0)
@@ -130,7 +130,7 @@ def _after(
     if off > ODD_OFF and not tool.is_learning:
         if tool.high + 1 < STEPPED_USES:
             return tool._replace(high=tool.high + 1, low=0)
-        rise = level.level - found.level - _wear(tool, terms)
+        rise = (level.level - found.level) / level.gain - _wear(tool, terms)
         share = rise / tool.known(terms).end
         trend = tool.trend._replace(share=tool.trend.share + share, var=tool.trend.var + share * share)
         wide = tool.wide._replace(share=tool.wide.share + share, var=tool.wide.var + share * share)

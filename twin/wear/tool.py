@@ -1,9 +1,11 @@
 """A tool of a machine over its parts: the level of each of its operations when it is sharp, its trend, and when it is replaced.
 
-    level of the tool in a part = Σ (log ratio_o − sharp_o) / σ_o² / Σ 1 / σ_o²      over its operations o
+    log ratio_o = sharp_o + material + gain_o · wear + ε_o,   ε_o ~ N(0, σ_o²)      over its operations o
+    level of the tool in a part = Σ (log ratio_o − sharp_o) / σ_o² / Σ 1 / σ_o²
 
 The sharp level of an operation is the mean of its first SHARP_USES uses after a replacement, of the first two lives, and stands still
-from then on. Until the first replacement, levels are counted from the first parts that were seen. σ_o is learned.
+from then on. Until the first replacement, levels are counted from the first parts that were seen. σ_o is learned, and so is gain_o: an
+edge that is worn costs more force where the chip is thin. It is 1 for the first operation of a tool, in whose level its wear is given.
 """
 
 from collections.abc import Mapping
@@ -21,20 +23,27 @@ NOISE_PRIOR, NOISE_COUNT = 10, 200
 LIMIT_ASSUMED = 0.3
 """The scale of a trend while no limit is known; nothing that is published depends on it."""
 RATE_WIDE, RATE_UNKNOWN = 4.0, 0.05
-SHARE_WANDER, RATE_WANDER = 0.03, 0.3
+SHARE_WANDER, RATE_WANDER = 0.03, 0.15
 WIDE_IS_BETTER = 5.0
 STEPPED_USES, REPLACED_USES = 3, 2
 OPERATIONS_MAX = 40
 MEMORY_USES = 10.0
+GAIN_SPREAD, GAIN_MIN, GAIN_VAR_MIN, GAIN_NOISE = 0.3, 0.3, 1e-4, 0.03
+"""Spread of gains from 1, bounds, and the least noise with which one is learned: the error of the wear lasts for many parts."""
 
 
 class Base(NamedTuple):
-    """The sharp level of an operation, learned from so many uses; the variance of its level from part to part, from so many."""
+    """The sharp level of an operation, learned from so many uses; the variance of its level from part to part, from so many.
+
+    gain: by how much of the tool's wear it rises; gain_var: 0 for the first operation of a tool
+    """
 
     level: float
     uses: int
     noise: float
     count: int = 0
+    gain: float = 1.0
+    gain_var: float = 0.0
 
 
 class Tool(NamedTuple):
@@ -80,10 +89,11 @@ class Told(NamedTuple):
 
 
 class Level(NamedTuple):
-    """The level of a tool in a part over that of a sharp one, and its variance."""
+    """The level of a tool in a part over that of a sharp one, material and all; its variance; by how much of the wear it rises."""
 
     level: float
     noise: float
+    gain: float = 1.0
 
 
 def begun(life: Known, terms: Terms) -> tuple[Trend, Trend]:
@@ -110,16 +120,20 @@ def wander_of(life: Known, trend: Trend) -> Wander:
     return Wander(SHARE_WANDER**2 * rate * 10.0, (RATE_WANDER * rate) ** 2 * rate)
 
 
-def level_of(tool: Tool, logs: Mapping[str, float]) -> Level | None:
-    """Return the level of a tool by the log ratios of its operations in a part; None where none was seen before."""
-    weight = total = 0.0
+def level_of(tool: Tool, logs: Mapping[str, float], wear: float) -> Level | None:
+    """Return the level of a tool by the log ratios of its operations in a part; None where none was seen before.
+
+    wear: what is expected, since a gain that is not well known makes the level uncertain by so much
+    """
+    weight = total = gain = 0.0
     for operation, value in logs.items():
         base = tool.bases.get(operation)
         if base is not None and base.uses:
-            own = 1.0 / (base.noise * (1.0 + 1.0 / base.uses))
+            own = 1.0 / (base.noise * (1.0 + 1.0 / base.uses) + wear * wear * base.gain_var)
             weight += own
             total += own * (value - base.level)
-    return Level(total / weight, 1.0 / weight) if weight else None
+            gain += own * base.gain
+    return Level(total / weight, 1.0 / weight, gain / weight) if weight else None
 
 
 def used(tool: Tool, terms: Terms, level: Level | None, material: float, material_var: float) -> Tool:
@@ -130,12 +144,12 @@ def used(tool: Tool, terms: Terms, level: Level | None, material: float, materia
     course = tool.course
     if level is not None and not tool.is_learning:
         own, noise = level.level - material, level.noise + material_var
-        trend = updated(trend, own, noise, life.end, life.curve)
-        wide = updated(wide, own, noise, life.end, life.curve)
+        trend = updated(trend, own, noise, level.gain * life.end, life.curve)
+        wide = updated(wide, own, noise, level.gain * life.end, life.curve)
         if wide.fit - trend.fit > WIDE_IS_BETTER:
             trend, wide = wide._replace(fit=0.0), wide._replace(fit=0.0)
         if tool.is_whole:
-            course = followed(course, tool.uses, own)
+            course = followed(course, tool.uses, own / level.gain)
     tool = tool._replace(trend=trend, wide=wide, course=course, uses=tool.uses + 1)
     if tool.uses == SHARP_USES and tool.is_whole and tool.sharp_lives < SHARP_LIVES:
         tool = tool._replace(sharp_lives=tool.sharp_lives + 1)
@@ -156,22 +170,30 @@ def learned(tool: Tool, told: Told, material: float, wear: float) -> Tool:
     bases = dict(tool.bases)
     is_sharp = tool.uses < SHARP_USES and (tool.sharp_lives < SHARP_LIVES or not tool.is_whole)
     for operation, value in told.logs.items():
-        base, own = bases.get(operation), value - material - wear
-        if base is None:
-            if len(bases) < OPERATIONS_MAX:
-                noise = min(max(told.spreads.get(operation, NOISE), NOISE_MIN), NOISE_MAX) ** 2
-                bases[operation] = Base(own, 1, noise)
-            continue
-        off = own - base.level
-        noise = base.noise
-        if base.uses > 1:
-            count = min(base.count + NOISE_PRIOR, NOISE_COUNT)
-            noise += (min(off * off, 9.0 * noise) - noise) / (count + 1)
-        level, uses = base.level, base.uses
-        if is_sharp and uses < SHARP_USES * SHARP_LIVES:
-            level, uses = level + off / (uses + 1), uses + 1
-        bases[operation] = Base(level, uses, max(noise, NOISE_MIN**2), base.count + 1)
+        base = bases.get(operation)
+        if base is not None:
+            bases[operation] = _base_after(base, value - material, wear, is_sharp=is_sharp, is_known=tool.sharp_lives > 0)
+        elif len(bases) < OPERATIONS_MAX:
+            noise = min(max(told.spreads.get(operation, NOISE), NOISE_MIN), NOISE_MAX) ** 2
+            bases[operation] = Base(value - material - wear, 1, noise, gain_var=GAIN_SPREAD**2 if bases else 0.0)
     return tool._replace(bases=bases)
+
+
+def _base_after(base: Base, own: float, wear: float, *, is_sharp: bool, is_known: bool) -> Base:
+    """Return an operation after a part in which its level, less the material's, was `own`."""
+    noise, gain, gain_var = base.noise, base.gain, base.gain_var
+    off = own - base.level - gain * wear
+    if base.uses > 1:
+        count = min(base.count + NOISE_PRIOR, NOISE_COUNT)
+        noise += (min(off * off, 9.0 * noise) - noise) / (count + 1)
+    if is_known and not is_sharp and gain_var > 0.0:
+        pull = gain_var * wear / (wear * wear * gain_var + max(noise, GAIN_NOISE**2))
+        gain = min(max(gain + pull * off, GAIN_MIN), 1.0 / GAIN_MIN)
+        gain_var = max(gain_var * (1.0 - pull * wear), GAIN_VAR_MIN)
+    level, uses = base.level, base.uses
+    if is_sharp and uses < SHARP_USES * SHARP_LIVES:
+        level, uses = level + off / (uses + 1), uses + 1
+    return Base(level, uses, max(noise, NOISE_MIN**2), base.count + 1, gain, gain_var)
 
 
 def replaced(tool: Tool, terms: Terms, part: int, fell: float) -> Tool:
