@@ -1,8 +1,9 @@
 """The wear of all tools of a machine: cuts come in, parts are judged when they have ended.
 
-A part is what its cuts have in common, program and number. It is judged when a cut of another part comes: first what all tools share
-(twin/wear/material.py), then each tool by what is left (twin/wear/tool.py). A tool is taken to be replaced when its level has fallen
-back to that of a sharp one, and the others have not, in two of its parts in a row.
+A part is what its cuts have in common, program and number. It is judged when a cut of another part comes: first which batch it is of and
+which tools were replaced (twin/wear/material.py), then all tools together (twin/wear/joint.py), then what each operation tells of itself
+(twin/wear/tool.py). A tool is taken to be replaced when its level has fallen back to that of a sharp one, and the others have not, in
+two of its parts in a row; before a sharp one is known, when it has fallen alone in three.
 """
 
 from collections.abc import Mapping
@@ -11,7 +12,8 @@ from typing import NamedTuple
 
 from twin.wear.curve import at, slope
 from twin.wear.cut import Cut
-from twin.wear.material import Explained, Material, Seen, explained, followed
+from twin.wear.joint import MATERIAL, PART, Joint, Observed, passed, trend_of, with_tool
+from twin.wear.material import Batches, Explained, Seen, explained, followed
 from twin.wear.terms import Terms
 from twin.wear.tool import (
     MEMORY_USES,
@@ -45,11 +47,17 @@ class Wear(NamedTuple):
     """
 
     tools: Mapping[str, Tool] = {}
-    material: Material = Material()
+    joint: Joint = Joint()
+    batches: Batches = Batches()
     cuts: tuple[Cut, ...] = ()
     parts: int = 0
     at_s: float = 0.0
     anchors: int = 0
+
+    @property
+    def material(self) -> float:
+        """The level that all tools share in the batch that runs, as a logarithm, and 0 in the first batch that was seen."""
+        return self.joint.means[MATERIAL]
 
 
 def cut_added(wear: Wear, cut: Cut, terms: Terms) -> tuple[Wear, bool]:
@@ -71,20 +79,31 @@ def judged(wear: Wear, terms: Terms) -> Wear:
         return wear._replace(cuts=())
     at_s = max(cut.ended_s for cut in wear.cuts)
     tools = {name: wear.tools.get(name) or new_tool(terms) for name in cuts}
+    joint = wear.joint
+    for name, tool in tools.items():
+        joint = joint if name in joint.names else with_tool(joint, name, tool.trend)
+    joint = passed(joint, terms.part, {name: wander_of(tool.known(terms), tool.trend) for name, tool in tools.items()})
     told = {name: _told(own) for name, own in cuts.items()}
-    levels = {name: level_of(tools[name], told[name].logs, _wear(tools[name], terms)) for name in cuts}
-    names = [name for name in cuts if levels[name] is not None]
-    found = explained([_seen(tools[name], levels[name], terms) for name in names], wear.material, terms)
-    anchors = sum(tools[name].sharp_lives > 0 for name in names)
+    levels = {name: level_of(tools[name], told[name].logs, wear_of(tools[name], terms)) for name in cuts}
+    seen = [_seen(name, tools[name], level, joint, terms) for name, level in levels.items() if level is not None]
+    found = explained(joint, seen, wear.batches, terms)
+    joint = found.joint
     for name, own in cuts.items():
-        place = names.index(name) if name in names else None
-        tools[name] = _after(tools[name], terms, told[name], levels[name], found, place, wear.parts)
-        tools[name] = _shaken(tools[name]._replace(seen_s=at_s), own)
-    all_tools = {**wear.tools, **tools}
-    for name in sorted(all_tools, key=lambda one: all_tools[one].seen_s)[: max(len(all_tools) - TOOLS_MAX, 0)]:
-        del all_tools[name]
-    material = followed(wear.material, found, terms) if names else wear.material
-    return Wear(all_tools, material, (), wear.parts + 1, at_s, anchors)
+        tool = _after(tools[name], name, terms, told[name], levels[name], found, wear.parts)
+        if tool.trend[:5] != trend_of(joint, name)[:5]:
+            joint = with_tool(joint, name, tool.trend)
+        tools[name] = _shaken(tool._replace(seen_s=at_s), own)
+    batches = followed(wear.batches, wear.material) if found.is_batch else wear.batches
+    return Wear(
+        _bounded({**wear.tools, **tools}), joint, batches, (), wear.parts + 1, at_s,
+        sum(tools[one.worn.name].sharp_lives > 0 for one in seen),
+    )  # fmt: skip
+
+
+def _bounded(tools: dict[str, Tool]) -> dict[str, Tool]:
+    for name in sorted(tools, key=lambda one: tools[one].seen_s)[: max(len(tools) - TOOLS_MAX, 0)]:
+        del tools[name]
+    return tools
 
 
 def _told(cuts: list[Cut]) -> Told:
@@ -92,56 +111,52 @@ def _told(cuts: list[Cut]) -> Told:
     return Told(logs, {cut.operation: cut.load_ratio_sd for cut in cuts if cut.load_ratio_sd})
 
 
-def _seen(tool: Tool, level: Level | None, terms: Terms) -> Seen:
+def _seen(name: str, tool: Tool, level: Level, joint: Joint, terms: Terms) -> Seen:
     """Return a tool as the explanation of a part takes it."""
-    assert level is not None
-    life = tool.known(terms)
-    trend = advanced(tool.trend, 1.0, wander_of(life, tool.trend))
-    wear, steep = life.end * at(life.curve, trend.share), life.end * slope(life.curve, trend.share)
-    var = steep * steep * trend.var
+    life, trend = tool.known(terms), trend_of(joint, name)
+    sharp = Observed(name, level.level, level.noise + terms.sharp**2, 0.0, 0.0)
     if tool.is_learning:
-        return Seen(level.level, level.noise, 0.0, terms.sharp**2)
-    can_be_new = tool.sharp_lives > 0 and wear > REPLACED_MIN
-    return Seen(level.level, level.noise, level.gain * wear, level.gain**2 * var, terms.sharp**2 if can_be_new else None, trend.share > DUE)
+        return Seen(sharp)
+    end = level.gain * life.end
+    worn = Observed(name, level.level, level.noise, end * at(life.curve, trend.share), end * slope(life.curve, trend.share))
+    can_be_new = tool.sharp_lives > 0 and worn.expected > REPLACED_MIN
+    return Seen(worn, sharp if can_be_new else None, trend.share > DUE)
 
 
 def _after(
-    tool: Tool,
-    terms: Terms,
-    told: Told,
-    level: Level | None,
-    found: Explained,
-    place: int | None,
-    part: int,
+    tool: Tool, name: str, terms: Terms, told: Told, level: Level | None, found: Explained, part: int
 ) -> Tool:
-    """Return a tool after a part of which this much is shared."""
-    if place is None or level is None:
-        return used(learned(tool, told, found.level, _wear(tool, terms)), terms, None, found.level, found.var)
-    off = found.off(place)
-    if place in found.replaced or (off < -ODD_OFF and not tool.is_learning):
+    """Return a tool after a part that was explained like this."""
+    joint = found.joint
+    shared = joint.means[MATERIAL] + joint.means[PART]
+    trend = trend_of(joint, name, tool.trend.fit)
+    if level is None:
+        return used(learned(tool, told, shared, wear_of(tool, terms)), terms, trend, None, 0.0, 0.0)
+    far = found.off[name]
+    if name in found.replaced or (far < -ODD_OFF and not tool.is_learning):
         low = tool.low + 1
-        if low < (REPLACED_USES if place in found.replaced else STEPPED_USES):
-            return tool._replace(low=low, high=0, trend=advanced(tool.trend, 1.0, wander_of(tool.known(terms), tool.trend)))
-        fell = _wear(tool, terms) - (level.level - found.level) / level.gain
-        fresh = replaced(tool, terms, part - low + 1, fell)
+        if low < (REPLACED_USES if name in found.replaced else STEPPED_USES):
+            return tool._replace(low=low, high=0, trend=trend)
+        fresh = replaced(tool, terms, part - low + 1, wear_of(tool, terms) - (level.level - shared) / level.gain)
         for _ in range(low):
-            fresh = used(fresh, terms, None, 0.0, 0.0)
-        return learned(fresh, told, found.level, 0.0) if not fresh.sharp_lives else fresh
-    if off > ODD_OFF and not tool.is_learning:
+            fresh = used(fresh, terms, advanced(fresh.trend, 1.0, wander_of(fresh.known(terms), fresh.trend)), None, 0.0, 0.0)
+        return learned(fresh, told, shared, 0.0) if not fresh.sharp_lives else fresh
+    if far > ODD_OFF and not tool.is_learning:
         if tool.high + 1 < STEPPED_USES:
-            return tool._replace(high=tool.high + 1, low=0)
-        rise = (level.level - found.level) / level.gain - _wear(tool, terms)
-        share = rise / tool.known(terms).end
-        trend = tool.trend._replace(share=tool.trend.share + share, var=tool.trend.var + share * share)
-        wide = tool.wide._replace(share=tool.wide.share + share, var=tool.wide.var + share * share)
-        return tool._replace(trend=trend, wide=wide, high=0, low=0, has_stepped=True, uses=tool.uses + STEPPED_USES)
-    shared, shared_var = found.without(place)
-    after = used(tool, terms, level, shared, shared_var)
-    wear = 0.0 if tool.is_learning else _wear(after, terms)
-    return learned(after._replace(uses=tool.uses), told, found.level, wear)._replace(uses=after.uses, low=0, high=0)
+            return tool._replace(high=tool.high + 1, low=0, trend=trend)
+        share = ((level.level - shared) / level.gain - wear_of(tool, terms)) / tool.known(terms).end
+        stepped = trend._replace(share=trend.share + share, var=trend.var + share * share)
+        wide = tool.wide._replace(share=stepped.share, var=stepped.var)
+        return tool._replace(trend=stepped, wide=wide, high=0, low=0, has_stepped=True, uses=tool.uses + STEPPED_USES)
+    rows = joint.rows
+    shared_var = rows[MATERIAL][MATERIAL] + 2.0 * rows[MATERIAL][PART] + rows[PART][PART]
+    after = used(tool, terms, trend, level, shared, shared_var)
+    wear = 0.0 if tool.is_learning else wear_of(after, terms)
+    return learned(after._replace(uses=tool.uses), told, shared, wear)._replace(uses=after.uses, low=0, high=0)
 
 
-def _wear(tool: Tool, terms: Terms) -> float:
+def wear_of(tool: Tool, terms: Terms) -> float:
+    """Return the level of a tool over that of a sharp one."""
     life = tool.known(terms)
     return life.end * at(life.curve, tool.trend.share)
 

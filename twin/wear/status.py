@@ -124,7 +124,7 @@ def _basis(number: str, tool: Tool, wear: Wear, terms: Terms) -> str:
     if tool.has_stepped:
         said.append("its load stepped up in this life")
     if wear.anchors >= ANCHORS_MIN:
-        said.append(f"{_pct(wear.material.level):+g} % that all tools share is taken off")
+        said.append(f"{_pct(wear.material):+g} % that all tools share is taken off")
     else:
         said.append("material and wear can't be told apart: fewer than two tools of a part are known sharp")
     return "; ".join(said)

@@ -136,21 +136,23 @@ def level_of(tool: Tool, logs: Mapping[str, float], wear: float) -> Level | None
     return Level(total / weight, 1.0 / weight, gain / weight) if weight else None
 
 
-def used(tool: Tool, terms: Terms, level: Level | None, material: float, material_var: float) -> Tool:
-    """Return the tool after a part in which it cut: its trend by the level less the material's."""
+def used(tool: Tool, terms: Terms, trend: Trend, level: Level | None, material: float, material_var: float) -> Tool:
+    """Return the tool after a part in which it cut: `trend` is what is known of it now, with all tools together.
+
+    The trend that wears as it likes takes its level less the material's, and where that fits far better, it is the trend.
+    """
     life = tool.known(terms)
     wander = wander_of(life, tool.trend)
-    trend, wide = advanced(tool.trend, 1.0, wander), advanced(tool.wide, 1.0, wander)
-    course = tool.course
+    wide, course, fit = advanced(tool.wide, 1.0, wander), tool.course, tool.trend.fit
     if level is not None and not tool.is_learning:
-        own, noise = level.level - material, level.noise + material_var
-        trend = updated(trend, own, noise, level.gain * life.end, life.curve)
-        wide = updated(wide, own, noise, level.gain * life.end, life.curve)
-        if wide.fit - trend.fit > WIDE_IS_BETTER:
-            trend, wide = wide._replace(fit=0.0), wide._replace(fit=0.0)
+        own, noise, end = level.level - material, level.noise + material_var, level.gain * life.end
+        fit = updated(advanced(tool.trend, 1.0, wander), own, noise, end, life.curve).fit
+        wide = updated(wide, own, noise, end, life.curve)
+        if wide.fit - fit > WIDE_IS_BETTER:
+            trend, wide, fit = wide, wide._replace(fit=0.0), 0.0
         if tool.is_whole:
             course = followed(course, tool.uses, own / level.gain)
-    tool = tool._replace(trend=trend, wide=wide, course=course, uses=tool.uses + 1)
+    tool = tool._replace(trend=trend._replace(fit=fit), wide=wide, course=course, uses=tool.uses + 1)
     if tool.uses == SHARP_USES and tool.is_whole and tool.sharp_lives < SHARP_LIVES:
         tool = tool._replace(sharp_lives=tool.sharp_lives + 1)
     return tool._replace(is_fast=tool.is_fast or _is_fast(tool, life, terms))
