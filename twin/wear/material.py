@@ -21,6 +21,8 @@ BATCH_COST = log(40.0)
 REPLACED_COST, DUE_COST = log(400.0), log(15.0)
 """A tool is replaced in one part of so many; once its life is nearly over, far more often."""
 MEAN_BATCHES = 50
+LOW = -2.0
+"""Only tools that are lower than expected by two deviations may have been replaced."""
 
 
 class Batches(NamedTuple):
@@ -56,17 +58,17 @@ def explained(joint: Joint, tools: Sequence[Seen], batches: Batches, terms: Term
         more = [
             (_cost(here, tools, replaced | {one.worn.name}, batches, terms), replaced | {one.worn.name})
             for one in tools
-            if one.sharp is not None and one.worn.name not in replaced
+            if one.sharp is not None and one.worn.name not in replaced and best.off[one.worn.name] < LOW
         ]
         if not more:
             break
-        found, which = min(more, key=lambda one: one[0][0])
-        if found[0] >= best[0]:
+        found, which = min(more, key=lambda one: one[0].cost)
+        if found.cost >= best.cost:
             break
         best, replaced = found, which
-    joint = renewed(joint, MATERIAL, batches.mean, terms.material**2) if best[1] else joint
+    joint = renewed(joint, MATERIAL, batches.mean, terms.material**2) if best.is_batch else joint
     _, joint, missed = _taken(joint, _levels(tools, replaced))
-    return Explained(joint, best[1], replaced, missed)
+    return Explained(joint, best.is_batch, replaced, missed)
 
 
 def followed(batches: Batches, before: float) -> Batches:
@@ -79,14 +81,22 @@ def _levels(tools: Iterable[Seen], replaced: frozenset[str]) -> list[Observed]:
     return [one.sharp if one.sharp is not None and one.worn.name in replaced else one.worn for one in tools]
 
 
-def _cost(joint: Joint, tools: Sequence[Seen], replaced: frozenset[str], batches: Batches, terms: Terms) -> tuple[float, bool]:
-    """Return the cost of an explanation, and whether another batch makes it cheaper."""
+class _Costs(NamedTuple):
+    """The cost of an explanation, whether another batch makes it cheaper, and by how many deviations each tool is off by it."""
+
+    cost: float
+    is_batch: bool
+    off: dict[str, float]
+
+
+def _cost(joint: Joint, tools: Sequence[Seen], replaced: frozenset[str], batches: Batches, terms: Terms) -> _Costs:
     cost = sum(DUE_COST if one.is_due else REPLACED_COST for one in tools if one.worn.name in replaced)
     levels = _levels(tools, replaced)
-    same, _, _ = _taken(joint, levels)
-    other, _, _ = _taken(renewed(joint, MATERIAL, batches.mean, terms.material**2), levels)
-    is_batch = other + BATCH_COST < same
-    return cost + (other + BATCH_COST if is_batch else same), is_batch
+    same, _, off_same = _taken(joint, levels)
+    other, _, off_other = _taken(renewed(joint, MATERIAL, batches.mean, terms.material**2), levels)
+    if other + BATCH_COST < same:
+        return _Costs(cost + other + BATCH_COST, True, off_other)
+    return _Costs(cost + same, False, off_same)
 
 
 def _taken(joint: Joint, levels: Sequence[Observed]) -> tuple[float, Joint, dict[str, float]]:

@@ -28,13 +28,19 @@ WIDE_IS_BETTER = 5.0
 STEPPED_USES, REPLACED_USES = 3, 2
 OPERATIONS_MAX = 40
 MEMORY_USES = 10.0
-GAIN_SPREAD, GAIN_MIN, GAIN_VAR_MIN, GAIN_NOISE = 0.3, 0.3, 1e-4, 0.03
+PROVISIONAL = 0.03
+SHARP_ERROR = 0.02
+"""Errors of a sharp level: inferred from a worn tool, and of several operations, from one sharp tool."""
+EARLY, EARLY_WANDER = 0.25, 0.08
+"""Until this share of a life, lives differ by so much more: each is run in in its own way."""
+GAIN_SPREAD, GAIN_MIN, GAIN_VAR_MIN, GAIN_NOISE = 0.4, 0.4, 4e-4, 0.05
 """Spread of gains from 1, bounds, and the least noise with which one is learned: the error of the wear lasts for many parts."""
 
 
 class Base(NamedTuple):
     """The sharp level of an operation, learned from so many uses; the variance of its level from part to part, from so many.
 
+    uses: 0 while it was only seen on a tool that was worn already; level_var: of the sharp level; count: parts that taught the noise
     gain: by how much of the tool's wear it rises; gain_var: 0 for the first operation of a tool
     """
 
@@ -44,6 +50,7 @@ class Base(NamedTuple):
     count: int = 0
     gain: float = 1.0
     gain_var: float = 0.0
+    level_var: float = 0.0
 
 
 class Tool(NamedTuple):
@@ -117,7 +124,8 @@ _NONE = Trend(0.0, 0.0, 1.0, 0.0, 1.0)
 def wander_of(life: Known, trend: Trend) -> Wander:
     """Return by how much share and rate wander in a use: by so much of themselves over a life."""
     rate = min(1.0 / life.uses if life.uses > 0.0 else max(trend.rate, 0.001), 0.1)
-    return Wander(SHARE_WANDER**2 * rate * 10.0, (RATE_WANDER * rate) ** 2 * rate)
+    early = EARLY_WANDER**2 / EARLY * rate if trend.share < EARLY else 0.0
+    return Wander(SHARE_WANDER**2 * rate * 10.0 + early, (RATE_WANDER * rate) ** 2 * rate)
 
 
 def level_of(tool: Tool, logs: Mapping[str, float], wear: float) -> Level | None:
@@ -128,8 +136,8 @@ def level_of(tool: Tool, logs: Mapping[str, float], wear: float) -> Level | None
     weight = total = gain = 0.0
     for operation, value in logs.items():
         base = tool.bases.get(operation)
-        if base is not None and base.uses:
-            own = 1.0 / (base.noise * (1.0 + 1.0 / base.uses) + wear * wear * base.gain_var)
+        if base is not None and not (base.uses == 0 and tool.is_learning):
+            own = 1.0 / (base.noise + base.level_var + wear * wear * base.gain_var)
             weight += own
             total += own * (value - base.level)
             gain += own * base.gain
@@ -170,14 +178,15 @@ def _is_fast(tool: Tool, life: Known, terms: Terms) -> bool:
 def learned(tool: Tool, told: Told, material: float, wear: float) -> Tool:
     """Return the tool with what a part tells of its operations: sharp levels while it is sharp, and their noise."""
     bases = dict(tool.bases)
-    is_sharp = tool.uses < SHARP_USES and (tool.sharp_lives < SHARP_LIVES or not tool.is_whole)
+    is_sharp = tool.uses < SHARP_USES
     for operation, value in told.logs.items():
         base = bases.get(operation)
         if base is not None:
             bases[operation] = _base_after(base, value - material, wear, is_sharp=is_sharp, is_known=tool.sharp_lives > 0)
         elif len(bases) < OPERATIONS_MAX:
             noise = min(max(told.spreads.get(operation, NOISE), NOISE_MIN), NOISE_MAX) ** 2
-            bases[operation] = Base(value - material - wear, 1, noise, gain_var=GAIN_SPREAD**2 if bases else 0.0)
+            gain_var = GAIN_SPREAD**2 if bases else 0.0
+            bases[operation] = Base(value - material - wear, int(is_sharp), noise, 0, 1.0, gain_var, _level_var(wear, gain_var))
     return tool._replace(bases=bases)
 
 
@@ -185,17 +194,25 @@ def _base_after(base: Base, own: float, wear: float, *, is_sharp: bool, is_known
     """Return an operation after a part in which its level, less the material's, was `own`."""
     noise, gain, gain_var = base.noise, base.gain, base.gain_var
     off = own - base.level - gain * wear
-    if base.uses > 1:
+    if base.count > 0:
         count = min(base.count + NOISE_PRIOR, NOISE_COUNT)
         noise += (min(off * off, 9.0 * noise) - noise) / (count + 1)
-    if is_known and not is_sharp and gain_var > 0.0:
+    if is_known and not is_sharp and gain_var > 0.0 and base.uses:
         pull = gain_var * wear / (wear * wear * gain_var + max(noise, GAIN_NOISE**2))
         gain = min(max(gain + pull * off, GAIN_MIN), 1.0 / GAIN_MIN)
         gain_var = max(gain_var * (1.0 - pull * wear), GAIN_VAR_MIN)
-    level, uses = base.level, base.uses
+    level, uses, level_var = base.level, base.uses, base.level_var
     if is_sharp and uses < SHARP_USES * SHARP_LIVES:
-        level, uses = level + off / (uses + 1), uses + 1
-    return Base(level, uses, max(noise, NOISE_MIN**2), base.count + 1, gain, gain_var)
+        level, uses = (own - gain * wear if uses == 0 else level + off / (uses + 1)), uses + 1
+        level_var = (noise + SHARP_ERROR**2) / uses if gain_var else noise / uses
+    elif uses == 0 and _level_var(wear, gain_var) < 0.7 * level_var:
+        level, level_var = own - gain * wear, _level_var(wear, gain_var)
+    return Base(level, uses, max(noise, NOISE_MIN**2), base.count + 1, gain, gain_var, level_var)
+
+
+def _level_var(wear: float, gain_var: float) -> float:
+    """Return the variance of a sharp level that is inferred from a worn tool."""
+    return PROVISIONAL**2 + wear * wear * gain_var
 
 
 def replaced(tool: Tool, terms: Terms, part: int, fell: float) -> Tool:
