@@ -22,6 +22,8 @@ from twin.wear.tool import (
     Level,
     Told,
     Tool,
+    doubted,
+    leap,
     learned,
     level_of,
     new_tool,
@@ -29,13 +31,14 @@ from twin.wear.tool import (
     used,
     wander_of,
 )
-from twin.wear.trend import advanced
+from twin.wear.trend import Trend, advanced
 
 TOOLS_MAX = 120
 CUTS_MAX = 200
 ANCHORS_MIN = 2
 DUE = 0.7
 ODD_OFF = 4.0
+LEAP = 0.4
 REPLACED_MIN = 0.04
 """Less wear than this can't be told from the spread of sharp tools: its replacement is not looked for."""
 
@@ -133,26 +136,43 @@ def _after(
     if level is None:
         return used(learned(tool, told, shared, wear_of(tool, terms)), terms, trend, None, 0.0, 0.0)
     far = found.off[name]
-    if name in found.replaced or (far < -ODD_OFF and not tool.is_learning):
+    wear = wear_of(tool, terms)
+    is_low = name in found.replaced or (far < -ODD_OFF and not tool.is_learning)
+    is_high = far > ODD_OFF and not tool.is_learning
+    if is_low or is_high:
+        moved = leap(tool, told, shared)
+        has_leapt = moved is None or abs(moved) > max(LEAP * wear * level.gain, REPLACED_MIN)
+        if not has_leapt and len(tool.bases) > 1:
+            return used(doubted(tool, told, shared, wear), terms, trend, None, 0.0, 0.0)._replace(low=0, high=0)
+    if is_low:
         low = tool.low + 1
         if low < (REPLACED_USES if name in found.replaced else STEPPED_USES):
             return tool._replace(low=low, high=0, trend=trend)
-        fresh = replaced(tool, terms, part - low + 1, wear_of(tool, terms) - (level.level - shared) / level.gain)
-        for _ in range(low):
-            fresh = used(fresh, terms, advanced(fresh.trend, 1.0, wander_of(fresh.known(terms), fresh.trend)), None, 0.0, 0.0)
-        return learned(fresh, told, shared, 0.0) if not fresh.sharp_lives else fresh
-    if far > ODD_OFF and not tool.is_learning:
+        return _new_life(tool._replace(low=low), terms, told, shared, part, wear - (level.level - shared) / level.gain)
+    if is_high:
         if tool.high + 1 < STEPPED_USES:
             return tool._replace(high=tool.high + 1, low=0, trend=trend)
-        share = ((level.level - shared) / level.gain - wear_of(tool, terms)) / tool.known(terms).end
-        stepped = trend._replace(share=trend.share + share, var=trend.var + share * share)
-        wide = tool.wide._replace(share=stepped.share, var=stepped.var)
-        return tool._replace(trend=stepped, wide=wide, high=0, low=0, has_stepped=True, uses=tool.uses + STEPPED_USES)
+        return _stepped(tool, trend, ((level.level - shared) / level.gain - wear) / tool.known(terms).end)
     rows = joint.rows
     shared_var = rows[MATERIAL][MATERIAL] + 2.0 * rows[MATERIAL][PART] + rows[PART][PART]
     after = used(tool, terms, trend, level, shared, shared_var)
     wear = 0.0 if tool.is_learning else wear_of(after, terms)
     return learned(after._replace(uses=tool.uses), told, shared, wear)._replace(uses=after.uses, low=0, high=0)
+
+
+def _new_life(tool: Tool, terms: Terms, told: Told, shared: float, part: int, fell: float) -> Tool:
+    """Return the tool in its new life, of which it has gone through the parts in which it seemed to be replaced."""
+    fresh = replaced(tool, terms, part - tool.low + 1, fell)
+    for _ in range(tool.low):
+        fresh = used(fresh, terms, advanced(fresh.trend, 1.0, wander_of(fresh.known(terms), fresh.trend)), None, 0.0, 0.0)
+    return learned(fresh._replace(uses=0), told, shared, 0.0)._replace(uses=fresh.uses)
+
+
+def _stepped(tool: Tool, trend: Trend, share: float) -> Tool:
+    """Return the tool after a rise of its share of life that has lasted, as of a chipped edge."""
+    trend = trend._replace(share=trend.share + share, var=trend.var + share * share)
+    wide = tool.wide._replace(share=trend.share, var=trend.var)
+    return tool._replace(trend=trend, wide=wide, high=0, low=0, has_stepped=True, uses=tool.uses + STEPPED_USES)
 
 
 def wear_of(tool: Tool, terms: Terms) -> float:

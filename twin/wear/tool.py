@@ -41,7 +41,8 @@ class Base(NamedTuple):
     """The sharp level of an operation, learned from so many uses; the variance of its level from part to part, from so many.
 
     uses: 0 while it was only seen on a tool that was worn already; level_var: of the sharp level; count: parts that taught the noise
-    gain: by how much of the tool's wear it rises; gain_var: 0 for the first operation of a tool
+    gain: by how much of the tool's wear it rises; gain_var: 0 for the first operation of a tool; last: its level less the material's when
+    it was seen last
     """
 
     level: float
@@ -51,6 +52,7 @@ class Base(NamedTuple):
     gain: float = 1.0
     gain_var: float = 0.0
     level_var: float = 0.0
+    last: float | None = None
 
 
 class Tool(NamedTuple):
@@ -186,7 +188,7 @@ def learned(tool: Tool, told: Told, material: float, wear: float) -> Tool:
         elif len(bases) < OPERATIONS_MAX:
             noise = min(max(told.spreads.get(operation, NOISE), NOISE_MIN), NOISE_MAX) ** 2
             gain_var = GAIN_SPREAD**2 if bases else 0.0
-            bases[operation] = Base(value - material - wear, int(is_sharp), noise, 0, 1.0, gain_var, _level_var(wear, gain_var))
+            bases[operation] = Base(value - material - wear, int(is_sharp), noise, 0, 1.0, gain_var, _level_var(wear, gain_var), value - material)
     return tool._replace(bases=bases)
 
 
@@ -207,12 +209,32 @@ def _base_after(base: Base, own: float, wear: float, *, is_sharp: bool, is_known
         level_var = (noise + SHARP_ERROR**2) / uses if gain_var else noise / uses
     elif uses == 0 and _level_var(wear, gain_var) < 0.7 * level_var:
         level, level_var = own - gain * wear, _level_var(wear, gain_var)
-    return Base(level, uses, max(noise, NOISE_MIN**2), base.count + 1, gain, gain_var, level_var)
+    return Base(level, uses, max(noise, NOISE_MIN**2), base.count + 1, gain, gain_var, level_var, own)
 
 
 def _level_var(wear: float, gain_var: float) -> float:
     """Return the variance of a sharp level that is inferred from a worn tool."""
     return PROVISIONAL**2 + wear * wear * gain_var
+
+
+def leap(tool: Tool, told: Told, material: float) -> float | None:
+    """Return by how much a tool's operations stand above where each was seen last, the largest of them; None = none was seen before.
+
+    A tool that changed shows it in the very operation. One that seems to change as another program comes is another program's.
+    """
+    leaps = [value - material - base.last for name, value in told.logs.items() if (base := tool.bases.get(name)) and base.last is not None]
+    return max(leaps, key=abs) if leaps else None
+
+
+def doubted(tool: Tool, told: Told, material: float, wear: float) -> Tool:
+    """Return the tool whose sharp level in these operations is not believed any more, and learned anew from its wear."""
+    bases = dict(tool.bases)
+    for name, value in told.logs.items():
+        own = value - material
+        if (base := bases.get(name)) is not None:
+            gain_var = GAIN_SPREAD**2
+            bases[name] = Base(own - wear, 0, base.noise, base.count, 1.0, gain_var, _level_var(wear, gain_var), own)
+    return tool._replace(bases=bases)
 
 
 def replaced(tool: Tool, terms: Terms, part: int, fell: float) -> Tool:
