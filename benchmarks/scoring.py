@@ -31,7 +31,7 @@ from benchmarks.evaluation.baselines import constant_score, one_feature_score, r
 from benchmarks.evaluation.events import Detections, Event, delays_s, detections, false_alerts_a_week, recall
 from benchmarks.evaluation.range_based import Range, range_based, ranges
 from benchmarks.evaluation.volume import vus_pr
-from benchmarks.simulated_cell.cell import Cell, draw_cell, machine_signals
+from benchmarks.simulated_cell.cell import Cell, draw_cell, machine_readings
 from benchmarks.simulated_cell.fault import SIZES, Fault, FaultKind, Overlap
 from benchmarks.simulated_cell.schedule import DAY_S, Schedule
 from benchmarks.simulated_cell.signals import FEATURES
@@ -110,7 +110,7 @@ def framed(cell: Cell, days: tuple[int, int, int]) -> Frames:
 
 def _machine(cell: Cell, place: int, train_s: int) -> tuple[list[NDArray[Any]], Preparation]:
     """The arrays of `Frames` from `plain` to `judged` for one machine, in this order; what is usual for it."""
-    rows, schedule = machine_signals(cell, place), cell.schedules[place]
+    rows, schedule = machine_readings(cell, place).rows, cell.schedules[place]
     look_back_s = LATE_LOOK_BACK_S if cell.machines[place].label_late_s else 0.0
     shut = gate(schedule.tool_change_active, TICK_S, TAIL_S, look_back_s)
     codes, names = regimes(schedule, rows)

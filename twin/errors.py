@@ -9,6 +9,7 @@ TwinError
 ├── EffectError       an effect that does not exist, or is given what it does not take
 ├── OptimisationError a program in which nothing may be changed, or an optimisation that is asked for what there is not
 │   └── LimitsError   a program whose limits no feed and speed can keep
+├── ExpectationError a file that holds no expectation of a program, or a damaged one
 ├── ModelError        an anomaly model that cannot be trained, read or used (twin/anomaly/errors.py)
 ├── ResidualError     a residual model that cannot be trained, read or used (twin/residual/errors.py)
 ├── PointerError      a current.json that names no model (twin/models/errors.py)
@@ -47,6 +48,10 @@ class OptimisationError(TwinError):
 
 class LimitsError(OptimisationError):
     """Limits that leave a line nothing: the answer is bad news, the question was not wrong."""
+
+
+class ExpectationError(TwinError):
+    """An expectation that cannot be read or written."""
 
 
 class PartProgramError(TwinError):

@@ -1,6 +1,11 @@
-"""A cell of machines that work, are disturbed together and break: weeks of five features each second, with everything known.
+"""A cell of machines that work, are disturbed together and break: weeks of readings each second, with everything known.
 
-It was written from what machines and recordings show (what a spindle's load does in a tool change, how late a Hurco tells of
-one), and shares nothing with the detectors that are judged on it: disturbances and faults act on loads, speeds, temperatures and
-vibrations, never on a score.
+    part_program.py, tooling.py    programs as text, with passes whose engagement is known; the tool list
+    machine.py                     a machine as it is stated and as it is: the reference machine's milling, drive and heat
+    schedule.py                    shifts, batches, parts, lines, overrides, wear
+    disturbance.py, fault.py       what all feel, what breaks; broken.py puts faults on a machine
+    signals.py, cell.py            the readings of a machine; the cell
+
+The machine that is read shares no code with the twin nor with the detectors that are judged on it: disturbances and faults act on
+forces, powers, speeds, temperatures and vibrations, never on a score.
 """

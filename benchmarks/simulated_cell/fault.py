@@ -7,8 +7,16 @@
 | spindle_heat | 12 K | over 15 min | 60 to 80 min |
 | feed_mismatch | half the feed at the same load in the cut | at once | 6 to 15 min |
 | intermittent | vibration × 2.5 and load × 1.25 in bursts of 30 to 60 s, each 2 to 4 min, in the cut | at once | 25 to 40 min |
+| dulling_tool | one tool wears 15 times as fast: by 15 parts of 40 in 8 min; wear of 1 = edge force × 2, coefficient × 1.05 | slowly | 50 to 90 min |
+| broken_insert | one tooth of one tool is 0.1 mm short | at once | 20 to 40 min |
+| broken_tool | one tool cuts nothing, from one second to the next; it has no other size | at once | 8 to 15 min |
+| tool_too_long | one tool cuts 0.4 mm deeper than its 0.5 to 3 mm: the one that cuts least deep | at once | 20 to 40 min |
+| wrong_material | coefficient and edge force × 1.3, from the beginning of a part to the end of it or of the next | at once | 1 or 2 parts |
+| coolant_off | nothing flows though the control says so: coefficient × 1.2 in wet operations, no cooling by it | at once | 20 to 40 min |
+| worn_bearing | idle power × 1.3 and vibration × 1.5 while the spindle turns; judged apart, as of the scale of weeks | over days | 4 to 6 days |
 
-Size s: factors to the power s (a feed of 1 / (1 + s)), temperatures times s. Judged at the sizes 0.5, 1 and 2; the headline is 1.
+Size s: factors to the power s (a feed of 1 / (1 + s)); temperatures, lengths and the rate of wear times s; coolant that flows
+1 − min(s, 1). Judged at the sizes 0.5, 1 and 2; the headline is 1.
 """
 
 from dataclasses import dataclass
@@ -22,17 +30,24 @@ SIZES = (0.5, 1.0, 2.0)
 
 
 class FaultKind(StrEnum):
-    """What is broken."""
+    """The kinds of a fault."""
 
     BEARING = "bearing"
     CHIP_PACKING = "chip_packing"
     SPINDLE_HEAT = "spindle_heat"
     FEED_MISMATCH = "feed_mismatch"
     INTERMITTENT = "intermittent"
+    DULLING_TOOL = "dulling_tool"
+    BROKEN_INSERT = "broken_insert"
+    BROKEN_TOOL = "broken_tool"
+    TOOL_TOO_LONG = "tool_too_long"
+    WRONG_MATERIAL = "wrong_material"
+    COOLANT_OFF = "coolant_off"
+    WORN_BEARING = "worn_bearing"
 
 
 class Overlap(StrEnum):
-    """What happens at the same time, on purpose.
+    """A coincidence with something else, on purpose.
 
     DISTURBANCE: one that lasts from two minutes before the fault to two after it
     PEER_CHANGE: it begins within a peer's tool change; OWN_CHANGE: within one of its own
@@ -50,13 +65,31 @@ LASTS_S = {
     FaultKind.SPINDLE_HEAT: (3600, 4800),
     FaultKind.FEED_MISMATCH: (360, 900),
     FaultKind.INTERMITTENT: (1500, 2400),
+    FaultKind.DULLING_TOOL: (3000, 5400),
+    FaultKind.BROKEN_INSERT: (1200, 2400),
+    FaultKind.BROKEN_TOOL: (480, 900),
+    FaultKind.TOOL_TOO_LONG: (1200, 2400),
+    FaultKind.WRONG_MATERIAL: (900, 900),
+    FaultKind.COOLANT_OFF: (1200, 2400),
+    FaultKind.WORN_BEARING: (345_600, 518_400),
 }
 RAMP_S = {FaultKind.BEARING: 300.0, FaultKind.SPINDLE_HEAT: 900.0}
+ONE_TOOL = frozenset({FaultKind.DULLING_TOOL, FaultKind.BROKEN_INSERT, FaultKind.BROKEN_TOOL, FaultKind.TOOL_TOO_LONG})
+"""Kinds that belong to one tool: seen only while it is in the spindle."""
+PLANTED = tuple(kind for kind in FaultKind if kind is not FaultKind.WORN_BEARING)
+WEAR_OF_LIFE_EDGE, WEAR_OF_LIFE_COEFFICIENT = 1.0, 0.05
+"""Shares by which wear of 1, which is 40 parts, raises the force of the edge and the coefficient."""
+WEARS_FASTER, PART_S, LIFE_PARTS = 15.0, 480.0, 40
+WEAR_MAX = 4.0
+CHIPPED_MM, LONGER_MM = 0.1, 0.4
 
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """One fault of one machine, gone at `end_s`. bursts_s: when it shows, from the start; empty: all the time."""
+    """One fault of one machine, gone at `end_s`. bursts_s: when it shows, from the start; empty: all the time.
+
+    tool: whose fault it is, 0 = of no tool alone
+    """
 
     machine: int
     kind: FaultKind
@@ -65,6 +98,7 @@ class Fault:
     end_s: float
     overlap: Overlap
     bursts_s: tuple[tuple[float, float], ...] = ()
+    tool: int = 0
 
 
 def draw_bursts(lasts_s: float, rng: np.random.Generator) -> tuple[tuple[float, float], ...]:
@@ -77,13 +111,17 @@ def draw_bursts(lasts_s: float, rng: np.random.Generator) -> tuple[tuple[float, 
 
 
 def course(fault: Fault, t_s: Floats) -> Floats:
-    """How much of the fault there is at each time, 0 to 1."""
-    ramp_s = RAMP_S.get(fault.kind, 0.0)
+    """How much of the fault there is at each time, 0 to 1; of a dulling tool, the wear that has come at size 1."""
     inside = (t_s >= fault.start_s) & (t_s < fault.end_s)
+    since = t_s - fault.start_s
+    if fault.kind is FaultKind.DULLING_TOOL:
+        return np.where(inside, WEARS_FASTER / LIFE_PARTS * since / PART_S, 0.0)
+    if fault.kind is FaultKind.WORN_BEARING:
+        return np.where(inside, since / (fault.end_s - fault.start_s), 0.0)
+    ramp_s = RAMP_S.get(fault.kind, 0.0)
     if ramp_s:
-        share = np.clip(np.minimum(t_s - fault.start_s, fault.end_s - t_s) / ramp_s, 0.0, 1.0)
+        share = np.clip(np.minimum(since, fault.end_s - t_s) / ramp_s, 0.0, 1.0)
         return np.where(inside, share, 0.0)
     if fault.bursts_s:
-        since = t_s - fault.start_s
         inside &= np.any([(since >= start) & (since < end) for start, end in fault.bursts_s], axis=0)
     return inside.astype(np.float64)

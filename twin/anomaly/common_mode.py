@@ -35,6 +35,7 @@ class Method(StrEnum):
     SOURCE = "source"
     RESIDUAL = "residual"
     FEATURES = "features"  # not of scores: twin/anomaly/common_features.py
+    PARTS = "parts"  # not of scores: twin/anomaly/parts/
 
 
 @dataclass(frozen=True, slots=True)

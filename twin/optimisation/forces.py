@@ -5,7 +5,7 @@ the feed at any speed n is c_max · N · n. Nominally the force is c times a fig
 size effect it is the root of a growing function, found to 1e-12. What the learned terms of a machine make of it is sampled.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from twin.effects.added import added_effects
 from twin.effects.catalogue import effect_named
-from twin.machine import Tool
+from twin.machine import MachineFile, Tool
 from twin.optimisation.learned_forces import LearnedForces
 from twin.optimisation.program import Cuts, Programmed
 from twin.process.kernel import process_quantities
@@ -45,8 +45,8 @@ class CutForces:
     @classmethod
     def of(cls, program: Programmed) -> "CutForces":
         """The forces of a program on its machine, effects included."""
+        constants = process_constants(program.machine)
         added = added_effects(program.machine, process_quantities())
-        constants = {f"{e}__{k}": v for e, given in added.items() for k, v in effect_named(e).checked(given).items()}
         tool = np.array([program.lines[int(line)].tool for line in program.cuts.line], dtype=np.int64)
         named = tuple(f"tools.{n}" if str(n) in program.machine.tools else "tool" for n, _ in program.tools)
         tools, cuts = tuple(tool for _, tool in program.tools), program.cuts
@@ -121,13 +121,31 @@ class CutForces:
         return peak_force(constants, tool.teeth, RPM, feed, cuts.axial_depth_mm[mine], *arcs, effects=self.effects)
 
     def _tangential_of_tool(self, tool: Tool, mine: Ints, advance: Floats) -> Floats:
-        """A tick that lasts a whole turn: at 60 rev/min one of 1 s."""
-        constants: dict[str, ArrayLike] = {**tool_constants(tool), **self.effect_constants}
-        zero = np.zeros(len(mine))
         cuts = self.cuts
         arcs = (cuts.axial_depth_mm[mine], cuts.entry_angle_rad[mine], cuts.exit_angle_rad[mine])
-        motion = Milling(zero, np.full(len(mine), 60.0), advance * tool.teeth, zero, *arcs)
-        return np.asarray(milling_force(constants, tool.teeth, motion, period_s=1.0, effects=self.effects).mean_tangential_n[0])
+        return mean_tangential_n({**tool_constants(tool), **self.effect_constants}, self.effects, tool.teeth, arcs, advance)
+
+
+def mean_tangential_n(
+    constants: Mapping[str, ArrayLike],
+    effects: Sequence[str],
+    teeth: int,
+    arcs: tuple[Floats, Floats, Floats],
+    advance_mm: Floats,
+) -> Floats:
+    """Return the mean over a turn of the tangential force of all teeth, (cuts,). arcs: depth, entry and exit of each cut
+
+    A tick lasts a whole turn: at 60 rev/min one of 1 s.
+    """
+    zero = np.zeros(len(advance_mm))
+    motion = Milling(zero, np.full(len(advance_mm), 60.0), advance_mm * teeth, zero, *arcs)
+    return np.asarray(milling_force(constants, teeth, motion, period_s=1.0, effects=tuple(effects)).mean_tangential_n[0])
+
+
+def process_constants(machine: MachineFile) -> dict[str, float]:
+    """Return the constants of the effects on the force of the cut, as the kernels name them."""
+    added = added_effects(machine, process_quantities())
+    return {f"{e}__{k}": v for e, given in added.items() for k, v in effect_named(e).checked(given).items()}
 
 
 def constant_name(path: str) -> tuple[str, str]:

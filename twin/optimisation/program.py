@@ -15,11 +15,12 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.engagement.along_path import PathRows, Section, engaged_along
+from twin.engagement.along_path import PathRows, engaged_along
+from twin.engagement.tools import collision_notes, tool_notes, tool_sections, tools_used, unknown_start
 from twin.errors import MachineError, OptimisationError
 from twin.gcode import Arc, Linear, interpret
 from twin.machine import MachineFile, Tool
-from twin.motion.path import EventKind, Kind, Path, path_from_moves
+from twin.motion.path import Kind, Path, path_from_moves
 from twin.optimisation.spring_passes import touching
 from twin.optimisation.words import branches, codes, figure_mm_min, find_word, inch_lines, source_lines
 
@@ -124,14 +125,14 @@ def programmed(
     path = path_from_moves(moves, machine.settings.start_mm or None)
     if engagement is None and machine.stock is None:
         raise MachineError("no [stock]: what a line cuts is not known; write [stock], or give a run log with --engagement")
-    numbers, tools = _tools(machine, path)
-    notes = _tool_notes(machine, path)
+    numbers, tools = tools_used(machine, path)
+    notes = tool_notes(machine, path)
     rows: PathRows | None = None
-    sections = _sections(numbers, tools, _unknown_start(path))
+    sections = tool_sections(numbers, tools, unknown_start(path))
     collisions: tuple[int, ...] = ()
     if engagement is None and machine.stock is not None:
         rows = engaged_along(path, machine.stock, sections)
-        notes += _collision_notes(path, rows)
+        notes += collision_notes(path, rows)
         collisions = tuple(sorted({int(path.line[hit.segment]) + 1 for hit in rows.collisions}))
     speeds = path.commanded_rpm()
     tied = {move.line for move in moves if isinstance(move, Linear | Arc) and move.feed_per_rev_mm is not None}
@@ -191,64 +192,6 @@ class _LineCuts:
     rows: Floats
     cut_mm: float
     plunges: bool
-
-
-def tool_numbers(path: Path) -> Ints:
-    """The number of the tool in the spindle on each segment (n,); 0 before the first change."""
-    number = np.zeros(len(path), dtype=np.int64)
-    for event in path.events:
-        if event.kind == EventKind.TOOL_CHANGE:
-            number[event.segment :] = int(event.value)
-    return number
-
-
-def _tools(machine: MachineFile, path: Path) -> tuple[Ints, list[tuple[int, Tool]]]:
-    """Index of the tool of each segment, −1 where it is not described, and the tools."""
-    number = tool_numbers(path)
-    tools: list[tuple[int, Tool]] = []
-    index = np.full(len(path), -1, dtype=np.int64)
-    for one in dict.fromkeys(number.tolist()):
-        tool = machine.tools.get(str(one), None if machine.tools and one else machine.tool)
-        if tool is not None:
-            index[number == one] = len(tools)
-            tools.append((one, tool))
-    return index, tools
-
-
-def _tool_notes(machine: MachineFile, path: Path) -> list[str]:
-    """Says it where several tools of the program are taken to be one."""
-    numbers = {int(event.value) for event in path.events if event.kind == EventKind.TOOL_CHANGE and event.value}
-    if len(numbers) < 2 or machine.tools or machine.tool is None:
-        return []
-    taken = f"all are taken to be the {machine.tool.diameter_mm:g} mm one of [tool]"
-    return [f"the program has {len(numbers)} tools; {taken}: write [tools.N]"]
-
-
-def _collision_notes(path: Path, rows: PathRows) -> list[str]:
-    """Return notes on rapids that go into material, the first three."""
-    said = []
-    for hit in rows.collisions[:3]:
-        place = ", ".join(f"{v:.1f}" for v in hit.position_mm)
-        said.append(f"line {int(path.line[hit.segment]) + 1}: rapid into material at {place} mm")
-    return said
-
-
-def _unknown_start(path: Path) -> int:
-    """Return the number of rapids before the first motion of Z: where they go from is not known, so they meet nothing."""
-    level = (path.kind == Kind.RAPID) & (path.start_mm[:, 2] == path.end_mm[:, 2])
-    count = int(np.argmin(level)) if not level.all() else len(path)
-    leaves_z = count < len(path) and path.kind[count] == Kind.RAPID
-    return count + int(leaves_z)
-
-
-def _sections(index: Ints, tools: Sequence[tuple[int, Tool]], unknown: int) -> list[Section]:
-    if not len(index):
-        return []
-    edges = np.unique(np.concatenate([[0, unknown], np.flatnonzero(np.diff(index)) + 1, [len(index)]]))
-    return [
-        Section(int(a), int(b), tools[int(index[a])][1].diameter_mm if index[a] >= 0 and a >= unknown else 0.0)
-        for a, b in pairwise(edges)
-    ]
 
 
 def _executions(path: Path) -> dict[int, tuple[tuple[int, int], ...]]:

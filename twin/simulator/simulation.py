@@ -77,14 +77,14 @@ def simulate(
     would be longer than 8 million ticks, EffectError where its effects do not fit.
     """
     notes: list[str] = []
-    settings = _settings(machine) if settings is None else settings
+    settings = program_settings(machine) if settings is None else settings
     path = path_from_moves(interpret(text, settings), settings.start_mm or None, settings.axes)
     moving = [a for column, a in enumerate(path.axes) if np.any(path.start_mm[:, column] != path.end_mm[:, column])]
     missing = [a for a in moving if a not in machine.axes]
     if missing:
         follow = "follow their references" if len(missing) > 1 else "follows its reference"
         notes.append(f"no [axes.{missing[0]}]: {' and '.join(missing)} {follow} without error in this run")
-    planned = _planned(machine, path, notes)
+    planned = program_plan(machine, path, notes)
     period_s = machine.machine.servo_period_s
     if planned.total_s / period_s > TICKS_MAX:
         raise MachineError(f"{name} takes {planned.total_s:.0f} s, more than {TICKS_MAX} ticks of {period_s} s; split it")
@@ -117,7 +117,7 @@ def simulate(
     return Simulation(run, response, planned, tuple(notes), learned_s)
 
 
-def _settings(machine: MachineFile) -> Settings:
+def program_settings(machine: MachineFile) -> Settings:
     """The settings of the control, with a word for each rotary axis of the machine, which starts at 0 deg."""
     settings = machine.settings
     if not (more := (0.0,) * (len(machine.words) - 3)):
@@ -131,7 +131,7 @@ def _settings(machine: MachineFile) -> Settings:
     )
 
 
-def _planned(machine: MachineFile, path: Path, notes: list[str]) -> Plan:
+def program_plan(machine: MachineFile, path: Path, notes: list[str]) -> Plan:
     """The plan of the control that the machine states, as its effects change it."""
     if machine.program is None and not effects_tell(machine):
         notes.append("no [program]: 30 m/min, 2.5 m/s², 60 m/s³ and corners of 500 mm/min were taken for the control")

@@ -37,6 +37,13 @@ COMMON_MODE = f"{TWIN_PREFIX}common_mode"
 TOOL_CHANGE_GATE = f"{TWIN_PREFIX}tool_change_gate"
 GATED_SHARE_PCT = f"{TWIN_PREFIX}gated_share_pct"
 SCORE_DRIFT = f"{TWIN_PREFIX}score_drift"
+ANOMALY_WHY = f"{TWIN_PREFIX}anomaly_why"
+"""JSON text while an alarm is on: the signal, the cut and how far from what was expected (twin/anomaly/parts/why.py)."""
+ANOMALY_KNOWS = f"{TWIN_PREFIX}anomaly_knows"
+ANOMALY_VERDICTS = f"{TWIN_PREFIX}anomaly_verdicts"
+"""JSON text on change: the last alarms with who said what of them, and what follows from it (twin/anomaly/parts/feedback.py)."""
+CUT_RECORD = f"{TWIN_PREFIX}cut_record"
+"""JSON text at the end of an operation of a part (twin/anomaly/parts/record.py)."""
 
 # gap
 GAP_PREFIX = f"{TWIN_PREFIX}gap_"

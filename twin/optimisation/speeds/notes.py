@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from twin.engagement.tools import tool_numbers
 from twin.motion.path import Path
 from twin.optimisation.answer import Objective, SpeedChanges
 from twin.optimisation.problem import Problem
-from twin.optimisation.program import tool_numbers
 from twin.optimisation.question import Question
 from twin.optimisation.seeds import in_sequence
 from twin.optimisation.speeds.groups import speed_groups

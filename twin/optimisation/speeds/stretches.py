@@ -13,9 +13,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from twin.engagement.tools import tool_numbers
 from twin.motion.path import EventKind, Kind, Path
 from twin.optimisation.answer import SpeedChanges
-from twin.optimisation.program import CLEARANCE_MM, Programmed, tool_numbers
+from twin.optimisation.program import CLEARANCE_MM, Programmed
 
 Flags = NDArray[np.bool_]
 HAIR_MM = 1e-6

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from tests.depth import examples
 from tests.twin.optimisation.benchmark import machine_with, paper, second, text
+from twin.engagement.tools import tool_numbers
 from twin.errors import LimitsError
 from twin.gcode import interpret
 from twin.motion.path import Path, path_from_moves
@@ -18,7 +19,6 @@ from twin.optimisation.forces import CutForces
 from twin.optimisation.optimise import Hooks, optimise
 from twin.optimisation.paper import forces_of_lines
 from twin.optimisation.problem import Problem
-from twin.optimisation.program import tool_numbers
 from twin.optimisation.question import Question, problem
 from twin.optimisation.seeds import closed_form, worth_of
 from twin.optimisation.speeds.groups import Kept, speed_groups

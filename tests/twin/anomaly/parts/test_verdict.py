@@ -1,0 +1,149 @@
+"""Verdicts: what each brings about, the order in which they come, and what is refused."""
+
+import itertools
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tests.twin.anomaly.parts.alarms import LOAD, THRESHOLD, alarmed, seen, signature, verdict
+from twin.anomaly.parts.episodes import Memory, alarm_of, followed
+from twin.anomaly.parts.signature import Signature
+from twin.anomaly.parts.verdict import (
+    FACTOR_MAX,
+    HALF_LIFE_S,
+    MARGIN,
+    TOLERATED_MAX,
+    Verdict,
+    corrected_memory,
+    limit_factor,
+    limits_of,
+    refused,
+    verdict_of,
+)
+
+WORDS = st.sampled_from(["true", "false", "known"])
+
+
+def score_of(given_signature: Signature, memory: Memory, at_s: float) -> float:
+    """A score as a chart of several signals has it: the length of what is left, each part by its raised limit."""
+    operation = given_signature.operation
+    parts = [(one.left, limit_factor(memory, operation, one.signal, one.scale, one.side, at_s)) for one in given_signature.shares]
+    return math.hypot(*(left / factor for left, factor in parts))
+
+
+@given(load=st.floats(2.0, 5.0), vibration=st.floats(-1.0, 1.0))
+def test_the_same_size_as_a_false_alarm_does_not_alarm_again(load: float, vibration: float) -> None:
+    given_signature = signature(load, vibration)
+    score = score_of(given_signature, Memory(), 0.0)
+    memory = followed(followed(Memory(), seen(score, given_signature), 1000.0), None, 1010.0)
+    memory = corrected_memory(memory, verdict("false"))
+    assert score_of(given_signature, memory, 2000.0) <= score / min(FACTOR_MAX, MARGIN * score / THRESHOLD) * 1.01
+    assert score_of(given_signature, memory, 2000.0) < THRESHOLD
+
+
+def test_a_raised_limit_is_of_its_operation_signal_scale_and_side_only() -> None:
+    memory = corrected_memory(alarmed(score=4.0), verdict("false"))
+    assert limit_factor(memory, "O1|T5|1", LOAD, "cut", 1, 2000.0) == 2.0 * MARGIN
+    others = [
+        ("O1|T6|1", LOAD, "cut", 1),
+        ("O1|T5|1", LOAD, "seconds", 1),
+        ("O1|T5|1", LOAD, "cut", -1),
+        ("O1|T5|1", "x", "cut", 1),
+    ]
+    assert [limit_factor(memory, *other, 2000.0) for other in others] == [1.0] * 4
+
+
+def test_a_raised_limit_is_bounded_and_forgotten() -> None:
+    memory = corrected_memory(alarmed(score=100.0), verdict("false"))
+    factors = [limit_factor(memory, "O1|T5|1", LOAD, "cut", 1, 2000.0 + halves * HALF_LIFE_S) for halves in range(9)]
+    assert factors[:3] == [FACTOR_MAX, 1.0 + (FACTOR_MAX - 1.0) / 2.0, 1.0 + (FACTOR_MAX - 1.0) / 4.0]
+    assert factors[-1] == 1.0
+    assert "call it known" in memory.outcomes[-1].text
+
+
+def test_many_false_alarms_raise_a_bounded_number_of_limits() -> None:
+    memory = Memory()
+    for place in range(TOLERATED_MAX):
+        at_s = 1000.0 + 100.0 * place
+        memory = corrected_memory(alarmed(memory, at_s, given=signature(tool=place)), verdict("false", at_s, at_s + 20.0))
+    assert len(memory.tolerated) == TOLERATED_MAX
+    assert limits_of(memory, f"O1|T{TOLERATED_MAX - 1}|1", 2e4) != {}
+
+
+def test_the_parts_of_a_false_alarm_may_be_learned_and_of_no_other() -> None:
+    assert corrected_memory(alarmed(), verdict("false")).learn == ("O1#7",)
+    assert corrected_memory(alarmed(), verdict("true")).learn == ()
+    assert corrected_memory(alarmed(), verdict("known")).learn == ()
+
+
+def test_an_alarm_that_is_on_goes_off_by_false_and_by_known_and_stays_by_true() -> None:
+    memory = followed(Memory(), seen(), 1000.0)
+    assert [alarm_of(corrected_memory(memory, verdict(word))) for word in ("true", "false", "known")] == [True, False, False]
+
+
+def test_a_person_ends_an_alarm_that_stands() -> None:
+    memory = corrected_memory(alarmed(), verdict("true"))
+    ended = corrected_memory(memory, verdict("true", at_s=2100.0, ends=True))
+    assert (alarm_of(memory), alarm_of(ended)) == (True, False)
+    late = corrected_memory(memory, verdict("true", at_s=1900.0, ends=True))
+    assert alarm_of(late)
+
+
+@given(words=st.lists(st.tuples(WORDS, st.integers(2000, 2005), st.sampled_from(["ada", "bob"])), min_size=1, max_size=3))
+def test_the_order_in_which_verdicts_come_does_not_matter(words: list[tuple[str, int, str]]) -> None:
+    said = [verdict(word, at_s=at_s, by=by) for word, at_s, by in words]
+    ends = set()
+    for order in itertools.permutations(said):
+        memory = alarmed()
+        for one in order:
+            memory = corrected_memory(memory, one)
+        ends.add(memory._replace(outcomes=()))
+    assert len(ends) == 1
+
+
+@given(word=WORDS, key=st.sampled_from(["", "k1"]))
+def test_the_same_verdict_again_changes_nothing(word: str, key: str) -> None:
+    once = corrected_memory(alarmed(), verdict(word, id=key))
+    assert corrected_memory(once, verdict(word, id=key)) is once
+
+
+def test_a_later_verdict_takes_back_the_limit_that_an_earlier_one_raised() -> None:
+    memory = corrected_memory(corrected_memory(alarmed(), verdict("false")), verdict("true", at_s=2001.0))
+    assert (memory.tolerated, memory.learn) == ((), ())
+    assert alarm_of(memory)
+
+
+def test_a_verdict_on_no_alarm_is_answered_and_changes_nothing() -> None:
+    memory = corrected_memory(alarmed(), verdict("false", alarm_at_s=999_999.0, id="k"))
+    assert memory._replace(outcomes=()) == alarmed()
+    assert (memory.outcomes[0].id, memory.outcomes[0].is_done) == ("k", False)
+    assert "the last ones: 1000.000" in memory.outcomes[0].text
+
+
+GOOD = '{"version":1,"alarm_at_s":1000.0,"verdict":"true","label":"dull tool","by":"ada","at_s":2000.0}'
+BAD = {
+    "no JSON": ("{", "the message"),
+    "another word": (GOOD.replace('"true"', '"maybe"'), "verdict"),
+    "nobody": (GOOD.replace('"ada"', '""'), "by"),
+    "a name of two lines": (GOOD.replace('"ada"', '"a\\nb"'), "by"),
+    "no time": (GOOD.replace('"alarm_at_s":1000.0,', ""), "alarm_at_s"),
+    "a time that is none": (GOOD.replace("1000.0", "NaN"), "alarm_at_s"),
+    "a field too many": (GOOD.replace('"by"', '"colour":1,"by"'), "colour"),
+    "a later version": (GOOD.replace('"version":1', '"version":2'), "version"),
+    "far too long": (GOOD + " " * 5000, "characters"),
+}
+
+
+def test_a_message_is_a_verdict() -> None:
+    assert verdict_of(GOOD) == Verdict(alarm_at_s=1000.0, verdict="true", label="dull tool", by="ada", at_s=2000.0)
+
+
+@pytest.mark.parametrize("case", BAD.values(), ids=BAD.keys())
+def test_a_bad_message_is_refused_in_one_line(case: tuple[str, str]) -> None:
+    text, culprit = case
+    with pytest.raises(ValueError, match=culprit) as error:
+        verdict_of(text)
+    assert "\n" not in str(error.value)
+    assert refused(Memory(), str(error.value), 1.0).outcomes[0].is_done is False

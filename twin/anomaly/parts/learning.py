@@ -1,0 +1,154 @@
+"""What a part that has ended without an alarm teaches; a part that alarmed teaches nothing.
+
+At the end of an operation its levels of wear and material are followed, unless its score was suspicious for long. At the end of the
+part the sections of all its operations are learned. An alarm takes back the levels to those at the beginning of its part.
+"""
+
+from twin.anomaly.parts.following import with_levels
+from twin.anomaly.parts.judging import Judged
+from twin.anomaly.parts.levels import followed
+from twin.anomaly.parts.model import LEVELLED, OPERATIONS_MAX, PartsModel
+from twin.anomaly.parts.moment import is_beyond
+from twin.anomaly.parts.own import NEVER, Ended, Own, Tool, tool_of, usual_of
+from twin.anomaly.parts.record import CutRecord, recorded
+from twin.anomaly.parts.usual import Sums, Usual, begun_usual, extended, froze, learned_section
+
+SUSPICIOUS = 1.0
+HELD_SHARE_MAX = 0.3
+SKIPPED_MAX = 5
+OPERATIONS_OF_PART_MAX = 40
+TICKS_MIN = 3
+
+
+def learned(model: PartsModel, own: Own, judged: Judged, is_alarm: bool) -> tuple[Own, CutRecord | None]:
+    """Return the state once the alarm is known, and the record of an operation that has ended at this tick."""
+    ended = own.ended
+    is_high = judged.score is not None and judged.score >= SUSPICIOUS
+    if ended is None and not is_high and not is_alarm and not own.is_held:
+        return own, None
+    cut = None
+    if ended is not None:
+        own, cut = _operation_ended(model, own, ended)
+    if is_alarm and not own.is_part_bad:
+        own = _taken_back(model, own)
+    since = own.high_since
+    return own._replace(
+        is_held=is_high or is_alarm,
+        high_since=NEVER if not is_high and not is_alarm else own.tick if since == NEVER else since,
+        held_ticks=own.held_ticks + (is_high and not own.is_idle),
+        alarm_ticks=own.alarm_ticks + is_alarm,
+    ), cut
+
+
+def _taken_back(model: PartsModel, own: Own) -> Own:
+    """Return the state of a part that has alarmed: nothing of it is learned, and its levels are those at its beginning."""
+    own = own._replace(is_part_bad=True, waiting=())
+    if own.kept is None:
+        return own
+    material, tools = own.kept
+    levels = {
+        name: tool._replace(level=tools[name].level if name in tools else model.tool_level(name))
+        for name, tool in own.tools.items()
+    }
+    return with_levels(model, own._replace(material=material, tools=levels))
+
+
+def _operation_ended(model: PartsModel, own: Own, ended: Ended) -> tuple[Own, CutRecord | None]:
+    place = ended.place
+    usual = usual_of(model, own, place.key)
+    is_alarmed = bool(ended.alarm_ticks) or own.is_part_bad
+    cut = recorded(model, ended, usual, is_alarmed) if place.is_whole else None
+    is_calm = not is_alarmed and ended.held_ticks <= HELD_SHARE_MAX * place.ticks
+    if is_calm or (not is_alarmed and own.skipped >= SKIPPED_MAX):
+        own = _levels_followed(model, own, ended, usual)
+        if len(own.waiting) < OPERATIONS_OF_PART_MAX:
+            own = own._replace(waiting=(*own.waiting, ended))
+    if not ended.is_part_over:
+        return own, cut
+    skipped = 0 if is_calm or is_alarmed else own.skipped + 1
+    if not own.is_part_bad:
+        for one in own.waiting:
+            own = _sections_learned(model, own, one)
+    return own._replace(waiting=(), is_part_bad=False, skipped=min(skipped, SKIPPED_MAX), kept=(own.material, own.tools)), cut
+
+
+def _levels_followed(model: PartsModel, own: Own, ended: Ended, usual: Usual | None) -> Own:
+    """Return the state with the levels after an operation that earlier parts know."""
+    if usual is None:
+        return own
+    residual = [_mean(ended, usual, at) if kind in LEVELLED else None for at, kind in enumerate(model.plan.kinds)]
+    if all(value is None for value in residual):
+        return own
+    tool = tool_of(model, own, ended.place.tool)
+    material, level = followed(own.material, tool.level, residual)
+    name = "?" if ended.place.tool is None else str(ended.place.tool)
+    if name not in own.tools and len(own.tools) >= OPERATIONS_MAX:
+        return own
+    return with_levels(model, own._replace(material=material, tools={**own.tools, name: Tool(level, tool.slow)}))
+
+
+def _mean(ended: Ended, usual: Usual, at: int) -> float | None:
+    """Return the mean residual of a signal over the sections that earlier parts know, weighted by what repeats."""
+    total = weights = ticks = 0.0
+    for section, sums in ended.sections:
+        if 0 <= section < len(usual.marks) and usual.told[section][at] and sums.count[at]:
+            share = usual.weight[section][at] ** 2
+            total += share * sums.total[at]
+            weights += share * sums.count[at]
+            ticks += sums.count[at]
+    return total / weights if ticks >= TICKS_MIN and weights > 0.0 else None
+
+
+def _sections_learned(model: PartsModel, own: Own, ended: Ended) -> Own:
+    """Return the state with the usual course of an operation after one more healthy part."""
+    place, count, plan = ended.place, len(model.signals), model.plan
+    if place.key is None or not model.follows_parts:
+        return own
+    usual = usual_of(model, own, place.key)
+    if usual is None:
+        if not place.is_whole or not place.forming or len(own.usual) + len(model.usual) >= 2 * OPERATIONS_MAX:
+            return own
+        usual = begun_usual(place.forming, place.end, count)
+    elif place.is_whole:
+        beyond = tuple([mark for mark in place.forming if is_beyond(usual.end, *mark)])
+        usual = extended(usual, beyond, place.end, count) if beyond else usual
+    merged = _merged(ended, len(usual.marks))
+    centre, variance = list(usual.centre), list(usual.variance)
+    told, weight, frozen = list(usual.told), list(usual.weight), list(usual.frozen)
+    for section, sums in merged.items():
+        before = usual.told[section]
+        centre[section], variance[section], told[section], weight[section] = learned_section(
+            usual, section, sums, plan.prior, plan.least
+        )
+        if plan.load_at >= 0 and before[plan.load_at] < told[section][plan.load_at]:
+            at = plan.load_at
+            now = usual.centre[section][at] + sums.total[at] / sums.count[at] + ended.level[at]
+            frozen[section] = froze(frozen[section], before[at], now)
+    parts = min(usual.parts + 1, 10**6) if place.is_whole else usual.parts
+    duration = usual.duration_ticks
+    if place.is_whole:
+        duration += (place.ticks - duration) / min(parts, 20)
+    after = usual._replace(
+        parts=parts,
+        duration_ticks=duration,
+        centre=tuple(centre),
+        variance=tuple(variance),
+        told=tuple(told),
+        weight=tuple(weight),
+        frozen=tuple(frozen),
+    )
+    return own._replace(usual={**own.usual, place.key: after})
+
+
+def _merged(ended: Ended, known: int) -> dict[int, Sums]:
+    """Return the sums by section; a section that was come to several times has those of all."""
+    found: dict[int, Sums] = {}
+    for section, sums in ended.sections:
+        if 0 <= section < known:
+            before = found.get(section)
+            found[section] = sums if before is None else _plus(before, sums)
+    return found
+
+
+def _plus(one: Sums, other: Sums) -> Sums:
+    return Sums(*(tuple([a + b for a, b in zip(x, y, strict=True)]) for x, y in zip(one, other, strict=True)))

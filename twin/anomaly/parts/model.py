@@ -1,0 +1,126 @@
+"""The model of parts: what training learned of a machine, before anything was told of the week that is judged."""
+
+import bisect
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Annotated
+
+from pydantic import Field
+
+from twin.anomaly.calibration import Finite, NotNegative, Positive, Record
+from twin.anomaly.parts import quantity, scales
+from twin.anomaly.parts.heat import BASE_S, TAUS_S
+from twin.anomaly.parts.levels import BATCH_VAR, TOOL_VAR, Level
+from twin.anomaly.parts.quantity import Kind
+from twin.anomaly.parts.usual import Usual
+
+OPERATIONS_MAX = 500
+SIGNALS_MAX = 16
+RPM_STEP = 500.0
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What a step needs of a model, put together once. *_at: places of signals, −1 = the model has none."""
+
+    kinds: tuple[int, ...]
+    floors: tuple[float, ...]
+    shares: tuple[float, ...]
+    heat_shares: tuple[tuple[float, ...], float]
+    drivers_at: tuple[int, int]
+    speed_at: int
+    feed_at: int
+    load_at: int
+    idle_pct: tuple[float, ...]
+    least: tuple[float, ...]
+    prior: tuple[float, ...]
+    over_spread: tuple[float, ...]
+    over_twin: tuple[float, ...]
+    over_up: tuple[float, ...]
+    over_down: tuple[float, ...]
+    blank: tuple[float, ...]
+    flat: tuple[float, ...]
+
+
+class PartsModel(Record):
+    """signals: in the order of a row; tick_s: the tick it was trained with
+    idle: load of the spindle idle at a speed, (rpm, %), ascending
+    power: of the feed override in each signal; heat: coefficients of each temperature, () for others
+    spread: of a tick about the centre of its section, by signal, pooled over operations
+    twin_offset, twin_spread: of a section's quantity beside the twin's expectation, by signal; spread 0 = it has none
+    up, down: tails by signal, each on all scales; usual: by operation; material, tools: levels when training ended
+    """
+
+    signals: Annotated[tuple[str, ...], Field(min_length=1, max_length=SIGNALS_MAX)]
+    tick_s: Positive
+    idle: tuple[tuple[NotNegative, NotNegative], ...] = ((0.0, 0.0),)
+    power: tuple[Finite, ...] = ()
+    heat: tuple[tuple[Finite, ...], ...] = ()
+    spread: tuple[Positive, ...] = ()
+    twin_offset: tuple[Finite, ...] = ()
+    twin_spread: tuple[NotNegative, ...] = ()
+    up: tuple[Positive, ...] = ()
+    down: tuple[Positive, ...] = ()
+    usual: Annotated[dict[str, Usual], Field(max_length=OPERATIONS_MAX)] = {}
+    material: Level = Level((), BATCH_VAR)
+    tools: Annotated[dict[str, Level], Field(max_length=OPERATIONS_MAX)] = {}
+    follows_parts: bool = True
+
+    def idle_at(self, rpm: float) -> float:
+        """Return what the spindle takes idle, %.
+
+        >>> PartsModel(signals=("spindle_load_pct",), tick_s=1.0, idle=((0.0, 1.0), (1000.0, 3.0))).idle_at(500.0)
+        2.0
+        """
+        points = self.idle
+        at = bisect.bisect_right(points, (rpm, math.inf))
+        if at == 0 or at == len(points):
+            return points[max(0, at - 1)][1]
+        (x0, y0), (x1, y1) = points[at - 1], points[at]
+        return y0 + (y1 - y0) * (rpm - x0) / (x1 - x0)
+
+    @cached_property
+    def plan(self) -> Plan:
+        """What a step needs."""
+        count = len(self.signals)
+        kinds = tuple(quantity.kind_of(signal) for signal in self.signals)
+        spread = self.spread or tuple(quantity.SPREADS[kind] for kind in kinds)
+        up, down = (tails or (1.0,) * (count * scales.COUNT) for tails in (self.up, self.down))
+
+        def at(name: str) -> int:
+            return self.signals.index(name) if name in self.signals else -1
+
+        steps = range(int(quantity.RPM_MAX / RPM_STEP) + 1)
+        return Plan(
+            kinds=tuple(map(int, kinds)),
+            floors=tuple(quantity.floor_of(signal) for signal in self.signals),
+            shares=scales.shares(self.tick_s),
+            heat_shares=(tuple(self.tick_s / tau_s for tau_s in TAUS_S), self.tick_s / BASE_S),
+            drivers_at=(at(quantity.SPEED), at(quantity.LOAD)),
+            speed_at=at(quantity.SPEED),
+            feed_at=at(quantity.FEED),
+            load_at=at(quantity.LOAD),
+            idle_pct=tuple(self.idle_at(step * RPM_STEP) for step in steps),
+            least=tuple((quantity.SPREAD_LEAST[kind]) ** 2 for kind in kinds),
+            prior=tuple(value * value for value in spread),
+            over_spread=tuple(1.0 / value for value in spread),
+            over_twin=tuple(1.0 / value if value else 0.0 for value in self.twin_spread or (0.0,) * count),
+            over_up=tuple(1.0 / value for value in up),
+            over_down=tuple(1.0 / value for value in down),
+            blank=(0.0,) * (count * scales.COUNT),
+            flat=(0.0,) * count,
+        )
+
+    @property
+    def powers(self) -> tuple[float, ...]:
+        """Powers of the feed override, by signal."""
+        return self.power or tuple(quantity.POWERS.get(quantity.kind_of(signal), 0.0) for signal in self.signals)
+
+    def tool_level(self, tool: str) -> Level:
+        """Return the level of a tool when training ended; of one that was not seen, none."""
+        return self.tools.get(tool) or Level((0.0,) * len(self.signals), TOOL_VAR)
+
+
+LEVELLED = frozenset({Kind.LOAD, Kind.VIBRATION})
+"""The kinds that follow wear and material."""

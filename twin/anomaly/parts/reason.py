@@ -1,0 +1,73 @@
+"""The reason of a score: the signal and the scale that it rests on most, what was measured there and what was expected.
+
+measured = expected · exp(s / weight)        of a ratio; expected + s / weight of a temperature
+"""
+
+import math
+from collections.abc import Sequence
+
+from twin.anomaly.parts import scales
+from twin.anomaly.parts.episodes import nearest
+from twin.anomaly.parts.model import PartsModel
+from twin.anomaly.parts.own import Own, usual_of
+from twin.anomaly.parts.quantity import UNITS, Kind, kind_of
+from twin.anomaly.parts.signature import shares_of, signature_of
+from twin.anomaly.parts.why import Why
+
+PEER_SHOWS = 0.5
+"""A peer shows it too where its residual is at least half as large."""
+
+
+def why_of(model: PartsModel, own: Own, peers: Sequence[Own], left: Sequence[float], knows: str) -> Why:
+    """Return the reason of a score; left: in tails, signal by signal, each on all scales. Peers are named by their place."""
+    index = max(range(len(left)), key=lambda at: abs(left[at]))
+    at, scale = divmod(index, scales.COUNT)
+    place, plan, s = own.place, model.plan, own.smooth[index]
+    usual = usual_of(model, own, place.key)
+    section = max(0, place.section)
+    kind = Kind(plan.kinds[at])
+    is_known = usual is not None and section < len(usual.marks) and not own.is_new
+    lines = None
+    if usual is not None and is_known:
+        here = usual.marks[section][0]
+        after = usual.marks[section + 1][0] if section + 1 < len(usual.marks) else usual.end[0]
+        lines = (here, max(here, after)) if here >= 0 else None
+    elif place.line >= 0:
+        lines = (place.line, place.line)
+    centre, weight = 0.0, plan.over_spread[at]
+    if usual is not None and is_known and kind is not Kind.TEMPERATURE:
+        centre = usual.centre[section][at] + own.level[at]
+        weight = usual.weight[section][at] or weight
+    away = s / (weight * own.calm[at])
+    expected, measured = _in_units(model, own, at, centre, away)
+    shows = [
+        str(n) for n, peer in enumerate(peers) if peer.smooth[index] * s > 0.0 and abs(peer.smooth[index]) > PEER_SHOWS * abs(s)
+    ]
+    signature = signature_of(shares_of(model.signals, scales.SCALES, left), place.key or "", place.program, place.tool)
+    return Why(
+        model.signals[at],
+        scales.SCALES[scale],
+        place.program,
+        place.tool,
+        lines,
+        section,
+        measured,
+        expected,
+        UNITS[kind_of(model.signals[at])],
+        abs(s),
+        max(0.0, (own.tick - own.high_since) * model.tick_s) if own.high_since > 0 else 0.0,
+        knows if is_known else "the twin",
+        nearest(own.memory, signature),
+        tuple(shows),
+    )
+
+
+def _in_units(model: PartsModel, own: Own, at: int, centre: float, away: float) -> tuple[float, float]:
+    """Return what was expected and what was measured, in the unit of the signal."""
+    kind, floor = Kind(model.plan.kinds[at]), model.plan.floors[at]
+    if kind in (Kind.TEMPERATURE, Kind.PLAIN):
+        base = (own.heat.base[at] or 0.0) if kind is Kind.TEMPERATURE else centre
+        return round(base, 4), round(base + away, 4)
+    idle = model.idle_at(own.rpm) if at == model.plan.load_at else 0.0
+    expected, measured = (max(0.0, math.exp(value) - floor) + idle for value in (centre, centre + away))
+    return round(expected, 4), round(measured, 4)

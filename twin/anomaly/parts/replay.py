@@ -1,0 +1,298 @@
+"""A cell of machines over recorded ticks, with the very functions of the stream: training, thresholds and benchmarks use it.
+
+for each tick:  own = told_after(own, told);  judged(own, peers);  alarm;  learned(own)
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple
+
+from twin.anomaly.alarm import AlarmState, after_tick
+from twin.anomaly.parts import scales
+from twin.anomaly.parts.following import told_after
+from twin.anomaly.parts.judging import judged
+from twin.anomaly.parts.learning import learned
+from twin.anomaly.parts.model import OPERATIONS_MAX, PartsModel
+from twin.anomaly.parts.own import Own, begun
+from twin.anomaly.parts.quantity import Kind
+from twin.anomaly.parts.record import CutRecord
+from twin.anomaly.parts.told import Expects, Told
+from twin.anomaly.parts.why import Why
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from twin.anomaly.alarm import AlarmRule
+
+EXPECTED = ("cut_load_pct", "load_pct", "feed_mm_min", "spindle_rpm", "force_n", "time_s")
+"""The columns of `Recorded.expected`."""
+YOUNG = 4
+"""The first fourth of the recordings gives spreads; tails are those of the rest."""
+SEEN_S = 5.0
+SPREAD_PARTS_MIN = 2
+LOOSE_TAILS = (6.0, 3.0, 1.5, 2.5)
+CUT = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """One machine, a row a tick; row i is tick `first_tick + i`.
+
+    values: (T, F) in the order of `signals`, NaN = not known
+    programs: names, of which `program` (T,) is the place, −1 = not known
+    tool, line: (T,), −1 = not known; overrides: (T,) in %, NaN = not known; gated: (T,)
+    expected: (T, 6) in the order of `EXPECTED` at programmed feed and speed, NaN = none; None = no expectation at all
+    is_known: (T,), False where the machine told nothing at that tick (a gap); None = always told
+    """
+
+    machine: str
+    tick_s: float
+    signals: tuple[str, ...]
+    values: "NDArray[np.float64]"
+    programs: tuple[str, ...]
+    program: "NDArray[np.integer]"
+    tool: "NDArray[np.integer]"
+    line: "NDArray[np.integer]"
+    feed_override_pct: "NDArray[np.float64]"
+    spindle_override_pct: "NDArray[np.float64]"
+    gated: "NDArray[np.bool_]"
+    expected: "NDArray[np.float64] | None" = None
+    is_known: "NDArray[np.bool_] | None" = None
+    first_tick: int = 0
+
+    def until(self, ticks: int) -> "Recorded":
+        """Return the first ticks of it."""
+        return self.between(0, ticks)
+
+    def between(self, start: int, stop: int) -> "Recorded":
+        """Return its rows from start to before stop."""
+        part = slice(start, stop)
+        return replace(
+            self,
+            values=self.values[part],
+            program=self.program[part],
+            tool=self.tool[part],
+            line=self.line[part],
+            feed_override_pct=self.feed_override_pct[part],
+            spindle_override_pct=self.spindle_override_pct[part],
+            gated=self.gated[part],
+            expected=None if self.expected is None else self.expected[part],
+            is_known=None if self.is_known is None else self.is_known[part],
+            first_tick=self.first_tick + start,
+        )
+
+    def told(self) -> Iterator[Told | None]:
+        """Yield what is told at each tick; None where the machine told nothing."""
+        import numpy as np  # noqa: PLC0415
+
+        rows = np.where(np.isnan(self.values), None, self.values.astype(object)).tolist()
+        feed, speed = (_or_none(one) for one in (self.feed_override_pct, self.spindle_override_pct))
+        known = [True] * len(rows) if self.is_known is None else self.is_known.tolist()
+        program, tool, line, gated = (one.tolist() for one in (self.program, self.tool, self.line, self.gated))
+        expected = [None] * len(rows) if self.expected is None else self._expected(self.expected)
+        for at, row in enumerate(rows):
+            if not known[at]:
+                yield None
+                continue
+            yield Told(
+                self.first_tick + at,
+                row,
+                self.programs[program[at]] if program[at] >= 0 else None,
+                tool[at] if tool[at] >= 0 else None,
+                line[at] if line[at] >= 0 else None,
+                feed[at],
+                speed[at],
+                expected[at],
+                gated[at],
+            )
+
+    @staticmethod
+    def _expected(columns: "NDArray[np.float64]") -> list[Expects | None]:
+        """Return the expectation of each tick; those that are alike are one."""
+        import numpy as np  # noqa: PLC0415
+
+        known, place = np.unique(columns[:, : len(EXPECTED)], axis=0, return_inverse=True)
+        made = [None if math.isnan(row[0]) and math.isnan(row[2]) else Line(*row) for row in known.tolist()]
+        return [made[at] for at in place.ravel().tolist()]
+
+
+def _or_none(column: "NDArray[np.float64]") -> list[float | None]:
+    return [None if value != value else value for value in column.tolist()]  # noqa: PLR0124  NaN alone differs from itself
+
+
+class Line(NamedTuple):
+    """The twin's expectation at a line, as recorded."""
+
+    cut_load_pct: float
+    load_pct: float
+    feed_mm_min: float
+    spindle_rpm: float
+    force_n: float
+    time_s: float
+
+
+class Ablation(NamedTuple):
+    """What a replay takes into account."""
+
+    has_parts: bool = True
+    has_twin: bool = True
+    has_peers: bool = True
+    has_gates: bool = True
+
+
+ALL = Ablation()
+
+
+@dataclass(frozen=True, slots=True)
+class Replayed:
+    """scores, own_scores: (T, N), NaN = not known, held while idle; is_idle, is_alarm: (T, N)
+    whys: (tick, machine's place, why) at each onset of an alarm; records: (machine's place, record) in order
+    """
+
+    scores: "NDArray[np.float64]"
+    own_scores: "NDArray[np.float64]"
+    is_idle: "NDArray[np.bool_]"
+    is_alarm: "NDArray[np.bool_]"
+    whys: tuple[tuple[int, int, Why], ...]
+    records: tuple[tuple[int, CutRecord], ...]
+
+
+def fit(cell: Sequence[Recorded], ablation: Ablation = ALL) -> tuple[PartsModel, ...]:
+    """Learn a model for each machine of a cell from recordings of healthy parts over the same ticks.
+
+    Idle load, heat and the twin's error come from the arrays; the rest from a replay, in which each part is judged by the earlier
+    ones only, so that tails are those of the future. Raises ValueError where nothing can be learned from a recording.
+    """
+    from twin.anomaly.parts.training import prepared  # noqa: PLC0415  numpy comes with it
+
+    models = [prepared(one).model_copy(update={"follows_parts": ablation.has_parts}) for one in cell]
+    models = [model.model_copy(update=_loose(model)) for model in models]
+    young = [one.until(max(1, len(one.values) // YOUNG)) for one in cell]
+    _, owns, seen = _run(models, young, None, ablation, SEEN_S)
+    models = [_with_spreads(model, own, rows) for model, own, rows in zip(models, owns, seen, strict=True)]
+    _, owns, seen = _run(models, cell, None, ablation, SEEN_S)
+    return tuple(_taught(model, own, rows) for model, own, rows in zip(models, owns, seen, strict=True))
+
+
+def replayed(
+    models: Sequence[PartsModel],
+    cell: Sequence[Recorded],
+    rules: "Sequence[AlarmRule | None] | None" = None,
+    ablation: Ablation = ALL,
+    owns: Sequence[Own] | None = None,
+) -> Replayed:
+    """Judge a cell tick by tick, learning as the stream does; rules: of the alarms, one a machine, None = never an alarm.
+
+    Without an alarm rule a part whose score is suspicious for long is not learned either. owns: states to go on from.
+    """
+    return _run(models, cell, rules, ablation, 0.0, owns)[0]
+
+
+def _run(
+    models: Sequence[PartsModel],
+    cell: Sequence[Recorded],
+    rules: "Sequence[AlarmRule | None] | None",
+    ablation: Ablation,
+    seen_s: float,
+    owns: Sequence[Own] | None = None,
+) -> "tuple[Replayed, list[Own], list[list[tuple[int, tuple[float, ...]]]]]":
+    """Replay a cell; return what came of it, the states at the end, and what was left beside the peers every seen_s, by tick."""
+    import numpy as np  # noqa: PLC0415  the stream needs none
+
+    count, ticks = len(cell), len(cell[0].values)
+    scores, own_scores = np.full((ticks, count), np.nan), np.full((ticks, count), np.nan)
+    is_idle, is_alarm = np.zeros((ticks, count), dtype=np.bool_), np.zeros((ticks, count), dtype=np.bool_)
+    states = [begun(model) for model in models] if owns is None else list(owns)
+    alarms = [AlarmState()] * count
+    every = max(1, round(seen_s / cell[0].tick_s)) if seen_s else 0
+    seen: list[list[tuple[int, tuple[float, ...]]]] = [[] for _ in cell]
+    whys, records = [], []
+    for tick, told in enumerate(zip(*(one.told() for one in cell), strict=True)):
+        for place, one in enumerate(told):
+            if one is not None:
+                now = one if ablation == ALL else _ablated(one, ablation)
+                states[place] = told_after(models[place], states[place], now)
+        before = tuple(states)
+        for place, model in enumerate(models):
+            if told[place] is None:
+                is_idle[tick, place] = True
+                continue
+            own = before[place]
+            peers = (*before[:place], *before[place + 1 :]) if ablation.has_peers else ()
+            judgement = judged(model, own, peers)
+            rule = None if rules is None else rules[place]
+            was_on = alarms[place].is_on
+            if rule is not None:
+                alarms[place] = after_tick(rule, alarms[place], judgement.score, judgement.is_idle)
+            states[place], record = learned(model, own, judgement, alarms[place].is_on)
+            scores[tick, place] = np.nan if judgement.score is None else judgement.score
+            own_scores[tick, place] = np.nan if judgement.own_score is None else judgement.own_score
+            is_idle[tick, place], is_alarm[tick, place] = judgement.is_idle, alarms[place].is_on
+            if record is not None:
+                records.append((place, record))
+            if alarms[place].is_on and not was_on and judgement.why is not None:
+                whys.append((tick, place, judgement.why))
+            if every and tick % every == 0 and not judgement.is_idle and judgement.signature:
+                seen[place].append((tick, judgement.signature))
+    return Replayed(scores, own_scores, is_idle, is_alarm, tuple(whys), tuple(records)), states, seen
+
+
+def _ablated(told: Told, ablation: Ablation) -> Told:
+    if not ablation.has_twin and told.expected is not None:
+        told = told._replace(expected=None)
+    return told if ablation.has_gates or not told.is_gated else told._replace(is_gated=False)
+
+
+def _loose(model: PartsModel) -> dict[str, tuple[float, ...]]:
+    """Return tails so wide that only what stands out is kept from being learned, before the real ones are known."""
+    wide = LOOSE_TAILS * len(model.signals)
+    return {"up": wide, "down": wide}
+
+
+def _with_spreads(model: PartsModel, own: Own, seen: "list[tuple[int, tuple[float, ...]]]") -> PartsModel:
+    """Return the model with the spreads of a tick that its first parts had."""
+    import numpy as np  # noqa: PLC0415
+
+    spread = list(1.0 / value for value in model.plan.over_spread)
+    rows = np.array([row for _, row in seen]) if seen else np.zeros((0, len(spread) * scales.COUNT))
+    for at, kind in enumerate(model.plan.kinds):
+        known = [
+            variance[at]
+            for usual in own.usual.values()
+            for variance, told in zip(usual.variance, usual.told, strict=True)
+            if told[at] >= SPREAD_PARTS_MIN
+        ]
+        if known:
+            spread[at] = max(float(np.median(known)) ** 0.5, model.plan.least[at] ** 0.5)
+        elif kind == Kind.TEMPERATURE and len(rows):
+            away = rows[:, at * scales.COUNT + CUT] * LOOSE_TAILS[CUT]
+            spread[at] = max(float(np.sqrt(np.mean(away**2))) * spread[at], model.plan.least[at] ** 0.5)
+    return model.model_copy(update={"spread": tuple(spread)})
+
+
+def _taught(model: PartsModel, own: Own, seen: "list[tuple[int, tuple[float, ...]]]") -> PartsModel:
+    """Return the model with all that the replay has taught it, and with the tails of what was left beside the peers.
+
+    Raises ValueError where no tick was judged.
+    """
+    import numpy as np  # noqa: PLC0415
+
+    late = [(tick, row) for tick, row in seen if tick >= seen[-1][0] // YOUNG]
+    if not late:
+        raise ValueError("no tick is judged outside of tool changes in an operation that came twice: record more parts")
+    left = np.array([row for _, row in late]) * np.array([LOOSE_TAILS * len(model.signals)])
+    blocks = np.array([tick for tick, _ in late]) // max(1, round(scales.BLOCK_S / model.tick_s))
+    return PartsModel(
+        **{
+            **{name: getattr(model, name) for name in PartsModel.model_fields},
+            **{
+                "up": tuple(scales.tails(left, blocks).tolist()),
+                "down": tuple(scales.tails(-left, blocks).tolist()),
+                "usual": dict(list(own.usual.items())[-OPERATIONS_MAX:]),
+                "material": own.material,
+                "tools": {name: tool.level for name, tool in own.tools.items()},
+            },
+        }
+    )

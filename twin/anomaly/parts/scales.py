@@ -1,0 +1,77 @@
+"""Residuals on several time scales, and the tails of healthy parts that make them comparable.
+
+    s ← s + (1 − exp(−tick / τ)) · (z − s)          only at ticks that tell of the signal; τ: 3 s, 30 s, 5 min, 2 min of one tool
+
+The last scale is kept for each tool while others cut, so a tool that is dull or mounted too long is compared with its own last parts.
+A tail is the size that healthy parts reach about once a day on that scale and side, so that all of them alarm equally often.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+SCALES = ("seconds", "cut", "part", "tool")
+TAUS_S = (3.0, 30.0, 300.0, 120.0)
+TOOL = 3
+COUNT = len(SCALES)
+CLIP = 8.0
+BLOCK_S = 3600.0
+RETURN_S = 86_400.0
+TAIL_LEAST = 0.2
+
+
+def shares(tick_s: float) -> tuple[float, ...]:
+    """Return the share of a new tick on each scale.
+
+    >>> [round(share, 3) for share in shares(1.0)]
+    [0.283, 0.033, 0.003, 0.008]
+    """
+    return tuple(1.0 - math.exp(-tick_s / tau_s) for tau_s in TAUS_S)
+
+
+def smoothed(before: Sequence[float], z: Sequence[float], told: Sequence[bool], each: Sequence[float]) -> tuple[float, ...]:
+    """Return the residuals by signal, each on all scales, after one more tick.
+
+    >>> smoothed((0.0,) * 4, (4.0,), (True,), (0.5, 0.25, 0.125, 0.25))
+    (2.0, 1.0, 0.5, 1.0)
+    """
+    a, b, c, d = each
+    found: list[float] = []
+    at = 0
+    for value, is_told in zip(z, told, strict=True):
+        s, t, u, v = before[at : at + 4]
+        at += 4
+        if is_told:
+            found += (s + a * (value - s), t + b * (value - t), u + c * (value - u), v + d * (value - v))
+        else:
+            found += (s, t, u, v)
+    return tuple(found)
+
+
+def of_tool(smooth: Sequence[float]) -> tuple[float, ...]:
+    """Return the residuals of the tool in the spindle, by signal."""
+    return tuple(smooth[TOOL::COUNT])
+
+
+def with_tool(smooth: Sequence[float], slow: Sequence[float]) -> tuple[float, ...]:
+    """Return the residuals once another tool is in the spindle, whose own were `slow`."""
+    found = list(smooth)
+    found[TOOL::COUNT] = slow
+    return tuple(found)
+
+
+def tails(left: "NDArray[np.float64]", blocks: "NDArray[np.integer]", block_s: float = BLOCK_S) -> "NDArray[np.float64]":
+    """Return the size that each column of healthy remainders (T, K) reaches once in RETURN_S, 0 and more; blocks: (T,), ascending.
+
+    The quantile of block maxima that is exceeded as often; never less than `TAIL_LEAST`.
+    """
+    import numpy as np  # noqa: PLC0415  the stream needs none
+
+    begins = np.flatnonzero(np.diff(blocks, prepend=-1))
+    largest = np.maximum.reduceat(np.maximum(left, 0.0), begins, axis=0)
+    share = max(0.5, 1.0 - block_s / RETURN_S)
+    return np.maximum(np.quantile(largest, share, axis=0), TAIL_LEAST)

@@ -1,0 +1,57 @@
+"""The basis of an expectation in words: what it rests on, and what is left out and why."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from twin.expected.expected import Run
+from twin.expected.lines import IN_WORDS, Numbering
+from twin.learned.words import LearnedSite
+from twin.machine import MachineFile
+
+LINES_SHOWN = 5
+
+
+@dataclass(frozen=True, slots=True)
+class Missing:
+    """Why the load of a line is not known → the lines. Reasons without a line hold for the program."""
+
+    lines: dict[str, set[int]] = field(default_factory=dict)
+
+    def add(self, why: str, line: int | None = None) -> None:
+        """Note a reason, for a line."""
+        found = self.lines.setdefault(why, set())
+        if line is not None:
+            found.add(line)
+
+    def sentences(self) -> list[str]:
+        """Return a sentence for each reason.
+
+        >>> missing = Missing()
+        >>> missing.add("goes down into material", 7)
+        >>> missing.sentences()
+        ['no load of 1 line that goes down into material (7)']
+        """
+        said = []
+        for why, lines in self.lines.items():
+            shown = ", ".join(str(line) for line in sorted(lines)[:LINES_SHOWN]) + (", …" if len(lines) > LINES_SHOWN else "")
+            if why.startswith(("no ", "the path")) or not lines:
+                said.append(why)
+            elif why.startswith(("goes", "cuts")):
+                said.append(f"no load of {len(lines)} line{'s'[: len(lines) > 1]} that {why} ({shown})")
+            else:
+                said.append(f"no load of {len(lines)} line{'s'[: len(lines) > 1]}: {why} ({shown})")
+        return said
+
+
+def in_words(
+    machine: MachineFile, numbering: Numbering, runs: Sequence[Run], notes: Sequence[str], missing: Missing
+) -> tuple[str, ...]:
+    """Return the sentences: the numbering, what is taken in, the notes on the machine, and what is missing."""
+    tools = sorted({run.tool for run in runs if run.tool})
+    named = f", tools {', '.join(str(tool) for tool in tools)}" if tools else ""
+    learned = []
+    if any(section.site is LearnedSite.CUT_FORCE for section in machine.learned):
+        learned.append("without the learned term of the cutting force")
+    effects = [one.effect for one in machine.effects]
+    with_effects = [f"with the effects {', '.join(dict.fromkeys(effects))}"] if effects else []
+    return (IN_WORDS[numbering] + named, *with_effects, *dict.fromkeys(notes), *learned, *missing.sentences())
