@@ -61,7 +61,12 @@ def played(seed: int, days: float, fast: float, terms: Terms) -> Result:
     """Play a history and judge it."""
     parts = list(World(seed, fast=fast).parts(days))
     length = lives_of(parts)
-    wanted = {(tool, life, max(int(uses * mark), 1)): mark for (tool, life), (uses, is_over) in length.items() if is_over for mark in SHARES}
+    wanted = {
+        (tool, life, max(int(uses * mark), 1)): mark
+        for (tool, life), (uses, is_over) in length.items()
+        if is_over
+        for mark in SHARES
+    }
     wear, spent_s, cuts = Wear(), 0.0, 0
     forecasts: list[Forecast] = []
     first: dict[tuple[int, int], int] = {}
@@ -93,7 +98,9 @@ def played(seed: int, days: float, fast: float, terms: Terms) -> Result:
                 low, middle, high = (None, 0.0, 0.0) if given is None else (given.low, given.middle, given.high)
                 mean = float(np.mean([life.uses for life in tool.lives]))
                 forecasts.append(Forecast(mark, uses - truth.uses, low, middle, high, uses, mean))
-    lives = tuple(FastLife(told.get(key), uses, is_fast.get(key, False)) for key, (uses, over) in length.items() if over and key[1] >= 3)
+    lives = tuple(
+        FastLife(told.get(key), uses, is_fast.get(key, False)) for key, (uses, over) in length.items() if over and key[1] >= 3
+    )
     true_at = defaultdict(list)
     for part in parts:
         for truth in part.tools:
@@ -125,14 +132,19 @@ def matched(true_at: dict[str, list[int]], found_at: dict[str, list[int]]) -> tu
 def table(results: Sequence[Result]) -> str:
     """Return the table of the parts left."""
     forecasts = [one for result in results for one in result.forecasts]
-    lines = ["| at | lives | given | error, median, % of life | by mean life alone | in the band of 90 % | half band, % of life |", "|---|---|---|---|---|---|---|"]
+    lines = [
+        "| at | lives | given | error, median, % of life | by mean life alone | in the band of 90 % | half band, % of life |",
+        "|---|---|---|---|---|---|---|",
+    ]
     for mark in SHARES:
         own = [one for one in forecasts if one.share == mark]
         given = [one for one in own if one.low is not None]
         if not given:
             continue
         error = float(np.median([abs(one.middle - one.left) / one.life_uses for one in given]))
-        naive = float(np.median([abs(max(one.mean_uses - (one.life_uses - one.left), 0.0) - one.left) / one.life_uses for one in own]))
+        naive = float(
+            np.median([abs(max(one.mean_uses - (one.life_uses - one.left), 0.0) - one.left) / one.life_uses for one in own])
+        )
         inside = share(sum((one.low or 0.0) - 1.0 <= one.left <= one.high + 1.0 for one in given), len(given))
         half = float(np.median([(one.high - (one.low or 0.0)) / 2.0 / one.life_uses for one in given]))
         lines.append(

@@ -74,9 +74,7 @@ def trend_of(joint: Joint, name: str, fit: float = 0.0) -> Trend:
     """Return what is known of one tool."""
     place = joint.place(name)
     row = joint.rows[place]
-    return Trend(
-        joint.means[place], joint.means[place + 1], row[place], row[place + 1], joint.rows[place + 1][place + 1], fit
-    )
+    return Trend(joint.means[place], joint.means[place + 1], row[place], row[place + 1], joint.rows[place + 1][place + 1], fit)
 
 
 def renewed(joint: Joint, place: int, mean: float, var: float) -> Joint:

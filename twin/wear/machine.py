@@ -110,8 +110,10 @@ def _bounded(tools: dict[str, Tool]) -> dict[str, Tool]:
 
 
 def _told(cuts: list[Cut]) -> Told:
-    logs = {cut.operation: log(cut.load_ratio) for cut in cuts if cut.load_ratio}
-    return Told(logs, {cut.operation: cut.load_ratio_sd for cut in cuts if cut.load_ratio_sd})
+    """Return what cuts tell. A ratio over another reference has another sharp level, so it counts as another operation."""
+    known = {f"{cut.operation} over {cut.reference}": cut for cut in cuts if cut.load_ratio}
+    logs = {name: log(cut.load_ratio) for name, cut in known.items() if cut.load_ratio}
+    return Told(logs, {name: cut.load_ratio_sd for name, cut in known.items() if cut.load_ratio_sd})
 
 
 def _seen(name: str, tool: Tool, level: Level, joint: Joint, terms: Terms) -> Seen:
@@ -126,9 +128,7 @@ def _seen(name: str, tool: Tool, level: Level, joint: Joint, terms: Terms) -> Se
     return Seen(worn, sharp if can_be_new else None, trend.share > DUE)
 
 
-def _after(
-    tool: Tool, name: str, terms: Terms, told: Told, level: Level | None, found: Explained, part: int
-) -> Tool:
+def _after(tool: Tool, name: str, terms: Terms, told: Told, level: Level | None, found: Explained, part: int) -> Tool:
     """Return a tool after a part that was explained like this."""
     joint = found.joint
     shared = joint.means[MATERIAL] + joint.means[PART]

@@ -71,7 +71,9 @@ def status_of(number: str, tool: Tool, wear: Wear, terms: Terms) -> Status:
         None if no_level else (_pct(level - off), _pct(level + off)),
         no_level,
         None if no_slope else round(100.0 * per_part * trend.rate, 3),
-        None if no_slope else (round(100.0 * per_part * (trend.rate - rate), 3), round(100.0 * per_part * (trend.rate + rate), 3)),
+        None
+        if no_slope
+        else (round(100.0 * per_part * (trend.rate - rate), 3), round(100.0 * per_part * (trend.rate + rate), 3)),
         no_slope,
         uses_left,
         no_left,
@@ -114,7 +116,9 @@ def _pct(level: float) -> float:
 def _basis(number: str, tool: Tool, wear: Wear, terms: Terms) -> str:
     said = [f"tool {number}: {tool.uses} parts" + ("" if tool.is_whole else " since it was first seen")]
     if tool.replaced_part >= 0:
-        said.append(f"replaced at part {tool.replaced_part}, inferred: its load fell by {_pct(tool.fell):g} % and the others' did not")
+        said.append(
+            f"replaced at part {tool.replaced_part}, inferred: its load fell by {_pct(tool.fell):g} % and the others' did not"
+        )
     life = known(tool.lives, terms.wear_limit)
     if life is not None and life.lives >= LIVES_MIN:
         uses = sorted(one.uses for one in tool.lives)

@@ -188,7 +188,9 @@ def learned(tool: Tool, told: Told, material: float, wear: float) -> Tool:
         elif len(bases) < OPERATIONS_MAX:
             noise = min(max(told.spreads.get(operation, NOISE), NOISE_MIN), NOISE_MAX) ** 2
             gain_var = GAIN_SPREAD**2 if bases else 0.0
-            bases[operation] = Base(value - material - wear, int(is_sharp), noise, 0, 1.0, gain_var, _level_var(wear, gain_var), value - material)
+            bases[operation] = Base(
+                value - material - wear, int(is_sharp), noise, 0, 1.0, gain_var, _level_var(wear, gain_var), value - material
+            )
     return tool._replace(bases=bases)
 
 
@@ -222,7 +224,11 @@ def leap(tool: Tool, told: Told, material: float) -> float | None:
 
     A tool that changed shows it in the very operation. One that seems to change as another program comes is another program's.
     """
-    leaps = [value - material - base.last for name, value in told.logs.items() if (base := tool.bases.get(name)) and base.last is not None]
+    leaps = [
+        value - material - base.last
+        for name, value in told.logs.items()
+        if (base := tool.bases.get(name)) and base.last is not None
+    ]
     return max(leaps, key=abs) if leaps else None
 
 

@@ -38,9 +38,7 @@ def advanced(trend: Trend, uses: float, wander: Wander) -> Trend:
     """Return the trend after so many uses that told nothing."""
     var = trend.var + 2.0 * uses * trend.cov + uses * uses * trend.rate_var + uses * wander.share
     cov = trend.cov + uses * trend.rate_var
-    return Trend(
-        trend.share + uses * trend.rate, trend.rate, var, cov, trend.rate_var + uses * wander.rate, trend.fit
-    )
+    return Trend(trend.share + uses * trend.rate, trend.rate, var, cov, trend.rate_var + uses * wander.rate, trend.fit)
 
 
 def updated(trend: Trend, level: float, noise: float, limit: float, curve: Curve) -> Trend:
