@@ -43,13 +43,12 @@ class Life(NamedTuple):
 
 
 class Known(NamedTuple):
-    """The sum of what is known of a tool's lives: level at the end, its log spread, uses, their log spread, the fastest, the curve."""
+    """The sum of what is known of a tool's lives: level at the end, its log spread, uses, their log spread; the curve."""
 
     end: float
     end_spread: float
     uses: float
     uses_spread: float
-    uses_least: float
     curve: Curve
     lives: int
 
@@ -106,11 +105,10 @@ def _level(points: Sequence[tuple[float, float, int]], use: float) -> float:
 def known(lives: Sequence[Life], limit: float | None) -> Known | None:
     """Return what earlier lives say of the next one, else what the configured limit does; None where neither is known."""
     if len(lives) < LIVES_MIN:
-        return None if limit is None else Known(limit, 0.0, 0.0, 0.0, 0.0, LINE, len(lives))
+        return None if limit is None else Known(limit, 0.0, 0.0, 0.0, LINE, len(lives))
     end, end_spread = _pooled([log(life.end) for life in lives], END_SPREAD)
     uses, uses_spread = _pooled([log(life.uses) for life in lives], LENGTH_SPREAD)
-    least = min(life.uses for life in lives)
-    return Known(exp(end), end_spread, exp(uses), uses_spread, least, mean_curve([life.levels for life in lives]), len(lives))
+    return Known(exp(end), end_spread, exp(uses), uses_spread, mean_curve([life.levels for life in lives]), len(lives))
 
 
 def _pooled(values: Sequence[float], usual: float) -> tuple[float, float]:

@@ -28,6 +28,7 @@ from twin.wear.tool import (
     level_of,
     new_tool,
     replaced,
+    rises_freely,
     used,
     wander_of,
 )
@@ -138,7 +139,9 @@ def _after(tool: Tool, name: str, terms: Terms, told: Told, level: Level | None,
     far = found.off[name]
     wear = wear_of(tool, terms)
     is_low = name in found.replaced or (far < -ODD_OFF and not tool.is_learning)
-    is_high = far > ODD_OFF and not tool.is_learning
+    rows = joint.rows
+    shared_var = rows[MATERIAL][MATERIAL] + 2.0 * rows[MATERIAL][PART] + rows[PART][PART]
+    is_high = far > ODD_OFF and not tool.is_learning and not rises_freely(tool, terms, level, shared, shared_var)
     if is_low or is_high:
         moved = leap(tool, told, shared)
         has_leapt = moved is None or abs(moved) > max(LEAP * wear * level.gain, REPLACED_MIN)
@@ -153,8 +156,6 @@ def _after(tool: Tool, name: str, terms: Terms, told: Told, level: Level | None,
         if tool.high + 1 < STEPPED_USES:
             return tool._replace(high=tool.high + 1, low=0, trend=trend)
         return _stepped(tool, trend, ((level.level - shared) / level.gain - wear) / tool.known(terms).end)
-    rows = joint.rows
-    shared_var = rows[MATERIAL][MATERIAL] + 2.0 * rows[MATERIAL][PART] + rows[PART][PART]
     after = used(tool, terms, trend, level, shared, shared_var)
     wear = 0.0 if tool.is_learning else wear_of(after, terms)
     return learned(after._replace(uses=tool.uses), told, shared, wear)._replace(uses=after.uses, low=0, high=0)

@@ -8,7 +8,7 @@ class Terms(NamedTuple):
 
     material: standard deviation of the load from one batch to another; part: from one part to the next within a batch
     sharp: standard deviation from one sharp tool to another
-    uses_min: of a tool, before parts left are given; fast: times the fastest of earlier lives is a tool that wears too fast
+    uses_min: of a tool, before parts left are given; fast: a tool that surely wears so many times as fast as its earlier lives wears too fast
     """
 
     wear_limit: float | None = None

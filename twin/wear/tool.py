@@ -12,10 +12,10 @@ from collections.abc import Mapping
 from math import sqrt
 from typing import NamedTuple
 
-from twin.wear.curve import LINE, slope
+from twin.wear.curve import LINE, at, slope
 from twin.wear.life import LIVES_MAX, Course, Known, Life, ended, followed, known
 from twin.wear.terms import Terms
-from twin.wear.trend import Trend, Wander, advanced, updated
+from twin.wear.trend import HUBER, Trend, Wander, advanced, updated
 
 SHARP_USES, SHARP_LIVES = 5, 2
 NOISE, NOISE_MIN, NOISE_MAX = 0.03, 0.004, 0.3
@@ -25,6 +25,7 @@ LIMIT_ASSUMED = 0.3
 RATE_WIDE, RATE_UNKNOWN = 4.0, 0.05
 SHARE_WANDER, RATE_WANDER = 0.03, 0.15
 WIDE_IS_BETTER = 5.0
+SURE = 2.33
 STEPPED_USES, REPLACED_USES = 3, 2
 OPERATIONS_MAX = 40
 MEMORY_USES = 10.0
@@ -73,6 +74,7 @@ class Tool(NamedTuple):
     high: int = 0
     has_stepped: bool = False
     is_fast: bool = False
+    was_fast: bool = False
     course: Course = Course()
     lives: tuple[Life, ...] = ()
     seen_s: float = 0.0
@@ -82,7 +84,7 @@ class Tool(NamedTuple):
 
     def known(self, terms: Terms) -> Known:
         """Return what is known of its lives; by assumption where that is nothing."""
-        return known(self.lives, terms.wear_limit) or Known(LIMIT_ASSUMED, 0.0, 0.0, 0.0, 0.0, LINE, 0)
+        return known(self.lives, terms.wear_limit) or Known(LIMIT_ASSUMED, 0.0, 0.0, 0.0, LINE, 0)
 
     @property
     def is_learning(self) -> bool:
@@ -168,13 +170,22 @@ def used(tool: Tool, terms: Terms, trend: Trend, level: Level | None, material: 
     return tool._replace(is_fast=tool.is_fast or _is_fast(tool, life, terms))
 
 
+def rises_freely(tool: Tool, terms: Terms, level: Level, material: float, material_var: float) -> bool:
+    """Return True where a level that is far above what was expected is what a tool that wears as it likes would show."""
+    life = tool.known(terms)
+    wide = advanced(tool.wide, 1.0, wander_of(life, tool.trend))
+    end = level.gain * life.end
+    var = (end * slope(life.curve, wide.share)) ** 2 * wide.var + level.noise + material_var
+    return abs(level.level - material - end * at(life.curve, wide.share)) < HUBER * sqrt(var)
+
+
 def _is_fast(tool: Tool, life: Known, terms: Terms) -> bool:
-    """Return True where even the slow end of the rate is so many times the fastest of earlier lives."""
-    if not (tool.is_whole and life.uses_least > 0.0 and tool.uses >= 4):
+    """Return True where even the slow end of the rate is so many times that of the median of earlier lives."""
+    if not (tool.is_whole and life.uses > 0.0 and tool.uses >= 4):
         return False
     wide = tool.wide
     is_worn = wide.share - 2.0 * sqrt(wide.var) > 0.1
-    return is_worn and (wide.rate - 3.0 * sqrt(wide.rate_var)) * life.uses_least > terms.fast
+    return is_worn and (wide.rate - SURE * sqrt(wide.rate_var)) * life.uses > terms.fast
 
 
 def learned(tool: Tool, told: Told, material: float, wear: float) -> Tool:
@@ -244,13 +255,17 @@ def doubted(tool: Tool, told: Told, material: float, wear: float) -> Tool:
 
 
 def replaced(tool: Tool, terms: Terms, part: int, fell: float) -> Tool:
-    """Return the tool with a new life, which has just begun; the life before is remembered if it was seen as a whole."""
-    life = ended(tool.course) if tool.is_whole and not tool.has_stepped else None
+    """Return the tool with a new life, which has just begun; the life before is remembered if it was seen as a whole.
+
+    One that was told to wear fast, or in which the load stepped up, teaches nothing; the second fast one in a row does.
+    """
+    is_taught = tool.is_whole and not tool.has_stepped and (tool.was_fast or not tool.is_fast)
+    life = ended(tool.course) if is_taught else None
     lives = tool.lives if life is None else (*tool.lives, life)[-LIVES_MAX:]
     bases = tool.bases if tool.sharp_lives else {name: base._replace(uses=0) for name, base in tool.bases.items()}
     fresh = tool._replace(lives=lives)
     trend, wide = begun(fresh.known(terms), terms)
     return Tool(
         trend, wide, bases, is_whole=True, sharp_lives=tool.sharp_lives, lives=lives, seen_s=tool.seen_s,
-        replaced_part=part, fell=fell, vibration=None,
+        replaced_part=part, fell=fell, was_fast=tool.is_fast,
     )  # fmt: skip
