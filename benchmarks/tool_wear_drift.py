@@ -2,10 +2,10 @@
 
     .venv/bin/python -m benchmarks.tool_wear_drift --seeds 101-106 --days 150
 
-The machine is benchmarks/worn_tools/world.py; its meter drifts by 6 % within four weeks from day 60 on. The figures are the blocks of
-processors/tool_wear/drift.py, the same for all charts. river's ADWIN and PageHinkley are in the table where river is installed (it is
-no dependency); their thresholds are as it gives them, and in a second row the least at which the healthy halves of the seeds are silent.
-Each false alarm begins the chart anew.
+The machine is benchmarks/worn_tools/world.py; its meter drifts by 6 % within four weeks from day 60 on. The figures are the
+blocks of processors/tool_wear/drift.py, the same for all charts. river's ADWIN and PageHinkley are in the table where river is
+installed (it is no dependency); their thresholds are as it gives them, and in a second row the least at which the healthy
+halves of the seeds are silent. Each false alarm begins the chart anew.
 """
 
 import argparse

@@ -1,10 +1,11 @@
 """Parts made one after the other with tools that wear and are replaced, in batches of material that differ.
 
-Written down before anything was judged: a tool lives 80 to 400 parts on average, its lives spread by 20 %; wear follows a break-in, an even
-stretch and a steep end (ISO 8688-2, annex), spread in shape from life to life; at its end the edge force is 40 N/mm larger and the
-tangential coefficient 12 % (carbide in steel, VB 0.3 mm). It is replaced where the wear is 1 ± 0.08. Batches of 20 to 80 parts differ by 5 %,
-parts of a batch by 0.5 %, sharp tools by 2 %. The meter shows whole per cents, noise 0.15 %; the reference of the ratio is an expectation
-with constants 3 % off. A tool that wears fast does so 3 or 15 times as fast. Drift: the meter's scale moves by 6 % within four weeks.
+Written down before anything was judged: a tool lives 80 to 400 parts on average, its lives spread by 20 %; wear follows a
+break-in, an even stretch and a steep end (ISO 8688-2, annex), spread in shape from life to life; at its end the edge force is
+40 N/mm larger and the tangential coefficient 12 % (carbide in steel, VB 0.3 mm). It is replaced where the wear is 1 ± 0.08.
+Batches of 20 to 80 parts differ by 5 %, parts of a batch by 0.5 %, sharp tools by 2 %. The meter shows whole per cents, noise
+0.15 %; the reference of the ratio is an expectation with constants 3 % off. A tool that wears fast does so 3 or 15 times as
+fast. Drift: the meter's scale moves by 6 % within four weeks.
 """
 
 from collections.abc import Iterator

@@ -12,7 +12,8 @@ from twin.wear.terms import Terms
 class Config(ProcessorConfig):
     """wear_limit_pct: load over that of a sharp tool at which one is spent, until two of its lives have told it; None = not known
 
-    material_pct, part_pct: by how much the load differs from batch to batch, and from part to part of a batch (standard deviations)
+    material_pct, part_pct: by how much the load differs from batch to batch, and from part to part of a batch (standard
+    deviations)
     """
 
     late_s_max: float = Field(default=60.0, ge=0.0, le=3600.0, description="joint_anomaly is a moment behind the machine")

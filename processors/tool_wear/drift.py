@@ -2,9 +2,10 @@
 
     figure of a block = mean over its parts of the material of the batch that runs (twin/wear/joint.py)
 
-Batches come and go, each with its own hardness; what stays when they go is the machine: its meter, its spindle, its bearings. The chart
-is that of the gap (processors/gap/growth.py), with the correlation that batches give neighbouring blocks. The first blocks are taken
-to be healthy. Blocks count only while two tools or more of a part are known sharp, since material and wear are not told apart before.
+Batches come and go, each with its own hardness; what stays when they go is the machine: its meter, its spindle, its bearings.
+The chart is that of the gap (processors/gap/growth.py), with the correlation that batches give neighbouring blocks. The first
+blocks are taken to be healthy. Blocks count only while two tools or more of a part are known sharp, since material and wear are
+not told apart before.
 """
 
 from datetime import UTC, datetime
@@ -20,7 +21,9 @@ SIDES = 2
 
 
 class Drift(NamedTuple):
-    """The blocks so far. block: number since 1970 of the one that runs, with its parts and their sum; last: figure of the block before"""
+    """The blocks so far. block: number since 1970 of the one that runs, with its parts and their sum; last: figure of the block
+    before
+    """
 
     block: int = -1
     parts: int = 0
@@ -72,8 +75,9 @@ def in_words(config: Config, drift: Drift, machine: str) -> str:
         return f"what all tools and programs share is as it was in {healthy}, which are assumed healthy"
     way = "risen" if drift.chart.grows > 0 else "fallen"
     since = datetime.fromtimestamp(drift.chart.since_s, UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+    lately = f"{100.0 * (exp(drift.level) - 1.0):+.1f} %"
     return (
-        f"the load of all tools and programs has {way} since {since} against {healthy}, by {100.0 * (exp(drift.level) - 1.0):+.1f} % "
-        f"lately, so it is not one tool and not one batch; to name the cause: cnctwin gap case --store STORE --machine {machine} "
+        f"the load of all tools and programs has {way} since {since} against {healthy}, by {lately} lately, so it is not "
+        f"one tool and not one batch; to name the cause: cnctwin gap case --store STORE --machine {machine} "
         "--out CASE && cnctwin gap diagnose CASE --out diagnosis; with cnctwin twin run it begins by itself"
     )

@@ -1,9 +1,10 @@
 """Tool life and the drift of weeks, folded over the cut records of a machine (`twin/cut_record`).
 
-The wear of a tool is what its load has risen by over that of a sharp one, the material of the batch taken off, since that moves all
-tools together (twin/wear/). It is published for the tool in the spindle, and as JSON for all of them; parts left only where they are
-known (twin/wear/status.py). What all tools share and what stays over many batches is the drift of the machine, and a case for the
-gap diagnosis (processors/tool_wear/drift.py). A broken insert is no wear: it is left to the score of joint_anomaly.
+The wear of a tool is what its load has risen by over that of a sharp one, the material of the batch taken off, since that moves
+all tools together (twin/wear/). It is published for the tool in the spindle, and as JSON for all of them; parts left only where
+they are known (twin/wear/status.py). What all tools share and what stays over many batches is the drift of the machine, and a
+case for the gap diagnosis (processors/tool_wear/drift.py). A broken insert is no wear: it is left to the score of
+joint_anomaly.
 """
 
 import json

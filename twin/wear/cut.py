@@ -1,6 +1,7 @@
 """A cut record: an operation of a part that has ended, as JSON in `twin/cut_record`.
 
-`load_ratio` is the cutting load over a reference that never changes, so wear stays visible in it. A ratio that is not known is null.
+`load_ratio` is the cutting load over a reference that never changes, so wear stays visible in it. A ratio that is not known is
+null.
 
 >>> text = '{"version":1,"program":"O1","tool":3,"operation":"O1|T3|1","part":7,"ended_s":9.0,"load_ratio":1.1}'
 >>> cut_of(text).load_ratio

@@ -1,10 +1,11 @@
-"""What is known of a machine's tools together: the material of the batch, the part, and share and rate of each tool, as one Gaussian.
+"""What is known of a machine's tools together: the material of the batch, the part, and share and rate of each tool, as one
+Gaussian.
 
     level_j = c + e + gain_j R_j g_j(u_j) + ε_j      c: batch, e: part, u_j: share of the life of tool j      (twin/wear/trend.py)
 
-A level tells of material and wear together, so their errors belong together: after a batch has changed, only tools whose wear is known
-tell how hard the new one is, and each sharp tool tells more. A Kalman filter with the whole covariance keeps that; two filters that
-take the other's mean for granted are too sure of themselves.
+A level tells of material and wear together, so their errors belong together: after a batch has changed, only tools whose wear
+is known tell how hard the new one is, and each sharp tool tells more. A Kalman filter with the whole covariance keeps that; two
+filters that take the other's mean for granted are too sure of themselves.
 """
 
 from collections.abc import Mapping, Sequence

@@ -2,9 +2,9 @@
 
     P(m) = Σ_i p_i Φ((u_i + m r_i − 1) / √(v + m n² b² / 3 + s²)),   given that it has not passed yet: (P(m) − P(0)) / (1 − P(0))
 
-over rates r_i, which are taken to be log-normal with the trend's mean and variance (Gauss-Hermite, seven points), u_i and v being mean and
-variance of the share given the rate. n is m, at most a life, since a rate does not wander away for ever. s is the spread of the share
-at which earlier lives ended.
+over rates r_i, which are taken to be log-normal with the trend's mean and variance (Gauss-Hermite, seven points), u_i and v
+being mean and variance of the share given the rate. n is m, at most a life, since a rate does not wander away for ever. s is
+the spread of the share at which earlier lives ended.
 """
 
 from math import erf, exp, log, sqrt
@@ -29,7 +29,9 @@ class Left(NamedTuple):
 
 
 class _Spent(NamedTuple):
-    """The chance that a tool is spent, as it depends on the uses: (share, rate, weight) of each point, and what the share varies by."""
+    """The chance that a tool is spent, as it depends on the uses: (share, rate, weight) of each point, and what the share
+    varies by.
+    """
 
     points: tuple[tuple[float, float, float], ...]
     var: float

@@ -4,9 +4,9 @@ A life that began at a replacement and ended at one gives its length T in parts,
 
     log T ~ N(mean, s²),   s² = (K·k² + Σ (log T − mean)²) / (K + L − 1) · (1 + 1/L)
 
-with K lives' worth of the usual spread k, and log R likewise: the predictive spread of a normal with an inverse-gamma prior (Gelman et
-al., Bayesian Data Analysis, 3rd ed., section 3.3). The mean is the median, and a deviation counts as at most FAR usual spreads, since a
-replacement that was not seen makes two lives one.
+with K lives' worth of the usual spread k, and log R likewise: the predictive spread of a normal with an inverse-gamma prior
+(Gelman et al., Bayesian Data Analysis, 3rd ed., section 3.3). The mean is the median, and a deviation counts as at most FAR
+usual spreads, since a replacement that was not seen makes two lives one.
 """
 
 from collections.abc import Sequence

@@ -1,9 +1,9 @@
 """The wear of all tools of a machine: cuts come in, parts are judged when they have ended.
 
-A part is what its cuts have in common, program and number. It is judged when a cut of another part comes: first which batch it is of and
-which tools were replaced (twin/wear/material.py), then all tools together (twin/wear/joint.py), then what each operation tells of itself
-(twin/wear/tool.py). A tool is taken to be replaced when its level has fallen back to that of a sharp one, and the others have not, in
-two of its parts in a row; before a sharp one is known, when it has fallen alone in three.
+A part is what its cuts have in common, program and number. It is judged when a cut of another part comes: first which batch it
+is of and which tools were replaced (twin/wear/material.py), then all tools together (twin/wear/joint.py), then what each
+operation tells of itself (twin/wear/tool.py). A tool is taken to be replaced when its level has fallen back to that of a sharp
+one, and the others have not, in two of its parts in a row; before a sharp one is known, when it has fallen alone in three.
 """
 
 from collections.abc import Mapping

@@ -3,8 +3,9 @@
     c ~ N(c', …)   as in the part before,   or   N(c̄, m²)   in another batch
 
 The explanation that costs least in −log probability is taken: the same batch or another one, and none, one or more of the tools
-replaced since the part before; a tool that neither fits costs ODD, so one broken insert is no batch. This is the maximum a posteriori
-among them, found greedily over the tools. An outlier of one tool is thus its own, and a step of all is the material's.
+replaced since the part before; a tool that neither fits costs ODD, so one broken insert is no batch. This is the maximum a
+posteriori among them, found greedily over the tools. An outlier of one tool is thus its own, and a step of all is the
+material's.
 """
 
 from collections.abc import Iterable, Sequence
@@ -33,7 +34,9 @@ class Batches(NamedTuple):
 
 
 class Seen(NamedTuple):
-    """A tool in a part as it is if it goes on, and as it is if it was replaced; None = it can't be told. is_due: its life is nearly over"""
+    """A tool in a part as it is if it goes on, and as it is if it was replaced; None = it can't be told. is_due: its life is
+    nearly over
+    """
 
     worn: Observed
     sharp: Observed | None = None
@@ -93,6 +96,8 @@ def _cost(joint: Joint, tools: Sequence[Seen], replaced: frozenset[str], batches
     cost = sum(DUE_COST if one.is_due else REPLACED_COST for one in tools if one.worn.name in replaced)
     levels = _levels(tools, replaced)
     same, _, off_same = _taken(joint, levels)
+    if sum(0.5 * far * far for far in off_same.values()) < BATCH_COST:
+        return _Costs(cost + same, False, off_same)  # another batch can't pay for itself
     other, _, off_other = _taken(renewed(joint, MATERIAL, batches.mean, terms.material**2), levels)
     if other + BATCH_COST < same:
         return _Costs(cost + other + BATCH_COST, True, off_other)

@@ -1,7 +1,7 @@
 """The standing of a tool in words and figures: level over a sharp one, slope, parts left, and why a figure is missing.
 
-Parts left are given after `uses_min` parts of a life that was seen from its beginning, where the level at which such tools are spent
-is known, the slope is above nothing by its band of 90 %, and the band of the parts left is finite.
+Parts left are given after `uses_min` parts of a life that was seen from its beginning, where the level at which such tools are
+spent is known, the slope is above nothing by its band of 90 %, and the band of the parts left is finite.
 """
 
 from math import exp, sqrt
@@ -19,7 +19,7 @@ BAND_90 = 1.645
 
 
 class Status(NamedTuple):
-    """One tool. level, slope: in % over a sharp tool, and % a part, each with its band of 90 %; None with the reason beside it."""
+    """One tool. level, slope: in % over a sharp tool, and % a part, each with its band of 90 %; None has its reason beside it."""
 
     tool: int
     uses: int

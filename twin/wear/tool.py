@@ -3,9 +3,10 @@
     log ratio_o = sharp_o + material + gain_o · wear + ε_o,   ε_o ~ N(0, σ_o²)      over its operations o
     level of the tool in a part = Σ (log ratio_o − sharp_o) / σ_o² / Σ 1 / σ_o²
 
-The sharp level of an operation is the mean of its first SHARP_USES uses after a replacement, of the first two lives, and stands still
-from then on. Until the first replacement, levels are counted from the first parts that were seen. σ_o is learned, and so is gain_o: an
-edge that is worn costs more force where the chip is thin. It is 1 for the first operation of a tool, in whose level its wear is given.
+The sharp level of an operation is the mean of its first SHARP_USES uses after a replacement, of the first two lives, and stands
+still from then on. Until the first replacement, levels are counted from the first parts that were seen. σ_o is learned, and so
+is gain_o: an edge that is worn costs more force where the chip is thin. It is 1 for the first operation of a tool, in whose
+level its wear is given.
 """
 
 from collections.abc import Mapping
@@ -22,7 +23,7 @@ NOISE, NOISE_MIN, NOISE_MAX = 0.03, 0.004, 0.3
 NOISE_PRIOR, NOISE_COUNT = 10, 200
 LIMIT_ASSUMED = 0.3
 """The scale of a trend while no limit is known; nothing that is published depends on it."""
-RATE_WIDE, RATE_UNKNOWN = 4.0, 0.05
+RATE_WIDE, RATE_UNKNOWN = 8.0, 0.05
 SHARE_WANDER, RATE_WANDER = 0.03, 0.15
 WIDE_IS_BETTER = 5.0
 SURE = 2.33
@@ -41,9 +42,9 @@ GAIN_SPREAD, GAIN_MIN, GAIN_VAR_MIN, GAIN_NOISE = 0.4, 0.4, 4e-4, 0.05
 class Base(NamedTuple):
     """The sharp level of an operation, learned from so many uses; the variance of its level from part to part, from so many.
 
-    uses: 0 while it was only seen on a tool that was worn already; level_var: of the sharp level; count: parts that taught the noise
-    gain: by how much of the tool's wear it rises; gain_var: 0 for the first operation of a tool; last: its level less the material's when
-    it was seen last
+    uses: 0 while it was only seen on a tool that was worn already; level_var: of the sharp level; count: parts that taught the
+    noise gain: by how much of the tool's wear it rises; gain_var: 0 for the first operation of a tool; last: its level less the
+    material's when it was seen last
     """
 
     level: float
@@ -59,9 +60,9 @@ class Base(NamedTuple):
 class Tool(NamedTuple):
     """The state of a tool. uses: parts of the life that runs; is_whole: it was seen from its beginning
 
-    wide: the trend without earlier lives; sharp_lives: lives whose first uses are in the bases
-    low, high: uses in a row at which it seemed to be replaced, or far above what was expected; has_stepped: a sudden rise was taken
-    in; replaced_part, fell: of the last replacement, and by how much the level fell at it; vibration: mean of its log ratio
+    wide: the trend without earlier lives; sharp_lives: lives whose first uses are in the bases low, high: uses in a row at
+    which it seemed to be replaced, or far above what was expected; has_stepped: a sudden rise was taken in; replaced_part,
+    fell: of the last replacement, and by how much the level fell at it; vibration: mean of its log ratio
     """
 
     trend: Trend
@@ -93,14 +94,16 @@ class Tool(NamedTuple):
 
 
 class Told(NamedTuple):
-    """The records of a tool's operations in a part: log ratios, and the spreads of the ratio over healthy parts where they are known."""
+    """The records of a tool's operations in a part: log ratios, and the spreads of the ratio over healthy parts where they are
+    known.
+    """
 
     logs: Mapping[str, float]
     spreads: Mapping[str, float]
 
 
 class Level(NamedTuple):
-    """The level of a tool in a part over that of a sharp one, material and all; its variance; by how much of the wear it rises."""
+    """The level of a tool in a part over that of a sharp one, material and all; its variance; how it rises with the wear."""
 
     level: float
     noise: float
@@ -231,7 +234,8 @@ def _level_var(wear: float, gain_var: float) -> float:
 
 
 def leap(tool: Tool, told: Told, material: float) -> float | None:
-    """Return by how much a tool's operations stand above where each was seen last, the largest of them; None = none was seen before.
+    """Return by how much a tool's operations stand above where each was seen last, the largest of them; None = none was seen
+    before.
 
     A tool that changed shows it in the very operation. One that seems to change as another program comes is another program's.
     """

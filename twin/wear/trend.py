@@ -1,10 +1,11 @@
-"""The wear of one tool as a local linear trend of the share u of its life, which the level shows through the curve of earlier lives.
+"""The wear of one tool as a local linear trend of the share u of its life, which the level shows through the curve of earlier
+lives.
 
     u' = u + r n + ν,   r' = r + η,   level = R g(u) + ε,        ν ~ N(0, n a²), η ~ N(0, n b²)
 
-over n uses, followed by an extended Kalman filter (Harvey, Forecasting, Structural Time Series Models and the Kalman Filter, 1989,
-section 2.3.2). R is the level at the end of a life, r the share of a life that a use costs. A level further than HUBER deviations off
-pulls no more than one at HUBER (Masreliez and Martin, IEEE Trans. Automatic Control 22, 1977).
+over n uses, followed by an extended Kalman filter (Harvey, Forecasting, Structural Time Series Models and the Kalman Filter,
+1989, section 2.3.2). R is the level at the end of a life, r the share of a life that a use costs. A level further than HUBER
+deviations off pulls no more than one at HUBER (Masreliez and Martin, IEEE Trans. Automatic Control 22, 1977).
 """
 
 from math import log, sqrt

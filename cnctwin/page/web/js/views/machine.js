@@ -12,6 +12,7 @@ import { machineHead } from "./machine_head.js";
 import { noMachine } from "./no_machine.js";
 import { SignalTable } from "./signal_table.js";
 import { ScoreTile, Tile } from "./tiles.js";
+import { ToolLives } from "./tool_lives.js";
 
 const WINDOWS = [
   [120000, "2 min"],
@@ -33,6 +34,7 @@ export function open(app, { machine: named, search }) {
     asked = search.get("signal") ?? null,
     frozenAt = null;
   const panels = new Panels(machine),
+    tools = new ToolLives(machine),
     table = new SignalTable(machine);
   const tiles = [...TILES.map((tile) => new Tile(machine, tile, () => pick(tile.id))), new ScoreTile(machine)];
   const select = el("select", {
@@ -69,6 +71,7 @@ export function open(app, { machine: named, search }) {
       note,
     ),
     panels.element,
+    tools.element,
     table.element,
   );
 
@@ -178,6 +181,7 @@ export function open(app, { machine: named, search }) {
   }, 250);
   const tick = setInterval(() => {
     onFrame(write);
+    tools.write();
     table.write();
   }, 1000);
 
