@@ -39,7 +39,8 @@ CUTS_MAX = 200
 ANCHORS_MIN = 2
 DUE = 0.7
 ODD_OFF = 4.0
-LEAP = 0.4
+LEAP, FALL_MIN = 0.4, 0.1
+"""A tool was replaced if the level of the very operation leapt by this part of its wear; by FALL_MIN it is enough on its own."""
 REPLACED_MIN = 0.04
 """Less wear than this can't be told from the spread of sharp tools: its replacement is not looked for."""
 
@@ -138,18 +139,18 @@ def _after(tool: Tool, name: str, terms: Terms, told: Told, level: Level | None,
         return used(learned(tool, told, shared, wear_of(tool, terms)), terms, trend, None, 0.0, 0.0)
     far = found.off[name]
     wear = wear_of(tool, terms)
-    is_low = name in found.replaced or (far < -ODD_OFF and not tool.is_learning)
     rows = joint.rows
     shared_var = rows[MATERIAL][MATERIAL] + 2.0 * rows[MATERIAL][PART] + rows[PART][PART]
+    moved = leap(tool, told, shared)
+    far_enough = max(LEAP * wear * level.gain, REPLACED_MIN)
+    has_fallen = moved is not None and moved < -max(far_enough, FALL_MIN)
+    is_low = name in found.replaced or ((far < -ODD_OFF or has_fallen) and not tool.is_learning)
     is_high = far > ODD_OFF and not tool.is_learning and not rises_freely(tool, terms, level, shared, shared_var)
-    if is_low or is_high:
-        moved = leap(tool, told, shared)
-        has_leapt = moved is None or abs(moved) > max(LEAP * wear * level.gain, REPLACED_MIN)
-        if not has_leapt and len(tool.bases) > 1:
-            return used(doubted(tool, told, shared, wear), terms, trend, None, 0.0, 0.0)._replace(low=0, high=0)
+    if (is_low or is_high) and moved is not None and abs(moved) <= far_enough and len(tool.bases) > 1:
+        return used(doubted(tool, told, shared, wear), terms, trend, None, 0.0, 0.0)._replace(low=0, high=0)
     if is_low:
         low = tool.low + 1
-        if low < (REPLACED_USES if name in found.replaced else STEPPED_USES):
+        if low < (REPLACED_USES if name in found.replaced or has_fallen else STEPPED_USES):
             return tool._replace(low=low, high=0, trend=trend)
         return _new_life(tool._replace(low=low), terms, told, shared, part, wear - (level.level - shared) / level.gain)
     if is_high:

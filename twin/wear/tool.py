@@ -23,10 +23,10 @@ NOISE, NOISE_MIN, NOISE_MAX = 0.03, 0.004, 0.3
 NOISE_PRIOR, NOISE_COUNT = 10, 200
 LIMIT_ASSUMED = 0.3
 """The scale of a trend while no limit is known; nothing that is published depends on it."""
-RATE_WIDE, RATE_UNKNOWN = 8.0, 0.05
+RATE_WIDE, RATE_UNKNOWN = 4.0, 0.05
 SHARE_WANDER, RATE_WANDER = 0.03, 0.15
 WIDE_IS_BETTER = 5.0
-SURE = 2.33
+SURE = 2.6
 STEPPED_USES, REPLACED_USES = 3, 2
 OPERATIONS_MAX = 40
 MEMORY_USES = 10.0
@@ -266,7 +266,7 @@ def replaced(tool: Tool, terms: Terms, part: int, fell: float) -> Tool:
     is_taught = tool.is_whole and not tool.has_stepped and (tool.was_fast or not tool.is_fast)
     life = ended(tool.course) if is_taught else None
     lives = tool.lives if life is None else (*tool.lives, life)[-LIVES_MAX:]
-    bases = tool.bases if tool.sharp_lives else {name: base._replace(uses=0) for name, base in tool.bases.items()}
+    bases = {name: base._replace(last=None, uses=base.uses if tool.sharp_lives else 0) for name, base in tool.bases.items()}
     fresh = tool._replace(lives=lives)
     trend, wide = begun(fresh.known(terms), terms)
     return Tool(
