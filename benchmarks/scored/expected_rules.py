@@ -1,6 +1,6 @@
 """Two rules beside the twin's expectation, on the simulated cell: false alarms a machine-week, and delays of a broken tool.
 
-    .venv/bin/python benchmarks/expected_rules.py --seeds 101-103 --machines 4 --days 6
+    .venv/bin/python benchmarks/scored/expected_rules.py --seeds 101-102 --machines 4 --days 4
 
 The cell is cut by the reference machine, which shares no code with the twin; the twin is given the statement of each machine, a
 few percent off, without its edge forces, losses and cold grease. A control tells once a second. The programs of a machine are
@@ -154,9 +154,9 @@ def within(fault: Fault, at_s: float) -> bool:
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--seeds", default="101-103")
+    parser.add_argument("--seeds", default="101-102")
     parser.add_argument("--machines", type=int, default=4)
-    parser.add_argument("--days", type=int, default=6)
+    parser.add_argument("--days", type=int, default=4)
     asked = parser.parse_args()
     first, _, last = asked.seeds.partition("-")
     every: list[Found] = []
