@@ -124,7 +124,7 @@ def step(given: Described, state: State, sample: Sample) -> tuple[State, Sequenc
     planned_mm_min = planned.feed_mm_min * _override(sample)
     place = placed(state.place, (program, line, tool), sample.at_s, feed, planned_mm_min)
     window = window_mm(place)
-    along_mm = None if window is None else 0.5 * (window[0] + window[1])
+    along_mm = None if window is None else place.along_mm + 0.5 * place.doubt_mm
     run_feed = planned_mm_min if feed is None else feed
     expected = expectation.at(line, run_feed, rpm, tool=tool, along_mm=along_mm) or planned
     ratio_cut_pct_min = given.configuration.of(sample.machine).ratio_cut_pct_min
