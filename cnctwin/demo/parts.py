@@ -205,8 +205,9 @@ class Demo:
             diagnose="by_itself" if self.options.diagnose is ByItself.BY_ITSELF else "by_hand",
             promote="by_rule" if self.options.promote is ByItself.BY_ITSELF else "by_hand",
         )
-        expected = place_expectation(self._folder / "expectations", self.machine)
-        return settings + expected + place_model(self._folder / "models", self.machine)
+        folder = self._folder / "expectations"
+        expected = place_expectation(folder, self.machine)
+        return settings + expected + place_model(self._folder / "models", self.machine, folder)
 
     def _agent(self) -> list[str]:
         """The command that stands in for the control."""
