@@ -59,7 +59,7 @@ class Told(NamedTuple):
 
 
 class Found(NamedTuple):
-    """delays_s: of each broken tool that had to cut, inf = not found; false, healthy: false onsets by rule, those in no other fault
+    """delays_s: of each broken tool that had to cut, inf = not found; false, healthy: false onsets, those in no fault
 
     over, planted: faults that raise the load by kind and size, found and all
     """
@@ -188,9 +188,7 @@ def main() -> None:
     for name in (RULE_TOOL_BROKEN, RULE_LOAD_OVER_EXPECTED):
         false = sum(found.false[name] for found in every)
         healthy = sum(found.healthy[name] for found in every)
-        print(
-            f"{name}: {false} false alarms, {false / weeks:.2f} a machine-week; {healthy / weeks:.2f} beside those in other faults"
-        )
+        print(f"{name}: {false} false alarms, {false / weeks:.2f} a machine-week; {healthy / weeks:.2f} but for other faults")
     soon = np.sort(delays)
     print(
         f"broken tools: {len(delays)}, found {np.isfinite(delays).mean():.2f}, within 2 s {(delays <= 2.0).mean():.2f}, "

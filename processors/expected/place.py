@@ -16,7 +16,7 @@ DT_S_MAX = 10.0
 
 
 class Place(NamedTuple):
-    """program, line, tool: as told last, at `at_s`, with that feed; along_mm, planned_mm, doubt_mm: since the line was first told."""
+    """program, line, tool: as told last, at `at_s`, with that feed; along_mm, planned_mm, doubt_mm: since the line was told."""
 
     program: str = ""
     line: int | None = None
