@@ -42,13 +42,17 @@ class Usual(NamedTuple):
 class Sums(NamedTuple):
     """The sums of a section in one part: for each signal ticks that told, residuals, their squares."""
 
-    count: tuple[int, ...]
+    ticks: tuple[int, ...]
     total: tuple[float, ...]
     squares: tuple[float, ...]
 
     def plus(self, other: "Sums") -> "Sums":
         """Return the sums of both."""
-        return Sums(*(tuple([a + b for a, b in zip(x, y, strict=True)]) for x, y in zip(self, other, strict=True)))
+        return Sums(
+            tuple([a + b for a, b in zip(self.ticks, other.ticks, strict=True)]),
+            tuple([a + b for a, b in zip(self.total, other.total, strict=True)]),
+            tuple([a + b for a, b in zip(self.squares, other.squares, strict=True)]),
+        )
 
 
 Rows = tuple[tuple[float | None, ...], ...]
@@ -59,7 +63,7 @@ def with_rows(sections: tuple[tuple[int, Sums], ...], section: int, rows: Rows) 
     """Return the sums of an operation's sections with those of one more.
 
     >>> with_rows((), 4, ((0.5, None), (1.5, None)))
-    ((4, Sums(count=(2, 0), total=(2.0, 0.0), squares=(2.5, 0.0))),)
+    ((4, Sums(ticks=(2, 0), total=(2.0, 0.0), squares=(2.5, 0.0))),)
     """
     columns = [[value for value in column if value is not None] for column in zip(*rows, strict=True)]
     sums = Sums(
