@@ -3,7 +3,7 @@
     .venv/bin/python benchmarks/part_score.py --days 2 --machines 4
 
 A cell of machines learns for some days and is followed through the next one; the time of following, judging beside the peers and
-learning is that of all ticks, standing ones included, and of those that cut alone. Times are of the process; of those that cut, the median.
+learning is that of all ticks, standing ones included, and the median of those at which all of them cut. Times are the process's.
 """
 
 import argparse

@@ -122,7 +122,7 @@ def _sections_learned(model: PartsModel, own: Own, ended: Ended) -> Own:
     for section, sums in merged.items():
         before = usual.told[section]
         centre[section], variance[section], told[section], weight[section] = learned_section(
-            usual, section, sums, plan.prior, plan.least
+            usual, section, sums, plan.prior, plan.least, plan.first
         )
         if plan.load_at >= 0 and before[plan.load_at] < told[section][plan.load_at]:
             at = plan.load_at

@@ -119,12 +119,15 @@ def extended(usual: Usual, marks: tuple[Mark, ...], end: Mark, signals: int) -> 
 
 
 def learned_section(
-    usual: Usual, section: int, sums: Sums, prior: Sequence[float], floor: Sequence[float]
+    usual: Usual, section: int, sums: Sums, prior: Sequence[float], floor: Sequence[float], first: Sequence[float]
 ) -> tuple[tuple[float, ...], tuple[float, ...], tuple[int, ...], tuple[float, ...]]:
-    """Return centre, variance, parts and weight of a section after one more healthy part; sums: of residuals to the centre."""
+    """Return centre, variance, parts and weight of a section after one more healthy part; sums: of residuals to the centre.
+
+    prior, floor, first: by signal, the variance of a steady section, the least one, and what the first part is not trusted by
+    """
     centre, variance, parts = [], [], []
-    rows = zip(usual.centre[section], usual.variance[section], usual.told[section], *sums, prior, strict=True)
-    for c, v, n, count, total, squares, usual_variance in rows:
+    rows = zip(usual.centre[section], usual.variance[section], usual.told[section], *sums, prior, first, strict=True)
+    for c, v, n, count, total, squares, usual_variance, mistrust in rows:
         if not count:
             centre.append(c)
             variance.append(v)
@@ -133,7 +136,7 @@ def learned_section(
         mean, square = total / count, squares / count
         if n == 0:
             centre.append(round(c + mean, 4))
-            variance.append(round(max(0.0, square - mean * mean) + FIRST_PRIORS * usual_variance, 6))
+            variance.append(round(max(0.0, square - mean * mean) + mistrust, 6))
             parts.append(1)
             continue
         spread = (max(v, usual_variance)) ** 0.5
