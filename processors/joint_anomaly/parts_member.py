@@ -76,7 +76,8 @@ def learnt(scoring: "Scoring", before: PartsMember | None, found: tuple[Own, Jud
     elif before.is_shown and not is_shown:
         why = None
         outputs.append(_published(why, NO_ALARM, name, at_s))
-    knows = before.knows if judged.is_idle and before.knows else judged.knows  # between two cuts nothing is news
+    is_between_cuts = own.place.stood_ticks > 0 or own.place.tool is None
+    knows = before.knows if is_between_cuts and before.knows else judged.knows
     if knows != before.knows:
         outputs.append(Output(KNOWS, knows, machine=name, at_s=at_s))
     if memory is not found[0].memory:
