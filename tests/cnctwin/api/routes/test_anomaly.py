@@ -193,7 +193,7 @@ class Milling:
 def test_a_verdict_reaches_the_real_processor(mosquitto: Mosquitto, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(anomaly_routes, "ANSWER_S_MAX", PATIENCE_S)
     milling = Milling(mosquitto, tmp_path)
-    with milling.judged(), served(mosquitto) as server:
+    with served(mosquitto) as server, milling.judged():
         told = milling.until_it_alarms(server)
         assert (told["why"]["program"], told["verdicts"]["alarms"][0]["state"]) == ("O1", "on")
         answer = post(f"{server.url}/anomaly/vmc/verdict", json={"verdict": "known", "label": "harder material", "by": "ada"})
