@@ -10,7 +10,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 from pydantic import Field
 
@@ -21,6 +21,7 @@ from processors.expected.place import BEYOND, Place, placed, window_mm
 from processors.expected.usual import Air, Ratio, air_after, ratios_after
 from processors.sample import why_unknown
 from sparkplug.datatype import DataType
+from sparkplug.quality import Quality
 from twin.errors import ExpectationError
 from twin.expected.expectation import Expectation
 from twin.expected.expected import Expected
@@ -77,7 +78,7 @@ class Described:
     def basis(self, expectation: Expectation) -> str:
         """Return in words what an expectation rests on, first of all whether the description has changed since."""
         changed = stale(expectation, description=self.version)
-        return "; ".join((*([] if changed is None else [changed]), *expectation.basis))
+        return expectation.in_words if changed is None else f"{changed}; {expectation.in_words}"
 
 
 def described(configuration: Configuration[Config], description: Description | None) -> Described:
@@ -98,9 +99,6 @@ class State:
     ratios: Mapping[str, Ratio] = field(default_factory=dict)
 
 
-_UNSEEN = State()
-
-
 def step(given: Described, state: State, sample: Sample) -> tuple[State, Sequence[Output]]:
     """Compare at every sample; a hole or a death ends what is known of the place in the line."""
     if sample.kind in (SampleKind.HOLE, SampleKind.DEATH):
@@ -118,7 +116,7 @@ def step(given: Described, state: State, sample: Sample) -> tuple[State, Sequenc
         return _lost(state), _nulls(no_line)
     tool = _whole(sample, TOOL)[0]
     feed, rpm = _bounded(sample, FEED), _bounded(sample, SPEED)
-    planned = expectation.at(line, tool=tool)
+    planned = expectation.planned(line, tool)
     if planned is None:
         return _lost(state), _nulls(f"program {program} has no move in this line")
     planned_mm_min = planned.feed_mm_min * _override(sample)
@@ -126,14 +124,14 @@ def step(given: Described, state: State, sample: Sample) -> tuple[State, Sequenc
     window = window_mm(place)
     along_mm = None if window is None else place.along_mm + 0.5 * place.doubt_mm
     run_feed = planned_mm_min if feed is None else feed
-    expected = expectation.at(line, run_feed, rpm, tool=tool, along_mm=along_mm) or planned
+    expected = expectation.at(line, run_feed, rpm, tool=tool, along_mm=along_mm)
+    assert expected is not None, "a line that is planned is expected"
     ratio_cut_pct_min = given.configuration.of(sample.machine).ratio_cut_pct_min
     now = _Now(expectation, expected, place, window, run_feed, rpm, sample, given.basis(expectation))
     return _compared(ratio_cut_pct_min, state, now)
 
 
-@dataclass(frozen=True, slots=True)
-class _Now:
+class _Now(NamedTuple):
     """A sample whose line is known."""
 
     expectation: Expectation
@@ -164,9 +162,9 @@ def _compared(ratio_cut_pct_min: float, state: State, now: _Now) -> tuple[State,
     expected, sample, rpm = now.expected, now.sample, now.rpm
     at_s, tool = sample.at_s, str(now.place.tool)
     outputs = [
-        Output(twin_signals.EXPECTED_FEED_MM_MIN, round(expected.feed_mm_min * _override(sample), 1)),
-        Output(twin_signals.EXPECTED_LINE_S, round(expected.time_s, DIGITS)),
-        Output(twin_signals.EXPECTED_BASIS, now.basis),
+        _said(twin_signals.EXPECTED_FEED_MM_MIN, round(expected.feed_mm_min * _override(sample), 1)),
+        _said(twin_signals.EXPECTED_LINE_S, round(expected.time_s, DIGITS)),
+        _said(twin_signals.EXPECTED_BASIS, now.basis),
     ]
     is_on = now.place.along_mm > 0.0 and at_s - state.place.at_s <= WITHIN_S
     bounds = now.bounds(state.place.feed_mm_min if is_on else None)
@@ -179,10 +177,10 @@ def _compared(ratio_cut_pct_min: float, state: State, now: _Now) -> tuple[State,
     else:
         least_shown, most_shown = 0.0, max(most, 0.0)
     outputs += [
-        Output(twin_signals.EXPECTED_SPINDLE_LOAD_PCT, round(expected.load_pct, DIGITS)),
-        Output(twin_signals.EXPECTED_CUTTING_FORCE_N, round(expected.force_n, 1)),
-        Output(twin_signals.EXPECTED_CUT_LEAST_PCT, round(least_shown, DIGITS)),
-        Output(twin_signals.EXPECTED_CUT_MOST_PCT, round(most_shown, DIGITS)),
+        _said(twin_signals.EXPECTED_SPINDLE_LOAD_PCT, round(expected.load_pct, DIGITS)),
+        _said(twin_signals.EXPECTED_CUTTING_FORCE_N, round(expected.force_n, 1)),
+        _said(twin_signals.EXPECTED_CUT_LEAST_PCT, round(least_shown, DIGITS)),
+        _said(twin_signals.EXPECTED_CUT_MOST_PCT, round(most_shown, DIGITS)),
     ]
     air, ratios = state.air, state.ratios
     load_pct, no_load = sample.number(LOAD)
@@ -201,17 +199,22 @@ def _compared(ratio_cut_pct_min: float, state: State, now: _Now) -> tuple[State,
             since_s = min(max(at_s - state.bounds_s, 0.0), WITHIN_S)
             ratios = ratios_after(ratios, tool, cut_pct, math.sqrt(least_shown * most_shown), since_s)
         outputs += [
-            Output(twin_signals.SPINDLE_CUT_LOAD_PCT, round(cut_pct, DIGITS)),
-            Output(twin_signals.SPINDLE_LOAD_RESIDUAL_PCT, round(load_pct - expected.load_pct, DIGITS)),
+            _said(twin_signals.SPINDLE_CUT_LOAD_PCT, round(cut_pct, DIGITS)),
+            _said(twin_signals.SPINDLE_LOAD_RESIDUAL_PCT, round(load_pct - expected.load_pct, DIGITS)),
         ]
     own = ratios.get(tool)
     value = None if own is None else own.value
     outputs.append(
         Output.null(twin_signals.EXPECTED_RATIO, "too little of this tool has been seen")
         if value is None
-        else Output(twin_signals.EXPECTED_RATIO, round(value, DIGITS))
+        else _said(twin_signals.EXPECTED_RATIO, round(value, DIGITS))
     )
     return State(now.place, least, most, at_s, rpm, air, ratios), outputs
+
+
+def _said(name: str, value: float | str) -> Output:
+    """Return a good value, the short way: there are nine of them at every sample."""
+    return tuple.__new__(Output, (name, value, Quality.GOOD, None, None, None))
 
 
 def _lost(state: State, place: Place | None = None) -> State:
