@@ -1,7 +1,7 @@
 """Two rules beside the twin's expectation, on the simulated cell: false alarms a machine-week, and delays of a broken tool.
 
     .venv/bin/python benchmarks/scored/expected_rules.py --seeds 101-102 --machines 4 --days 3
-    .venv/bin/python benchmarks/scored/expected_rules.py --seeds 101 --machines 4 --days 1 --breaks     # a tool breaks every 10 min
+    .venv/bin/python benchmarks/scored/expected_rules.py --seeds 101 --machines 3 --days 1 --breaks     # one every 10 min
 
 The cell is cut by the reference machine, which shares no code with the twin; the twin is given the statement of each machine, a
 few percent off, without its edge forces, losses and cold grease. A control tells once a second. The programs of a machine are

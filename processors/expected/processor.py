@@ -3,7 +3,7 @@
     residual = measured load − expected load        cut = measured load − load in air        (twin/expected, `cnctwin expect`)
 
 Between two samples a machine is somewhere in a line, so the expected cut has a least and a greatest value, over the places where
-it may be at this sample and was at the one before. What is not known is null, with the reason.
+it may be at this sample, and was at one just before. What is not known is null, with the reason.
 """
 
 import math
@@ -17,7 +17,7 @@ from pydantic import Field
 from processors.config import Configuration, ProcessorConfig
 from processors.contract import Output, OutputSpec, Processor, Provenance, Sample, SampleKind
 from processors.description import Description
-from processors.expected.place import BEYOND, Place, placed, window_mm
+from processors.expected.place import ANYWHERE_MM, BEYOND, Place, placed, window_mm
 from processors.expected.usual import Air, Ratio, air_after, ratios_after
 from processors.sample import why_unknown
 from sparkplug.datatype import DataType
@@ -32,6 +32,7 @@ PROGRAM, LINE, TOOL, LOAD = "program", "nc_line", "tool_number", "spindle_load_p
 SPEED, FEED, OVERRIDE = "spindle_rpm", "feed_mm_min", "feed_override_pct"
 NO_FOLDER = "no expectations; cnctwin expect makes them, [expected] expectations names their folder"
 TURNING_RPM, STEADY, WITHIN_S, SETTLED_S = 100.0, 0.005, 2.5, 0.7
+"""A meter shows for up to SETTLED_S what was a sample ago; a sample WITHIN_S ago tells of the time between."""
 CUTS_SHARE, EVEN = 0.3, 1.5
 """A cut tells of the ratio where it is no less than this share of what is expected, and what is expected is known so well."""
 BEYOND_MAX = 1e6
@@ -117,12 +118,12 @@ def step(given: Described, state: State, sample: Sample) -> tuple[State, Sequenc
     tool = _whole(sample, TOOL)[0]
     feed, rpm = _bounded(sample, FEED), _bounded(sample, SPEED)
     planned = expectation.planned(line, tool)
-    if planned is None:
-        return _lost(state), _nulls(f"program {program} has no move in this line")
-    planned_mm_min = planned.feed_mm_min * _override(sample)
+    planned_mm_min = 0.0 if planned is None else planned.feed_mm_min * _override(sample)
     place = placed(state.place, (program, line, tool), sample.at_s, feed, planned_mm_min)
+    if planned is None:
+        return _lost(state, place), _nulls(f"program {program} has no move in this line")
     window = window_mm(place)
-    along_mm = None if window is None else place.along_mm + 0.5 * place.doubt_mm
+    along_mm = None if window is None or place.doubt_mm >= ANYWHERE_MM else place.along_mm + 0.5 * place.doubt_mm
     run_feed = planned_mm_min if feed is None else feed
     expected = expectation.at(line, run_feed, rpm, tool=tool, along_mm=along_mm)
     assert expected is not None, "a line that is planned is expected"
@@ -172,10 +173,9 @@ def _compared(ratio_cut_pct_min: float, state: State, now: _Now) -> tuple[State,
         why = now.expectation.why_not(now.place.line, now.place.tool) or "no load is expected of this line"
         return _lost(state, now.place), (*outputs, *_nulls(why, _OF_LOAD))
     least, most = bounds
-    if state.least_pct is not None and state.most_pct is not None and 0.0 <= at_s - state.bounds_s <= WITHIN_S:
+    least_shown, most_shown = least, most
+    if state.least_pct is not None and state.most_pct is not None and 0.0 <= at_s - state.bounds_s < SETTLED_S:
         least_shown, most_shown = min(least, state.least_pct), max(most, state.most_pct)
-    else:
-        least_shown, most_shown = 0.0, max(most, 0.0)
     outputs += [
         _said(twin_signals.EXPECTED_SPINDLE_LOAD_PCT, round(expected.load_pct, DIGITS)),
         _said(twin_signals.EXPECTED_CUTTING_FORCE_N, round(expected.force_n, 1)),
@@ -190,8 +190,7 @@ def _compared(ratio_cut_pct_min: float, state: State, now: _Now) -> tuple[State,
     else:
         idle_pct = expected.load_pct - expected.cut_load_pct
         is_steady = state.rpm is not None and abs(rpm - state.rpm) <= STEADY * abs(rpm) and abs(rpm) >= TURNING_RPM
-        is_air = most <= 0.0 and (most_shown <= 0.0 or at_s - state.bounds_s >= SETTLED_S)
-        if is_air and is_steady and sample.kind is not SampleKind.BIRTH:
+        if most_shown <= 0.0 and is_steady and sample.kind is not SampleKind.BIRTH:
             air = air_after(air, load_pct - idle_pct, abs(rpm))
         cut_pct = load_pct - idle_pct - air.beyond_pct(rpm)
         is_even = ratio_cut_pct_min <= least_shown and most_shown <= EVEN * least_shown
