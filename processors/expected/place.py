@@ -13,6 +13,7 @@ SLACK_S = 0.3
 BEYOND = 1.05
 """So much longer than it is, a line has been begun again."""
 DT_S_MAX = 10.0
+ANYWHERE_MM = 1e9
 
 
 class Place(NamedTuple):
@@ -39,6 +40,8 @@ def placed(
     """
     since_s = min(max(at_s - before.at_s, 0.0), DT_S_MAX)
     feeds = [one for one in (before.feed_mm_min, feed_mm_min) if one is not None]
+    if before.line is None:  # it may be anywhere in the line
+        return tuple.__new__(Place, (*where, at_s, feed_mm_min, 0.0, 0.0, ANYWHERE_MM))
     if where != (before.program, before.line, before.tool):
         return tuple.__new__(
             Place, (*where, at_s, feed_mm_min, 0.0, 0.0, max(feed_mm_min or 0.0, planned_mm_min) / 60.0 * since_s)
