@@ -30,7 +30,7 @@ class Batches(NamedTuple):
     """The mean material of the batches so far, and their number."""
 
     mean: float = 0.0
-    count: int = 0
+    number: int = 0
 
 
 class Seen(NamedTuple):
@@ -76,8 +76,8 @@ def explained(joint: Joint, tools: Sequence[Seen], batches: Batches, terms: Term
 
 def followed(batches: Batches, before: float) -> Batches:
     """Return the batches with one more that has ended, of this material."""
-    count = min(batches.count + 1, MEAN_BATCHES)
-    return Batches(batches.mean + (before - batches.mean) / count, count)
+    number = min(batches.number + 1, MEAN_BATCHES)
+    return Batches(batches.mean + (before - batches.mean) / number, number)
 
 
 def _levels(tools: Iterable[Seen], replaced: frozenset[str]) -> list[Observed]:

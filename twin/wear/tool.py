@@ -50,7 +50,7 @@ class Base(NamedTuple):
     level: float
     uses: int
     noise: float
-    count: int = 0
+    taught: int = 0
     gain: float = 1.0
     gain_var: float = 0.0
     level_var: float = 0.0
@@ -212,8 +212,8 @@ def _base_after(base: Base, own: float, wear: float, *, is_sharp: bool, is_known
     """Return an operation after a part in which its level, less the material's, was `own`."""
     noise, gain, gain_var = base.noise, base.gain, base.gain_var
     off = own - base.level - gain * wear
-    if base.count > 0:
-        count = min(base.count + NOISE_PRIOR, NOISE_COUNT)
+    if base.taught > 0:
+        count = min(base.taught + NOISE_PRIOR, NOISE_COUNT)
         noise += (min(off * off, 9.0 * noise) - noise) / (count + 1)
     if is_known and not is_sharp and gain_var > 0.0 and base.uses:
         pull = gain_var * wear / (wear * wear * gain_var + max(noise, GAIN_NOISE**2))
@@ -225,7 +225,7 @@ def _base_after(base: Base, own: float, wear: float, *, is_sharp: bool, is_known
         level_var = (noise + SHARP_ERROR**2) / uses if gain_var else noise / uses
     elif uses == 0 and _level_var(wear, gain_var) < 0.7 * level_var:
         level, level_var = own - gain * wear, _level_var(wear, gain_var)
-    return Base(level, uses, max(noise, NOISE_MIN**2), base.count + 1, gain, gain_var, level_var, own)
+    return Base(level, uses, max(noise, NOISE_MIN**2), base.taught + 1, gain, gain_var, level_var, own)
 
 
 def _level_var(wear: float, gain_var: float) -> float:
@@ -254,7 +254,7 @@ def doubted(tool: Tool, told: Told, material: float, wear: float) -> Tool:
         own = value - material
         if (base := bases.get(name)) is not None:
             gain_var = GAIN_SPREAD**2
-            bases[name] = Base(own - wear, 0, base.noise, base.count, 1.0, gain_var, _level_var(wear, gain_var), own)
+            bases[name] = Base(own - wear, 0, base.noise, base.taught, 1.0, gain_var, _level_var(wear, gain_var), own)
     return tool._replace(bases=bases)
 
 
