@@ -39,7 +39,7 @@ SETTLED = 0.006
 SETTLED_RPM = 5.0
 EXPECTED_PCT_MIN = 0.5
 ROWS_MAX = 30
-REST = Own._fields.index("expected") + 1
+REST = Own._fields.index("held") + 1
 """Fields from here on do not change at every tick."""
 
 
@@ -105,7 +105,7 @@ def _cut(model: PartsModel, own: Own, told: Told, place: Place, here: Mark, over
         told_at = (told.tick,) * len(tells)
     smooth = scales.smoothed(own.smooth, z, tells, plan.shares)
     return Own._make(
-        (told.tick, place, rpm or 0.0, smooth, told_at, not any(tells), is_new, (*rows, d), sections, expected, *own[REST:])
+        (told.tick, place, rpm or 0.0, smooth, told_at, not any(tells), is_new, (*rows, d), sections, expected, None, *own[REST:])
     )
 
 
