@@ -12,6 +12,8 @@ A floor keeps the rounding of a meter from becoming a large ratio. While the spi
 
 from enum import IntEnum
 
+from twin.vocabulary import twin_signals
+
 SPEED, FEED, LOAD = "spindle_rpm", "feed_mm_min", "spindle_load_pct"
 TURNS_RPM_MIN = 50.0
 
@@ -59,7 +61,7 @@ def kind_of(signal: str) -> Kind:
     """
     if signal in (FEED, SPEED):
         return Kind.FEED if signal == FEED else Kind.SPEED
-    if signal.endswith("_load_pct") or signal in ("spindle_power_kw", "spindle_current_a", "twin/cutting_force_n"):
+    if signal.endswith("_load_pct") or signal in ("spindle_power_kw", "spindle_current_a", twin_signals.CUTTING_FORCE_N):
         return Kind.LOAD
     if signal.endswith(("_temp_c", "_residual_k")):
         return Kind.TEMPERATURE
