@@ -30,7 +30,7 @@ class Kind(IntEnum):
 
 
 FLOORS = {"spindle_load_pct": 2.0, "spindle_power_kw": 0.1, "spindle_current_a": 0.5, "feed_mm_min": 20.0, "spindle_rpm": 20.0}
-FLOORS |= {"vibration_velocity_mm_s": 0.3, "twin/vibration_velocity_mm_s": 0.3}
+FLOORS |= {"vibration_velocity_mm_s": 0.3, twin_signals.VIBRATION_VELOCITY_MM_S: 0.3}
 VIBRATION_FLOOR = 0.05
 LOAD_FLOOR = 3.0
 RPM_MAX = 60_000.0
