@@ -18,6 +18,8 @@ from twin.anomaly.parts.usual import Sums, Usual, begun_usual, extended, froze, 
 SUSPICIOUS = 1.0
 HELD_SHARE_MAX = 0.3
 SKIPPED_MAX = 5
+YOUNG_PARTS = 3
+"""An operation that so few parts know is learned also where it is suspicious: only an alarm keeps it from being."""
 OPERATIONS_OF_PART_MAX = 40
 TICKS_MIN = 3
 CUT_SHARE_MIN = 0.3
@@ -64,7 +66,8 @@ def _operation_ended(model: PartsModel, own: Own, ended: Ended) -> tuple[Own, Cu
     is_alarmed = bool(ended.alarm_ticks) or own.is_part_bad
     cut = recorded(model, ended, usual, is_alarmed) if place.is_whole else None
     is_calm = not is_alarmed and ended.held_ticks <= HELD_SHARE_MAX * place.ticks
-    if is_calm or (not is_alarmed and own.skipped >= SKIPPED_MAX):
+    is_young = usual is None or usual.parts < YOUNG_PARTS
+    if is_calm or (not is_alarmed and (is_young or own.skipped >= SKIPPED_MAX)):
         own = _levels_followed(model, own, ended, usual)
         if len(own.waiting) < OPERATIONS_OF_PART_MAX:
             own = own._replace(waiting=(*own.waiting, ended))

@@ -19,6 +19,8 @@ from twin.anomaly.parts.usual import FIRST_PRIORS, Usual
 OPERATIONS_MAX = 500
 SIGNALS_MAX = 16
 RPM_STEP = 500.0
+LEAST_SHARE = 0.5
+"""A section has at least this share of the usual spread: what repeats too well in a few parts is luck, or rounding."""
 SILENT = {Kind.TEMPERATURE: ("seconds", "tool"), Kind.FEED: ("tool",), Kind.SPEED: ("tool",)}
 """The scales that say nothing of a kind: a temperature is slow, and neither feed nor speed belongs to a tool."""
 
@@ -120,7 +122,9 @@ class PartsModel(Record):
             feed_at=at(quantity.FEED),
             load_at=at(quantity.LOAD),
             idle_pct=tuple(self.idle_at(step * RPM_STEP) for step in steps),
-            least=tuple((quantity.SPREAD_LEAST[kind]) ** 2 for kind in kinds),
+            least=tuple(
+                max(quantity.SPREAD_LEAST[kind], LEAST_SHARE * own) ** 2 for kind, own in zip(kinds, spread, strict=True)
+            ),
             prior=tuple(value * value for value in spread),
             first=tuple(FIRST_PRIORS * value * value if self.spread else 0.0 for value in spread),
             over_spread=tuple(1.0 / value for value in spread),

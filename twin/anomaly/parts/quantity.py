@@ -44,7 +44,7 @@ SPREAD_LEAST = {
     Kind.LOAD: 0.02,
     Kind.VIBRATION: 0.03,
     Kind.FEED: 0.01,
-    Kind.SPEED: 0.003,
+    Kind.SPEED: 0.006,
     Kind.TEMPERATURE: 0.1,
     Kind.PLAIN: 1e-6,
 }

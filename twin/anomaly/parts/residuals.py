@@ -22,7 +22,7 @@ _RPM_STEP = 1.0 / RPM_STEP
 _CLIP = scales.CLIP
 TWIN_CLIP = 2.5
 """A line of a program has air in it that the twin, line by line, does not tell from the cut."""
-POWER_SPREAD = 0.15
+POWER_SPREAD = 0.25
 """Operations differ by so much in the power of the override with which load and vibration go."""
 TELLS_MIN = 0.15
 """A section whose spread is so many times larger than usual tells nothing of a signal."""

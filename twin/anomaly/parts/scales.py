@@ -27,7 +27,7 @@ FORGETS = 0.5
 """A tool comes back with half of its residual: a fault that all tools had is forgotten soon after it is gone."""
 BLOCK_S = 900.0
 RETURN_S = 86_400.0
-TAIL_LEAST = 0.2
+TAIL_LEAST = 0.4
 
 
 def shares(tick_s: float) -> tuple[float, ...]:

@@ -15,7 +15,7 @@ from twin.anomaly.parts.model import RPM_STEP, PartsModel
 from twin.anomaly.parts.quantity import FEED, LOAD, SPEED, TURNS_RPM_MIN, Kind, floor_of, kind_of
 
 if TYPE_CHECKING:
-    from twin.anomaly.parts.replay import Recorded
+    from twin.anomaly.parts.recorded import Recorded
 
 Floats = NDArray[np.float64]
 IDLE_QUANTILE = 0.05

@@ -16,7 +16,7 @@ from twin.anomaly.parts.moment import Mark
 MEMORY_PARTS = 20
 PRIOR_PARTS = 3.0
 OUTLIER = 4.0
-FIRST_PRIORS, SECOND_SHARE = 2.0, 0.7
+FIRST_PRIORS, SECOND_SHARE = 5.0, 0.7
 """The first part of a program is often proved at half feed: it is trusted less than the second."""
 FROZEN_PARTS = 3
 
