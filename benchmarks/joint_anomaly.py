@@ -5,7 +5,7 @@
     .venv/bin/python benchmarks/joint_anomaly.py --parts [--machines N] [--cell N] [--seconds S] [--json]
 
 With `--parts` cuts are compared with cuts, the default of the processor: ticks of a second, five signals, a part of 240 s with
-four tools and 24 lines (benchmarks/milled_parts.py). Twenty-four machines for twelve minutes.
+four tools and 24 lines (benchmarks/simulated_cell/milled_parts.py). Twenty-four machines for twelve minutes.
 
 Every machine has an Isolation Forest of 200 trees on five features in a place of its own in memory (eight are trained, the others
 are copies, which cost the same), and reports all five ten times a second, always other values.
@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 from sklearn.ensemble import IsolationForest
 
-from benchmarks.milled_parts import PART_S, model_of_parts, recorded, rows_of
+from benchmarks.simulated_cell.milled_parts import PART_S, model_of_parts, recorded, rows_of
 from processors.actions import Action, Publish
 from processors.config import Configuration
 from processors.contract import Output
@@ -208,10 +208,10 @@ def _print_parts(given: argparse.Namespace) -> None:
         if given.json:
             print(json.dumps(found))
         else:
-            fold_us, empty_us, scores_us = (found[f"us_of_the_{what}"] for what in ("fold", "empty_engine", "scores"))
+            fold_us, empty_us, scores_us = (found[f"us_of_the_{part}"] for part in ("fold", "empty_engine", "scores"))
             print(
-                f"parts, {found['machines']} machines at 1 Hz in cells of {cell}: {fold_us:.1f} µs a machine tick over an engine with "
-                f"an empty fold ({empty_us:.1f} µs), of which the scores alone {scores_us:.1f} µs; "
+                f"parts, {found['machines']} machines at 1 Hz in cells of {cell}: {fold_us:.1f} µs a machine tick over an engine "
+                f"with an empty fold ({empty_us:.1f} µs), of which the scores alone {scores_us:.1f} µs; "
                 f"a snapshot has {found['snapshot_kb_a_machine']:.1f} kB a machine"
             )
 

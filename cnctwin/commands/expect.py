@@ -45,7 +45,7 @@ def expect(
     if name is not None:
         described = described.model_copy(update={"machine": described.machine.model_copy(update={"name": name})})
     table, numbering = _tools(tools), _numbering(lines)
-    version = version_of(text)
+    version = version_of(text) + ("" if tools is None else f"+{version_of(read_text(tools))}")
     shown: list[dict[str, Any]] = []
     for program in programs:
         source = read_text(program)
@@ -69,7 +69,9 @@ def _tools(path: Path | None) -> "dict[str, Tool]":
 
     if path is None:
         return {}
-    found = machine_from_toml('[machine]\nname = "tools"\n' + read_text(path), str(path)).tools
+    text = read_text(path)
+    head = "" if "[machine]" in text else '[machine]\nname = "tools"\n'
+    found = machine_from_toml(head + text, str(path)).tools
     if not found:
         raise UsageError(f"{path}: has no [tools.N]; write one for each tool, with diameter_mm, teeth and the coefficients")
     return found

@@ -11,7 +11,7 @@ from sparkplug.metric import NodeId
 from sparkplug.topics import NAMESPACE
 from twin.vocabulary.nodes import twin_node
 
-GAP = twin_node("gap")
+GAP, TOOL_WEAR = twin_node("gap"), twin_node("tool_wear")
 POLL_S = 0.05
 
 

@@ -18,7 +18,7 @@ from typing import IO, Any
 from cnctwin.errors import ApplicationError, UsageError
 from cnctwin.loop.config import LoopConfiguration
 from cnctwin.loop.keeper import Heard, Keeper
-from cnctwin.loop.listening import GAP
+from cnctwin.loop.listening import GAP, TOOL_WEAR
 from cnctwin.loop.request import Request, RequestError, read_request
 from cnctwin.loop.standing import standing_of
 from cnctwin.loop.workshop import Places, Workshop
@@ -27,10 +27,11 @@ from cnctwin.processes import published_state
 from sparkplug.broker import BrokerAddress
 from sparkplug.clock import now_ms
 from sparkplug.host import EventKind, HostApplication, HostEvent
-from sparkplug.metric import NodeId
+from sparkplug.metric import NodeId, Reading
 from sparkplug.topics import NAMESPACE
 from twin.errors import TwinError
 from twin.vocabulary import topics
+from twin.vocabulary.twin_signals import MACHINE_DRIFT, MACHINE_DRIFT_BASIS
 
 LOOK_S = 1.0
 POLL_S = 0.1
@@ -68,9 +69,9 @@ class LoopService:
         self._host = HostApplication(
             broker,
             f"twin-loop-{machines.resolve().name}"[:40],
-            (f"{NAMESPACE}/{group}/+/{GAP}/#",),
+            tuple(f"{NAMESPACE}/{group}/+/{node}/#" for node in (GAP, TOOL_WEAR)),
             publish_state=False,
-            wanted=lambda node: node.node == GAP,
+            wanted=lambda node: node.node in {GAP, TOOL_WEAR},
             trusted=lambda _: True,
         )
         self._workshop = Workshop(places, self._ask, self._cancel, configuration.healthy_ms)
@@ -140,8 +141,16 @@ class LoopService:
         clock = self._clocks.setdefault(machine, _Clock())
         if picture is None or device is None:
             return Heard(at_ms=clock.at_ms(clock.newest_ms, now_s, online=False))
-        standing = standing_of(device.readings.values())
+        standing = standing_of((*device.readings.values(), *self._drift(machine)))
         return Heard(standing, clock.at_ms(max(standing.at_ms, clock.newest_ms), now_s, online=picture.online and device.online))
+
+    def _drift(self, machine: str) -> tuple[Reading, ...]:
+        """Return what is told of the drift of a machine, whose time is not that of its gap."""
+        picture = self._host.picture(NodeId(self._group, TOOL_WEAR))
+        device = None if picture is None else picture.devices.get(machine)
+        if device is None:
+            return ()
+        return tuple(one for name, one in device.readings.items() if name in {MACHINE_DRIFT, MACHINE_DRIFT_BASIS})
 
     # What we do and say.
 
@@ -170,7 +179,8 @@ class LoopService:
     def _send(self) -> None:
         if self._host.online and self._host.reconnects != self._reconnects:
             self._reconnects = self._host.reconnects
-            self._host.request_rebirth(NodeId(self._group, GAP))  # what stands there is not told again by itself
+            for node in (GAP, TOOL_WEAR):
+                self._host.request_rebirth(NodeId(self._group, node))  # what stands there is not told again by itself
             self._outbox = {topics.LOOP + machine: payload for machine, payload in self._told.items()} | self._outbox
         for topic, payload in list(self._outbox.items()):
             if self._host.publish_plain(topic, payload, qos=1, retain=True):

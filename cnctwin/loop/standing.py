@@ -1,4 +1,8 @@
-"""The standing gap of a machine as the processor `gap` tells it on the broker: of the live description, and of the challenger."""
+"""The standing gap of a machine as the processor `gap` tells it on the broker: of the live description, and of the challenger.
+
+Where no gap grows or stands open, a drift of the machine that `tool_wear` tells counts as one that grows: the load of the cut, which
+the gap has no live twin of.
+"""
 
 import re
 from collections.abc import Iterable, Mapping
@@ -14,6 +18,8 @@ from twin.vocabulary.twin_signals import (
     GAP_OPEN,
     GAP_PREFIX,
     GAP_WINDOW,
+    MACHINE_DRIFT,
+    MACHINE_DRIFT_BASIS,
     TWIN_PREFIX,
     is_gap,
 )
@@ -59,6 +65,9 @@ def standing_of(readings: Iterable[Reading]) -> Standing:
     growing = told.get(GAP_GROWING)
     grows = _text(told, GAP_GROWING_SIGNAL) if growing is not None and growing.value is True else ""
     opens = _text(told, GAP_OPEN)
+    drifts = told.get(MACHINE_DRIFT)
+    if not grows and not opens and drifts is not None and drifts.value is True:
+        grows = _text(told, MACHINE_DRIFT_BASIS).partition("; to name the cause")[0] or "the load of all tools and programs"
     return Standing(
         at_ms=max((one.timestamp_ms for one in told.values()), default=0),
         grows=grows,

@@ -3,24 +3,25 @@
     residual = measured load − expected load        cut = measured load − load in air        (twin/expected, `cnctwin expect`)
 
 Between two samples a machine is somewhere in a line, so the expected cut has a least and a greatest value, over the places where
-it may be at this sample and was at the one before. What is not known is null, with the reason.
+it may be at this sample, and was at one just before. What is not known is null, with the reason.
 """
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 from pydantic import Field
 
 from processors.config import Configuration, ProcessorConfig
 from processors.contract import Output, OutputSpec, Processor, Provenance, Sample, SampleKind
 from processors.description import Description
-from processors.expected.place import BEYOND, Place, placed, window_mm
+from processors.expected.place import ANYWHERE_MM, BEYOND, Place, placed, window_mm
 from processors.expected.usual import Air, Ratio, air_after, ratios_after
 from processors.sample import why_unknown
 from sparkplug.datatype import DataType
+from sparkplug.quality import Quality
 from twin.errors import ExpectationError
 from twin.expected.expectation import Expectation
 from twin.expected.expected import Expected
@@ -31,6 +32,7 @@ PROGRAM, LINE, TOOL, LOAD = "program", "nc_line", "tool_number", "spindle_load_p
 SPEED, FEED, OVERRIDE = "spindle_rpm", "feed_mm_min", "feed_override_pct"
 NO_FOLDER = "no expectations; cnctwin expect makes them, [expected] expectations names their folder"
 TURNING_RPM, STEADY, WITHIN_S, SETTLED_S = 100.0, 0.005, 2.5, 0.7
+"""A meter shows for up to SETTLED_S what was a sample ago; a sample WITHIN_S ago tells of the time between."""
 CUTS_SHARE, EVEN = 0.3, 1.5
 """A cut tells of the ratio where it is no less than this share of what is expected, and what is expected is known so well."""
 BEYOND_MAX = 1e6
@@ -77,7 +79,7 @@ class Described:
     def basis(self, expectation: Expectation) -> str:
         """Return in words what an expectation rests on, first of all whether the description has changed since."""
         changed = stale(expectation, description=self.version)
-        return "; ".join((*([] if changed is None else [changed]), *expectation.basis))
+        return expectation.in_words if changed is None else f"{changed}; {expectation.in_words}"
 
 
 def described(configuration: Configuration[Config], description: Description | None) -> Described:
@@ -98,9 +100,6 @@ class State:
     ratios: Mapping[str, Ratio] = field(default_factory=dict)
 
 
-_UNSEEN = State()
-
-
 def step(given: Described, state: State, sample: Sample) -> tuple[State, Sequence[Output]]:
     """Compare at every sample; a hole or a death ends what is known of the place in the line."""
     if sample.kind in (SampleKind.HOLE, SampleKind.DEATH):
@@ -118,22 +117,22 @@ def step(given: Described, state: State, sample: Sample) -> tuple[State, Sequenc
         return _lost(state), _nulls(no_line)
     tool = _whole(sample, TOOL)[0]
     feed, rpm = _bounded(sample, FEED), _bounded(sample, SPEED)
-    planned = expectation.at(line, tool=tool)
-    if planned is None:
-        return _lost(state), _nulls(f"program {program} has no move in this line")
-    planned_mm_min = planned.feed_mm_min * _override(sample)
+    planned = expectation.planned(line, tool)
+    planned_mm_min = 0.0 if planned is None else planned.feed_mm_min * _override(sample)
     place = placed(state.place, (program, line, tool), sample.at_s, feed, planned_mm_min)
+    if planned is None:
+        return _lost(state, place), _nulls(f"program {program} has no move in this line")
     window = window_mm(place)
-    along_mm = None if window is None else 0.5 * (window[0] + window[1])
+    along_mm = None if window is None or place.doubt_mm >= ANYWHERE_MM else place.along_mm + 0.5 * place.doubt_mm
     run_feed = planned_mm_min if feed is None else feed
-    expected = expectation.at(line, run_feed, rpm, tool=tool, along_mm=along_mm) or planned
+    expected = expectation.at(line, run_feed, rpm, tool=tool, along_mm=along_mm)
+    assert expected is not None, "a line that is planned is expected"
     ratio_cut_pct_min = given.configuration.of(sample.machine).ratio_cut_pct_min
     now = _Now(expectation, expected, place, window, run_feed, rpm, sample, given.basis(expectation))
     return _compared(ratio_cut_pct_min, state, now)
 
 
-@dataclass(frozen=True, slots=True)
-class _Now:
+class _Now(NamedTuple):
     """A sample whose line is known."""
 
     expectation: Expectation
@@ -164,9 +163,9 @@ def _compared(ratio_cut_pct_min: float, state: State, now: _Now) -> tuple[State,
     expected, sample, rpm = now.expected, now.sample, now.rpm
     at_s, tool = sample.at_s, str(now.place.tool)
     outputs = [
-        Output(twin_signals.EXPECTED_FEED_MM_MIN, round(expected.feed_mm_min * _override(sample), 1)),
-        Output(twin_signals.EXPECTED_LINE_S, round(expected.time_s, DIGITS)),
-        Output(twin_signals.EXPECTED_BASIS, now.basis),
+        _said(twin_signals.EXPECTED_FEED_MM_MIN, round(expected.feed_mm_min * _override(sample), 1)),
+        _said(twin_signals.EXPECTED_LINE_S, round(expected.time_s, DIGITS)),
+        _said(twin_signals.EXPECTED_BASIS, now.basis),
     ]
     is_on = now.place.along_mm > 0.0 and at_s - state.place.at_s <= WITHIN_S
     bounds = now.bounds(state.place.feed_mm_min if is_on else None)
@@ -174,15 +173,14 @@ def _compared(ratio_cut_pct_min: float, state: State, now: _Now) -> tuple[State,
         why = now.expectation.why_not(now.place.line, now.place.tool) or "no load is expected of this line"
         return _lost(state, now.place), (*outputs, *_nulls(why, _OF_LOAD))
     least, most = bounds
-    if state.least_pct is not None and state.most_pct is not None and 0.0 <= at_s - state.bounds_s <= WITHIN_S:
+    least_shown, most_shown = least, most
+    if state.least_pct is not None and state.most_pct is not None and 0.0 <= at_s - state.bounds_s < SETTLED_S:
         least_shown, most_shown = min(least, state.least_pct), max(most, state.most_pct)
-    else:
-        least_shown, most_shown = 0.0, max(most, 0.0)
     outputs += [
-        Output(twin_signals.EXPECTED_SPINDLE_LOAD_PCT, round(expected.load_pct, DIGITS)),
-        Output(twin_signals.EXPECTED_CUTTING_FORCE_N, round(expected.force_n, 1)),
-        Output(twin_signals.EXPECTED_CUT_LEAST_PCT, round(least_shown, DIGITS)),
-        Output(twin_signals.EXPECTED_CUT_MOST_PCT, round(most_shown, DIGITS)),
+        _said(twin_signals.EXPECTED_SPINDLE_LOAD_PCT, round(expected.load_pct, DIGITS)),
+        _said(twin_signals.EXPECTED_CUTTING_FORCE_N, round(expected.force_n, 1)),
+        _said(twin_signals.EXPECTED_CUT_LEAST_PCT, round(least_shown, DIGITS)),
+        _said(twin_signals.EXPECTED_CUT_MOST_PCT, round(most_shown, DIGITS)),
     ]
     air, ratios = state.air, state.ratios
     load_pct, no_load = sample.number(LOAD)
@@ -192,8 +190,7 @@ def _compared(ratio_cut_pct_min: float, state: State, now: _Now) -> tuple[State,
     else:
         idle_pct = expected.load_pct - expected.cut_load_pct
         is_steady = state.rpm is not None and abs(rpm - state.rpm) <= STEADY * abs(rpm) and abs(rpm) >= TURNING_RPM
-        is_air = most <= 0.0 and (most_shown <= 0.0 or at_s - state.bounds_s >= SETTLED_S)
-        if is_air and is_steady and sample.kind is not SampleKind.BIRTH:
+        if most_shown <= 0.0 and is_steady and sample.kind is not SampleKind.BIRTH:
             air = air_after(air, load_pct - idle_pct, abs(rpm))
         cut_pct = load_pct - idle_pct - air.beyond_pct(rpm)
         is_even = ratio_cut_pct_min <= least_shown and most_shown <= EVEN * least_shown
@@ -201,17 +198,22 @@ def _compared(ratio_cut_pct_min: float, state: State, now: _Now) -> tuple[State,
             since_s = min(max(at_s - state.bounds_s, 0.0), WITHIN_S)
             ratios = ratios_after(ratios, tool, cut_pct, math.sqrt(least_shown * most_shown), since_s)
         outputs += [
-            Output(twin_signals.SPINDLE_CUT_LOAD_PCT, round(cut_pct, DIGITS)),
-            Output(twin_signals.SPINDLE_LOAD_RESIDUAL_PCT, round(load_pct - expected.load_pct, DIGITS)),
+            _said(twin_signals.SPINDLE_CUT_LOAD_PCT, round(cut_pct, DIGITS)),
+            _said(twin_signals.SPINDLE_LOAD_RESIDUAL_PCT, round(load_pct - expected.load_pct, DIGITS)),
         ]
     own = ratios.get(tool)
     value = None if own is None else own.value
     outputs.append(
         Output.null(twin_signals.EXPECTED_RATIO, "too little of this tool has been seen")
         if value is None
-        else Output(twin_signals.EXPECTED_RATIO, round(value, DIGITS))
+        else _said(twin_signals.EXPECTED_RATIO, round(value, DIGITS))
     )
     return State(now.place, least, most, at_s, rpm, air, ratios), outputs
+
+
+def _said(name: str, value: float | str) -> Output:
+    """Return a good value, the short way: there are nine of them at every sample."""
+    return tuple.__new__(Output, (name, value, Quality.GOOD, None, None, None))
 
 
 def _lost(state: State, place: Place | None = None) -> State:

@@ -76,13 +76,15 @@ def learnt(scoring: "Scoring", before: PartsMember | None, found: tuple[Own, Jud
     elif before.is_shown and not is_shown:
         why = None
         outputs.append(_published(why, NO_ALARM, name, at_s))
-    if judged.knows != before.knows:
-        outputs.append(Output(KNOWS, judged.knows, machine=name, at_s=at_s))
+    is_between_cuts = own.place.stood_ticks > 0 or own.place.tool is None
+    knows = before.knows if is_between_cuts and before.knows else judged.knows
+    if knows != before.knows:
+        outputs.append(Output(KNOWS, knows, machine=name, at_s=at_s))
     if memory is not found[0].memory:
         outputs.append(Output(VERDICTS, told_of(memory, at_s), machine=name, at_s=at_s))
     if record is not None:
         outputs.append(Output(CUT_RECORD, record.in_json(), machine=name, at_s=at_s))
-    after = PartsMember(own, scoring.parts_id, _part(before, own), why, is_shown, judged.knows)
+    after = PartsMember(own, scoring.parts_id, _part(before, own), why, is_shown, knows)
     return Learnt(after, is_alarm, outputs)
 
 

@@ -136,6 +136,15 @@ class Expectation:
                 least, most = min(least, cut_pct), max(most, cut_pct)
         return (least, most) if runs else None
 
+    @cached_property
+    def in_words(self) -> str:
+        """The basis as one text."""
+        return "; ".join(self.basis)
+
+    def planned(self, line: int, tool: int | None = None) -> Run | None:
+        """Return the mean of the runs of a line as planned, by this tool where it runs it; None where no such line runs."""
+        return self.lines.get((line, tool)) or self.lines.get((line, None))
+
     def length_mm(self, line: int, tool: int | None = None) -> float:
         """Return the greatest length of a run of a line, 0 where it does not run."""
         return self._lengths.get((line, tool)) or self._lengths.get((line, None), 0.0)
@@ -148,7 +157,7 @@ class Expectation:
         """Return why the load of a line is not known; empty = it is, or no such line runs."""
         if line is None:
             return ""
-        own = self.lines.get((line, tool)) or self.lines.get((line, None))
+        own = self.planned(line, tool)
         return "" if own is None else own.why_not
 
     def followed(self, run: int | None, line: int, tool: int | None = None) -> int | None:

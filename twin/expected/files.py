@@ -134,10 +134,14 @@ def from_json(text: str) -> Expectation:
 
 
 def stale(expectation: Expectation, *, program_sha256: str = "", description: str = "") -> str | None:
-    """Return why an expectation no longer holds: its program or the machine's description has changed; None where it does."""
+    """Return why an expectation no longer holds: its program or the machine's description has changed; None where it does.
+
+    What stands behind a + in the description of an expectation is the version of a table of tools that came with it.
+    """
     if program_sha256 and expectation.program_sha256 != program_sha256:
         return f"the program {expectation.program} has changed since; {AGAIN}"
-    if description and expectation.description and expectation.description != description:
+    own = expectation.description.partition("+")[0]
+    if description and own and own != description:
         return f"the description of {expectation.machine} has changed since; {AGAIN}"
     return None
 

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.engagement.along_path import PathRows, engaged_along
-from twin.engagement.tools import collision_notes, tool_notes, tool_numbers, tool_sections, tools_used, unknown_start
+from twin.engagement.tool_sections import collision_notes, tool_notes, tool_numbers, tool_sections, tools_used, unknown_start
 from twin.errors import EngagementError, MachineError
 from twin.expected.basis import Missing, in_words
 from twin.expected.expectation import Expectation

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.engagement.along_path import PathRows, engaged_along
-from twin.engagement.tools import collision_notes, tool_notes, tool_sections, tools_used, unknown_start
+from twin.engagement.tool_sections import collision_notes, tool_notes, tool_sections, tools_used, unknown_start
 from twin.errors import MachineError, OptimisationError
 from twin.gcode import Arc, Linear, interpret
 from twin.machine import MachineFile, Tool

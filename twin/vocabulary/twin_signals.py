@@ -57,6 +57,19 @@ ANOMALY_VERDICTS = f"{TWIN_PREFIX}anomaly_verdicts"
 CUT_RECORD = f"{TWIN_PREFIX}cut_record"
 """JSON text at the end of an operation of a part (twin/anomaly/parts/record.py)."""
 
+# tool_wear
+TOOL_WEAR_PCT = f"{TWIN_PREFIX}tool_wear_pct"
+TOOL_WEAR_SLOPE_PCT = f"{TWIN_PREFIX}tool_wear_slope_pct"
+TOOL_PARTS_LEFT = f"{TWIN_PREFIX}tool_parts_left"
+TOOL_PARTS_LEFT_LOW = f"{TWIN_PREFIX}tool_parts_left_low"
+TOOL_PARTS_LEFT_HIGH = f"{TWIN_PREFIX}tool_parts_left_high"
+TOOL_WEARS_FAST = f"{TWIN_PREFIX}tool_wears_fast"
+TOOL_WEAR_BASIS = f"{TWIN_PREFIX}tool_wear_basis"
+TOOL_LIVES = f"{TWIN_PREFIX}tool_lives"
+"""JSON text after each part: all tools with their wear and parts left (twin/wear/status.py)."""
+MACHINE_DRIFT = f"{TWIN_PREFIX}machine_drift"
+MACHINE_DRIFT_BASIS = f"{TWIN_PREFIX}machine_drift_basis"
+
 # gap
 GAP_PREFIX = f"{TWIN_PREFIX}gap_"
 """Followed by a signal: its standing gap; by a signal, a slash and a regime: the gap in that regime."""

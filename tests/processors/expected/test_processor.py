@@ -105,7 +105,7 @@ def test_the_ratio_of_a_tool_is_learned_slowly(given: Described, made: Expectati
     assert expected is not None and math.isfinite(expected.load_pct)
     told.row["nc_line"] = reading("nc_line", LINE)
     for _ in range(250):
-        place = told.state.place._replace(along_mm=40.0)
+        place = told.state.place._replace(along_mm=40.0, planned_mm=40.0)
         told.state = State(place, *list(told.state.__getstate__())[1:])  # type: ignore[attr-defined]
         now = made.at(LINE, 1200.0, 4000.0, along_mm=40.0)
         assert now is not None

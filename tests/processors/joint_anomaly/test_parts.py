@@ -1,16 +1,19 @@
 """Parts compared with parts on the stream: what the replay gives over the same ticks, why, what a person says, and a restart."""
 
 import json
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
 
+from cnctwin.standins.simulated_machine.expectation import EXPECTATION
 from processors.actions import Action, DeadLetter, Publish
 from processors.config import Configuration
 from processors.errors import ConfigurationError
 from processors.joint_anomaly.config import Config
+from processors.joint_anomaly.introduction import BASIS
 from processors.joint_anomaly.member import ADJUSTED, ALARM, GATE
 from processors.joint_anomaly.parts_member import CUT_RECORD, KNOWS, NO_ALARM, RAW, VERDICTS, WHY
 from processors.joint_anomaly.processor import PROCESSOR
@@ -25,6 +28,7 @@ from twin.anomaly.alarm import AlarmRule
 from twin.anomaly.model import AnomalyModel
 from twin.anomaly.parts.replay import replayed
 from twin.anomaly.parts_scorer import PartsScorer
+from twin.expected.files import ByProgram, read_expectation
 from twin.vocabulary.topics import VERDICT
 
 THRESHOLD = 4.0
@@ -211,3 +215,20 @@ def test_the_snapshot_of_a_machine_with_parts_stays_small() -> None:
     engine = cell("a")
     fed(engine, *told("a", FAULTY))
     assert len(engine.snapshot("all")) < 40_000
+
+
+def test_what_the_twin_expects_is_named_and_is_stale_once_the_machine_is_described_anew() -> None:
+    """The expectation was made for description 0123456789ab; `thermal` tells which one is live."""
+    expected = {"a": ByProgram([replace(read_expectation(EXPECTATION), machine="a", description="0123456789ab")])}
+    by_name = {"a": models()[0]}
+    table = {"threshold": THRESHOLD, "tail_s": 2.0}
+    engine = Engine(
+        PROCESSOR, Configuration(Config, table, name="joint_anomaly", reads=lambda one: scorings(one, by_name, expected))
+    )
+    rows, named = parts(1, 1), "twin/spindle_temp_basis"
+    rows[10][named], rows[30][named] = "description 0123456789ab; started cold", "description ba9876543210; started cold"
+    actions = fed(engine, *told("a", rows))
+    basis = [value for _, value, _ in said("a", BASIS, actions)]
+    assert "; the twin expects base_plate; gate" in basis[0]
+    assert ["stale" in text for text in basis] == [False, True]
+    assert "cnctwin expect makes them again" in basis[1]

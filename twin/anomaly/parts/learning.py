@@ -18,6 +18,8 @@ from twin.anomaly.parts.usual import Sums, Usual, begun_usual, extended, froze, 
 SUSPICIOUS = 1.0
 HELD_SHARE_MAX = 0.3
 SKIPPED_MAX = 5
+YOUNG_PARTS = 3
+"""An operation that so few parts know is learned also where it is suspicious: only an alarm keeps it from being."""
 OPERATIONS_OF_PART_MAX = 40
 TICKS_MIN = 3
 CUT_SHARE_MIN = 0.3
@@ -26,6 +28,8 @@ CUT_SHARE_MIN = 0.3
 def learned(model: PartsModel, own: Own, judged: Judged, is_alarm: bool) -> tuple[Own, CutRecord | None]:
     """Return the state once the alarm is known, and the record of an operation that has ended at this tick."""
     ended = own.ended
+    if own.is_idle and own.held is None and judged.score is not None:
+        own = own._replace(held=judged)
     is_high = judged.score is not None and judged.score >= SUSPICIOUS
     if ended is None and not is_high and not is_alarm and not own.is_held:
         return own, None
@@ -62,7 +66,8 @@ def _operation_ended(model: PartsModel, own: Own, ended: Ended) -> tuple[Own, Cu
     is_alarmed = bool(ended.alarm_ticks) or own.is_part_bad
     cut = recorded(model, ended, usual, is_alarmed) if place.is_whole else None
     is_calm = not is_alarmed and ended.held_ticks <= HELD_SHARE_MAX * place.ticks
-    if is_calm or (not is_alarmed and own.skipped >= SKIPPED_MAX):
+    is_young = usual is None or usual.parts < YOUNG_PARTS
+    if is_calm or (not is_alarmed and (is_young or own.skipped >= SKIPPED_MAX)):
         own = _levels_followed(model, own, ended, usual)
         if len(own.waiting) < OPERATIONS_OF_PART_MAX:
             own = own._replace(waiting=(*own.waiting, ended))
@@ -94,13 +99,13 @@ def _mean(plan: Plan, ended: Ended, usual: Usual, at: int) -> float | None:
     """Return the change of the cut that a signal shows, by least squares over the sections that earlier parts know."""
     total = weights = ticks = 0.0
     for section, sums in ended.sections:
-        if 0 <= section < len(usual.marks) and usual.told[section][at] and sums.count[at]:
+        if 0 <= section < len(usual.marks) and usual.told[section][at] and sums.ticks[at]:
             cuts = cut_share(plan, usual.centre[section])
             if cuts >= CUT_SHARE_MIN:
                 share = cuts * usual.weight[section][at] ** 2
                 total += share * sums.total[at]
-                weights += share * cuts * sums.count[at]
-                ticks += sums.count[at]
+                weights += share * cuts * sums.ticks[at]
+                ticks += sums.ticks[at]
     return total / weights if ticks >= TICKS_MIN and weights > 0.0 else None
 
 
@@ -122,13 +127,13 @@ def _sections_learned(model: PartsModel, own: Own, ended: Ended) -> Own:
     for section, sums in merged.items():
         before = usual.told[section]
         centre[section], variance[section], told[section], weight[section] = learned_section(
-            usual, section, sums, plan.prior, plan.least
+            usual, section, sums, plan.prior, plan.least, plan.first
         )
         if plan.load_at >= 0 and before[plan.load_at] < told[section][plan.load_at]:
             at = plan.load_at
             now = (
                 usual.centre[section][at]
-                + sums.total[at] / sums.count[at]
+                + sums.total[at] / sums.ticks[at]
                 + ended.level[at] * cut_share(plan, usual.centre[section])
             )
             frozen[section] = froze(frozen[section], before[at], now)

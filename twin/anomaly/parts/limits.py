@@ -13,7 +13,7 @@ from typing import NamedTuple
 from twin.anomaly.parts.scales import SCALES
 from twin.anomaly.parts.signature import Signature
 
-FACTOR_MAX = 4.0
+FACTOR_MAX = 6.0
 FACTOR_LEAST = 1.05
 """A raised limit below it is forgotten."""
 MARGIN = 1.6

@@ -14,11 +14,13 @@ from twin.anomaly.parts import quantity, scales
 from twin.anomaly.parts.heat import EVERY_S, TAUS_S, base_s
 from twin.anomaly.parts.levels import BATCH_VAR, TOOL_VAR, Level
 from twin.anomaly.parts.quantity import Kind
-from twin.anomaly.parts.usual import Usual
+from twin.anomaly.parts.usual import FIRST_PRIORS, Usual
 
 OPERATIONS_MAX = 500
 SIGNALS_MAX = 16
 RPM_STEP = 500.0
+LEAST_SHARE = 0.5
+"""A section has at least this share of the usual spread: what repeats too well in a few parts is luck, or rounding."""
 SILENT = {Kind.TEMPERATURE: ("seconds", "tool"), Kind.FEED: ("tool",), Kind.SPEED: ("tool",)}
 """The scales that say nothing of a kind: a temperature is slow, and neither feed nor speed belongs to a tool."""
 
@@ -41,6 +43,7 @@ class Plan:
     idle_pct: tuple[float, ...]
     least: tuple[float, ...]
     prior: tuple[float, ...]
+    first: tuple[float, ...]
     over_spread: tuple[float, ...]
     over_twin: tuple[float, ...]
     over_up: tuple[float, ...]
@@ -56,6 +59,7 @@ class PartsModel(Record):
     spread: of a tick about the centre of its section, by signal, pooled over operations
     twin_offset, twin_spread: of a section's quantity beside the twin's expectation, by signal; spread 0 = it has none
     up, down: tails by signal, each on all scales; usual: by operation; material, tools: levels when training ended
+    still: quantity of a vibration while the spindle stands, by signal; follows_parts: False = beside the twin only
     """
 
     signals: Annotated[tuple[str, ...], Field(min_length=1, max_length=SIGNALS_MAX)]
@@ -71,6 +75,7 @@ class PartsModel(Record):
     usual: Annotated[dict[str, Usual], Field(max_length=OPERATIONS_MAX)] = Field(default={})
     material: Level = Level((), BATCH_VAR)
     tools: Annotated[dict[str, Level], Field(max_length=OPERATIONS_MAX)] = Field(default={})
+    still: tuple[Finite, ...] = ()
     follows_parts: bool = True
 
     def idle_at(self, rpm: float) -> float:
@@ -120,8 +125,11 @@ class PartsModel(Record):
             feed_at=at(quantity.FEED),
             load_at=at(quantity.LOAD),
             idle_pct=tuple(self.idle_at(step * RPM_STEP) for step in steps),
-            least=tuple((quantity.SPREAD_LEAST[kind]) ** 2 for kind in kinds),
+            least=tuple(
+                max(quantity.SPREAD_LEAST[kind], LEAST_SHARE * own) ** 2 for kind, own in zip(kinds, spread, strict=True)
+            ),
             prior=tuple(value * value for value in spread),
+            first=tuple(FIRST_PRIORS * value * value if self.spread else 0.0 for value in spread),
             over_spread=tuple(1.0 / value for value in spread),
             over_twin=tuple(1.0 / value if value else 0.0 for value in self.twin_spread or (0.0,) * count),
             over_up=tuple(share / value for share, value in zip(counts, up, strict=True)),

@@ -12,6 +12,8 @@ A floor keeps the rounding of a meter from becoming a large ratio. While the spi
 
 from enum import IntEnum
 
+from twin.vocabulary import twin_signals
+
 SPEED, FEED, LOAD = "spindle_rpm", "feed_mm_min", "spindle_load_pct"
 TURNS_RPM_MIN = 50.0
 
@@ -28,7 +30,8 @@ class Kind(IntEnum):
 
 
 FLOORS = {"spindle_load_pct": 2.0, "spindle_power_kw": 0.1, "spindle_current_a": 0.5, "feed_mm_min": 20.0, "spindle_rpm": 20.0}
-VIBRATION_FLOOR = 0.02
+FLOORS |= {"vibration_velocity_mm_s": 0.3, twin_signals.VIBRATION_VELOCITY_MM_S: 0.3}
+VIBRATION_FLOOR = 0.05
 LOAD_FLOOR = 3.0
 RPM_MAX = 60_000.0
 UNITS = {
@@ -41,7 +44,7 @@ SPREAD_LEAST = {
     Kind.LOAD: 0.02,
     Kind.VIBRATION: 0.03,
     Kind.FEED: 0.01,
-    Kind.SPEED: 0.003,
+    Kind.SPEED: 0.006,
     Kind.TEMPERATURE: 0.1,
     Kind.PLAIN: 1e-6,
 }
@@ -58,7 +61,7 @@ def kind_of(signal: str) -> Kind:
     """
     if signal in (FEED, SPEED):
         return Kind.FEED if signal == FEED else Kind.SPEED
-    if signal.endswith("_load_pct") or signal in ("spindle_power_kw", "spindle_current_a", "twin/cutting_force_n"):
+    if signal.endswith("_load_pct") or signal in ("spindle_power_kw", "spindle_current_a", twin_signals.CUTTING_FORCE_N):
         return Kind.LOAD
     if signal.endswith(("_temp_c", "_residual_k")):
         return Kind.TEMPERATURE

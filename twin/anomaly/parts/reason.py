@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from twin.anomaly.parts import scales
 from twin.anomaly.parts.model import PartsModel
 from twin.anomaly.parts.own import Own, usual_of
-from twin.anomaly.parts.quantity import UNITS, Kind, kind_of
+from twin.anomaly.parts.quantity import UNITS, Kind
 from twin.anomaly.parts.residuals import cut_share
 from twin.anomaly.parts.why import Why
 
@@ -38,7 +38,8 @@ def why_of(model: PartsModel, own: Own, peers: Sequence[Own], left: Sequence[flo
     if usual is not None and is_known and kind is not Kind.TEMPERATURE:
         centre = usual.centre[section][at] + own.level[at] * cut_share(plan, usual.centre[section])
     away = s / plan.over_spread[at]
-    expected, measured = _in_units(model, own, at, centre, away)
+    is_share = not is_known and kind not in (Kind.TEMPERATURE, Kind.PLAIN)
+    expected, measured = (100.0, round(100.0 * math.exp(away), 2)) if is_share else _in_units(model, own, at, centre, away)
     shows = [
         str(n) for n, peer in enumerate(peers) if peer.smooth[index] * s > 0.0 and abs(peer.smooth[index]) > PEER_SHOWS * abs(s)
     ]
@@ -51,7 +52,7 @@ def why_of(model: PartsModel, own: Own, peers: Sequence[Own], left: Sequence[flo
         section,
         measured,
         expected,
-        UNITS[kind_of(model.signals[at])],
+        "% of expected" if is_share else UNITS[kind],
         abs(s),
         max(0.0, (own.tick - own.high_since) * model.tick_s) if own.high_since > 0 else 0.0,
         knows if is_known else "the twin",

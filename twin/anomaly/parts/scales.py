@@ -27,7 +27,7 @@ FORGETS = 0.5
 """A tool comes back with half of its residual: a fault that all tools had is forgotten soon after it is gone."""
 BLOCK_S = 900.0
 RETURN_S = 86_400.0
-TAIL_LEAST = 0.2
+TAIL_LEAST = 0.4
 
 
 def shares(tick_s: float) -> tuple[float, ...]:
@@ -85,4 +85,4 @@ def tails(left: "NDArray[np.float64]", blocks: "NDArray[np.integer]", block_s: f
     begins = np.flatnonzero(np.diff(blocks, prepend=-1))
     largest = np.maximum.reduceat(np.maximum(left, 0.0), begins, axis=0)
     share = max(0.5, 1.0 - block_s / RETURN_S)
-    return np.maximum(np.quantile(largest, share, axis=0), TAIL_LEAST)
+    return np.asarray(np.maximum(np.quantile(largest, share, axis=0), TAIL_LEAST), dtype=np.float64)

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from twin.engagement.tools import tool_numbers
+from twin.engagement.tool_sections import tool_numbers
 from twin.motion.path import Path
 from twin.optimisation.answer import Objective, SpeedChanges
 from twin.optimisation.problem import Problem

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.engagement.tools import tool_numbers
+from twin.engagement.tool_sections import tool_numbers
 from twin.motion.path import EventKind, Kind, Path
 from twin.optimisation.answer import SpeedChanges
 from twin.optimisation.program import CLEARANCE_MM, Programmed

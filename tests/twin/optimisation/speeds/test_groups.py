@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from tests.depth import examples
 from tests.twin.optimisation.benchmark import machine_with, paper, second, text
-from twin.engagement.tools import tool_numbers
+from twin.engagement.tool_sections import tool_numbers
 from twin.errors import LimitsError
 from twin.gcode import interpret
 from twin.motion.path import Path, path_from_moves

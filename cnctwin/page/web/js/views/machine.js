@@ -15,6 +15,7 @@ import { machineHead } from "./machine_head.js";
 import { noMachine } from "./no_machine.js";
 import { SignalTable } from "./signal_table.js";
 import { ScoreTile, Tile } from "./tiles.js";
+import { ToolLives } from "./tool_lives.js";
 
 const WINDOWS = [
   [120000, "2 min"],
@@ -37,6 +38,7 @@ export function open(app, { machine: named, search }) {
     asked = search.get("signal") ?? null,
     frozenAt = null;
   const panels = new Panels(machine),
+    tools = new ToolLives(machine),
     table = new SignalTable(machine);
   const tiles = [...TILES.map((tile) => new Tile(machine, tile, () => pick(tile.id))), new ScoreTile(machine)];
   const select = el("select", {
@@ -74,6 +76,7 @@ export function open(app, { machine: named, search }) {
       note,
     ),
     panels.element,
+    tools.element,
     table.element,
   );
 
@@ -194,6 +197,7 @@ export function open(app, { machine: named, search }) {
   }, 250);
   const tick = setInterval(() => {
     onFrame(write);
+    tools.write();
     table.write();
   }, 1000);
 
