@@ -2,9 +2,9 @@
 
     z = (x − centre(section) − level) · weight(section) · calm
 
-x is the quantity of a signal (`quantity.py`), centre and weight are those of the same section in earlier parts (`usual.py`), or the
-twin's expectation where no earlier part has the section; level follows wear and material (`levels.py`). A tick tells nothing while
-gated, while the spindle stands or changes its speed, or while the feed is held.
+x is the quantity of a signal (`quantity.py`), centre and weight are those of the same section in earlier parts (`usual.py`), or
+the twin's expectation where no earlier part has the section; level follows wear and material (`levels.py`). A tick tells
+nothing while gated, while the spindle stands or changes its speed, or while the feed is held.
 """
 
 from collections.abc import Sequence
@@ -176,5 +176,5 @@ def with_levels(model: PartsModel, own: Own) -> Own:
     variance = own.material.variance + tool.variance
     kinds = model.plan.kinds
     rows = zip(kinds, own.material.values, tool.values, model.plan.prior, strict=True)
-    both = [(m + l, (1.0 + variance / v) ** -0.5) if k in LEVELLED else (0.0, 1.0) for k, m, l, v in rows]
+    both = [(m + t, (1.0 + variance / v) ** -0.5) if k in LEVELLED else (0.0, 1.0) for k, m, t, v in rows]
     return own._replace(level=tuple([one[0] for one in both]), calm=tuple([one[1] for one in both]))

@@ -3,8 +3,8 @@
     u = left / tail(signal, scale, side)           left: what the peers do not share (`beside.py`)
     score = largest over the scales of  (Σ over signals of u⁴)^(1/4)
 
-The fourth power lets one signal speak for itself, and several that rise together a little earlier. The score is held while nothing
-is told: in a gate, and while the spindle stands.
+The fourth power lets one signal speak for itself, and several that rise together a little earlier. The score is held while
+nothing is told: in a gate, and while the spindle stands.
 """
 
 from collections.abc import Sequence
@@ -12,14 +12,14 @@ from typing import NamedTuple
 
 from twin.anomaly.parts import scales
 from twin.anomaly.parts.beside import left_over
+from twin.anomaly.parts.limits import limits_of
 from twin.anomaly.parts.model import PartsModel
 from twin.anomaly.parts.own import NEVER, Own, usual_of
 from twin.anomaly.parts.reason import why_of
-from twin.anomaly.parts.verdict import limits_of
 from twin.anomaly.parts.why import Why
 
 SMALL = 0.5
-"""A residual below this share of its tail is taken as it is, without the peers: it moves no score that matters. Where none is larger, the largest is the score."""
+"""A residual below this share of its tail is taken as it is, without the peers; where none is larger, it is the score."""
 WHY_FROM = 1.0
 NOTHING_TOLD = "nothing was told yet of a cut that is known"
 
@@ -74,7 +74,7 @@ def _length(u: list[float]) -> float:
 
 def _tolerated(model: PartsModel, own: Own, u: list[float]) -> list[float]:
     """Return what is left where a person has called such an alarm false: less by the limit that was raised."""
-    limits = limits_of(own.memory, own.place.key or "", own.tick * model.tick_s)
+    limits = limits_of(own.memory.tolerated, own.place.key or "", own.tick * model.tick_s)
     names = ((signal, scale) for signal in model.signals for scale in scales.SCALES)
     return [
         value / limits.get((signal, scale, 1 if value > 0.0 else -1), 1.0)

@@ -68,9 +68,9 @@ class PartsModel(Record):
     twin_spread: tuple[NotNegative, ...] = ()
     up: tuple[Positive, ...] = ()
     down: tuple[Positive, ...] = ()
-    usual: Annotated[dict[str, Usual], Field(max_length=OPERATIONS_MAX)] = {}
+    usual: Annotated[dict[str, Usual], Field(max_length=OPERATIONS_MAX)] = Field(default={})
     material: Level = Level((), BATCH_VAR)
-    tools: Annotated[dict[str, Level], Field(max_length=OPERATIONS_MAX)] = {}
+    tools: Annotated[dict[str, Level], Field(max_length=OPERATIONS_MAX)] = Field(default={})
     follows_parts: bool = True
 
     def idle_at(self, rpm: float) -> float:

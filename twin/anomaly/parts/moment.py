@@ -96,7 +96,7 @@ def is_part_begun(place: Place, program: str | None, tool: int | None, line: int
     if line >= 0:
         return line < place.line and line <= place.line_first + BACK_SHARE * (place.line_last - place.line_first)
     if tool is None or place.first_tool is None:
-        return False
+        return tool is not None
     if tool != place.tool:
         return tool == place.first_tool and len(place.uses) > 1
     return len(place.uses) == 1 and place.stood_ticks >= stood_ticks_min

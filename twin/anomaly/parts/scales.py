@@ -2,11 +2,12 @@
 
     s ← s + (1 − exp(−tick / τ)) · r² · (z / r − s)          τ: 3 s, 30 s, 5 min, 2 min of one tool
 
-r tells how much a tick says: 1 where the section repeats as well as sections usually do, less at an edge, 0 where nothing is told. So
-s is a mean in which each tick counts by its precision, in usual spreads of the signal.
+r tells how much a tick says: 1 where the section repeats as well as sections usually do, less at an edge, 0 where nothing is
+told. So s is a mean in which each tick counts by its precision, in usual spreads of the signal.
 
-The last scale is kept for each tool while others cut, so a tool that is dull or mounted too long is compared with its own last parts.
-A tail is the size that healthy parts reach about once a day on that scale and side, so that all of them alarm equally often.
+The last scale is kept for each tool while others cut, so a tool that is dull or mounted too long is compared with its own last
+parts. A tail is the size that healthy parts reach about once a day on that scale and side, so that all of them alarm equally
+often.
 """
 
 import math
@@ -73,9 +74,9 @@ def with_tool(smooth: Sequence[float], slow: Sequence[float]) -> tuple[float, ..
 
 
 def tails(left: "NDArray[np.float64]", blocks: "NDArray[np.integer]", block_s: float = BLOCK_S) -> "NDArray[np.float64]":
-    """Return the size that each column of healthy remainders (T, K) reaches once in RETURN_S, 0 and more; blocks: (T,), ascending.
+    """Return the size that each column of healthy remainders (T, K) reaches once in RETURN_S.
 
-    The quantile of block maxima that is exceeded as often; never less than `TAIL_LEAST`.
+    The quantile of block maxima that is exceeded as often, never less than `TAIL_LEAST`; blocks: (T,), ascending.
     """
     import numpy as np  # noqa: PLC0415  the stream needs none
 
