@@ -119,8 +119,8 @@ def twins(outcomes: Sequence[Outcome], folder: Path) -> None:
 
 
 def controls(folder: Path, rule: AlarmRule) -> None:
-    """Print what can be judged of controls that tell no line."""
-    print("\nControls that tell no line (load, speed, feed)")
+    """Print what can be judged of controls that tell no line; tails are of the recording itself, since there is no other."""
+    print("\nControls that tell no line (load and feed; tails of the same recording)")
     for machine, recording, devices in (
         ("Okuma", "mtconnect/okuma.txt", "mtconnect/okuma_devices.xml"),
         ("Mazak01", "nist/raw/Mazak01-20180718-20180719.txt", "nist/devices.xml"),
