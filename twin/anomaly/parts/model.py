@@ -19,8 +19,8 @@ from twin.anomaly.parts.usual import Usual
 OPERATIONS_MAX = 500
 SIGNALS_MAX = 16
 RPM_STEP = 500.0
-QUICK = ("seconds", "tool")
-"""The scales that say nothing of a temperature."""
+SILENT = {Kind.TEMPERATURE: ("seconds", "tool"), Kind.FEED: ("tool",), Kind.SPEED: ("tool",)}
+"""The scales that say nothing of a kind: a temperature is slow, and neither feed nor speed belongs to a tool."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +101,7 @@ class PartsModel(Record):
         def at(name: str) -> int:
             return self.signals.index(name) if name in self.signals else -1
 
-        counts = [0.0 if kind is Kind.TEMPERATURE and scale in QUICK else 1.0 for kind in kinds for scale in scales.SCALES]
+        counts = [0.0 if scale in SILENT.get(kind, ()) else 1.0 for kind in kinds for scale in scales.SCALES]
         every = max(1, round(EVERY_S / self.tick_s))
         steps = range(int(quantity.RPM_MAX / RPM_STEP) + 1)
         return Plan(

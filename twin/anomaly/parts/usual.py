@@ -16,6 +16,8 @@ from twin.anomaly.parts.moment import Mark
 MEMORY_PARTS = 20
 PRIOR_PARTS = 3.0
 OUTLIER = 4.0
+FIRST_PRIORS, SECOND_SHARE = 2.0, 0.7
+"""The first part of a program is often proved at half feed: it is trusted less than the second."""
 FROZEN_PARTS = 3
 
 
@@ -127,11 +129,11 @@ def learned_section(
         mean, square = total / count, squares / count
         if n == 0:
             centre.append(round(c + mean, 4))
-            variance.append(round(max(0.0, square - mean * mean), 6))
+            variance.append(round(max(0.0, square - mean * mean) + FIRST_PRIORS * usual_variance, 6))
             parts.append(1)
             continue
         spread = (max(v, usual_variance)) ** 0.5
-        share = 1.0 / (min(n, MEMORY_PARTS) + 1)
+        share = SECOND_SHARE if n == 1 else 1.0 / (min(n, MEMORY_PARTS) + 1)
         limit = OUTLIER * spread
         centre.append(round(c + share * max(-limit, min(limit, mean)), 4))
         variance.append(round(v + share * (min(square, limit * limit) - v), 6))
