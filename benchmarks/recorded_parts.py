@@ -155,7 +155,9 @@ def main() -> None:
     for name in GROUPS:
         found = judgement(models[name], by_text(groups[name]), rule, None)
         count, judged_h = show(f"{name}: parts beside earlier parts", found, None)
-        if name != "cover":
+        if name == "cover":
+            print(f"\n{said(count, judged_h)} (covers, which set the threshold)")
+        else:
             alerts, hours = alerts + count, hours + judged_h
     print(
         f"\nboxes and plates: {alerts} alerts in {hours:.2f} h judged: {rate(alerts, hours / WEEK_H)} a machine-week of machining"
