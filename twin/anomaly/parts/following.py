@@ -102,8 +102,9 @@ def _cut(model: PartsModel, own: Own, told: Told, place: Place, here: Mark, over
     else:
         told_at = (told.tick,) * len(tells)
     smooth = scales.smoothed(own.smooth, z, tells, plan.shares)
-    rest = own[REST:]
-    return Own(told.tick, place, rpm or 0.0, smooth, told_at, not any(tells), is_new, (*rows, d), sections, expected, *rest)
+    return Own._make(
+        (told.tick, place, rpm or 0.0, smooth, told_at, not any(tells), is_new, (*rows, d), sections, expected, *own[REST:])
+    )
 
 
 def _put_right(usual: Usual, place: Place, d: Sequence[float | None]) -> Place:

@@ -85,4 +85,4 @@ def tails(left: "NDArray[np.float64]", blocks: "NDArray[np.integer]", block_s: f
     begins = np.flatnonzero(np.diff(blocks, prepend=-1))
     largest = np.maximum.reduceat(np.maximum(left, 0.0), begins, axis=0)
     share = max(0.5, 1.0 - block_s / RETURN_S)
-    return np.maximum(np.quantile(largest, share, axis=0), TAIL_LEAST)
+    return np.asarray(np.maximum(np.quantile(largest, share, axis=0), TAIL_LEAST), dtype=np.float64)
