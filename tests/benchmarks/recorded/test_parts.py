@@ -11,7 +11,7 @@ from benchmarks.recorded.happened import happened
 from benchmarks.recorded.labels import Trial, outcome
 from benchmarks.recorded.parts import Part, nist_parts, operations
 from benchmarks.recorded.replaying import judgement, recorded, taught
-from benchmarks.recorded_parts import by_text
+from benchmarks.recorded.study import by_text
 from tests.recordings import recording, recordings_folder
 from twin.anomaly.alarm import AlarmRule
 from twin.anomaly.parts.model import PartsModel

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Parts of real machines compared with parts: alerts on parts without known faults, and parts under another program's label.
 
-    PYTHONPATH=. .venv/bin/python benchmarks/recorded_parts.py
+    PYTHONPATH=. .venv/bin/python benchmarks/recorded/study.py
 
 NIST plates, covers and boxes (feed, speed, line and tool at about 5 Hz, read once a second; these controls told no load), in the
 order in which they were made. Spreads and tails are learned on the other groups, the course of a program in the stream alone: it
