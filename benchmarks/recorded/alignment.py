@@ -75,7 +75,7 @@ def pair(model: PartsModel, first: Part, second: Part) -> Iterator[Apart]:
 
 def _place_of_lines(usual: NDArray[np.int64], progress: Floats, lines: NDArray[np.int64]) -> Floats:
     """Return the progress at which each line stood in the first part; within a line, by the share of its ticks so far."""
-    usual, lines = (np.maximum.accumulate(one - one[0]) for one in (usual, lines))
+    usual, lines = np.maximum.accumulate(usual), np.maximum.accumulate(lines)
     first, last = (np.searchsorted(usual, lines, side=side) for side in ("left", "right"))
     begin, end = (np.searchsorted(lines, lines, side=side) for side in ("left", "right"))
     at = first + (last - first) * (np.arange(len(lines)) - begin) / (end - begin)

@@ -32,6 +32,10 @@ def _facts(part: Part, at: int, earlier: Part | None, folder: Path | None) -> It
         told = override[own][np.isfinite(override[own])]
         if len(told) and (told.min() < 99.0 or told.max() > 101.0):
             yield f"{name} override {told.min():.0f} to {told.max():.0f} %"
+    if earlier is not None:
+        now, then = (float(np.nanmedian(np.append(one.feed_override_pct, 100.0))) for one in (part, earlier))
+        if abs(now - then) > 100.0 * APART:
+            yield f"the part before was told to run at {then:.0f} % of its feed, this one at {now:.0f} %"
     rpm, feed, by = _elsewhere(part, own, earlier, folder)
     here = part.values[own]
     speed_at, feed_at = part.signals.index("spindle_rpm"), part.signals.index("feed_mm_min")

@@ -76,7 +76,6 @@ def of_parts(by_name: Mapping[str, Part]) -> Iterator[Trial]:
         ("cover 03/2", "COVER OP2", "cover 01/2"),
         ("cover 04/4", "COVER OP2", "cover 03/2"),
         ("cover 02/5", "COVER OP3", "cover 01/3"),
-        ("box 03/2", "BOX OP2", "box 01/2"),
         ("box 02/4", "BOX OP3", "box 01/3"),
         ("box 03/3", "BOX OP3", "box 01/3"),
         ("plate 13/2", "PLATE BACK FACE", "plate 03/2"),

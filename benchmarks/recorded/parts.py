@@ -24,7 +24,8 @@ TICK_S, TAIL_S, LOOK_BACK_S = 1.0, 8.0, 10.0
 PART_S_MIN = 40.0
 NIST_SIGNALS = ("spindle_rpm", "feed_mm_min")
 """Of those that scores are of, all that these controls told: no load, temperature or vibration."""
-CONTROL_SIGNALS = ("spindle_load_pct", "spindle_rpm", "feed_mm_min")
+CONTROL_SIGNALS = ("spindle_load_pct", "feed_mm_min")
+"""Without the speed: of two spindles one is mapped, and it stands while the other cuts."""
 TEXTS = {
     59: "PLATE BACK FACE",
     1463: "COVER OP3",

@@ -11,9 +11,13 @@ from benchmarks.recorded.happened import happened
 from benchmarks.recorded.labels import Trial, outcome
 from benchmarks.recorded.parts import Part, nist_parts, operations
 from benchmarks.recorded.replaying import judgement, recorded, taught
-from benchmarks.recorded_parts import RULE, by_text
+from benchmarks.recorded.study import by_text
 from tests.recordings import recording, recordings_folder
+from twin.anomaly.alarm import AlarmRule
 from twin.anomaly.parts.model import PartsModel
+
+RULE = AlarmRule(5.0, 2)
+"""Tails that a handful of parts teach are narrow; what is found here stands ten times above them."""
 
 
 @pytest.fixture(scope="module")
