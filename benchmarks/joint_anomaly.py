@@ -26,7 +26,8 @@ from processors.actions import Action, Publish
 from processors.config import Configuration
 from processors.contract import Output
 from processors.joint_anomaly.config import Config
-from processors.joint_anomaly.processor import PROCESSOR, RAW, State
+from processors.joint_anomaly.parts_member import RAW
+from processors.joint_anomaly.processor import PROCESSOR, State
 from processors.joint_anomaly.scoring import scorings
 from processors.running.engine import Engine
 from processors.sample import Sample
@@ -76,7 +77,10 @@ def stream(machines: list[str], seconds: float) -> list[HostEvent]:
 def engine(step: Step, names: list[str], cell: int, models: list[AnomalyModel]) -> Engine:
     """The processor's own fold, or another, over cells of so many machines."""
     cells = {f"c{i}": names[i : i + cell] for i in range(0, len(names), cell)}
-    table, by_name = {"cells": cells, "tick_s": TICK_MS / 1000, "threshold": 1.0}, dict(zip(names, models, strict=True))
+    table, by_name = (
+        {"cells": cells, "tick_s": TICK_MS / 1000, "threshold": 1.0, "common_mode": "source"},
+        dict(zip(names, models, strict=True)),
+    )
     configuration = Configuration(Config, table, name="joint_anomaly", reads=lambda config: scorings(config, by_name))
     return Engine(replace(PROCESSOR, step=step), configuration, machines_max=len(names))
 

@@ -12,6 +12,7 @@ from cnctwin.api.failures import Failures
 from cnctwin.api.guard import Guard
 from cnctwin.api.live.fan_out import FanOut
 from cnctwin.api.routes.alerts import alert_routes
+from cnctwin.api.routes.anomaly import anomaly_routes
 from cnctwin.api.routes.gap import gap_routes
 from cnctwin.api.routes.health import health_routes
 from cnctwin.api.routes.history import history_routes
@@ -60,6 +61,7 @@ def create_app(sources: Sources) -> FastAPI:
         gap_routes(sources),
         twin_routes(sources),
         alert_routes(sources.live, sources.viewer),
+        anomaly_routes(sources),
         job_routes(sources),
         history_routes(sources.live, sources.store),
         past_routes(sources),

@@ -36,6 +36,8 @@ class Config(CellConfig):
     """The models, the rule of common mode, the gate and the alarm.
 
     models: folder with one model for each machine, by name; "" = none: every score is null then, and says so
+    expectations: folder with what the twin expects of each machine's programs (`cnctwin expect`); "" = none: parts are compared
+        with parts alone
     threshold: in units of the adjusted score; absent = that of the model
     peer_wait_s: machines whose ticks are no further apart wait for each other (`processors/joint_anomaly/frames.py`); one that
         says nothing is at least 2 s and a tick behind, since its messages might still be on their way
@@ -44,7 +46,8 @@ class Config(CellConfig):
     of_one_machine: ClassVar[frozenset[str] | None] = frozenset({"threshold"})
 
     models: str = ""
-    common_mode: Method = Method.SOURCE
+    expectations: str = ""
+    common_mode: Method = Method.PARTS
     common_mode_factor: PositiveFloat = 0.5
     exclude_gated_peers: bool = False
     tail_s: float = Field(default=8.0, ge=0.0, le=600.0)

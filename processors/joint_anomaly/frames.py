@@ -11,6 +11,7 @@ from collections.abc import Collection, Mapping
 from typing import NamedTuple
 
 from processors.joint_anomaly.gate import Gated
+from processors.joint_anomaly.moment import Moment
 from twin.anomaly.preparation import Standardised
 
 NEVER = -(2**62)
@@ -20,6 +21,7 @@ class Scored(NamedTuple):
     """A raw score of tick number `tick`, at `at_s` of the machine's own clock; None with the reason where there is none.
 
     now: the features beside what is usual, where the model knows that
+    moment: what the machine told at this tick, where parts are compared; the raw score is known later then
     """
 
     tick: int
@@ -27,6 +29,7 @@ class Scored(NamedTuple):
     raw: float | None
     reason: str | None = None
     now: Standardised | None = None
+    moment: Moment | None = None
 
 
 Ready = tuple[Scored, Gated]

@@ -5,10 +5,13 @@ from typing import NamedTuple
 from processors.contract import Output
 from processors.joint_anomaly.frames import NEVER, Ready, Scored
 from processors.joint_anomaly.gate import Gate, Gated, GateRule, gated, restarted
+from processors.joint_anomaly.parts_member import PartsMember, learnt
 from processors.joint_anomaly.score_drift import Drift, drifted
 from processors.joint_anomaly.scoring import Scoring
 from sparkplug.quality import Quality
 from twin.anomaly.alarm import AlarmState, after_tick
+from twin.anomaly.parts.judging import Judged
+from twin.anomaly.parts.own import Own
 from twin.anomaly.preparation import Smoothed
 from twin.vocabulary import twin_signals
 
@@ -27,6 +30,7 @@ class Adjustment(NamedTuple):
 
     score: None where it is not known, for the reason `why`; is_idle: nothing was judged, as in a gate
     smoothed: the features of the machine after this tick, where they are judged
+    parts: its state after this tick and how it was judged, where parts are compared
     """
 
     score: float | None
@@ -36,6 +40,7 @@ class Adjustment(NamedTuple):
     why: str | None = None
     is_idle: bool = False
     smoothed: Smoothed | None = None
+    parts: tuple[Own, Judged] | None = None
 
 
 class Published(NamedTuple):
@@ -62,6 +67,7 @@ class Member(NamedTuple):
     young, ready: scores that wait for what a late label may say of them; and then for those of the peers
     judged: the last tick that was
     total_s, gated_s: of the last week, forgotten slowly
+    description: the version that is live, as far as it was needed
     """
 
     tick: int | None = None
@@ -76,6 +82,8 @@ class Member(NamedTuple):
     drift: Drift = Drift()
     told: Published = Published()
     smoothed: Smoothed | None = None
+    parts: PartsMember | None = None
+    description: str = ""
 
     def waiting_with(self, scored: Scored, rule: GateRule, look_back_ticks: int) -> "Member":
         """The machine with one more score. One that is older than the look-back is ready: whether it is gated stands."""
@@ -102,7 +110,7 @@ def after(scoring: Scoring, member: Member, adjustment: Adjustment, outputs: lis
 
     The dwell counts ticks in a row: one that is missing interrupts it like one that is gated.
     """
-    tick, offset_ticks, young, ready, gate, judged, alarm, total_s, gated_s, drift, told, _ = member
+    tick, offset_ticks, young, ready, gate, judged, alarm, total_s, gated_s, drift, told, _, parts, description = member
     scored, label = ready[0]
     name, tick_s, at_s, adjusted, is_gated = scoring.machine, scoring.tick_s, scored.at_s, adjustment.score, label.is_on is True
     unknown, is_on, why = None, None, NO_MODEL if scoring.model is None else NO_THRESHOLD
@@ -120,15 +128,21 @@ def after(scoring: Scoring, member: Member, adjustment: Adjustment, outputs: lis
         is_on, why = (alarm.is_on, "") if alarm.is_on or unknown is None else (None, unknown)
     total_s = min(total_s + tick_s, SHARE_S)
     gated_s = gated_s * (1.0 - tick_s / SHARE_S) + (tick_s if is_gated else 0.0)
+    raw = scored.raw
+    if adjustment.parts is not None:
+        raw = adjustment.parts[1].own_score
+        parts, is_published, said = learnt(scoring, parts, adjustment.parts, alarm.is_on, at_s)
+        outputs += said
+        if scoring.rule is not None:
+            is_on, why = (is_published, "") if is_published or unknown is None else (None, unknown)
     share_pct = min(round(200.0 * gated_s / total_s) / 2.0, 100.0)
     now = Published(label, adjustment.is_common, unknown, adjustment.peer, adjustment.peers, is_on, why, share_pct)
     if now != told:
         outputs += _news(name, at_s, now)
-    drift, news = drifted(drift, scoring.calibration, None if is_gated else scored.raw, at_s)
+    drift, news = drifted(drift, scoring.calibration, None if is_gated else raw, at_s)
     outputs += [one._replace(machine=name) for one in news]
-    return Member(
-        tick, offset_ticks, young, ready[1:], gate, scored.tick, alarm, total_s, gated_s, drift, now, adjustment.smoothed
-    )
+    news_and_state = (drift, now, adjustment.smoothed, parts, description)
+    return Member(tick, offset_ticks, young, ready[1:], gate, scored.tick, alarm, total_s, gated_s, *news_and_state)
 
 
 def _news(name: str, at_s: float, told: Published) -> list[Output]:

@@ -7,6 +7,9 @@ are in step have come to that tick (`processors/joint_anomaly/frames.py`), the f
     adjusted = 0 where the score is common mode (`twin/anomaly/common_mode.py`) or gated (`processors/joint_anomaly/gate.py`),
                else raw
 
+By default each cut is compared with the same cut of earlier parts instead, and with what the twin expects of it, less what the
+peers share (`processors/joint_anomaly/parts.py`).
+
 An adjusted score at or above the threshold in `dwell_ticks` ticks in a row is an alarm (`twin/anomaly/alarm.py`). The threshold
 is fitted in alerts per machine-week on scores as they come out of this fold (`cnctwin train anomaly`); it holds for the settings
 that it was fitted with only, so others are refused. Suppressing an alarm hides no data: raw score, adjusted score and the gate
@@ -20,9 +23,11 @@ from dataclasses import dataclass, field
 from processors.config import Configuration
 from processors.contract import CellProcessor, Output, OutputSpec, Provenance, Sample, SampleKind
 from processors.joint_anomaly.config import NUMBERS, Config
+from processors.joint_anomaly.expectations import DESCRIBED_BY, live_description
 from processors.joint_anomaly.features import adjusted_by_features
 from processors.joint_anomaly.frames import Frame, InStep, Scored, frames, in_step
 from processors.joint_anomaly.gate import followed
+from processors.joint_anomaly.introduction import BASIS, THRESHOLD, basis, introduction
 from processors.joint_anomaly.member import (
     ADJUSTED,
     ALARM,
@@ -32,25 +37,28 @@ from processors.joint_anomaly.member import (
     GATED_SHARE,
     NO_MODEL,
     NO_PEER,
-    NO_THRESHOLD,
     PEER,
     PEERS,
     Adjustment,
     Member,
     after,
 )
-from processors.joint_anomaly.score_drift import DRIFT, NO_GOLDEN_WEEK
+from processors.joint_anomaly.moment import MOMENT_INPUTS, moment_of
+from processors.joint_anomaly.parts import NO_PARTS, adjusted_by_parts
+from processors.joint_anomaly.parts_member import CUT_RECORD, KNOWS, RAW, VERDICTS, WHY, spoken
+from processors.joint_anomaly.score_drift import DRIFT
 from processors.joint_anomaly.scoring import Scoring, read_scorings, scoring_of
+from processors.plain_topic import topic_level
 from processors.tool_change_detector.context import INPUTS as CONTEXT_INPUTS
 from processors.tool_change_detector.context import tool_change_context
 from sparkplug.datatype import DataType
 from sparkplug.metric import Reading
 from sparkplug.quality import Quality
 from twin.anomaly.common_mode import Method, adjust_frame, standardised
+from twin.anomaly.parts.verdict import verdict_of
 from twin.anomaly.preparation import CONTEXT, Preparation, standardised_row
-from twin.vocabulary import twin_signals
+from twin.vocabulary.topics import VERDICT
 
-RAW, THRESHOLD, BASIS = twin_signals.RAW_SCORE, twin_signals.ANOMALY_THRESHOLD, twin_signals.ANOMALY_BASIS
 CLOCK_OFFSET, STAMP_CLOCK = "clock_offset_s", "stamp_clock"
 BY_EDGE = "edge"  # the control gives no stamps: its samples carry the edge's time, whatever its own clock shows
 _VALUE, _QUALITY = Reading._fields.index("value"), Reading._fields.index("quality")
@@ -73,6 +81,8 @@ def step(config: Configuration[Config], state: State, sample: Sample) -> tuple[S
         return state, ()
     if sample.kind is SampleKind.TICK:
         return _ticked(config, state, sample)
+    if sample.kind is SampleKind.PLAIN:
+        return _spoken(config, state, sample)
     rule, machine, at_s = config.default.gate_rule, sample.machine, sample.at_s
     member = state.members.get(machine) or Member()
     member = member._replace(gate=followed(member.gate, rule, tool_change_context(sample.row), at_s))
@@ -80,7 +90,7 @@ def step(config: Configuration[Config], state: State, sample: Sample) -> tuple[S
     if sample.kind is SampleKind.BIRTH:
         member = _placed(config.default, member, sample)
         member = member._replace(tick=_tick(config.default, member, at_s))
-        outputs = _introduced(config, machine)
+        outputs = introduction(config, machine, member)
     elif sample.kind is SampleKind.DEATH and machine not in sample.cell:
         member = member.offline(rule)
     elif sample.kind is SampleKind.HOLE and member.tick is not None and _tick(config.default, member, at_s) < member.tick:
@@ -99,9 +109,15 @@ def _ticked(config: Configuration[Config], state: State, sample: Sample) -> tupl
     scoring, step_before = scoring_of(config, machine), state.in_step
     member = _placed(shared, state.members.get(machine) or Member(), sample)
     before, tick = member.tick, _tick(shared, member, sample.at_s)
-    scored = _scored(scoring, sample, tick)
+    is_by_parts = shared.common_mode is Method.PARTS
+    scored = _told(scoring, sample, tick) if is_by_parts else _scored(scoring, sample, tick)
     members = {**state.members, machine: member.waiting_with(scored, shared.gate_rule, shared.look_back_ticks)}
-    outputs = [Output.null(RAW, scored.reason or "") if scored.raw is None else Output(RAW, scored.raw)]
+    outputs = []
+    if scoring.expectations and is_by_parts and (description := live_description(sample.row)) != member.description:
+        members[machine] = members[machine]._replace(description=description)
+        outputs.append(basis(config, scoring, description))
+    if scored.moment is None:
+        outputs.append(Output.null(RAW, scored.reason or "") if scored.raw is None else Output(RAW, scored.raw))
     step_now = step_before.moved(before, tick)
     if step_now is None:
         return _together(config, members, outputs)
@@ -114,6 +130,23 @@ def _by_name(members: dict[str, Member], online: Container[str]) -> dict[str, Me
     """Sort the members, lest their order be that of arrival; where they are too many, forget those that are offline."""
     kept = sorted(members if len(members) <= MEMBERS_MAX else [name for name in members if name in online])
     return {name: members[name] for name in kept}
+
+
+def _spoken(config: Configuration[Config], state: State, sample: Sample) -> tuple[State, Sequence[Output]]:
+    """Take a person's verdict on an alarm. Raises ValueError where it is none; one on a machine of another cell is passed by."""
+    level = sample.topic.removeprefix(VERDICT)
+    machine = next((name for name in state.members if topic_level(name) == level), "")
+    scoring = scoring_of(config, machine)
+    parts = state.members[machine].parts if machine else None
+    if parts is None or scoring.parts is None or parts.model != scoring.parts_id:
+        return state, ()
+    member = state.members[machine]
+    at_s = (member.judged + member.offset_ticks) * config.default.tick_s
+    parts, is_alarm, outputs = spoken(scoring, parts, verdict_of(sample.detail), at_s)
+    told = member.told if member.told.alarm is None else member.told._replace(alarm=is_alarm)
+    if told != member.told:
+        outputs.append(Output(ALARM, is_alarm, machine=machine, at_s=at_s))
+    return State({**state.members, machine: member._replace(parts=parts, told=told)}, state.in_step), outputs
 
 
 def _together(config: Configuration[Config], members: dict[str, Member], outputs: list[Output]) -> tuple[State, list[Output]]:
@@ -139,6 +172,13 @@ def _placed(shared: Config, member: Member, sample: Sample) -> Member:
 def _tick(shared: Config, member: Member, at_s: float) -> int:
     """The last tick of a machine at its time, by the clock that the peers have too."""
     return round(at_s * 1000.0) // shared.tick_ms - member.offset_ticks
+
+
+def _told(scoring: Scoring, sample: Sample, tick: int) -> Scored:
+    """What a machine told as of a tick, whose score waits until the ticks before it are judged."""
+    if scoring.parts is None:
+        return Scored(tick, sample.at_s, None, NO_MODEL if scoring.model is None else NO_PARTS)
+    return Scored(tick, sample.at_s, None, moment=moment_of(scoring.parts.signals, sample))
 
 
 def _scored(scoring: Scoring, sample: Sample, tick: int) -> Scored:
@@ -177,7 +217,9 @@ def _judge(
     ready = {name: members[name].ready for name in names if members[name].ready}
     for frame in frames(ready, step_now, shared.look_back_ticks):
         scorings = {name: scoring_of(config, name) for name in frame}
-        if shared.common_mode is Method.FEATURES:
+        if shared.common_mode is Method.PARTS:
+            found = adjusted_by_parts(scorings, frame, members)
+        elif shared.common_mode is Method.FEATURES:
             found = adjusted_by_features(scorings, frame, members)
         else:
             found = _adjusted_by_scores(shared, scorings, frame)
@@ -206,27 +248,11 @@ def _on_the_scale(shared: Config, scoring: Scoring, raw: float | None) -> float 
     return None if calibration is None else standardised(raw, calibration.raw_center, calibration.raw_spread)
 
 
-def _introduced(config: Configuration[Config], machine: str) -> list[Output]:
-    """Return the outputs that explain a machine's scores, once."""
-    shared, scoring = config.default, scoring_of(config, machine)
-    model, rule = scoring.model, scoring.rule
-    if model is None:
-        return [Output.null(THRESHOLD, NO_MODEL), Output(BASIS, NO_MODEL)]
-    fitted = "configured" if config.of(machine).threshold is not None else "not fitted"
-    if fitted == "not fitted" and model.calibration is not None:
-        fitted = model.calibration.in_words
-    common = f"common mode by {shared.common_mode.value}, factor {shared.common_mode_factor:g}"
-    basis = f"{model.in_words}; threshold {fitted}; {common}; gate tail {shared.tail_s:g} s, look-back {shared.look_back_s:g} s"
-    threshold = Output.null(THRESHOLD, NO_THRESHOLD) if rule is None else Output(THRESHOLD, rule.threshold)
-    drift = [Output.null(DRIFT, NO_GOLDEN_WEEK)] if model.calibration is None else []
-    return [threshold, Output(BASIS, basis), *drift]
-
-
 def _specs() -> tuple[OutputSpec, ...]:
     inferred, text, number = Provenance.INFERRED, DataType.STRING, DataType.DOUBLE
     return (
         OutputSpec(
-            RAW, number, None, "how unusual the machine is: 0 = at the contamination share of training, larger = worse", inferred
+            RAW, number, None, "how unusual the machine is by itself; larger = worse (parts: in tails of healthy parts)", inferred
         ),
         OutputSpec(
             ADJUSTED, number, None, "raw score; 0 while it is common mode or gated (residual: spreads over the peers)", inferred
@@ -246,6 +272,16 @@ def _specs() -> tuple[OutputSpec, ...]:
         OutputSpec(
             ALARM, DataType.BOOLEAN, None, "the adjusted score has been at the threshold for the dwell", inferred, is_alarm=True
         ),
+        OutputSpec(
+            WHY, text, None, "JSON, while an alarm is on: which signal, which cut, how far from what was expected", inferred
+        ),
+        OutputSpec(
+            KNOWS, text, None, "how much the score knows of the operation that runs: parts, the twin only, nothing", inferred
+        ),
+        OutputSpec(
+            CUT_RECORD, text, None, "JSON, at the end of an operation: its load, vibration, feed over earlier parts", inferred
+        ),
+        OutputSpec(VERDICTS, text, None, "JSON: the last alarms, what people have said of them, and what came of it", inferred),
         OutputSpec(THRESHOLD, number, None, "of the adjusted score", inferred),
         OutputSpec(BASIS, text, None, "what the score and its threshold rest on", inferred),
         OutputSpec(
@@ -256,13 +292,14 @@ def _specs() -> tuple[OutputSpec, ...]:
 
 PROCESSOR = CellProcessor(
     name="joint_anomaly",
-    version=1,
-    inputs=NUMBERS | CONTEXT_INPUTS | {CLOCK_OFFSET, STAMP_CLOCK, *CONTEXT},
+    version=2,
+    inputs=NUMBERS | CONTEXT_INPUTS | {CLOCK_OFFSET, STAMP_CLOCK, *CONTEXT, DESCRIBED_BY} | MOMENT_INPUTS,
     outputs=_specs(),
     config=Config,
     state=State,
     initial=lambda _: State(),
     step=step,
     wakes=CONTEXT_INPUTS,
+    listens=(f"{VERDICT}+",),
     reads=read_scorings,
 )

@@ -17,6 +17,7 @@ JOBS = ("cnc/jobs/state", "cnc/jobs/reply/night-7")
 DESCRIPTIONS = tuple(f"cnctwin/description/okuma/{end}" for end in ("live", "challenger", "fault", "fault/gap/live"))
 LOOP = "cnctwin/loop/okuma"
 ASK_THE_LOOP = tuple(f"cnctwin/loop/request/{word}" for word in ("diagnose", "promote", "back", "withdraw"))
+VERDICT = "cnctwin/verdict/okuma"
 ELSEWHERE = (
     "anything",
     "spBv1.0/other/NDATA/edge-okuma",
@@ -60,7 +61,7 @@ ALL = sorted(
         *ASK_FOR_JOBS,
         JOB,
     }
-    | {*JOBS, *DESCRIPTIONS, LOOP, *ASK_THE_LOOP, *ELSEWHERE}
+    | {*JOBS, *DESCRIPTIONS, LOOP, *ASK_THE_LOOP, VERDICT, *ELSEWHERE}
 )
 
 MAY_WRITE: dict[str, frozenset[str]] = {
@@ -72,14 +73,26 @@ MAY_WRITE: dict[str, frozenset[str]] = {
     | {STATES[0], SNAPSHOT, LETTER, MARKER, LAG, *OUTBOX, ALERTS_STATE, COMMANDS[0], *MIRROR}
     | {*ASK_FOR_JOBS, JOB, *JOBS, *DESCRIPTIONS, LOOP},
     "viewer": frozenset(),
-    "operator": ASK_FOR_BIRTHS | set(COMMANDS) | set(ASK_FOR_JOBS) | set(ASK_THE_LOOP),
+    "operator": ASK_FOR_BIRTHS | set(COMMANDS) | set(ASK_FOR_JOBS) | set(ASK_THE_LOOP) | {VERDICT},
 }
-READERS = SPARKPLUG | {*STATES, ALERTS_STATE, LETTER, *MIRROR, *ASK_FOR_JOBS, JOB, *JOBS, *DESCRIPTIONS, LOOP, ELSEWHERE[2]}
+READERS = SPARKPLUG | {
+    *STATES,
+    ALERTS_STATE,
+    LETTER,
+    *MIRROR,
+    *ASK_FOR_JOBS,
+    JOB,
+    *JOBS,
+    *DESCRIPTIONS,
+    LOOP,
+    VERDICT,
+    ELSEWHERE[2],
+}
 MAY_READ: dict[str, frozenset[str]] = {
     **{edge: told(edge) | set(STATES) for edge in EDGE_NODES},
     "processors": SPARKPLUG
     | {*STATES, SNAPSHOT, LETTER, MARKER, LAG, *OUTBOX, ALERTS_STATE, *COMMANDS, *ASK_FOR_JOBS, JOB, JOBS[1], ELSEWHERE[2]}
-    | {*DESCRIPTIONS, LOOP, *ASK_THE_LOOP},
+    | {*DESCRIPTIONS, LOOP, *ASK_THE_LOOP, VERDICT},
     "viewer": READERS,
     "operator": READERS,
 }

@@ -354,7 +354,7 @@ def test_the_user_of_the_page_may_do_the_same_on_both_brokers() -> None:
     mosquitto = (DEPLOY / "mosquitto" / "people.acl").read_text().partition("user page\n")[2].strip().splitlines()
     writes = {line.removeprefix("topic write ") for line in mosquitto}
     hivemq = (DEPLOY / "hivemq" / "credentials.xml").read_text().partition("<id>page</id>\n            <permissions>")[2]
-    asks = {"cnc/jobs/request", "cnc/jobs/cancel", "cnctwin/loop/request/+"}
+    asks = {"cnc/jobs/request", "cnc/jobs/cancel", "cnctwin/loop/request/+", "cnctwin/verdict/+"}
     assert (
         writes
         == set(re.findall(r"<topic>([^<]+)</topic>", hivemq))

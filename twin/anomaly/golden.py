@@ -13,17 +13,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.anomaly.errors import ModelError
+from twin.anomaly.golden_parts import EXPECTS, NAMES, PROGRAMS, Told
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 WEEK_S = 604_800.0
+TOLD = "told_"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GoldenWeek:
     """features: names of the columns; rows: (n, features), NaN where a feature was not known; scores: (n,), NaN there;
     gated: (n,), not judged; peers: (n,) what it was judged beside, NaN where there was none; alerts: of the model then
-    Of a model with a preparation, rows are prepared ones, and peers what was left beside them: the adjusted score.
+    Of a model with a preparation, rows are prepared ones, and peers what was left beside them: the adjusted score. So it is
+    of one that compares parts; `told` has what else the machine told then (twin/anomaly/golden_parts.py), and gated ticks are
+    those at which nothing was judged.
     """
 
     features: tuple[str, ...]
@@ -33,6 +37,7 @@ class GoldenWeek:
     peers: Floats
     alerts: int
     tick_s: float
+    told: Told | None = None
 
     @property
     def weeks(self) -> float:
@@ -42,7 +47,15 @@ class GoldenWeek:
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Return the arrays that `golden_of_arrays` takes."""
         told = np.array([self.alerts, self.tick_s])
-        return {"rows": self.rows, "scores": self.scores, "gated": self.gated, "peers": self.peers, "alerts_tick_s": told}
+        columns = {f"{TOLD}{name}": column for name, column in (self.told or {}).items()}
+        return {
+            "rows": self.rows,
+            "scores": self.scores,
+            "gated": self.gated,
+            "peers": self.peers,
+            "alerts_tick_s": told,
+            **columns,
+        }
 
 
 def golden_of_arrays(arrays: Mapping[str, NDArray[Any]], features: Sequence[str]) -> GoldenWeek:
@@ -51,8 +64,12 @@ def golden_of_arrays(arrays: Mapping[str, NDArray[Any]], features: Sequence[str]
         alerts, tick_s = arrays["alerts_tick_s"].tolist()
         parts = {name: arrays[name] for name in ("rows", "scores", "gated", "peers")}
         fits = {len(part) for part in parts.values()} == {len(parts["rows"])} and parts["rows"].shape[1] == len(features)
+        columns = {name: arrays[f"{TOLD}{name}"] for name in NAMES} if any(name.startswith(TOLD) for name in arrays) else None
+        if columns is not None:
+            fits = fits and {len(column) for name, column in columns.items() if name != PROGRAMS} <= {len(parts["rows"])}
+            fits = fits and columns[EXPECTS].ndim == 2 and columns[PROGRAMS].dtype.kind == "U"
     except (KeyError, ValueError, IndexError, TypeError):
-        fits = False
+        fits, columns = False, None
     if not fits:
         raise ModelError("the golden week does not fit the manifest: copy the model again")
-    return GoldenWeek(tuple(features), **parts, alerts=int(alerts), tick_s=float(tick_s))
+    return GoldenWeek(tuple(features), **parts, alerts=int(alerts), tick_s=float(tick_s), told=columns)

@@ -14,7 +14,9 @@ from twin.anomaly.calibration import Calibration
 from twin.anomaly.common_mode import CommonModeRule, Method, adjust_frames
 from twin.anomaly.errors import ModelError
 from twin.anomaly.golden import GoldenWeek
+from twin.anomaly.golden_parts import Told, recorded_again, scores_alone, told_columns
 from twin.anomaly.model import AnomalyModel
+from twin.anomaly.parts.replay import Recorded
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -57,6 +59,25 @@ def frozen(model: AnomalyModel, rows: Floats, gated: Flags, peers: Floats) -> Go
     return GoldenWeek(model.features, rows, scores, gated, peers, alerts, found.tick_s)
 
 
+def frozen_parts(model: AnomalyModel, recorded: Recorded, skipped: Flags, adjusted: Floats) -> GoldenWeek:
+    """The golden week of a model that compares parts; skipped, adjusted: (n,), at the ticks that the machine told of.
+
+    Raises ModelError where the model has no calibration.
+    """
+    found = _calibration(model)
+    rows, told = told_columns(recorded, TICKS_MAX)
+    skipped, adjusted = skipped[-TICKS_MAX:], adjusted[-TICKS_MAX:]
+    scores = _scores_again(model, rows, told, found.tick_s)
+    alerts = alerts_of(found, adjusted, skipped, adjusted)
+    return GoldenWeek(model.features, rows, scores, skipped, adjusted, alerts, found.tick_s, told)
+
+
+def _scores_again(model: AnomalyModel, rows: Floats, told: Told, tick_s: float) -> Floats:
+    if model.parts is None:
+        raise ModelError("the golden week is that of parts, the model compares none: check it on recordings")
+    return scores_alone(model.parts, recorded_again(model.features, tick_s, rows, told))
+
+
 def scores_of(model: AnomalyModel, rows: Floats) -> Floats:
     """Scores (n,) of rows (n, features), NaN where a feature is not known."""
     known = np.isfinite(rows).all(axis=1)
@@ -82,7 +103,7 @@ def peers_of(rule: CommonModeRule, scores: Floats, gated: Flags, place: int) -> 
 def adjusted_by_peers(found: Calibration, scores: Floats, gated: Flags, peers: Floats) -> Floats:
     """Adjusted scores (n,), of raw scores and what the peers were; the same as twin/anomaly/common_mode.py."""
     none = np.isnan(peers)
-    if found.common_mode == "features":
+    if found.common_mode in {Method.FEATURES, Method.PARTS}:
         left = peers
     elif found.common_mode is Method.SOURCE:
         common = (scores > 0.0) & ~none & (np.where(none, -np.inf, peers) >= found.common_mode_factor * scores)
@@ -110,15 +131,16 @@ def checked(model: AnomalyModel, golden: GoldenWeek, is_challenger: bool = False
         raise ModelError(
             f"the golden week has a tick of {golden.tick_s:g} s, the model of {found.tick_s:g} s: they cannot be compared"
         )
-    if is_challenger and model.preparation is not None:
+    if is_challenger and (model.preparation is not None or model.parts is not None):
         raise ModelError("what was left beside the peers is frozen for the model that left it: check another on recordings")
-    scores = scores_of(model, golden.rows[:, [golden.features.index(name) for name in model.features]])
+    rows = golden.rows[:, [golden.features.index(name) for name in model.features]]
+    scores = scores_of(model, rows) if golden.told is None else _scores_again(model, rows, golden.told, found.tick_s)
     off = np.abs(scores - golden.scores)
     differ, largest = (
         int((off > SAME).sum() + (np.isnan(scores) != np.isnan(golden.scores)).sum()),
         float(np.nanmax(off, initial=0.0)),
     )
-    alerts = alerts_of(found, scores, golden.gated, golden.peers)
+    alerts = alerts_of(found, scores if golden.told is None else golden.peers, golden.gated, golden.peers)
     most = most_alerts(found.alerts_per_week * golden.weeks)
     faults = []
     if is_challenger and alerts > most:

@@ -49,13 +49,22 @@ class Refit(Record):
     center: Finite = 0.0
 
 
+class Parts(Record):
+    """The usual values at each moment of a part, which are in the file `parts.json` (twin/anomaly/parts/model.py)."""
+
+    kind: Literal["parts"] = "parts"
+
+
 class Manifest(Record):
-    """The file."""
+    """The file.
+
+    arrays_sha256: of the file that the detector needs, which is parts.json for `parts` and arrays.npz for the others
+    """
 
     kind: str
     version: int
     features: tuple[str, ...] = Field(min_length=1)
-    detector: Annotated[Flat | Refit, Field(discriminator="kind")]
+    detector: Annotated[Flat | Refit | Parts, Field(discriminator="kind")]
     trained: Trained
     calibration: Calibration | None
     preparation: Preparation | None = None

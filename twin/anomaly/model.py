@@ -5,6 +5,7 @@ scikit-learn, decision_function of PyOD's IForest, decision_function − thresho
 
     manifest.json   features in their order, detector, training window, versions of libraries, calibration, checksums
     arrays.npz      the flattened forest; of other detectors the rows to train them on again, and rows with their scores
+    parts.json      in its place, of a model that compares parts with parts
     golden.npz      the golden week (twin/anomaly/golden.py), where there is one
 
 and the models of several machines stand in a folder as <machine>/current (twin/anomaly/store.py).
@@ -21,7 +22,9 @@ from pydantic import ValidationError
 from twin.anomaly.calibration import Calibration
 from twin.anomaly.errors import ModelError
 from twin.anomaly.golden import GoldenWeek, golden_of_arrays
-from twin.anomaly.manifest import KIND, UNSAID, VERSION, Flat, Manifest, Refit, Trained
+from twin.anomaly.manifest import KIND, UNSAID, VERSION, Flat, Manifest, Parts, Refit, Trained
+from twin.anomaly.parts.model import PartsModel
+from twin.anomaly.parts_scorer import PARTS, PartsScorer, parts_text, read_parts
 from twin.anomaly.preparation import Preparation
 from twin.anomaly.refit import RefitScorer, again
 from twin.forest.artefact import ARRAYS, MANIFEST, digest, manifest_text, packed, read_arrays, read_manifest, write_folder
@@ -43,7 +46,7 @@ class AnomalyModel:
     """
 
     features: tuple[str, ...]
-    scorer: IsolationScorer | RefitScorer
+    scorer: IsolationScorer | RefitScorer | PartsScorer
     trained: Trained = UNSAID
     calibration: Calibration | None = None
     preparation: Preparation | None = None
@@ -51,7 +54,7 @@ class AnomalyModel:
     def score_one(self, values: Sequence[float]) -> float:
         """Return how unusual one row is: 0 = at the contamination share of training, larger = worse.
 
-        Raises TwinError where it has not one finite number for each feature.
+        Raises TwinError where it has not one finite number for each feature, or parts are compared, where a row has no score.
         """
         return self.scorer.score_one(values)
 
@@ -64,10 +67,25 @@ class AnomalyModel:
         return replace(self, calibration=calibration)
 
     @property
+    def parts(self) -> PartsModel | None:
+        """The usual values at each moment of a part; None where a row is scored by itself."""
+        return self.scorer.model if isinstance(self.scorer, PartsScorer) else None
+
+    @property
+    def parts_id(self) -> str:
+        """The first digits of the checksum of `parts`; "" = there are none."""
+        return self.scorer.sha256[:12] if isinstance(self.scorer, PartsScorer) else ""
+
+    @property
     def in_words(self) -> str:
         """Describe the model in one line."""
         scorer = self.scorer
-        name = f"isolation forest of {scorer.forest.trees} trees" if isinstance(scorer, IsolationScorer) else scorer.about.name
+        if isinstance(scorer, PartsScorer):
+            name = "parts beside parts"
+        else:
+            name = (
+                f"isolation forest of {scorer.forest.trees} trees" if isinstance(scorer, IsolationScorer) else scorer.about.name
+            )
         when = f", trained {self.trained.at}" if self.trained.at else ", trained"
         return f"{name} on {', '.join(self.features)}{when} on {self.trained.rows} rows"
 
@@ -76,10 +94,12 @@ def files_of(model: AnomalyModel, golden: GoldenWeek | None = None) -> dict[str,
     """Return the files of a model's folder; the same model gives the same bytes."""
     scorer = model.scorer
     if isinstance(scorer, IsolationScorer):
-        detector: Flat | Refit = Flat(denominator=scorer.denominator, offset=scorer.offset)
-        arrays = packed(scorer.forest.arrays())
+        detector: Flat | Refit | Parts = Flat(denominator=scorer.denominator, offset=scorer.offset)
+        file, arrays = ARRAYS, packed(scorer.forest.arrays())
+    elif isinstance(scorer, PartsScorer):
+        detector, file, arrays = Parts(), PARTS, parts_text(scorer.model)
     else:
-        detector, arrays = scorer.about, packed(scorer.arrays())
+        detector, file, arrays = scorer.about, ARRAYS, packed(scorer.arrays())
     week = None if golden is None else packed(golden.arrays())
     manifest = Manifest(
         kind=KIND,
@@ -92,7 +112,7 @@ def files_of(model: AnomalyModel, golden: GoldenWeek | None = None) -> dict[str,
         arrays_sha256=digest(arrays),
         golden_sha256=None if week is None else digest(week),
     )
-    files = {MANIFEST: manifest_text(manifest.model_dump(mode="json")).encode(), ARRAYS: arrays}
+    files = {MANIFEST: manifest_text(manifest.model_dump(mode="json")).encode(), file: arrays}
     return files if week is None else {**files, GOLDEN: week}
 
 
@@ -109,11 +129,13 @@ def load_model(folder: Path) -> AnomalyModel:
     folder = _folder(folder)
     manifest = _manifest(folder)
     try:
+        if isinstance(manifest.detector, Parts):
+            return _of_parts(folder, manifest)
         arrays = read_arrays(folder / ARRAYS, manifest.arrays_sha256)
         if isinstance(manifest.detector, Flat):
             forest = forest_of_arrays(arrays)
             width = forest.features
-            scorer: IsolationScorer | RefitScorer = IsolationScorer(
+            scorer: IsolationScorer | RefitScorer | PartsScorer = IsolationScorer(
                 forest, manifest.detector.denominator, manifest.detector.offset
             )
             scorer.score_one(forest.scaling[0])  # compiles the kernel or fetches it, so that the first row need not wait
@@ -127,6 +149,13 @@ def load_model(folder: Path) -> AnomalyModel:
     if width != len(manifest.features) or prepared != manifest.features:
         raise ModelError(f"{folder}: {MANIFEST} names {len(manifest.features)} features, the arrays have {width}: train anew")
     return AnomalyModel(manifest.features, scorer, manifest.trained, manifest.calibration, manifest.preparation)
+
+
+def _of_parts(folder: Path, manifest: Manifest) -> AnomalyModel:
+    model = read_parts(folder / PARTS, manifest.arrays_sha256)
+    if model.signals != manifest.features:
+        raise ModelError(f"{folder}: {MANIFEST} names {manifest.features}, {PARTS} has {model.signals}: train anew")
+    return AnomalyModel(manifest.features, PartsScorer(model), manifest.trained, manifest.calibration)
 
 
 def load_golden(folder: Path) -> GoldenWeek | None:

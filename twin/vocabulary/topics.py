@@ -35,6 +35,8 @@ LOOP = f"{OWN}loop/"
 """Machine, retained: the step of the loop that diagnoses its gap and corrects its description (cnctwin/loop)."""
 LOOP_REQUEST = f"{LOOP}request/"
 """diagnose, promote, back or withdraw: JSON from a person, {"machine": …, "by": …, "version": …}."""
+VERDICT = f"{OWN}verdict/"
+"""Machine, retained: a person's verdict on one of its anomaly alarms (twin/anomaly/parts/verdict.py)."""
 VALIDATION_BARRIER = f"{OWN}validation-barrier"
 
 MIRROR = "cnc/"

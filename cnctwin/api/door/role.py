@@ -45,6 +45,7 @@ _TABLE = tuple(
         ("POST", "/twin/([^/]+)/promote", Role.OPERATOR, "promote twin"),
         ("POST", "/twin/([^/]+)/back", Role.OPERATOR, "go back"),
         ("POST", "/twin/([^/]+)/withdraw", Role.OPERATOR, "withdraw challenger"),
+        ("POST", "/anomaly/([^/]+)/verdict", Role.OPERATOR, "give verdict"),
         ("POST", "/demo/reveal", Role.OPERATOR, "reveal"),
         ("GET", "/audit", Role.ADMINISTRATOR, ""),
     )

@@ -43,7 +43,7 @@ class Viewer:
         self._host = viewer(broker, group, limits)
         for topic in (ALERT_STATE, *LiveDescriptions.filters, *LiveJobs.filters, *LiveLoops.filters):
             self._host.subscribe_plain(topic)
-        self._outbox: deque[tuple[str, bytes]] = deque(maxlen=OUTBOX_MAX)
+        self._outbox: deque[tuple[str, bytes, bool]] = deque(maxlen=OUTBOX_MAX)
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="viewer", daemon=True)
 
@@ -78,11 +78,11 @@ class Viewer:
         host = self._host
         return {**host.counts, "dropped": host.dropped, "queue": host.queue_depth, "reconnects": host.reconnects}
 
-    def publish(self, topic: str, payload: bytes) -> bool:
+    def publish(self, topic: str, payload: bytes, *, retain: bool = False) -> bool:
         """Have a plain message sent; False where there is no connection or too much waits."""
         if not self._host.online or len(self._outbox) >= OUTBOX_MAX:
             return False
-        self._outbox.append((topic, payload))
+        self._outbox.append((topic, payload, retain))
         return True
 
     def _run(self) -> None:
@@ -93,8 +93,8 @@ class Viewer:
                     self._take(events)
                     self._stop.wait(GATHER_S)
                 while self._outbox:
-                    topic, payload = self._outbox.popleft()
-                    self._host.publish_plain(topic, payload, qos=1)
+                    topic, payload, retain = self._outbox.popleft()
+                    self._host.publish_plain(topic, payload, qos=1, retain=retain)
                 now_s = time.monotonic()
                 if now_s - flushed_s >= FLUSH_S:
                     flushed_s = now_s

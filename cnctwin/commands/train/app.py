@@ -37,15 +37,19 @@ def train_anomaly(
     common_mode: Annotated[
         str,
         typer.Option(
-            help="source: the published ratio rule; residual: spreads over the peers; features: each one beside the peers'"
+            help="parts: each cut beside earlier parts, the twin and the peers; features: each one beside the peers'; "
+            "source: the published ratio rule; residual: spreads over the peers"
         ),
-    ] = "source",
+    ] = "parts",
     common_mode_factor: Annotated[float, typer.Option(min=0.001, help="A peer with this share of a score makes it common")] = 0.5,
     exclude_gated_peers: Annotated[bool, typer.Option(help="Peers in a tool change are no peers")] = False,
     tail_s: Annotated[float, typer.Option(min=0.0, max=600.0, help="Gated after the end of a tool change")] = 8.0,
     look_back_s: Annotated[
         float, typer.Option(min=0.0, max=600.0, help="Gated before its begin, where the control tells late")
     ] = 0.0,
+    expectations: Annotated[
+        Path | None, typer.Option(help="Folder with what the twin expects of the programs: what `cnctwin expect --out` wrote")
+    ] = None,
     train_share: Annotated[
         float, typer.Option(min=0.05, max=0.95, help="First part of the time, trained on; the rest calibrates")
     ] = 0.5,
@@ -71,6 +75,8 @@ def train_anomaly(
         exclude_gated_peers=exclude_gated_peers,
         tail_s=tail_s,
         look_back_s=look_back_s,
+        expectations=training.expectations_in(expectations),
+        expectations_from="" if expectations is None else str(expectations),
         at=datetime.now(UTC).isoformat(timespec="seconds"),
     )
     training.train_anomaly(files, asked, out, as_json=as_json, console=Console())

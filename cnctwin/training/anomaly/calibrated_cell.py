@@ -4,7 +4,7 @@ The scores that a threshold is fitted on are those of the processor itself (repl
 gate, the peers and the dwell. Rows in a tool change are not trained on, so that a change stands out in the raw score.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -15,9 +15,11 @@ from cnctwin.errors import UsageError
 from cnctwin.training.anomaly.frozen_week import frozen_week, segments
 from cnctwin.training.anomaly.recorded_cell import TOOL_CHANGE, RecordedCell, Stretch
 from cnctwin.training.anomaly.regimes import Ticks, fitted_preparation, held_run, standardised, tailed_preparations
-from cnctwin.training.anomaly.replayed_cell import Track, replayed
+from cnctwin.training.anomaly.replayed_cell import replayed
 from cnctwin.training.anomaly.time_split import split
+from cnctwin.training.anomaly.track import Track
 from processors.joint_anomaly.config import Config
+from processors.joint_anomaly.expectations import Expectations
 from twin.anomaly.calibration import Calibration
 from twin.anomaly.common_mode import Method
 from twin.anomaly.detector import Detector, trained_model
@@ -37,7 +39,10 @@ MAD_TO_SD = 1.4826
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrainingSettings:
-    """The settings of a training. Durations in s; the settings of the processor are to be the same on the day."""
+    """The settings of a training. Durations in s; the settings of the processor are to be the same on the day.
+
+    expectations: of the twin, by machine, where parts are compared; expectations_from: the folder that has them
+    """
 
     features: tuple[str, ...]
     detector: Detector = field(default_factory=Detector)
@@ -46,12 +51,14 @@ class TrainingSettings:
     tick_s: float = 1.0
     dwell_ticks: int = 3
     clear_fraction: float = 0.8
-    common_mode: Method = Method.SOURCE
+    common_mode: Method = Method.PARTS
     common_mode_factor: float = 0.5
     exclude_gated_peers: bool = False
     tail_s: float = 8.0
     look_back_s: float = 0.0
     at: str = ""
+    expectations: Mapping[str, Expectations] = field(default_factory=dict)
+    expectations_from: str = ""
 
     @property
     def ticks(self) -> Ticks:
@@ -75,7 +82,7 @@ class TrainingSettings:
 class Calibrated:
     """The model of one machine with its threshold, its golden week, and what came out on the part that it was calibrated on.
 
-    has_tool_changes: whether anything tells of them; gated_share: of the ticks
+    has_tool_changes: whether anything tells of them; gated_share: of the ticks; missing: what would tell of the place in the part
     """
 
     machine: str
@@ -85,6 +92,7 @@ class Calibrated:
     has_tool_changes: bool
     gated_share: float
     alerts: int
+    missing: tuple[str, ...] = ()
 
 
 def calibrated_cell(

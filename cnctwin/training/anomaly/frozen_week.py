@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from cnctwin.training.anomaly.recorded_cell import Stretch
 from cnctwin.training.anomaly.regimes import Ticks, held_run, standardised
-from cnctwin.training.anomaly.replayed_cell import Track
+from cnctwin.training.anomaly.track import Track
 from twin.anomaly.alarm import AlarmRule, is_alarm, onsets
 from twin.anomaly.common_mode import CommonModeRule, Method
 from twin.anomaly.golden import GoldenWeek

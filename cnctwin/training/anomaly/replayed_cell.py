@@ -14,38 +14,29 @@ from numpy.typing import NDArray
 
 from cnctwin.errors import UsageError
 from cnctwin.training.anomaly.held_rows import held_rows, milliseconds
+from cnctwin.training.anomaly.parts_cell import PartTicks, cell_of_parts, tracks_of_parts
 from cnctwin.training.anomaly.recorded_cell import TOOL_CHANGE, Stretch
+from cnctwin.training.anomaly.track import Track
 from processors.actions import DeadLetter
 from processors.config import Configuration
 from processors.contract import Output, Outputs, Sample
 from processors.joint_anomaly.config import Config
 from processors.joint_anomaly.member import ADJUSTED, GATE
-from processors.joint_anomaly.processor import PROCESSOR, RAW
+from processors.joint_anomaly.parts_member import RAW
+from processors.joint_anomaly.processor import PROCESSOR
 from processors.joint_anomaly.scoring import scorings
 from processors.running.engine import Engine
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId, Reading
 from sparkplug.quality import Quality
+from twin.anomaly.alarm import AlarmRule
+from twin.anomaly.common_mode import Method
 from twin.anomaly.model import AnomalyModel
 from twin.anomaly.preparation import CONTEXT, SPEED, TURNS_RPM_MIN
 from twin.runlog import RunLog
 
 Floats = NDArray[np.float64]
 START_MS = 1_767_225_600_000  # 1 January 2026 UTC: t_s = 0
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Track:
-    """Scores of one machine over one stretch, by tick. t_s: (T,); raw, adjusted: (T,), NaN = not known; gated: (T,)
-
-    skipped: (T,) gated, or the spindle stands where that is not judged: neither evidence for an alarm nor against
-    """
-
-    t_s: Floats
-    raw: Floats
-    adjusted: Floats
-    gated: NDArray[np.bool_]
-    skipped: NDArray[np.bool_]
 
 
 class _Times(NamedTuple):
@@ -65,6 +56,8 @@ class _MachineScores:
 
 def replayed(stretch: Stretch, models: Mapping[str, AnomalyModel], settings: Mapping[str, Any]) -> dict[str, Track]:
     """The scores of each machine. `settings` are the processor's. Raises UsageError where a sample cannot be folded."""
+    if settings.get("common_mode", Config().common_mode) == Method.PARTS:
+        return _replayed_parts(stretch, models, settings)
     told = {name: _MachineScores() for name in stretch}
     configuration = Configuration(Config, settings, name=PROCESSOR.name, reads=lambda config: scorings(config, models))
 
@@ -88,6 +81,28 @@ def replayed(stretch: Stretch, models: Mapping[str, AnomalyModel], settings: Map
         at_ms = np.array([row[0] - start_ms for row in one.judged], dtype=np.int64)
         tracks[name] = _track(one, at_ms, start_ms, _stands(models[name], stretch[name], at_ms, (tick_ms, gap_ms)))
     return tracks
+
+
+def _replayed_parts(stretch: Stretch, models: Mapping[str, AnomalyModel], settings: Mapping[str, Any]) -> dict[str, Track]:
+    """The scores of parts; they alarm and learn by the threshold of each model, whatever that of the settings."""
+    config = Config.model_validate(settings)
+    parts = {name: model.parts for name, model in models.items() if name in stretch and model.parts is not None}
+    if other := [name for name in stretch if name not in parts]:
+        raise UsageError(f"the model of {other[0]} was not trained for common_mode = parts: train it anew")
+    first = next(iter(parts.values()))
+    ticks = PartTicks(
+        signals=first.signals,
+        tick_ms=config.tick_ms,
+        gap_ms=round(config.gap_s_max * 1000),
+        tail_s=config.tail_s,
+        look_back_s=config.look_back_s,
+    )
+    rules = [
+        None if found is None else AlarmRule(found.threshold, found.dwell_ticks, found.clear_fraction)
+        for found in (models[name].calibration for name in parts)
+    ]
+    cell = cell_of_parts(tuple(parts), [stretch], ticks)
+    return dict(zip(parts, tracks_of_parts(cell, tuple(parts.values()), rules), strict=True))
 
 
 def _note(told: _MachineScores, output: Output, at_s: float) -> None:

@@ -13,10 +13,12 @@ from rich.console import Console
 from cnctwin.errors import UsageError
 from cnctwin.terminal.spinner import working
 from cnctwin.training.anomaly.calibrated_cell import Calibrated, TrainingSettings, calibrated_cell
+from cnctwin.training.anomaly.calibrated_parts import calibrated_parts
 from cnctwin.training.anomaly.frozen_week import segments
 from cnctwin.training.anomaly.recorded_cell import recorded_cell, shared_features
 from cnctwin.training.anomaly.replayed_cell import replayed
 from processors.joint_anomaly.config import FITTED_WITH
+from processors.joint_anomaly.expectations import Expectations, read_expectations
 from twin.anomaly.alarm import AlarmRule, is_alarm, onsets
 from twin.anomaly.common_mode import Method
 from twin.anomaly.detector import Detector
@@ -30,7 +32,7 @@ from twin.forest.artefact import MANIFEST
 
 FEATURES = ("spindle_load_pct", "spindle_rpm", "feed_mm_min", "spindle_temp_c", "vibration_rms_g")
 """The published ones, of which those are taken that all files have."""
-__all__ = ["Detector", "Method", "TrainingSettings", "check_models", "promote_model", "train_anomaly"]
+__all__ = ["Detector", "Method", "TrainingSettings", "check_models", "expectations_in", "promote_model", "train_anomaly"]
 
 
 def train_anomaly(arguments: Sequence[str], asked: TrainingSettings, out: Path, *, as_json: bool, console: Console) -> None:
@@ -40,7 +42,8 @@ def train_anomaly(arguments: Sequence[str], asked: TrainingSettings, out: Path, 
     cell = recorded_cell(arguments, asked.features, asked.tick_s)
     try:
         with working("training") as say:
-            found = calibrated_cell(cell, asked, say)
+            calibrated = calibrated_parts if asked.common_mode is Method.PARTS else calibrated_cell
+            found = calibrated(cell, asked, say)
         lines = [_kept(one, out) for one in found]
     except TwinError as error:
         raise UsageError(str(error)) from None
@@ -53,9 +56,18 @@ def train_anomaly(arguments: Sequence[str], asked: TrainingSettings, out: Path, 
     console.print(f"\n{configuration(asked, out)}", markup=False, highlight=False, soft_wrap=True)
 
 
+def expectations_in(folder: Path | None) -> dict[str, Expectations]:
+    """Return what the twin expects, by machine. Raises UsageError where a file cannot be read."""
+    try:
+        return read_expectations("" if folder is None else str(folder))
+    except ValueError as error:
+        raise UsageError(f"--expectations: {error}") from None
+
+
 def configuration(asked: TrainingSettings, out: Path) -> str:
     """Return what belongs in the processor's configuration: a threshold holds for the settings that it was fitted with."""
-    lines = [f"{name} = {json.dumps(value)}" for name, value in {"models": str(out), **asked.settings}.items()]
+    expected = {"expectations": asked.expectations_from} if asked.expectations_from else {}
+    lines = [f"{name} = {json.dumps(value)}" for name, value in {"models": str(out), **expected, **asked.settings}.items()]
     return "\n".join(["[joint_anomaly]", *lines])
 
 
@@ -116,6 +128,7 @@ def _kept(one: Calibrated, out: Path) -> dict[str, Any]:
         "gated_share": one.gated_share,
         "alerts": one.alerts,
         "drift_hours": len(found.hourly_means),
+        "missing": list(one.missing),
     }
 
 
@@ -139,6 +152,8 @@ def _sentences(line: dict[str, Any]) -> list[str]:
     ]
     if not line["has_tool_changes"]:
         told.append("  nothing tells of tool changes (no tool_change_active): none of its scores is gated")
+    if line["missing"]:
+        told.append(f"  the recordings tell no {', '.join(line['missing'])}: a part is known as far as the others go")
     if line["not_promoted"]:
         told.append(
             f"  NOT promoted: on the golden week of {line['before']}: {line['not_promoted']}; cnctwin train promote does it"

@@ -15,12 +15,13 @@ OF_THE_PLANT = (
     "/gap/{machine}/report",
     "/twin/{machine}",
     "/alerts",
+    "/anomaly/{machine}",
 )
 OF_JOBS = ("/jobs", "/jobs/{job_id}", "/jobs/{job_id}/files/{name}")
 OF_THE_PAST = ("/history/{machine}", "/events/{machine}", "/parts/{machine}", "/validation/{machine}")
 OF_THE_SERVER = ("/health", "/livez", "/readyz", "/metrics", "/whoami", "/audit", "/models")
 ASKED = ("/silences", "/predict", "/twin/replay", "/alerts/{fingerprint}/acknowledge", "/jobs")
-OF_ITS_OWN = ("/silences/{silence_id}/end", "/models/{kind}/{machine}/promote")
+OF_ITS_OWN = ("/silences/{silence_id}/end", "/anomaly/{machine}/verdict", "/models/{kind}/{machine}/promote")
 OF_THE_LOOP = tuple(f"/twin/{{machine}}/{word}" for word in ("diagnose", "promote", "back", "withdraw"))
 POSTS = (*ASKED, *OF_ITS_OWN, *OF_THE_LOOP, "/jobs/{job_id}/cancel", "/login", "/logout")
 ROUTES = {f"GET {path}" for path in (*OF_THE_PLANT, *OF_JOBS, *OF_THE_PAST, *OF_THE_SERVER)} | {f"POST {path}" for path in POSTS}

@@ -7,7 +7,8 @@ import pytest
 from processors.actions import Action, Publish
 from processors.errors import ConfigurationError
 from processors.joint_anomaly.member import ADJUSTED, ALARM, COMMON, GATE, PEER
-from processors.joint_anomaly.processor import PROCESSOR, RAW
+from processors.joint_anomaly.parts_member import RAW
+from processors.joint_anomaly.processor import PROCESSOR
 from processors.running.engine import Engine
 from sparkplug.host_session import HostEvent
 from sparkplug.metric import NodeId

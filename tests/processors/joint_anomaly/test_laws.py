@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from processors.actions import Action, DeadLetter, Publish
 from processors.joint_anomaly.member import ADJUSTED, ALARM, COMMON, GATE
-from processors.joint_anomaly.processor import RAW
+from processors.joint_anomaly.parts_member import RAW
 from processors.running.engine import Engine
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId

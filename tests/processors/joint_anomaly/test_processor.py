@@ -12,12 +12,14 @@ from processors.config import Configuration
 from processors.errors import ConfigurationError
 from processors.joint_anomaly.config import Config
 from processors.joint_anomaly.member import ADJUSTED, ALARM, COMMON, GATE, GATE_SOURCE, NO_MODEL, PEERS
-from processors.joint_anomaly.processor import PROCESSOR, RAW
+from processors.joint_anomaly.parts_member import RAW
+from processors.joint_anomaly.processor import PROCESSOR
 from processors.joint_anomaly.scoring import scorings
 from processors.running.engine import Engine
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId
 from tests.processors.streams import T0_MS, birth, data, death, event, fed, named, reading
+from twin.anomaly.common_mode import Method
 
 A_TENTH = 0.1
 
@@ -37,7 +39,8 @@ class PlainModel:
 
 
 def engine_with(models: Mapping[str, Any], table: dict[str, Any]) -> Engine:
-    """An engine whose machines have these models."""
+    """An engine whose machines have these models; judged by the published rule, where the table says nothing else."""
+    table = {"common_mode": "source"} | table
     configuration = Configuration(Config, table, name="joint_anomaly", reads=lambda config: scorings(config, models))
     return Engine(PROCESSOR, configuration)
 
@@ -345,12 +348,12 @@ def test_history_that_comes_late_wakes_nobody() -> None:
 
 
 def test_a_threshold_is_refused_for_settings_that_it_was_not_fitted_with(monkeypatch: pytest.MonkeyPatch) -> None:
-    fitted = Config().model_dump() | {"tick_s": 0.1}
+    fitted = Config(common_mode=Method.SOURCE).model_dump() | {"tick_s": 0.1}
     model = SimpleNamespace(features=("spindle_load_pct",), calibration=SimpleNamespace(**fitted), preparation=None)
     monkeypatch.setattr("processors.joint_anomaly.scoring._models_in", lambda _: {"a": model})
     with pytest.raises(ConfigurationError, match=r"tick_s = 1.0, but the threshold of a was fitted with 0.1"):
-        PROCESSOR.configured({"models": "somewhere"})
-    assert PROCESSOR.configured({"models": "somewhere", "threshold": 0.3}).default.threshold == 0.3
+        PROCESSOR.configured({"models": "somewhere", "common_mode": "source"})
+    assert PROCESSOR.configured({"models": "somewhere", "common_mode": "source", "threshold": 0.3}).default.threshold == 0.3
 
 
 def test_the_snapshot_of_a_cell_stays_small() -> None:

@@ -94,7 +94,6 @@ class Memory(NamedTuple):
 
     running: the alarm that is on by its score; held: why it is held back, if it is
     standing, known: the began_s of those that are not gone
-    learn: parts of alarms that were called false, to be learned and then taken out
     """
 
     running: Episode | None = None
@@ -103,7 +102,6 @@ class Memory(NamedTuple):
     known: tuple[float, ...] = ()
     tolerated: tuple[Tolerated, ...] = ()
     outcomes: tuple[Outcome, ...] = ()
-    learn: tuple[str, ...] = ()
     held: Held | None = None
 
 
@@ -140,6 +138,11 @@ def alarm_of(memory: Memory) -> bool:
     if running is None or memory.standing:
         return bool(memory.standing)
     return memory.held is None and (running.said is None or running.said.verdict == TRUE)
+
+
+def is_excused(memory: Memory) -> bool:
+    """Return True while the alarm that is on has been called false: its part may be learned."""
+    return memory.running is not None and memory.running.said is not None and memory.running.said.verdict == FALSE
 
 
 def part_ended(memory: Memory, program: str | None, part: str, at_s: float) -> Memory:

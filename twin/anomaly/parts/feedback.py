@@ -18,8 +18,10 @@ ALARMS_MAX = 50
 VERDICTS_MIN = 10
 KEEPS = 0.95
 Z_OF_90_PCT = 1.6449
-SHOWN_MAX = 10
-TEXT_CHARACTERS_MAX = 16_000
+SHOWN_MAX = 6
+COMPACT: dict[str, Any] = {"ensure_ascii": False, "separators": (",", ":")}
+TEXT_CHARACTERS_MAX = 3_900
+"""The interface cuts texts at 4,000."""
 
 
 class Precision(NamedTuple):
@@ -83,20 +85,17 @@ def suggested(memory: Memory) -> Suggestion | None:
 def told_of(memory: Memory, at_s: float) -> str:
     """Return what is published of the memory, as JSON: the last alarms with who said what, raised limits, outcomes."""
     share, better = precision(memory), suggested(memory)
-    document = {
-        "version": 1,
+    raised = [one for one in memory.tolerated if factor_at(one, at_s) > 1.0]
+    lists = {
         "alarms": [_alarm(memory, one) for one in reversed(all_of(memory)[-SHOWN_MAX:])],
-        "limits": [_limit(one) for one in memory.tolerated[-SHOWN_MAX:] if factor_at(one, at_s) > 1.0],
-        "limits_not_shown": max(len(memory.tolerated) - SHOWN_MAX, 0),
-        "remembered": len(all_of(memory)),
-        "precision": None if share is None else str(share),
-        "suggestion": None if better is None else str(better),
-        "outcomes": [one._asdict() for one in memory.outcomes],
+        "limits": [_limit(one) for one in reversed(raised[-SHOWN_MAX:])],
+        "outcomes": [one._asdict() for one in reversed(memory.outcomes[-SHOWN_MAX:])],
     }
-    text = json.dumps(document, ensure_ascii=False, separators=(",", ":"))
-    if len(text) <= TEXT_CHARACTERS_MAX:
-        return text
-    return json.dumps({**document, "alarms": document["alarms"][:2], "limits": []}, ensure_ascii=False, separators=(",", ":"))
+    counts = {"remembered": len(all_of(memory)), "raised": len(raised)}
+    sums = {"precision": None if share is None else str(share), "suggestion": None if better is None else str(better)}
+    while len(text := json.dumps({"version": 1, **lists, **counts, **sums}, **COMPACT)) > TEXT_CHARACTERS_MAX:
+        max(lists.values(), key=len).pop()
+    return text
 
 
 def _alarm(memory: Memory, one: Episode) -> dict[str, Any]:

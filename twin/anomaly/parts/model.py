@@ -9,8 +9,9 @@ from typing import Annotated
 from pydantic import Field
 
 from twin.anomaly.calibration import Finite, NotNegative, Positive, Record
+from twin.anomaly.common_features import MEMORY_S
 from twin.anomaly.parts import quantity, scales
-from twin.anomaly.parts.heat import BASE_S, TAUS_S
+from twin.anomaly.parts.heat import BASE_S, EVERY_S, TAUS_S
 from twin.anomaly.parts.levels import BATCH_VAR, TOOL_VAR, Level
 from twin.anomaly.parts.quantity import Kind
 from twin.anomaly.parts.usual import Usual
@@ -27,6 +28,9 @@ class Plan:
     kinds: tuple[int, ...]
     floors: tuple[float, ...]
     shares: tuple[float, ...]
+    heat_every: int
+    memory_ticks: int
+    powers: tuple[float, ...]
     heat_shares: tuple[tuple[float, ...], float]
     drivers_at: tuple[int, int]
     speed_at: int
@@ -80,6 +84,10 @@ class PartsModel(Record):
         (x0, y0), (x1, y1) = points[at - 1], points[at]
         return y0 + (y1 - y0) * (rpm - x0) / (x1 - x0)
 
+    def changed(self, **fields: object) -> "PartsModel":
+        """Return the model with other values of some fields, checked; the plan is another one then."""
+        return PartsModel.model_validate({**{name: getattr(self, name) for name in PartsModel.model_fields}, **fields})
+
     @cached_property
     def plan(self) -> Plan:
         """What a step needs."""
@@ -91,12 +99,16 @@ class PartsModel(Record):
         def at(name: str) -> int:
             return self.signals.index(name) if name in self.signals else -1
 
+        every = max(1, round(EVERY_S / self.tick_s))
         steps = range(int(quantity.RPM_MAX / RPM_STEP) + 1)
         return Plan(
             kinds=tuple(map(int, kinds)),
             floors=tuple(quantity.floor_of(signal) for signal in self.signals),
+            powers=self.powers,
             shares=scales.shares(self.tick_s),
-            heat_shares=(tuple(self.tick_s / tau_s for tau_s in TAUS_S), self.tick_s / BASE_S),
+            memory_ticks=round(MEMORY_S / self.tick_s),
+            heat_every=every if any(self.heat) else 0,
+            heat_shares=(tuple(every * self.tick_s / tau_s for tau_s in TAUS_S), every * self.tick_s / BASE_S),
             drivers_at=(at(quantity.SPEED), at(quantity.LOAD)),
             speed_at=at(quantity.SPEED),
             feed_at=at(quantity.FEED),

@@ -12,7 +12,7 @@ from twin.anomaly.parts.model import PartsModel
 from twin.anomaly.parts.own import Own, usual_of
 from twin.anomaly.parts.quantity import UNITS, Kind, kind_of
 from twin.anomaly.parts.signature import shares_of, signature_of
-from twin.anomaly.parts.why import Why
+from twin.anomaly.parts.why import Like, Why
 
 PEER_SHOWS = 0.5
 """A peer shows it too where its residual is at least half as large."""
@@ -20,7 +20,8 @@ PEER_SHOWS = 0.5
 
 def why_of(model: PartsModel, own: Own, peers: Sequence[Own], left: Sequence[float], knows: str) -> Why:
     """Return the reason of a score; left: in tails, signal by signal, each on all scales. Peers are named by their place."""
-    index = max(range(len(left)), key=lambda at: abs(left[at]))
+    most, least = max(left), min(left)
+    index = left.index(most if most >= -least else least)
     at, scale = divmod(index, scales.COUNT)
     place, plan, s = own.place, model.plan, own.smooth[index]
     usual = usual_of(model, own, place.key)
@@ -43,7 +44,6 @@ def why_of(model: PartsModel, own: Own, peers: Sequence[Own], left: Sequence[flo
     shows = [
         str(n) for n, peer in enumerate(peers) if peer.smooth[index] * s > 0.0 and abs(peer.smooth[index]) > PEER_SHOWS * abs(s)
     ]
-    signature = signature_of(shares_of(model.signals, scales.SCALES, left), place.key or "", place.program, place.tool)
     return Why(
         model.signals[at],
         scales.SCALES[scale],
@@ -57,9 +57,17 @@ def why_of(model: PartsModel, own: Own, peers: Sequence[Own], left: Sequence[flo
         abs(s),
         max(0.0, (own.tick - own.high_since) * model.tick_s) if own.high_since > 0 else 0.0,
         knows if is_known else "the twin",
-        nearest(own.memory, signature),
+        _like(model, own, left),
         tuple(shows),
     )
+
+
+def _like(model: PartsModel, own: Own, left: Sequence[float]) -> tuple[Like, ...]:
+    if not own.memory.episodes:
+        return ()
+    place = own.place
+    shares = shares_of(model.signals, scales.SCALES, left)
+    return nearest(own.memory, signature_of(shares, place.key or "", place.program, place.tool))
 
 
 def _in_units(model: PartsModel, own: Own, at: int, centre: float, away: float) -> tuple[float, float]:

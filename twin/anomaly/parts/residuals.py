@@ -5,40 +5,20 @@ Where no earlier part has the section, the twin's expectation takes its place, w
 
 import math
 from collections.abc import Sequence
+from math import exp, log
 
 from twin.anomaly.parts import scales
 from twin.anomaly.parts.heat import explained
-from twin.anomaly.parts.model import PartsModel, Plan
+from twin.anomaly.parts.model import RPM_STEP, PartsModel, Plan
 from twin.anomaly.parts.own import Own
 from twin.anomaly.parts.quantity import Kind
 from twin.anomaly.parts.told import Expects, Told
 from twin.anomaly.parts.usual import Usual
 
 _LOAD, _VIBRATION, _FEED, _SPEED, _TEMPERATURE = (int(k) for k in list(Kind)[:5])
-_RPM_STEP = 1.0 / 500.0
-
-
-def quantities(model: PartsModel, told: Told, override: float, settled: bool) -> list[float | None]:
-    """Return the quantity of each signal, None where this tick does not tell of it; temperatures as they are told."""
-    plan = model.plan
-    found: list[float | None] = []
-    speed = 1.0 if told.spindle_override_pct is None else max(told.spindle_override_pct, 1.0) / 100.0
-    log_override = math.log(override)
-    for at, (kind, value, floor, power) in enumerate(zip(plan.kinds, told.values, plan.floors, model.powers, strict=True)):
-        if value is None or (not settled and kind != _FEED and kind != _TEMPERATURE):
-            found.append(None)
-        elif kind == _LOAD:
-            idle = idle_of(plan, told.values) if at == plan.load_at else 0.0
-            found.append(math.log(max(0.0, value - idle) * math.exp(-power * log_override) + floor))
-        elif kind == _VIBRATION:
-            found.append(math.log(max(0.0, value) + floor) - power * log_override)
-        elif kind == _FEED:
-            found.append(math.log(max(0.0, value) / override + floor))
-        elif kind == _SPEED:
-            found.append(math.log(max(0.0, value) / speed + floor))
-        else:
-            found.append(value)
-    return found
+_RPM_STEP = 1.0 / RPM_STEP
+TWIN_CLIP = 2.5
+"""A line of a program has air in it that the twin, line by line, does not tell from the cut."""
 
 
 def idle_of(plan: Plan, values: Sequence[float | None]) -> float:
@@ -49,39 +29,63 @@ def idle_of(plan: Plan, values: Sequence[float | None]) -> float:
 
 
 def residuals(
-    plan: Plan, model: PartsModel, own: Own, x: list[float | None], expected: Expects | None, usual: Usual | None, section: int
-) -> tuple[list[float], list[float | None], list[bool]]:
-    """Return z, the residual that is learned from (without the twin), and which signals are told of."""
+    model: PartsModel,
+    own: Own,
+    told: Told,
+    override: float,
+    settled: bool,
+    usual: Usual | None,
+    section: int,
+) -> tuple[list[float], tuple[float | None, ...], list[bool]]:
+    """Return z, the residuals that are learned from (never beside the twin), and which signals this tick tells of.
+
+    usual: the usual course of the operation, None where no earlier part has this section
+    """
+    plan = model.plan
+    learned = plan.flat if usual is None else usual.centre[section]
     if usual is not None and model.follows_parts:
-        centre: Sequence[float | None] = usual.centre[section]
-        learned, weight = usual.centre[section], usual.weight[section]
+        centre: Sequence[float | None] = learned
+        weight, clip = usual.weight[section], scales.CLIP
     else:
-        centre, learned, weight = beside_twin(plan, model, expected), plan.flat, plan.over_twin
-        if usual is not None:
-            learned = usual.centre[section]
+        centre, weight, clip = beside_twin(plan, model, told.expected), plan.over_twin, TWIN_CLIP
     z: list[float] = []
     d: list[float | None] = []
-    told: list[bool] = []
-    clip, base = scales.CLIP, own.heat.base
-    for at, value in enumerate(x):
-        if value is None:
+    is_told: list[bool] = []
+    log_override = 0.0 if override == 1.0 else log(override)
+    rows = zip(plan.kinds, told.values, plan.floors, plan.powers, centre, learned, weight, own.level, own.calm, strict=True)
+    for at, (kind, value, floor, power, middle, usually, w, level, calm) in enumerate(rows):
+        if value is None or (not settled and kind != _FEED and kind < _TEMPERATURE):
             z.append(0.0)
             d.append(None)
-            told.append(False)
+            is_told.append(False)
             continue
-        if plan.kinds[at] == _TEMPERATURE:
-            level = base[at]
-            y = 0.0 if level is None else (value - explained(model.heat[at], own.heat.driven) - level) * plan.over_spread[at]
+        if kind == _TEMPERATURE:
+            base = own.heat.base[at]
+            y = 0.0 if base is None else (value - explained(model.heat[at], own.heat.driven) - base) * plan.over_spread[at]
             d.append(None)
-            told.append(level is not None)
+            is_told.append(base is not None and own.heat.is_settled)
         else:
-            value -= own.level[at]  # noqa: PLW2901
-            middle, w = centre[at], weight[at]
-            d.append(value - learned[at])
-            told.append(middle is not None and w > 0.0)
-            y = 0.0 if middle is None else (value - middle) * w * own.calm[at]
+            if kind == _LOAD:
+                cut = value - idle_of(plan, told.values) if at == plan.load_at else value
+                x = log((cut if cut > 0.0 else 0.0) * (exp(-power * log_override) if log_override else 1.0) + floor)
+            elif kind == _FEED:
+                x = log(value / override + floor)
+            elif kind == _VIBRATION:
+                x = log(value + floor) - power * log_override
+            elif kind == _SPEED:
+                x = log(value / _share(told.spindle_override_pct) + floor)
+            else:
+                x = value
+            x -= level
+            d.append(x - usually)
+            is_told.append(middle is not None and w > 0.0)
+            y = 0.0 if middle is None else (x - middle) * w * calm
         z.append(clip if y > clip else -clip if y < -clip else y)
-    return z, d, told
+    return z, tuple(d), is_told
+
+
+def _share(pct: float | None) -> float:
+    return 1.0 if pct is None or pct < 1.0 else pct / 100.0
 
 
 def beside_twin(plan: Plan, model: PartsModel, expected: Expects | None) -> list[float | None]:

@@ -18,8 +18,8 @@ SCALES = ("seconds", "cut", "part", "tool")
 TAUS_S = (3.0, 30.0, 300.0, 120.0)
 TOOL = 3
 COUNT = len(SCALES)
-CLIP = 8.0
-BLOCK_S = 3600.0
+CLIP = 6.0
+BLOCK_S = 900.0
 RETURN_S = 86_400.0
 TAIL_LEAST = 0.2
 

@@ -1,13 +1,14 @@
 """A person's verdict on an alarm, and what follows from it. Nothing follows from silence.
 
     true   the alarm stands until its cause is gone (episodes.py), or until the person ends it; its parts are never learned
-    false  its parts may be learned, and the limit of its signals, scales and sides in its operation rises to
+    false  the part that runs may be learned, and the limit of its signals, scales and sides in its operation rises to
            factor = min(FACTOR_MAX, limit in force · MARGIN · score / threshold)
            which is forgotten: 1 + (factor − 1) · 2^(−age / HALF_LIFE_S)
     known  it is held back, with its like, until it is gone (episodes.py); its parts are never learned
 
 The same verdict again changes nothing. Of several on one alarm, that with the latest `at_s` holds, in whatever order they come.
-It takes back a limit that an earlier one has raised, but not what was learned meanwhile.
+It takes back a limit that an earlier one has raised, but not what was learned meanwhile. Of a false alarm the part that is being
+cut is learned; those that have ended are not kept, but the next ones, which alarm no more, are learned like any other.
 """
 
 from collections.abc import Iterable
@@ -25,6 +26,7 @@ from twin.anomaly.parts.episodes import (
     Said,
     Tolerated,
     all_of,
+    is_excused,
     is_gone,
     kept,
 )
@@ -41,11 +43,13 @@ MARGIN = 1.3
 HALF_LIFE_S = 60 * 86_400.0
 TOLERATED_MAX = 100
 OUTCOMES_MAX = 10
-LEARN_MAX = 40
 ALARM_WITHIN_S = 2.0
 """An alarm is found by when it began, give or take the rounding of the sender."""
 TEXT_MAX = 200
 MESSAGE_CHARACTERS_MAX = 4096
+
+
+LINE = r"^[^\x00-\x1f\x7f]*$"
 
 
 class Verdict(BaseModel):
@@ -61,11 +65,11 @@ class Verdict(BaseModel):
     version: Literal[1] = 1
     alarm_at_s: float = Field(ge=0.0, le=1e11)
     verdict: Literal["true", "false", "known"]
-    label: Annotated[str, Field(max_length=60)] = ""
-    by: Annotated[str, Field(min_length=1, max_length=100)]
+    label: Annotated[str, Field(max_length=60, pattern=LINE)] = ""
+    by: Annotated[str, Field(min_length=1, max_length=100, pattern=LINE)]
     at_s: float = Field(ge=0.0, le=1e11)
     ends: bool = False
-    id: Annotated[str, Field(max_length=64)] = ""
+    id: Annotated[str, Field(max_length=64, pattern=LINE)] = ""
 
 
 def verdict_of(text: str) -> Verdict:
@@ -77,18 +81,21 @@ def verdict_of(text: str) -> Verdict:
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"])) or "the message"
-        given = repr(first["input"])[:40]
-        raise ValueError(f"{where}: {first['msg']}, but it is {given}; docs/anomaly.md shows a verdict") from None
+        given = "missing" if first["type"] == "missing" else repr(first["input"])[:40]
+        raise ValueError(f"{where}: {first['msg']}, but it is {given}; docs/verdicts.md shows a verdict") from None
 
 
 def corrected(model: PartsModel, own: Own, verdict: Verdict) -> Own:
     """Return the state of a machine after a verdict on one of its alarms."""
-    del model
-    return own._replace(memory=corrected_memory(own.memory, verdict))
+    memory = corrected_memory(own.memory, verdict, own.tick * model.tick_s)
+    return own._replace(memory=memory, is_part_bad=own.is_part_bad and not is_excused(memory))
 
 
-def corrected_memory(memory: Memory, verdict: Verdict) -> Memory:
-    """Return the memory after a verdict: who said what, and what follows from it."""
+def corrected_memory(memory: Memory, verdict: Verdict, now_s: float) -> Memory:
+    """Return the memory after a verdict: who said what, and what follows from it.
+
+    now_s: event time, which may be another one than that of the person's clock
+    """
     if verdict.id and any(one.id == verdict.id for one in memory.outcomes):
         return memory
     found = _meant(memory, verdict.alarm_at_s)
@@ -107,15 +114,13 @@ def corrected_memory(memory: Memory, verdict: Verdict) -> Memory:
         return _noted(memory, verdict, False, f"a later verdict holds: {before.verdict}, by {before.by}")
     spoken = found._replace(said=said)
     memory = _without(memory, found)
-    is_here = not is_gone(spoken, verdict.at_s)
+    is_here = not is_gone(spoken, now_s)
     standing, known = (
         tuple(sorted((*before, found.began_s))) if said.verdict == word and is_here else before
         for word, before in ((TRUE, memory.standing), (KNOWN, memory.known))
     )
-    raised = _raised(spoken) if said.verdict == FALSE else ()
-    memory = memory._replace(standing=standing, known=known, tolerated=_bounded((*memory.tolerated, *raised), verdict.at_s))
-    if said.verdict == FALSE:
-        memory = memory._replace(learn=(*memory.learn, *found.parts)[-LEARN_MAX:])
+    raised = _raised(spoken, now_s) if said.verdict == FALSE else ()
+    memory = memory._replace(standing=standing, known=known, tolerated=_bounded((*memory.tolerated, *raised), now_s))
     return _noted(_replaced(memory, spoken), verdict, True, _text(spoken, is_here))
 
 
@@ -171,14 +176,14 @@ def _ended(memory: Memory, found: Episode, verdict: Verdict) -> Memory:
     return _noted(memory._replace(standing=standing), verdict, True, f"ended by {verdict.by}")
 
 
-def _raised(episode: Episode) -> tuple[Tolerated, ...]:
+def _raised(episode: Episode, now_s: float) -> tuple[Tolerated, ...]:
     assert episode.said is not None
     over, said = MARGIN * max(episode.size, 1.0), episode.said
 
     def raised(share: Share) -> Tolerated:
         factor = round(min(FACTOR_MAX, share.factor * over), 3)
         operation = episode.signature.operation
-        return Tolerated(episode.began_s, operation, share.signal, share.scale, share.side, factor, said.at_s, said.by)
+        return Tolerated(episode.began_s, operation, share.signal, share.scale, share.side, factor, now_s, said.by)
 
     return tuple(map(raised, episode.signature.shares))
 
@@ -201,7 +206,6 @@ def _without(memory: Memory, found: Episode) -> Memory:
         standing=tuple(one for one in memory.standing if one != found.began_s),
         known=tuple(one for one in memory.known if one != found.began_s),
         tolerated=tuple(one for one in memory.tolerated if one.episode_s != found.began_s),
-        learn=tuple(part for part in memory.learn if part not in found.parts),
     )
 
 

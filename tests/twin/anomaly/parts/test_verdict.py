@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.twin.anomaly.parts.alarms import LOAD, THRESHOLD, alarmed, seen, signature, verdict
-from twin.anomaly.parts.episodes import Memory, alarm_of, followed
+from tests.twin.anomaly.parts.alarms import LOAD, THRESHOLD, alarmed, seen, signature, spoken, verdict
+from twin.anomaly.parts.episodes import Memory, alarm_of, followed, is_excused
 from twin.anomaly.parts.signature import Signature
 from twin.anomaly.parts.verdict import (
     FACTOR_MAX,
@@ -38,13 +38,13 @@ def test_the_same_size_as_a_false_alarm_does_not_alarm_again(load: float, vibrat
     given_signature = signature(load, vibration)
     score = score_of(given_signature, Memory(), 0.0)
     memory = followed(followed(Memory(), seen(score, given_signature), 1000.0), None, 1010.0)
-    memory = corrected_memory(memory, verdict("false"))
+    memory = spoken(memory, verdict("false"))
     assert score_of(given_signature, memory, 2000.0) <= score / min(FACTOR_MAX, MARGIN * score / THRESHOLD) * 1.01
     assert score_of(given_signature, memory, 2000.0) < THRESHOLD
 
 
 def test_a_raised_limit_is_of_its_operation_signal_scale_and_side_only() -> None:
-    memory = corrected_memory(alarmed(score=4.0), verdict("false"))
+    memory = spoken(alarmed(score=4.0), verdict("false"))
     assert limit_factor(memory, "O1|T5|1", LOAD, "cut", 1, 2000.0) == 2.0 * MARGIN
     others = [
         ("O1|T6|1", LOAD, "cut", 1),
@@ -56,7 +56,7 @@ def test_a_raised_limit_is_of_its_operation_signal_scale_and_side_only() -> None
 
 
 def test_a_raised_limit_is_bounded_and_forgotten() -> None:
-    memory = corrected_memory(alarmed(score=100.0), verdict("false"))
+    memory = spoken(alarmed(score=100.0), verdict("false"))
     factors = [limit_factor(memory, "O1|T5|1", LOAD, "cut", 1, 2000.0 + halves * HALF_LIFE_S) for halves in range(9)]
     assert factors[:3] == [FACTOR_MAX, 1.0 + (FACTOR_MAX - 1.0) / 2.0, 1.0 + (FACTOR_MAX - 1.0) / 4.0]
     assert factors[-1] == 1.0
@@ -67,27 +67,34 @@ def test_many_false_alarms_raise_a_bounded_number_of_limits() -> None:
     memory = Memory()
     for place in range(TOLERATED_MAX):
         at_s = 1000.0 + 100.0 * place
-        memory = corrected_memory(alarmed(memory, at_s, given=signature(tool=place)), verdict("false", at_s, at_s + 20.0))
+        memory = spoken(alarmed(memory, at_s, given=signature(tool=place)), verdict("false", at_s, at_s + 20.0))
     assert len(memory.tolerated) == TOLERATED_MAX
     assert limits_of(memory, f"O1|T{TOLERATED_MAX - 1}|1", 2e4) != {}
 
 
-def test_the_parts_of_a_false_alarm_may_be_learned_and_of_no_other() -> None:
-    assert corrected_memory(alarmed(), verdict("false")).learn == ("O1#7",)
-    assert corrected_memory(alarmed(), verdict("true")).learn == ()
-    assert corrected_memory(alarmed(), verdict("known")).learn == ()
+def test_the_part_of_a_false_alarm_that_is_on_may_be_learned_and_of_no_other() -> None:
+    memory = followed(Memory(), seen(), 1000.0)
+    assert [is_excused(spoken(memory, verdict(word))) for word in ("true", "false", "known")] == [False, True, False]
+    assert not is_excused(memory)
+    assert not is_excused(spoken(alarmed(), verdict("false")))
+
+
+def test_time_is_the_machine_s_and_not_the_person_s() -> None:
+    memory = corrected_memory(alarmed(score=4.0), verdict("false", at_s=9e9), 2000.0)
+    assert limit_factor(memory, "O1|T5|1", LOAD, "cut", 1, 2000.0) == 2.0 * MARGIN
+    assert alarm_of(corrected_memory(alarmed(), verdict("true", at_s=9e9), 2000.0))
 
 
 def test_an_alarm_that_is_on_goes_off_by_false_and_by_known_and_stays_by_true() -> None:
     memory = followed(Memory(), seen(), 1000.0)
-    assert [alarm_of(corrected_memory(memory, verdict(word))) for word in ("true", "false", "known")] == [True, False, False]
+    assert [alarm_of(spoken(memory, verdict(word))) for word in ("true", "false", "known")] == [True, False, False]
 
 
 def test_a_person_ends_an_alarm_that_stands() -> None:
-    memory = corrected_memory(alarmed(), verdict("true"))
-    ended = corrected_memory(memory, verdict("true", at_s=2100.0, ends=True))
+    memory = spoken(alarmed(), verdict("true"))
+    ended = spoken(memory, verdict("true", at_s=2100.0, ends=True))
     assert (alarm_of(memory), alarm_of(ended)) == (True, False)
-    late = corrected_memory(memory, verdict("true", at_s=1900.0, ends=True))
+    late = spoken(memory, verdict("true", at_s=1900.0, ends=True))
     assert alarm_of(late)
 
 
@@ -98,25 +105,25 @@ def test_the_order_in_which_verdicts_come_does_not_matter(words: list[tuple[str,
     for order in itertools.permutations(said):
         memory = alarmed()
         for one in order:
-            memory = corrected_memory(memory, one)
+            memory = spoken(memory, one)
         ends.add(memory._replace(outcomes=()))
     assert len(ends) == 1
 
 
 @given(word=WORDS, key=st.sampled_from(["", "k1"]))
 def test_the_same_verdict_again_changes_nothing(word: str, key: str) -> None:
-    once = corrected_memory(alarmed(), verdict(word, id=key))
-    assert corrected_memory(once, verdict(word, id=key)) is once
+    once = spoken(alarmed(), verdict(word, id=key))
+    assert spoken(once, verdict(word, id=key)) is once
 
 
 def test_a_later_verdict_takes_back_the_limit_that_an_earlier_one_raised() -> None:
-    memory = corrected_memory(corrected_memory(alarmed(), verdict("false")), verdict("true", at_s=2001.0))
-    assert (memory.tolerated, memory.learn) == ((), ())
+    memory = spoken(spoken(alarmed(), verdict("false")), verdict("true", at_s=2001.0))
+    assert memory.tolerated == ()
     assert alarm_of(memory)
 
 
 def test_a_verdict_on_no_alarm_is_answered_and_changes_nothing() -> None:
-    memory = corrected_memory(alarmed(), verdict("false", alarm_at_s=999_999.0, id="k"))
+    memory = spoken(alarmed(), verdict("false", alarm_at_s=999_999.0, id="k"))
     assert memory._replace(outcomes=()) == alarmed()
     assert (memory.outcomes[0].id, memory.outcomes[0].is_done) == ("k", False)
     assert "the last ones: 1000.000" in memory.outcomes[0].text
@@ -127,6 +134,8 @@ BAD = {
     "no JSON": ("{", "the message"),
     "another word": (GOOD.replace('"true"', '"maybe"'), "verdict"),
     "nobody": (GOOD.replace('"ada"', '""'), "by"),
+    "a name of two lines": (GOOD.replace('"ada"', '"a\\nb"'), "by"),
+    "no time": (GOOD.replace('"alarm_at_s":1000.0,', ""), "alarm_at_s"),
     "a time that is none": (GOOD.replace("1000.0", "NaN"), "alarm_at_s"),
     "a field too many": (GOOD.replace('"by"', '"colour":1,"by"'), "colour"),
     "a later version": (GOOD.replace('"version":1', '"version":2'), "version"),

@@ -1,0 +1,130 @@
+"""Verdicts through the interface: what is shown, what goes over the broker, what is refused; the memory behind it is the real one."""
+
+import json
+from typing import Any
+
+import pytest
+
+from cnctwin.api.door.audit import AuditLog
+from cnctwin.api.live.plant import LivePlant
+from cnctwin.api.routes import anomaly as anomaly_routes
+from sparkplug.metric import NodeId
+from tests.cnctwin.api.small_plant import birth, client_of, data, now, small_plant
+from tests.twin.anomaly.parts.alarms import alarmed
+from twin.anomaly.parts.episodes import Memory
+from twin.anomaly.parts.feedback import told_of
+from twin.anomaly.parts.verdict import corrected_memory, verdict_of
+
+NODE = NodeId("cnc", "twin-joint_anomaly")
+WHY = {"signal": "spindle_load_pct", "scale": "cut", "measured": 44.0, "expected": 37.0, "by": "12 parts"}
+
+
+class Ear:
+    """A viewer, and behind it a processor that answers at once, as `joint_anomaly` does."""
+
+    online, alive, trouble = True, True, ""
+
+    def __init__(self, live: LivePlant, memory: Memory) -> None:
+        self.memory, self.live = memory, live
+        self.sent: list[tuple[str, str, bool]] = []
+
+    def publish(self, topic: str, payload: bytes, *, retain: bool = False) -> bool:
+        """Take a verdict, and tell the memory after it."""
+        self.sent.append((topic, payload.decode(), retain))
+        self.memory = corrected_memory(self.memory, verdict_of(payload.decode()), 2000.0)
+        self.live.take([data({"twin/anomaly_verdicts": told_of(self.memory, 3000.0)}, now(), NODE)], now())
+        return True
+
+
+def plant(memory: Memory) -> tuple[LivePlant, Ear]:
+    """A machine whose score alarms."""
+    live = small_plant()
+    told = {
+        "twin/anomaly_alarm": True,
+        "twin/adjusted_score": 3.0,
+        "twin/anomaly_threshold": 2.0,
+        "twin/anomaly_why": json.dumps(WHY),
+        "twin/anomaly_knows": "12 parts",
+        "twin/anomaly_verdicts": told_of(memory, 2000.0),
+    }
+    live.take([birth(told, now(), NODE)], now())
+    return live, Ear(live, memory)
+
+
+def test_the_score_is_shown_with_its_reason() -> None:
+    live, ear = plant(alarmed())
+    with client_of(live, viewer=ear) as client:
+        told = client.get("/anomaly/vmc").json()
+    assert (told["is_alarm"], told["score"], told["threshold"], told["knows"]) == (True, 3.0, 2.0, "12 parts")
+    assert told["why"] == WHY
+    assert told["verdicts"]["alarms"][0]["alarm_at_s"] == 1000.0
+
+
+def test_without_the_processor_it_says_what_to_do() -> None:
+    with client_of(small_plant()) as client:
+        told = client.get("/anomaly/vmc").json()
+        refused = client.post("/anomaly/vmc/verdict", json={"verdict": "true", "by": "ada"})
+        assert client.get("/anomaly/lathe").status_code == 404
+    assert (told["is_alarm"], told["verdicts"], "cnctwin process joint_anomaly" in told["reason"]) == (None, None, True)
+    assert (refused.status_code, refused.json()["error"]) == (503, told["reason"])
+
+
+@pytest.mark.parametrize("alarm_at_s", [None, 1000.0])
+def test_a_verdict_goes_over_the_broker_is_kept_there_and_noted(alarm_at_s: float | None) -> None:
+    live, ear = plant(alarmed())
+    audit = AuditLog()
+    with client_of(live, viewer=ear, audit=audit) as client:
+        body = {"verdict": "known", "label": "dull tool", "by": "ada", "alarm_at_s": alarm_at_s}
+        answer = client.post("/anomaly/vmc/verdict", json=body)
+    assert answer.status_code == 200
+    said = answer.json()["verdicts"]["alarms"][0]["said"]
+    assert (said["verdict"], said["label"], said["by"]) == ("known", "dull tool", "ada")
+    ((topic, _, is_retained),) = ear.sent
+    assert (topic, is_retained) == ("cnctwin/verdict/vmc", True)
+    (deed,) = audit.newest(5)
+    assert (deed["action"], deed["object"], deed["outcome"]) == ("give verdict", "vmc 1000.000 known", "done")
+
+
+def test_what_the_memory_refuses_is_a_conflict_with_its_reason() -> None:
+    live, ear = plant(alarmed())
+    with client_of(live, viewer=ear) as client:
+        refused = client.post("/anomaly/vmc/verdict", json={"verdict": "true", "by": "ada", "alarm_at_s": 5.0})
+        ended = client.post("/anomaly/vmc/verdict", json={"verdict": "true", "by": "ada", "ends": True})
+    assert (refused.status_code, "the last ones: 1000.000" in refused.json()["error"]) == (409, True)
+    assert (ended.status_code, ended.json()["error"]) == (409, "the alarm does not stand any more")
+
+
+def test_of_a_machine_without_an_alarm_nothing_can_be_said() -> None:
+    live, ear = plant(Memory())
+    with client_of(live, viewer=ear) as client:
+        refused = client.post("/anomaly/vmc/verdict", json={"verdict": "true", "by": "ada"})
+    assert (refused.status_code, "no anomaly alarm" in refused.json()["error"]) == (404, True)
+
+
+def test_nobody_s_answer_is_waited_for_without_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(anomaly_routes, "ANSWER_S_MAX", 0.1)
+    live, ear = plant(alarmed())
+    monkeypatch.setattr(ear, "publish", lambda *_, **__: True)
+    with client_of(live, viewer=ear) as client:
+        answer = client.post("/anomaly/vmc/verdict", json={"verdict": "true", "by": "ada"})
+    assert (answer.status_code, "the broker keeps the verdict" in answer.json()["error"]) == (504, True)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"verdict": "maybe"}, {"by": " "}, {"by": "a\nb"}, {"label": "x" * 61}, {"alarm_at_s": -1.0}, {"verdct": "true"}],
+)
+def test_a_verdict_of_another_form_is_refused(wrong: dict[str, Any]) -> None:
+    live, ear = plant(alarmed())
+    with client_of(live, viewer=ear) as client:
+        assert client.post("/anomaly/vmc/verdict", json={"verdict": "true", "by": "ada", **wrong}).status_code == 400
+    assert ear.sent == []
+
+
+@pytest.mark.parametrize("text", ["{", "[]", "3", '"x"', "[" * 3000])
+def test_a_text_of_another_shape_is_not_shown(text: str) -> None:
+    live, ear = plant(alarmed())
+    live.take([data({"twin/anomaly_verdicts": text, "twin/anomaly_why": text}, now(), NODE)], now())
+    with client_of(live, viewer=ear) as client:
+        told = client.get("/anomaly/vmc").json()
+    assert (told["why"], told["verdicts"]) == (None, None)
