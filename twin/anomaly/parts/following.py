@@ -103,13 +103,12 @@ def _expected_after(
 ) -> tuple[float, float, int]:
     """Return the sums of the cutting load that was measured, at full feed, and of what the twin expects, with their ticks."""
     expected = told.expected
-    if expected is None or plan.load_at < 0 or not expected.cut_load_pct >= EXPECTED_PCT_MIN:
-        return before
-    load = told.values[plan.load_at]
-    if load is None:
+    twin = None if expected is None else expected.cut_load_pct
+    load = told.values[plan.load_at] if plan.load_at >= 0 else None
+    if twin is None or load is None or not twin >= EXPECTED_PCT_MIN:
         return before
     cut = max(0.0, load - idle_of(plan, told.values)) * override ** -model.powers[plan.load_at]
-    return before[0] + cut, before[1] + expected.cut_load_pct, before[2] + 1
+    return before[0] + cut, before[1] + twin, before[2] + 1
 
 
 def _turned(model: PartsModel, own: Own, told: Told, line: int) -> Own:

@@ -130,8 +130,9 @@ class PartsModel(Record):
         return self.power or tuple(quantity.POWERS.get(quantity.kind_of(signal), 0.0) for signal in self.signals)
 
     def tool_level(self, tool: str) -> Level:
-        """Return the level of a tool when training ended; of one that was not seen, none."""
-        return self.tools.get(tool) or Level((0.0,) * len(self.signals), TOOL_VAR)
+        """Return the level of a tool when training ended, which may have been long ago; of one that was not seen, none."""
+        known = self.tools.get(tool)
+        return Level((0.0,) * len(self.signals) if known is None else known.values, TOOL_VAR)
 
 
 LEVELLED = frozenset({Kind.LOAD, Kind.VIBRATION})

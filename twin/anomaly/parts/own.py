@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from twin.anomaly.parts.episodes import Memory
 from twin.anomaly.parts.heat import Heat
-from twin.anomaly.parts.levels import Level
+from twin.anomaly.parts.levels import Level, another_material
 from twin.anomaly.parts.model import PartsModel
 from twin.anomaly.parts.moment import Place
 from twin.anomaly.parts.usual import Rows, Sums, Usual
@@ -81,7 +81,7 @@ class Own(NamedTuple):
 def begun(model: PartsModel) -> Own:
     """Return the state of a machine before anything was told."""
     count, plan = len(model.signals), model.plan
-    material = model.material if model.material.values else Level(plan.flat, model.material.variance)
+    material = another_material(model.material if model.material.values else Level(plan.flat, model.material.variance))
     return Own(
         smooth=plan.blank,
         told_at=(NEVER,) * count,

@@ -152,6 +152,7 @@ ALL = Ablation()
 class Replayed:
     """scores, own_scores: (T, N), NaN = not known, held while idle; is_idle, is_alarm: (T, N)
     whys: (tick, machine's place, why) at each onset of an alarm; records: (machine's place, record) in order
+    owns: the states at the end, from which a later stretch goes on
     """
 
     scores: "NDArray[np.float64]"
@@ -160,6 +161,7 @@ class Replayed:
     is_alarm: "NDArray[np.bool_]"
     whys: tuple[tuple[int, int, Why], ...]
     records: tuple[tuple[int, CutRecord], ...]
+    owns: tuple[Own, ...]
 
 
 def fit(cell: Sequence[Recorded], ablation: Ablation = ALL) -> tuple[PartsModel, ...]:
@@ -242,7 +244,7 @@ def _run(
                 whys.append((tick, place, judgement.why))
             if every and tick % every == 0 and not judgement.is_idle and judgement.signature:
                 seen[place].append((tick, judgement.signature))
-    return Replayed(scores, own_scores, is_idle, is_alarm, tuple(whys), tuple(records)), states, seen
+    return Replayed(scores, own_scores, is_idle, is_alarm, tuple(whys), tuple(records), tuple(states)), states, seen
 
 
 def _ablated(told: Told, ablation: Ablation) -> Told:
