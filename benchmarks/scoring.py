@@ -20,7 +20,7 @@ develop the methods; others are for reporting. Nothing is point-adjusted (benchm
 import argparse
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from typing import NamedTuple
 
@@ -127,10 +127,22 @@ def main() -> None:
         ]
         if given.jobs > 1:
             with ProcessPoolExecutor(given.jobs) as pool:
-                answers = list(pool.map(answer, cells))
+                answers = list(_told(pool.map(answer, cells), cells))
         else:
-            answers = [answer(one) for one in cells]
+            answers = list(_told(map(answer, cells), cells))
         printed(machines, given.seeds, answers, methods, has_parts=given.parts)
+
+
+def _told(answers: Iterable[Answer], cells: Sequence[Asked]) -> Iterator[Answer]:
+    """Tell on the error stream of each cell that is judged: hits of all faults, and false alerts."""
+    for asked, found in zip(cells, answers, strict=True):
+        for method, parts in found.judged.items():
+            hits, every = (
+                sum(figures) for figures in zip(*((one.detections.hits, len(one.faults)) for one in parts), strict=True)
+            )
+            false = sum(one.detections.false for one in parts)
+            print(f"seed {asked.seed}: {method} {hits} of {every}, {false} false, {found.took_s[method]:.0f} s", file=sys.stderr)
+        yield found
 
 
 if __name__ == "__main__":

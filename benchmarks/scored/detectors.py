@@ -1,8 +1,8 @@
 """Detectors and drift detectors of others, on the signals beside what is usual in the operation, in frames of 10 s; gate only.
 
     loda, hbos       of PyOD, trained on the rows of week A (ECOD and COPOD are scored row by row, 10 ms each: days for this table)
-    page             S ← max(0, S + y − 0.5), the larger of both sides, the sum over signals (Page 1954): what river's PageHinkley
-                     is, with a known mean. Gated frames leave S as it is.
+    page             S ← max(0, S + y − 0.5), the larger of both sides, the sum over signals (Page 1954): river's PageHinkley,
+                     with a known mean. Gated frames leave S as it is.
 
 river, with its ADWIN and PageHinkley, is not among the dependencies, so its own code has no line here.
 """

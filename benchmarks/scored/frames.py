@@ -9,7 +9,7 @@ features         smoothed features, what peers share subtracted feature by featu
 random, constant, vibration: what a detector has to beat
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 

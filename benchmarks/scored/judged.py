@@ -1,7 +1,7 @@
 """The outcome for one machine: what was found of its faults and when, which alerts were none, and what happened at the time.
 
-An occasion is no fault: an override turned by hand, a new program, the first part of a batch, a Monday's start, a disturbance that
-all feel. An alert within one is a false alert like any other, and counted by occasion.
+An occasion is no fault: an override turned by hand, a new program, the first part of a batch, a Monday's start, a disturbance
+that all feel. An alert within one is a false alert like any other, and counted by occasion.
 """
 
 from collections.abc import Callable, Sequence
