@@ -183,5 +183,5 @@ def judged(frames: Frames, method: str, alerts_per_week: float = 1.0) -> list[Ju
         on = alarms_of(threshold, own, idle)
         from_s = frames.judge.start * FRAME_S
         has_threshold = threshold is not None
-        results.append(outcome(frames.cell, place, from_s, FRAME_S, own, idle, on, has_threshold=has_threshold))
+        results.append(outcome(frames.cell, place, from_s, FRAME_S, scores=own, idle=idle, on=on, has_threshold=has_threshold))
     return results

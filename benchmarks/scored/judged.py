@@ -76,7 +76,7 @@ def alarms_of(threshold: float | None, scores: Floats, idle: Flags) -> Flags:
 
 
 def outcome(
-    cell: Cell, place: int, from_s: int, tick_s: int, scores: Floats, idle: Flags, on: Flags, *, has_threshold: bool
+    cell: Cell, place: int, from_s: int, tick_s: int, *, scores: Floats, idle: Flags, on: Flags, has_threshold: bool
 ) -> Judged:
     """What came of a machine from `from_s` on: scores, where they do not count, and alarms, (T,), a row each tick_s."""
     faults = [fault for fault in cell.faults if fault.machine == place]

@@ -106,9 +106,9 @@ def judged_parts(
             place,
             starts[2] * TICK_S,
             TICK_S,
-            after.scores[:, place],
-            after.is_idle[:, place],
-            after.is_alarm[:, place],
+            scores=after.scores[:, place],
+            idle=after.is_idle[:, place],
+            on=after.is_alarm[:, place],
             has_threshold=limits[place] is not None,
         )
         for place in range(len(recordings))

@@ -13,12 +13,13 @@
 | tool_too_long | one tool cuts 0.4 mm deeper: the one that cuts least deep, 0.3 to 3 mm | at once | 20 to 40 min |
 | wrong_material | coefficient and edge force × 1.3, from the beginning of a part on | at once | 1 or 2 parts |
 | coolant_off | nothing flows though the control says so: wet cuts × 1.2 in coefficient and edge force | at once | 20 to 40 min |
-| worn_bearing | idle power × 1.3, vibration × 1.5 while it turns; judged apart, as of the scale of weeks | over days | 4 to 6 days |
+| worn_bearing | idle power × 1.3, vibration × 1.5 while it turns; judged apart | over days | 4 to 6 days |
 
 The life of a tool is 40 parts. It doubles the force of the edge and raises the coefficient by 5 %; a dulling tool goes on to four
 lives.
 Size s: factors to the power s (a feed of 1 / (1 + s)); temperatures, lengths and the rate of wear times s; coolant that flows
-1 − min(s, 1). Judged at the sizes 0.5, 1 and 2; the headline is 1.
+1 − min(s, 1). Judged at the sizes 0.5, 1 and 2; the headline is 1. A worn bearing is judged by itself,
+on the scale of weeks.
 """
 
 from dataclasses import dataclass

@@ -203,7 +203,7 @@ def _part(
             stretches.hands_s.append((begins_s, begins_s + lasts_s))
         wear = shop.worn[operations[place].tool] / LIFE_PARTS
         span = slice(shop.first_line[place], shop.first_line[place + 1])
-        stretches.many(_cut(stretches, shop, lines, span, place, (override, material, wear, chatter)))
+        stretches.many(_cut(stretches, shop, lines, span, place, drawn=(override, material, wear, chatter)))
     for tool in {operations[place].tool for place in range(first, first + len(machine.programs[program].operations))}:
         shop.worn[tool] = (shop.worn[tool] + 1) % LIFE_PARTS
     stretches.parts.append(Part(program, shop.made[program], started_s, stretches.now_s, is_first))
@@ -211,7 +211,7 @@ def _part(
 
 
 def _cut(
-    stretches: _Stretches, shop: _Shop, lines: Rows, span: slice, place: int, drawn: tuple[float, float, float, float]
+    stretches: _Stretches, shop: _Shop, lines: Rows, span: slice, place: int, *, drawn: tuple[float, float, float, float]
 ) -> Floats:
     """The lines of an operation as stretches: (8, n)."""
     override, material, wear, chatter = drawn

@@ -83,7 +83,8 @@ def test_the_twin_reads_in_a_program_what_the_cell_cuts(cell: Cell) -> None:
                 if run is None or line.cut < 0:
                     continue
                 cut = operation.cuts[line.cut]
-                assert (run.tool, run.length_mm) == (operation.tool, pytest.approx(line.length_mm, abs=0.01))
+                assert run.tool == operation.tool
+                assert run.length_mm == pytest.approx(line.length_mm, abs=0.01)
                 removed = cut.depth_mm * cut.width_mm * line.feed_mm_min
                 force_n = tool.tangential_n_per_mm2 * removed / (np.pi * tool.diameter_mm * operation.rpm)
                 most = max(stretch.forces_n[-1] / (3.0 if len(stretch.forces_n) > 1 else 1.0) for stretch in run.stretches)
