@@ -2,9 +2,9 @@
 
     z = (x − centre(section) − level) · weight(section) · calm
 
-x is the quantity of a signal (`quantity.py`), centre and weight are those of the same section in earlier parts (`usual.py`), or the
-twin's expectation where no earlier part has the section; level follows wear and material (`levels.py`). A tick tells nothing while
-gated, while the spindle stands or changes its speed, or while the feed is held.
+x is the quantity of a signal (`quantity.py`), centre and weight are those of the same section in earlier parts (`usual.py`), or
+the twin's expectation where no earlier part has the section; level follows wear and material (`levels.py`). A tick tells
+nothing while gated, while the spindle stands or changes its speed, or while the feed is held.
 """
 
 from twin.anomaly.parts import heat, scales
@@ -32,8 +32,8 @@ BATCH_S = 240.0
 """After so long a standstill the material may be another one."""
 OVERRIDE_MIN = 0.01
 FEED_MIN = 1.0
-SETTLED = 0.03
-SETTLED_RPM = 20.0
+SETTLED = 0.006
+SETTLED_RPM = 5.0
 EXPECTED_PCT_MIN = 0.5
 ROWS_MAX = 30
 REST = Own._fields.index("expected") + 1
@@ -87,15 +87,15 @@ def _cut(model: PartsModel, own: Own, told: Told, place: Place, here: Mark, over
         sections, rows = with_rows(sections, before, rows), ()
     rpm = told.values[plan.speed_at] if plan.speed_at >= 0 else None
     settled = rpm is None or -SETTLED * rpm - SETTLED_RPM <= rpm - own.rpm <= SETTLED * rpm + SETTLED_RPM
-    z, d, is_told = residuals(model, own, told, override, settled, None if is_new else usual, place.section)
+    z, tells, d = residuals(model, own, told, override, settled, None if is_new else usual, place.section)
     expected = own.expected if told.expected is None else _expected_after(plan, own.expected, told, override, model)
-    if False in is_told:
-        told_at = tuple([told.tick if t else last for t, last in zip(is_told, own.told_at, strict=True)])
+    if 0.0 in tells:
+        told_at = tuple([told.tick if t else last for t, last in zip(tells, own.told_at, strict=True)])
     else:
-        told_at = (told.tick,) * len(is_told)
-    smooth = scales.smoothed(own.smooth, z, is_told, plan.shares)
+        told_at = (told.tick,) * len(tells)
+    smooth = scales.smoothed(own.smooth, z, tells, plan.shares)
     rest = own[REST:]
-    return Own(told.tick, place, rpm or 0.0, smooth, told_at, True not in is_told, is_new, (*rows, d), sections, expected, *rest)
+    return Own(told.tick, place, rpm or 0.0, smooth, told_at, not any(tells), is_new, (*rows, d), sections, expected, *rest)
 
 
 def _expected_after(
@@ -162,5 +162,5 @@ def with_levels(model: PartsModel, own: Own) -> Own:
     variance = own.material.variance + tool.variance
     kinds = model.plan.kinds
     rows = zip(kinds, own.material.values, tool.values, model.plan.prior, strict=True)
-    both = [(m + l, (1.0 + variance / v) ** -0.5) if k in LEVELLED else (0.0, 1.0) for k, m, l, v in rows]
+    both = [(m + t, (1.0 + variance / v) ** -0.5) if k in LEVELLED else (0.0, 1.0) for k, m, t, v in rows]
     return own._replace(level=tuple([one[0] for one in both]), calm=tuple([one[1] for one in both]))

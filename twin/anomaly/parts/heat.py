@@ -1,7 +1,7 @@
 """The temperature that speed and load explain, and the slow drift that weather explains.
 
     h_i ← h_i + (10 s / τ_i) · (driver_i − h_i)          drivers: speed, load; τ: 10 min, 40 min, 2 h
-    x = value − Σ b_i h_i − base                         base ← base + (10 s / 3 h) · x, unless suspicious
+    x = value − Σ b_i h_i − base                         base ← base + (10 s / 3 h) · x, a fourth of it while suspicious
 
 The coefficients come from training, by least squares on values from which the same slow drift was taken. A machine that is
 already warm when it is first seen has stored heat that nobody knows: for `SETTLE_S` its temperature tells nothing, and the base
@@ -22,6 +22,7 @@ DRIVERS = (SPEED, LOAD)
 BASE_S = 10_800.0
 SETTLE_S = 7200.0
 RIDGE = 1e-3
+HELD = 0.25
 EVERY_S = 10.0
 """Heat is slow: it is followed so often."""
 STEPS = round(SETTLE_S / EVERY_S)
@@ -78,7 +79,7 @@ def warmed(
 ) -> Heat:
     """Return the heat after a tick; places: of speed and load, −1 = none; shares: of a tick in each time constant and the base.
 
-    A base follows its temperature slowly, and not at all while the score is suspicious.
+    A base follows its temperature slowly, and a fourth as fast while the score is suspicious.
     """
     speed, load = (values[at] if at >= 0 else None for at in places)
     driven = driven_after(before.driven, ((speed or 0.0) * SCALES[SPEED], (load or 0.0) * SCALES[LOAD]), shares[0])
@@ -91,7 +92,7 @@ def warmed(
         elif known is None:
             base.append(value - explained(own, driven))
         else:
-            base.append(known if is_held else known + share * (value - explained(own, driven) - known))
+            base.append(known + (HELD * share if is_held else share) * (value - explained(own, driven) - known))
     return Heat(driven, tuple(base), min(before.steps + 1, STEPS))
 
 

@@ -3,8 +3,8 @@
     u = left / tail(signal, scale, side)           left: what the peers do not share (`beside.py`)
     score = largest over the scales of  (Σ over signals of u⁴)^(1/4)
 
-The fourth power lets one signal speak for itself, and several that rise together a little earlier. The score is held while nothing
-is told: in a gate, and while the spindle stands.
+The fourth power lets one signal speak for itself, and several that rise together a little earlier. The score is held while
+nothing is told: in a gate, and while the spindle stands.
 """
 
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ from twin.anomaly.parts.verdict import limits_of
 from twin.anomaly.parts.why import Why
 
 SMALL = 0.5
-"""A residual below this share of its tail is taken as it is, without the peers: it moves no score that matters. Where none is larger, the largest is the score."""
+"""A residual below this share of its tail is taken as it is, without the peers; where none is larger, it is the score."""
 WHY_FROM = 1.0
 NOTHING_TOLD = "nothing was told yet of a cut that is known"
 

@@ -1,16 +1,17 @@
 """What a part that has ended without an alarm teaches; a part that alarmed teaches nothing.
 
-At the end of an operation its levels of wear and material are followed, unless its score was suspicious for long. At the end of the
-part the sections of all its operations are learned. An alarm takes back the levels to those at the beginning of its part.
+At the end of an operation its levels of wear and material are followed, unless its score was suspicious for long. At the end of
+the part the sections of all its operations are learned. An alarm takes back the levels to those at the beginning of its part.
 """
 
 from twin.anomaly.parts.following import with_levels
 from twin.anomaly.parts.judging import Judged
 from twin.anomaly.parts.levels import followed
-from twin.anomaly.parts.model import LEVELLED, OPERATIONS_MAX, PartsModel
+from twin.anomaly.parts.model import LEVELLED, OPERATIONS_MAX, PartsModel, Plan
 from twin.anomaly.parts.moment import SECTIONS_MAX, is_beyond
 from twin.anomaly.parts.own import NEVER, Ended, Own, Tool, tool_of, usual_of
 from twin.anomaly.parts.record import CutRecord, recorded
+from twin.anomaly.parts.residuals import cut_share
 from twin.anomaly.parts.sectioning import starts_of
 from twin.anomaly.parts.usual import Sums, Usual, begun_usual, extended, froze, learned_section
 
@@ -19,6 +20,7 @@ HELD_SHARE_MAX = 0.3
 SKIPPED_MAX = 5
 OPERATIONS_OF_PART_MAX = 40
 TICKS_MIN = 3
+CUT_SHARE_MIN = 0.3
 
 
 def learned(model: PartsModel, own: Own, judged: Judged, is_alarm: bool) -> tuple[Own, CutRecord | None]:
@@ -77,7 +79,7 @@ def _levels_followed(model: PartsModel, own: Own, ended: Ended, usual: Usual | N
     """Return the state with the levels after an operation that earlier parts know."""
     if usual is None:
         return own
-    residual = [_mean(ended, usual, at) if kind in LEVELLED else None for at, kind in enumerate(model.plan.kinds)]
+    residual = [_mean(model.plan, ended, usual, at) if kind in LEVELLED else None for at, kind in enumerate(model.plan.kinds)]
     if all(value is None for value in residual):
         return own
     tool = tool_of(model, own, ended.place.tool)
@@ -88,15 +90,17 @@ def _levels_followed(model: PartsModel, own: Own, ended: Ended, usual: Usual | N
     return with_levels(model, own._replace(material=material, tools={**own.tools, name: Tool(level, tool.slow)}))
 
 
-def _mean(ended: Ended, usual: Usual, at: int) -> float | None:
-    """Return the mean residual of a signal over the sections that earlier parts know, weighted by what repeats."""
+def _mean(plan: Plan, ended: Ended, usual: Usual, at: int) -> float | None:
+    """Return the change of the cut that a signal shows, by least squares over the sections that earlier parts know."""
     total = weights = ticks = 0.0
     for section, sums in ended.sections:
         if 0 <= section < len(usual.marks) and usual.told[section][at] and sums.count[at]:
-            share = usual.weight[section][at] ** 2
-            total += share * sums.total[at]
-            weights += share * sums.count[at]
-            ticks += sums.count[at]
+            cuts = cut_share(plan, usual.centre[section])
+            if cuts >= CUT_SHARE_MIN:
+                share = cuts * usual.weight[section][at] ** 2
+                total += share * sums.total[at]
+                weights += share * cuts * sums.count[at]
+                ticks += sums.count[at]
     return total / weights if ticks >= TICKS_MIN and weights > 0.0 else None
 
 
@@ -122,7 +126,11 @@ def _sections_learned(model: PartsModel, own: Own, ended: Ended) -> Own:
         )
         if plan.load_at >= 0 and before[plan.load_at] < told[section][plan.load_at]:
             at = plan.load_at
-            now = usual.centre[section][at] + sums.total[at] / sums.count[at] + ended.level[at]
+            now = (
+                usual.centre[section][at]
+                + sums.total[at] / sums.count[at]
+                + ended.level[at] * cut_share(plan, usual.centre[section])
+            )
             frozen[section] = froze(frozen[section], before[at], now)
     parts = min(usual.parts + 1, 10**6) if place.is_whole else usual.parts
     duration = usual.duration_ticks

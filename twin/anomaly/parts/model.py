@@ -19,6 +19,8 @@ from twin.anomaly.parts.usual import Usual
 OPERATIONS_MAX = 500
 SIGNALS_MAX = 16
 RPM_STEP = 500.0
+QUICK = ("seconds", "tool")
+"""The scales that say nothing of a temperature."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,9 +68,9 @@ class PartsModel(Record):
     twin_spread: tuple[NotNegative, ...] = ()
     up: tuple[Positive, ...] = ()
     down: tuple[Positive, ...] = ()
-    usual: Annotated[dict[str, Usual], Field(max_length=OPERATIONS_MAX)] = {}
+    usual: Annotated[dict[str, Usual], Field(max_length=OPERATIONS_MAX)] = Field(default={})
     material: Level = Level((), BATCH_VAR)
-    tools: Annotated[dict[str, Level], Field(max_length=OPERATIONS_MAX)] = {}
+    tools: Annotated[dict[str, Level], Field(max_length=OPERATIONS_MAX)] = Field(default={})
     follows_parts: bool = True
 
     def idle_at(self, rpm: float) -> float:
@@ -99,6 +101,7 @@ class PartsModel(Record):
         def at(name: str) -> int:
             return self.signals.index(name) if name in self.signals else -1
 
+        counts = [0.0 if kind is Kind.TEMPERATURE and scale in QUICK else 1.0 for kind in kinds for scale in scales.SCALES]
         every = max(1, round(EVERY_S / self.tick_s))
         steps = range(int(quantity.RPM_MAX / RPM_STEP) + 1)
         return Plan(
@@ -118,8 +121,8 @@ class PartsModel(Record):
             prior=tuple(value * value for value in spread),
             over_spread=tuple(1.0 / value for value in spread),
             over_twin=tuple(1.0 / value if value else 0.0 for value in self.twin_spread or (0.0,) * count),
-            over_up=tuple(1.0 / value for value in up),
-            over_down=tuple(1.0 / value for value in down),
+            over_up=tuple(share / value for share, value in zip(counts, up, strict=True)),
+            over_down=tuple(share / value for share, value in zip(counts, down, strict=True)),
             blank=(0.0,) * (count * scales.COUNT),
             flat=(0.0,) * count,
         )

@@ -2,9 +2,10 @@
 
     moved ← moved + feed · tick          along the line; from the beginning of the operation where the control tells no line
 
-Distance is the integral of the feed that was run, so overrides and holds do not shift a section. A part begins where the program
-changes or goes back to its beginning; where no line is told, where the first tool comes back, or a single one after a standstill.
-The first part notes a mark each second; sections are made of them when it has ended (`sectioning.py`), and looked up from then on.
+Distance is the integral of the feed that was run, so overrides and holds do not shift a section. A part begins where the
+program changes or goes back to its beginning; where no line is told, where the first tool comes back, or a single one after a
+standstill. The first part notes a mark each second; sections are made of them when it has ended (`sectioning.py`), and looked
+up from then on.
 """
 
 from bisect import bisect_right

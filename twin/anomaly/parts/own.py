@@ -42,8 +42,10 @@ class Own(NamedTuple):
     smooth: residuals in spreads, by signal, each on all scales; told_at: tick at which each signal was last told of
     is_idle: this tick told nothing; is_new: no earlier part has the section, so the twin is all there is
     level: of wear and material in the operation that runs, by signal; calm: what its uncertainty leaves of a residual, by signal
-    material, tools: the levels; kept: those at the beginning of the part; skipped: parts in a row that were too suspicious to learn
-    rows: residuals of the section that runs; sections: sums of those of the operation so far; expected, cut: sums of cutting load, %
+    material, tools: the levels; kept: those at the beginning of the part; skipped: parts in a row
+        that were too suspicious to learn
+    rows: residuals of the section that runs; sections: sums of those of the operation so far; expected: sums of the cutting
+        load, % at full feed, and of what the twin expects, and their ticks
     usual: the operations learned since training; waiting: those of the part that runs, until it has ended without an alarm
     ended: an operation that has ended at this tick
     is_held: the score is suspicious, nothing is followed; high_since: tick since when; held_ticks, alarm_ticks: of the operation

@@ -11,6 +11,7 @@ from twin.anomaly.parts.episodes import nearest
 from twin.anomaly.parts.model import PartsModel
 from twin.anomaly.parts.own import Own, usual_of
 from twin.anomaly.parts.quantity import UNITS, Kind, kind_of
+from twin.anomaly.parts.residuals import cut_share
 from twin.anomaly.parts.signature import shares_of, signature_of
 from twin.anomaly.parts.why import Like, Why
 
@@ -35,11 +36,10 @@ def why_of(model: PartsModel, own: Own, peers: Sequence[Own], left: Sequence[flo
         lines = (here, max(here, after)) if here >= 0 else None
     elif place.line >= 0:
         lines = (place.line, place.line)
-    centre, weight = 0.0, plan.over_spread[at]
+    centre = 0.0
     if usual is not None and is_known and kind is not Kind.TEMPERATURE:
-        centre = usual.centre[section][at] + own.level[at]
-        weight = usual.weight[section][at] or weight
-    away = s / (weight * own.calm[at])
+        centre = usual.centre[section][at] + own.level[at] * cut_share(plan, usual.centre[section])
+    away = s / plan.over_spread[at]
     expected, measured = _in_units(model, own, at, centre, away)
     shows = [
         str(n) for n, peer in enumerate(peers) if peer.smooth[index] * s > 0.0 and abs(peer.smooth[index]) > PEER_SHOWS * abs(s)

@@ -1,5 +1,7 @@
 """Residuals of a tick: the quantity of each signal less what is usual in the section, in spreads.
 
+    z = (x − centre − level · cut share) / spread          r = min(1, usual spread of the signal / spread) · cut share of a load
+
 Where no earlier part has the section, the twin's expectation takes its place, with what training found it to be off by.
 """
 
@@ -19,6 +21,8 @@ _LOAD, _VIBRATION, _FEED, _SPEED, _TEMPERATURE = (int(k) for k in list(Kind)[:5]
 _RPM_STEP = 1.0 / RPM_STEP
 TWIN_CLIP = 2.5
 """A line of a program has air in it that the twin, line by line, does not tell from the cut."""
+TELLS_MIN = 0.15
+"""A section whose spread is so many times larger than usual tells nothing of a signal."""
 
 
 def idle_of(plan: Plan, values: Sequence[float | None]) -> float:
@@ -36,52 +40,67 @@ def residuals(
     settled: bool,
     usual: Usual | None,
     section: int,
-) -> tuple[list[float], tuple[float | None, ...], list[bool]]:
-    """Return z, the residuals that are learned from (never beside the twin), and which signals this tick tells of.
+) -> tuple[list[float], list[float], tuple[float | None, ...]]:
+    """Return r · z and r² of each signal, and the residuals that are learned from, which are never those beside the twin.
 
     usual: the usual course of the operation, None where no earlier part has this section
     """
-    plan = model.plan
+    plan, heat = model.plan, own.heat
     learned = plan.flat if usual is None else usual.centre[section]
     if usual is not None and model.follows_parts:
         centre: Sequence[float | None] = learned
         weight, clip = usual.weight[section], scales.CLIP
     else:
         centre, weight, clip = beside_twin(plan, model, told.expected), plan.over_twin, TWIN_CLIP
+    cuts = cut_share(plan, centre)
     z: list[float] = []
+    tells: list[float] = []
     d: list[float | None] = []
-    is_told: list[bool] = []
     log_override = 0.0 if override == 1.0 else log(override)
     rows = zip(plan.kinds, told.values, plan.floors, plan.powers, centre, learned, weight, own.level, own.calm, strict=True)
     for at, (kind, value, floor, power, middle, usually, w, level, calm) in enumerate(rows):
-        if value is None or (not settled and kind != _FEED and kind < _TEMPERATURE):
-            z.append(0.0)
-            d.append(None)
-            is_told.append(False)
-            continue
-        if kind == _TEMPERATURE:
-            base = own.heat.base[at]
-            y = 0.0 if base is None else (value - explained(model.heat[at], own.heat.driven) - base) * plan.over_spread[at]
-            d.append(None)
-            is_told.append(base is not None and own.heat.is_settled)
+        y, r, x = 0.0, 0.0, value
+        if value is None or (kind < _TEMPERATURE and kind != _FEED and not settled):
+            x = None
+        elif kind == _TEMPERATURE:
+            base = heat.base[at]
+            if base is not None and heat.is_settled:
+                y, r = (value - explained(model.heat[at], heat.driven) - base) * plan.over_spread[at], 1.0
+            x = None
         else:
-            if kind == _LOAD:
-                cut = value - idle_of(plan, told.values) if at == plan.load_at else value
-                x = log((cut if cut > 0.0 else 0.0) * (exp(-power * log_override) if log_override else 1.0) + floor)
-            elif kind == _FEED:
-                x = log(value / override + floor)
-            elif kind == _VIBRATION:
-                x = log(value + floor) - power * log_override
-            elif kind == _SPEED:
-                x = log(value / _share(told.spindle_override_pct) + floor)
-            else:
-                x = value
-            x -= level
-            d.append(x - usually)
-            is_told.append(middle is not None and w > 0.0)
-            y = 0.0 if middle is None else (x - middle) * w * calm
-        z.append(clip if y > clip else -clip if y < -clip else y)
-    return z, tuple(d), is_told
+            x = _quantity(plan, at, kind, value, told, (override, log_override, floor, power)) - level * cuts
+            if middle is not None and w > 0.0:
+                y, r = (x - middle) * w * calm, w * calm / plan.over_spread[at]
+                r = r * cuts if kind == _LOAD else r
+                r = 1.0 if r > 1.0 else 0.0 if r < TELLS_MIN else r
+        d.append(None if x is None else x - usually)
+        z.append(r * (clip if y > clip else -clip if y < -clip else y))
+        tells.append(r * r)
+    return z, tells, tuple(d)
+
+
+def cut_share(plan: Plan, centre: Sequence[float | None]) -> float:
+    """Return how far a change of the cut moves the ln ratio of the load in a section: 1 in a heavy cut, 0 in air."""
+    usual = centre[plan.load_at] if plan.load_at >= 0 else None
+    if usual is None:
+        return 1.0
+    share = 1.0 - plan.floors[plan.load_at] * exp(-usual)
+    return share if share > 0.0 else 0.0
+
+
+def _quantity(plan: Plan, at: int, kind: int, value: float, told: Told, scale: tuple[float, float, float, float]) -> float:
+    """Return the quantity of a signal that is not a temperature; scale: override, its logarithm, floor and power."""
+    override, log_override, floor, power = scale
+    if kind == _LOAD:
+        cut = value - idle_of(plan, told.values) if at == plan.load_at else value
+        return log((cut if cut > 0.0 else 0.0) * (exp(-power * log_override) if log_override else 1.0) + floor)
+    if kind == _FEED:
+        return log(value / override + floor)
+    if kind == _VIBRATION:
+        return log(value + floor) - power * log_override
+    if kind == _SPEED:
+        return log(value / _share(told.spindle_override_pct) + floor)
+    return value
 
 
 def _share(pct: float | None) -> float:

@@ -1,7 +1,7 @@
 """An operation is cut into sections by its first part: stretches in which load and feed are steady, and the edges between them.
 
-    edge:    the ticks on either side of a jump of a ln ratio by more than 0.25; parts are sampled at other moments, so an edge may
-             fall a tick earlier or later in the next
+    edge:    the ticks on either side of a jump of a ln ratio by more than 0.25; parts are sampled at other moments, so an edge
+             may fall a tick earlier or later in the next
     steady:  the ticks between two edges, up to ten seconds, whose ln ratios stay within 0.15 of their mean
 
 An edge has a large spread, so what happens in it says little; a steady stretch has a small one. Where there would be more than 64
@@ -58,7 +58,7 @@ def _differ(one: Sequence[float | None] | None, other: Sequence[float | None] | 
     if one is None or other is None:
         return False
     pairs = zip(one, other, strict=True)
-    return any([a is not None and b is not None and abs(a - b) > limit for a, b in pairs])
+    return any(a is not None and b is not None and abs(a - b) > limit for a, b in pairs)
 
 
 def _joined(starts: list[int], rows: Sequence[list[float | None] | None]) -> list[int]:

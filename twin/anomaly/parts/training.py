@@ -38,7 +38,7 @@ def prepared(one: "Recorded") -> PartsModel:
         raise ValueError(
             f"{one.machine}: neither spindle nor feed works in {len(one.values)} ticks: there is nothing to learn from"
         )
-    settled = works & (np.isnan(rpm) | (np.abs(np.diff(rpm, prepend=rpm[:1])) <= 0.03 * rpm + 20.0))
+    settled = works & (np.isnan(rpm) | (np.abs(np.diff(rpm, prepend=rpm[:1])) <= 0.006 * rpm + 5.0))
     idle = _idle(rpm, load, settled)
     first = PartsModel(signals=one.signals, tick_s=one.tick_s, idle=idle)
     x = _quantities(first, one, settled)

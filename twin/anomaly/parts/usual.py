@@ -1,10 +1,10 @@
 """The usual course of an operation: for each section and signal a centre and a variance, from as few parts as possible.
 
     centre ← centre + (mean of the part − centre) / (min(n, memory) + 1)
-    variance = (n₀ · prior + n · own) / (n₀ + n) · (1 + 1 / n)                 prior: of the signal over all operations, n₀ = 3 parts
+    variance = (n₀ · prior + n · own) / (n₀ + n) · (1 + 1 / n)          prior: of the signal in steady sections, n₀ = 3 parts
 
-Centres are of ln ratios less the levels of wear and material (`levels.py`). In the first part the centre is the twin's expectation,
-which training found to be off by so much, and the variance has the twin's own error in it: limits are wide then.
+Centres are of ln ratios less the levels of wear and material (`levels.py`). While no part has come to a
+section, the twin's expectation stands in for it (`residuals.py`).
 """
 
 import math
