@@ -32,6 +32,7 @@ from benchmarks.scored.parts import ABLATIONS, judged_parts, recorded
 from benchmarks.scored.shown import sizes_shown
 from benchmarks.scored.table import details, row
 from benchmarks.simulated_cell.cell import draw_cell
+from benchmarks.simulated_cell.fault import SIZES
 
 METHODS = (*ABLATIONS, *by_frames.METHODS)
 FAST = ("1", "2,2,2")
@@ -93,9 +94,10 @@ def printed(machines: int, seeds: str, answers: Sequence[Answer], methods: Seque
 
 
 def print_sizes(seed: int) -> None:
-    """Print how big size 1 is beside what healthy parts do."""
-    shown = ", ".join(f"{kind} {size:.1f}" for kind, size in sizes_shown(seed).items())
-    print(f"size 1 in spreads of a pass from part to part, seed {seed}: {shown}")
+    """Print how big the sizes are beside what healthy parts do."""
+    for size in SIZES:
+        shown = ", ".join(f"{kind} {one.shown:.1f} ({one.sudden:.1f})" for kind, one in sizes_shown(seed, size).items())
+        print(f"size {size:g} in spreads of a pass from part to part (from the part before), seed {seed}: {shown}")
 
 
 def main() -> None:
@@ -109,7 +111,7 @@ def main() -> None:
     asked.add_argument("--parts", action="store_true", help="also by kind of fault, and by occasion")
     asked.add_argument("--jobs", type=int, default=1)
     asked.add_argument("--fast", action="store_true", help="seed 1, four machines, two days each")
-    asked.add_argument("--sizes", action="store_true", help="print only how big size 1 is")
+    asked.add_argument("--sizes", action="store_true", help="print only how big the sizes are")
     given = asked.parse_args()
     if given.fast:
         given.seeds, given.days = FAST
