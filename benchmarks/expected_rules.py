@@ -4,7 +4,7 @@
 
 The cell is cut by the reference machine, which shares no code with the twin; the twin is given the statement of each machine, a
 few percent off, without its edge forces, losses and cold grease. A control tells once a second. The programs of a machine are
-worked out by `expectation_of`; the processors `expected` and `rules` then see what the control tells. An alarm of `tool_broken` is
+worked out by `expectation_of`; the processors `expected` and `rules` see what the control tells. An alarm of `tool_broken` is
 true while a broken tool is in the spindle; one of `load_over_expected` is true within any fault that raises the load beside the
 feed (RAISES_LOAD). What alarms otherwise is false. Delays are from the first second in which the broken tool should cut.
 """

@@ -72,7 +72,12 @@ class Described:
         found: Expectation | None = of_machine.get(program)
         if found is None:
             return f"no expectation for program {program}: cnctwin expect makes one"
-        return stale(found, description=self.version) or found
+        return found
+
+    def basis(self, expectation: Expectation) -> str:
+        """Return in words what an expectation rests on, first of all whether the description has changed since."""
+        changed = stale(expectation, description=self.version)
+        return "; ".join((*([] if changed is None else [changed]), *expectation.basis))
 
 
 def described(configuration: Configuration[Config], description: Description | None) -> Described:
@@ -123,7 +128,7 @@ def step(given: Described, state: State, sample: Sample) -> tuple[State, Sequenc
     run_feed = planned_mm_min if feed is None else feed
     expected = expectation.at(line, run_feed, rpm, tool=tool, along_mm=along_mm) or planned
     ratio_cut_pct_min = given.configuration.of(sample.machine).ratio_cut_pct_min
-    now = _Now(expectation, expected, place, window, run_feed, rpm, sample)
+    now = _Now(expectation, expected, place, window, run_feed, rpm, sample, given.basis(expectation))
     return _compared(ratio_cut_pct_min, state, now)
 
 
@@ -138,6 +143,7 @@ class _Now:
     feed: float | None
     rpm: float | None
     sample: Sample
+    basis: str
 
     def bounds(self, before_mm_min: float | None) -> tuple[float, float] | None:
         """Return the least and greatest cut between the places where the machine may be, at the lesser and the greater feed."""
@@ -160,7 +166,7 @@ def _compared(ratio_cut_pct_min: float, state: State, now: _Now) -> tuple[State,
     outputs = [
         Output(twin_signals.EXPECTED_FEED_MM_MIN, round(expected.feed_mm_min * _override(sample), 1)),
         Output(twin_signals.EXPECTED_LINE_S, round(expected.time_s, DIGITS)),
-        Output(twin_signals.EXPECTED_BASIS, "; ".join(now.expectation.basis)),
+        Output(twin_signals.EXPECTED_BASIS, now.basis),
     ]
     is_on = now.place.along_mm > 0.0 and at_s - state.place.at_s <= WITHIN_S
     bounds = now.bounds(state.place.feed_mm_min if is_on else None)

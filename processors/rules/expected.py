@@ -50,7 +50,9 @@ def tool_broken(limits: ExpectedLimits, moves: Motion, sample: Sample) -> Judgem
     least_pct, no_least = sample.number(LEAST)
     if cut_pct is None or least_pct is None or moves.rpm is None:
         return unknown(no_cut or no_least or moves.why_not)
-    feed, _ = sample.number(FEED)
+    feed, no_feed = sample.number(FEED)
+    if feed is None and FEED in sample.row:
+        return unknown(no_feed or "")
     if moves.is_ramping or not moves.is_turning or least_pct < limits.tool_broken_cut_pct:
         return EXCUSED
     if feed is not None and abs(feed) < FEEDS_MM_MIN:

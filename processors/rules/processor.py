@@ -81,7 +81,7 @@ class Given(NamedTuple):
 class Rule:
     """One rule: it is published as `twin/rule_<name>`.
 
-    is_of_programs: it needs an NC program, which not every machine has: `twin/rule_detail` does not name it where it can't judge
+    is_of_programs: it needs an expectation of the NC program; `twin/rule_detail` does not name it where there is none
     """
 
     name: str
@@ -202,7 +202,7 @@ def _outputs(stands: tuple[Stand, ...], has_zone: bool, zone: str, anomaly: bool
     judged = False
     for rule, stand in zip(RULES, stands, strict=True):
         if isinstance(stand, str):
-            if not rule.is_of_programs:
+            if not (rule.is_of_programs and stand.startswith(CUT)):
                 unknown.append(rule.name)
             outputs.append(Output.null(rule.metric, stand))
             continue

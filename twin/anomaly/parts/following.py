@@ -7,7 +7,10 @@ the twin's expectation where no earlier part has the section; level follows wear
 nothing while gated, while the spindle stands or changes its speed, or while the feed is held.
 """
 
+from collections.abc import Sequence
+
 from twin.anomaly.parts import heat, scales
+from twin.anomaly.parts.alignment import CELL_S, put_right
 from twin.anomaly.parts.levels import another_material
 from twin.anomaly.parts.model import LEVELLED, PartsModel, Plan
 from twin.anomaly.parts.moment import (
@@ -25,7 +28,7 @@ from twin.anomaly.parts.own import NEVER, Ended, Own, tool_of, usual_of
 from twin.anomaly.parts.quantity import TURNS_RPM_MIN
 from twin.anomaly.parts.residuals import idle_of, residuals
 from twin.anomaly.parts.told import Told
-from twin.anomaly.parts.usual import with_rows
+from twin.anomaly.parts.usual import Usual, with_rows
 
 GAP_TICKS = 5
 BATCH_S = 240.0
@@ -63,12 +66,14 @@ def told_after(model: PartsModel, own: Own, told: Told) -> Own:
         warm = heat.warmed(warm, plan.drivers_at, model.heat, values, plan.heat_shares, is_held=own.is_held)
     override = 1.0 if told.feed_override_pct is None else told.feed_override_pct / 100.0
     feed = values[plan.feed_at] if plan.feed_at >= 0 else None
+    step = (feed or 0.0) * model.tick_s / 60.0 if line >= 0 else override * model.tick_s
     if told.is_gated or not turns or override < OVERRIDE_MIN or (feed is not None and feed < FEED_MIN):
-        place = place._replace(line=line, stood_ticks=0 if turns else place.stood_ticks + 1)
+        moved = place.moved_mm + step if line < 0 and turns and feed is not None and feed >= FEED_MIN else place.moved_mm
+        place = place._replace(line=line, stood_ticks=0 if turns else place.stood_ticks + 1, moved_mm=moved)
         return own._replace(tick=tick, place=place, rpm=rpm or 0.0, is_idle=True, heat=warm)
     if place.stood_ticks * model.tick_s >= BATCH_S:
         own = with_levels(model, own._replace(material=another_material(own.material)))
-    moved = (place.moved_mm if line == place.line else 0.0) + (feed or 0.0) * model.tick_s / 60.0
+    moved = (place.moved_mm if line == place.line else 0.0) + step
     return _cut(model, own._replace(heat=warm) if warm is not own.heat else own, told, place, (line, moved), override)
 
 
@@ -88,6 +93,8 @@ def _cut(model: PartsModel, own: Own, told: Told, place: Place, here: Mark, over
     rpm = told.values[plan.speed_at] if plan.speed_at >= 0 else None
     settled = rpm is None or -SETTLED * rpm - SETTLED_RPM <= rpm - own.rpm <= SETTLED * rpm + SETTLED_RPM
     z, tells, d = residuals(model, own, told, override, settled, None if is_new else usual, place.section)
+    if here[0] < 0 and usual is not None and not is_new and told.tick % max(1, round(CELL_S / model.tick_s)) == 0:
+        place = _put_right(usual, place, d)
     expected = own.expected if told.expected is None else _expected_after(plan, own.expected, told, override, model)
     if 0.0 in tells:
         told_at = tuple([told.tick if t else last for t, last in zip(tells, own.told_at, strict=True)])
@@ -96,6 +103,13 @@ def _cut(model: PartsModel, own: Own, told: Told, place: Place, here: Mark, over
     smooth = scales.smoothed(own.smooth, z, tells, plan.shares)
     rest = own[REST:]
     return Own(told.tick, place, rpm or 0.0, smooth, told_at, not any(tells), is_new, (*rows, d), sections, expected, *rest)
+
+
+def _put_right(usual: Usual, place: Place, d: Sequence[float | None]) -> Place:
+    """Return the place with its progress put right by the signals; d: residuals to the centre of its section."""
+    values = [None if apart is None else apart + middle for apart, middle in zip(d, usual.centre[place.section], strict=True)]
+    band, shift_s = put_right(usual, place.band, place.moved_mm, values)
+    return place._replace(band=band, moved_mm=max(0.0, place.moved_mm + shift_s))
 
 
 def _expected_after(

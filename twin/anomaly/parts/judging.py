@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 from twin.anomaly.parts import scales
 from twin.anomaly.parts.beside import left_over
+from twin.anomaly.parts.limits import limits_of
 from twin.anomaly.parts.model import PartsModel
 from twin.anomaly.parts.own import NEVER, Own, usual_of
 from twin.anomaly.parts.reason import why_of
-from twin.anomaly.parts.verdict import limits_of
 from twin.anomaly.parts.why import Why
 
 SMALL = 0.5
@@ -74,7 +74,7 @@ def _length(u: list[float]) -> float:
 
 def _tolerated(model: PartsModel, own: Own, u: list[float]) -> list[float]:
     """Return what is left where a person has called such an alarm false: less by the limit that was raised."""
-    limits = limits_of(own.memory, own.place.key or "", own.tick * model.tick_s)
+    limits = limits_of(own.memory.tolerated, own.place.key or "", own.tick * model.tick_s)
     names = ((signal, scale) for signal in model.signals for scale in scales.SCALES)
     return [
         value / limits.get((signal, scale, 1 if value > 0.0 else -1), 1.0)

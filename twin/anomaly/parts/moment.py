@@ -1,18 +1,19 @@
 """The moment of a part: operation (program, tool, n-th use of that tool) and section of it (line, and distance along the line).
 
-    moved ← moved + feed · tick          along the line; from the beginning of the operation where the control tells no line
+    moved ← moved + feed · tick          along the line, mm
+    moved ← moved + override · tick      since the operation began, s as programmed, where the control tells no line
 
-Distance is the integral of the feed that was run, so overrides and holds do not shift a section. A part begins where the
-program changes or goes back to its beginning; where no line is told, where the first tool comes back, or a single one after a
-standstill. The first part notes a mark each second; sections are made of them when it has ended (`sectioning.py`), and looked
-up from then on.
+Overrides and holds do not shift a section. Where no line is told, the signals put the progress right (`alignment.py`). A part
+begins where the program changes or goes back to its beginning; without a line, where the first tool comes back, or a single one
+after a standstill. The first part notes a mark each second; sections are made of them when it has ended (`sectioning.py`), and
+looked up from then on.
 """
 
 from bisect import bisect_right
 from typing import NamedTuple
 
 Mark = tuple[int, float]
-"""Where a section begins: line, mm along it."""
+"""Where a section begins: line, mm along it; −1 and s as programmed where no line is told."""
 NO_LINE = -1
 USES_MAX = 100
 BACK_SHARE = 0.1
@@ -33,6 +34,7 @@ class Place(NamedTuple):
     section: of the operation; forming: marks of sections that no earlier part has; section_ticks: ticks that told of the section
     section_s: length of the sections that are formed; end: the furthest moment of this operation
     stood_ticks: how long the spindle has stood; ticks: that told in this operation; is_whole: it was seen from its beginning
+    band: costs of other offsets, where no line is told (`alignment.py`)
     """
 
     program: str | None = None
@@ -53,6 +55,7 @@ class Place(NamedTuple):
     stood_ticks: int = 0
     ticks: int = 0
     is_whole: bool = False
+    band: tuple[float, ...] = ()
 
     def moved_to(self, here: Mark, section: int) -> "Place":
         """Return the place after one more tick that tells."""
@@ -77,6 +80,7 @@ class Place(NamedTuple):
             0,
             self.ticks + 1,
             self.is_whole,
+            self.band,
         )
 
 
@@ -92,7 +96,7 @@ def is_part_begun(place: Place, program: str | None, tool: int | None, line: int
     if line >= 0:
         return line < place.line and line <= place.line_first + BACK_SHARE * (place.line_last - place.line_first)
     if tool is None or place.first_tool is None:
-        return False
+        return tool is not None
     if tool != place.tool:
         return tool == place.first_tool and len(place.uses) > 1
     return len(place.uses) == 1 and place.stood_ticks >= stood_ticks_min

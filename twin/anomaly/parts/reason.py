@@ -7,13 +7,11 @@ import math
 from collections.abc import Sequence
 
 from twin.anomaly.parts import scales
-from twin.anomaly.parts.episodes import nearest
 from twin.anomaly.parts.model import PartsModel
 from twin.anomaly.parts.own import Own, usual_of
 from twin.anomaly.parts.quantity import UNITS, Kind, kind_of
 from twin.anomaly.parts.residuals import cut_share
-from twin.anomaly.parts.signature import shares_of, signature_of
-from twin.anomaly.parts.why import Like, Why
+from twin.anomaly.parts.why import Why
 
 PEER_SHOWS = 0.5
 """A peer shows it too where its residual is at least half as large."""
@@ -57,17 +55,8 @@ def why_of(model: PartsModel, own: Own, peers: Sequence[Own], left: Sequence[flo
         abs(s),
         max(0.0, (own.tick - own.high_since) * model.tick_s) if own.high_since > 0 else 0.0,
         knows if is_known else "the twin",
-        _like(model, own, left),
-        tuple(shows),
+        peers=tuple(shows),
     )
-
-
-def _like(model: PartsModel, own: Own, left: Sequence[float]) -> tuple[Like, ...]:
-    if not own.memory.episodes:
-        return ()
-    place = own.place
-    shares = shares_of(model.signals, scales.SCALES, left)
-    return nearest(own.memory, signature_of(shares, place.key or "", place.program, place.tool))
 
 
 def _in_units(model: PartsModel, own: Own, at: int, centre: float, away: float) -> tuple[float, float]:

@@ -68,9 +68,14 @@ def test_the_like_of_a_known_alarm_is_held_back_until_it_is_gone() -> None:
 
 def test_a_known_alarm_that_has_become_much_larger_alarms() -> None:
     memory = spoken(alarmed(), verdict("known"))
-    memory = followed(memory, seen(3.5), 3000.0)
+    memory = followed(memory, seen(3.5, signature(3.5, 1.0)), 3000.0)
     assert not alarm_of(memory)
-    assert alarm_of(followed(memory, seen(6.0), 3001.0))
+    assert alarm_of(followed(memory, seen(6.0, signature(6.0, 2.0)), 3001.0))
+
+
+def test_the_like_of_a_known_alarm_in_another_operation_alarms() -> None:
+    memory = spoken(alarmed(), verdict("known"))
+    assert alarm_of(followed(memory, seen(3.0, signature(tool=6)), 3000.0))
 
 
 def test_another_kind_of_alarm_is_not_held_back() -> None:
