@@ -3,7 +3,8 @@
     shown = median over passes of  |mean of the pass with the fault − without| / robust spread of the mean of the pass
     sudden = the same over the spread of its difference from the part before, which batch and wear hardly move
 
-of passes at full feed; bursts count as if they lasted, a dulling tool with a wear of 4. A pass lasts 5 to 20 s.
+of passes at full feed, where the whole arc cuts; bursts count as if they lasted, a dulling tool with a wear of 4.
+A pass lasts 5 to 20 s.
 """
 
 from dataclasses import replace
@@ -14,8 +15,7 @@ from numpy.typing import NDArray
 
 from benchmarks.simulated_cell.cell import Cell, draw_cell, machine_readings
 from benchmarks.simulated_cell.fault import ONE_TOOL, PLANTED, Fault, FaultKind, Overlap
-from benchmarks.simulated_cell.part_program import Work
-from benchmarks.simulated_cell.schedule import DAY_S, Schedule
+from benchmarks.simulated_cell.schedule import DAY_S, Schedule, has_whole_arc
 from benchmarks.simulated_cell.signals import FEATURES
 
 Floats = NDArray[np.float64]
@@ -80,7 +80,7 @@ def _operations(own: Schedule, kind: FaultKind, tool: int) -> NDArray[np.bool_]:
 
 def _by_pass(own: Schedule, healthy: Floats, broken: Floats, operations: NDArray[np.bool_]) -> list[Shown]:
     """Change over spread of each pass that is repeated."""
-    wanted = (own.work == Work.CUTTING) & (own.feed_override_pct == FULL_PCT) & operations[own.operation]
+    wanted = has_whole_arc(own) & (own.feed_override_pct == FULL_PCT) & operations[own.operation]
     at = np.flatnonzero(wanted)
     stretches, first, which, count = np.unique(own.stretch[at], return_index=True, return_inverse=True, return_counts=True)
     before, after = (np.bincount(which, weights=values[at]) / count for values in (healthy, broken))
