@@ -11,7 +11,7 @@ which shares no code with the twin; a control tells of it once a second. Methods
     parts            cuts beside the same cut of earlier parts and beside the twin, less what peers share (twin/anomaly/parts)
     parts -part      no baseline of parts: beside the twin only;  -twin, -peers, -gates: without these
     features, own features, residual, source f, gate, plain, random, constant, vibration: benchmarks/scored/frames.py
-    hbos, loda, page: benchmarks/scored/detectors.py
+    hbos, pca, page: benchmarks/scored/detectors.py
 
 Size 1 of a fault is stated in benchmarks/simulated_cell/fault.py, and was before anything was judged. Seeds 1 to 3 were used to
 develop the methods; others are for reporting. Nothing is point-adjusted (benchmarks/evaluation).

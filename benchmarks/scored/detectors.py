@@ -1,6 +1,6 @@
 """Detectors and drift detectors of others, on the signals beside what is usual in the operation, in frames of 10 s; gate only.
 
-    loda, hbos       of PyOD, trained on the rows of week A (ECOD is scored row by row, 10 ms each: too slow here)
+    hbos, pca        of PyOD, trained on the rows of week A (ECOD takes 10 ms a row, LODA cannot score a stream)
     page             S ← max(0, S + y − 0.5), the larger of both sides, the sum over signals (Page 1954): river's PageHinkley,
                      with a known mean. Gated frames leave S as it is.
 
@@ -57,4 +57,4 @@ def _page(rows: Floats, idle: Flags) -> Floats:
     return found
 
 
-SCORES: dict[str, Score] = {"hbos": of_pyod("HBOS"), "loda": of_pyod("LODA"), "page": page}
+SCORES: dict[str, Score] = {"hbos": of_pyod("HBOS"), "pca": of_pyod("PCA"), "page": page}
