@@ -3,7 +3,7 @@
     .venv/bin/python benchmarks/part_score.py --days 2 --machines 4
 
 A cell of machines learns for some days and is followed through the next one; the time of following, judging beside the peers and
-learning is that of all ticks, standing ones included, and of those that cut alone. Times are of the process, median of the hours.
+learning is that of all ticks, standing ones included, and the median of those at which all of them cut. Times are the process's.
 """
 
 import argparse
@@ -63,9 +63,9 @@ def plain(ticks: Sequence[Sequence[Told]]) -> float:
     return time.process_time() - began
 
 
-def scored(models: Sequence[PartsModel], owns: list[Own], ticks: Sequence[Sequence[Told]]) -> tuple[float, float]:
-    """Return the seconds of following, judging and learning, all ticks' and those at which the machine cuts."""
-    clock, cutting, began = time.process_time, 0.0, time.process_time()
+def scored(models: Sequence[PartsModel], owns: list[Own], ticks: Sequence[Sequence[Told]]) -> tuple[float, list[float]]:
+    """Return the seconds of following, judging and learning in all, and of each tick at which all machines cut."""
+    clock, cutting, began = time.process_time, [], time.process_time()
     for row in ticks:
         tick_began = clock()
         for place, told in enumerate(row):
@@ -74,8 +74,8 @@ def scored(models: Sequence[PartsModel], owns: list[Own], ticks: Sequence[Sequen
         for place, model in enumerate(models):
             now = judged(model, before[place], (*before[:place], *before[place + 1 :]))
             owns[place], _ = learned(model, before[place], now, False)
-        if not any(own.is_idle for own in owns):
-            cutting += clock() - tick_began
+        if not any(own.is_idle for own in before):
+            cutting.append(clock() - tick_began)
     return clock() - began, cutting
 
 
@@ -89,19 +89,19 @@ def main() -> None:
     cell = cell_of(given.seed, given.machines, given.days + 1)
     models = fit([one.until(given.days * DAY_S) for one in cell])
     owns = [begun(model) for model in models]
-    every, alone, simple = [], [], []
+    every, simple, cutting = 0.0, 0.0, []
     for hour in range(24):
         begins = given.days * DAY_S + hour * HOUR
         told = zip(*(one.between(begins, begins + HOUR).told() for one in cell), strict=True)
         ticks = [[one for one in row if one is not None] for row in told]
-        simple.append(plain(ticks) / (HOUR * given.machines))
-        seconds, cutting = scored(models, owns, ticks)
-        every.append(seconds / (HOUR * given.machines))
-        count = sum(not any(own.is_idle for own in row) for row in [owns]) and cutting
-        alone.append(count)
-    print(f"{given.machines} machines, {24 * HOUR * given.machines} machine ticks of a working day")
-    print(f"a tick: {1e6 * sum(every) / 24:.1f} us, busiest hour {1e6 * max(every):.1f} us, median {1e6 * median(every):.1f} us")
-    print(f"a plain fold: {1e6 * sum(simple) / 24:.2f} us; ratio {sum(every) / sum(simple):.0f}")
+        simple += plain(ticks)
+        seconds, cuts = scored(models, owns, ticks)
+        every += seconds
+        cutting += cuts
+    count = 24 * HOUR * given.machines
+    print(f"{given.machines} machines, {count} machine ticks of a working day, standing ones included")
+    print(f"a tick: {1e6 * every / count:.1f} us; while all cut: {1e6 * median(cutting) / given.machines:.1f} us")
+    print(f"a plain fold: {1e6 * simple / count:.2f} us; ratio {every / simple:.0f}")
 
 
 if __name__ == "__main__":

@@ -63,7 +63,8 @@ def told_after(model: PartsModel, own: Own, told: Told) -> Own:
         place = place._replace(is_whole=False)
     warm = own.heat
     if plan.heat_every and tick % plan.heat_every == 0:
-        warm = heat.warmed(warm, plan.drivers_at, model.heat, values, plan.heat_shares, is_held=own.is_held)
+        is_held = own.is_held and (tick - own.high_since) * model.tick_s < heat.HELD_S
+        warm = heat.warmed(warm, plan.drivers_at, model.heat, values, plan.heat_shares, is_held=is_held)
     override = 1.0 if told.feed_override_pct is None else told.feed_override_pct / 100.0
     feed = values[plan.feed_at] if plan.feed_at >= 0 else None
     step = (feed or 0.0) * model.tick_s / 60.0 if line >= 0 else override * model.tick_s
@@ -101,8 +102,9 @@ def _cut(model: PartsModel, own: Own, told: Told, place: Place, here: Mark, over
     else:
         told_at = (told.tick,) * len(tells)
     smooth = scales.smoothed(own.smooth, z, tells, plan.shares)
-    rest = own[REST:]
-    return Own(told.tick, place, rpm or 0.0, smooth, told_at, not any(tells), is_new, (*rows, d), sections, expected, *rest)
+    return Own._make(
+        (told.tick, place, rpm or 0.0, smooth, told_at, not any(tells), is_new, (*rows, d), sections, expected, *own[REST:])
+    )
 
 
 def _put_right(usual: Usual, place: Place, d: Sequence[float | None]) -> Place:

@@ -1,7 +1,7 @@
 """The temperature that speed and load explain, and the slow drift that weather explains.
 
     h_i ← h_i + (10 s / τ_i) · (driver_i − h_i)          drivers: speed, load; τ: 10 min, 40 min, 2 h
-    x = value − Σ b_i h_i − base                         base ← base + (10 s / 3 h) · x, a fourth of it while suspicious
+    x = value − Σ b_i h_i − base                         base ← base + (10 s / 3 h) · x, a twentieth of it while suspicious
 
 The coefficients come from training, by least squares on values from which the same slow drift was taken. A machine that is
 already warm when it is first seen has stored heat that nobody knows: for `SETTLE_S` its temperature tells nothing, and the base
@@ -22,7 +22,9 @@ DRIVERS = (SPEED, LOAD)
 BASE_S = 10_800.0
 SETTLE_S = 7200.0
 RIDGE = 1e-3
-HELD = 0.25
+HELD = 0.05
+HELD_S = 9000.0
+"""So long at most a base is held: what stays for longer is weather, or has been an alarm for hours."""
 EVERY_S = 10.0
 """Heat is slow: it is followed so often."""
 STEPS = round(SETTLE_S / EVERY_S)
@@ -79,7 +81,7 @@ def warmed(
 ) -> Heat:
     """Return the heat after a tick; places: of speed and load, −1 = none; shares: of a tick in each time constant and the base.
 
-    A base follows its temperature slowly, and a fourth as fast while the score is suspicious.
+    A base follows its temperature slowly, and next to not at all while the score is suspicious.
     """
     speed, load = (values[at] if at >= 0 else None for at in places)
     driven = driven_after(before.driven, ((speed or 0.0) * SCALES[SPEED], (load or 0.0) * SCALES[LOAD]), shares[0])

@@ -7,6 +7,7 @@ The fourth power lets one signal speak for itself, and several that rise togethe
 nothing is told: in a gate, and while the spindle stands.
 """
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -69,7 +70,7 @@ def judged(model: PartsModel, own: Own, peers: Sequence[Own]) -> Judged:
 def _length(u: list[float]) -> float:
     """Return the score of what is left, in tails: signal by signal, each on all scales."""
     fourth = [value * value * value * value for value in u]
-    return max([sum(fourth[scale :: scales.COUNT]) for scale in range(scales.COUNT)]) ** 0.25
+    return math.sqrt(math.sqrt(max([sum(fourth[scale :: scales.COUNT]) for scale in range(scales.COUNT)])))
 
 
 def _tolerated(model: PartsModel, own: Own, u: list[float]) -> list[float]:

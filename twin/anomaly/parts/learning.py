@@ -94,13 +94,13 @@ def _mean(plan: Plan, ended: Ended, usual: Usual, at: int) -> float | None:
     """Return the change of the cut that a signal shows, by least squares over the sections that earlier parts know."""
     total = weights = ticks = 0.0
     for section, sums in ended.sections:
-        if 0 <= section < len(usual.marks) and usual.told[section][at] and sums.count[at]:
+        if 0 <= section < len(usual.marks) and usual.told[section][at] and sums.ticks[at]:
             cuts = cut_share(plan, usual.centre[section])
             if cuts >= CUT_SHARE_MIN:
                 share = cuts * usual.weight[section][at] ** 2
                 total += share * sums.total[at]
-                weights += share * cuts * sums.count[at]
-                ticks += sums.count[at]
+                weights += share * cuts * sums.ticks[at]
+                ticks += sums.ticks[at]
     return total / weights if ticks >= TICKS_MIN and weights > 0.0 else None
 
 
@@ -122,13 +122,13 @@ def _sections_learned(model: PartsModel, own: Own, ended: Ended) -> Own:
     for section, sums in merged.items():
         before = usual.told[section]
         centre[section], variance[section], told[section], weight[section] = learned_section(
-            usual, section, sums, plan.prior, plan.least
+            usual, section, sums, plan.prior, plan.least, plan.first
         )
         if plan.load_at >= 0 and before[plan.load_at] < told[section][plan.load_at]:
             at = plan.load_at
             now = (
                 usual.centre[section][at]
-                + sums.total[at] / sums.count[at]
+                + sums.total[at] / sums.ticks[at]
                 + ended.level[at] * cut_share(plan, usual.centre[section])
             )
             frozen[section] = froze(frozen[section], before[at], now)

@@ -14,13 +14,13 @@ from twin.anomaly.parts import quantity, scales
 from twin.anomaly.parts.heat import BASE_S, EVERY_S, TAUS_S
 from twin.anomaly.parts.levels import BATCH_VAR, TOOL_VAR, Level
 from twin.anomaly.parts.quantity import Kind
-from twin.anomaly.parts.usual import Usual
+from twin.anomaly.parts.usual import FIRST_PRIORS, Usual
 
 OPERATIONS_MAX = 500
 SIGNALS_MAX = 16
 RPM_STEP = 500.0
-QUICK = ("seconds", "tool")
-"""The scales that say nothing of a temperature."""
+SILENT = {Kind.TEMPERATURE: ("seconds", "tool"), Kind.FEED: ("tool",), Kind.SPEED: ("tool",)}
+"""The scales that say nothing of a kind: a temperature is slow, and neither feed nor speed belongs to a tool."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +41,7 @@ class Plan:
     idle_pct: tuple[float, ...]
     least: tuple[float, ...]
     prior: tuple[float, ...]
+    first: tuple[float, ...]
     over_spread: tuple[float, ...]
     over_twin: tuple[float, ...]
     over_up: tuple[float, ...]
@@ -101,7 +102,7 @@ class PartsModel(Record):
         def at(name: str) -> int:
             return self.signals.index(name) if name in self.signals else -1
 
-        counts = [0.0 if kind is Kind.TEMPERATURE and scale in QUICK else 1.0 for kind in kinds for scale in scales.SCALES]
+        counts = [0.0 if scale in SILENT.get(kind, ()) else 1.0 for kind in kinds for scale in scales.SCALES]
         every = max(1, round(EVERY_S / self.tick_s))
         steps = range(int(quantity.RPM_MAX / RPM_STEP) + 1)
         return Plan(
@@ -119,6 +120,7 @@ class PartsModel(Record):
             idle_pct=tuple(self.idle_at(step * RPM_STEP) for step in steps),
             least=tuple((quantity.SPREAD_LEAST[kind]) ** 2 for kind in kinds),
             prior=tuple(value * value for value in spread),
+            first=tuple(FIRST_PRIORS * value * value if self.spread else 0.0 for value in spread),
             over_spread=tuple(1.0 / value for value in spread),
             over_twin=tuple(1.0 / value if value else 0.0 for value in self.twin_spread or (0.0,) * count),
             over_up=tuple(share / value for share, value in zip(counts, up, strict=True)),

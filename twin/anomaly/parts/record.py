@@ -81,13 +81,13 @@ def _load_beside_parts(model: PartsModel, ended: Ended, usual: Usual | None) -> 
         return None, None
     floor, rows = model.plan.floors[at], []
     for section, sums in ended.sections:
-        if not 0 <= section < len(usual.marks) or not sums.count[at]:
+        if not 0 <= section < len(usual.marks) or not sums.ticks[at]:
             continue
         before = usual.frozen[section]
         level = ended.level[at] * cut_share(model.plan, usual.centre[section])
-        now = usual.centre[section][at] + sums.total[at] / sums.count[at] + level
+        now = usual.centre[section][at] + sums.total[at] / sums.ticks[at] + level
         if before is not None and math.exp(before) - floor >= CUT_PCT_MIN:
-            rows.append((sums.count[at], max(0.0, math.exp(now) - floor), math.exp(before) - floor))
+            rows.append((sums.ticks[at], max(0.0, math.exp(now) - floor), math.exp(before) - floor))
     if not rows:
         return None, None
     ratio = sum(n * cut for n, cut, _ in rows) / sum(n * usual_cut for n, _, usual_cut in rows)
@@ -102,6 +102,6 @@ def _ratio(ended: Ended, usual: Usual | None, at: int) -> float | None:
     """Return a signal over what is usual now, as a ratio, levels of wear and material included."""
     if usual is None or at < 0:
         return None
-    known = [(s.count[at], s.total[at]) for n, s in ended.sections if 0 <= n < len(usual.marks) and usual.told[n][at]]
+    known = [(s.ticks[at], s.total[at]) for n, s in ended.sections if 0 <= n < len(usual.marks) and usual.told[n][at]]
     ticks = sum(count for count, _ in known)
     return math.exp(sum(total for _, total in known) / ticks + ended.level[at]) if ticks else None

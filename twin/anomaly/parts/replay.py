@@ -90,7 +90,9 @@ class Recorded:
         """Yield what is told at each tick; None where the machine told nothing."""
         import numpy as np  # noqa: PLC0415
 
-        rows = np.where(np.isnan(self.values), None, self.values.astype(object)).tolist()
+        held = self.values.astype(object)
+        held[np.isnan(self.values)] = None
+        rows = held.tolist()
         feed, speed = (_or_none(one) for one in (self.feed_override_pct, self.spindle_override_pct))
         known = [True] * len(rows) if self.is_known is None else self.is_known.tolist()
         program, tool, line, gated = (one.tolist() for one in (self.program, self.tool, self.line, self.gated))

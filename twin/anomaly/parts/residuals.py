@@ -7,7 +7,7 @@ Where no earlier part has the section, the twin's expectation takes its place, w
 
 import math
 from collections.abc import Sequence
-from math import exp, log
+from math import exp, log, sqrt
 
 from twin.anomaly.parts import scales
 from twin.anomaly.parts.heat import explained
@@ -21,6 +21,8 @@ _LOAD, _VIBRATION, _FEED, _SPEED, _TEMPERATURE = (int(k) for k in list(Kind)[:5]
 _RPM_STEP = 1.0 / RPM_STEP
 TWIN_CLIP = 2.5
 """A line of a program has air in it that the twin, line by line, does not tell from the cut."""
+POWER_SPREAD = 0.15
+"""Operations differ by so much in the power of the override with which load and vibration go."""
 TELLS_MIN = 0.15
 """A section whose spread is so many times larger than usual tells nothing of a signal."""
 
@@ -52,11 +54,12 @@ def residuals(
         weight, clip = usual.weight[section], scales.CLIP
     else:
         centre, weight, clip = beside_twin(plan, model, told.expected), plan.over_twin, TWIN_CLIP
-    cuts = cut_share(plan, centre)
+    log_override = 0.0 if override == 1.0 else log(override)
+    off = POWER_SPREAD * log_override
+    cuts = _cut_share_now(plan, told) if usual is None else cut_share(plan, learned)
     z: list[float] = []
     tells: list[float] = []
     d: list[float | None] = []
-    log_override = 0.0 if override == 1.0 else log(override)
     rows = zip(plan.kinds, told.values, plan.floors, plan.powers, centre, learned, weight, own.level, own.calm, strict=True)
     for at, (kind, value, floor, power, middle, usually, w, level, calm) in enumerate(rows):
         y, r, x = 0.0, 0.0, value
@@ -70,6 +73,8 @@ def residuals(
         else:
             x = _quantity(plan, at, kind, value, told, (override, log_override, floor, power)) - level * cuts
             if middle is not None and w > 0.0:
+                if off and kind <= _VIBRATION:
+                    w /= sqrt(1.0 + off * off * w * w)  # noqa: PLW2901
                 y, r = (x - middle) * w * calm, w * calm / plan.over_spread[at]
                 r = r * cuts if kind == _LOAD else r
                 r = 1.0 if r > 1.0 else 0.0 if r < TELLS_MIN else r
@@ -86,6 +91,15 @@ def cut_share(plan: Plan, centre: Sequence[float | None]) -> float:
         return 1.0
     share = 1.0 - plan.floors[plan.load_at] * exp(-usual)
     return share if share > 0.0 else 0.0
+
+
+def _cut_share_now(plan: Plan, told: Told) -> float:
+    """Return the same of a section that no earlier part has, by its load at this tick."""
+    load = told.values[plan.load_at] if plan.load_at >= 0 else None
+    if load is None:
+        return 1.0
+    cut = max(0.0, load - idle_of(plan, told.values))
+    return cut / (cut + plan.floors[plan.load_at])
 
 
 def _quantity(plan: Plan, at: int, kind: int, value: float, told: Told, scale: tuple[float, float, float, float]) -> float:

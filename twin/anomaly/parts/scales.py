@@ -23,6 +23,8 @@ TAUS_S = (3.0, 30.0, 300.0, 120.0)
 TOOL = 3
 COUNT = len(SCALES)
 CLIP = 6.0
+FORGETS = 0.5
+"""A tool comes back with half of its residual: a fault that all tools had is forgotten soon after it is gone."""
 BLOCK_S = 900.0
 RETURN_S = 86_400.0
 TAIL_LEAST = 0.2
@@ -67,9 +69,9 @@ def of_tool(smooth: Sequence[float]) -> tuple[float, ...]:
 
 
 def with_tool(smooth: Sequence[float], slow: Sequence[float]) -> tuple[float, ...]:
-    """Return the residuals once another tool is in the spindle, whose own were `slow`."""
+    """Return the residuals once another tool is in the spindle, whose own were `slow` when it left."""
     found = list(smooth)
-    found[TOOL::COUNT] = slow
+    found[TOOL::COUNT] = [FORGETS * value for value in slow]
     return tuple(found)
 
 
@@ -83,4 +85,4 @@ def tails(left: "NDArray[np.float64]", blocks: "NDArray[np.integer]", block_s: f
     begins = np.flatnonzero(np.diff(blocks, prepend=-1))
     largest = np.maximum.reduceat(np.maximum(left, 0.0), begins, axis=0)
     share = max(0.5, 1.0 - block_s / RETURN_S)
-    return np.maximum(np.quantile(largest, share, axis=0), TAIL_LEAST)
+    return np.asarray(np.maximum(np.quantile(largest, share, axis=0), TAIL_LEAST), dtype=np.float64)

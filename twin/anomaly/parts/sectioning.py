@@ -35,7 +35,7 @@ def starts_of(sums: Sequence[Sums | None], kinds: Sequence[int], tick_s: float, 
     starts, begun_ticks, steady = [0], 0.0, rows[0] if rows else None
     for at in range(1, len(rows)):
         one = sums[at]
-        begun_ticks += 1.0 if one is None else max(one.count)
+        begun_ticks += 1.0 if one is None else max(one.ticks)
         is_new = edges[at] != edges[at - 1]
         if not is_new and not edges[at]:
             is_new = _differ(steady, rows[at], STEADY) or begun_ticks * tick_s >= STEADY_S_MAX
@@ -50,7 +50,7 @@ def starts_of(sums: Sequence[Sums | None], kinds: Sequence[int], tick_s: float, 
 
 
 def _means(one: Sums, kinds: Sequence[int]) -> list[float | None]:
-    rows = zip(kinds, one.count, one.total, strict=True)
+    rows = zip(kinds, one.ticks, one.total, strict=True)
     return [total / count if kind in JUMPING and count else None for kind, count, total in rows]
 
 

@@ -24,6 +24,10 @@ LINES_OVERRIDDEN_MIN = 3
 POWER_MAX = 1.2
 CUTS_PCT_MIN = 8.0
 TWIN_TICKS_MIN = 300
+LINE_TICKS_MIN = 3
+OVERRIDES_APART = 0.3
+STEADY_QUANTILE = 0.7
+"""Of the ticks of a line, above its edges in air."""
 VIBRATION_POWER = 0.5
 TWIN_CLIP = 3.0
 
@@ -100,17 +104,27 @@ def _power(one: "Recorded", x: Floats, kind: int) -> float:
     known = ~np.isnan(x) & (one.feed_override_pct >= 10.0)
     if not known.any():
         return usual
-    group, y, log_override = _groups(one)[known], x[known], np.log(one.feed_override_pct[known] / 100.0)
-    count = np.maximum(np.bincount(group), 1)
+    group, y, pct = _groups(one)[known], x[known], one.feed_override_pct[known]
     if kind == Kind.LOAD:
-        cuts = (np.bincount(group, y) / count > math.log(CUTS_PCT_MIN))[group]
-        group, y, log_override = group[cuts], y[cuts], log_override[cuts]
-        count = np.maximum(np.bincount(group), 1)
-    y, log_override = (column - (np.bincount(group, column) / count)[group] for column in (y, log_override))
-    moved = np.bincount(group, np.abs(log_override) > 0.1) > 0
-    if len(y) == 0 or moved.sum() < LINES_OVERRIDDEN_MIN:
+        cuts = y > math.log(CUTS_PCT_MIN)
+        group, y, pct = group[cuts], y[cuts], pct[cuts]
+    pairs, place = np.unique(np.stack([group, np.round(pct).astype(np.int64)], axis=1), axis=0, return_inverse=True)
+    order = np.argsort(place.ravel(), kind="stable")
+    stretches = np.split(y[order], np.flatnonzero(np.diff(place.ravel()[order])) + 1)
+    points: dict[int, list[tuple[float, float]]] = {}
+    for (line, override), own in zip(pairs.tolist(), stretches, strict=True):
+        if len(own) >= LINE_TICKS_MIN:
+            points.setdefault(line, []).append((math.log(override / 100.0), float(np.quantile(own, STEADY_QUANTILE))))
+    slopes = [_slope(own) for own in points.values() if max(own)[0] - min(own)[0] > OVERRIDES_APART]
+    if len(slopes) < LINES_OVERRIDDEN_MIN:
         return usual
-    return float(np.clip((y * log_override).sum() / (log_override**2).sum(), 0.0, POWER_MAX))
+    return float(np.clip(np.median(slopes), 0.0, POWER_MAX))
+
+
+def _slope(points: "list[tuple[float, float]]") -> float:
+    """Return the slope between the lowest and the highest override of a line."""
+    (x0, y0), (x1, y1) = min(points), max(points)
+    return (y1 - y0) / (x1 - x0)
 
 
 def _twin_error(model: PartsModel, one: "Recorded", settled: NDArray[np.bool_]) -> tuple[tuple[float, ...], tuple[float, ...]]:

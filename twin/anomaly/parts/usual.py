@@ -16,6 +16,8 @@ from twin.anomaly.parts.moment import Mark
 MEMORY_PARTS = 20
 PRIOR_PARTS = 3.0
 OUTLIER = 4.0
+FIRST_PRIORS, SECOND_SHARE = 2.0, 0.7
+"""The first part of a program is often proved at half feed: it is trusted less than the second."""
 FROZEN_PARTS = 3
 
 
@@ -40,13 +42,17 @@ class Usual(NamedTuple):
 class Sums(NamedTuple):
     """The sums of a section in one part: for each signal ticks that told, residuals, their squares."""
 
-    count: tuple[int, ...]
+    ticks: tuple[int, ...]
     total: tuple[float, ...]
     squares: tuple[float, ...]
 
     def plus(self, other: "Sums") -> "Sums":
         """Return the sums of both."""
-        return Sums(*(tuple([a + b for a, b in zip(x, y, strict=True)]) for x, y in zip(self, other, strict=True)))
+        return Sums(
+            tuple([a + b for a, b in zip(self.ticks, other.ticks, strict=True)]),
+            tuple([a + b for a, b in zip(self.total, other.total, strict=True)]),
+            tuple([a + b for a, b in zip(self.squares, other.squares, strict=True)]),
+        )
 
 
 Rows = tuple[tuple[float | None, ...], ...]
@@ -57,7 +63,7 @@ def with_rows(sections: tuple[tuple[int, Sums], ...], section: int, rows: Rows) 
     """Return the sums of an operation's sections with those of one more.
 
     >>> with_rows((), 4, ((0.5, None), (1.5, None)))
-    ((4, Sums(count=(2, 0), total=(2.0, 0.0), squares=(2.5, 0.0))),)
+    ((4, Sums(ticks=(2, 0), total=(2.0, 0.0), squares=(2.5, 0.0))),)
     """
     columns = [[value for value in column if value is not None] for column in zip(*rows, strict=True)]
     sums = Sums(
@@ -113,12 +119,15 @@ def extended(usual: Usual, marks: tuple[Mark, ...], end: Mark, signals: int) -> 
 
 
 def learned_section(
-    usual: Usual, section: int, sums: Sums, prior: Sequence[float], floor: Sequence[float]
+    usual: Usual, section: int, sums: Sums, prior: Sequence[float], floor: Sequence[float], first: Sequence[float]
 ) -> tuple[tuple[float, ...], tuple[float, ...], tuple[int, ...], tuple[float, ...]]:
-    """Return centre, variance, parts and weight of a section after one more healthy part; sums: of residuals to the centre."""
+    """Return centre, variance, parts and weight of a section after one more healthy part; sums: of residuals to the centre.
+
+    prior, floor, first: by signal, the variance of a steady section, the least one, and what the first part is not trusted by
+    """
     centre, variance, parts = [], [], []
-    rows = zip(usual.centre[section], usual.variance[section], usual.told[section], *sums, prior, strict=True)
-    for c, v, n, count, total, squares, usual_variance in rows:
+    rows = zip(usual.centre[section], usual.variance[section], usual.told[section], *sums, prior, first, strict=True)
+    for c, v, n, count, total, squares, usual_variance, mistrust in rows:
         if not count:
             centre.append(c)
             variance.append(v)
@@ -127,11 +136,11 @@ def learned_section(
         mean, square = total / count, squares / count
         if n == 0:
             centre.append(round(c + mean, 4))
-            variance.append(round(max(0.0, square - mean * mean), 6))
+            variance.append(round(max(0.0, square - mean * mean) + mistrust, 6))
             parts.append(1)
             continue
         spread = (max(v, usual_variance)) ** 0.5
-        share = 1.0 / (min(n, MEMORY_PARTS) + 1)
+        share = SECOND_SHARE if n == 1 else 1.0 / (min(n, MEMORY_PARTS) + 1)
         limit = OUTLIER * spread
         centre.append(round(c + share * max(-limit, min(limit, mean)), 4))
         variance.append(round(v + share * (min(square, limit * limit) - v), 6))

@@ -73,7 +73,8 @@ def test_what_is_not_told_moves_nothing() -> None:
 
 
 def test_the_state_is_json_and_bounded() -> None:
-    usual, costs = course(), ()
+    usual = course()
+    costs: Costs = ()
     for second in range(2 * SECONDS):
         costs, _ = put_right(usual, costs, float(second), told(course(2), second % SECONDS))
         assert len(costs) == 2 * BAND + 1
@@ -83,7 +84,8 @@ def test_the_state_is_json_and_bounded() -> None:
 
 def test_the_recursion_is_that_of_a_plain_dynamic_programme(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(alignment, "STAY", 1e9)  # the band stays about the diagonal
-    usual, other, costs = course(), course(3), ()
+    usual, other = course(), course(3)
+    costs: Costs = ()
     plain = [SHIFT * abs(offset) for offset in range(-BAND, BAND + 1)]
     for second in range(100):
         values = told(other, second)
