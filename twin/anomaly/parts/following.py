@@ -26,7 +26,7 @@ from twin.anomaly.parts.moment import (
 )
 from twin.anomaly.parts.own import NEVER, Ended, Own, tool_of, usual_of
 from twin.anomaly.parts.quantity import TURNS_RPM_MIN
-from twin.anomaly.parts.residuals import idle_of, residuals
+from twin.anomaly.parts.residuals import idle_of, residuals, shaken
 from twin.anomaly.parts.told import Told
 from twin.anomaly.parts.usual import Usual, with_rows
 
@@ -39,7 +39,7 @@ SETTLED = 0.006
 SETTLED_RPM = 5.0
 EXPECTED_PCT_MIN = 0.5
 ROWS_MAX = 30
-REST = Own._fields.index("expected") + 1
+REST = Own._fields.index("held") + 1
 """Fields from here on do not change at every tick."""
 
 
@@ -70,6 +70,8 @@ def told_after(model: PartsModel, own: Own, told: Told) -> Own:
     step = (feed or 0.0) * model.tick_s / 60.0 if line >= 0 else override * model.tick_s
     if told.is_gated or not turns or override < OVERRIDE_MIN or (feed is not None and feed < FEED_MIN):
         moved = place.moved_mm + step if line < 0 and turns and feed is not None and feed >= FEED_MIN else place.moved_mm
+        if not turns and not told.is_gated and model.still:
+            own = own._replace(shake=shaken(model, own.shake, values), shake_at=tick)
         place = place._replace(line=line, stood_ticks=0 if turns else place.stood_ticks + 1, moved_mm=moved)
         return own._replace(tick=tick, place=place, rpm=rpm or 0.0, is_idle=True, heat=warm)
     if place.stood_ticks * model.tick_s >= BATCH_S:
@@ -103,7 +105,7 @@ def _cut(model: PartsModel, own: Own, told: Told, place: Place, here: Mark, over
         told_at = (told.tick,) * len(tells)
     smooth = scales.smoothed(own.smooth, z, tells, plan.shares)
     return Own._make(
-        (told.tick, place, rpm or 0.0, smooth, told_at, not any(tells), is_new, (*rows, d), sections, expected, *own[REST:])
+        (told.tick, place, rpm or 0.0, smooth, told_at, not any(tells), is_new, (*rows, d), sections, expected, None, *own[REST:])
     )
 
 

@@ -9,41 +9,26 @@ nothing is told: in a gate, and while the spindle stands.
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
 
 from twin.anomaly.parts import scales
 from twin.anomaly.parts.beside import left_over
+from twin.anomaly.parts.judgement import Judged
 from twin.anomaly.parts.limits import limits_of
 from twin.anomaly.parts.model import PartsModel
 from twin.anomaly.parts.own import NEVER, Own, usual_of
 from twin.anomaly.parts.reason import why_of
-from twin.anomaly.parts.why import Why
 
+__all__ = ["Judged", "judged"]
 SMALL = 0.5
 """A residual below this share of its tail is taken as it is, without the peers; where none is larger, it is the score."""
 WHY_FROM = 1.0
 NOTHING_TOLD = "nothing was told yet of a cut that is known"
 
 
-class Judged(NamedTuple):
-    """score: in tails of healthy parts, None where it is not known, for `reason`; own_score: before the peers
-    is_idle: nothing new was told at this tick (a gate, a spindle that stands), so it counts neither for nor against an alarm
-    why: what the score rests on most; None where the score is next to nothing
-    knows: what is known of the operation that runs, as "12 parts", "the twin only", "nothing: program O12 is new"
-    signature: what is left beside the peers, in tails, signed: signal by signal, each on all scales
-    """
-
-    score: float | None
-    own_score: float | None
-    reason: str | None = None
-    is_idle: bool = False
-    why: Why | None = None
-    knows: str = ""
-    signature: tuple[float, ...] = ()
-
-
 def judged(model: PartsModel, own: Own, peers: Sequence[Own]) -> Judged:
-    """Judge a machine as of a tick that its peers have come to as well."""
+    """Judge a machine as of a tick that its peers have come to as well; while it is idle, the judgement is held."""
+    if own.held is not None:
+        return own.held
     plan = model.plan
     usual = usual_of(model, own, own.place.key)
     knows = _knows(own, usual is None, 0 if usual is None else usual.parts)

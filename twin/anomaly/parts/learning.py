@@ -26,6 +26,8 @@ CUT_SHARE_MIN = 0.3
 def learned(model: PartsModel, own: Own, judged: Judged, is_alarm: bool) -> tuple[Own, CutRecord | None]:
     """Return the state once the alarm is known, and the record of an operation that has ended at this tick."""
     ended = own.ended
+    if own.is_idle and own.held is None and judged.score is not None:
+        own = own._replace(held=judged)
     is_high = judged.score is not None and judged.score >= SUSPICIOUS
     if ended is None and not is_high and not is_alarm and not own.is_held:
         return own, None

@@ -57,6 +57,7 @@ class PartsModel(Record):
     spread: of a tick about the centre of its section, by signal, pooled over operations
     twin_offset, twin_spread: of a section's quantity beside the twin's expectation, by signal; spread 0 = it has none
     up, down: tails by signal, each on all scales; usual: by operation; material, tools: levels when training ended
+    still: quantity of a vibration while the spindle stands, by signal; follows_parts: False = beside the twin only
     """
 
     signals: Annotated[tuple[str, ...], Field(min_length=1, max_length=SIGNALS_MAX)]
@@ -72,6 +73,7 @@ class PartsModel(Record):
     usual: Annotated[dict[str, Usual], Field(max_length=OPERATIONS_MAX)] = Field(default={})
     material: Level = Level((), BATCH_VAR)
     tools: Annotated[dict[str, Level], Field(max_length=OPERATIONS_MAX)] = Field(default={})
+    still: tuple[Finite, ...] = ()
     follows_parts: bool = True
 
     def idle_at(self, rpm: float) -> float:

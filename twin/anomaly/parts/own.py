@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 from twin.anomaly.parts.episodes import Memory
 from twin.anomaly.parts.heat import Heat
+from twin.anomaly.parts.judgement import Judged
 from twin.anomaly.parts.levels import Level, another_material
 from twin.anomaly.parts.model import PartsModel
 from twin.anomaly.parts.moment import Place
@@ -41,6 +42,8 @@ class Own(NamedTuple):
     """tick: the last one told; place: where the machine is in its part; rpm: speed at the last tick
     smooth: residuals in spreads, by signal, each on all scales; told_at: tick at which each signal was last told of
     is_idle: this tick told nothing; is_new: no earlier part has the section, so the twin is all there is
+    held: the judgement of the first idle tick, until there is another one
+    shake: vibration above the usual while the spindle stands, as `smooth`; shake_at: tick at which that was last told
     level: of wear and material in the operation that runs, by signal; calm: what its uncertainty leaves of a residual, by signal
     material, tools: the levels; kept: those at the beginning of the part; skipped: parts in a row
         that were too suspicious to learn
@@ -62,7 +65,10 @@ class Own(NamedTuple):
     rows: Rows = ()
     sections: tuple[tuple[int, Sums], ...] = ()
     expected: tuple[float, float, int] = (0.0, 0.0, 0)
+    held: Judged | None = None
     heat: Heat = Heat()
+    shake: tuple[float, ...] = ()
+    shake_at: int = NEVER
     level: tuple[float, ...] = ()
     calm: tuple[float, ...] = ()
     material: Level = Level((), 0.0)
@@ -86,6 +92,7 @@ def begun(model: PartsModel) -> Own:
     material = another_material(model.material if model.material.values else Level(plan.flat, model.material.variance))
     return Own(
         smooth=plan.blank,
+        shake=plan.blank,
         told_at=(NEVER,) * count,
         level=plan.flat,
         calm=(1.0,) * count,

@@ -28,7 +28,8 @@ class Kind(IntEnum):
 
 
 FLOORS = {"spindle_load_pct": 2.0, "spindle_power_kw": 0.1, "spindle_current_a": 0.5, "feed_mm_min": 20.0, "spindle_rpm": 20.0}
-VIBRATION_FLOOR = 0.02
+FLOORS |= {"vibration_velocity_mm_s": 0.3, "twin/vibration_velocity_mm_s": 0.3}
+VIBRATION_FLOOR = 0.05
 LOAD_FLOOR = 3.0
 RPM_MAX = 60_000.0
 UNITS = {

@@ -19,6 +19,7 @@ from twin.anomaly.parts.usual import Usual
 
 _LOAD, _VIBRATION, _FEED, _SPEED, _TEMPERATURE = (int(k) for k in list(Kind)[:5])
 _RPM_STEP = 1.0 / RPM_STEP
+_CLIP = scales.CLIP
 TWIN_CLIP = 2.5
 """A line of a program has air in it that the twin, line by line, does not tell from the cut."""
 POWER_SPREAD = 0.15
@@ -79,9 +80,24 @@ def residuals(
                 r = r * cuts if kind == _LOAD else r
                 r = 1.0 if r > 1.0 else 0.0 if r < TELLS_MIN else r
         d.append(None if x is None else x - usually)
-        z.append(r * (clip if y > clip else -clip if y < -clip else y))
+        most = clip if usual is None else clip * r
+        z.append(r * (most if y > most else -most if y < -most else y))
         tells.append(r * r)
     return z, tells, tuple(d)
+
+
+def shaken(model: PartsModel, before: Sequence[float], values: Sequence[float | None]) -> tuple[float, ...]:
+    """Return how far the vibration of a machine whose spindle stands is above the usual, by signal, each on all scales.
+
+    It says nothing of the machine, but of the floor that its peers stand on.
+    """
+    plan, z, tells = model.plan, [], []
+    for kind, value, floor, still, over in zip(plan.kinds, values, plan.floors, model.still, plan.over_spread, strict=True):
+        is_told = kind == _VIBRATION and value is not None
+        y = (log((value or 0.0) + floor) - still) * over if is_told else 0.0
+        z.append(_CLIP if y > _CLIP else -_CLIP if y < -_CLIP else y)
+        tells.append(1.0 if is_told else 0.0)
+    return scales.smoothed(before, z, tells, plan.shares)
 
 
 def cut_share(plan: Plan, centre: Sequence[float | None]) -> float:

@@ -50,9 +50,17 @@ def prepared(one: "Recorded") -> PartsModel:
     heat = tuple(
         fit_heat(rpm, load, columns[name], one.tick_s) if kind_of(name) is Kind.TEMPERATURE else () for name in one.signals
     )
+    still = tuple(_still(one, at, rpm) for at in range(len(one.signals)))
     offset, spread = _twin_error(first.changed(power=powers), one, settled)
     return PartsModel(
-        signals=one.signals, tick_s=one.tick_s, idle=idle, power=powers, heat=heat, twin_offset=offset, twin_spread=spread
+        signals=one.signals,
+        tick_s=one.tick_s,
+        idle=idle,
+        power=powers,
+        heat=heat,
+        twin_offset=offset,
+        twin_spread=spread,
+        still=still,
     )
 
 
@@ -70,6 +78,15 @@ def _idle(rpm: Floats, load: Floats, settled: NDArray[np.bool_]) -> tuple[tuple[
             most = max(most, float(np.quantile(own, IDLE_QUANTILE)))
             points.append((step * RPM_STEP, max(0.0, float(np.quantile(own, IDLE_QUANTILE)))))
     return tuple(points) or ((0.0, 0.0),)
+
+
+def _still(one: "Recorded", at: int, rpm: Floats) -> float:
+    """Return the quantity of a vibration while the spindle stands; 0 of other signals."""
+    name = one.signals[at]
+    known = ~one.gated & (rpm < TURNS_RPM_MIN) & ~np.isnan(one.values[:, at])
+    if kind_of(name) is not Kind.VIBRATION or not known.any():
+        return 0.0
+    return float(np.log(np.median(one.values[known, at]) + floor_of(name)))
 
 
 def _quantities(model: PartsModel, one: "Recorded", settled: NDArray[np.bool_]) -> Floats:
