@@ -11,7 +11,7 @@ which shares no code with the twin; a control tells of it once a second. Methods
     parts            cuts beside the same cut of earlier parts and beside the twin, less what peers share (twin/anomaly/parts)
     parts -part      no baseline of parts: beside the twin only;  -twin, -peers, -gates: without these
     features, own features, residual, source f, gate, plain, random, constant, vibration: benchmarks/scored/frames.py
-    ecod, loda, adwin, page_hinkley …: benchmarks/scored/detectors.py
+    hbos, pca, page: benchmarks/scored/detectors.py
 
 Size 1 of a fault is stated in benchmarks/simulated_cell/fault.py, and was before anything was judged. Seeds 1 to 3 were used to
 develop the methods; others are for reporting. Nothing is point-adjusted (benchmarks/evaluation).
@@ -20,7 +20,7 @@ develop the methods; others are for reporting. Nothing is point-adjusted (benchm
 import argparse
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from typing import NamedTuple
 
@@ -32,6 +32,7 @@ from benchmarks.scored.parts import ABLATIONS, judged_parts, recorded
 from benchmarks.scored.shown import sizes_shown
 from benchmarks.scored.table import details, row
 from benchmarks.simulated_cell.cell import draw_cell
+from benchmarks.simulated_cell.fault import SIZES
 
 METHODS = (*ABLATIONS, *by_frames.METHODS)
 FAST = ("1", "2,2,2")
@@ -93,9 +94,10 @@ def printed(machines: int, seeds: str, answers: Sequence[Answer], methods: Seque
 
 
 def print_sizes(seed: int) -> None:
-    """Print how big size 1 is beside what healthy parts do."""
-    shown = ", ".join(f"{kind} {size:.1f}" for kind, size in sizes_shown(seed).items())
-    print(f"size 1 in spreads of a pass from part to part, seed {seed}: {shown}")
+    """Print how big the sizes are beside what healthy parts do."""
+    for size in SIZES:
+        shown = ", ".join(f"{kind} {one.shown:.1f} ({one.sudden:.1f})" for kind, one in sizes_shown(seed, size).items())
+        print(f"size {size:g} in spreads of a pass from part to part (from the part before), seed {seed}: {shown}")
 
 
 def main() -> None:
@@ -109,7 +111,7 @@ def main() -> None:
     asked.add_argument("--parts", action="store_true", help="also by kind of fault, and by occasion")
     asked.add_argument("--jobs", type=int, default=1)
     asked.add_argument("--fast", action="store_true", help="seed 1, four machines, two days each")
-    asked.add_argument("--sizes", action="store_true", help="print only how big size 1 is")
+    asked.add_argument("--sizes", action="store_true", help="print only how big the sizes are")
     given = asked.parse_args()
     if given.fast:
         given.seeds, given.days = FAST
@@ -127,10 +129,22 @@ def main() -> None:
         ]
         if given.jobs > 1:
             with ProcessPoolExecutor(given.jobs) as pool:
-                answers = list(pool.map(answer, cells))
+                answers = list(_told(pool.map(answer, cells), cells))
         else:
-            answers = [answer(one) for one in cells]
+            answers = list(_told(map(answer, cells), cells))
         printed(machines, given.seeds, answers, methods, has_parts=given.parts)
+
+
+def _told(answers: Iterable[Answer], cells: Sequence[Asked]) -> Iterator[Answer]:
+    """Tell on the error stream of each cell that is judged: hits of all faults, and false alerts."""
+    for asked, found in zip(cells, answers, strict=True):
+        for method, parts in found.judged.items():
+            hits, every = (
+                sum(figures) for figures in zip(*((one.detections.hits, len(one.faults)) for one in parts), strict=True)
+            )
+            false = sum(one.detections.false for one in parts)
+            print(f"seed {asked.seed}: {method} {hits} of {every}, {false} false, {found.took_s[method]:.0f} s", file=sys.stderr)
+        yield found
 
 
 if __name__ == "__main__":

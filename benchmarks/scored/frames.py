@@ -9,7 +9,7 @@ features         smoothed features, what peers share subtracted feature by featu
 random, constant, vibration: what a detector has to beat
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.evaluation.baselines import constant_score, one_feature_score, random_score
+from benchmarks.scored.detectors import SCORES
 from benchmarks.scored.judged import FRAME_S, Judged, alarms_of, outcome, threshold_of
 from benchmarks.simulated_cell.cell import Cell, machine_readings
 from benchmarks.simulated_cell.schedule import DAY_S, Schedule
@@ -45,7 +46,8 @@ FOREST = Detector(parameters={"n_estimators": 100})
 class Frames:
     """A cell at each frame. (T, N), or (T, N, F).
 
-    plain, usual: forest's score of the signals as they are, and beside what is usual; smooth, last: smoothed features
+    plain, usual: forest's score of the signals as they are, and beside what is usual; beside: those signals
+    smooth, last: smoothed features, and when each was last told of
     shut: gated; judged: not gated, the spindle turns in a regime that was learned; train, calibrate, judge: frames of the weeks
     """
 
@@ -53,6 +55,7 @@ class Frames:
     plain: Floats
     usual: Floats
     vibration: Floats
+    beside: Floats
     smooth: Floats
     last: NDArray[np.int64]
     shut: Flags
@@ -70,10 +73,10 @@ def framed(cell: Cell, days: tuple[int, int, int]) -> Frames:
     train, calibrate, judge = (slice(start, end) for start, end in zip([0, *ends[:-1]], ends, strict=True))
     machines = [_machine(cell, place, days[0] * DAY_S) for place in range(len(cell.machines))]
     columns = (np.stack(column, axis=1) for column in zip(*(arrays for arrays, _ in machines), strict=True))
-    plain, usual, vibration, smooth, last, shut, judged = columns
+    plain, usual, vibration, beside, smooth, last, shut, judged = columns
     ticks = np.arange(len(plain), dtype=np.int64) * FRAME_S + FRAME_S - 1
     preparations = tuple(preparation for _, preparation in machines)
-    return Frames(cell, plain, usual, vibration, smooth, last, shut, judged, ticks, preparations, train, calibrate, judge)
+    return Frames(cell, plain, usual, vibration, beside, smooth, last, shut, judged, ticks, preparations, train, calibrate, judge)
 
 
 def _machine(cell: Cell, place: int, train_s: int) -> tuple[list[NDArray[Any]], Preparation]:
@@ -94,7 +97,7 @@ def _machine(cell: Cell, place: int, train_s: int) -> tuple[list[NDArray[Any]], 
         for part, mask in ((plain, ~shut), (beside, ~shut & judged))
     ]
     vibration = one_feature_score(plain[:, 4], plain[learned, 4])
-    return [*scores, vibration, smooth[at], last[at], shut[at], (judged & ~shut)[at]], usual
+    return [*scores, vibration, beside, smooth[at], last[at], shut[at], (judged & ~shut)[at]], usual
 
 
 def regimes(schedule: Schedule, rows: Floats) -> tuple[NDArray[np.int64], list[str]]:
@@ -122,6 +125,10 @@ def adjusted(frames: Frames, method: str) -> tuple[Floats, Flags]:
         return adjust_frames(CommonModeRule(Method.RESIDUAL), _standardised(frames), idle)[0], idle
     if method in ("features", "own features"):
         return _lengths(frames, method == "features"), idle
+    if method in SCORES:
+        every = range(frames.usual.shape[1])
+        found = [SCORES[method](frames.beside[:, place], idle[:, place], frames.train) for place in every]
+        return np.stack(found, axis=1), idle
     shape, rng = frames.usual.shape, np.random.default_rng(frames.cell.seed)
     others: dict[str, Callable[[], tuple[Floats, Flags]]] = {
         "plain": lambda: (frames.plain, frames.shut),
@@ -135,6 +142,7 @@ def adjusted(frames: Frames, method: str) -> tuple[Floats, Flags]:
 
 METHODS = (
     *("plain", "gate", "source .5", "source .8", "source .5 sound", "source .8 sound", "residual", "own features", "features"),
+    *SCORES,
     *("random", "constant", "vibration"),
 )
 
@@ -175,5 +183,5 @@ def judged(frames: Frames, method: str, alerts_per_week: float = 1.0) -> list[Ju
         on = alarms_of(threshold, own, idle)
         from_s = frames.judge.start * FRAME_S
         has_threshold = threshold is not None
-        results.append(outcome(frames.cell, place, from_s, FRAME_S, own, idle, on, has_threshold=has_threshold))
+        results.append(outcome(frames.cell, place, from_s, FRAME_S, scores=own, idle=idle, on=on, has_threshold=has_threshold))
     return results

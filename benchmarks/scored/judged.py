@@ -1,7 +1,7 @@
 """The outcome for one machine: what was found of its faults and when, which alerts were none, and what happened at the time.
 
-An occasion is no fault: an override turned by hand, a new program, the first part of a batch, a Monday's start, a disturbance that
-all feel. An alert within one is a false alert like any other, and counted by occasion.
+An occasion is no fault: an override turned by hand, a new program, the first part of a batch, a Monday's start, a disturbance
+that all feel. An alert within one is a false alert like any other, and counted by occasion.
 """
 
 from collections.abc import Callable, Sequence
@@ -76,7 +76,7 @@ def alarms_of(threshold: float | None, scores: Floats, idle: Flags) -> Flags:
 
 
 def outcome(
-    cell: Cell, place: int, from_s: int, tick_s: int, scores: Floats, idle: Flags, on: Flags, *, has_threshold: bool
+    cell: Cell, place: int, from_s: int, tick_s: int, *, scores: Floats, idle: Flags, on: Flags, has_threshold: bool
 ) -> Judged:
     """What came of a machine from `from_s` on: scores, where they do not count, and alarms, (T,), a row each tick_s."""
     faults = [fault for fault in cell.faults if fault.machine == place]

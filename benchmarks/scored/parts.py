@@ -1,7 +1,7 @@
 """Cuts beside the same cut of earlier parts and beside the twin, by the functions that the stream has (twin/anomaly/parts).
 
-Models learn on week A, thresholds are fitted on the scores of week B, week C is judged, each week second by second from a state
-that knows what training learned. The twin works out its expectation from the program's text and the machine's statement.
+Models learn on week A, thresholds are fitted on the scores of week B, week C is judged, second by second, and goes on from the
+state at the end of week B. The twin works out its expectation from the program's text and the machine's statement.
 """
 
 from collections.abc import Sequence
@@ -117,16 +117,16 @@ def judged_parts(
         for place in range(len(recordings))
     ]
     rules = [None if limit is None else AlarmRule(limit, DWELL, CLEAR) for limit in limits]
-    after = replayed(models, of(2), rules, ablation)
+    after = replayed(models, of(2), rules, ablation, before.owns)
     return [
         outcome(
             cell,
             place,
             starts[2] * TICK_S,
             TICK_S,
-            after.scores[:, place],
-            after.is_idle[:, place],
-            after.is_alarm[:, place],
+            scores=after.scores[:, place],
+            idle=after.is_idle[:, place],
+            on=after.is_alarm[:, place],
             has_threshold=limits[place] is not None,
         )
         for place in range(len(recordings))

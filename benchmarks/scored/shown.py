@@ -1,19 +1,21 @@
-"""The size of the faults beside what healthy parts do: the change by size 1 over the spread of the same pass from part to part.
+"""The size of the faults beside what healthy parts do: the change over the spread of the same pass from part to part.
 
     shown = median over passes of  |mean of the pass with the fault − without| / robust spread of the mean of the pass
+    sudden = the same over the spread of its difference from the part before, which batch and wear hardly move
 
-of passes at full feed; bursts count as if they lasted, a dulling tool with a wear of 4. A pass lasts 5 to 20 s.
+of passes at full feed, where the whole arc cuts; bursts count as if they lasted, a dulling tool with a wear of 4.
+A pass lasts 5 to 20 s.
 """
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.simulated_cell.cell import Cell, draw_cell, machine_readings
 from benchmarks.simulated_cell.fault import ONE_TOOL, PLANTED, Fault, FaultKind, Overlap
-from benchmarks.simulated_cell.part_program import Work
-from benchmarks.simulated_cell.schedule import DAY_S, Schedule
+from benchmarks.simulated_cell.schedule import DAY_S, Schedule, has_whole_arc
 from benchmarks.simulated_cell.signals import FEATURES
 
 Floats = NDArray[np.float64]
@@ -37,21 +39,28 @@ SHOWN = {
 """The signal that shows a kind most."""
 
 
-def sizes_shown(seed: int) -> dict[str, float]:
-    """Return how many spreads size 1 of each kind is, on one machine in three days."""
+class Shown(NamedTuple):
+    """Spreads from part to part, and from the part before."""
+
+    shown: float
+    sudden: float
+
+
+def sizes_shown(seed: int, size: float) -> dict[str, Shown]:
+    """Return how many spreads a size of each kind is, on one machine in three days."""
     cell = draw_cell(seed, 1, DAYS, DAYS)
     healthy, own = machine_readings(cell, 0).rows, cell.schedules[0]
-    return {kind.value: _shown(cell, own, healthy, kind) for kind in PLANTED}
+    return {kind.value: _shown(cell, own, healthy, kind, size=size) for kind in PLANTED}
 
 
-def _shown(cell: Cell, own: Schedule, healthy: Floats, kind: FaultKind) -> float:
+def _shown(cell: Cell, own: Schedule, healthy: Floats, kind: FaultKind, *, size: float) -> Shown:
     """A fault of one tool is put on each tool in turn, but that of a tool that is too long, which is on the one it is on."""
-    signal, found = FEATURES.index(SHOWN[kind]), []
+    signal, found = FEATURES.index(SHOWN[kind]), [Shown(np.nan, np.nan)]
     for tool in _tools(own, kind):
-        fault = Fault(0, kind, 1.0, 0.0, float(DAYS * DAY_S), Overlap.NONE, tool=tool)
+        fault = Fault(0, kind, size, 0.0, float(DAYS * DAY_S), Overlap.NONE, tool=tool)
         broken = machine_readings(replace(cell, faults=(fault,)), 0).rows
         found += _by_pass(own, healthy[:, signal], broken[:, signal], _operations(own, kind, tool))
-    return float(np.median(found)) if found else float("nan")
+    return Shown(*np.nanmedian(np.array(found), axis=0).tolist()) if len(found) > 1 else found[0]
 
 
 def _tools(own: Schedule, kind: FaultKind) -> list[int]:
@@ -69,9 +78,9 @@ def _operations(own: Schedule, kind: FaultKind, tool: int) -> NDArray[np.bool_]:
     return np.array([bool(one.cuts) and tool in (0, one.tool) and (one.is_wet or not needs_coolant) for one in own.operations])
 
 
-def _by_pass(own: Schedule, healthy: Floats, broken: Floats, operations: NDArray[np.bool_]) -> list[float]:
+def _by_pass(own: Schedule, healthy: Floats, broken: Floats, operations: NDArray[np.bool_]) -> list[Shown]:
     """Change over spread of each pass that is repeated."""
-    wanted = (own.work == Work.CUTTING) & (own.feed_override_pct == FULL_PCT) & operations[own.operation]
+    wanted = has_whole_arc(own) & (own.feed_override_pct == FULL_PCT) & operations[own.operation]
     at = np.flatnonzero(wanted)
     stretches, first, which, count = np.unique(own.stretch[at], return_index=True, return_inverse=True, return_counts=True)
     before, after = (np.bincount(which, weights=values[at]) / count for values in (healthy, broken))
@@ -80,7 +89,13 @@ def _by_pass(own: Schedule, healthy: Floats, broken: Floats, operations: NDArray
     for one in np.unique(line):
         passes = line == one
         if passes.sum() >= PASSES_MIN and len(stretches):
-            low, high = np.percentile(before[passes], [25, 75])
-            spread = max((high - low) / 1.349, SPREAD_LEAST * abs(float(np.median(before[passes]))), 1e-9)
-            found.append(abs(float(np.median(after[passes] - before[passes]))) / spread)
+            least = max(SPREAD_LEAST * abs(float(np.median(before[passes]))), 1e-9)
+            change = abs(float(np.median(after[passes] - before[passes])))
+            shown, sudden = (change / max(_spread(values), least) for values in (before[passes], np.diff(before[passes])))
+            found.append(Shown(shown, sudden))
     return found
+
+
+def _spread(values: Floats) -> float:
+    low, high = np.percentile(values, [25, 75])
+    return float(high - low) / 1.349

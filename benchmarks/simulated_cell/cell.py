@@ -107,7 +107,7 @@ def _plant(
             turns += 1
             earliest = day * DAY_S + SHIFTS_S[0] + 3600 + slot * slot_s
             lasts_s = float(rng.uniform(*LASTS_S[kind]))
-            start_s = _start(schedules, place, (earliest, earliest + slot_s - lasts_s - 900, lasts_s), kind, overlap, rng)
+            start_s = _start(schedules, place, (earliest, earliest + slot_s - lasts_s - 900, lasts_s), kind, overlap, rng=rng)
             size = 1.0 if kind is FaultKind.BROKEN_TOOL else float(rng.choice(SIZES))
             fault = Fault(place, kind, size, start_s, start_s + lasts_s, overlap)
             fault = _completed(fault, schedules[place], rng)
@@ -136,6 +136,7 @@ def _start(
     within_s: tuple[float, float, float],
     kind: FaultKind,
     overlap: Overlap,
+    *,
     rng: np.random.Generator,
 ) -> float:
     """When the fault begins: so that the machine cuts in enough of its time; within a tool change, where that is asked for.

@@ -7,16 +7,19 @@
 | spindle_heat | 12 K | over 15 min | 60 to 80 min |
 | feed_mismatch | half the feed at the same load in the cut | at once | 6 to 15 min |
 | intermittent | vibration × 2.5 and load × 1.25 in bursts of 30 to 60 s, each 2 to 4 min, in the cut | at once | 25 to 40 min |
-| dulling_tool | one tool wears 15 times as fast: by 15 parts of 40 in 8 min; wear of 1 = edge force × 2, coefficient × 1.05 | slowly | 50 to 90 min |
+| dulling_tool | one tool wears 15 times as fast: as by 15 parts in 8 min | slowly | 50 to 90 min |
 | broken_insert | one tooth of one tool is 0.1 mm short | at once | 20 to 40 min |
 | broken_tool | one tool cuts nothing, from one second to the next; it has no other size | at once | 8 to 15 min |
-| tool_too_long | one tool cuts 0.4 mm deeper than its 0.5 to 3 mm: the one that cuts least deep | at once | 20 to 40 min |
-| wrong_material | coefficient and edge force × 1.3, from the beginning of a part to the end of it or of the next | at once | 1 or 2 parts |
-| coolant_off | nothing flows though the control says so: coefficient × 1.2 in wet operations, no cooling by it | at once | 20 to 40 min |
-| worn_bearing | idle power × 1.3 and vibration × 1.5 while the spindle turns; judged apart, as of the scale of weeks | over days | 4 to 6 days |
+| tool_too_long | one tool cuts 0.4 mm deeper: the one that cuts least deep, 0.3 to 3 mm | at once | 20 to 40 min |
+| wrong_material | coefficient and edge force × 1.3, from the beginning of a part on | at once | 1 or 2 parts |
+| coolant_off | nothing flows though the control says so: wet cuts × 1.2 in coefficient and edge force | at once | 20 to 40 min |
+| worn_bearing | idle power × 1.3, vibration × 1.5 while it turns; judged apart | over days | 4 to 6 days |
 
+The life of a tool is 40 parts. It doubles the force of the edge and raises the coefficient by 5 %; a dulling tool goes on to four
+lives.
 Size s: factors to the power s (a feed of 1 / (1 + s)); temperatures, lengths and the rate of wear times s; coolant that flows
-1 − min(s, 1). Judged at the sizes 0.5, 1 and 2; the headline is 1.
+1 − min(s, 1). Judged at the sizes 0.5, 1 and 2; the headline is 1. A worn bearing is judged by itself,
+on the scale of weeks.
 """
 
 from dataclasses import dataclass

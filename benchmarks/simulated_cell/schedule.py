@@ -142,6 +142,14 @@ def rows_of(machine: Machine, operations: Sequence[Operation]) -> tuple[Rows, li
     return Rows(columns[0].astype(np.int32), columns[1], columns[2], columns[3].astype(np.int32), *columns[4:]), first
 
 
+def has_whole_arc(own: Schedule) -> NDArray[np.bool_]:
+    """Return the seconds in which a pass cuts with the whole of its arc: neither entering nor leaving the stock."""
+    lines, line = own.lines, own.line
+    gone = lines.length_mm[line] * own.since_s / own.lasts_s[own.stretch]
+    lead, leaves = lines.lead_mm[line], lines.lead_mm[line] + lines.stock_mm[line] - lines.reach_mm[line]
+    return np.asarray((own.work == Work.CUTTING) & (gone > lead) & (gone < leaves))
+
+
 def draw_schedule(machine: Machine, days: int, rng: np.random.Generator, new_from_day: int | None = None) -> Schedule:
     """The work of the machine in `days` days, from Monday 0 o'clock on; the last program is new on `new_from_day`."""
     operations = (*WARM_UP, *(operation for program in machine.programs for operation in program.operations))
@@ -203,7 +211,7 @@ def _part(
             stretches.hands_s.append((begins_s, begins_s + lasts_s))
         wear = shop.worn[operations[place].tool] / LIFE_PARTS
         span = slice(shop.first_line[place], shop.first_line[place + 1])
-        stretches.many(_cut(stretches, shop, lines, span, place, (override, material, wear, chatter)))
+        stretches.many(_cut(stretches, shop, lines, span, place, drawn=(override, material, wear, chatter)))
     for tool in {operations[place].tool for place in range(first, first + len(machine.programs[program].operations))}:
         shop.worn[tool] = (shop.worn[tool] + 1) % LIFE_PARTS
     stretches.parts.append(Part(program, shop.made[program], started_s, stretches.now_s, is_first))
@@ -211,7 +219,7 @@ def _part(
 
 
 def _cut(
-    stretches: _Stretches, shop: _Shop, lines: Rows, span: slice, place: int, drawn: tuple[float, float, float, float]
+    stretches: _Stretches, shop: _Shop, lines: Rows, span: slice, place: int, *, drawn: tuple[float, float, float, float]
 ) -> Floats:
     """The lines of an operation as stretches: (8, n)."""
     override, material, wear, chatter = drawn

@@ -79,7 +79,7 @@ def readings(
     warm = heat.temperature_c(machine.heat, 1.0, air_c[0], rated * power_kw, rpm, air_c, coolant_on * broken["flow"])
     temp = warm + broken["temp_k"] + rng.normal(0.0, 0.08, ticks)
     steady = np.where(is_turning, broken["turning_vibration"], 1.0) * np.where(is_cutting, broken["cut_vibration"], 1.0)
-    vibration = _vibration(machine, schedule, rpm, cut, tool, rng) * steady
+    vibration = _vibration(machine, schedule, rpm, cut, tool, rng=rng) * steady
     shaken = (felt[Kind.FORKLIFT] + felt[Kind.PRESS]) * np.exp(_alike(ticks, 0.5, 0.15, rng))
     vibration = np.hypot(vibration, shaken)
     rounded = (np.round(load), np.round(rpm), np.round(feed), np.round(temp, 1), np.round(vibration, 3))
@@ -125,7 +125,7 @@ def _cut(machine: Machine, schedule: Schedule, rpm: Floats, harder: Floats, brok
     for start, stop, tool, chipped_mm in broken.chipped:
         own = np.flatnonzero((at >= start) & (at < stop) & (schedule.tool_number[at] == tool))
         some = (chip[own], edge[own])
-        power_w[own], force2[own] = _of_passes(machine, schedule, lines.cut[line][own], g[own], some, (tool, chipped_mm))
+        power_w[own], force2[own] = _of_passes(machine, schedule, lines.cut[line][own], g[own], some, chipped=(tool, chipped_mm))
     found.share[at], found.feed[at] = whole, feed
     found.power_kw[at] = 0.001 * power_w * turns * whole
     found.force_n[at] = np.sqrt(np.maximum(force2, 0.0)) * whole * schedule.chatter[stretch]
@@ -138,6 +138,7 @@ def _of_passes(
     rows: NDArray[np.integer],
     g: Floats,
     scales: tuple[Floats, Floats],
+    *,
     chipped: tuple[int, float] = (0, 0.0),
 ) -> tuple[Floats, Floats]:
     """Power, W, and variance of the force, N², of passes at feeds g, in steps of the grid; scales: of chip and edge."""
@@ -191,7 +192,7 @@ def weather(ticks: int, rng: np.random.Generator) -> Floats:
 
 
 def _vibration(
-    machine: Machine, schedule: Schedule, rpm: Floats, cut: _Cut, tool: NDArray[np.integer], rng: np.random.Generator
+    machine: Machine, schedule: Schedule, rpm: Floats, cut: _Cut, tool: NDArray[np.integer], *, rng: np.random.Generator
 ) -> Floats:
     ticks = len(rpm)
     turning = STILL_G + 0.05 * (rpm / 10000.0) ** 1.5

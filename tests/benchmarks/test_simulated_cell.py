@@ -12,7 +12,7 @@ from benchmarks.simulated_cell.cell import Cell, draw_cell, machine_readings
 from benchmarks.simulated_cell.fault import ONE_TOOL, PLANTED, SIZES, Fault, FaultKind, Overlap
 from benchmarks.simulated_cell.machine import of_pass
 from benchmarks.simulated_cell.part_program import Cut, Sense, Work
-from benchmarks.simulated_cell.schedule import DAY_S, KNOWN_PROGRAMS
+from benchmarks.simulated_cell.schedule import DAY_S, KNOWN_PROGRAMS, has_whole_arc
 from benchmarks.simulated_cell.signals import FEATURES, Readings
 from cnctwin.standins.reference_machine.milling import CutPhysics
 
@@ -83,7 +83,8 @@ def test_the_twin_reads_in_a_program_what_the_cell_cuts(cell: Cell) -> None:
                 if run is None or line.cut < 0:
                     continue
                 cut = operation.cuts[line.cut]
-                assert (run.tool, run.length_mm) == (operation.tool, pytest.approx(line.length_mm, abs=0.01))
+                assert run.tool == operation.tool
+                assert run.length_mm == pytest.approx(line.length_mm, abs=0.01)
                 removed = cut.depth_mm * cut.width_mm * line.feed_mm_min
                 force_n = tool.tangential_n_per_mm2 * removed / (np.pi * tool.diameter_mm * operation.rpm)
                 most = max(stretch.forces_n[-1] / (3.0 if len(stretch.forces_n) > 1 else 1.0) for stretch in run.stretches)
@@ -110,11 +111,8 @@ def broken_for(cell: Cell, kind: FaultKind, size: float, tool: int, bursts: bool
 def cut_by(cell: Cell, tool: int = 0) -> Flags:
     """The seconds of the last day in which the first machine cuts with the whole arc, by a tool where it is given."""
     own = cell.schedules[0]
-    lines, line = own.lines, own.line
-    gone = lines.length_mm[line] * own.since_s / own.lasts_s[own.stretch]
-    is_whole = (gone > lines.lead_mm[line]) & (gone < lines.lead_mm[line] + lines.stock_mm[line] - lines.reach_mm[line])
-    later = np.arange(len(line)) > 2 * DAY_S
-    return np.asarray((own.work == Work.CUTTING) & later & is_whole & ((tool == 0) | (own.tool_number == tool)))
+    later = np.arange(len(own.work)) > 2 * DAY_S
+    return np.asarray(has_whole_arc(own) & later & ((tool == 0) | (own.tool_number == tool)))
 
 
 def factor(kind: FaultKind, cell: Cell, healthy: Readings, signal: int, tool: int, idle: float = 0.0) -> float:
