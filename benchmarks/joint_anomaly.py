@@ -2,6 +2,10 @@
 """How much of one core the joint anomaly score of 1,000 machines at 10 Hz takes: engine, model, gate and common mode.
 
     .venv/bin/python benchmarks/joint_anomaly.py [--machines N] [--cell N] [--seconds S] [--json]
+    .venv/bin/python benchmarks/joint_anomaly.py --parts [--machines N] [--cell N] [--seconds S] [--json]
+
+With `--parts` cuts are compared with cuts, the default of the processor: ticks of a second, five signals, a part of 240 s with
+four tools and 24 lines (benchmarks/milled_parts.py). Twenty-four machines for twelve minutes.
 
 Every machine has an Isolation Forest of 200 trees on five features in a place of its own in memory (eight are trained, the others
 are copies, which cost the same), and reports all five ten times a second, always other values.
@@ -22,6 +26,7 @@ from typing import Any
 import numpy as np
 from sklearn.ensemble import IsolationForest
 
+from benchmarks.milled_parts import PART_S, model_of_parts, recorded, rows_of
 from processors.actions import Action, Publish
 from processors.config import Configuration
 from processors.contract import Output
@@ -36,6 +41,7 @@ from sparkplug.metric import Change, NodeId, Reading
 from sparkplug.quality import Quality
 from twin.anomaly.detector import flattened
 from twin.anomaly.model import AnomalyModel
+from twin.anomaly.parts.replay import replayed
 from twin.forest.forest import forest_of_arrays
 from twin.forest.isolation import IsolationScorer
 
@@ -133,6 +139,54 @@ def measure(machines: int, cell: int, seconds: float) -> dict[str, Any]:
     }
 
 
+def measure_parts(machines: int, cell: int, seconds: float) -> dict[str, Any]:
+    """CPU time for each tick of a machine whose parts are compared: of the whole, and of an engine whose fold does nothing."""
+    names = [f"m{i}" for i in range(machines)]
+    learned = model_of_parts()
+    cells = {f"c{i}": names[i : i + cell] for i in range(0, len(names), cell)}
+    table, models = {"cells": cells, "threshold": 5.0}, dict.fromkeys(names, learned)
+    configuration = Configuration(Config, table, name="joint_anomaly", reads=lambda config: scorings(config, models))
+    whole, empty = (
+        Engine(replace(PROCESSOR, step=step), configuration, machines_max=machines) for step in (PROCESSOR.step, nothing)
+    )
+    parts = [rows_of(place, 1 + round(seconds) // PART_S) for place in range(machines)]
+    times: list[tuple[float, float]] = []
+    for second in range(round(seconds)):
+        kind, at_ms = EventKind.DATA if second else EventKind.BIRTH, START_MS + 1000 * second + 500
+        said = [(name, parts[place][(second + 7 * place) % len(parts[place])]) for place, name in enumerate(names)]
+        events = [
+            HostEvent(kind, NodeId("cnc", name), name, at_ms, tuple(_told(key, value, at_ms) for key, value in row.items()))
+            for name, row in said
+        ]
+        at_s = [time.process_time()]
+        for engine_now in (whole, empty):
+            for event in events:
+                engine_now.feed(event, 0.0)
+            at_s.append(time.process_time())
+        times.append((at_s[1] - at_s[0], at_s[2] - at_s[1]))
+    late = times[len(times) // 3 :]  # the first part is new to nobody, but births and caches are not what is measured
+    if whole.counts.dead_letters:
+        raise SystemExit(f"{whole.counts.dead_letters} dead letters")
+    whole_us, empty_us = (1e6 * sum(each) / len(late) / machines for each in zip(*late, strict=True))
+    assert learned.parts is not None
+    rows, at_s = recorded(machines, 4), [time.process_time()]
+    replayed([learned.parts], [rows])
+    scores_us = 1e6 * (time.process_time() - at_s[0]) / len(rows.values)
+    return {
+        "machines": machines,
+        "cell": cell,
+        "us_of_the_scores": round(scores_us, 1),
+        "us_a_machine_tick": round(whole_us, 1),
+        "us_of_the_empty_engine": round(empty_us, 1),
+        "us_of_the_fold": round(whole_us - empty_us, 1),
+        "snapshot_kb_a_machine": round(len(whole.snapshot("c0")) / 1000 / min(cell, machines), 1),
+    }
+
+
+def _told(name: str, value: Any, at_ms: int) -> Reading:
+    return Reading(name, value, at_ms, Quality.GOOD, None, None, False)
+
+
 def later(event: HostEvent) -> tuple[Reading, ...]:
     """The same, a tick later."""
     return tuple(reading._replace(timestamp_ms=reading.timestamp_ms + TICK_MS) for reading in event.readings)
@@ -148,21 +202,40 @@ def nothing(config: Configuration[Config], state: State, sample: Sample) -> tupl
     return state, ()
 
 
+def _print_parts(given: argparse.Namespace) -> None:
+    for cell in given.cell or [1, 4, 12]:
+        found = measure_parts(given.machines or 24, cell, given.seconds or 3.0 * PART_S)
+        if given.json:
+            print(json.dumps(found))
+        else:
+            fold_us, empty_us, scores_us = (found[f"us_of_the_{what}"] for what in ("fold", "empty_engine", "scores"))
+            print(
+                f"parts, {found['machines']} machines at 1 Hz in cells of {cell}: {fold_us:.1f} µs a machine tick over an engine with "
+                f"an empty fold ({empty_us:.1f} µs), of which the scores alone {scores_us:.1f} µs; "
+                f"a snapshot has {found['snapshot_kb_a_machine']:.1f} kB a machine"
+            )
+
+
 def main() -> None:
     """Print a line for each size of cell."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--machines", type=int, default=1000)
+    parser.add_argument("--machines", type=int)
     parser.add_argument("--cell", type=int, action="append")
-    parser.add_argument("--seconds", type=float, default=6.0)
+    parser.add_argument("--seconds", type=float)
     parser.add_argument("--json", action="store_true")
+    parser.add_argument("--parts", action="store_true", help="compare cuts with cuts")
     given = parser.parse_args()
+    if given.parts:
+        _print_parts(given)
+        return
     for cell in given.cell or [4, 12, 50]:
-        found = measure(given.machines, cell, given.seconds)
+        machines = given.machines or 1000
+        found = measure(machines, cell, given.seconds or 6.0)
         if given.json:
             print(json.dumps(found))
         else:
             print(
-                f"{given.machines} machines at 10 Hz in cells of {cell}: {found['share_of_a_core']:.2f} of a core; "
+                f"{machines} machines at 10 Hz in cells of {cell}: {found['share_of_a_core']:.2f} of a core; "
                 f"{found['us_per_score']:.1f} µs a score, {found['times_the_empty_engine']:.1f} times an engine with an empty "
                 f"fold ({found['us_of_the_empty_engine']:.1f} µs); kernel {found['us_of_the_kernel']:.1f} µs"
             )

@@ -15,6 +15,7 @@ from cnctwin.commands.alerts import alerts_app
 from cnctwin.commands.demo import demo
 from cnctwin.commands.doctor import doctor
 from cnctwin.commands.edge import edge_app
+from cnctwin.commands.expect import expect
 from cnctwin.commands.gap import gap_app
 from cnctwin.commands.identify import identify
 from cnctwin.commands.import_recording import import_recording
@@ -64,6 +65,7 @@ app.command()(watch)
 app.command()(doctor)
 app.command()(process)
 app.command()(simulate)
+app.command()(expect)
 app.command()(identify)
 app.command("import")(import_recording)
 app.command()(record)

@@ -9,7 +9,6 @@ a replay knows which one was live when. A machine has one that is live, and at m
 
 import hashlib
 import json
-import re
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any, NamedTuple, Self
@@ -22,8 +21,6 @@ from twin.machine import MachineFile, machine_from_toml
 from twin.vocabulary import topics
 
 VERSION_DIGITS = 12
-ENDINGS = (".nc", ".mpf", ".spf", ".h", ".eia", ".min", ".tap", ".txt")
-_NUMBER = re.compile(r"[o:]?0*(\d+)")
 
 
 class Role(StrEnum):
@@ -34,7 +31,7 @@ class Role(StrEnum):
 
 
 Programs = dict[str, tuple[float, ...]]
-"""Name of a program (`program_key`) → the seconds of each of its sections between tool changes, as the twin plans them."""
+"""Key of a program (twin/vocabulary/program_names.py) → the seconds of each of its sections between tool changes, by the twin."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,18 +130,6 @@ def edition_of(version: str, programs: Programs) -> str:
     ('65e5121911d1', '65e5121911d1+af339d674746')
     """
     return f"{version}+{version_of(json.dumps(programs, sort_keys=True))}" if programs else version
-
-
-def program_key(name: str) -> str:
-    """Return the name under which a program is planned, of the name that a control tells or that its file has.
-
-    >>> program_key("/PRG/O01701"), program_key("O1701.nc"), program_key("PLATE-1.NC")
-    ('o1701', 'o1701', 'plate-1')
-    """
-    bare = name.strip().replace("\\", "/").rstrip("/").rpartition("/")[2].casefold()
-    stem = next((bare.removesuffix(ending) for ending in ENDINGS if bare.endswith(ending)), bare)
-    number = _NUMBER.fullmatch(stem)
-    return stem if number is None else f"o{number[1]}"
 
 
 def topic_of(machine: str, role: Role) -> str:

@@ -26,7 +26,7 @@ USE_S_MIN = 20
 """A fault of one tool begins where that tool goes on cutting for so long."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Cell:
     """seed: of everything in it. Faults are planted from `faults_from_day` on."""
 
@@ -166,11 +166,13 @@ def _begins(kind: FaultKind, own: Schedule, part: slice, overlap: Overlap) -> ND
         begins = np.zeros(len(own.work), dtype=np.bool_)
         begins[[int(one.start_s) + 1 for one in own.parts]] = True
         return begins[part]
-    if kind not in ONE_TOOL:
+    if kind not in ONE_TOOL and kind is not FaultKind.COOLANT_OFF:
         return None
+    wet = np.array([one.is_wet for one in own.operations])
     depths = np.array([min((cut.depth_mm for cut in one.cuts), default=np.inf) for one in own.operations])
     least = np.array([depths[own.program_of == program].min() for program in own.program_of])
     fits = np.isfinite(depths) & ((depths <= least) | (kind is not FaultKind.TOOL_TOO_LONG))
+    fits &= wet | (kind is not FaultKind.COOLANT_OFF)
     operation = own.operation[part]
     fitting = (operation >= 0) & fits[operation]
     if overlap is Overlap.OWN_CHANGE:

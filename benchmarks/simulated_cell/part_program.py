@@ -165,7 +165,7 @@ class _Writer:
         depth = round(float(np.clip(removed / (width * feed), *sort.depth_mm)), 2)
         one_s = 60.0 * (self.length_mm + tool.diameter_mm + 2.0 * BESIDE_MM) / feed
         passes = max(2, round(_drawn(rng, sort.duration_s) / one_s))
-        is_wet = bool(rng.random() < 0.6)
+        is_wet = bool(rng.random() < 0.6) or not self.operations
         first = self.word(f"T{number} M6")
         self.word(f"S{rpm:.0f} M3")
         self.word("M8" if is_wet else "M9")

@@ -18,12 +18,13 @@ from cnctwin.processes.port import is_free
 from cnctwin.processes.private_broker import PrivateBroker
 from cnctwin.standins.simulated_machine import description
 from cnctwin.standins.simulated_machine.anomaly_model import place_model
+from cnctwin.standins.simulated_machine.expectation import place_expectation
 from cnctwin.standins.simulated_machine.hidden_effect import RANDOM, choice_of
 from sparkplug.errors import TopicError
 from sparkplug.topics import check_id
 from twin.vocabulary.nodes import HISTORIAN_NODE
 
-PROCESSORS = ("thermal", "cutting_force", "gap", "rules", "joint_anomaly", "alerts", "events", "mirror", "historian")
+PROCESSORS = ("thermal", "cutting_force", "expected", "gap", "rules", "joint_anomaly", "alerts", "events", "mirror", "historian")
 START_S_MAX = 15.0
 PAGE_PORT = 8080
 NONE = "none"
@@ -199,12 +200,14 @@ class Demo:
         return folder
 
     def _as_described(self) -> str:
-        """Return the processors' settings for the simulated machine, and for the model of its scores."""
+        """Return the processors' settings for the simulated machine, for its program, and for the model of its scores."""
         settings = description.PROCESSORS.read_text() + _LOOP_TOML.format(
             diagnose="by_itself" if self.options.diagnose is ByItself.BY_ITSELF else "by_hand",
             promote="by_rule" if self.options.promote is ByItself.BY_ITSELF else "by_hand",
         )
-        return settings + place_model(self._folder / "models", self.machine)
+        folder = self._folder / "expectations"
+        expected = place_expectation(folder, self.machine)
+        return settings + expected + place_model(self._folder / "models", self.machine, folder)
 
     def _agent(self) -> list[str]:
         """The command that stands in for the control."""

@@ -123,18 +123,22 @@ def _changes(run: RunLog) -> int:
     return int((np.diff(active[np.isfinite(active)]) > 0.0).sum())
 
 
+_RENAMED = {"nc_line": "line"}
+
+
 class _Moment(NamedTuple):
     at_s: float
     told: dict[str, EdgeSample]
 
 
 def _run(moments: Sequence[_Moment], source: str) -> RunLog:
-    names = {name for moment in moments for name in moment.told} & (COLUMNS | TEXT_COLUMNS)
+    told = {name for moment in moments for name in moment.told}
+    names = {column: name for name in told if (column := _RENAMED.get(name, name)) in COLUMNS | TEXT_COLUMNS}
     columns: dict[str, NDArray[np.generic]] = {"t_s": np.array([moment.at_s for moment in moments]) - moments[0].at_s}
-    for name in sorted(names):
-        empty = None if name in TEXT_COLUMNS else math.nan
-        values = np.array([_value(moment.told.get(name), empty) for moment in moments], dtype=object)
-        columns[name] = values if name in TEXT_COLUMNS else values.astype(np.float64)
+    for column in sorted(names):
+        empty = None if column in TEXT_COLUMNS else math.nan
+        values = np.array([_value(moment.told.get(names[column]), empty) for moment in moments], dtype=object)
+        columns[column] = values if column in TEXT_COLUMNS else values.astype(np.float64)
     return run_log(columns, source)
 
 

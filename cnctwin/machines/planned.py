@@ -11,10 +11,11 @@ from cnctwin.files.program_folder import ProgramFolder
 from cnctwin.files.program_text import read_text
 from cnctwin.machines import disk
 from cnctwin.machines.folder import MachineFolder
-from processors.description import Programs, program_key
+from processors.description import Programs
 from processors.description_folder import PROGRAMS
 from twin.errors import TwinError
 from twin.machine import MachineFile
+from twin.vocabulary.program_names import program_key
 
 SECONDS_DIGITS = 3
 

@@ -12,10 +12,11 @@ from processors.alerts.state import ALERTS_MAX, Alert, AlertsState, Phase, Sever
 from processors.config import Configuration
 from sparkplug.metric import Reading
 from sparkplug.quality import Quality
-from twin.vocabulary.twin_signals import SEVERITY, TWIN_PREFIX
+from twin.anomaly.parts.words import in_words
+from twin.vocabulary.twin_signals import ANOMALY_ALARM, ANOMALY_WHY, SEVERITY, TWIN_PREFIX
 
 PROGRAM, TOOL = "program", "tool_number"
-INPUTS = frozenset({*NAMED, SEVERITY, PROGRAM, TOOL})
+INPUTS = frozenset({*NAMED, SEVERITY, PROGRAM, TOOL, ANOMALY_WHY})
 SEEN_S_MAX = 5.0  # of one beat: what lies between two that are further apart was not watched
 RESOLVED_SHOWN_S = 3600.0
 MACHINES_MAX = 2000
@@ -66,7 +67,7 @@ def watched(configuration: Configuration[AlertsConfig], state: AlertsState, cell
             if before is None or before.phase is not alert.phase:
                 alert = replace(alert, context=one.context)
         elif alert is not None and (before is None or before.episode != alert.episode):
-            alert = replace(alert, context=_context(cell.get(one.machine, {})))
+            alert = replace(alert, context=_context(one.signal, cell.get(one.machine, {})))
         if alert is not None and _is_remembered(alert, state, beat, config):
             alerts[alert.fingerprint] = alert
     for left in known.values():  # neither its machine nor its rule is known any more
@@ -183,11 +184,14 @@ def _says_high(reading: Reading | None) -> bool:
     return reading is not None and reading.quality is Quality.GOOD and reading.value == Severity.HIGH.value
 
 
-def _context(row: Row) -> str:
-    """Return what the machine was doing, for the person who is woken up."""
+def _context(signal: str, row: Row) -> str:
+    """Return what the machine was doing, for the person who is woken up, and of a score why it alarms."""
     parts = []
-    for signal, word in ((PROGRAM, "program"), (TOOL, "tool")):
-        reading = row.get(signal)
+    why = row.get(ANOMALY_WHY) if signal == ANOMALY_ALARM else None
+    if why is not None and why.quality is Quality.GOOD and isinstance(why.value, str) and (sentence := in_words(why.value)):
+        parts.append(sentence)
+    for name, word in ((PROGRAM, "program"), (TOOL, "tool")):
+        reading = row.get(name)
         if (
             reading is not None
             and reading.quality is Quality.GOOD

@@ -7,12 +7,13 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from processors.description import Description, program_key
+from processors.description import Description
 from processors.gap.config import Config
 from processors.gap.signals import LOAD, PROGRAM_TIME, RESOLUTIONS, TEMPERATURE, TOOL_CHANGE
 from twin.live.spindle import LiveSpindle
 from twin.machine import MachineFile
 from twin.motion.quantity import changed_quantity
+from twin.vocabulary.program_names import program_key
 
 SECTIONS = {TEMPERATURE: "thermal", LOAD: "spindle", TOOL_CHANGE: "program", PROGRAM_TIME: "program"}
 """The section of a description that the twin of a signal rests on."""

@@ -9,12 +9,12 @@ from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 
-from processors.description import program_key
 from sparkplug.metric import Reading
 from twin.errors import ExpectationError
 from twin.expected import Expectation, Expected
 from twin.expected.files import load_expectations
 from twin.vocabulary import twin_signals
+from twin.vocabulary.program_names import program_key
 
 LINES_KEPT = 20_000
 NAMED_MAX = 5
@@ -32,7 +32,7 @@ def read_expectations(folder: str) -> dict[str, Expectations]:
         found = load_expectations(Path(folder))
     except ExpectationError as error:
         raise ValueError(str(error)) from None
-    return {machine: {program_key(one.program): one for one in own} for machine, own in found.items()}
+    return dict(found)
 
 
 def expected_at(expectations: Expectations, program: str | None, line: int | None, tool: int | None) -> Expected | None:
@@ -69,9 +69,9 @@ def basis_of(expectations: Expectations, description: str) -> str:
     """Return in words which programs the twin expects, and which of them stale; description: the live one, "" = not known."""
     if not expectations:
         return "no expectation of the twin"
-    stale = sorted(one.program for one in expectations.values() if description and one.description not in ("", description))
+    stale = sorted({one.program for one in expectations.values() if description and one.description not in ("", description)})
     old = f"; stale, since the machine is described anew: {_listed(stale)}: cnctwin expect makes them again" if stale else ""
-    return f"the twin expects {_listed(sorted(one.program for one in expectations.values()))}{old}"
+    return f"the twin expects {_listed(sorted({one.program for one in expectations.values()}))}{old}"
 
 
 def _listed(names: Sequence[str]) -> str:

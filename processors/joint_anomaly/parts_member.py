@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from processors.contract import Output
 from twin.anomaly.parts import scales
-from twin.anomaly.parts.episodes import Memory, Seen, alarm_of, followed, part_ended
+from twin.anomaly.parts.episodes import Memory, Seen, alarm_of, followed, is_excused, nearest, part_ended
 from twin.anomaly.parts.feedback import told_of
 from twin.anomaly.parts.judging import Judged
 from twin.anomaly.parts.learning import learned
 from twin.anomaly.parts.moment import Place
 from twin.anomaly.parts.own import Own
-from twin.anomaly.parts.signature import Share, Signature, shares_of, signature_of
-from twin.anomaly.parts.verdict import Verdict, corrected, limits_of
+from twin.anomaly.parts.signature import Signature, shares_of, signature_of
+from twin.anomaly.parts.verdict import Verdict, corrected
 from twin.anomaly.parts.why import Why
 from twin.vocabulary import twin_signals
 
@@ -61,12 +61,17 @@ def learnt(scoring: "Scoring", before: PartsMember | None, found: tuple[Own, Jud
     (own, judged), name = found, scoring.machine
     before = PartsMember(own, scoring.parts_id) if before is None else before
     memory = _remembered(scoring, before, found, is_on, at_s)
-    own, record = learned(scoring.parts, own._replace(memory=memory) if memory is not own.memory else own, judged, is_on)
+    own, record = learned(
+        scoring.parts,
+        own._replace(memory=memory) if memory is not own.memory else own,
+        judged,
+        is_on and not is_excused(memory),
+    )
     raw, is_alarm = judged.own_score, alarm_of(memory)
     outputs = [Output.null(RAW, judged.reason or "", name, at_s) if raw is None else Output(RAW, raw, machine=name, at_s=at_s)]
     why, is_shown = before.why, is_on or is_alarm
     if is_shown and (not before.is_shown or _is_stronger(judged.why, why)):
-        why = judged.why
+        why = judged.why and judged.why._replace(like=nearest(memory, _signature(scoring, own, judged)))
         outputs.append(_published(why, NO_REASON, name, at_s))
     elif before.is_shown and not is_shown:
         why = None
@@ -111,18 +116,14 @@ def _remembered(scoring: "Scoring", before: PartsMember, found: tuple[Own, Judge
     if is_on and judged.score is None:
         return memory  # the alarm stays as it is while nothing is known
     if is_on and judged.score is not None and scoring.rule is not None:
-        seen = Seen(judged.score, scoring.rule.threshold, _signature(scoring, own, judged, at_s), _part(before, own))
+        seen = Seen(judged.score, scoring.rule.threshold, _signature(scoring, own, judged), _part(before, own))
     return followed(memory, seen, at_s)
 
 
-def _signature(scoring: "Scoring", own: Own, judged: Judged, at_s: float) -> Signature:
+def _signature(scoring: "Scoring", own: Own, judged: Judged) -> Signature:
     assert scoring.parts is not None
-    key, memory = own.place.key or "", own.memory
     shares = shares_of(scoring.parts.signals, scales.SCALES, judged.signature)
-    if memory.tolerated:
-        limits = limits_of(memory, key, at_s)
-        shares = [Share(*one[:3], limits.get((one.signal, one.scale, one.side), 1.0)) for one in shares]
-    return signature_of(shares, key, own.place.program, own.place.tool)
+    return signature_of(shares, own.place.key or "", own.place.program, own.place.tool)
 
 
 def _part(before: PartsMember, own: Own) -> str:

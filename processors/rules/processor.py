@@ -1,4 +1,4 @@
-"""Rules that anybody can check by hand: load over limit, thermal runaway, load without feed, vibration zone.
+"""Rules that anybody can check by hand: load, thermal runaway, load without feed, vibration zone, the cut beside the twin's.
 
 Each rule is a row of RULES: its name, what it reads, its dwell, and a pure function from the present sample to a judgement: over
 its limit, between, under, excused, or unknown with the reason. `processors/rules/alarm.py` makes an alarm of it. A rule whose
@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 from processors.contract import Output, OutputSpec, Processor, Provenance, Sample, SampleKind
 from processors.rules.alarm import IDLE, Judgement, Latch, LimitState, Timing, latched, rested
+from processors.rules.expected import CUT, LEAST, MOST, RATIO, ExpectedLimits, load_over_expected, tool_broken
 from processors.rules.spindle import (
     EXECUTION,
     FEED,
@@ -44,7 +45,7 @@ NO_ANOMALY = f"{ANOMALY} is not offered"
 _HOLE, _GOOD, _OVER, _UNKNOWN = SampleKind.HOLE, Quality.GOOD, LimitState.OVER, LimitState.UNKNOWN
 
 
-class Config(SpindleLimits, TemperatureLimits, VibrationLimits):
+class Config(SpindleLimits, TemperatureLimits, VibrationLimits, ExpectedLimits):
     """The limits of all rules; each is described where its rule is."""
 
     @cached_property
@@ -78,13 +79,17 @@ class Given(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """One rule: it is published as `twin/rule_<name>`."""
+    """One rule: it is published as `twin/rule_<name>`.
+
+    is_of_programs: it needs an expectation of the NC program; `twin/rule_detail` does not name it where there is none
+    """
 
     name: str
     meaning: str
     reads: frozenset[str]
     timing: Callable[[Config], Timing]
     judge: Callable[[Given], Judgement]
+    is_of_programs: bool = False
 
     @property
     def metric(self) -> str:
@@ -120,6 +125,22 @@ RULES = (
         frozenset({SPEED, *SOURCES}),
         lambda config: Timing(config.vibration_dwell_s, config.vibration_clear_s),
         lambda given: vibration(given.config, given.moves, given.zone, given.velocity),
+    ),
+    Rule(
+        "tool_broken",
+        "the twin expects a cut, and the spindle runs as in air",
+        frozenset({CUT, LEAST, SPEED, FEED}),
+        lambda config: Timing(config.tool_broken_s, config.tool_broken_clear_s),
+        lambda given: tool_broken(given.config, given.moves, given.sample),
+        is_of_programs=True,
+    ),
+    Rule(
+        "load_over_expected",
+        "the cut takes far more than the twin expects: a collision, packed chips",
+        frozenset({CUT, MOST, RATIO, SPEED}),
+        lambda config: Timing(config.over_expected_s, config.over_expected_clear_s),
+        lambda given: load_over_expected(given.config, given.moves, given.sample),
+        is_of_programs=True,
     ),
 )
 
@@ -178,16 +199,19 @@ def _outputs(stands: tuple[Stand, ...], has_zone: bool, zone: str, anomaly: bool
     outputs: list[Output] = []
     alarms: list[str] = []
     unknown: list[str] = []
+    judged = False
     for rule, stand in zip(RULES, stands, strict=True):
         if isinstance(stand, str):
-            unknown.append(rule.name)
+            if not (rule.is_of_programs and stand.startswith(CUT)):
+                unknown.append(rule.name)
             outputs.append(Output.null(rule.metric, stand))
             continue
+        judged = True
         outputs.append(Output(rule.metric, stand is not None))
         if stand is not None and stand.alarm_s is not None:
             alarms.append(f"{rule.name}: {stand.finding}, since {_utc(stand.alarm_s)}")
     outputs.append(Output(ZONE, zone) if has_zone else Output.null(ZONE, zone))
-    if len(unknown) == len(RULES):
+    if not judged:
         reason = outputs[0].reason or ""
         outputs.append(Output.null(DETAIL, reason))
         if isinstance(anomaly, str):

@@ -29,17 +29,13 @@ class Missing:
         >>> missing = Missing()
         >>> missing.add("goes down into material", 7)
         >>> missing.sentences()
-        ['no load of 1 line that goes down into material (7)']
+        ['no load of 1 line (7): goes down into material']
         """
         said = []
         for why, lines in self.lines.items():
             shown = ", ".join(str(line) for line in sorted(lines)[:LINES_SHOWN]) + (", …" if len(lines) > LINES_SHOWN else "")
-            if why.startswith(("no ", "the path")) or not lines:
-                said.append(why)
-            elif why.startswith(("goes", "cuts")):
-                said.append(f"no load of {len(lines)} line{'s'[: len(lines) > 1]} that {why} ({shown})")
-            else:
-                said.append(f"no load of {len(lines)} line{'s'[: len(lines) > 1]}: {why} ({shown})")
+            is_of_all = not lines or why.startswith(("no ", "the path"))
+            said.append(why if is_of_all else f"no load of {len(lines)} line{'s'[: len(lines) > 1]} ({shown}): {why}")
         return said
 
 

@@ -26,6 +26,7 @@ class Expectation:
     """The expectation of a program on a machine. basis: sentences on what it rests on and what is left out
 
     program_sha256, description: of the texts that it was worked out from; runs: in the order in which they are run
+    o_word: the number that the program gives itself; empty = none
     meter: None where the machine has no [spindle], so that no load is known
     """
 
@@ -37,6 +38,7 @@ class Expectation:
     basis: tuple[str, ...]
     program_sha256: str = ""
     description: str = ""
+    o_word: str = ""
 
     @cached_property
     def runs_of_line(self) -> dict[int, tuple[int, ...]]:
@@ -121,10 +123,9 @@ class Expectation:
 
         None where no such line runs, or where its load is not known in one of its runs.
         """
-        runs = [self.runs[k] for k in self.runs_of_line.get(line, ())]
-        runs = [run for run in runs if tool is None or run.tool == tool] or runs
+        runs = self._runs_by.get((line, tool)) or self._runs_by.get((line, None)) or []
         least, most = math.inf, -math.inf
-        for run in runs:
+        for run in (self.runs[k] for k in runs):
             if not run.stretches:
                 return None
             last = _place(run.stretches, to_mm)
@@ -134,6 +135,21 @@ class Expectation:
                     return None
                 least, most = min(least, cut_pct), max(most, cut_pct)
         return (least, most) if runs else None
+
+    def length_mm(self, line: int, tool: int | None = None) -> float:
+        """Return the greatest length of a run of a line, 0 where it does not run."""
+        return self._lengths.get((line, tool)) or self._lengths.get((line, None), 0.0)
+
+    @cached_property
+    def _lengths(self) -> dict[tuple[int, int | None], float]:
+        return {key: max(self.runs[k].length_mm for k in own) for key, own in self._runs_by.items()}
+
+    def why_not(self, line: int | None, tool: int | None = None) -> str:
+        """Return why the load of a line is not known; empty = it is, or no such line runs."""
+        if line is None:
+            return ""
+        own = self.lines.get((line, tool)) or self.lines.get((line, None))
+        return "" if own is None else own.why_not
 
     def followed(self, run: int | None, line: int, tool: int | None = None) -> int | None:
         """Return the run that a control is in at `line`, after it was in `run`: the next of this line, else the first again."""
@@ -145,6 +161,11 @@ class Expectation:
         later = own[bisect_right(own, -1 if run is None else run) :]
         fitting = (k for k in (*later, *own) if tool is None or self.runs[k].tool == tool)
         return next(fitting, (later or own)[0])
+
+    def peak_of(self, run: Run) -> tuple[float, float] | None:
+        """Return the greatest load and force of a run as planned; None where they are not known."""
+        found = [self._loads(run, stretch.forces_n, None, None) for stretch in run.stretches]
+        return max(((load, force) for _, load, force in found), key=lambda pair: pair[1], default=None)
 
     def _loads(
         self, run: Run, forces_n: Sequence[float], feed_mm_min: float | None, rpm: float | None

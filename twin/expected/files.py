@@ -11,7 +11,7 @@ import json
 import os
 import re
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -20,18 +20,22 @@ from twin.expected.expectation import Expectation
 from twin.expected.expected import Run, Stretch
 from twin.expected.lines import Numbering
 from twin.expected.meter import Meter
+from twin.vocabulary.program_names import program_key
 
 VERSION, ENDING = 1, ".json"
 BYTES_MAX, FILES_MAX = 256 * 1024 * 1024, 2000
 UNSAFE = re.compile(r"[^A-Za-z0-9._+-]+")
 AGAIN = "make it again with cnctwin expect"
-Expectations = Mapping[str, tuple[Expectation, ...]]
-"""Machine → the expectations of its programs."""
+
+
+def place_of(folder: Path, machine: str, program: str) -> Path:
+    """Return the file of a program of a machine."""
+    return folder / _safe(machine) / (_safe(program) + ENDING)
 
 
 def written(folder: Path, expectation: Expectation) -> Path:
     """Write an expectation into its place in a folder, in one move; return the file. Raises ExpectationError."""
-    place = folder / _safe(expectation.machine) / (_safe(expectation.program) + ENDING)
+    place = place_of(folder, expectation.machine, expectation.program)
     try:
         place.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".new.", dir=place.parent) as aside:
@@ -43,7 +47,31 @@ def written(folder: Path, expectation: Expectation) -> Path:
     return place
 
 
-def load_expectations(folder: Path) -> dict[str, tuple[Expectation, ...]]:
+class ByProgram(Mapping[str, Expectation]):
+    """The expectations of a machine by program, looked up by any name that a control or a file has for it.
+
+    >>> found = ByProgram([])
+    >>> len(found), found.get("O0012.nc")
+    (0, None)
+    """
+
+    def __init__(self, expectations: Iterable[Expectation]) -> None:
+        """Keep expectations by the key of their program and by its O word; a later one replaces an earlier one."""
+        self._own: dict[str, Expectation] = {}
+        for one in expectations:
+            self._own |= {program_key(name): one for name in (one.o_word, one.program) if name}
+
+    def __getitem__(self, program: str) -> Expectation:
+        return self._own[program_key(program)]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._own)
+
+    def __len__(self) -> int:
+        return len(self._own)
+
+
+def load_expectations(folder: Path) -> dict[str, ByProgram]:
     """Return the expectations in a folder by machine, as each says whose it is. Raises ExpectationError."""
     if not folder.is_dir():
         raise ExpectationError(f"{folder}: there is no such folder; cnctwin expect --out makes it")
@@ -54,7 +82,7 @@ def load_expectations(folder: Path) -> dict[str, tuple[Expectation, ...]]:
     for path in files:
         expectation = read_expectation(path)
         found.setdefault(expectation.machine, []).append(expectation)
-    return {machine: tuple(own) for machine, own in found.items()}
+    return {machine: ByProgram(own) for machine, own in found.items()}
 
 
 def read_expectation(path: Path) -> Expectation:
@@ -76,6 +104,7 @@ def to_json(expectation: Expectation) -> str:
     body = {
         "program": expectation.program,
         "machine": expectation.machine,
+        "o_word": expectation.o_word,
         "numbering": expectation.numbering.value,
         "program_sha256": expectation.program_sha256,
         "description": expectation.description,
@@ -128,6 +157,7 @@ def _of(body: Mapping[str, Any]) -> Expectation:
         basis=tuple(body["basis"]),
         program_sha256=str(body["program_sha256"]),
         description=str(body["description"]),
+        o_word=str(body["o_word"]),
     )
 
 

@@ -7,6 +7,7 @@ physics. Feed of a line is its mean over the time in motion, starts and stops in
 """
 
 import hashlib
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -40,6 +41,7 @@ Ints = NDArray[np.int64]
 PLUNGE = 0.2
 """Steeper than this, 11°, the end face takes so much of the cut that the force of the side says little."""
 RUNS_MAX = 400_000
+O_WORD = re.compile(r"^\s*([O:]\d+)", re.I)
 OUTSIDE = -1
 """The line of what runs in a subprogram that has a text of its own."""
 
@@ -84,6 +86,7 @@ def expectation_of(
         missing.add("no [spindle]: no load is expected")
     return Expectation(
         program=name,
+        o_word=next((match[1] for one in source if (match := O_WORD.match(one))), ""),
         machine=machine.machine.name,
         numbering=numbering,
         runs=runs,
@@ -198,7 +201,7 @@ class _Given:
         start, end = self.path.tip_ends_mm(own)
         down = np.maximum(start[:, 2] - end[:, 2], 0.0) > PLUNGE * self.path.length_mm[own]
         if bool((down & (self.rows.end_face_mm2[rows] > END_FACE_MM2)).any()):
-            return "goes down into material: the formula of the force has no end face"
+            return "down into material, and the formula of the force has no end face"
         if bool((self.rows.axial_depth_mm[rows] > 0.0).any()) and bool((self.rpm[cutting] <= 0.0).any()):
-            return "cuts with the spindle at rest or backwards"
+            return "a cut with the spindle at rest or backwards"
         return ""

@@ -24,6 +24,18 @@ VIBRATION_VELOCITY_MM_S = f"{TWIN_PREFIX}vibration_velocity_mm_s"
 VIBRATION_CREST_FACTOR = f"{TWIN_PREFIX}vibration_crest_factor"
 VIBRATION_KURTOSIS = f"{TWIN_PREFIX}vibration_kurtosis"
 
+# expected
+EXPECTED_SPINDLE_LOAD_PCT = f"{TWIN_PREFIX}expected_spindle_load_pct"
+EXPECTED_FEED_MM_MIN = f"{TWIN_PREFIX}expected_feed_mm_min"
+EXPECTED_CUTTING_FORCE_N = f"{TWIN_PREFIX}expected_cutting_force_n"
+EXPECTED_LINE_S = f"{TWIN_PREFIX}expected_line_s"
+EXPECTED_CUT_LEAST_PCT = f"{TWIN_PREFIX}expected_cut_least_pct"
+EXPECTED_CUT_MOST_PCT = f"{TWIN_PREFIX}expected_cut_most_pct"
+EXPECTED_RATIO = f"{TWIN_PREFIX}expected_ratio"
+EXPECTED_BASIS = f"{TWIN_PREFIX}expected_basis"
+SPINDLE_CUT_LOAD_PCT = f"{TWIN_PREFIX}spindle_cut_load_pct"
+SPINDLE_LOAD_RESIDUAL_PCT = f"{TWIN_PREFIX}spindle_load_residual_pct"
+
 # tool_change_detector
 TOOL_CHANGE_ACTIVE = f"{TWIN_PREFIX}tool_change_active"
 
@@ -77,7 +89,16 @@ RULE_LOAD_OVER_LIMIT = f"{RULE_PREFIX}load_over_limit"
 RULE_THERMAL_RUNAWAY = f"{RULE_PREFIX}thermal_runaway"
 RULE_LOAD_WITHOUT_FEED = f"{RULE_PREFIX}load_without_feed"
 RULE_VIBRATION = f"{RULE_PREFIX}vibration"
-RULES = (RULE_LOAD_OVER_LIMIT, RULE_THERMAL_RUNAWAY, RULE_LOAD_WITHOUT_FEED, RULE_VIBRATION)
+RULE_TOOL_BROKEN = f"{RULE_PREFIX}tool_broken"
+RULE_LOAD_OVER_EXPECTED = f"{RULE_PREFIX}load_over_expected"
+RULES = (
+    RULE_LOAD_OVER_LIMIT,
+    RULE_THERMAL_RUNAWAY,
+    RULE_LOAD_WITHOUT_FEED,
+    RULE_VIBRATION,
+    RULE_TOOL_BROKEN,
+    RULE_LOAD_OVER_EXPECTED,
+)
 RULE_DETAIL = f"{RULE_PREFIX}detail"
 SEVERITY = f"{TWIN_PREFIX}severity"
 

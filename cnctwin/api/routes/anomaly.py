@@ -55,6 +55,7 @@ class Anomaly(Answer):
     score: float | None
     threshold: float | None
     why: dict[str, Any] | None = Field(description="signal, scale, program, tool, lines, measured, expected, by, like, peers, …")
+    why_t: int | None = Field(description="when the reason was told, ms since 1970")
     knows: str | None = Field(description="what the score knows of the program that runs", examples=["12 parts"])
     verdicts: dict[str, Any] | None = Field(description="alarms, limits that were raised, outcomes, precision, suggestion")
     reason: str | None
@@ -101,6 +102,7 @@ def _shown(sources: Sources, machine: str) -> dict[str, Any]:
         "score": now(twin_signals.ADJUSTED_SCORE),
         "threshold": now(twin_signals.ANOMALY_THRESHOLD),
         "why": _document(now(twin_signals.ANOMALY_WHY)),
+        "why_t": twin.get(twin_signals.ANOMALY_WHY, {}).get("t"),
         "knows": now(twin_signals.ANOMALY_KNOWS),
         "verdicts": verdicts,
         "reason": reason,

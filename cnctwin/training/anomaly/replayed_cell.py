@@ -56,7 +56,7 @@ class _MachineScores:
 
 def replayed(stretch: Stretch, models: Mapping[str, AnomalyModel], settings: Mapping[str, Any]) -> dict[str, Track]:
     """The scores of each machine. `settings` are the processor's. Raises UsageError where a sample cannot be folded."""
-    if settings.get("common_mode", Config().common_mode) is Method.PARTS:
+    if settings.get("common_mode", Config().common_mode) == Method.PARTS:
         return _replayed_parts(stretch, models, settings)
     told = {name: _MachineScores() for name in stretch}
     configuration = Configuration(Config, settings, name=PROCESSOR.name, reads=lambda config: scorings(config, models))

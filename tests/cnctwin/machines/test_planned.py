@@ -11,13 +11,14 @@ from cnctwin.cli import app
 from cnctwin.errors import UsageError
 from cnctwin.machines.folder import MachineFolder
 from cnctwin.machines.planned import keep_planned, planned
-from processors.description import Description, DescriptionMessage, Role, program_key
+from processors.description import Description, DescriptionMessage, Role
 from processors.description_folder import DescriptionFolder
 from processors.gap.comparison import times_compared
 from processors.gap.config import Config
 from processors.gap.described import described
 from processors.gap.timing import Timed
 from twin.errors import MachineError
+from twin.vocabulary.program_names import program_key
 
 TOML = "[machine]\nname = 'vmc'\n[program]\nrapid_mm_min = 30000.0\nacceleration_mm_s2 = 1e6\ntool_change_s = 5.0\n"
 TEXT = "%\nO7\nG21 G90 G94 G1 X100. F6000.\nT2 M6\nX300.\nM30\n%\n"

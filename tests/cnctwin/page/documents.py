@@ -5,6 +5,7 @@ import zlib
 from datetime import UTC, datetime
 from typing import Any
 
+from tests.cnctwin.page.anomaly_document import anomaly
 from tests.cnctwin.page.diagnosis_document import diagnosis
 from tests.cnctwin.page.fake_server import Answer, Shop, now_ms
 from tests.cnctwin.page.simulated_shop import CYCLE_S
@@ -273,6 +274,7 @@ def tell_all(shop: Shop) -> None:
         200,
         {"done": True, "text": f"acknowledged by {(body or {})['by']}"},
     )
+    shop.answers["/anomaly/[^/]+"] = lambda path, _body: (200, anomaly(path.rpartition("/")[2]))
     for machine in machines:
         _tell_machine(shop, machine, machine == machines[0], started)
     shop.answers["/jobs"] = lambda _path, body: (

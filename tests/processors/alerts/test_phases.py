@@ -1,5 +1,6 @@
 """The life of an alert: dwell, hysteresis, what cannot be read, severity, flapping, machines that go."""
 
+import json
 from typing import Any
 
 import pytest
@@ -265,6 +266,28 @@ def test_what_the_machine_was_doing_is_said() -> None:
     (told,) = shop.wait(15)
     assert told.body["alerts"][0]["annotations"]["description"] == "program O1234, tool 7"
     assert "(program O1234, tool 7)" in told.text
+
+
+def test_a_score_says_why_it_alarms_and_another_alarm_does_not() -> None:
+    why = {"signal": "spindle_load_pct", "measured": 44.0, "expected": 40.0, "unit": "%", "by": "12 parts", "lines": [210, 260]}
+    why["like"] = [{"label": "packed chips", "likeness": 0.91, "at_s": 1.0}]
+    shop = Shop()
+    shop.set(program="O1234", tool_number=7, **{"twin/anomaly_why": json.dumps(why)})
+    shop.set(score=True, vibration=True)
+    told = [alert for notification in shop.wait(120) for alert in notification.body["alerts"]]
+    said = {alert["labels"]["alertname"]: alert["annotations"]["description"] for alert in told}
+    reason = "spindle_load_pct 10 % above the last 12 parts in lines 210–260; looks like packed chips (0.91); no peer shows it"
+    assert said["anomaly_alarm"] == f"{reason}, program O1234, tool 7"
+    assert said["rule_vibration"] == "program O1234, tool 7"
+
+
+@pytest.mark.parametrize("text", ["{", "[]", '"x"', '{"signal": 3}', "[" * 5000])
+def test_a_reason_that_is_none_is_left_out(text: str) -> None:
+    shop = Shop()
+    shop.set(program="O1234", **{"twin/anomaly_why": text})
+    shop.set(score=True)
+    told = shop.wait(120)
+    assert told[0].body["alerts"][0]["annotations"]["description"] == "program O1234"
 
 
 def test_history_wakes_nobody() -> None:

@@ -19,7 +19,7 @@ from sparkplug.metric import Change
 from sparkplug.quality import Quality
 from tests.processors.streams import birth, data, death, engine_of, event, fed, reading
 
-LOAD, RUNAWAY, NO_FEED, VIBRATION = (rule.metric for rule in RULES)
+LOAD, RUNAWAY, NO_FEED, VIBRATION, *_ = (rule.metric for rule in RULES)
 CUTTING = {
     "spindle_rpm": 4000.0,
     "spindle_load_pct": 40.0,
@@ -27,6 +27,10 @@ CUTTING = {
     "exec_state": "ACTIVE",
     "spindle_temp_c": 30.0,
     "vibration_velocity_mm_s": 1.0,
+    "twin/spindle_cut_load_pct": 36.0,
+    "twin/expected_cut_least_pct": 34.0,
+    "twin/expected_cut_most_pct": 35.0,
+    "twin/expected_ratio": 1.02,
 }
 
 

@@ -76,4 +76,5 @@ def test_without_dwell_and_without_regard_to_ramps_each_of_them_would_have_alarm
 ) -> None:
     """So that the silence above is not that of rules which see nothing."""
     actions = fed(engine_of(PROCESSOR, **NAIVE), *replayed(recording(name), keys, since))
-    assert alarms(actions) == {"load_over_limit": over, "thermal_runaway": 0, "load_without_feed": idle, "vibration": 0}
+    found = {name: count for name, count in alarms(actions).items() if count}
+    assert found == {name: count for name, count in (("load_over_limit", over), ("load_without_feed", idle)) if count}

@@ -14,7 +14,7 @@ def test_what_is_read_expects_what_was_written(tmp_path: Path) -> None:
     made = expectation_of(machine(), PLATE, name="O12", description="d1")
     path = written(tmp_path, made)
     assert path == tmp_path / "small" / "O12.json"
-    (read,) = load_expectations(tmp_path)["small"]
+    read = load_expectations(tmp_path)["small"]["/PRG/O0012.NC"]
     assert (read.runs, read.meter, read.basis, read.numbering) == (made.runs, made.meter, made.basis, made.numbering)
     assert [read.at(line, 900.0, 3900.0) for line in made.runs_of_line] == [
         made.at(line, 900.0, 3900.0) for line in made.runs_of_line

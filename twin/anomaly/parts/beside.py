@@ -9,25 +9,27 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from twin.anomaly.common_features import GAIN, MEMORY_S, ONE_IN
+from twin.anomaly.common_features import GAIN, ONE_IN
 from twin.anomaly.parts.scales import COUNT
 
 if TYPE_CHECKING:
     from twin.anomaly.parts.own import Own
 
 
-def left_over(own: "Own", peers: Sequence["Own"], index: int, tick_s: float) -> float:
+def left_over(own: "Own", peers: Sequence["Own"], index: int, memory_ticks: int) -> float:
     """Return the part of a residual that the peers do not explain; index: signal by signal, each on all scales."""
-    value = own.smooth[index]
-    signal, oldest = index // COUNT, own.tick - round(MEMORY_S / tick_s)
-    if value > 0.0:
-        theirs = [peer.smooth[index] for peer in peers if peer.told_at[signal] >= oldest]
-        if not theirs:
-            return value
-        theirs.sort(reverse=True)
-        return max(0.0, value - GAIN * max(0.0, theirs[math.ceil(len(theirs) / ONE_IN) - 1]))
+    value, signal, oldest = own.smooth[index], index // COUNT, own.tick - memory_ticks
     theirs = [peer.smooth[index] for peer in peers if peer.told_at[signal] >= oldest]
     if not theirs:
         return value
-    theirs.sort()
-    return min(0.0, value - GAIN * min(0.0, theirs[math.ceil(len(theirs) / ONE_IN) - 1]))
+    if value < 0.0:
+        return -max(0.0, -value - GAIN * max(0.0, -_shared(theirs, is_above=False)))
+    return max(0.0, value - GAIN * max(0.0, _shared(theirs, is_above=True)))
+
+
+def _shared(theirs: list[float], *, is_above: bool) -> float:
+    """Return the peers' residual that counts: the furthest, or of six and more that of the second fifth."""
+    place = math.ceil(len(theirs) / ONE_IN) - 1
+    if place == 0:
+        return max(theirs) if is_above else min(theirs)
+    return sorted(theirs, reverse=is_above)[place]

@@ -4,24 +4,28 @@
     gone: `GONE_PARTS` parts of its program in a row without it, or `GONE_S` without it
 
 An alarm that was called true stands until it is gone, or until a person ends it. One that was called known is held back until it
-is gone, with all that are like it and at most `WORSE_MAX` as large. What nobody has spoken of changes nothing.
+is gone, with all that are like it and at most `WORSE_MAX` as large. One that was called false is off; where it comes back in the
+same part it is the same alarm, and its limits grow with it, but it is on again once it is larger than a limit may become and much
+larger than what was called false. What nobody has spoken of changes nothing.
 """
 
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from twin.anomaly.parts.signature import LIKE_MIN, NAME_MAX, Signature, likeness
+from twin.anomaly.parts.limits import FACTOR_MAX, Tolerated, bounded, raised
+from twin.anomaly.parts.signature import GROWTH, LIKE_MIN, NAME_MAX, Signature, envelope, likeness
 from twin.anomaly.parts.why import Like
 
 OPEN_MAX = 50
 LABELLED_MAX = 200
 PARTS_MAX = 20
+OPERATIONS_MAX = 12
 SHOWN_MAX = 3
 TRUE, FALSE, KNOWN = "true", "false", "known"
 GONE_PARTS = {TRUE: 1, FALSE: 1, KNOWN: 5}
 CLEAN_MAX = 5
 GONE_S = 14 * 86_400.0
-HELD_LIKENESS_MIN = 0.85
+ALIKE = 0.8
 WORSE_MAX = 1.5
 
 
@@ -37,9 +41,10 @@ class Said(NamedTuple):
 class Episode(NamedTuple):
     """An alarm; began_s names it.
 
-    score, threshold: at its largest, in tails of healthy parts; the signature is that of the same moment
-    parts: in which it or its like was seen, as the caller names them; seen_s: when it began, was largest or was over, or its like
-    clean_parts: of its program, in a row, since it or its like was seen
+    score, threshold: at its largest, in tails of healthy parts; signature: the largest that was seen of each share
+    operations: in which it was seen; parts: in which it or its like was, as the caller names them
+    seen_s: when it began, was largest or was over, or its like
+    clean_parts: of its program, in a row, since it or its like was seen; called_false: its largest share when somebody said so
     """
 
     began_s: float
@@ -47,28 +52,12 @@ class Episode(NamedTuple):
     score: float
     threshold: float
     signature: Signature
-    parts: tuple[str, ...] = ()
+    operations: tuple[str, ...]
+    parts: tuple[str, ...]
     said: Said | None = None
     is_over: bool = False
     clean_parts: int = 0
-
-    @property
-    def size(self) -> float:
-        """Return the score in thresholds."""
-        return self.score / self.threshold if self.threshold > 0.0 else 1.0
-
-
-class Tolerated(NamedTuple):
-    """A limit that a false alarm has raised; episode_s: the alarm's began_s. See verdict.py."""
-
-    episode_s: float
-    operation: str
-    signal: str
-    scale: str
-    side: int
-    factor: float
-    since_s: float
-    by: str
+    called_false: float = 0.0
 
 
 class Outcome(NamedTuple):
@@ -94,7 +83,6 @@ class Memory(NamedTuple):
 
     running: the alarm that is on by its score; held: why it is held back, if it is
     standing, known: the began_s of those that are not gone
-    learn: parts of alarms that were called false, to be learned and then taken out
     """
 
     running: Episode | None = None
@@ -103,7 +91,6 @@ class Memory(NamedTuple):
     known: tuple[float, ...] = ()
     tolerated: tuple[Tolerated, ...] = ()
     outcomes: tuple[Outcome, ...] = ()
-    learn: tuple[str, ...] = ()
     held: Held | None = None
 
 
@@ -123,15 +110,32 @@ def followed(memory: Memory, seen: Seen | None, at_s: float) -> Memory:
         return memory if running is None else _over(memory, running, at_s)
     part = seen.part[:NAME_MAX]
     if running is None:
-        first = Episode(at_s, at_s, seen.score, seen.threshold, seen.signature, (part,))
-        return _held(_touched(memory._replace(running=first), first), seen)
-    if seen.score > running.score:
-        now = running._replace(score=seen.score, threshold=seen.threshold, signature=seen.signature, seen_s=at_s)
-        memory = _held(memory._replace(running=now), seen)
-    if part != running.parts[-1]:
-        now = (memory.running or running)._replace(parts=(*running.parts, part)[-PARTS_MAX:], seen_s=at_s)
+        again = _called_false(memory, seen.signature, part)
+        if again is None:
+            operations = (seen.signature.operation,)
+            first = Episode(at_s, at_s, seen.score, seen.threshold, seen.signature, operations, (part,))
+            return _held(_touched(memory._replace(running=first), first), first)
+        running = again._replace(is_over=False)
+        memory = memory._replace(running=running, episodes=tuple(one for one in memory.episodes if one is not again))
+    now = _grown(running, seen, at_s)
+    if now is not running:
+        memory = _held(_tolerating(memory._replace(running=now), now, at_s), now)
+    if part != now.parts[-1]:
+        now = now._replace(parts=(*now.parts, part)[-PARTS_MAX:], seen_s=at_s)
         memory = _touched(memory._replace(running=now), now)
     return memory
+
+
+def _grown(running: Episode, seen: Seen, at_s: float) -> Episode:
+    """Return an alarm after one more tick of it; the same object where it has hardly changed."""
+    signature = envelope(running.signature, seen.signature)
+    if signature is not running.signature:
+        running = running._replace(signature=signature, seen_s=at_s)
+    if seen.score > GROWTH * running.score:
+        running = running._replace(score=seen.score, threshold=seen.threshold, seen_s=at_s)
+    if seen.signature.operation not in running.operations:
+        running = running._replace(operations=(*running.operations, seen.signature.operation)[-OPERATIONS_MAX:])
+    return running
 
 
 def alarm_of(memory: Memory) -> bool:
@@ -139,7 +143,15 @@ def alarm_of(memory: Memory) -> bool:
     running = memory.running
     if running is None or memory.standing:
         return bool(memory.standing)
-    return memory.held is None and (running.said is None or running.said.verdict == TRUE)
+    return memory.held is None and not is_excused(memory) and (running.said is None or running.said.verdict != KNOWN)
+
+
+def is_excused(memory: Memory) -> bool:
+    """Return True while the alarm that is on has been called false, and is not much larger: its part may be learned."""
+    one = memory.running
+    if one is None or one.said is None or one.said.verdict != FALSE:
+        return False
+    return one.signature.largest <= max(FACTOR_MAX * one.threshold, WORSE_MAX * one.called_false)
 
 
 def part_ended(memory: Memory, program: str | None, part: str, at_s: float) -> Memory:
@@ -169,15 +181,16 @@ def is_gone(one: Episode, at_s: float) -> bool:
     return one.is_over and (one.clean_parts >= parts or at_s - one.seen_s >= GONE_S)
 
 
-def held_back(memory: Memory, signature: Signature, score: float) -> Held | None:
-    """Return the known cause that explains an alarm; None where there is none, or where it has become much larger."""
+def held_back(memory: Memory, signature: Signature) -> Held | None:
+    """Return the known cause that explains an alarm of the same operation; None without one, or where it is much larger."""
     if not memory.known:
         return None
     found: Held | None = None
     for one in all_of(memory):
-        if one.began_s in memory.known and one.said is not None and score <= WORSE_MAX * one.score:
+        is_known = one.began_s in memory.known and one.said is not None and signature.operation in one.operations
+        if is_known and one.said is not None and signature.largest <= WORSE_MAX * one.signature.largest:
             like = likeness(one.signature, signature)
-            if like >= HELD_LIKENESS_MIN and (found is None or like > found.likeness):
+            if like >= ALIKE and (found is None or like > found.likeness):
                 found = Held(one.said.label, one.said.by, one.said.at_s, like)
     return found
 
@@ -215,8 +228,37 @@ def _over(memory: Memory, running: Episode, at_s: float) -> Memory:
     return memory._replace(episodes=kept((*memory.episodes, over), (*memory.standing, *memory.known)))
 
 
-def _held(memory: Memory, seen: Seen) -> Memory:
-    held = held_back(memory, seen.signature, seen.score)
+def _called_false(memory: Memory, signature: Signature, part: str) -> Episode | None:
+    """Return the alarm that was called false in this part, and that has come back; None where there is none."""
+    return next(
+        (
+            one
+            for one in reversed(memory.episodes)
+            if one.said is not None
+            and one.said.verdict == FALSE
+            and part in one.parts
+            and likeness(one.signature, signature) >= ALIKE
+        ),
+        None,
+    )
+
+
+def _tolerating(memory: Memory, now: Episode, at_s: float) -> Memory:
+    """Return the memory in which the limits of an alarm that was called false have grown with it."""
+    if now.said is None or now.said.verdict != FALSE:
+        return memory
+    others = (one for one in memory.tolerated if one.episode_s != now.began_s)
+    return memory._replace(tolerated=bounded((*others, *tolerated_of(now, at_s)), at_s))
+
+
+def tolerated_of(one: Episode, now_s: float) -> tuple[Tolerated, ...]:
+    """Return the limits that an alarm raises which somebody has called false."""
+    by = "" if one.said is None else one.said.by
+    return raised(one.began_s, one.operations, one.signature, one.threshold, by, now_s)
+
+
+def _held(memory: Memory, now: Episode) -> Memory:
+    held = held_back(memory, now.signature)
     return memory if held == memory.held else memory._replace(held=held)
 
 
@@ -224,7 +266,7 @@ def _touched(memory: Memory, now: Episode) -> Memory:
     """Return the memory in which all that are like an alarm were seen in its part too."""
 
     def after(one: Episode) -> Episode:
-        if now.seen_s - one.seen_s >= GONE_S or likeness(one.signature, now.signature) < HELD_LIKENESS_MIN:
+        if now.seen_s - one.seen_s >= GONE_S or likeness(one.signature, now.signature) < ALIKE:
             return one
         parts = one.parts if now.parts[-1] in one.parts else (*one.parts, now.parts[-1])[-PARTS_MAX:]
         return one._replace(parts=parts, seen_s=max(one.seen_s, now.seen_s), clean_parts=0)

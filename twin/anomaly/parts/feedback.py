@@ -11,8 +11,9 @@ import json
 import math
 from typing import Any, NamedTuple
 
-from twin.anomaly.parts.episodes import FALSE, Episode, Memory, Tolerated, all_of
-from twin.anomaly.parts.verdict import factor_at
+from twin.anomaly.parts.episodes import FALSE, Episode, Memory, all_of
+from twin.anomaly.parts.limits import Tolerated, factor_at
+from twin.anomaly.parts.signature import NAME_MAX
 
 ALARMS_MAX = 50
 VERDICTS_MIN = 10
@@ -118,7 +119,7 @@ def _alarm(memory: Memory, one: Episode) -> dict[str, Any]:
 
 def _limit(one: Tolerated) -> dict[str, Any]:
     return {
-        "operation": one.operation,
+        "operation": ", ".join(one.operations)[:NAME_MAX],
         "signal": one.signal,
         "scale": one.scale,
         "side": "above" if one.side > 0 else "below",

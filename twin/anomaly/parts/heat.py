@@ -1,9 +1,11 @@
 """The temperature that speed and load explain, and the slow drift that weather explains.
 
-    h_i ← h_i + (tick / τ_i) · (driver_i − h_i)          drivers: speed, load; τ: 10 min, 40 min, 2 h
-    x = value − Σ b_i h_i − base                         base ← base + (tick / 3 h) · (value − Σ b_i h_i − base), unless suspicious
+    h_i ← h_i + (10 s / τ_i) · (driver_i − h_i)          drivers: speed, load; τ: 10 min, 40 min, 2 h
+    x = value − Σ b_i h_i − base                         base ← base + (10 s / 3 h) · x, a fourth of it while suspicious
 
-The coefficients come from training, by least squares on values from which the same slow drift was taken.
+The coefficients come from training, by least squares on values from which the same slow drift was taken. A machine that is
+already warm when it is first seen has stored heat that nobody knows: for `SETTLE_S` its temperature tells nothing, and the base
+is the mean.
 """
 
 from collections.abc import Sequence
@@ -18,15 +20,28 @@ if TYPE_CHECKING:
 TAUS_S = (600.0, 2400.0, 7200.0)
 DRIVERS = (SPEED, LOAD)
 BASE_S = 10_800.0
+SETTLE_S = 7200.0
 RIDGE = 1e-3
+HELD = 0.25
+EVERY_S = 10.0
+"""Heat is slow: it is followed so often."""
+STEPS = round(SETTLE_S / EVERY_S)
 SCALES = {SPEED: 1e-3, LOAD: 1e-2}
 
 
 class Heat(NamedTuple):
-    """driven: the drivers as each time constant has smoothed them; base: of each temperature, None before it was told"""
+    """driven: the drivers as each time constant has smoothed them; base: of each temperature, None before it was told
+    steps: since the machine was first seen, up to those of `SETTLE_S`
+    """
 
     driven: tuple[float, ...] = (0.0,) * (len(TAUS_S) * len(DRIVERS))
     base: tuple[float | None, ...] = ()
+    steps: int = 0
+
+    @property
+    def is_settled(self) -> bool:
+        """Return True where the heat of before the machine was first seen matters no more."""
+        return self.steps >= STEPS
 
 
 def driven_after(driven: Sequence[float], drivers: Sequence[float], shares: Sequence[float]) -> tuple[float, ...]:
@@ -62,21 +77,23 @@ def warmed(
     *,
     is_held: bool,
 ) -> Heat:
-    """Return the heat after a tick; places: of speed and load, −1 = none; shares: of a tick in each time constant, and in the base.
+    """Return the heat after a tick; places: of speed and load, −1 = none; shares: of a tick in each time constant and the base.
 
-    A base follows its temperature slowly, and not at all while the score is suspicious.
+    A base follows its temperature slowly, and a fourth as fast while the score is suspicious.
     """
     speed, load = (values[at] if at >= 0 else None for at in places)
     driven = driven_after(before.driven, ((speed or 0.0) * SCALES[SPEED], (load or 0.0) * SCALES[LOAD]), shares[0])
     base: list[float | None] = []
+    share = shares[1] if before.is_settled else max(shares[1], 1.0 / (before.steps + 1))
+    is_held = is_held and before.is_settled
     for known, own, value in zip(before.base, coefficients, values, strict=True):
         if value is None or not own:
             base.append(known)
         elif known is None:
             base.append(value - explained(own, driven))
         else:
-            base.append(known if is_held else known + shares[1] * (value - explained(own, driven) - known))
-    return Heat(driven, tuple(base))
+            base.append(known + (HELD * share if is_held else share) * (value - explained(own, driven) - known))
+    return Heat(driven, tuple(base), min(before.steps + 1, STEPS))
 
 
 def fit_heat(

@@ -3,8 +3,8 @@
     u = left / tail(signal, scale, side)           left: what the peers do not share (`beside.py`)
     score = largest over the scales of  (Σ over signals of u⁴)^(1/4)
 
-The fourth power lets one signal speak for itself, and several that rise together a little earlier. The score is held while nothing
-is told: in a gate, and while the spindle stands.
+The fourth power lets one signal speak for itself, and several that rise together a little earlier. The score is held while
+nothing is told: in a gate, and while the spindle stands.
 """
 
 from collections.abc import Sequence
@@ -12,14 +12,14 @@ from typing import NamedTuple
 
 from twin.anomaly.parts import scales
 from twin.anomaly.parts.beside import left_over
+from twin.anomaly.parts.limits import limits_of
 from twin.anomaly.parts.model import PartsModel
 from twin.anomaly.parts.own import NEVER, Own, usual_of
 from twin.anomaly.parts.reason import why_of
-from twin.anomaly.parts.verdict import limits_of
 from twin.anomaly.parts.why import Why
 
 SMALL = 0.5
-"""A residual below this share of its tail is taken as it is, without the peers: it moves no score that matters."""
+"""A residual below this share of its tail is taken as it is, without the peers; where none is larger, it is the score."""
 WHY_FROM = 1.0
 NOTHING_TOLD = "nothing was told yet of a cut that is known"
 
@@ -49,14 +49,15 @@ def judged(model: PartsModel, own: Own, peers: Sequence[Own]) -> Judged:
     if max(own.told_at) == NEVER:
         return Judged(None, None, NOTHING_TOLD, True, None, knows)
     u = [s * up if s > 0.0 else s * down for s, up, down in zip(own.smooth, plan.over_up, plan.over_down, strict=True)]
+    most, least = max(u), min(u)
+    if most < SMALL and least > -SMALL:
+        most = max(most, -least)
+        return Judged(most, most, None, own.is_idle, None, knows, tuple(u))
     own_score = _length(u)
-    if own_score < SMALL:
-        return Judged(own_score, own_score, None, own.is_idle, None, knows, tuple(u))
     if peers:
-        for index, value in enumerate(u):
-            if value > SMALL or value < -SMALL:
-                left = left_over(own, peers, index, model.tick_s)
-                u[index] = left * (plan.over_up[index] if left > 0.0 else plan.over_down[index])
+        for index in [at for at, value in enumerate(u) if value > SMALL or value < -SMALL]:
+            left = left_over(own, peers, index, plan.memory_ticks)
+            u[index] = left * (plan.over_up[index] if left > 0.0 else plan.over_down[index])
     left_in_tails = tuple(u)
     if own.memory.tolerated and own.place.key is not None:
         u = _tolerated(model, own, u)
@@ -67,19 +68,13 @@ def judged(model: PartsModel, own: Own, peers: Sequence[Own]) -> Judged:
 
 def _length(u: list[float]) -> float:
     """Return the score of what is left, in tails: signal by signal, each on all scales."""
-    most = 0.0
-    for scale in range(scales.COUNT):
-        total = 0.0
-        for value in u[scale :: scales.COUNT]:
-            square = value * value
-            total += square * square
-        most = max(most, total)
-    return most**0.25
+    fourth = [value * value * value * value for value in u]
+    return max([sum(fourth[scale :: scales.COUNT]) for scale in range(scales.COUNT)]) ** 0.25
 
 
 def _tolerated(model: PartsModel, own: Own, u: list[float]) -> list[float]:
     """Return what is left where a person has called such an alarm false: less by the limit that was raised."""
-    limits = limits_of(own.memory, own.place.key or "", own.tick * model.tick_s)
+    limits = limits_of(own.memory.tolerated, own.place.key or "", own.tick * model.tick_s)
     names = ((signal, scale) for signal in model.signals for scale in scales.SCALES)
     return [
         value / limits.get((signal, scale, 1 if value > 0.0 else -1), 1.0)

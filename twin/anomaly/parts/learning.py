@@ -1,16 +1,18 @@
 """What a part that has ended without an alarm teaches; a part that alarmed teaches nothing.
 
-At the end of an operation its levels of wear and material are followed, unless its score was suspicious for long. At the end of the
-part the sections of all its operations are learned. An alarm takes back the levels to those at the beginning of its part.
+At the end of an operation its levels of wear and material are followed, unless its score was suspicious for long. At the end of
+the part the sections of all its operations are learned. An alarm takes back the levels to those at the beginning of its part.
 """
 
 from twin.anomaly.parts.following import with_levels
 from twin.anomaly.parts.judging import Judged
 from twin.anomaly.parts.levels import followed
-from twin.anomaly.parts.model import LEVELLED, OPERATIONS_MAX, PartsModel
-from twin.anomaly.parts.moment import is_beyond
+from twin.anomaly.parts.model import LEVELLED, OPERATIONS_MAX, PartsModel, Plan
+from twin.anomaly.parts.moment import SECTIONS_MAX, is_beyond
 from twin.anomaly.parts.own import NEVER, Ended, Own, Tool, tool_of, usual_of
 from twin.anomaly.parts.record import CutRecord, recorded
+from twin.anomaly.parts.residuals import cut_share
+from twin.anomaly.parts.sectioning import starts_of
 from twin.anomaly.parts.usual import Sums, Usual, begun_usual, extended, froze, learned_section
 
 SUSPICIOUS = 1.0
@@ -18,6 +20,7 @@ HELD_SHARE_MAX = 0.3
 SKIPPED_MAX = 5
 OPERATIONS_OF_PART_MAX = 40
 TICKS_MIN = 3
+CUT_SHARE_MIN = 0.3
 
 
 def learned(model: PartsModel, own: Own, judged: Judged, is_alarm: bool) -> tuple[Own, CutRecord | None]:
@@ -76,7 +79,7 @@ def _levels_followed(model: PartsModel, own: Own, ended: Ended, usual: Usual | N
     """Return the state with the levels after an operation that earlier parts know."""
     if usual is None:
         return own
-    residual = [_mean(ended, usual, at) if kind in LEVELLED else None for at, kind in enumerate(model.plan.kinds)]
+    residual = [_mean(model.plan, ended, usual, at) if kind in LEVELLED else None for at, kind in enumerate(model.plan.kinds)]
     if all(value is None for value in residual):
         return own
     tool = tool_of(model, own, ended.place.tool)
@@ -87,32 +90,33 @@ def _levels_followed(model: PartsModel, own: Own, ended: Ended, usual: Usual | N
     return with_levels(model, own._replace(material=material, tools={**own.tools, name: Tool(level, tool.slow)}))
 
 
-def _mean(ended: Ended, usual: Usual, at: int) -> float | None:
-    """Return the mean residual of a signal over the sections that earlier parts know, weighted by what repeats."""
+def _mean(plan: Plan, ended: Ended, usual: Usual, at: int) -> float | None:
+    """Return the change of the cut that a signal shows, by least squares over the sections that earlier parts know."""
     total = weights = ticks = 0.0
     for section, sums in ended.sections:
         if 0 <= section < len(usual.marks) and usual.told[section][at] and sums.count[at]:
-            share = usual.weight[section][at] ** 2
-            total += share * sums.total[at]
-            weights += share * sums.count[at]
-            ticks += sums.count[at]
+            cuts = cut_share(plan, usual.centre[section])
+            if cuts >= CUT_SHARE_MIN:
+                share = cuts * usual.weight[section][at] ** 2
+                total += share * sums.total[at]
+                weights += share * cuts * sums.count[at]
+                ticks += sums.count[at]
     return total / weights if ticks >= TICKS_MIN and weights > 0.0 else None
 
 
 def _sections_learned(model: PartsModel, own: Own, ended: Ended) -> Own:
     """Return the state with the usual course of an operation after one more healthy part."""
-    place, count, plan = ended.place, len(model.signals), model.plan
+    place, plan = ended.place, model.plan
     if place.key is None or not model.follows_parts:
         return own
     usual = usual_of(model, own, place.key)
+    if usual is None and (not place.is_whole or len(own.usual) >= OPERATIONS_MAX):
+        return own
+    merged = _merged(ended, 0 if usual is None else len(usual.marks))
+    if place.is_whole and place.forming:
+        usual, merged = _with_sections(usual, ended, merged, plan.kinds, model.tick_s)
     if usual is None:
-        if not place.is_whole or not place.forming or len(own.usual) + len(model.usual) >= 2 * OPERATIONS_MAX:
-            return own
-        usual = begun_usual(place.forming, place.end, count)
-    elif place.is_whole:
-        beyond = tuple([mark for mark in place.forming if is_beyond(usual.end, *mark)])
-        usual = extended(usual, beyond, place.end, count) if beyond else usual
-    merged = _merged(ended, len(usual.marks))
+        return own
     centre, variance = list(usual.centre), list(usual.variance)
     told, weight, frozen = list(usual.told), list(usual.weight), list(usual.frozen)
     for section, sums in merged.items():
@@ -122,7 +126,11 @@ def _sections_learned(model: PartsModel, own: Own, ended: Ended) -> Own:
         )
         if plan.load_at >= 0 and before[plan.load_at] < told[section][plan.load_at]:
             at = plan.load_at
-            now = usual.centre[section][at] + sums.total[at] / sums.count[at] + ended.level[at]
+            now = (
+                usual.centre[section][at]
+                + sums.total[at] / sums.count[at]
+                + ended.level[at] * cut_share(plan, usual.centre[section])
+            )
             frozen[section] = froze(frozen[section], before[at], now)
     parts = min(usual.parts + 1, 10**6) if place.is_whole else usual.parts
     duration = usual.duration_ticks
@@ -140,15 +148,33 @@ def _sections_learned(model: PartsModel, own: Own, ended: Ended) -> Own:
     return own._replace(usual={**own.usual, place.key: after})
 
 
+def _with_sections(
+    usual: Usual | None, ended: Ended, sums: dict[int, Sums], kinds: tuple[int, ...], tick_s: float
+) -> tuple[Usual | None, dict[int, Sums]]:
+    """Return the course with the sections that this part was the first to come to, and the sums by its sections."""
+    known, place = 0 if usual is None else len(usual.marks), ended.place
+    beyond = [at for at, mark in enumerate(place.forming) if usual is None or is_beyond(usual.end, *mark)]
+    room = SECTIONS_MAX - known
+    own = {section: one for section, one in sums.items() if section < known}
+    if not beyond or room <= 0:
+        return usual, own
+    stretches = [sums.get(known + at) for at in beyond]
+    starts = starts_of(stretches, kinds, tick_s, room)
+    marks = tuple([place.forming[beyond[start]] for start in starts])
+    for number, (start, stop) in enumerate(zip(starts, [*starts[1:], len(stretches)], strict=True)):
+        for one in stretches[start:stop]:
+            if one is not None:
+                before = own.get(known + number)
+                own[known + number] = one if before is None else before.plus(one)
+    after = begun_usual(marks, place.end, len(kinds)) if usual is None else extended(usual, marks, place.end, len(kinds))
+    return after, own
+
+
 def _merged(ended: Ended, known: int) -> dict[int, Sums]:
     """Return the sums by section; a section that was come to several times has those of all."""
     found: dict[int, Sums] = {}
     for section, sums in ended.sections:
-        if 0 <= section < known:
+        if 0 <= section < known + len(ended.place.forming):
             before = found.get(section)
-            found[section] = sums if before is None else _plus(before, sums)
+            found[section] = sums if before is None else before.plus(sums)
     return found
-
-
-def _plus(one: Sums, other: Sums) -> Sums:
-    return Sums(*(tuple([a + b for a, b in zip(x, y, strict=True)]) for x, y in zip(one, other, strict=True)))

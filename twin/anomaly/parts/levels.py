@@ -4,7 +4,8 @@
     K_m = P_m / (P_m + P_l + R),  K_l = P_l / (P_m + P_l + R)            m ← m + K_m r,  l ← l + K_l r,  P ← (1 − K) P + q
 
 A Kalman filter with two levels. After a standstill or a change of program the material may be another one, so P_m grows to the
-variance between batches. What lies beyond three standard deviations is cut off there; nothing is followed while a score is suspicious.
+variance between batches. What lies beyond three standard deviations is cut off there; nothing is followed while a score is
+suspicious.
 """
 
 from collections.abc import Sequence
@@ -12,7 +13,7 @@ from typing import NamedTuple
 
 BATCH_VAR = 0.06**2
 MATERIAL_DRIFT = 0.003**2
-TOOL_DRIFT = 0.008**2
+TOOL_DRIFT = 0.005**2
 TOOL_VAR = 0.05**2
 """Variance of the level of a tool that has not been followed yet."""
 NOISE = 0.02**2

@@ -9,8 +9,9 @@ from typing import Annotated
 from pydantic import Field
 
 from twin.anomaly.calibration import Finite, NotNegative, Positive, Record
+from twin.anomaly.common_features import MEMORY_S
 from twin.anomaly.parts import quantity, scales
-from twin.anomaly.parts.heat import BASE_S, TAUS_S
+from twin.anomaly.parts.heat import BASE_S, EVERY_S, TAUS_S
 from twin.anomaly.parts.levels import BATCH_VAR, TOOL_VAR, Level
 from twin.anomaly.parts.quantity import Kind
 from twin.anomaly.parts.usual import Usual
@@ -18,6 +19,8 @@ from twin.anomaly.parts.usual import Usual
 OPERATIONS_MAX = 500
 SIGNALS_MAX = 16
 RPM_STEP = 500.0
+QUICK = ("seconds", "tool")
+"""The scales that say nothing of a temperature."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +30,9 @@ class Plan:
     kinds: tuple[int, ...]
     floors: tuple[float, ...]
     shares: tuple[float, ...]
+    heat_every: int
+    memory_ticks: int
+    powers: tuple[float, ...]
     heat_shares: tuple[tuple[float, ...], float]
     drivers_at: tuple[int, int]
     speed_at: int
@@ -62,9 +68,9 @@ class PartsModel(Record):
     twin_spread: tuple[NotNegative, ...] = ()
     up: tuple[Positive, ...] = ()
     down: tuple[Positive, ...] = ()
-    usual: Annotated[dict[str, Usual], Field(max_length=OPERATIONS_MAX)] = {}
+    usual: Annotated[dict[str, Usual], Field(max_length=OPERATIONS_MAX)] = Field(default={})
     material: Level = Level((), BATCH_VAR)
-    tools: Annotated[dict[str, Level], Field(max_length=OPERATIONS_MAX)] = {}
+    tools: Annotated[dict[str, Level], Field(max_length=OPERATIONS_MAX)] = Field(default={})
     follows_parts: bool = True
 
     def idle_at(self, rpm: float) -> float:
@@ -80,6 +86,10 @@ class PartsModel(Record):
         (x0, y0), (x1, y1) = points[at - 1], points[at]
         return y0 + (y1 - y0) * (rpm - x0) / (x1 - x0)
 
+    def changed(self, **fields: object) -> "PartsModel":
+        """Return the model with other values of some fields, checked; the plan is another one then."""
+        return PartsModel.model_validate({**{name: getattr(self, name) for name in PartsModel.model_fields}, **fields})
+
     @cached_property
     def plan(self) -> Plan:
         """What a step needs."""
@@ -91,12 +101,17 @@ class PartsModel(Record):
         def at(name: str) -> int:
             return self.signals.index(name) if name in self.signals else -1
 
+        counts = [0.0 if kind is Kind.TEMPERATURE and scale in QUICK else 1.0 for kind in kinds for scale in scales.SCALES]
+        every = max(1, round(EVERY_S / self.tick_s))
         steps = range(int(quantity.RPM_MAX / RPM_STEP) + 1)
         return Plan(
             kinds=tuple(map(int, kinds)),
             floors=tuple(quantity.floor_of(signal) for signal in self.signals),
+            powers=self.powers,
             shares=scales.shares(self.tick_s),
-            heat_shares=(tuple(self.tick_s / tau_s for tau_s in TAUS_S), self.tick_s / BASE_S),
+            memory_ticks=round(MEMORY_S / self.tick_s),
+            heat_every=every if any(self.heat) else 0,
+            heat_shares=(tuple(every * self.tick_s / tau_s for tau_s in TAUS_S), every * self.tick_s / BASE_S),
             drivers_at=(at(quantity.SPEED), at(quantity.LOAD)),
             speed_at=at(quantity.SPEED),
             feed_at=at(quantity.FEED),
@@ -106,8 +121,8 @@ class PartsModel(Record):
             prior=tuple(value * value for value in spread),
             over_spread=tuple(1.0 / value for value in spread),
             over_twin=tuple(1.0 / value if value else 0.0 for value in self.twin_spread or (0.0,) * count),
-            over_up=tuple(1.0 / value for value in up),
-            over_down=tuple(1.0 / value for value in down),
+            over_up=tuple(share / value for share, value in zip(counts, up, strict=True)),
+            over_down=tuple(share / value for share, value in zip(counts, down, strict=True)),
             blank=(0.0,) * (count * scales.COUNT),
             flat=(0.0,) * count,
         )
@@ -118,8 +133,9 @@ class PartsModel(Record):
         return self.power or tuple(quantity.POWERS.get(quantity.kind_of(signal), 0.0) for signal in self.signals)
 
     def tool_level(self, tool: str) -> Level:
-        """Return the level of a tool when training ended; of one that was not seen, none."""
-        return self.tools.get(tool) or Level((0.0,) * len(self.signals), TOOL_VAR)
+        """Return the level of a tool when training ended, which may have been long ago; of one that was not seen, none."""
+        known = self.tools.get(tool)
+        return Level((0.0,) * len(self.signals) if known is None else known.values, TOOL_VAR)
 
 
 LEVELLED = frozenset({Kind.LOAD, Kind.VIBRATION})

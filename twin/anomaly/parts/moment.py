@@ -1,22 +1,25 @@
 """The moment of a part: operation (program, tool, n-th use of that tool) and section of it (line, and distance along the line).
 
-    moved ← moved + feed · tick          along the line; from the beginning of the operation where the control tells no line
+    moved ← moved + feed · tick          along the line, mm
+    moved ← moved + override · tick      since the operation began, s as programmed, where the control tells no line
 
-Distance is the integral of the feed that was run, so overrides and holds do not shift a section. A part begins where the program
-changes or goes back to its beginning; where no line is told, where the first tool comes back, or a single one after a standstill.
-The first part cuts an operation into sections of about five seconds; from the second on they are looked up.
+Overrides and holds do not shift a section. Where no line is told, the signals put the progress right (`alignment.py`). A part
+begins where the program changes or goes back to its beginning; without a line, where the first tool comes back, or a single one
+after a standstill. The first part notes a mark each second; sections are made of them when it has ended (`sectioning.py`), and
+looked up from then on.
 """
 
 from bisect import bisect_right
 from typing import NamedTuple
 
 Mark = tuple[int, float]
-"""Where a section begins: line, mm along it."""
+"""Where a section begins: line, mm along it; −1 and s as programmed where no line is told."""
 NO_LINE = -1
 USES_MAX = 100
 BACK_SHARE = 0.1
 STOOD_S = 10.0
-SECTION_S = 5.0
+FORMED_S = 1.0
+FORMED_MAX = 256
 SECTIONS_MAX = 64
 BEYOND = 1.2
 SLACK_MM = 5.0
@@ -31,6 +34,7 @@ class Place(NamedTuple):
     section: of the operation; forming: marks of sections that no earlier part has; section_ticks: ticks that told of the section
     section_s: length of the sections that are formed; end: the furthest moment of this operation
     stood_ticks: how long the spindle has stood; ticks: that told in this operation; is_whole: it was seen from its beginning
+    band: costs of other offsets, where no line is told (`alignment.py`)
     """
 
     program: str | None = None
@@ -46,11 +50,38 @@ class Place(NamedTuple):
     section: int = 0
     forming: tuple[Mark, ...] = ()
     section_ticks: int = 0
-    section_s: float = SECTION_S
+    section_s: float = FORMED_S
     end: Mark = (NO_LINE, 0.0)
     stood_ticks: int = 0
     ticks: int = 0
     is_whole: bool = False
+    band: tuple[float, ...] = ()
+
+    def moved_to(self, here: Mark, section: int) -> "Place":
+        """Return the place after one more tick that tells."""
+        line, moved = here
+        last, end = self.line_last, self.end
+        return Place(
+            self.program,
+            self.tool,
+            self.key,
+            self.part,
+            line,
+            self.line_first,
+            line if line > last else last,
+            moved,
+            self.uses,
+            self.first_tool,
+            section,
+            self.forming,
+            self.section_ticks + 1 if section == self.section else 1,
+            self.section_s,
+            here if here > end else end,
+            0,
+            self.ticks + 1,
+            self.is_whole,
+            self.band,
+        )
 
 
 def is_part_begun(place: Place, program: str | None, tool: int | None, line: int, stood_ticks_min: int) -> bool:
@@ -65,7 +96,7 @@ def is_part_begun(place: Place, program: str | None, tool: int | None, line: int
     if line >= 0:
         return line < place.line and line <= place.line_first + BACK_SHARE * (place.line_last - place.line_first)
     if tool is None or place.first_tool is None:
-        return False
+        return tool is not None
     if tool != place.tool:
         return tool == place.first_tool and len(place.uses) > 1
     return len(place.uses) == 1 and place.stood_ticks >= stood_ticks_min
@@ -107,16 +138,16 @@ def is_beyond(end: Mark, line: int, moved_mm: float) -> bool:
 
 
 def formed(place: Place, known: int, override: float, tick_s: float) -> Place:
-    """Return the place after a tick beyond what earlier parts know: a section ends after about five seconds at full feed.
+    """Return the place after a tick beyond what earlier parts know: a mark each second at full feed.
 
-    Where there are too many, every other mark goes and sections become twice as long.
+    Where there are too many, they are twice as far apart from then on, and every other one goes.
     """
     marks, length_s = place.forming, place.section_s
     if not marks or place.section_ticks * tick_s * override >= length_s:
         here = (place.line, place.moved_mm)
         if not marks or here > marks[-1]:
             marks = (*marks, here)
-            if known + len(marks) > SECTIONS_MAX:
+            if len(marks) > FORMED_MAX:
                 marks, length_s = marks[::2], 2.0 * length_s
         return place._replace(forming=marks, section_s=length_s, section=known + len(marks) - 1, section_ticks=0)
     return place

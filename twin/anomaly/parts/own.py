@@ -4,10 +4,10 @@ from typing import NamedTuple
 
 from twin.anomaly.parts.episodes import Memory
 from twin.anomaly.parts.heat import Heat
-from twin.anomaly.parts.levels import Level
+from twin.anomaly.parts.levels import Level, another_material
 from twin.anomaly.parts.model import PartsModel
 from twin.anomaly.parts.moment import Place
-from twin.anomaly.parts.usual import Sums, Usual
+from twin.anomaly.parts.usual import Rows, Sums, Usual
 
 NEVER = -(10**12)
 
@@ -42,8 +42,10 @@ class Own(NamedTuple):
     smooth: residuals in spreads, by signal, each on all scales; told_at: tick at which each signal was last told of
     is_idle: this tick told nothing; is_new: no earlier part has the section, so the twin is all there is
     level: of wear and material in the operation that runs, by signal; calm: what its uncertainty leaves of a residual, by signal
-    material, tools: the levels; kept: those at the beginning of the part; skipped: parts in a row that were too suspicious to learn
-    sums: of the section that runs; sections: those of the operation so far; expected, cut: sums of cutting load, %
+    material, tools: the levels; kept: those at the beginning of the part; skipped: parts in a row
+        that were too suspicious to learn
+    rows: residuals of the section that runs; sections: sums of those of the operation so far; expected: sums of the cutting
+        load, % at full feed, and of what the twin expects, and their ticks
     usual: the operations learned since training; waiting: those of the part that runs, until it has ended without an alarm
     ended: an operation that has ended at this tick
     is_held: the score is suspicious, nothing is followed; high_since: tick since when; held_ticks, alarm_ticks: of the operation
@@ -57,16 +59,16 @@ class Own(NamedTuple):
     told_at: tuple[int, ...] = ()
     is_idle: bool = True
     is_new: bool = True
+    rows: Rows = ()
+    sections: tuple[tuple[int, Sums], ...] = ()
+    expected: tuple[float, float, int] = (0.0, 0.0, 0)
+    heat: Heat = Heat()
     level: tuple[float, ...] = ()
     calm: tuple[float, ...] = ()
-    heat: Heat = Heat()
     material: Level = Level((), 0.0)
     tools: dict[str, Tool] = {}  # noqa: RUF012  never changed in place
     kept: tuple[Level, dict[str, Tool]] | None = None
     skipped: int = 0
-    sums: Sums = Sums((), (), ())
-    sections: tuple[tuple[int, Sums], ...] = ()
-    expected: tuple[float, float, int] = (0.0, 0.0, 0)
     usual: dict[str, Usual] = {}  # noqa: RUF012  never changed in place
     waiting: tuple[Ended, ...] = ()
     ended: Ended | None = None
@@ -81,8 +83,7 @@ class Own(NamedTuple):
 def begun(model: PartsModel) -> Own:
     """Return the state of a machine before anything was told."""
     count, plan = len(model.signals), model.plan
-    zero = (0,) * count
-    material = model.material if model.material.values else Level(plan.flat, model.material.variance)
+    material = another_material(model.material if model.material.values else Level(plan.flat, model.material.variance))
     return Own(
         smooth=plan.blank,
         told_at=(NEVER,) * count,
@@ -90,7 +91,6 @@ def begun(model: PartsModel) -> Own:
         calm=(1.0,) * count,
         heat=Heat(base=(None,) * count),
         material=material,
-        sums=Sums(zero, plan.flat, plan.flat),
     )
 
 

@@ -1,9 +1,9 @@
 """The quantity of a signal that repeats from part to part, and the ticks that tell of it.
 
-    load, power      x = ln((max(0, load − idle(speed)) + floor) / (override^p · (expected + floor)))      expected: 0 where unknown
+    load, power      x = ln(max(0, load − idle(speed)) / override^p + floor)
     vibration        x = ln(vibration + floor) − p · ln override
-    feed             x = ln(feed / override + floor) − ln(expected + floor)
-    speed            x = ln(speed / override + floor) − ln(expected + floor)
+    feed             x = ln(feed / override + floor)
+    speed            x = ln(speed / override + floor)
     temperature      x = value − heat(speed, load): `heat.py`
     others           x = value
 

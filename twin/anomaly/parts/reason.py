@@ -7,11 +7,10 @@ import math
 from collections.abc import Sequence
 
 from twin.anomaly.parts import scales
-from twin.anomaly.parts.episodes import nearest
 from twin.anomaly.parts.model import PartsModel
 from twin.anomaly.parts.own import Own, usual_of
 from twin.anomaly.parts.quantity import UNITS, Kind, kind_of
-from twin.anomaly.parts.signature import shares_of, signature_of
+from twin.anomaly.parts.residuals import cut_share
 from twin.anomaly.parts.why import Why
 
 PEER_SHOWS = 0.5
@@ -20,7 +19,8 @@ PEER_SHOWS = 0.5
 
 def why_of(model: PartsModel, own: Own, peers: Sequence[Own], left: Sequence[float], knows: str) -> Why:
     """Return the reason of a score; left: in tails, signal by signal, each on all scales. Peers are named by their place."""
-    index = max(range(len(left)), key=lambda at: abs(left[at]))
+    most, least = max(left), min(left)
+    index = left.index(most if most >= -least else least)
     at, scale = divmod(index, scales.COUNT)
     place, plan, s = own.place, model.plan, own.smooth[index]
     usual = usual_of(model, own, place.key)
@@ -34,16 +34,14 @@ def why_of(model: PartsModel, own: Own, peers: Sequence[Own], left: Sequence[flo
         lines = (here, max(here, after)) if here >= 0 else None
     elif place.line >= 0:
         lines = (place.line, place.line)
-    centre, weight = 0.0, plan.over_spread[at]
+    centre = 0.0
     if usual is not None and is_known and kind is not Kind.TEMPERATURE:
-        centre = usual.centre[section][at] + own.level[at]
-        weight = usual.weight[section][at] or weight
-    away = s / (weight * own.calm[at])
+        centre = usual.centre[section][at] + own.level[at] * cut_share(plan, usual.centre[section])
+    away = s / plan.over_spread[at]
     expected, measured = _in_units(model, own, at, centre, away)
     shows = [
         str(n) for n, peer in enumerate(peers) if peer.smooth[index] * s > 0.0 and abs(peer.smooth[index]) > PEER_SHOWS * abs(s)
     ]
-    signature = signature_of(shares_of(model.signals, scales.SCALES, left), place.key or "", place.program, place.tool)
     return Why(
         model.signals[at],
         scales.SCALES[scale],
@@ -57,8 +55,7 @@ def why_of(model: PartsModel, own: Own, peers: Sequence[Own], left: Sequence[flo
         abs(s),
         max(0.0, (own.tick - own.high_since) * model.tick_s) if own.high_since > 0 else 0.0,
         knows if is_known else "the twin",
-        nearest(own.memory, signature),
-        tuple(shows),
+        peers=tuple(shows),
     )
 
 

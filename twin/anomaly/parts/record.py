@@ -12,6 +12,7 @@ from typing import NamedTuple
 from twin.anomaly.parts.model import PartsModel
 from twin.anomaly.parts.own import Ended
 from twin.anomaly.parts.quantity import FEED, Kind
+from twin.anomaly.parts.residuals import cut_share
 from twin.anomaly.parts.usual import Usual
 
 VERSION = 1
@@ -83,7 +84,8 @@ def _load_beside_parts(model: PartsModel, ended: Ended, usual: Usual | None) -> 
         if not 0 <= section < len(usual.marks) or not sums.count[at]:
             continue
         before = usual.frozen[section]
-        now = usual.centre[section][at] + sums.total[at] / sums.count[at] + ended.level[at]
+        level = ended.level[at] * cut_share(model.plan, usual.centre[section])
+        now = usual.centre[section][at] + sums.total[at] / sums.count[at] + level
         if before is not None and math.exp(before) - floor >= CUT_PCT_MIN:
             rows.append((sums.count[at], max(0.0, math.exp(now) - floor), math.exp(before) - floor))
     if not rows:

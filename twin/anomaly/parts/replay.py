@@ -33,7 +33,10 @@ YOUNG = 4
 SEEN_S = 5.0
 SPREAD_PARTS_MIN = 2
 LOOSE_TAILS = (6.0, 3.0, 1.5, 2.5)
+"""Tails so wide that only what stands out is kept from being learned, before the real ones are known."""
 CUT = 1
+STEADY_QUANTILE = 0.35
+"""About half of the sections are edges, which spread further."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,6 +152,7 @@ ALL = Ablation()
 class Replayed:
     """scores, own_scores: (T, N), NaN = not known, held while idle; is_idle, is_alarm: (T, N)
     whys: (tick, machine's place, why) at each onset of an alarm; records: (machine's place, record) in order
+    owns: the states at the end, from which a later stretch goes on
     """
 
     scores: "NDArray[np.float64]"
@@ -157,6 +161,7 @@ class Replayed:
     is_alarm: "NDArray[np.bool_]"
     whys: tuple[tuple[int, int, Why], ...]
     records: tuple[tuple[int, CutRecord], ...]
+    owns: tuple[Own, ...]
 
 
 def fit(cell: Sequence[Recorded], ablation: Ablation = ALL) -> tuple[PartsModel, ...]:
@@ -167,8 +172,11 @@ def fit(cell: Sequence[Recorded], ablation: Ablation = ALL) -> tuple[PartsModel,
     """
     from twin.anomaly.parts.training import prepared  # noqa: PLC0415  numpy comes with it
 
-    models = [prepared(one).model_copy(update={"follows_parts": ablation.has_parts}) for one in cell]
-    models = [model.model_copy(update=_loose(model)) for model in models]
+    wide = [LOOSE_TAILS * len(one.signals) for one in cell]
+    models = [
+        prepared(one).changed(follows_parts=ablation.has_parts, up=tails, down=tails)
+        for one, tails in zip(cell, wide, strict=True)
+    ]
     young = [one.until(max(1, len(one.values) // YOUNG)) for one in cell]
     _, owns, seen = _run(models, young, None, ablation, SEEN_S)
     models = [_with_spreads(model, own, rows) for model, own, rows in zip(models, owns, seen, strict=True)]
@@ -236,7 +244,7 @@ def _run(
                 whys.append((tick, place, judgement.why))
             if every and tick % every == 0 and not judgement.is_idle and judgement.signature:
                 seen[place].append((tick, judgement.signature))
-    return Replayed(scores, own_scores, is_idle, is_alarm, tuple(whys), tuple(records)), states, seen
+    return Replayed(scores, own_scores, is_idle, is_alarm, tuple(whys), tuple(records), tuple(states)), states, seen
 
 
 def _ablated(told: Told, ablation: Ablation) -> Told:
@@ -245,17 +253,11 @@ def _ablated(told: Told, ablation: Ablation) -> Told:
     return told if ablation.has_gates or not told.is_gated else told._replace(is_gated=False)
 
 
-def _loose(model: PartsModel) -> dict[str, tuple[float, ...]]:
-    """Return tails so wide that only what stands out is kept from being learned, before the real ones are known."""
-    wide = LOOSE_TAILS * len(model.signals)
-    return {"up": wide, "down": wide}
-
-
 def _with_spreads(model: PartsModel, own: Own, seen: "list[tuple[int, tuple[float, ...]]]") -> PartsModel:
     """Return the model with the spreads of a tick that its first parts had."""
     import numpy as np  # noqa: PLC0415
 
-    spread = list(1.0 / value for value in model.plan.over_spread)
+    spread = [1.0 / value for value in model.plan.over_spread]
     rows = np.array([row for _, row in seen]) if seen else np.zeros((0, len(spread) * scales.COUNT))
     for at, kind in enumerate(model.plan.kinds):
         known = [
@@ -265,11 +267,11 @@ def _with_spreads(model: PartsModel, own: Own, seen: "list[tuple[int, tuple[floa
             if told[at] >= SPREAD_PARTS_MIN
         ]
         if known:
-            spread[at] = max(float(np.median(known)) ** 0.5, model.plan.least[at] ** 0.5)
+            spread[at] = max(float(np.quantile(known, STEADY_QUANTILE)) ** 0.5, model.plan.least[at] ** 0.5)
         elif kind == Kind.TEMPERATURE and len(rows):
             away = rows[:, at * scales.COUNT + CUT] * LOOSE_TAILS[CUT]
             spread[at] = max(float(np.sqrt(np.mean(away**2))) * spread[at], model.plan.least[at] ** 0.5)
-    return model.model_copy(update={"spread": tuple(spread)})
+    return model.changed(spread=tuple(spread))
 
 
 def _taught(model: PartsModel, own: Own, seen: "list[tuple[int, tuple[float, ...]]]") -> PartsModel:
@@ -284,15 +286,10 @@ def _taught(model: PartsModel, own: Own, seen: "list[tuple[int, tuple[float, ...
         raise ValueError("no tick is judged outside of tool changes in an operation that came twice: record more parts")
     left = np.array([row for _, row in late]) * np.array([LOOSE_TAILS * len(model.signals)])
     blocks = np.array([tick for tick, _ in late]) // max(1, round(scales.BLOCK_S / model.tick_s))
-    return PartsModel(
-        **{
-            **{name: getattr(model, name) for name in PartsModel.model_fields},
-            **{
-                "up": tuple(scales.tails(left, blocks).tolist()),
-                "down": tuple(scales.tails(-left, blocks).tolist()),
-                "usual": dict(list(own.usual.items())[-OPERATIONS_MAX:]),
-                "material": own.material,
-                "tools": {name: tool.level for name, tool in own.tools.items()},
-            },
-        }
+    return model.changed(
+        up=tuple(scales.tails(left, blocks).tolist()),
+        down=tuple(scales.tails(-left, blocks).tolist()),
+        usual=dict(list(own.usual.items())[-OPERATIONS_MAX:]),
+        material=own.material,
+        tools={name: tool.level for name, tool in own.tools.items()},
     )

@@ -1,9 +1,13 @@
 """Residuals on several time scales, and the tails of healthy parts that make them comparable.
 
-    s ← s + (1 − exp(−tick / τ)) · (z − s)          only at ticks that tell of the signal; τ: 3 s, 30 s, 5 min, 2 min of one tool
+    s ← s + (1 − exp(−tick / τ)) · r² · (z / r − s)          τ: 3 s, 30 s, 5 min, 2 min of one tool
 
-The last scale is kept for each tool while others cut, so a tool that is dull or mounted too long is compared with its own last parts.
-A tail is the size that healthy parts reach about once a day on that scale and side, so that all of them alarm equally often.
+r tells how much a tick says: 1 where the section repeats as well as sections usually do, less at an edge, 0 where nothing is
+told. So s is a mean in which each tick counts by its precision, in usual spreads of the signal.
+
+The last scale is kept for each tool while others cut, so a tool that is dull or mounted too long is compared with its own last
+parts. A tail is the size that healthy parts reach about once a day on that scale and side, so that all of them alarm equally
+often.
 """
 
 import math
@@ -18,8 +22,8 @@ SCALES = ("seconds", "cut", "part", "tool")
 TAUS_S = (3.0, 30.0, 300.0, 120.0)
 TOOL = 3
 COUNT = len(SCALES)
-CLIP = 8.0
-BLOCK_S = 3600.0
+CLIP = 6.0
+BLOCK_S = 900.0
 RETURN_S = 86_400.0
 TAIL_LEAST = 0.2
 
@@ -33,20 +37,25 @@ def shares(tick_s: float) -> tuple[float, ...]:
     return tuple(1.0 - math.exp(-tick_s / tau_s) for tau_s in TAUS_S)
 
 
-def smoothed(before: Sequence[float], z: Sequence[float], told: Sequence[bool], each: Sequence[float]) -> tuple[float, ...]:
-    """Return the residuals by signal, each on all scales, after one more tick.
+def smoothed(before: Sequence[float], z: Sequence[float], tells: Sequence[float], each: Sequence[float]) -> tuple[float, ...]:
+    """Return the residuals by signal, each on all scales, after one more tick; z: r · z, tells: r², 0 = nothing.
 
-    >>> smoothed((0.0,) * 4, (4.0,), (True,), (0.5, 0.25, 0.125, 0.25))
+    >>> smoothed((0.0,) * 4, (4.0,), (1.0,), (0.5, 0.25, 0.125, 0.25))
     (2.0, 1.0, 0.5, 1.0)
     """
     a, b, c, d = each
     found: list[float] = []
     at = 0
-    for value, is_told in zip(z, told, strict=True):
+    for value, told in zip(z, tells, strict=True):
         s, t, u, v = before[at : at + 4]
         at += 4
-        if is_told:
-            found += (s + a * (value - s), t + b * (value - t), u + c * (value - u), v + d * (value - v))
+        if told:
+            found += (
+                s + a * (value - told * s),
+                t + b * (value - told * t),
+                u + c * (value - told * u),
+                v + d * (value - told * v),
+            )
         else:
             found += (s, t, u, v)
     return tuple(found)
@@ -65,9 +74,9 @@ def with_tool(smooth: Sequence[float], slow: Sequence[float]) -> tuple[float, ..
 
 
 def tails(left: "NDArray[np.float64]", blocks: "NDArray[np.integer]", block_s: float = BLOCK_S) -> "NDArray[np.float64]":
-    """Return the size that each column of healthy remainders (T, K) reaches once in RETURN_S, 0 and more; blocks: (T,), ascending.
+    """Return the size that each column of healthy remainders (T, K) reaches once in RETURN_S.
 
-    The quantile of block maxima that is exceeded as often; never less than `TAIL_LEAST`.
+    The quantile of block maxima that is exceeded as often, never less than `TAIL_LEAST`; blocks: (T,), ascending.
     """
     import numpy as np  # noqa: PLC0415  the stream needs none
 

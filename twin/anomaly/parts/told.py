@@ -8,23 +8,23 @@ class Expects(Protocol):
     """The twin's expectation at a line, at programmed feed and speed: overrides are taken into account by whoever compares."""
 
     @property
-    def cut_load_pct(self) -> float:
+    def cut_load_pct(self) -> float | None:
         """Spindle load of the cut alone, without what the spindle takes idle."""
 
     @property
-    def load_pct(self) -> float:
+    def load_pct(self) -> float | None:
         """Spindle load."""
 
     @property
-    def feed_mm_min(self) -> float:
+    def feed_mm_min(self) -> float | None:
         """Feed along the path."""
 
     @property
-    def spindle_rpm(self) -> float:
+    def spindle_rpm(self) -> float | None:
         """Spindle speed."""
 
     @property
-    def force_n(self) -> float:
+    def force_n(self) -> float | None:
         """Cutting force."""
 
 

@@ -3,6 +3,7 @@ twin's error. All of it is plain least squares and quantiles over arrays (T,); w
 replay itself (`replay.py`).
 """
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,8 +22,10 @@ IDLE_QUANTILE = 0.05
 IDLE_TICKS_MIN = 60
 LINES_OVERRIDDEN_MIN = 3
 POWER_MAX = 1.2
+CUTS_PCT_MIN = 8.0
 TWIN_TICKS_MIN = 300
 VIBRATION_POWER = 0.5
+TWIN_CLIP = 3.0
 
 
 def prepared(one: "Recorded") -> PartsModel:
@@ -35,7 +38,7 @@ def prepared(one: "Recorded") -> PartsModel:
         raise ValueError(
             f"{one.machine}: neither spindle nor feed works in {len(one.values)} ticks: there is nothing to learn from"
         )
-    settled = works & (np.isnan(rpm) | (np.abs(np.diff(rpm, prepend=rpm[:1])) <= 0.03 * rpm + 20.0))
+    settled = works & (np.isnan(rpm) | (np.abs(np.diff(rpm, prepend=rpm[:1])) <= 0.006 * rpm + 5.0))
     idle = _idle(rpm, load, settled)
     first = PartsModel(signals=one.signals, tick_s=one.tick_s, idle=idle)
     x = _quantities(first, one, settled)
@@ -43,7 +46,7 @@ def prepared(one: "Recorded") -> PartsModel:
     heat = tuple(
         fit_heat(rpm, load, columns[name], one.tick_s) if kind_of(name) is Kind.TEMPERATURE else () for name in one.signals
     )
-    offset, spread = _twin_error(first.model_copy(update={"power": powers}), one, settled)
+    offset, spread = _twin_error(first.changed(power=powers), one, settled)
     return PartsModel(
         signals=one.signals, tick_s=one.tick_s, idle=idle, power=powers, heat=heat, twin_offset=offset, twin_spread=spread
     )
@@ -99,9 +102,13 @@ def _power(one: "Recorded", x: Floats, kind: int) -> float:
         return usual
     group, y, log_override = _groups(one)[known], x[known], np.log(one.feed_override_pct[known] / 100.0)
     count = np.maximum(np.bincount(group), 1)
+    if kind == Kind.LOAD:
+        cuts = (np.bincount(group, y) / count > math.log(CUTS_PCT_MIN))[group]
+        group, y, log_override = group[cuts], y[cuts], log_override[cuts]
+        count = np.maximum(np.bincount(group), 1)
     y, log_override = (column - (np.bincount(group, column) / count)[group] for column in (y, log_override))
     moved = np.bincount(group, np.abs(log_override) > 0.1) > 0
-    if moved.sum() < LINES_OVERRIDDEN_MIN:
+    if len(y) == 0 or moved.sum() < LINES_OVERRIDDEN_MIN:
         return usual
     return float(np.clip((y * log_override).sum() / (log_override**2).sum(), 0.0, POWER_MAX))
 
@@ -124,5 +131,7 @@ def _twin_error(model: PartsModel, one: "Recorded", settled: NDArray[np.bool_]) 
         off = off[~np.isnan(off)]
         if len(off) * one.tick_s >= TWIN_TICKS_MIN:
             low, middle, high = np.percentile(off, [16.0, 50.0, 84.0])
-            offset[at], spread[at] = float(middle), max(float(high - low) / 2.0, quantity.SPREAD_LEAST[kind])
+            half = max(float(high - low) / 2.0, quantity.SPREAD_LEAST[kind])
+            cut_off = np.clip(off - middle, -TWIN_CLIP * half, TWIN_CLIP * half)
+            offset[at], spread[at] = float(middle + cut_off.mean()), max(float(cut_off.std()), quantity.SPREAD_LEAST[kind])
     return tuple(offset), tuple(spread)

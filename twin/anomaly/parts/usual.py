@@ -1,12 +1,13 @@
 """The usual course of an operation: for each section and signal a centre and a variance, from as few parts as possible.
 
     centre ← centre + (mean of the part − centre) / (min(n, memory) + 1)
-    variance = (n₀ · prior + n · own) / (n₀ + n) · (1 + 1 / n)                 prior: of the signal over all operations, n₀ = 3 parts
+    variance = (n₀ · prior + n · own) / (n₀ + n) · (1 + 1 / n)          prior: of the signal in steady sections, n₀ = 3 parts
 
-Centres are of ln ratios less the levels of wear and material (`levels.py`). In the first part the centre is the twin's expectation,
-which training found to be off by so much, and the variance has the twin's own error in it: limits are wide then.
+Centres are of ln ratios less the levels of wear and material (`levels.py`). While no part has come to a
+section, the twin's expectation stands in for it (`residuals.py`).
 """
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -42,6 +43,29 @@ class Sums(NamedTuple):
     count: tuple[int, ...]
     total: tuple[float, ...]
     squares: tuple[float, ...]
+
+    def plus(self, other: "Sums") -> "Sums":
+        """Return the sums of both."""
+        return Sums(*(tuple([a + b for a, b in zip(x, y, strict=True)]) for x, y in zip(self, other, strict=True)))
+
+
+Rows = tuple[tuple[float | None, ...], ...]
+"""Residuals of the ticks of a section, by signal."""
+
+
+def with_rows(sections: tuple[tuple[int, Sums], ...], section: int, rows: Rows) -> tuple[tuple[int, Sums], ...]:
+    """Return the sums of an operation's sections with those of one more.
+
+    >>> with_rows((), 4, ((0.5, None), (1.5, None)))
+    ((4, Sums(count=(2, 0), total=(2.0, 0.0), squares=(2.5, 0.0))),)
+    """
+    columns = [[value for value in column if value is not None] for column in zip(*rows, strict=True)]
+    sums = Sums(
+        tuple([len(column) for column in columns]),
+        tuple([round(math.fsum(column), 4) for column in columns]),
+        tuple([round(math.fsum([value * value for value in column]), 6) for column in columns]),
+    )
+    return (*sections, (section, sums))
 
 
 def weights(variance: Sequence[float], told: Sequence[int], prior: Sequence[float], floor: Sequence[float]) -> tuple[float, ...]:

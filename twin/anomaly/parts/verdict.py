@@ -1,16 +1,14 @@
 """A person's verdict on an alarm, and what follows from it. Nothing follows from silence.
 
     true   the alarm stands until its cause is gone (episodes.py), or until the person ends it; its parts are never learned
-    false  its parts may be learned, and the limit of its signals, scales and sides in its operation rises to
-           factor = min(FACTOR_MAX, limit in force · MARGIN · score / threshold)
-           which is forgotten: 1 + (factor − 1) · 2^(−age / HALF_LIFE_S)
+    false  the part that runs may be learned, and the limits of its signals, scales and sides in its operation rise (limits.py)
     known  it is held back, with its like, until it is gone (episodes.py); its parts are never learned
 
 The same verdict again changes nothing. Of several on one alarm, that with the latest `at_s` holds, in whatever order they come.
-It takes back a limit that an earlier one has raised, but not what was learned meanwhile.
+It takes back a limit that an earlier one has raised, but not what was learned meanwhile. Of a false alarm the part that is being
+cut is learned; those that have ended are not kept, but the next ones, which alarm no more, are learned like any other.
 """
 
-from collections.abc import Iterable
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -23,25 +21,18 @@ from twin.anomaly.parts.episodes import (
     Memory,
     Outcome,
     Said,
-    Tolerated,
     all_of,
+    is_excused,
     is_gone,
     kept,
+    tolerated_of,
 )
+from twin.anomaly.parts.limits import FACTOR_MAX, MARGIN, bounded
 from twin.anomaly.parts.model import PartsModel
 from twin.anomaly.parts.own import Own
-from twin.anomaly.parts.signature import Share
 
 VERSION = 1
-FACTOR_MAX = 4.0
-FACTOR_LEAST = 1.05
-"""A raised limit below it is forgotten."""
-MARGIN = 1.3
-"""Of the score over which a limit is raised: an alarm ends below 0.8 thresholds."""
-HALF_LIFE_S = 60 * 86_400.0
-TOLERATED_MAX = 100
 OUTCOMES_MAX = 10
-LEARN_MAX = 40
 ALARM_WITHIN_S = 2.0
 """An alarm is found by when it began, give or take the rounding of the sender."""
 TEXT_MAX = 200
@@ -81,17 +72,20 @@ def verdict_of(text: str) -> Verdict:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"])) or "the message"
         given = "missing" if first["type"] == "missing" else repr(first["input"])[:40]
-        raise ValueError(f"{where}: {first['msg']}, but it is {given}; docs/anomaly.md shows a verdict") from None
+        raise ValueError(f"{where}: {first['msg']}, but it is {given}; docs/verdicts.md shows a verdict") from None
 
 
 def corrected(model: PartsModel, own: Own, verdict: Verdict) -> Own:
     """Return the state of a machine after a verdict on one of its alarms."""
-    del model
-    return own._replace(memory=corrected_memory(own.memory, verdict))
+    memory = corrected_memory(own.memory, verdict, own.tick * model.tick_s)
+    return own._replace(memory=memory, is_part_bad=own.is_part_bad and not is_excused(memory))
 
 
-def corrected_memory(memory: Memory, verdict: Verdict) -> Memory:
-    """Return the memory after a verdict: who said what, and what follows from it."""
+def corrected_memory(memory: Memory, verdict: Verdict, now_s: float) -> Memory:
+    """Return the memory after a verdict: who said what, and what follows from it.
+
+    now_s: event time, which may be another one than that of the person's clock
+    """
     if verdict.id and any(one.id == verdict.id for one in memory.outcomes):
         return memory
     found = _meant(memory, verdict.alarm_at_s)
@@ -108,52 +102,21 @@ def corrected_memory(memory: Memory, verdict: Verdict) -> Memory:
         return _noted(memory, verdict, True, f"{before.by} has said so before")
     if before is not None and _order(before) > _order(said):
         return _noted(memory, verdict, False, f"a later verdict holds: {before.verdict}, by {before.by}")
-    spoken = found._replace(said=said)
+    spoken = found._replace(said=said, called_false=found.signature.largest if said.verdict == FALSE else 0.0)
     memory = _without(memory, found)
-    is_here = not is_gone(spoken, verdict.at_s)
+    is_here = not is_gone(spoken, now_s)
     standing, known = (
         tuple(sorted((*before, found.began_s))) if said.verdict == word and is_here else before
         for word, before in ((TRUE, memory.standing), (KNOWN, memory.known))
     )
-    raised = _raised(spoken) if said.verdict == FALSE else ()
-    memory = memory._replace(standing=standing, known=known, tolerated=_bounded((*memory.tolerated, *raised), verdict.at_s))
-    if said.verdict == FALSE:
-        memory = memory._replace(learn=(*memory.learn, *found.parts)[-LEARN_MAX:])
+    own = tolerated_of(spoken, now_s) if said.verdict == FALSE else ()
+    memory = memory._replace(standing=standing, known=known, tolerated=bounded((*memory.tolerated, *own), now_s))
     return _noted(_replaced(memory, spoken), verdict, True, _text(spoken, is_here))
 
 
 def refused(memory: Memory, why: str, at_s: float) -> Memory:
     """Return the memory with a message that could not be read among the outcomes."""
     return memory._replace(outcomes=(*memory.outcomes, Outcome("", False, why[:TEXT_MAX], at_s))[-OUTCOMES_MAX:])
-
-
-def limit_factor(memory: Memory, operation: str, signal: str, scale: str, side: int, at_s: float) -> float:
-    """Return by how much the limit of a signal, scale and side is raised in an operation: what is left is divided by it.
-
-    >>> raised = Tolerated(0.0, "O1|T5|1", "spindle_load_pct", "cut", 1, 3.0, 0.0, "ada")
-    >>> memory = Memory(tolerated=(raised,))
-    >>> [limit_factor(memory, "O1|T5|1", "spindle_load_pct", "cut", 1, days * 86400.0) for days in (0, 60, 120)]
-    [3.0, 2.0, 1.5]
-    """
-    if not memory.tolerated:
-        return 1.0
-    return limits_of(memory, operation, at_s).get((signal, scale, side), 1.0)
-
-
-def limits_of(memory: Memory, operation: str, at_s: float) -> dict[tuple[str, str, int], float]:
-    """Return the raised limits of an operation, by signal, scale and side; once for an operation, they hardly change in it."""
-    found: dict[tuple[str, str, int], float] = {}
-    for one in memory.tolerated:
-        if one.operation == operation:
-            key = (one.signal, one.scale, one.side)
-            found[key] = max(found.get(key, 1.0), factor_at(one, at_s))
-    return found
-
-
-def factor_at(one: Tolerated, at_s: float) -> float:
-    """Return a raised limit as of `at_s`; 1 once it is forgotten."""
-    factor = 1.0 + (one.factor - 1.0) * 2.0 ** (-max(at_s - one.since_s, 0.0) / HALF_LIFE_S)
-    return factor if factor >= FACTOR_LEAST else 1.0
 
 
 def _meant(memory: Memory, alarm_at_s: float) -> Episode | None:
@@ -174,28 +137,15 @@ def _ended(memory: Memory, found: Episode, verdict: Verdict) -> Memory:
     return _noted(memory._replace(standing=standing), verdict, True, f"ended by {verdict.by}")
 
 
-def _raised(episode: Episode) -> tuple[Tolerated, ...]:
-    assert episode.said is not None
-    over, said = MARGIN * max(episode.size, 1.0), episode.said
-
-    def raised(share: Share) -> Tolerated:
-        factor = round(min(FACTOR_MAX, share.factor * over), 3)
-        operation = episode.signature.operation
-        return Tolerated(episode.began_s, operation, share.signal, share.scale, share.side, factor, said.at_s, said.by)
-
-    return tuple(map(raised, episode.signature.shares))
-
-
 def _text(episode: Episode, is_here: bool) -> str:
     assert episode.said is not None
     if episode.said.verdict == TRUE:
         return "true: it stands until a part of the program has run without it" if is_here else "true: it is gone already"
     if episode.said.verdict == KNOWN:
         return "known: its like is held back until it is gone" if is_here else "known: it is gone already"
-    needed = max((share.factor for share in episode.signature.shares), default=1.0) * MARGIN * max(episode.size, 1.0)
-    if needed > FACTOR_MAX:
-        return f"false: its limits rise to {FACTOR_MAX:g} times, the most; one as large as this would alarm again: call it known"
-    return f"false: its limits in {episode.signature.operation} rise to {needed:.3g} times, forgotten over months"
+    if MARGIN * episode.signature.largest > FACTOR_MAX * episode.threshold:
+        return f"false: its limits rise to {FACTOR_MAX:g} times, the most; one as large as this may alarm again: call it known"
+    return f"false: its limits rise in {', '.join(episode.operations)}, so that its size alarms no more; forgotten over months"
 
 
 def _without(memory: Memory, found: Episode) -> Memory:
@@ -204,7 +154,6 @@ def _without(memory: Memory, found: Episode) -> Memory:
         standing=tuple(one for one in memory.standing if one != found.began_s),
         known=tuple(one for one in memory.known if one != found.began_s),
         tolerated=tuple(one for one in memory.tolerated if one.episode_s != found.began_s),
-        learn=tuple(part for part in memory.learn if part not in found.parts),
     )
 
 
@@ -213,13 +162,6 @@ def _replaced(memory: Memory, spoken: Episode) -> Memory:
         return memory._replace(running=spoken)
     episodes = (spoken if one.began_s == spoken.began_s else one for one in memory.episodes)
     return memory._replace(episodes=kept(episodes, (*memory.standing, *memory.known)))
-
-
-def _bounded(tolerated: Iterable[Tolerated], at_s: float) -> tuple[Tolerated, ...]:
-    """Return the raised limits, those of later alarms last: as many as are remembered, the largest of them."""
-    alive = [one for one in tolerated if factor_at(one, at_s) > 1.0]
-    largest = sorted(alive, key=lambda one: (-factor_at(one, at_s), one))[:TOLERATED_MAX]
-    return tuple(sorted(largest))
 
 
 def _noted(memory: Memory, verdict: Verdict, is_done: bool, text: str) -> Memory:

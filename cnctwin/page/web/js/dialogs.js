@@ -229,8 +229,13 @@ export function openAsked(title, content, word, act, back = "Cancel") {
   const open = show(title, el("form", { onsubmit: submit }, content, told, el("div", { class: "actions" }, leave, button)));
 }
 
-/** Asks for a name, where the server does not know it, and a comment; `act(by, comment)` does it and gives what to say, or throws. */
-export function openSigned(title, about, word, act) {
+const COMMENT = { label: "Comment", length: 500, list: null };
+
+/**
+ * Asks for a name, where the server does not know it, and a comment; `act(by, comment)` does it, or throws why not.
+ * asked: what the comment is called, how long it may be, and the list that it may be chosen from; null = none is asked for.
+ */
+export function openSigned(title, about, word, act, asked = COMMENT) {
   const by = el("input", {
     class: "field",
     name: "by",
@@ -239,14 +244,18 @@ export function openSigned(title, about, word, act) {
     autocomplete: "username",
     value: remembered(),
   });
-  const comment = el("textarea", { class: "field", name: "comment", maxlength: "500" });
+  const attributes = asked?.list
+    ? { class: "field", name: "comment", maxlength: String(asked.length), list: asked.list, autocomplete: "off" }
+    : { class: "field", name: "comment", maxlength: String(asked?.length ?? 0) };
+  const comment = el(asked?.list ? "input" : "textarea", attributes);
   const name = me.user ? el("p", { class: "note" }, `As ${me.user}.`) : el("label", { class: "named" }, "Your name", by);
-  const content = [about, name, el("label", { class: "named" }, "Comment", comment)];
+  const content = [about, name, asked && el("label", { class: "named" }, asked.label, comment)];
   openAsked(title, content, word, async () => {
     if (!me.user) remember(by.value.trim());
     await act(me.user ?? by.value.trim(), comment.value.trim());
   });
-  (me.user || by.value ? comment : by).focus();
+  if (!me.user && !by.value) by.focus();
+  else if (asked) comment.focus();
 }
 
 const KEY = "cnctwin-name";

@@ -43,7 +43,8 @@ def named(folder: Path, names: str = "abc") -> list[str]:
 
 
 def trained(folder: Path, **asked: Any) -> tuple[Calibrated, ...]:
-    given = TrainingSettings(features=FEATURES, detector=SMALL, **{"alerts_per_week": OFTEN, **asked})
+    asked = {"alerts_per_week": OFTEN, "common_mode": Method.SOURCE, **asked}
+    given = TrainingSettings(features=FEATURES, detector=SMALL, **asked)
     return calibrated_cell(recorded_cell(named(folder), FEATURES, given.tick_s), given)
 
 
@@ -51,7 +52,16 @@ def run(*arguments: str | Path) -> Any:
     return CliRunner().invoke(train_app, [str(one) for one in arguments])
 
 
-QUICK = ["--parameter", "n_estimators=20", "--parameter", "contamination=0.25", "--alerts-per-week", "4000"]
+QUICK = [
+    "--parameter",
+    "n_estimators=20",
+    "--parameter",
+    "contamination=0.25",
+    "--alerts-per-week",
+    "4000",
+    "--common-mode",
+    "source",
+]
 
 
 def test_what_it_writes_is_what_the_processor_takes(folder: Path, tmp_path: Path) -> None:
@@ -65,7 +75,7 @@ def test_what_it_writes_is_what_the_processor_takes(folder: Path, tmp_path: Path
 
 
 def test_what_is_usual_in_each_operation_goes_with_the_model(folder: Path, tmp_path: Path) -> None:
-    done = run("anomaly", *named(folder), "--out", tmp_path / "models", "--common-mode", "features", *QUICK)
+    done = run("anomaly", *named(folder), "--out", tmp_path / "models", *QUICK, "--common-mode", "features")
     assert done.exit_code == 0, done.output
     for model in load_models(tmp_path / "models").values():
         assert model.preparation is not None
@@ -121,7 +131,7 @@ def test_the_golden_week_is_what_the_processor_made_of_the_recordings(folder: Pa
 def test_raw_scores_of_the_golden_week_are_those_of_the_stream(folder: Path) -> None:
     cell, asked = (
         recorded_cell(named(folder), FEATURES, 1.0),
-        TrainingSettings(features=FEATURES, detector=SMALL, alerts_per_week=OFTEN),
+        TrainingSettings(features=FEATURES, detector=SMALL, alerts_per_week=OFTEN, common_mode=Method.SOURCE),
     )
     models = {found.machine: found.model for found in calibrated_cell(cell, asked)}
     _, calibrating = split(cell, asked.train_share)
@@ -250,7 +260,9 @@ CASES = [
 @pytest.mark.parametrize("case", CASES)
 def test_wrong_input_is_one_line_with_the_way_out(case: str, folder: Path, tmp_path: Path) -> None:
     arguments, message = broken(folder, tmp_path)[case]
-    done = run("anomaly", *arguments, "--out", tmp_path / "out")
+    done = run(
+        "anomaly", *arguments, "--out", tmp_path / "out", *(() if "--common-mode" in arguments else ("--common-mode", "source"))
+    )
     assert isinstance(done.exception, UsageError), (done.output, done.exception)
     assert "\n" not in str(done.exception)
     with pytest.raises(UsageError, match=message):

@@ -87,7 +87,7 @@ LOGS = {
 @pytest.mark.parametrize("name", LOGS)
 def test_rows_at_ticks_are_those_that_the_processor_scores(name: str, tick_s: float) -> None:
     run, model = LOGS[name], Watching()
-    message_by_message({"a": run}, model, {"tick_s": tick_s, "threshold": 1.0})
+    message_by_message({"a": run}, model, {"tick_s": tick_s, "threshold": 1.0, "common_mode": "source"})
     tick_ms = round(tick_s * 1000)
     since_tick_s = START_MS % tick_ms / 1000  # this test's clock may begin within a tick
     shifted = run_log({**run.columns, "t_s": run.t_s + since_tick_s})
@@ -100,7 +100,7 @@ def test_rows_at_ticks_are_those_that_the_processor_scores(name: str, tick_s: fl
 @pytest.mark.parametrize("name", LOGS)
 @pytest.mark.parametrize("settings", [{}, {"look_back_s": 10.0}, {"tail_s": 0.0}, {"gate_s_max": 3.0}])
 def test_what_is_replayed_in_few_messages_is_what_comes_out_of_all(name: str, settings: dict[str, Any]) -> None:
-    run, model, settings = LOGS[name], Watching(), {"threshold": 1.0, **settings}
+    run, model, settings = LOGS[name], Watching(), {"threshold": 1.0, "common_mode": "source", **settings}
     track = replayed({"a": run}, {"a": model}, settings)["a"]  # type: ignore[dict-item]
     published = message_by_message({"a": run}, model, settings)
     adjusted = {t: value for t, value in published["a", "twin/adjusted_score"] if value is not None}
@@ -117,7 +117,7 @@ def test_what_is_replayed_in_few_messages_is_what_comes_out_of_all(name: str, se
 
 def test_machines_of_a_cell_are_judged_beside_each_other() -> None:
     runs = {"a": machine_log(900.0, 1, burst_s=[300.0]), "b": machine_log(900.0, 2, burst_s=[305.0]), "c": machine_log(900.0, 3)}
-    settings = {"threshold": 1.0, "common_mode_factor": 0.8}
+    settings = {"threshold": 1.0, "common_mode": "source", "common_mode_factor": 0.8}
     tracks = replayed(runs, dict.fromkeys(runs, Watching()), settings)  # type: ignore[arg-type]
     published = message_by_message(runs, Watching(), settings)
     for name, track in tracks.items():

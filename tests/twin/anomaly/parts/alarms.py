@@ -2,7 +2,7 @@
 
 from twin.anomaly.parts.episodes import Memory, Seen, followed
 from twin.anomaly.parts.signature import Share, Signature, signature_of
-from twin.anomaly.parts.verdict import Verdict
+from twin.anomaly.parts.verdict import Verdict, corrected_memory
 
 LOAD, VIBRATION = "spindle_load_pct", "vibration_rms_g"
 THRESHOLD = 2.0
@@ -21,10 +21,16 @@ def seen(score: float = 3.0, given: Signature | None = None, part: str = "O1#7")
 
 
 def alarmed(memory: Memory = NOTHING, at_s: float = 1000.0, score: float = 3.0, given: Signature | None = None) -> Memory:
-    """A memory in which an alarm has begun at `at_s`, and was over ten seconds later."""
-    return followed(followed(memory, seen(score, given), at_s), None, at_s + 10.0)
+    """A memory in which an alarm has begun at `at_s`, in a part of its own, and was over ten seconds later."""
+    part = "O1#7" if at_s == 1000.0 else f"O1 from {at_s}"
+    return followed(followed(memory, seen(score, given, part), at_s), None, at_s + 10.0)
 
 
 def verdict(word: str, alarm_at_s: float = 1000.0, at_s: float = 2000.0, by: str = "ada", **more: object) -> Verdict:
     """A verdict of a person."""
     return Verdict.model_validate({"alarm_at_s": alarm_at_s, "verdict": word, "at_s": at_s, "by": by, **more})
+
+
+def spoken(memory: Memory, said: Verdict) -> Memory:
+    """The memory after a verdict, where the machine's clock is the person's."""
+    return corrected_memory(memory, said, said.at_s)

@@ -2,10 +2,9 @@
 
 import json
 
-from tests.twin.anomaly.parts.alarms import alarmed, verdict
+from tests.twin.anomaly.parts.alarms import alarmed, spoken, verdict
 from twin.anomaly.parts.episodes import Memory
 from twin.anomaly.parts.feedback import TEXT_CHARACTERS_MAX, precision, suggested, told_of
-from twin.anomaly.parts.verdict import corrected_memory
 
 
 def told(cases: list[tuple[float, str]]) -> Memory:
@@ -15,7 +14,7 @@ def told(cases: list[tuple[float, str]]) -> Memory:
         at_s = 1000.0 + 100.0 * place
         memory = alarmed(memory, at_s, score=score)
         if word:
-            memory = corrected_memory(memory, verdict(word, at_s, at_s + 50.0, label="x" * 60, by="y" * 100))
+            memory = spoken(memory, verdict(word, at_s, at_s + 50.0, label="x" * 60, by="y" * 100))
     return memory
 
 

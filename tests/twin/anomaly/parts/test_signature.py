@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.twin.anomaly.parts.alarms import signature
-from twin.anomaly.parts.signature import SHARES_MAX, Share, Signature, likeness, signature_of
+from twin.anomaly.parts.signature import SHARES_MAX, Share, Signature, envelope, likeness, signature_of
 
 SHARES = st.builds(
     Share, st.sampled_from("abcdefgh"), st.sampled_from(["seconds", "cut"]), st.floats(-50, 50).map(lambda x: round(x, 2))
@@ -31,6 +31,20 @@ def test_an_alarm_is_wholly_like_itself(one: Signature) -> None:
 def test_size_does_not_matter_and_direction_does() -> None:
     assert likeness(signature(3.0, 1.0), signature(12.0, 4.0)) == 1.0
     assert likeness(signature(3.0, 1.0), signature(-3.0, -1.0)) == 0.0
+
+
+def test_another_scale_of_the_same_signals_is_nearly_as_like() -> None:
+    one, other = (signature_of([Share("spindle_load_pct", scale, 3.0)], "O1|T5|1", "O1", 5) for scale in ("seconds", "cut"))
+    assert likeness(one, other) == 0.95
+
+
+@given(one=SIGNATURES, other=SIGNATURES)
+def test_an_envelope_has_the_largest_of_both(one: Signature, other: Signature) -> None:
+    both = {share[:2]: share.left for share in envelope(one, other).shares}
+    for share in one.shares[:1]:
+        assert abs(both[share[:2]]) >= abs(share.left)
+    assert envelope(one, other).largest >= max(one.largest, other.largest / 1.1) - 1e-9
+    assert envelope(one, one) is one
 
 
 def test_another_tool_or_program_is_less_like() -> None:

@@ -7,30 +7,23 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.twin.anomaly.parts.alarms import LOAD, THRESHOLD, alarmed, seen, signature, verdict
-from twin.anomaly.parts.episodes import Memory, alarm_of, followed
-from twin.anomaly.parts.signature import Signature
-from twin.anomaly.parts.verdict import (
-    FACTOR_MAX,
-    HALF_LIFE_S,
-    MARGIN,
-    TOLERATED_MAX,
-    Verdict,
-    corrected_memory,
-    limit_factor,
-    limits_of,
-    refused,
-    verdict_of,
-)
+from tests.twin.anomaly.parts.alarms import LOAD, THRESHOLD, alarmed, seen, signature, spoken, verdict
+from twin.anomaly.parts.episodes import Memory, alarm_of, followed, is_excused
+from twin.anomaly.parts.limits import FACTOR_MAX, HALF_LIFE_S, MARGIN, TOLERATED_MAX, limit_factor, limits_of
+from twin.anomaly.parts.scales import SCALES
+from twin.anomaly.parts.signature import Share, Signature, signature_of
+from twin.anomaly.parts.verdict import Verdict, corrected_memory, refused, verdict_of
 
 WORDS = st.sampled_from(["true", "false", "known"])
 
 
 def score_of(given_signature: Signature, memory: Memory, at_s: float) -> float:
     """A score as a chart of several signals has it: the length of what is left, each part by its raised limit."""
-    operation = given_signature.operation
-    parts = [(one.left, limit_factor(memory, operation, one.signal, one.scale, one.side, at_s)) for one in given_signature.shares]
-    return math.hypot(*(left / factor for left, factor in parts))
+
+    def factor(one: Share) -> float:
+        return limit_factor(memory.tolerated, given_signature.operation, one.signal, one.scale, one.side, at_s)
+
+    return math.hypot(*(one.left / factor(one) for one in given_signature.shares))
 
 
 @given(load=st.floats(2.0, 5.0), vibration=st.floats(-1.0, 1.0))
@@ -38,26 +31,25 @@ def test_the_same_size_as_a_false_alarm_does_not_alarm_again(load: float, vibrat
     given_signature = signature(load, vibration)
     score = score_of(given_signature, Memory(), 0.0)
     memory = followed(followed(Memory(), seen(score, given_signature), 1000.0), None, 1010.0)
-    memory = corrected_memory(memory, verdict("false"))
-    assert score_of(given_signature, memory, 2000.0) <= score / min(FACTOR_MAX, MARGIN * score / THRESHOLD) * 1.01
+    memory = spoken(memory, verdict("false"))
     assert score_of(given_signature, memory, 2000.0) < THRESHOLD
 
 
 def test_a_raised_limit_is_of_its_operation_signal_scale_and_side_only() -> None:
-    memory = corrected_memory(alarmed(score=4.0), verdict("false"))
-    assert limit_factor(memory, "O1|T5|1", LOAD, "cut", 1, 2000.0) == 2.0 * MARGIN
+    memory = spoken(alarmed(given=signature(2.5, 1.0)), verdict("false"))
+    assert limit_factor(memory.tolerated, "O1|T5|1", LOAD, "cut", 1, 2000.0) == 1.25 * MARGIN
     others = [
         ("O1|T6|1", LOAD, "cut", 1),
         ("O1|T5|1", LOAD, "seconds", 1),
         ("O1|T5|1", LOAD, "cut", -1),
         ("O1|T5|1", "x", "cut", 1),
     ]
-    assert [limit_factor(memory, *other, 2000.0) for other in others] == [1.0] * 4
+    assert [limit_factor(memory.tolerated, *other, 2000.0) for other in others] == [1.0] * 4
 
 
 def test_a_raised_limit_is_bounded_and_forgotten() -> None:
-    memory = corrected_memory(alarmed(score=100.0), verdict("false"))
-    factors = [limit_factor(memory, "O1|T5|1", LOAD, "cut", 1, 2000.0 + halves * HALF_LIFE_S) for halves in range(9)]
+    memory = spoken(alarmed(given=signature(100.0)), verdict("false"))
+    factors = [limit_factor(memory.tolerated, "O1|T5|1", LOAD, "cut", 1, 2000.0 + halves * HALF_LIFE_S) for halves in range(9)]
     assert factors[:3] == [FACTOR_MAX, 1.0 + (FACTOR_MAX - 1.0) / 2.0, 1.0 + (FACTOR_MAX - 1.0) / 4.0]
     assert factors[-1] == 1.0
     assert "call it known" in memory.outcomes[-1].text
@@ -67,27 +59,79 @@ def test_many_false_alarms_raise_a_bounded_number_of_limits() -> None:
     memory = Memory()
     for place in range(TOLERATED_MAX):
         at_s = 1000.0 + 100.0 * place
-        memory = corrected_memory(alarmed(memory, at_s, given=signature(tool=place)), verdict("false", at_s, at_s + 20.0))
+        memory = spoken(alarmed(memory, at_s, given=signature(tool=place)), verdict("false", at_s, at_s + 20.0))
     assert len(memory.tolerated) == TOLERATED_MAX
-    assert limits_of(memory, f"O1|T{TOLERATED_MAX - 1}|1", 2e4) != {}
+    assert limits_of(memory.tolerated, f"O1|T{TOLERATED_MAX - 1}|1", 2e4) != {}
 
 
-def test_the_parts_of_a_false_alarm_may_be_learned_and_of_no_other() -> None:
-    assert corrected_memory(alarmed(), verdict("false")).learn == ("O1#7",)
-    assert corrected_memory(alarmed(), verdict("true")).learn == ()
-    assert corrected_memory(alarmed(), verdict("known")).learn == ()
+def test_the_part_of_a_false_alarm_that_is_on_may_be_learned_and_of_no_other() -> None:
+    memory = followed(Memory(), seen(), 1000.0)
+    assert [is_excused(spoken(memory, verdict(word))) for word in ("true", "false", "known")] == [False, True, False]
+    assert not is_excused(memory)
+    assert not is_excused(spoken(alarmed(), verdict("false")))
+
+
+def test_time_is_the_machine_s_and_not_the_person_s() -> None:
+    memory = corrected_memory(alarmed(given=signature(2.5)), verdict("false", at_s=9e9), 2000.0)
+    assert limit_factor(memory.tolerated, "O1|T5|1", LOAD, "cut", 1, 2000.0) == 1.25 * MARGIN
+    assert alarm_of(corrected_memory(alarmed(), verdict("true", at_s=9e9), 2000.0))
+
+
+def of(load: float) -> Signature:
+    """A signature of load alone."""
+    return signature_of([Share(LOAD, "cut", load)], "O1|T5|1", "O1", 5)
+
+
+def test_a_false_alarm_that_comes_back_in_its_part_is_the_same_one_and_its_limits_grow_with_it() -> None:
+    memory = spoken(followed(Memory(), seen(2.2, of(2.2)), 1000.0), verdict("false", at_s=1003.0))
+    before = limit_factor(memory.tolerated, "O1|T5|1", LOAD, "cut", 1, 1003.0)
+    memory = followed(memory, None, 1005.0)
+    memory = followed(memory, seen(2.1, of(2.1 * before)), 1010.0)
+    assert (alarm_of(memory), memory.episodes) == (False, ())
+    assert memory.running is not None
+    assert memory.running.began_s == 1000.0
+    assert limit_factor(memory.tolerated, "O1|T5|1", LOAD, "cut", 1, 1010.0) > before
+    elsewhere = followed(followed(memory, None, 1020.0), seen(3.0, of(3.0), "O1#8"), 1030.0)
+    assert alarm_of(elsewhere)
+
+
+def test_a_false_alarm_that_grows_beyond_any_limit_is_on_again() -> None:
+    memory = spoken(followed(Memory(), seen(2.2, of(2.2)), 1000.0), verdict("false", at_s=1003.0))
+    assert not alarm_of(followed(memory, seen(2.0, of(FACTOR_MAX * THRESHOLD)), 1010.0))
+    assert alarm_of(followed(memory, seen(2.1, of(1.05 * FACTOR_MAX * THRESHOLD)), 1010.0))
+    large = spoken(followed(Memory(), seen(20.0, of(20.0)), 1000.0), verdict("false", at_s=1003.0))
+    assert not alarm_of(followed(large, seen(7.0, of(28.0)), 1010.0))
+    assert alarm_of(followed(large, seen(8.0, of(32.0)), 1010.0))
+
+
+def test_what_lasts_raises_the_longer_scales_too_and_a_burst_does_not() -> None:
+    def factors(scale: str) -> list[float]:
+        cut = signature_of([Share(LOAD, scale, 2.5)], "O1|T5|1", "O1", 5)
+        tolerated = spoken(alarmed(given=cut), verdict("false")).tolerated
+        return [limit_factor(tolerated, "O1|T5|1", LOAD, one, 1, 2000.0) for one in SCALES]
+
+    assert factors("seconds") == [2.0, 1.0, 1.0, 1.0]
+    assert factors("cut") == [1.0, 2.0, 2.0, 2.0]
+
+
+def test_limits_rise_in_all_operations_in_which_the_alarm_was_seen() -> None:
+    memory = followed(Memory(), seen(3.0, of(3.0)), 1000.0)
+    other = signature_of([Share(LOAD, "cut", 3.0)], "O1|T6|1", "O1", 6)
+    memory = spoken(followed(memory, seen(3.0, other), 1001.0), verdict("false"))
+    factors = [limit_factor(memory.tolerated, f"O1|T{tool}|1", LOAD, "cut", 1, 2000.0) for tool in (5, 6, 7)]
+    assert factors == pytest.approx([1.5 * MARGIN, 1.5 * MARGIN, 1.0])
 
 
 def test_an_alarm_that_is_on_goes_off_by_false_and_by_known_and_stays_by_true() -> None:
     memory = followed(Memory(), seen(), 1000.0)
-    assert [alarm_of(corrected_memory(memory, verdict(word))) for word in ("true", "false", "known")] == [True, False, False]
+    assert [alarm_of(spoken(memory, verdict(word))) for word in ("true", "false", "known")] == [True, False, False]
 
 
 def test_a_person_ends_an_alarm_that_stands() -> None:
-    memory = corrected_memory(alarmed(), verdict("true"))
-    ended = corrected_memory(memory, verdict("true", at_s=2100.0, ends=True))
+    memory = spoken(alarmed(), verdict("true"))
+    ended = spoken(memory, verdict("true", at_s=2100.0, ends=True))
     assert (alarm_of(memory), alarm_of(ended)) == (True, False)
-    late = corrected_memory(memory, verdict("true", at_s=1900.0, ends=True))
+    late = spoken(memory, verdict("true", at_s=1900.0, ends=True))
     assert alarm_of(late)
 
 
@@ -98,25 +142,25 @@ def test_the_order_in_which_verdicts_come_does_not_matter(words: list[tuple[str,
     for order in itertools.permutations(said):
         memory = alarmed()
         for one in order:
-            memory = corrected_memory(memory, one)
+            memory = spoken(memory, one)
         ends.add(memory._replace(outcomes=()))
     assert len(ends) == 1
 
 
 @given(word=WORDS, key=st.sampled_from(["", "k1"]))
 def test_the_same_verdict_again_changes_nothing(word: str, key: str) -> None:
-    once = corrected_memory(alarmed(), verdict(word, id=key))
-    assert corrected_memory(once, verdict(word, id=key)) is once
+    once = spoken(alarmed(), verdict(word, id=key))
+    assert spoken(once, verdict(word, id=key)) is once
 
 
 def test_a_later_verdict_takes_back_the_limit_that_an_earlier_one_raised() -> None:
-    memory = corrected_memory(corrected_memory(alarmed(), verdict("false")), verdict("true", at_s=2001.0))
-    assert (memory.tolerated, memory.learn) == ((), ())
+    memory = spoken(spoken(alarmed(), verdict("false")), verdict("true", at_s=2001.0))
+    assert memory.tolerated == ()
     assert alarm_of(memory)
 
 
 def test_a_verdict_on_no_alarm_is_answered_and_changes_nothing() -> None:
-    memory = corrected_memory(alarmed(), verdict("false", alarm_at_s=999_999.0, id="k"))
+    memory = spoken(alarmed(), verdict("false", alarm_at_s=999_999.0, id="k"))
     assert memory._replace(outcomes=()) == alarmed()
     assert (memory.outcomes[0].id, memory.outcomes[0].is_done) == ("k", False)
     assert "the last ones: 1000.000" in memory.outcomes[0].text

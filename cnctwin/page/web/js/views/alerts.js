@@ -1,12 +1,13 @@
 // The alerts: what fires, by severity; who takes care of it; what is silenced; whether anybody was told.
 
-import { part, post } from "../api.js";
+import { get, part, post } from "../api.js";
 import { serverNow } from "../clock.js";
 import { openSigned } from "../dialogs.js";
 import { el, say, setText, symbol, table } from "../dom.js";
 import { lookup } from "../lookup.js";
 import { may, whyNot } from "../me.js";
 import { age, moment, words } from "../text.js";
+import { anomalyPanel } from "./anomaly_panel.js";
 
 const RANK = lookup({ high: 0, medium: 1, low: 2 }),
   PHASE = lookup({ firing: 0, acknowledged: 1, pending: 2, resolved: 3 });
@@ -14,6 +15,8 @@ const SIGNS = lookup({ firing: "s-alert", acknowledged: "s-ack", pending: "s-pen
 const LAST = 9; // of a phase or a severity that nobody knows
 const AROUND_MS = 300000;
 const RESOLVED_MAX = 20;
+const ANOMALY = "anomaly_alarm";
+const PANELS_MAX = 20;
 
 const began = (alert) => Date.parse(alert.startsAt);
 const ended = (alert) => {
@@ -34,6 +37,31 @@ export function open(app) {
   );
   let shown = "",
     focused = null;
+  const stop = new AbortController(),
+    reasons = new Map(); // by machine: the panel of its anomaly alarm, while that is listed
+
+  /** Asks why the scores alarm whose alerts are listed. A machine that the server does not know is not asked for again. */
+  async function explain() {
+    for (const [machine, panel] of reasons) {
+      if (document.hidden || panel.unknown) continue;
+      try {
+        const told = await get(["anomaly", part(machine)].join("/"), { signal: stop.signal });
+        panel.write({ ...told, told: told.why_t });
+      } catch (error) {
+        if (error.status === -1) return;
+        if (error.status === 404) panel.unknown = true;
+      }
+    }
+  }
+
+  /** The panel of an alert of the score; of each machine one, the first. */
+  function reasonOf(alert, taken) {
+    const machine = alert.labels?.machine ?? "";
+    if (alert.labels?.alertname !== ANOMALY || !machine || taken.has(machine) || taken.size >= PANELS_MAX) return null;
+    taken.add(machine);
+    if (!reasons.has(machine)) reasons.set(machine, anomalyPanel(app, machine, explain));
+    return reasons.get(machine).element;
+  }
 
   function acknowledge(alert) {
     const about = el(
@@ -64,7 +92,7 @@ export function open(app) {
     });
   }
 
-  function card(alert) {
+  function card(alert, taken) {
     const { labels = {}, annotations = {} } = alert,
       machine = labels.machine ?? "",
       start = began(alert),
@@ -124,6 +152,7 @@ export function open(app) {
             )
           : null,
       ),
+      reasonOf(alert, taken),
     );
   }
 
@@ -223,7 +252,9 @@ export function open(app) {
         began(b) - began(a),
     );
     const of = (...phases) => all.filter((one) => phases.includes(one.phase));
-    const firing = of("firing");
+    const firing = of("firing"),
+      taken = new Set(),
+      cards = (alerts) => alerts.map((alert) => card(alert, taken));
     setText(
       counts,
       all.length ? `${firing.length} firing, ${of("acknowledged").length} acknowledged, ${of("pending").length} pending` : "",
@@ -240,15 +271,17 @@ export function open(app) {
               el("p", {}, "The processor that turns alarms into alerts is not heard. Start it:"),
               el("pre", {}, "cnctwin process rules joint_anomaly alerts --config processors.toml"),
             )
-          : block("Firing", firing.map(card), "Nothing fires."),
-        block("Acknowledged", of("acknowledged").map(card)),
-        block("Pending", of("pending").map(card)),
+          : block("Firing", cards(firing), "Nothing fires."),
+        block("Acknowledged", cards(of("acknowledged"))),
+        block("Pending", cards(of("pending"))),
         given.alerts_not_shown ? el("p", { class: "note" }, `${given.alerts_not_shown} more are not shown.`) : null,
         silences(given.silences ?? []),
-        block("Over", of("resolved").slice(0, RESOLVED_MAX).map(card)),
+        block("Over", cards(of("resolved").slice(0, RESOLVED_MAX))),
         known ? receivers(given.receivers, given.failures) : null,
       ].filter(Boolean),
     );
+    for (const machine of reasons.keys()) if (!taken.has(machine)) reasons.delete(machine);
+    explain();
     if (focused)
       body
         .querySelector(`[data-fingerprint="${CSS.escape(focused)}"] button, [data-fingerprint="${CSS.escape(focused)}"] a`)
@@ -265,7 +298,10 @@ export function open(app) {
 
   write();
   app.askAlerts();
-  const timer = setInterval(write, 5000);
+  const timer = setInterval(() => {
+    write();
+    explain();
+  }, 5000);
   return {
     title: "Alerts",
     element,
@@ -287,6 +323,9 @@ export function open(app) {
     onLink: (state) => {
       if (state === "live") app.askAlerts();
     },
-    close: () => clearInterval(timer),
+    close() {
+      stop.abort();
+      clearInterval(timer);
+    },
   };
 }

@@ -1,5 +1,6 @@
 // One machine, live: measured beside its twin, what is between them, the score with its gate, and every signal with source and age.
 
+import { parsed } from "../anomaly_words.js";
 import { get, part, query } from "../api.js";
 import { CONTEXT, SCORES, TILES, chartOf, numbers, tileOf } from "../charted.js";
 import { el, setHidden, setText } from "../dom.js";
@@ -7,6 +8,8 @@ import { atMost, onFrame, offFrame } from "../frame.js";
 import { Panels } from "../panels.js";
 import { addBefore } from "../past.js";
 import { title } from "../text.js";
+import { ANOMALY_ALARM, ANOMALY_KNOWS, ANOMALY_VERDICTS, ANOMALY_WHY } from "../vocabulary.js";
+import { anomalyPanel } from "./anomaly_panel.js";
 import { loopLine } from "./loop_line.js";
 import { machineHead } from "./machine_head.js";
 import { noMachine } from "./no_machine.js";
@@ -29,6 +32,7 @@ export function open(app, { machine: named, search }) {
   const head = machineHead(app, machine, "machine");
   const stop = new AbortController(),
     line = loopLine(app, name),
+    anomaly = anomalyPanel(app, name, () => {}),
     filled = new Set();
   let windowMs = Number(search.get("window")) || 300000,
     asked = search.get("signal") ?? null,
@@ -58,6 +62,7 @@ export function open(app, { machine: named, search }) {
   element.append(
     head.element,
     line.element,
+    anomaly.element,
     el(
       "div",
       { class: "tiles" },
@@ -170,9 +175,20 @@ export function open(app, { machine: named, search }) {
     panels.draw(Math.max(to - windowMs, Math.min(first, to - 60000)), to, live);
   };
   const redraw = atMost(10, draw);
+  /** The score's reason as the stream tells it; the form is that of GET /anomaly. */
+  function writeAnomaly() {
+    anomaly.write({
+      verdicts: parsed(machine.good(ANOMALY_VERDICTS)),
+      why: parsed(machine.good(ANOMALY_WHY)),
+      told: machine.value(ANOMALY_WHY)?.t,
+      knows: machine.good(ANOMALY_KNOWS),
+      is_alarm: machine.good(ANOMALY_ALARM),
+    });
+  }
   const write = () => {
     offer();
     head.write();
+    writeAnomaly();
     for (const tile of tiles) tile.write();
     machine.changed.clear();
   };
@@ -205,6 +221,7 @@ export function open(app, { machine: named, search }) {
       redraw();
     },
     onAlerts: () => head.write(),
+    onMe: writeAnomaly,
     onHole() {
       filled.clear();
       fill();

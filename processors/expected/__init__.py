@@ -1,0 +1,1 @@
+"""The twin's expectation of the line that runs, and what is measured beside it. `processor.py` declares the processor."""

@@ -1,0 +1,74 @@
+"""An operation is cut into sections by its first part: stretches in which load and feed are steady, and the edges between them.
+
+    edge:    the ticks on either side of a jump of a ln ratio by more than 0.25; parts are sampled at other moments, so an edge
+             may fall a tick earlier or later in the next
+    steady:  the ticks between two edges, up to ten seconds, whose ln ratios stay within 0.15 of their mean
+
+An edge has a large spread, so what happens in it says little; a steady stretch has a small one. Where there would be more than 64
+sections, neighbours are joined, the most alike first.
+"""
+
+from collections.abc import Sequence
+
+from twin.anomaly.parts.moment import SECTIONS_MAX
+from twin.anomaly.parts.quantity import Kind
+from twin.anomaly.parts.usual import Sums
+
+JUMP = 0.25
+STEADY = 0.15
+STEADY_S_MAX = 10.0
+JUMPING = frozenset({Kind.LOAD, Kind.FEED})
+
+
+def starts_of(sums: Sequence[Sums | None], kinds: Sequence[int], tick_s: float, most: int = SECTIONS_MAX) -> list[int]:
+    """Return where sections begin, as places in `sums`, the short stretches that the first part was followed in; None = untold.
+
+    >>> def told(x): return Sums((1,), (x,), (x * x,))
+    >>> starts_of([told(x) for x in (3.0, 3.0, 3.1, 3.0, 0.5, 3.0, 3.0, 3.1)], (int(Kind.LOAD),), 1.0)
+    [0, 3, 6]
+    """
+    rows = [None if one is None else _means(one, kinds) for one in sums]
+    edges = [False] * len(rows)
+    for at in range(1, len(rows)):
+        if _differ(rows[at - 1], rows[at], JUMP):
+            edges[at - 1] = edges[at] = True
+    starts, begun_ticks, steady = [0], 0.0, rows[0] if rows else None
+    for at in range(1, len(rows)):
+        one = sums[at]
+        begun_ticks += 1.0 if one is None else max(one.count)
+        is_new = edges[at] != edges[at - 1]
+        if not is_new and not edges[at]:
+            is_new = _differ(steady, rows[at], STEADY) or begun_ticks * tick_s >= STEADY_S_MAX
+        if is_new:
+            starts.append(at)
+            begun_ticks, steady = 0.0, rows[at]
+        elif steady is None:
+            steady = rows[at]
+    while len(starts) > most:
+        starts = [starts[0], *starts[1::2]] if len(starts) > 2 * most else _joined(starts, rows)
+    return starts
+
+
+def _means(one: Sums, kinds: Sequence[int]) -> list[float | None]:
+    rows = zip(kinds, one.count, one.total, strict=True)
+    return [total / count if kind in JUMPING and count else None for kind, count, total in rows]
+
+
+def _differ(one: Sequence[float | None] | None, other: Sequence[float | None] | None, limit: float) -> bool:
+    if one is None or other is None:
+        return False
+    pairs = zip(one, other, strict=True)
+    return any(a is not None and b is not None and abs(a - b) > limit for a, b in pairs)
+
+
+def _joined(starts: list[int], rows: Sequence[list[float | None] | None]) -> list[int]:
+    """Return the starts with one less: that at which the rows on either side are most alike."""
+
+    def step(place: int) -> float:
+        before, after = rows[starts[place] - 1], rows[starts[place]]
+        if before is None or after is None:
+            return 0.0
+        return max([abs(a - b) for a, b in zip(before, after, strict=True) if a is not None and b is not None], default=0.0)
+
+    least = min(range(1, len(starts)), key=step)
+    return [start for place, start in enumerate(starts) if place != least]
