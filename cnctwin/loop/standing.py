@@ -1,7 +1,7 @@
 """The standing gap of a machine as the processor `gap` tells it on the broker: of the live description, and of the challenger.
 
-Where no gap grows or stands open, a drift of the machine that `tool_wear` tells counts as one that grows: the load of the cut, which
-the gap has no live twin of.
+Where no gap grows or stands open, a drift of the machine that `tool_wear` tells counts as one that grows: it is of the load
+of the cut, which the gap has no live twin of.
 """
 
 import re

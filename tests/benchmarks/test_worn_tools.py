@@ -2,7 +2,7 @@
 
 import pytest
 
-from benchmarks.tool_wear import matched, played
+from benchmarks.worn_tools.parts_left import matched, played
 from benchmarks.worn_tools.world import World, wear_at
 from twin.wear.terms import Terms
 

@@ -1,6 +1,6 @@
 """The drift of a machine by the load that all tools share: how soon it is told, and false alarms a year, by several charts.
 
-    .venv/bin/python -m benchmarks.tool_wear_drift --seeds 101-106 --days 150
+    .venv/bin/python -m benchmarks.worn_tools.drift --seeds 101-106 --days 150
 
 The machine is benchmarks/worn_tools/world.py; its meter drifts by 6 % within four weeks from day 60 on. The figures are the
 blocks of processors/tool_wear/drift.py, the same for all charts. river's ADWIN and PageHinkley are in the table where river is
@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.evaluation.intervals import rate, share
-from benchmarks.tool_wear import YEAR_DAYS, seeds_of
+from benchmarks.worn_tools.parts_left import YEAR_DAYS, seeds_of
 from benchmarks.worn_tools.world import World
 from processors.tool_wear.config import Config
 from processors.tool_wear.drift import Drift, after_part
