@@ -14,7 +14,7 @@ from twin.anomaly.parts.judging import judged
 from twin.anomaly.parts.learning import learned
 from twin.anomaly.parts.model import OPERATIONS_MAX, PartsModel
 from twin.anomaly.parts.own import Own, begun
-from twin.anomaly.parts.quantity import Kind
+from twin.anomaly.parts.quantity import SPREAD_LEAST, Kind
 from twin.anomaly.parts.record import CutRecord
 from twin.anomaly.parts.recorded import EXPECTED, Line, Recorded
 from twin.anomaly.parts.told import Told
@@ -169,10 +169,10 @@ def _with_spreads(model: PartsModel, own: Own, seen: "list[tuple[int, tuple[floa
             if told[at] >= SPREAD_PARTS_MIN
         ]
         if known:
-            spread[at] = max(float(np.quantile(known, STEADY_QUANTILE)) ** 0.5, model.plan.least[at] ** 0.5)
+            spread[at] = max(float(np.quantile(known, STEADY_QUANTILE)) ** 0.5, SPREAD_LEAST[Kind(kind)])
         elif kind == Kind.TEMPERATURE and len(rows):
             away = rows[:, at * scales.COUNT + CUT] * LOOSE_TAILS[CUT]
-            spread[at] = max(float(np.sqrt(np.mean(away**2))) * spread[at], model.plan.least[at] ** 0.5)
+            spread[at] = max(float(np.sqrt(np.mean(away**2))) * spread[at], SPREAD_LEAST[Kind(kind)])
     return model.changed(spread=tuple(spread))
 
 
