@@ -7,8 +7,8 @@ The cell is cut by the reference machine, which shares no code with the twin; th
 few percent off, without its edge forces, losses and cold grease. A control tells once a second. The programs of a machine are
 worked out by `expectation_of`; the processors `expected` and `rules` see what the control tells. An alarm of `tool_broken` is
 true while a broken tool is in the spindle; one of `load_over_expected` is true within any fault that raises the load beside the
-feed (RAISES_LOAD). What alarms otherwise is false; that within another fault is counted beside. Delays are in seconds in which the
-axis of the broken tool was within the stock, on a pass of its own: where it stands clear of the work, nothing shows.
+feed (RAISES_LOAD). What alarms otherwise is false; that within another fault is counted beside. Delays are in seconds in which
+the axis of the broken tool was within the stock, on a pass of its own: where it stands clear of the work, nothing shows.
 """
 
 import argparse

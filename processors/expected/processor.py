@@ -173,9 +173,11 @@ def _compared(ratio_cut_pct_min: float, state: State, now: _Now) -> tuple[State,
         why = now.expectation.why_not(now.place.line, now.place.tool) or "no load is expected of this line"
         return _lost(state, now.place), (*outputs, *_nulls(why, _OF_LOAD))
     least, most = bounds
-    least_shown, most_shown = least, most
-    if state.least_pct is not None and state.most_pct is not None and 0.0 <= at_s - state.bounds_s < SETTLED_S:
-        least_shown, most_shown = min(least, state.least_pct), max(most, state.most_pct)
+    least_shown, most_shown, ago_s = least, most, at_s - state.bounds_s
+    if state.least_pct is not None and 0.0 <= ago_s < SETTLED_S:
+        least_shown = min(least, state.least_pct)
+    if state.most_pct is not None and 0.0 <= ago_s <= WITHIN_S:
+        most_shown = max(most, state.most_pct)
     outputs += [
         _said(twin_signals.EXPECTED_SPINDLE_LOAD_PCT, round(expected.load_pct, DIGITS)),
         _said(twin_signals.EXPECTED_CUTTING_FORCE_N, round(expected.force_n, 1)),
@@ -190,7 +192,8 @@ def _compared(ratio_cut_pct_min: float, state: State, now: _Now) -> tuple[State,
     else:
         idle_pct = expected.load_pct - expected.cut_load_pct
         is_steady = state.rpm is not None and abs(rpm - state.rpm) <= STEADY * abs(rpm) and abs(rpm) >= TURNING_RPM
-        if most_shown <= 0.0 and is_steady and sample.kind is not SampleKind.BIRTH:
+        is_air = most <= 0.0 and (most_shown <= 0.0 or ago_s >= SETTLED_S)
+        if is_air and is_steady and sample.kind is not SampleKind.BIRTH:
             air = air_after(air, load_pct - idle_pct, abs(rpm))
         cut_pct = load_pct - idle_pct - air.beyond_pct(rpm)
         is_even = ratio_cut_pct_min <= least_shown and most_shown <= EVEN * least_shown
