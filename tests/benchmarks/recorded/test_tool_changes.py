@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from benchmarks import scoring_recording as study
+from benchmarks.recorded import tool_changes as study
 from tests.recordings import recording
 
 

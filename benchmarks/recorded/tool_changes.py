@@ -1,6 +1,6 @@
 """Tool changes of a real machine in the raw score, and what the gate makes of them: the Okuma recording, 11 labelled changes.
 
-    .venv/bin/python benchmarks/scoring_recording.py okuma.txt okuma_devices.xml
+    .venv/bin/python benchmarks/recorded/tool_changes.py okuma.txt okuma_devices.xml
 
 Each stretch is scored by a forest that learned on the others, outside of tool changes (22 minutes in all: enough to see
 transients, far too few for a rate of false alarms). The threshold is the largest score of what was learned, dwell a second. A
