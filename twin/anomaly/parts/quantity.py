@@ -43,9 +43,9 @@ SPREADS = {Kind.LOAD: 0.1, Kind.VIBRATION: 0.2, Kind.FEED: 0.2, Kind.SPEED: 0.02
 SPREAD_LEAST = {
     Kind.LOAD: 0.02,
     Kind.VIBRATION: 0.03,
-    Kind.FEED: 0.01,
-    Kind.SPEED: 0.006,
-    Kind.TEMPERATURE: 0.1,
+    Kind.FEED: 0.02,
+    Kind.SPEED: 0.01,
+    Kind.TEMPERATURE: 0.6,
     Kind.PLAIN: 1e-6,
 }
 """Least spreads: a signal that is rounded, or that a control repeats, has none in some sections."""

@@ -6,7 +6,7 @@ r tells how much a tick says: 1 where the section repeats as well as sections us
 told. So s is a mean in which each tick counts by its precision, in usual spreads of the signal.
 
 The last scale is kept for each tool while others cut, so a tool that is dull or mounted too long is compared with its own last
-parts. A tail is the size that healthy parts reach about once a day on that scale and side, so that all of them alarm equally
+parts. A tail is the size that healthy parts exceed about once in two weeks on that scale and side, so that all of them alarm equally
 often.
 """
 
@@ -26,8 +26,9 @@ CLIP = 6.0
 FORGETS = 0.5
 """A tool comes back with half of its residual: a fault that all tools had is forgotten soon after it is gone."""
 BLOCK_S = 900.0
-RETURN_S = 86_400.0
-TAIL_LEAST = 0.4
+DAY_S, RETURN_S = 86_400.0, 14 * 86_400.0
+TAIL_LEAST = (3.0, 2.0, 1.5, 1.5)
+"""Least tails on each scale, in spreads of a tick: what healthy parts never did in training may still be no fault."""
 
 
 def shares(tick_s: float) -> tuple[float, ...]:
@@ -76,13 +77,17 @@ def with_tool(smooth: Sequence[float], slow: Sequence[float]) -> tuple[float, ..
 
 
 def tails(left: "NDArray[np.float64]", blocks: "NDArray[np.integer]", block_s: float = BLOCK_S) -> "NDArray[np.float64]":
-    """Return the size that each column of healthy remainders (T, K) reaches once in RETURN_S.
+    """Return the size that each column of healthy remainders (T, K) exceeds once in RETURN_S.
 
-    The quantile of block maxima that is exceeded as often, never less than `TAIL_LEAST`; blocks: (T,), ascending.
+    The largest of each block beyond the size q that is reached once a day lie above it by β on average; on an exponential tail
+    (Davison and Smith 1990) the size is q + β ln(RETURN_S / day). Never less than `TAIL_LEAST`. blocks: (T,), ascending.
     """
     import numpy as np  # noqa: PLC0415  the stream needs none
 
     begins = np.flatnonzero(np.diff(blocks, prepend=-1))
     largest = np.maximum.reduceat(np.maximum(left, 0.0), begins, axis=0)
-    share = max(0.5, 1.0 - block_s / RETURN_S)
-    return np.asarray(np.maximum(np.quantile(largest, share, axis=0), TAIL_LEAST), dtype=np.float64)
+    daily = np.quantile(largest, max(0.5, 1.0 - block_s / DAY_S), axis=0)
+    beyond = np.where(largest > daily, largest - daily, 0.0)
+    mean = beyond.sum(axis=0) / np.maximum((largest > daily).sum(axis=0), 1)
+    least = np.resize(TAIL_LEAST, left.shape[1])
+    return np.asarray(np.maximum(daily + mean * math.log(RETURN_S / DAY_S), least), dtype=np.float64)

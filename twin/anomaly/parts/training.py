@@ -48,7 +48,8 @@ def prepared(one: "Recorded") -> PartsModel:
     x = _quantities(first, one, settled)
     powers = tuple(_power(one, x[:, at], first.plan.kinds[at]) for at in range(len(one.signals)))
     heat = tuple(
-        fit_heat(rpm, load, columns[name], one.tick_s, base_s(name)) if kind_of(name) is Kind.TEMPERATURE else () for name in one.signals
+        fit_heat(rpm, load, columns[name], one.tick_s, base_s(name)) if kind_of(name) is Kind.TEMPERATURE else ()
+        for name in one.signals
     )
     still = tuple(_still(one, at, rpm) for at in range(len(one.signals)))
     offset, spread = _twin_error(first.changed(power=powers), one, settled)
