@@ -1,8 +1,8 @@
 """An operation is cut into sections by its first part: stretches in which load and feed are steady, and the edges between them.
 
-    edge:    the ticks on either side of a jump of a ln ratio by more than 0.25; parts are sampled at other moments, so an edge
-             may fall a tick earlier or later in the next
-    steady:  the ticks between two edges, up to ten seconds, whose ln ratios stay within 0.15 of their mean
+    edge:    the ticks on either side of a jump of a ln ratio by more than 0.25 (of the speed 0.01); parts are sampled at other
+             moments, so an edge may fall a tick earlier or later in the next
+    steady:  the ticks between two edges, up to ten seconds, whose ln ratios stay within 0.15 of the first (the speed 0.005)
 
 An edge has a large spread, so what happens in it says little; a steady stretch has a small one. Where there would be more than 64
 sections, neighbours are joined, the most alike first.
@@ -14,10 +14,11 @@ from twin.anomaly.parts.moment import SECTIONS_MAX
 from twin.anomaly.parts.quantity import Kind
 from twin.anomaly.parts.usual import Sums
 
-JUMP = 0.25
-STEADY = 0.15
 STEADY_S_MAX = 10.0
-JUMPING = frozenset({Kind.LOAD, Kind.FEED})
+JUMPS = {Kind.LOAD: 0.25, Kind.FEED: 0.25, Kind.SPEED: 0.01}
+STEADY = {Kind.LOAD: 0.15, Kind.FEED: 0.15, Kind.SPEED: 0.005}
+Row = tuple[tuple[float | None, float, float], ...]
+"""A ln ratio of each signal with its limits, of a jump and of what is steady."""
 
 
 def starts_of(sums: Sequence[Sums | None], kinds: Sequence[int], tick_s: float, most: int = SECTIONS_MAX) -> list[int]:
@@ -30,7 +31,7 @@ def starts_of(sums: Sequence[Sums | None], kinds: Sequence[int], tick_s: float, 
     rows = [None if one is None else _means(one, kinds) for one in sums]
     edges = [False] * len(rows)
     for at in range(1, len(rows)):
-        if _differ(rows[at - 1], rows[at], JUMP):
+        if _differ(rows[at - 1], rows[at], 1):
             edges[at - 1] = edges[at] = True
     starts, begun_ticks, steady = [0], 0.0, rows[0] if rows else None
     for at in range(1, len(rows)):
@@ -38,7 +39,7 @@ def starts_of(sums: Sequence[Sums | None], kinds: Sequence[int], tick_s: float, 
         begun_ticks += 1.0 if one is None else max(one.ticks)
         is_new = edges[at] != edges[at - 1]
         if not is_new and not edges[at]:
-            is_new = _differ(steady, rows[at], STEADY) or begun_ticks * tick_s >= STEADY_S_MAX
+            is_new = _differ(steady, rows[at], 2) or begun_ticks * tick_s >= STEADY_S_MAX
         if is_new:
             starts.append(at)
             begun_ticks, steady = 0.0, rows[at]
@@ -49,26 +50,28 @@ def starts_of(sums: Sequence[Sums | None], kinds: Sequence[int], tick_s: float, 
     return starts
 
 
-def _means(one: Sums, kinds: Sequence[int]) -> list[float | None]:
+def _means(one: Sums, kinds: Sequence[int]) -> Row:
     rows = zip(kinds, one.ticks, one.total, strict=True)
-    return [total / count if kind in JUMPING and count else None for kind, count, total in rows]
+    known = [(Kind(kind), total / ticks) if ticks else (Kind(kind), None) for kind, ticks, total in rows]
+    return tuple([(mean, JUMPS[kind], STEADY[kind]) for kind, mean in known if kind in JUMPS])
 
 
-def _differ(one: Sequence[float | None] | None, other: Sequence[float | None] | None, limit: float) -> bool:
+def _differ(one: Row | None, other: Row | None, limit: int) -> bool:
+    """Return True where a ln ratio differs by more than its limit: 1 of a jump, 2 of what is steady."""
     if one is None or other is None:
         return False
-    pairs = zip(one, other, strict=True)
-    return any(a is not None and b is not None and abs(a - b) > limit for a, b in pairs)
+    return any(a[0] is not None and b[0] is not None and abs(a[0] - b[0]) > a[limit] for a, b in zip(one, other, strict=True))
 
 
-def _joined(starts: list[int], rows: Sequence[list[float | None] | None]) -> list[int]:
-    """Return the starts with one less: that at which the rows on either side are most alike."""
+def _joined(starts: list[int], rows: Sequence[Row | None]) -> list[int]:
+    """Return the starts with one less: that at which the rows on either side are most alike, in jumps."""
 
     def step(place: int) -> float:
         before, after = rows[starts[place] - 1], rows[starts[place]]
         if before is None or after is None:
             return 0.0
-        return max([abs(a - b) for a, b in zip(before, after, strict=True) if a is not None and b is not None], default=0.0)
+        pairs = zip(before, after, strict=True)
+        return max([abs(a[0] - b[0]) / a[1] for a, b in pairs if a[0] is not None and b[0] is not None], default=0.0)
 
     least = min(range(1, len(starts)), key=step)
     return [start for place, start in enumerate(starts) if place != least]
