@@ -13,7 +13,7 @@ from twin.anomaly.parts.following import told_after
 from twin.anomaly.parts.judging import judged
 from twin.anomaly.parts.learning import learned
 from twin.anomaly.parts.model import OPERATIONS_MAX, PartsModel
-from twin.anomaly.parts.own import Own, begun
+from twin.anomaly.parts.own import Own, begun, usual_of
 from twin.anomaly.parts.quantity import SPREAD_LEAST, Kind
 from twin.anomaly.parts.record import CutRecord
 from twin.anomaly.parts.recorded import EXPECTED, Line, Recorded
@@ -30,6 +30,8 @@ __all__ = ["ALL", "EXPECTED", "Ablation", "Line", "Recorded", "Replayed", "fit",
 YOUNG = 4
 """The first fourth of the recordings gives spreads; tails are those of the rest."""
 SEEN_S = 5.0
+MATURE_PARTS, MATURE_SHARE = 8, 0.3
+"""Tails come from operations that so many parts have taught, where they are so much of what was seen."""
 SPREAD_PARTS_MIN = 2
 LOOSE_TAILS = (6.0, 3.0, 1.5, 2.5)
 """Tails so wide that only what stands out is kept from being learned, before the real ones are known."""
@@ -48,6 +50,14 @@ class Ablation(NamedTuple):
 
 
 ALL = Ablation()
+
+
+class Seen(NamedTuple):
+    """What was left beside the peers at a tick, in tails; parts: that the operation was known by."""
+
+    tick: int
+    left: tuple[float, ...]
+    parts: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +117,7 @@ def _run(
     ablation: Ablation,
     seen_s: float,
     owns: Sequence[Own] | None = None,
-) -> "tuple[Replayed, list[Own], list[list[tuple[int, tuple[float, ...]]]]]":
+) -> "tuple[Replayed, list[Own], list[list[Seen]]]":
     """Replay a cell; return what came of it, the states at the end, and what was left beside the peers every seen_s, by tick."""
     import numpy as np  # noqa: PLC0415  the stream needs none
 
@@ -117,7 +127,7 @@ def _run(
     states = [begun(model) for model in models] if owns is None else list(owns)
     alarms = [AlarmState()] * count
     every = max(1, round(seen_s / cell[0].tick_s)) if seen_s else 0
-    seen: list[list[tuple[int, tuple[float, ...]]]] = [[] for _ in cell]
+    seen: list[list[Seen]] = [[] for _ in cell]
     whys, records = [], []
     for tick, told in enumerate(zip(*(one.told() for one in cell), strict=True)):
         for place, one in enumerate(told):
@@ -145,7 +155,8 @@ def _run(
             if alarms[place].is_on and not was_on and judgement.why is not None:
                 whys.append((tick, place, judgement.why))
             if every and tick % every == 0 and not judgement.is_idle and judgement.signature:
-                seen[place].append((tick, judgement.signature))
+                usual = usual_of(model, own, own.place.key)
+                seen[place].append(Seen(tick, judgement.signature, 0 if usual is None else usual.parts))
     return Replayed(scores, own_scores, is_idle, is_alarm, tuple(whys), tuple(records), tuple(states)), states, seen
 
 
@@ -155,12 +166,12 @@ def _ablated(told: Told, ablation: Ablation) -> Told:
     return told if ablation.has_gates or not told.is_gated else told._replace(is_gated=False)
 
 
-def _with_spreads(model: PartsModel, own: Own, seen: "list[tuple[int, tuple[float, ...]]]") -> PartsModel:
+def _with_spreads(model: PartsModel, own: Own, seen: "list[Seen]") -> PartsModel:
     """Return the model with the spreads of a tick that its first parts had."""
     import numpy as np  # noqa: PLC0415
 
     spread = [1.0 / value for value in model.plan.over_spread]
-    rows = np.array([row for _, row in seen]) if seen else np.zeros((0, len(spread) * scales.COUNT))
+    rows = np.array([one.left for one in seen]) if seen else np.zeros((0, len(spread) * scales.COUNT))
     for at, kind in enumerate(model.plan.kinds):
         known = [
             variance[at]
@@ -176,18 +187,19 @@ def _with_spreads(model: PartsModel, own: Own, seen: "list[tuple[int, tuple[floa
     return model.changed(spread=tuple(spread))
 
 
-def _taught(model: PartsModel, own: Own, seen: "list[tuple[int, tuple[float, ...]]]") -> PartsModel:
+def _taught(model: PartsModel, own: Own, seen: "list[Seen]") -> PartsModel:
     """Return the model with all that the replay has taught it, and with the tails of what was left beside the peers.
 
     Raises ValueError where no tick was judged.
     """
     import numpy as np  # noqa: PLC0415
 
-    late = [(tick, row) for tick, row in seen if tick >= seen[-1][0] // YOUNG]
+    old = [one for one in seen if one.parts >= MATURE_PARTS]
+    late = old if len(old) >= MATURE_SHARE * len(seen) else [one for one in seen if one.tick >= seen[-1].tick // YOUNG]
     if not late:
         raise ValueError("no tick is judged outside of tool changes in an operation that came twice: record more parts")
-    left = np.array([row for _, row in late]) * np.array([LOOSE_TAILS * len(model.signals)])
-    blocks = np.array([tick for tick, _ in late]) // max(1, round(scales.BLOCK_S / model.tick_s))
+    left = np.array([one.left for one in late]) * np.array([LOOSE_TAILS * len(model.signals)])
+    blocks = np.array([one.tick for one in late]) // max(1, round(scales.BLOCK_S / model.tick_s))
     return model.changed(
         up=tuple(scales.tails(left, blocks).tolist()),
         down=tuple(scales.tails(-left, blocks).tolist()),
