@@ -14,7 +14,7 @@ def told(load: float, speed: float | None) -> Sums:
 
 
 def test_a_speed_that_changes_while_it_is_not_told_ends_a_section() -> None:
-    """The spindle runs up unsettled, which tells nothing of its speed; afterwards it is another section, however many there are."""
+    """The spindle runs up unsettled, which tells nothing of its speed; afterwards it is another section."""
     stretches = [told(3.0, 8.16)] * 6 + [told(3.0, None)] * 2 + [told(3.0, 8.19)] * 6
     assert starts_of(stretches, KINDS, 1.0) == [0, 7, 9]
     assert len(starts_of(stretches, KINDS, 1.0, most=2)) == 2
