@@ -15,6 +15,7 @@ from twin.anomaly.parts.quantity import Kind
 from twin.anomaly.parts.usual import Sums
 
 STEADY_S_MAX = 10.0
+JUMP, EVEN = 0, 1
 JUMPS = {Kind.LOAD: 0.25, Kind.FEED: 0.25, Kind.SPEED: 0.01}
 STEADY = {Kind.LOAD: 0.15, Kind.FEED: 0.15, Kind.SPEED: 0.005}
 Row = tuple[tuple[float | None, float, float], ...]
@@ -28,10 +29,10 @@ def starts_of(sums: Sequence[Sums | None], kinds: Sequence[int], tick_s: float, 
     >>> starts_of([told(x) for x in (3.0, 3.0, 3.1, 3.0, 0.5, 3.0, 3.0, 3.1)], (int(Kind.LOAD),), 1.0)
     [0, 3, 6]
     """
-    rows = [None if one is None else _means(one, kinds) for one in sums]
+    rows = _carried([None if one is None else _means(one, kinds) for one in sums])
     edges = [False] * len(rows)
     for at in range(1, len(rows)):
-        if _differ(rows[at - 1], rows[at], 1):
+        if _differ(rows[at - 1], rows[at], JUMP):
             edges[at - 1] = edges[at] = True
     starts, begun_ticks, steady = [0], 0.0, rows[0] if rows else None
     for at in range(1, len(rows)):
@@ -39,7 +40,7 @@ def starts_of(sums: Sequence[Sums | None], kinds: Sequence[int], tick_s: float, 
         begun_ticks += 1.0 if one is None else max(one.ticks)
         is_new = edges[at] != edges[at - 1]
         if not is_new and not edges[at]:
-            is_new = _differ(steady, rows[at], 2) or begun_ticks * tick_s >= STEADY_S_MAX
+            is_new = _differ(steady, rows[at], EVEN) or begun_ticks * tick_s >= STEADY_S_MAX
         if is_new:
             starts.append(at)
             begun_ticks, steady = 0.0, rows[at]
@@ -56,11 +57,26 @@ def _means(one: Sums, kinds: Sequence[int]) -> Row:
     return tuple([(mean, JUMPS[kind], STEADY[kind]) for kind, mean in known if kind in JUMPS])
 
 
+def _carried(rows: Sequence[Row | None]) -> list[Row | None]:
+    """Return the rows in which what is not told is as it was last: a speed that changes is told again once it has settled."""
+    found: list[Row | None] = []
+    last: Row | None = None
+    for row in rows:
+        if row is not None:
+            held = row if last is None else last
+            last = tuple([now if now[0] is not None else (old[0], now[1], now[2]) for now, old in zip(row, held, strict=True)])
+        found.append(last)
+    return found
+
+
 def _differ(one: Row | None, other: Row | None, limit: int) -> bool:
-    """Return True where a ln ratio differs by more than its limit: 1 of a jump, 2 of what is steady."""
+    """Return True where a ln ratio differs by more than its limit."""
     if one is None or other is None:
         return False
-    return any(a[0] is not None and b[0] is not None and abs(a[0] - b[0]) > a[limit] for a, b in zip(one, other, strict=True))
+    for (a, *limits), (b, *_) in zip(one, other, strict=True):
+        if a is not None and b is not None and abs(a - b) > limits[limit]:
+            return True
+    return False
 
 
 def _joined(starts: list[int], rows: Sequence[Row | None]) -> list[int]:
