@@ -79,7 +79,7 @@ def warmed(
     *,
     is_held: bool,
 ) -> Heat:
-    """Return the heat after a tick; places: of speed and load, −1 = none; shares: of a tick in each time constant, and in each base.
+    """Return the heat after a tick; places: of speed and load, −1 = none; shares: of a tick in each time constant, in each base.
 
     A base follows its temperature slowly, and next to not at all while the score is suspicious.
     """

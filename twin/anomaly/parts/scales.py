@@ -6,8 +6,8 @@ r tells how much a tick says: 1 where the section repeats as well as sections us
 told. So s is a mean in which each tick counts by its precision, in usual spreads of the signal.
 
 The last scale is kept for each tool while others cut, so a tool that is dull or mounted too long is compared with its own last
-parts. A tail is the size that healthy parts exceed about once in two weeks on that scale and side, so that all of them alarm equally
-often.
+parts. A tail is the size that healthy parts exceed about once in two weeks on that scale and side, so that all of them alarm
+equally often.
 """
 
 import math
