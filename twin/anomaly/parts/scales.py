@@ -22,7 +22,7 @@ SCALES = ("seconds", "cut", "part", "tool")
 TAUS_S = (3.0, 30.0, 300.0, 120.0)
 TOOL = 3
 COUNT = len(SCALES)
-CLIP = 6.0
+CLIP = 12.0
 FORGETS = 0.5
 """A tool comes back with half of its residual: a fault that all tools had is forgotten soon after it is gone."""
 BLOCK_S = 900.0
