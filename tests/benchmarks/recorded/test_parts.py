@@ -16,7 +16,7 @@ from tests.recordings import recording, recordings_folder
 from twin.anomaly.alarm import AlarmRule
 from twin.anomaly.parts.model import PartsModel
 
-RULE = AlarmRule(5.0, 2)
+RULE = AlarmRule(1.5, 2)
 """Tails that a handful of parts teach are narrow; what is found here stands ten times above them."""
 
 

@@ -31,7 +31,7 @@ from twin.anomaly.parts_scorer import PartsScorer
 from twin.expected.files import ByProgram, read_expectation
 from twin.vocabulary.topics import VERDICT
 
-THRESHOLD = 4.0
+THRESHOLD = 2.0
 PART_S = 92
 T0_S = T0_MS / 1000.0
 

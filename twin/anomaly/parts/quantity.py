@@ -44,7 +44,7 @@ SPREAD_LEAST = {
     Kind.LOAD: 0.02,
     Kind.VIBRATION: 0.03,
     Kind.FEED: 0.02,
-    Kind.SPEED: 0.02,
+    Kind.SPEED: 0.006,
     Kind.TEMPERATURE: 0.6,
     Kind.PLAIN: 1e-6,
 }

@@ -27,7 +27,7 @@ FORGETS = 0.5
 """A tool comes back with half of its residual: a fault that all tools had is forgotten soon after it is gone."""
 BLOCK_S = 900.0
 DAY_S, RETURN_S = 86_400.0, 14 * 86_400.0
-TAIL_LEAST = (3.0, 2.0, 1.5, 1.5)
+TAIL_LEAST = (2.0, 1.5, 1.5, 1.5)
 """Least tails on each scale, in spreads of a tick: what healthy parts never did in training may still be no fault."""
 
 

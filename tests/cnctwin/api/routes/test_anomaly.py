@@ -158,7 +158,7 @@ class Milling:
         version = stored(AnomalyModel(SIGNALS, PartsScorer(fitted(machines=1)[0])), folder / "models", "vmc").name
         promote(folder / "models", "vmc", version)
         self._file = folder / "processors.toml"
-        self._file.write_text(f'[joint_anomaly]\nmodels = "{folder / "models"}"\nthreshold = 4.0\ntail_s = 2.0\n')
+        self._file.write_text(f'[joint_anomaly]\nmodels = "{folder / "models"}"\nthreshold = 2.0\ntail_s = 2.0\n')
         self._broker = BrokerAddress(*mosquitto.address)
         self.rows = parts(2, 6, {4: 1.6})[: int(4.9 * PART_S)]
         self._began_ms = now() - 1000 * len(self.rows)
