@@ -27,6 +27,7 @@ from cnctwin.processes.child import Child
 from cnctwin.processes.private_broker import PrivateBroker
 from cnctwin.standins.simulated_machine import description
 from cnctwin.standins.simulated_machine.anomaly_model import place_model
+from cnctwin.standins.simulated_machine.expectation import place_expectation
 from processors.discovery import discover
 from sparkplug.host import EventKind, HostApplication
 
@@ -58,9 +59,13 @@ class Stack:
                 f'session_file = "{self.folder}/edge-{machine}.json"\n[mtconnect]\nurl = "{said(state, "url")}"\n'
             )
         settings = self.folder / "processors.toml"
-        models = [place_model(self.folder / "models", machine) for machine in MACHINES]
+        expectations = self.folder / "expectations"
+        expected = [place_expectation(expectations, machine) for machine in MACHINES]
+        models = [place_model(self.folder / "models", machine, expectations) for machine in MACHINES]
         store = self.folder / "store"
-        settings.write_text(f"{description.PROCESSORS.read_text()}{models[0]}\n[historian]\nstore = {json.dumps(str(store))}\n")
+        settings.write_text(
+            f"{description.PROCESSORS.read_text()}{expected[0]}{models[0]}\n[historian]\nstore = {json.dumps(str(store))}\n"
+        )
         broker = ["--broker", self.broker.address.url]
         self._begin("processors", "process", *discover(), "--config", str(settings), *broker, "--state-dir", str(self.folder))
         self._begin("edge", "edge", "run", str(edges))

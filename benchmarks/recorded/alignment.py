@@ -70,7 +70,8 @@ def pair(model: PartsModel, first: Part, second: Part) -> Iterator[Apart]:
         true = _place_of_lines(first.line[there], usual[there], second.line[here])
         run, ran = (np.cumsum(part.feed[at]) * TICK_S / 60.0 for part, at in ((second, here), (first, there)))
         errors = [np.abs(found - true) for found in (np.interp(run, ran, usual[there]), plain[here], right[here])]
-        yield Apart(*(float(one.mean()) for one in errors), float((errors[2] > FAR_S).mean()))
+        distance, seconds, aligned = (float(one.mean()) for one in errors)
+        yield Apart(distance, seconds, aligned, float((errors[2] > FAR_S).mean()))
 
 
 def _place_of_lines(usual: NDArray[np.int64], progress: Floats, lines: NDArray[np.int64]) -> Floats:

@@ -5,6 +5,7 @@ CPU time is in µs a message of a machine, with 11 changing values. `each_us` is
 
     python -m benchmarks.fleet --machines 40 --each --prefer    # shared_us, each_us; broker_us, broker_mirror_us by its column
     python -m benchmarks.fleet --machines 20,100                # memory
+    python -m benchmarks.fleet --machines 40 --prefer --processors mirror,expected    # less mirror alone, and so tool_wear
     cnctwin plan fleet --machines 1 --measure --json            # calibration_us
 """
 
@@ -44,6 +45,7 @@ MEASURED = Measured(
         "alerts": 10.6,
         "cutting_force": 52.3,
         "events": 48.1,
+        "expected": 54.0,
         "gap": 39.8,
         "historian": 27.3,
         "joint_anomaly": 23.1,
@@ -52,6 +54,7 @@ MEASURED = Measured(
         "rules": 56.5,
         "thermal": 31.5,
         "tool_change_detector": 14.8,
+        "tool_wear": 7.0,
         "vibration": 19.0,
     },
     broker_us=45.0,
