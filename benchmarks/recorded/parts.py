@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 TICK_S, TAIL_S, LOOK_BACK_S = 1.0, 8.0, 10.0
 PART_S_MIN = 40.0
 NIST_SIGNALS = ("spindle_rpm", "feed_mm_min")
-"""Of those that scores are of, all that these controls told: no load, temperature or vibration."""
+"""The signals that these controls told: no load, temperature or vibration."""
 CONTROL_SIGNALS = ("spindle_load_pct", "feed_mm_min")
 """Without the speed: of two spindles one is mapped, and it stands while the other cuts."""
 TEXTS = {
@@ -74,7 +74,7 @@ class Part:
 
     @property
     def ticks(self) -> int:
-        """How long it took, in ticks."""
+        """Return its length in ticks."""
         return len(self.values)
 
     @property

@@ -43,7 +43,7 @@ class Stretch:
 
     @property
     def shut(self) -> Flags:
-        """Where scores are gated."""
+        """The stretches in which scores are gated."""
         return gate(self.active, TICK_S, self.tail_s, LOOK_BACK_S)
 
     @property

@@ -55,7 +55,7 @@ class Judged:
     has_threshold: bool
 
     def of(self, wanted: Callable[[Fault], bool], context: Callable[[Context], bool] = lambda _: True) -> Detections:
-        """What was found of some faults only."""
+        """Return the detections of some faults only."""
         rows = zip(self.detections.delays_s, self.faults, self.contexts, strict=True)
         return Detections(tuple(delay for delay, fault, where in rows if wanted(fault) and context(where)), 0, 0.0)
 
@@ -78,7 +78,7 @@ def alarms_of(threshold: float | None, scores: Floats, idle: Flags) -> Flags:
 def outcome(
     cell: Cell, place: int, from_s: int, tick_s: int, *, scores: Floats, idle: Flags, on: Flags, has_threshold: bool
 ) -> Judged:
-    """What came of a machine from `from_s` on: scores, where they do not count, and alarms, (T,), a row each tick_s."""
+    """Return the outcome of a machine from `from_s` on. scores, idle (do not count), on (alarms): (T,), each tick_s."""
     faults = [fault for fault in cell.faults if fault.machine == place]
     events = [Event(fault.start_s - from_s, fault.end_s - from_s) for fault in faults]
     alerts_s = [float(tick * tick_s) for tick in onsets(on)]

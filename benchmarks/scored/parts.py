@@ -37,7 +37,7 @@ ABLATIONS = {
 
 
 def expectations(machine: Machine, name: str) -> list[Expectation]:
-    """What the twin expects of each program of a machine, from its text and the machine's statement."""
+    """Return the twin's expectation of each program of a machine, from its text and the machine's statement."""
     return [
         expectation_of(machine_from_toml(machine.toml(program, name), name), program.text, name=program.name)
         for program in machine.programs

@@ -16,7 +16,7 @@ SOON_S = 60.0
 
 
 def of_faults(parts: Sequence[Judged], wanted: Callable[[Fault], bool]) -> list[Detections]:
-    """What was found of some faults only."""
+    """Return the detections of some faults only, of each machine."""
     return [part.of(wanted) for part in parts]
 
 

@@ -114,7 +114,7 @@ def draw_bursts(lasts_s: float, rng: np.random.Generator) -> tuple[tuple[float, 
 
 
 def course(fault: Fault, t_s: Floats) -> Floats:
-    """How much of the fault there is at each time, 0 to 1; of a dulling tool, the wear that has come at size 1."""
+    """Return the share of the fault at each time, 0 to 1; for a dulling tool, the wear that has come at size 1."""
     inside = (t_s >= fault.start_s) & (t_s < fault.end_s)
     since = t_s - fault.start_s
     if fault.kind is FaultKind.DULLING_TOOL:

@@ -39,7 +39,7 @@ CHIPS = 0.2
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """What is peculiar to one machine. The last program is the new one, which it runs only in the judged days.
+    """The traits of one machine. The last program is the new one, which it runs only in the judged days.
 
     label_late_s: how long after the spindle's stop its control tells of a tool change; 0: when it begins, as with M06
     tools, cutting: as stated, and as they are; vibration_g_per_n: by tool, how strongly the machine answers to its force

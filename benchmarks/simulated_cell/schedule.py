@@ -1,4 +1,4 @@
-"""When a machine does what: shifts, batches of parts, operations line by line, tool changes and stops.
+"""The schedule of a machine: shifts, batches of parts, operations line by line, tool changes and stops.
 
 Two shifts from 6 to 22 o'clock on six days; a warm-up each morning; batches of 10 to 60 parts of one of three programs, and of a
 new one from the second of the judged days on; tools that wear over 40 parts and are replaced; material that differs from batch to

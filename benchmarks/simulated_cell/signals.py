@@ -40,7 +40,7 @@ class Readings(NamedTuple):
 
 
 class _Cut(NamedTuple):
-    """At each second: share of the engaged arc, feed over programmed feed, power of the cut, kW, alternating force, N."""
+    """The cut at each second: share of the engaged arc, feed over programmed feed, power of the cut, kW, alternating force, N."""
 
     share: Floats
     feed: Floats

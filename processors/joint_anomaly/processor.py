@@ -175,7 +175,7 @@ def _tick(shared: Config, member: Member, at_s: float) -> int:
 
 
 def _told(scoring: Scoring, sample: Sample, tick: int) -> Scored:
-    """What a machine told as of a tick, whose score waits until the ticks before it are judged."""
+    """Return what a machine told as of a tick; its score waits until the ticks before it are judged."""
     if scoring.parts is None:
         return Scored(tick, sample.at_s, None, NO_MODEL if scoring.model is None else NO_PARTS)
     return Scored(tick, sample.at_s, None, moment=moment_of(scoring.parts.signals, sample))

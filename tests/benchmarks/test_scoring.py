@@ -1,4 +1,4 @@
-"""What the scores of a cell are counted as: faults found, false alerts by occasion, lines of the table."""
+"""The count of a cell's scores: faults found, false alerts by occasion, lines of the table."""
 
 import numpy as np
 import pytest

@@ -13,7 +13,7 @@ LINES_SHOWN = 5
 
 @dataclass(frozen=True, slots=True)
 class Missing:
-    """Why the load of a line is not known → the lines. Reasons without a line hold for the program."""
+    """The reasons for loads that are not known → the lines. Reasons without a line hold for the program."""
 
     lines: dict[str, set[int]] = field(default_factory=dict)
 

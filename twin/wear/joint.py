@@ -1,4 +1,4 @@
-"""What is known of a machine's tools together: the material of the batch, the part, and share and rate of each tool, as one
+"""The joint estimate of a machine's tools: the material of the batch, the part, and share and rate of each tool, as one
 Gaussian.
 
     level_j = c + e + gain_j R_j g_j(u_j) + ε_j      c: batch, e: part, u_j: share of the life of tool j      (twin/wear/trend.py)

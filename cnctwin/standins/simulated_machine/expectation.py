@@ -1,4 +1,4 @@
-"""What the twin expects of the simulated machine's program, as `scripts/make-expectation` has worked it out."""
+"""The twin's expectation of the simulated machine's program, as `scripts/make-expectation` has worked it out."""
 
 import json
 from dataclasses import replace

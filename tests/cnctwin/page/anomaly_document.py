@@ -1,4 +1,4 @@
-"""Why a score alarms, and what was said of earlier alarms, as the interface tells it."""
+"""The reason of an alarm, and what was said of earlier ones, as the interface tells it."""
 
 import json
 import time
@@ -60,7 +60,7 @@ def anomaly(machine: str = "vmc", **more: Any) -> dict[str, Any]:
 
 
 def signals(told: dict[str, Any]) -> dict[str, SignalValue]:
-    """The same as the stream of a machine has it."""
+    """Return that document as the stream of a machine has it."""
     text = {name: None if told[name] is None else json.dumps(told[name]) for name in ("why", "verdicts")}
     return {
         "twin/anomaly_alarm": SignalValue(told["is_alarm"], None, "inferred"),

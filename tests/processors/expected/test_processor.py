@@ -1,4 +1,4 @@
-"""What the twin expects of the line that runs, beside what is measured."""
+"""The twin's expectation of the line that runs, beside what is measured."""
 
 import math
 from pathlib import Path

@@ -62,7 +62,7 @@ def test_a_known_alarm_is_held_back_with_its_score_and_its_reason_and_what_it_lo
 
 
 def test_another_fault_alarms_all_the_same() -> None:
-    """After the first was called false, and limits of load have risen, a load that is far below what is usual still alarms."""
+    """A load far below the usual still alarms after the first alarm was called false and limits of load have risen."""
     rows = parts(2, 13, {4: LOAD, SECOND: 0.3})
     stream, engine = told("a", rows), cell("a")
     came_s = next(at_s for at_s, on in metric(fed(cell("a"), *stream), ALARM) if on)

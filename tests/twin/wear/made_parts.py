@@ -16,7 +16,7 @@ TERMS = Terms()
 
 
 class Made(NamedTuple):
-    """What happens beside even wear: batches by the part from which they run, rates by (tool, life)."""
+    """The exceptions from even wear: batches by the part from which they run, rates by (tool, life)."""
 
     parts: int
     batches: Mapping[int, float] = {}

@@ -1,4 +1,4 @@
-"""What a part that has ended without an alarm teaches; a part that alarmed teaches nothing.
+"""Learning from a part that has ended without an alarm; a part that alarmed teaches nothing.
 
 At the end of an operation its levels of wear and material are followed, unless its score was suspicious for long. At the end of
 the part the sections of all its operations are learned. An alarm takes back the levels to those at the beginning of its part.

@@ -27,7 +27,7 @@ SILENT = {Kind.TEMPERATURE: ("seconds", "tool"), Kind.FEED: ("tool",), Kind.SPEE
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What a step needs of a model, put together once. *_at: places of signals, −1 = the model has none."""
+    """The figures of a model that a step needs, put together once. *_at: places of signals, −1 = the model has none."""
 
     kinds: tuple[int, ...]
     floors: tuple[float, ...]
@@ -97,7 +97,7 @@ class PartsModel(Record):
 
     @cached_property
     def plan(self) -> Plan:
-        """What a step needs."""
+        """The figures that a step needs."""
         count = len(self.signals)
         kinds = tuple(quantity.kind_of(signal) for signal in self.signals)
         spread = self.spread or tuple(quantity.SPREADS[kind] for kind in kinds)

@@ -26,7 +26,7 @@ SLACK_MM = 5.0
 
 
 class Place(NamedTuple):
-    """Where a machine is in its part.
+    """The place of a machine in its part.
 
     key: of the operation, as "O1|T3|1", None where program or tool is not known; part: parts of this program that began
     line: as last told, −1 = not known; line_first, line_last: lowest and highest of this part

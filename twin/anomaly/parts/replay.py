@@ -41,7 +41,7 @@ STEADY_QUANTILE = 0.35
 
 
 class Ablation(NamedTuple):
-    """What a replay takes into account."""
+    """The knowledge that a replay takes into account."""
 
     has_parts: bool = True
     has_twin: bool = True
@@ -53,7 +53,7 @@ ALL = Ablation()
 
 
 class Seen(NamedTuple):
-    """What was left beside the peers at a tick, in tails; parts: that the operation was known by."""
+    """The remainder beside the peers at a tick, in tails. parts: that had taught the operation by then."""
 
     tick: int
     left: tuple[float, ...]

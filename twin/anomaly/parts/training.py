@@ -1,4 +1,4 @@
-"""What training takes from the recordings of a machine before they are replayed: idle load, heat, powers of the override, the
+"""The figures taken from the recordings of a machine before they are replayed: idle load, heat, powers of the override, the
 twin's error. All of it is plain least squares and quantiles over arrays (T,); what depends on the course of a part comes from the
 replay itself (`replay.py`).
 """

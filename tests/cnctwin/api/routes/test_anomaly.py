@@ -220,6 +220,6 @@ def test_a_verdict_that_is_given_while_the_processor_is_away_is_taken_up(mosquit
 
 
 def told_by(server: PlantServer) -> str | None:
-    """Who has spoken of the last alarm."""
+    """Return the people who have spoken of the last alarm."""
     verdicts = get(f"{server.url}/anomaly/vmc").json()["verdicts"]
     return verdicts["alarms"][0]["said"]["by"] if verdicts and verdicts["alarms"] and verdicts["alarms"][0]["said"] else None

@@ -105,7 +105,7 @@ def test_a_gradual_wear_is_followed() -> None:
 
 
 def test_a_new_program_is_judged_from_its_second_part() -> None:
-    """In its first part nothing is known of it, and that is said; in the second a change is found."""
+    """Nothing is known of it in its first part, and that is said; a change in the second is found."""
     first = replayed([model()], [shop.recorded(1, 7, program="O2")])
     assert np.isnan(first.scores).all()
     changed = shop.recorded(4, 7, shop.in_part(2, load=1.6), program="O2")
@@ -114,7 +114,7 @@ def test_a_new_program_is_judged_from_its_second_part() -> None:
 
 
 def test_a_new_program_is_judged_in_its_first_part_by_the_twin() -> None:
-    """With an expectation a first part that takes half as much again is found, one as expected is not."""
+    """A first part that takes half as much again as expected is found, one as expected is not."""
 
     def with_twin(one: Recorded) -> Recorded:
         lines = {}
@@ -149,7 +149,7 @@ def test_what_peers_share_is_no_fault() -> None:
 
 
 def test_values_that_are_not_known_are_left_out() -> None:
-    """Without vibration, and with holes in the load, a change of the load is still found."""
+    """A change of the load is found without vibration, and with holes in the load."""
     one = shop.recorded(6, 12, shop.in_part(4, load=1.6))
     values = one.values.copy()
     values[:, 3] = np.nan
