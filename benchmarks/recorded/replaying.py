@@ -13,10 +13,10 @@ import numpy as np
 from benchmarks.recorded.expectations import expected_rows
 from benchmarks.recorded.parts import TICK_S, Floats, Part
 from twin.anomaly.alarm import AlarmRule
+from twin.anomaly.parts.alarms.why import Why
 from twin.anomaly.parts.levels import BATCH_VAR, Level
 from twin.anomaly.parts.model import PartsModel
 from twin.anomaly.parts.replay import Recorded, fit, replayed
-from twin.anomaly.parts.why import Why
 
 STAND_TICKS = 60
 

@@ -180,7 +180,7 @@ def judged(frames: Frames, method: str, alerts_per_week: float = 1.0) -> list[Ju
         before, own = (scores[part, place] for part in (frames.calibrate, frames.judge))
         idle = shut[frames.judge, place]
         threshold = threshold_of(before, shut[frames.calibrate, place], FRAME_S, alerts_per_week)
-        on = alarms_of(threshold, own, idle)
+        on = alarms_of(threshold, own, idle, FRAME_S)
         from_s = frames.judge.start * FRAME_S
         has_threshold = threshold is not None
         results.append(outcome(frames.cell, place, from_s, FRAME_S, scores=own, idle=idle, on=on, has_threshold=has_threshold))

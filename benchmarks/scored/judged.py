@@ -23,7 +23,7 @@ from twin.anomaly.threshold import fit_threshold
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-DWELL, CLEAR = 3, 0.8
+DWELL, CLEAR, CALM_S = 3, 0.8, 600.0
 GRACE_S, WAKE_S = 60.0, 300.0
 FRAME_S = 10
 VOLUME_BUFFER, VOLUME_STEPS = 60, 3
@@ -63,16 +63,20 @@ class Judged:
 def threshold_of(scores: Floats, idle: Flags, tick_s: float, alerts_per_week: float) -> float | None:
     """The threshold fitted on scores of a week without faults; None where none can be."""
     try:
-        return fit_threshold([scores], [idle], tick_s, DWELL, CLEAR, alerts_per_week).threshold
+        return fit_threshold([scores], [idle], tick_s, DWELL, CLEAR, alerts_per_week, round(CALM_S / tick_s)).threshold
     except ModelError:
         return None
 
 
-def alarms_of(threshold: float | None, scores: Floats, idle: Flags) -> Flags:
+def rule_of(threshold: float | None, tick_s: float) -> AlarmRule | None:
+    """Return the rule of the alarm, as the processor has it; None without a threshold."""
+    return None if threshold is None else AlarmRule(threshold, DWELL, CLEAR, round(CALM_S / tick_s))
+
+
+def alarms_of(threshold: float | None, scores: Floats, idle: Flags, tick_s: float) -> Flags:
     """Return the ticks at which the alarm is on."""
-    if threshold is None:
-        return np.zeros(len(scores), dtype=np.bool_)
-    return is_alarm(AlarmRule(threshold, DWELL, CLEAR), scores, idle)
+    rule = rule_of(threshold, tick_s)
+    return np.zeros(len(scores), dtype=np.bool_) if rule is None else is_alarm(rule, scores, idle)
 
 
 def outcome(

@@ -10,12 +10,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.scored.judged import CLEAR, DWELL, Judged, outcome, threshold_of
+from benchmarks.scored.judged import Judged, outcome, rule_of, threshold_of
 from benchmarks.simulated_cell.cell import Cell, machine_readings
 from benchmarks.simulated_cell.machine import Machine
 from benchmarks.simulated_cell.schedule import DAY_S
 from benchmarks.simulated_cell.signals import FEATURES, Readings
-from twin.anomaly.alarm import AlarmRule
 from twin.anomaly.gate import gate
 from twin.anomaly.parts.replay import ALL, EXPECTED, Ablation, Recorded, fit, replayed
 from twin.expected import Expectation
@@ -116,7 +115,7 @@ def judged_parts(
         threshold_of(before.scores[:, place], before.is_idle[:, place], TICK_S, alerts_per_week)
         for place in range(len(recordings))
     ]
-    rules = [None if limit is None else AlarmRule(limit, DWELL, CLEAR) for limit in limits]
+    rules = [rule_of(limit, TICK_S) for limit in limits]
     after = replayed(models, of(2), rules, ablation, before.owns)
     return [
         outcome(

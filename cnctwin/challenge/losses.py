@@ -60,7 +60,7 @@ def anomaly(folder: Path, log: RunLog, machine: str) -> tuple[Floats, Floats, fl
     from cnctwin.training.anomaly.frozen_week import segments  # noqa: PLC0415
     from cnctwin.training.anomaly.replayed_cell import replayed  # noqa: PLC0415
     from processors.joint_anomaly.config import FITTED_WITH  # noqa: PLC0415
-    from twin.anomaly.alarm import AlarmRule, is_alarm, onsets  # noqa: PLC0415
+    from twin.anomaly.alarm import is_alarm, onsets  # noqa: PLC0415
     from twin.anomaly.model import load_model  # noqa: PLC0415
 
     model = load_model(folder)
@@ -70,7 +70,7 @@ def anomaly(folder: Path, log: RunLog, machine: str) -> tuple[Floats, Floats, fl
     settings = {name: getattr(found, name) for name in FITTED_WITH}
     at_zero = RunLog(log.t_s - log.t_s[0], log.columns, log.text, (), log.source)
     track = replayed({machine: at_zero}, {machine: model}, {**settings, "threshold": 1.0})[machine]
-    rule = AlarmRule(found.threshold, found.dwell_ticks, found.clear_fraction)
+    rule = found.rule
     loss = np.where(np.isfinite(track.adjusted) & ~track.skipped, 0.0, np.nan)
     for piece in segments(track, found.tick_s):
         begun = onsets(is_alarm(rule, track.adjusted[piece], track.skipped[piece]))

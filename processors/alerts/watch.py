@@ -12,7 +12,7 @@ from processors.alerts.state import ALERTS_MAX, Alert, AlertsState, Phase, Sever
 from processors.config import Configuration
 from sparkplug.metric import Reading
 from sparkplug.quality import Quality
-from twin.anomaly.parts.words import in_words
+from twin.anomaly.parts.alarms.words import in_words
 from twin.vocabulary.twin_signals import ANOMALY_ALARM, ANOMALY_WHY, SEVERITY, TWIN_PREFIX
 
 PROGRAM, TOOL = "program", "tool_number"

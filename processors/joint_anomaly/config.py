@@ -12,8 +12,8 @@ from twin.anomaly.common_mode import CommonModeRule, Method
 from twin.vocabulary import twin_signals
 
 FITTED_WITH = (
-    *("tick_s", "dwell_ticks", "clear_fraction", "common_mode", "common_mode_factor", "exclude_gated_peers", "tail_s"),
-    "look_back_s",
+    *("tick_s", "dwell_ticks", "clear_fraction", "calm_s", "common_mode", "common_mode_factor", "exclude_gated_peers"),
+    *("tail_s", "look_back_s"),
 )
 """The settings that a threshold holds for."""
 WAITING_MAX = 5000  # scores of one machine
@@ -56,6 +56,7 @@ class Config(CellConfig):
     threshold: PositiveFloat | None = None
     dwell_ticks: int = Field(default=3, ge=1, le=3600)
     clear_fraction: float = Field(default=0.8, gt=0.0, le=1.0)
+    calm_s: float = Field(default=600.0, ge=0.0, le=86_400.0)
     peer_wait_s: float = Field(default=5.0, ge=0.0, le=600.0)
 
     @cached_property

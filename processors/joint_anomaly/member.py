@@ -121,10 +121,10 @@ def after(scoring: Scoring, member: Member, adjustment: Adjustment, outputs: lis
         outputs.append(Output(ADJUSTED, adjusted, Quality.GOOD, None, name, at_s))
     if scoring.rule is not None:
         if scored.tick != judged + 1:
-            alarm = AlarmState(alarm.is_on)
+            alarm = after_tick(scoring.rule, alarm, None, True)
         is_idle = is_gated or adjustment.is_idle
-        if adjusted is None or is_idle or adjusted >= scoring.calm_below or alarm.calm_ticks < scoring.rule.dwell_ticks:
-            alarm = after_tick(scoring.rule, alarm, adjusted, is_idle)  # else it is calm, and stays so
+        if alarm.is_on or adjusted is None or is_idle or adjusted >= scoring.calm_below or alarm.high_ticks:
+            alarm = after_tick(scoring.rule, alarm, adjusted, is_idle)  # else it is off, and stays so
         is_on, why = (alarm.is_on, "") if alarm.is_on or unknown is None else (None, unknown)
     total_s = min(total_s + tick_s, SHARE_S)
     gated_s = gated_s * (1.0 - tick_s / SHARE_S) + (tick_s if is_gated else 0.0)

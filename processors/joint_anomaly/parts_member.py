@@ -4,22 +4,22 @@
 
 The raw score is the machine's own, before its peers. The reason that is published is the strongest since the alarm came on; it
 replaces the one before where it is `STRONGER` times as far from what was expected, so that a person can read it. An alarm that a
-person has explained is held back, and its reason is published all the same (`twin/anomaly/parts/verdict.py`).
+person has explained is held back, and its reason is published all the same (`twin/anomaly/parts/alarms/verdict.py`).
 """
 
 from typing import TYPE_CHECKING, NamedTuple
 
 from processors.contract import Output
 from twin.anomaly.parts import scales
-from twin.anomaly.parts.episodes import Memory, Seen, alarm_of, followed, is_excused, nearest, part_ended
-from twin.anomaly.parts.feedback import told_of
+from twin.anomaly.parts.alarms.episodes import Memory, Seen, alarm_of, followed, is_excused, nearest, part_ended
+from twin.anomaly.parts.alarms.feedback import told_of
+from twin.anomaly.parts.alarms.signature import Signature, shares_of, signature_of
+from twin.anomaly.parts.alarms.verdict import Verdict, corrected
+from twin.anomaly.parts.alarms.why import Why
 from twin.anomaly.parts.judging import Judged
 from twin.anomaly.parts.learning import learned
 from twin.anomaly.parts.moment import Place
 from twin.anomaly.parts.own import Own
-from twin.anomaly.parts.signature import Signature, shares_of, signature_of
-from twin.anomaly.parts.verdict import Verdict, corrected
-from twin.anomaly.parts.why import Why
 from twin.vocabulary import twin_signals
 
 if TYPE_CHECKING:

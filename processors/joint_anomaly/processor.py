@@ -55,7 +55,7 @@ from sparkplug.datatype import DataType
 from sparkplug.metric import Reading
 from sparkplug.quality import Quality
 from twin.anomaly.common_mode import Method, adjust_frame, standardised
-from twin.anomaly.parts.verdict import verdict_of
+from twin.anomaly.parts.alarms.verdict import verdict_of
 from twin.anomaly.preparation import CONTEXT, Preparation, standardised_row
 from twin.vocabulary.topics import VERDICT
 

@@ -91,7 +91,11 @@ def _scoring(config: Configuration[Config], machine: str, model: "AnomalyModel",
     shared, threshold = config.default, config.of(machine).threshold
     if threshold is None and model.calibration is not None:
         threshold = model.calibration.threshold
-    rule = None if threshold is None else AlarmRule(threshold, shared.dwell_ticks, shared.clear_fraction)
+    rule = (
+        None
+        if threshold is None
+        else AlarmRule(threshold, shared.dwell_ticks, shared.clear_fraction, round(shared.calm_s / shared.tick_s))
+    )
     return Scoring(machine, model, rule, shared.tick_s, expected)
 
 

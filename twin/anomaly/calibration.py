@@ -4,6 +4,7 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from twin.anomaly.alarm import AlarmRule
 from twin.anomaly.common_mode import Method
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -31,6 +32,7 @@ class Calibration(Record):
     tick_s: Positive
     dwell_ticks: int = Field(ge=1)
     clear_fraction: Positive
+    calm_s: NotNegative = 0.0
     common_mode: Method
     common_mode_factor: Positive
     exclude_gated_peers: bool
@@ -47,6 +49,11 @@ class Calibration(Record):
     raw_center: Finite
     raw_spread: Positive
     hourly_means: tuple[Finite, ...] = Field(default=(), max_length=10_000)
+
+    @property
+    def rule(self) -> AlarmRule:
+        """The rule of the alarm."""
+        return AlarmRule(self.threshold, self.dwell_ticks, self.clear_fraction, round(self.calm_s / self.tick_s))
 
     @property
     def in_words(self) -> str:

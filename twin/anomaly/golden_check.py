@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.anomaly.alarm import AlarmRule, is_alarm, onsets
+from twin.anomaly.alarm import is_alarm, onsets
 from twin.anomaly.calibration import Calibration
 from twin.anomaly.common_mode import CommonModeRule, Method, adjust_frames
 from twin.anomaly.errors import ModelError
@@ -115,7 +115,7 @@ def adjusted_by_peers(found: Calibration, scores: Floats, gated: Flags, peers: F
 
 def alerts_of(found: Calibration, scores: Floats, gated: Flags, peers: Floats) -> int:
     """Return the number of alarms that come on."""
-    rule = AlarmRule(found.threshold, found.dwell_ticks, found.clear_fraction)
+    rule = found.rule
     return len(onsets(is_alarm(rule, adjusted_by_peers(found, scores, gated, peers), gated)))
 
 

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaincinv
 
-from twin.anomaly.alarm import dwell_score
+from twin.anomaly.alarm import calm_score, dwell_score
 from twin.anomaly.errors import ModelError
 
 Floats = NDArray[np.float64]
@@ -62,7 +62,7 @@ class Threshold:
 
 @dataclass(frozen=True, slots=True)
 class _Stream:
-    """A stretch without a hole: dwell score (least of the last k), and the largest of the last k, −∞ and ∞ where unknown."""
+    """A stretch without a hole: dwell score, and calm score, −∞ and ∞ where unknown (`alarm.py`)."""
 
     least: Floats
     largest: Floats
@@ -100,6 +100,7 @@ def fit_threshold(
     dwell_ticks: int,
     clear_fraction: float = 0.8,
     alerts_per_week: float = 1.0,
+    calm_ticks: int = 0,
 ) -> Threshold:
     """The threshold that gives so many alerts a machine-week, from one or more stretches of adjusted scores (T,) without a hole.
 
@@ -117,7 +118,7 @@ def fit_threshold(
             f"calibrate on {need_h:.0f} h or more, better on weeks"
         )
     streams = [
-        _Stream(dwell_score(one, shut, dwell_ticks), -dwell_score(-one, shut, dwell_ticks))
+        _Stream(dwell_score(one, shut, dwell_ticks), calm_score(one, shut, dwell_ticks, calm_ticks))
         for one, shut in zip(scores, gated, strict=True)
     ]
 

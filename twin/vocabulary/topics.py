@@ -36,7 +36,7 @@ LOOP = f"{OWN}loop/"
 LOOP_REQUEST = f"{LOOP}request/"
 """diagnose, promote, back or withdraw: JSON from a person, {"machine": …, "by": …, "version": …}."""
 VERDICT = f"{OWN}verdict/"
-"""Machine, retained: a person's verdict on one of its anomaly alarms (twin/anomaly/parts/verdict.py)."""
+"""Machine, retained: a person's verdict on one of its anomaly alarms (twin/anomaly/parts/alarms/verdict.py)."""
 VALIDATION_BARRIER = f"{OWN}validation-barrier"
 
 MIRROR = "cnc/"

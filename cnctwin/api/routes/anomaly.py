@@ -16,7 +16,7 @@ from cnctwin.api.routes.plant import UNKNOWN, Machine, known_state
 from cnctwin.api.sources import Sources
 from processors.plain_topic import topic_level
 from sparkplug.clock import now_ms
-from twin.anomaly.parts.verdict import LINE
+from twin.anomaly.parts.alarms.verdict import LINE
 from twin.vocabulary import twin_signals
 from twin.vocabulary.topics import VERDICT
 

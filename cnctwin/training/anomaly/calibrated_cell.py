@@ -51,6 +51,7 @@ class TrainingSettings:
     tick_s: float = 1.0
     dwell_ticks: int = 3
     clear_fraction: float = 0.8
+    calm_s: float = 600.0
     common_mode: Method = Method.PARTS
     common_mode_factor: float = 0.5
     exclude_gated_peers: bool = False
@@ -74,8 +75,13 @@ class TrainingSettings:
     @property
     def settings(self) -> dict[str, Any]:
         """The settings of the processor joint_anomaly."""
-        names = ("tick_s", "dwell_ticks", "clear_fraction", "common_mode", "common_mode_factor", "exclude_gated_peers")
+        names = ("tick_s", "dwell_ticks", "clear_fraction", "calm_s", "common_mode", "common_mode_factor", "exclude_gated_peers")
         return {name: getattr(self, name) for name in (*names, "tail_s", "look_back_s")}
+
+    @property
+    def calm_ticks(self) -> int:
+        """The ticks that end an alarm."""
+        return round(self.calm_s / self.tick_s)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -194,6 +200,7 @@ def _calibration(machine: str, model: AnomalyModel, tracks: list[Track], asked: 
             asked.dwell_ticks,
             asked.clear_fraction,
             asked.alerts_per_week,
+            asked.calm_ticks,
         )
     except ValueError as error:
         raise UsageError(f"{machine}: no threshold can be fitted: {error}") from None

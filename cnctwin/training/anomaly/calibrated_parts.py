@@ -86,7 +86,7 @@ def _window(stretches: Sequence[Mapping[str, Any]], machine: str) -> tuple[float
 
 
 def _rule(fitted: Threshold, asked: TrainingSettings) -> AlarmRule:
-    return AlarmRule(fitted.threshold, asked.dwell_ticks, asked.clear_fraction)
+    return AlarmRule(fitted.threshold, asked.dwell_ticks, asked.clear_fraction, asked.calm_ticks)
 
 
 def _fitted(machine: str, track: Track, asked: TrainingSettings) -> Threshold:
@@ -99,6 +99,7 @@ def _fitted(machine: str, track: Track, asked: TrainingSettings) -> Threshold:
             asked.dwell_ticks,
             asked.clear_fraction,
             asked.alerts_per_week,
+            asked.calm_ticks,
         )
     except (ValueError, ModelError) as error:
         raise UsageError(f"{machine}: no threshold can be fitted: {error}") from None
@@ -123,7 +124,7 @@ def _calibrated(
 ) -> Calibrated:
     found = model.calibration
     assert found is not None
-    rule = AlarmRule(found.threshold, found.dwell_ticks, found.clear_fraction)
+    rule = found.rule
     alerts = sum(
         len(onsets(is_alarm(rule, track.adjusted[piece], track.skipped[piece]))) for piece in segments(track, found.tick_s)
     )

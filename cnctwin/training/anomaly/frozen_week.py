@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from cnctwin.training.anomaly.recorded_cell import Stretch
 from cnctwin.training.anomaly.regimes import Ticks, held_run, standardised
 from cnctwin.training.anomaly.track import Track
-from twin.anomaly.alarm import AlarmRule, is_alarm, onsets
+from twin.anomaly.alarm import is_alarm, onsets
 from twin.anomaly.common_mode import CommonModeRule, Method
 from twin.anomaly.golden import GoldenWeek
 from twin.anomaly.golden_check import frozen, peers_of
@@ -37,7 +37,7 @@ def frozen_week(
     found = model.calibration
     assert found is not None
     rows, gated, peers, alerts = [], [], [], 0
-    alarm = AlarmRule(found.threshold, found.dwell_ticks, found.clear_fraction)
+    alarm = found.rule
     for stretch, scored in zip(stretches, tracks, strict=True):
         if machine not in scored:
             continue

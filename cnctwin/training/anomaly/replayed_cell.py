@@ -29,7 +29,6 @@ from processors.running.engine import Engine
 from sparkplug.host_session import EventKind, HostEvent
 from sparkplug.metric import NodeId, Reading
 from sparkplug.quality import Quality
-from twin.anomaly.alarm import AlarmRule
 from twin.anomaly.common_mode import Method
 from twin.anomaly.model import AnomalyModel
 from twin.anomaly.preparation import CONTEXT, SPEED, TURNS_RPM_MIN
@@ -97,10 +96,7 @@ def _replayed_parts(stretch: Stretch, models: Mapping[str, AnomalyModel], settin
         tail_s=config.tail_s,
         look_back_s=config.look_back_s,
     )
-    rules = [
-        None if found is None else AlarmRule(found.threshold, found.dwell_ticks, found.clear_fraction)
-        for found in (models[name].calibration for name in parts)
-    ]
+    rules = [None if found is None else found.rule for found in (models[name].calibration for name in parts)]
     cell = cell_of_parts(tuple(parts), [stretch], ticks)
     return dict(zip(parts, tracks_of_parts(cell, tuple(parts.values()), rules), strict=True))
 

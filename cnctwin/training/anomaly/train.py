@@ -19,7 +19,7 @@ from cnctwin.training.anomaly.recorded_cell import recorded_cell, shared_feature
 from cnctwin.training.anomaly.replayed_cell import replayed
 from processors.joint_anomaly.config import FITTED_WITH
 from processors.joint_anomaly.expectations import Expectations, read_expectations
-from twin.anomaly.alarm import AlarmRule, is_alarm, onsets
+from twin.anomaly.alarm import is_alarm, onsets
 from twin.anomaly.common_mode import Method
 from twin.anomaly.detector import Detector
 from twin.anomaly.errors import ModelError
@@ -207,7 +207,7 @@ def _on_files(models: dict[str, tuple[Path, AnomalyModel]], arguments: Sequence[
                 raise ModelError(
                     f"the models of {machine} and {cell.machines[0]} were calibrated with different settings: check them apart"
                 )
-            rule = AlarmRule(found.threshold, found.dwell_ticks, found.clear_fraction)
+            rule = found.rule
             ticks[machine] += int((~track.skipped & np.isfinite(track.adjusted)).sum())
             for piece in segments(track, found.tick_s):
                 alerts[machine] += len(onsets(is_alarm(rule, track.adjusted[piece], track.skipped[piece])))

@@ -50,6 +50,7 @@ def drawn(seed: int) -> Shift:
         "look_back_s": chance.choice([0.0, 0.0, 2.0, 4.5]),
         "tail_s": chance.choice([0.0, 1.0, 2.5, 4.0]),
         "dwell_ticks": chance.choice([1, 2, 3]),
+        "calm_s": chance.choice([0.0, 7.0]),
         "peer_wait_s": 10.0,
     }
     said = {}
@@ -116,7 +117,7 @@ def expected(shift: Shift, unheard: dict[str, range] | None = None) -> Expected:
     z = raw if config.common_mode is Method.SOURCE else (raw + 0.2) / 0.1
     rule = CommonModeRule(config.common_mode, config.common_mode_factor, config.exclude_gated_peers)
     adjusted, common = adjust_frames(rule, z, gated)
-    alarm = is_alarm(AlarmRule(0.1, config.dwell_ticks, config.clear_fraction), adjusted, gated)
+    alarm = is_alarm(AlarmRule(0.1, config.dwell_ticks, config.clear_fraction, round(config.calm_s / config.tick_s)), adjusted, gated)
     return Expected(raw, adjusted, common, gated, alarm)
 
 

@@ -31,6 +31,7 @@ def calibration(**other: Any) -> Calibration:
         "tick_s": 1.0,
         "dwell_ticks": 3,
         "clear_fraction": 0.8,
+        "calm_s": 600.0,
         "common_mode": Method.SOURCE,
         "common_mode_factor": 0.5,
         "exclude_gated_peers": False,

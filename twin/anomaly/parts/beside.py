@@ -2,8 +2,8 @@
 
     left = sign(s) · max(0, |s| − 2 · c)     c: the ⌈n/5⌉-th largest of the peers' s in the direction of s, or 0
 
-as `twin/anomaly/common_features.py` does it. Peers mill other parts: their signals are not comparable, their
-residuals are. A peer whose spindle stands still feels the floor shake.
+as `twin/anomaly/common_features.py` does it. Peers mill other parts: their signals are not comparable, their residuals are. What
+shakes the floor is taken out of each tick instead, and so is what makes cuts harder out of an operation's (`shared.py`).
 """
 
 import math
@@ -20,14 +20,7 @@ if TYPE_CHECKING:
 def left_over(own: "Own", peers: Sequence["Own"], index: int, memory_ticks: int) -> float:
     """Return the part of a residual that the peers do not explain; index: signal by signal, each on all scales."""
     value, signal, oldest = own.smooth[index], index // COUNT, own.tick - memory_ticks
-    theirs = []
-    for peer in peers:
-        shakes = peer.shake[index] if peer.shake_at >= oldest else 0.0
-        if peer.told_at[signal] >= oldest:
-            residual = peer.smooth[index]
-            theirs.append(shakes if shakes > 0.0 and shakes > residual else residual)
-        elif shakes > 0.0:
-            theirs.append(shakes)
+    theirs = [peer.smooth[index] for peer in peers if peer.told_at[signal] >= oldest]
     if not theirs:
         return value
     if value < 0.0:

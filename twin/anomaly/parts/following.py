@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 from twin.anomaly.parts import heat, scales
 from twin.anomaly.parts.alignment import CELL_S, put_right
-from twin.anomaly.parts.levels import another_material
+from twin.anomaly.parts.levels import NOISE, another_material
 from twin.anomaly.parts.model import LEVELLED, PartsModel, Plan
 from twin.anomaly.parts.moment import (
     NO_LINE,
@@ -24,9 +24,10 @@ from twin.anomaly.parts.moment import (
     operation_begun,
     section_at,
 )
+from twin.anomaly.parts.operation import TICKS_MIN, TOGETHER, Gathered, begun_operation, both, clipped, gathered, tested, together
 from twin.anomaly.parts.own import NEVER, Ended, Own, tool_of, usual_of
 from twin.anomaly.parts.quantity import TURNS_RPM_MIN
-from twin.anomaly.parts.residuals import idle_of, residuals, shaken
+from twin.anomaly.parts.residuals import felt_still, idle_of, residuals
 from twin.anomaly.parts.told import Told
 from twin.anomaly.parts.usual import Usual, with_rows
 
@@ -38,6 +39,8 @@ FEED_MIN = 1.0
 SETTLED = 0.006
 SETTLED_RPM = 5.0
 EXPECTED_PCT_MIN = 0.5
+YOUNG_VAR = 0.05**2
+"""Variance of a centre that one part has taught."""
 ROWS_MAX = 30
 REST = Own._fields.index("held") + 1
 """Fields from here on do not change at every tick."""
@@ -71,9 +74,9 @@ def told_after(model: PartsModel, own: Own, told: Told) -> Own:
     if told.is_gated or not turns or override < OVERRIDE_MIN or (feed is not None and feed < FEED_MIN):
         moved = place.moved_mm + step if line < 0 and turns and feed is not None and feed >= FEED_MIN else place.moved_mm
         if not turns and not told.is_gated and model.still:
-            own = own._replace(shake=shaken(model, own.shake, values), shake_at=tick)
+            own = own._replace(felt=felt_still(model, own, values), felt_at=tick)
         place = place._replace(line=line, stood_ticks=0 if turns else place.stood_ticks + 1, moved_mm=moved)
-        return own._replace(tick=tick, place=place, rpm=rpm or 0.0, is_idle=True, heat=warm)
+        return own._replace(tick=tick, place=place, rpm=rpm or 0.0, is_idle=True, heat=warm, shared=plan.flat)
     if place.stood_ticks * model.tick_s >= BATCH_S:
         own = with_levels(model, own._replace(material=another_material(own.material)))
     moved = (place.moved_mm if line == place.line else 0.0) + step
@@ -95,7 +98,8 @@ def _cut(model: PartsModel, own: Own, told: Told, place: Place, here: Mark, over
         sections, rows = with_rows(sections, before, rows), ()
     rpm = told.values[plan.speed_at] if plan.speed_at >= 0 else None
     settled = rpm is None or -SETTLED * rpm - SETTLED_RPM <= rpm - own.rpm <= SETTLED * rpm + SETTLED_RPM
-    z, tells, d = residuals(model, own, told, override, settled, None if is_new else usual, place.section)
+    now = residuals(model, own, told, override, settled, None if is_new else usual, place.section)
+    tells, d = now.tells, now.d
     if here[0] < 0 and usual is not None and not is_new and told.tick % max(1, round(CELL_S / model.tick_s)) == 0:
         place = _put_right(usual, place, d)
     expected = own.expected if told.expected is None else _expected_after(plan, own.expected, told, override, model)
@@ -103,10 +107,25 @@ def _cut(model: PartsModel, own: Own, told: Told, place: Place, here: Mark, over
         told_at = tuple([told.tick if t else last for t, last in zip(tells, own.told_at, strict=True)])
     else:
         told_at = (told.tick,) * len(tells)
-    smooth = scales.smoothed(own.smooth, z, tells, plan.shares)
-    return Own._make(
-        (told.tick, place, rpm or 0.0, smooth, told_at, not any(tells), is_new, (*rows, d), sections, expected, None, *own[REST:])
-    )
+    sums = gathered(own.gathered, now.cut_z, now.cut_tells, now.late, now.off)
+    smooth = scales.smoothed(own.smooth, now.z, tells, plan.shares, _of_cuts(model, own, sums))
+    is_idle, rows, felt = not any(tells), (*rows, d), tuple(now.felt)
+    moving = (told.tick, place, rpm or 0.0, smooth, told_at, is_idle, is_new, rows, sections, expected, sums, felt, own.felt_at)
+    return Own._make((*moving, None, *own[REST:]))
+
+
+def _of_cuts(model: PartsModel, own: Own, sums: Gathered) -> list[tuple[float, ...]]:
+    """Return the figures of the operation that runs, of the last four, and of the tool, by signal; () of other signals."""
+    plan, found = model.plan, list[tuple[float, ...]]()
+    last = tool_of(model, own, own.place.tool).last
+    variance = own.unsure + sums.off / sums.ticks
+    for at, (is_levelled, over, alike) in enumerate(zip(plan.cuts, plan.over_spread, plan.alike, strict=True)):
+        if not is_levelled:
+            found.append(())
+            continue
+        t = tested(sums.total[at], sums.weight[at], variance * over * over, alike)
+        found.append((t, together(t, own.past, at), both(t, last[at])))
+    return found
 
 
 def _put_right(usual: Usual, place: Place, d: Sequence[float | None]) -> Place:
@@ -131,7 +150,7 @@ def _expected_after(
 
 def _turned(model: PartsModel, own: Own, told: Told, line: int) -> Own:
     """Return the state where program, tool or part may have changed; the operation before has ended then."""
-    before = own.place
+    before, plan = own.place, model.plan
     is_part = is_part_begun(before, told.program, told.tool, line, round(STOOD_S / model.tick_s))
     if not is_part and told.program == before.program and told.tool == before.tool:
         return own
@@ -149,15 +168,17 @@ def _turned(model: PartsModel, own: Own, told: Told, line: int) -> Own:
             own.held_ticks,
             own.alarm_ticks,
             is_part,
+            _noise(model, own.gathered),
         )
     is_seen = own.tick != NEVER and told.tick - own.tick <= GAP_TICKS
     place = operation_begun(before, told.program, told.tool, line, is_part, is_seen)
-    tools = {**own.tools, _name(before.tool): tool_of(model, own, before.tool)._replace(slow=scales.of_tool(own.smooth))}
-    tool = tools.get(_name(told.tool)) or tool_of(model, own, told.tool)
+    if own.gathered.ticks >= TICKS_MIN:
+        figures = tuple([one[0] if one else 0.0 for one in _of_cuts(model, own, own.gathered)])
+        tools = {**own.tools, _name(before.tool): tool_of(model, own, before.tool)._replace(last=figures)}
+        own = own._replace(tools=tools, past=(*own.past[2 - TOGETHER :], clipped(figures)))
     own = own._replace(
         place=place,
-        smooth=scales.with_tool(own.smooth, tool.slow),
-        tools=tools,
+        gathered=begun_operation(len(plan.kinds)),
         rows=(),
         sections=(),
         expected=(0.0, 0.0, 0),
@@ -170,6 +191,13 @@ def _turned(model: PartsModel, own: Own, told: Told, line: int) -> Own:
     return with_levels(model, own)
 
 
+def _noise(model: PartsModel, sums: Gathered) -> float:
+    """Return the variance of the change that an operation shows, ln²: of its override, and of its ticks."""
+    plan, at = model.plan, max(model.plan.load_at, 0)
+    ticks = sums.weight[at] * plan.over_spread[at] ** 2 / plan.alike[at] if sums.weight[at] else 0.0
+    return (sums.off / sums.ticks if sums.ticks else 0.0) + (1.0 / ticks if ticks else 0.0)
+
+
 def _name(tool: int | None) -> str:
     return "?" if tool is None else str(tool)
 
@@ -177,8 +205,10 @@ def _name(tool: int | None) -> str:
 def with_levels(model: PartsModel, own: Own) -> Own:
     """Return the state with the levels of the tool in the spindle, and what their uncertainty leaves of a residual."""
     tool = tool_of(model, own, own.place.tool).level
-    variance = own.material.variance + tool.variance
+    usual = usual_of(model, own, own.place.key)
+    young = 0.0 if usual is None or not usual.parts else YOUNG_VAR / usual.parts
+    variance = own.material.variance + tool.variance + young
     kinds = model.plan.kinds
-    rows = zip(kinds, own.material.values, tool.values, model.plan.prior, strict=True)
-    both = [(m + t, (1.0 + variance / v) ** -0.5) if k in LEVELLED else (0.0, 1.0) for k, m, t, v in rows]
-    return own._replace(level=tuple([one[0] for one in both]), calm=tuple([one[1] for one in both]))
+    each = zip(kinds, own.material.values, tool.values, model.plan.prior, strict=True)
+    rows = [(m + t, 1.0 / (1.0 + variance / v)) if k in LEVELLED else (0.0, 1.0) for k, m, t, v in each]
+    return own._replace(level=tuple([one[0] for one in rows]), calm=tuple([one[1] for one in rows]), unsure=variance + NOISE)

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from twin.anomaly.parts.why import Why
+from twin.anomaly.parts.alarms.why import Why
 
 
 class Judged(NamedTuple):
@@ -10,6 +10,7 @@ class Judged(NamedTuple):
     is_idle: nothing new was told at this tick (a gate, a spindle that stands), so it counts neither for nor against an alarm
     why: what the score rests on most; None where the score is next to nothing
     knows: what is known of the operation that runs, as "12 parts", "the twin only", "nothing: program O12 is new"
+    shared: what the peers feel, by signal, for the next tick (`shared.py`); () = as it was
     signature: what is left beside the peers, in tails, signed: signal by signal, each on all scales
     """
 
@@ -20,3 +21,4 @@ class Judged(NamedTuple):
     why: Why | None = None
     knows: str = ""
     signature: tuple[float, ...] = ()
+    shared: tuple[float, ...] = ()

@@ -1,27 +1,31 @@
 """The score of a machine beside its peers, in tails of healthy parts, and the reason of it.
 
     u = left / tail(signal, scale, side)           left: what the peers do not share (`beside.py`)
-    score = largest over the scales of  (Σ over signals of u⁴)^(1/4)
+    score = largest over the scales of  √(Σ over signals of u²)
 
-The fourth power lets one signal speak for itself, and several that rise together a little earlier. The score is held while
-nothing is told: in a gate, and while the spindle stands.
+One signal speaks for itself, and several that rise together speak earlier. The score is held while nothing is told: in a gate,
+and while the spindle stands.
 """
 
 import math
 from collections.abc import Sequence
 
 from twin.anomaly.parts import scales
+from twin.anomaly.parts.alarms.limits import limits_of
+from twin.anomaly.parts.alarms.reason import why_of
 from twin.anomaly.parts.beside import left_over
 from twin.anomaly.parts.judgement import Judged
-from twin.anomaly.parts.limits import limits_of
-from twin.anomaly.parts.model import PartsModel
+from twin.anomaly.parts.model import PartsModel, Plan
 from twin.anomaly.parts.own import NEVER, Own, usual_of
-from twin.anomaly.parts.reason import why_of
+from twin.anomaly.parts.quantity import Kind
+from twin.anomaly.parts.shared import harder, shaken
 
 __all__ = ["Judged", "judged"]
 SMALL = 0.5
 """A residual below this share of its tail is taken as it is, without the peers; where none is larger, it is the score."""
 WHY_FROM = 1.0
+FEELS, FEELS_ENERGY = 0.3, 0.2
+"""A machine asks what its peers feel where its load is so many spreads away, its vibration's energy so much above the usual."""
 NOTHING_TOLD = "nothing was told yet of a cut that is known"
 
 
@@ -35,13 +39,14 @@ def judged(model: PartsModel, own: Own, peers: Sequence[Own]) -> Judged:
     if max(own.told_at) == NEVER:
         return Judged(None, None, NOTHING_TOLD, True, None, knows)
     u = [s * up if s > 0.0 else s * down for s, up, down in zip(own.smooth, plan.over_up, plan.over_down, strict=True)]
+    shared = _shared(plan, own, peers)
     most, least = max(u), min(u)
     if most < SMALL and least > -SMALL:
         most = max(most, -least)
-        return Judged(most, most, None, own.is_idle, None, knows, tuple(u))
+        return Judged(most, most, None, own.is_idle, None, knows, tuple(u), shared)
     own_score = _length(u)
     if peers:
-        for index in [at for at, value in enumerate(u) if value > SMALL or value < -SMALL]:
+        for index in [at for at in plan.by_peers if u[at] > SMALL or u[at] < -SMALL]:
             left = left_over(own, peers, index, plan.memory_ticks)
             u[index] = left * (plan.over_up[index] if left > 0.0 else plan.over_down[index])
     left_in_tails = tuple(u)
@@ -49,13 +54,30 @@ def judged(model: PartsModel, own: Own, peers: Sequence[Own]) -> Judged:
         u = _tolerated(model, own, u)
     score = _length(u)
     why = why_of(model, own, peers, u, knows) if score >= WHY_FROM else None
-    return Judged(score, own_score, None, own.is_idle, why, knows, left_in_tails)
+    return Judged(score, own_score, None, own.is_idle, why, knows, left_in_tails, shared)
+
+
+def _shared(plan: Plan, own: Own, peers: Sequence[Own]) -> tuple[float, ...]:
+    """Return what the peers feel of the signals that the machine itself feels something of."""
+    found = plan.flat
+    for at in plan.levelled if peers else ():
+        kind, first = plan.kinds[at], at * scales.COUNT
+        energy, quiet = own.felt[at]
+        if kind == Kind.VIBRATION and energy > FEELS_ENERGY * quiet:
+            value = shaken(peers, at, own.tick - plan.fresh_ticks[0])
+        elif kind == Kind.LOAD and not -FEELS < own.smooth[first + scales.CUT] < FEELS:
+            value = harder(peers, at, own.tick - plan.fresh_ticks[1])
+        else:
+            continue
+        if value:
+            found = (*found[:at], value, *found[at + 1 :])
+    return found
 
 
 def _length(u: list[float]) -> float:
     """Return the score of what is left, in tails: signal by signal, each on all scales."""
-    fourth = [value * value * value * value for value in u]
-    return math.sqrt(math.sqrt(max([sum(fourth[scale :: scales.COUNT]) for scale in range(scales.COUNT)])))
+    squares = [value * value for value in u]
+    return math.sqrt(max([sum(squares[scale :: scales.COUNT]) for scale in range(scales.COUNT)]))
 
 
 def _tolerated(model: PartsModel, own: Own, u: list[float]) -> list[float]:

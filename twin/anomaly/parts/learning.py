@@ -9,7 +9,7 @@ from twin.anomaly.parts.judging import Judged
 from twin.anomaly.parts.levels import followed
 from twin.anomaly.parts.model import LEVELLED, OPERATIONS_MAX, PartsModel, Plan
 from twin.anomaly.parts.moment import SECTIONS_MAX, is_beyond
-from twin.anomaly.parts.own import NEVER, Ended, Own, Tool, tool_of, usual_of
+from twin.anomaly.parts.own import NEVER, Ended, Own, tool_of, usual_of
 from twin.anomaly.parts.record import CutRecord, recorded
 from twin.anomaly.parts.residuals import cut_share
 from twin.anomaly.parts.sectioning import starts_of
@@ -19,7 +19,8 @@ SUSPICIOUS = 1.0
 HELD_SHARE_MAX = 0.3
 SKIPPED_MAX = 5
 YOUNG_PARTS = 3
-"""An operation that so few parts know is learned also where it is suspicious: only an alarm keeps it from being."""
+"""An operation that so few parts know is learned also where it is suspicious. A part that alarms in it is the odd one, or the
+parts before are: the next one is learned, whatever alarms."""
 OPERATIONS_OF_PART_MAX = 40
 TICKS_MIN = 3
 CUT_SHARE_MIN = 0.3
@@ -32,14 +33,18 @@ def learned(model: PartsModel, own: Own, judged: Judged, is_alarm: bool) -> tupl
         own = own._replace(held=judged)
     is_high = judged.score is not None and judged.score >= SUSPICIOUS
     if ended is None and not is_high and not is_alarm and not own.is_held:
-        return own, None
+        return own if judged.shared in ((), own.shared) else own._replace(shared=judged.shared), None
     cut = None
     if ended is not None:
         own, cut = _operation_ended(model, own, ended)
-    if is_alarm and not own.is_part_bad:
-        own = _taken_back(model, own)
+    if is_alarm:
+        usual = usual_of(model, own, own.place.key)
+        if not own.is_odd and (usual is None or usual.parts < YOUNG_PARTS):
+            own = own._replace(is_odd=True)
+        own = own if own.is_part_bad else _taken_back(model, own)
     since = own.high_since
     return own._replace(
+        shared=judged.shared or own.shared,
         is_held=is_high or is_alarm,
         high_since=NEVER if not is_high and not is_alarm else own.tick if since == NEVER else since,
         held_ticks=own.held_ticks + (is_high and not own.is_idle),
@@ -63,10 +68,11 @@ def _taken_back(model: PartsModel, own: Own) -> Own:
 def _operation_ended(model: PartsModel, own: Own, ended: Ended) -> tuple[Own, CutRecord | None]:
     place = ended.place
     usual = usual_of(model, own, place.key)
-    is_alarmed = bool(ended.alarm_ticks) or own.is_part_bad
-    cut = recorded(model, ended, usual, is_alarmed) if place.is_whole else None
-    is_calm = not is_alarmed and ended.held_ticks <= HELD_SHARE_MAX * place.ticks
     is_young = usual is None or usual.parts < YOUNG_PARTS
+    is_bad = bool(ended.alarm_ticks) or own.is_part_bad
+    cut = recorded(model, ended, usual, is_bad) if place.is_whole else None
+    is_alarmed = is_bad and not (is_young and own.odd_parts)
+    is_calm = not is_alarmed and ended.held_ticks <= HELD_SHARE_MAX * place.ticks
     if is_calm or (not is_alarmed and (is_young or own.skipped >= SKIPPED_MAX)):
         own = _levels_followed(model, own, ended, usual)
         if len(own.waiting) < OPERATIONS_OF_PART_MAX:
@@ -74,10 +80,12 @@ def _operation_ended(model: PartsModel, own: Own, ended: Ended) -> tuple[Own, Cu
     if not ended.is_part_over:
         return own, cut
     skipped = 0 if is_calm or is_alarmed else own.skipped + 1
-    if not own.is_part_bad:
-        for one in own.waiting:
-            own = _sections_learned(model, own, one)
-    return own._replace(waiting=(), is_part_bad=False, skipped=min(skipped, SKIPPED_MAX), kept=(own.material, own.tools)), cut
+    for one in own.waiting:
+        own = _sections_learned(model, own, one)
+    odd_parts = min(own.odd_parts + 1, YOUNG_PARTS) if own.is_odd else 0
+    kept = (own.material, own.tools)
+    own = own._replace(is_part_bad=False, is_odd=False, odd_parts=odd_parts, skipped=min(skipped, SKIPPED_MAX), kept=kept)
+    return own._replace(waiting=()), cut
 
 
 def _levels_followed(model: PartsModel, own: Own, ended: Ended, usual: Usual | None) -> Own:
@@ -88,11 +96,11 @@ def _levels_followed(model: PartsModel, own: Own, ended: Ended, usual: Usual | N
     if all(value is None for value in residual):
         return own
     tool = tool_of(model, own, ended.place.tool)
-    material, level = followed(own.material, tool.level, residual)
+    material, level = followed(own.material, tool.level, residual, ended.noise, model.plan.load_at)
     name = "?" if ended.place.tool is None else str(ended.place.tool)
     if name not in own.tools and len(own.tools) >= OPERATIONS_MAX:
         return own
-    return with_levels(model, own._replace(material=material, tools={**own.tools, name: Tool(level, tool.slow)}))
+    return with_levels(model, own._replace(material=material, tools={**own.tools, name: tool._replace(level=level)}))
 
 
 def _mean(plan: Plan, ended: Ended, usual: Usual, at: int) -> float | None:

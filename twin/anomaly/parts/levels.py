@@ -4,8 +4,9 @@
     K_m = P_m / (P_m + P_l + R),  K_l = P_l / (P_m + P_l + R)            m ← m + K_m r,  l ← l + K_l r,  P ← (1 − K) P + q
 
 A Kalman filter with two levels. After a standstill or a change of program the material may be another one, so P_m grows to the
-variance between batches. What lies beyond three standard deviations is cut off there; nothing is followed while a score is
-suspicious.
+variance between batches; where a cut takes far less than before, the tool is a new one, so P_l grows to that of tools. What lies
+beyond three standard deviations is cut off there; nothing is followed while a score is suspicious. A level that lasts becomes the
+centre of the sections: it is forgotten by a hundredth at each operation.
 """
 
 from collections.abc import Sequence
@@ -17,6 +18,7 @@ TOOL_DRIFT = 0.005**2
 TOOL_VAR = 0.05**2
 """Variance of the level of a tool that has not been followed yet."""
 NOISE = 0.02**2
+FORGETS = 0.01
 LEVEL_MAX = 0.35
 CUT_OFF = 3.0
 
@@ -28,14 +30,21 @@ class Level(NamedTuple):
     variance: float
 
 
-def followed(material: Level, tool: Level, residual: Sequence[float | None]) -> tuple[Level, Level]:
+def followed(
+    material: Level, tool: Level, residual: Sequence[float | None], noise: float = 0.0, load_at: int = 0
+) -> tuple[Level, Level]:
     """Return both levels after an operation whose mean residual is known for some signals.
+
+    noise: variance of that residual beyond `NOISE`, as its override and its few ticks bring it
 
     >>> material, tool = followed(Level((0.0,), 0.0036), Level((0.0,), 0.0001), (0.05,))
     >>> round(material.values[0], 3), round(tool.values[0], 4), material.variance < 0.001
     (0.044, 0.0012, True)
     """
-    total = material.variance + tool.variance + NOISE
+    load = residual[load_at] if load_at >= 0 else None
+    if load is not None and load < -CUT_OFF * (material.variance + tool.variance + NOISE + noise) ** 0.5:
+        tool = Level(tool.values, TOOL_VAR)
+    total = material.variance + tool.variance + NOISE + noise
     limit = CUT_OFF * total**0.5
     k_m, k_l = material.variance / total, tool.variance / total
     steps = [0.0 if r is None else -limit if r < -limit else min(r, limit) for r in residual]
@@ -46,7 +55,8 @@ def followed(material: Level, tool: Level, residual: Sequence[float | None]) -> 
 
 
 def _moved(values: Sequence[float], gain: float, steps: Sequence[float]) -> tuple[float, ...]:
-    return tuple([max(-LEVEL_MAX, min(LEVEL_MAX, v + gain * step)) for v, step in zip(values, steps, strict=True)])
+    keeps = 1.0 - FORGETS
+    return tuple([max(-LEVEL_MAX, min(LEVEL_MAX, keeps * v + gain * step)) for v, step in zip(values, steps, strict=True)])
 
 
 def another_material(material: Level) -> Level:

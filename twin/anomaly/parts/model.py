@@ -14,6 +14,7 @@ from twin.anomaly.parts import quantity, scales
 from twin.anomaly.parts.heat import EVERY_S, TAUS_S, base_s
 from twin.anomaly.parts.levels import BATCH_VAR, TOOL_VAR, Level
 from twin.anomaly.parts.quantity import Kind
+from twin.anomaly.parts.shared import HARDER_FRESH_S, HARDER_GAIN, SHAKEN_FRESH_S, SHAKEN_GAIN, felt_shares
 from twin.anomaly.parts.usual import FIRST_PRIORS, Usual
 
 OPERATIONS_MAX = 500
@@ -21,8 +22,11 @@ SIGNALS_MAX = 16
 RPM_STEP = 500.0
 LEAST_SHARE = 0.5
 """A section has at least this share of the usual spread: what repeats too well in a few parts is luck, or rounding."""
-SILENT = {Kind.TEMPERATURE: ("seconds", "tool"), Kind.FEED: ("tool",), Kind.SPEED: ("tool",)}
-"""The scales that say nothing of a kind: a temperature is slow, and neither feed nor speed belongs to a tool."""
+SILENT = {Kind.TEMPERATURE: ("seconds",)}
+"""The scales that say nothing of a kind: a temperature is slow."""
+EASIER = {Kind.LOAD: ("operation", "part", "tool"), Kind.VIBRATION: ("cut", "operation", "part", "tool")}
+"""The scales on which a cut that takes less than before is no fault: its tool is a new one, its material a softer one."""
+ALIKE_MAX = 15.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +54,13 @@ class Plan:
     over_down: tuple[float, ...]
     blank: tuple[float, ...]
     flat: tuple[float, ...]
+    levelled: tuple[int, ...]
+    cuts: tuple[bool, ...]
+    alike: tuple[float, ...]
+    by_peers: tuple[int, ...]
+    gain: tuple[float, ...]
+    felt_shares: tuple[float, float]
+    fresh_ticks: tuple[int, int]
 
 
 class PartsModel(Record):
@@ -60,6 +71,8 @@ class PartsModel(Record):
     twin_offset, twin_spread: of a section's quantity beside the twin's expectation, by signal; spread 0 = it has none
     up, down: tails by signal, each on all scales; usual: by operation; material, tools: levels when training ended
     still: quantity of a vibration while the spindle stands, by signal; follows_parts: False = beside the twin only
+    gain: how many times as much as its peers the machine feels of a shared vibration or load, by signal, () = not known
+    step: deviation of the change from tick to tick, by signal, 0 = not known
     """
 
     signals: Annotated[tuple[str, ...], Field(min_length=1, max_length=SIGNALS_MAX)]
@@ -77,6 +90,8 @@ class PartsModel(Record):
     tools: Annotated[dict[str, Level], Field(max_length=OPERATIONS_MAX)] = Field(default={})
     still: tuple[Finite, ...] = ()
     follows_parts: bool = True
+    step: tuple[NotNegative, ...] = ()
+    gain: tuple[Positive, ...] = ()
 
     def idle_at(self, rpm: float) -> float:
         """Return what the spindle takes idle, %.
@@ -107,6 +122,9 @@ class PartsModel(Record):
             return self.signals.index(name) if name in self.signals else -1
 
         counts = [0.0 if scale in SILENT.get(kind, ()) else 1.0 for kind in kinds for scale in scales.SCALES]
+        cuts = [kind in LEVELLED for kind in kinds]
+        falls = [scale not in EASIER.get(kind, ()) for kind in kinds for scale in scales.SCALES]
+        less = [count if falling else 0.0 for count, falling in zip(counts, falls, strict=True)]
         every = max(1, round(EVERY_S / self.tick_s))
         steps = range(int(quantity.RPM_MAX / RPM_STEP) + 1)
         return Plan(
@@ -133,9 +151,21 @@ class PartsModel(Record):
             over_spread=tuple(1.0 / value for value in spread),
             over_twin=tuple(1.0 / value if value else 0.0 for value in self.twin_spread or (0.0,) * count),
             over_up=tuple(share / value for share, value in zip(counts, up, strict=True)),
-            over_down=tuple(share / value for share, value in zip(counts, down, strict=True)),
+            over_down=tuple(share / value for share, value in zip(less, down, strict=True)),
             blank=(0.0,) * (count * scales.COUNT),
             flat=(0.0,) * count,
+            levelled=tuple(at for at, kind in enumerate(kinds) if kind in LEVELLED),
+            cuts=tuple(cuts),
+            alike=tuple(_alike(step, own) for step, own in zip(self.step or (0.0,) * count, spread, strict=True)),
+            by_peers=tuple(
+                at * scales.COUNT + scale
+                for at, kind in enumerate(kinds)
+                for scale in range(scales.COUNT)
+                if kind not in LEVELLED or (kind is Kind.LOAD and scale < scales.OPERATION)
+            ),
+            gain=self.gain or tuple(SHAKEN_GAIN if kind is Kind.VIBRATION else HARDER_GAIN for kind in kinds),
+            felt_shares=felt_shares(self.tick_s),
+            fresh_ticks=(round(SHAKEN_FRESH_S / self.tick_s), round(HARDER_FRESH_S / self.tick_s)),
         )
 
     @property
@@ -147,6 +177,12 @@ class PartsModel(Record):
         """Return the level of a tool when training ended, which may have been long ago; of one that was not seen, none."""
         known = self.tools.get(tool)
         return Level((0.0,) * len(self.signals) if known is None else known.values, TOOL_VAR)
+
+
+def _alike(step: float, spread: float) -> float:
+    """Return how many ticks say as much as one that has no neighbours, from how far one is from the next."""
+    correlation = max(0.0, 1.0 - 0.5 * (step / spread) ** 2)
+    return min(ALIKE_MAX, (1.0 + correlation) / max(1e-3, 1.0 - correlation))
 
 
 LEVELLED = frozenset({Kind.LOAD, Kind.VIBRATION})

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from twin.anomaly.alarm import AlarmState, after_tick
 from twin.anomaly.parts import scales
+from twin.anomaly.parts.alarms.why import Why
 from twin.anomaly.parts.following import told_after
 from twin.anomaly.parts.judging import judged
 from twin.anomaly.parts.learning import learned
@@ -17,8 +18,8 @@ from twin.anomaly.parts.own import Own, begun, usual_of
 from twin.anomaly.parts.quantity import SPREAD_LEAST, Kind
 from twin.anomaly.parts.record import CutRecord
 from twin.anomaly.parts.recorded import EXPECTED, Line, Recorded
+from twin.anomaly.parts.shared import HARDER_GAIN, gain_of
 from twin.anomaly.parts.told import Told
-from twin.anomaly.parts.why import Why
 
 if TYPE_CHECKING:
     import numpy as np
@@ -33,7 +34,7 @@ SEEN_S = 5.0
 MATURE_PARTS, MATURE_SHARE = 8, 0.3
 """Tails come from operations that so many parts have taught, where they are so much of what was seen."""
 SPREAD_PARTS_MIN = 2
-LOOSE_TAILS = (6.0, 3.0, 1.5, 2.5)
+LOOSE_TAILS = (6.0, 3.0, 8.0, 6.0, 5.0)
 """Tails so wide that only what stands out is kept from being learned, before the real ones are known."""
 CUT = 1
 STEADY_QUANTILE = 0.35
@@ -53,11 +54,16 @@ ALL = Ablation()
 
 
 class Seen(NamedTuple):
-    """The remainder beside the peers at a tick, in tails. parts: that had taught the operation by then."""
+    """The remainder beside the peers at a tick, in tails. parts: that had taught the operation by then.
+
+    felt, shared: by the machine, and by its peers (`shared.py`)
+    """
 
     tick: int
     left: tuple[float, ...]
     parts: int
+    felt: tuple[tuple[float, float], ...]
+    shared: tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,7 +162,8 @@ def _run(
                 whys.append((tick, place, judgement.why))
             if every and tick % every == 0 and not judgement.is_idle and judgement.signature:
                 usual = usual_of(model, own, own.place.key)
-                seen[place].append(Seen(tick, judgement.signature, 0 if usual is None else usual.parts))
+                parts = 0 if usual is None else usual.parts
+                seen[place].append(Seen(tick, judgement.signature, parts, own.felt, judgement.shared))
     return Replayed(scores, own_scores, is_idle, is_alarm, tuple(whys), tuple(records), tuple(states)), states, seen
 
 
@@ -184,7 +191,16 @@ def _with_spreads(model: PartsModel, own: Own, seen: "list[Seen]") -> PartsModel
         elif kind == Kind.TEMPERATURE and len(rows):
             away = rows[:, at * scales.COUNT + CUT] * LOOSE_TAILS[CUT]
             spread[at] = max(float(np.sqrt(np.mean(away**2))) * spread[at], SPREAD_LEAST[Kind(kind)])
-    return model.changed(spread=tuple(spread))
+    return model.changed(spread=tuple(spread), gain=_gains(model, seen))
+
+
+def _gains(model: PartsModel, seen: "list[Seen]") -> tuple[float, ...]:
+    """Return how many times as much as its peers the machine feels, by signal."""
+    found = []
+    for at, kind in enumerate(model.plan.kinds):
+        pairs = [(one.felt[at][0], one.shared[at]) for one in seen if one.shared]
+        found.append(gain_of(pairs) if kind == Kind.VIBRATION else HARDER_GAIN)
+    return tuple(found)
 
 
 def _taught(model: PartsModel, own: Own, seen: "list[Seen]") -> PartsModel:

@@ -1,13 +1,13 @@
 """Residuals on several time scales, and the tails of healthy parts that make them comparable.
 
-    s ← s + (1 − exp(−tick / τ)) · r² · (z / r − s)          τ: 3 s, 30 s, 5 min, 2 min of one tool
+    seconds, cut:    s ← s + (1 − exp(−tick / τ)) · r² · (z / r − s)          τ: 3 s, 30 s
+    operation:       the change of the cut since the operation began (`operation.py`), in standard deviations
+    part:            that of the last four operations together; of a signal that knows no levels, s with τ = 5 min
+    tool:            the lesser of that of this operation and of the last one with the same tool
 
 r tells how much a tick says: 1 where the section repeats as well as sections usually do, less at an edge, 0 where nothing is
-told. So s is a mean in which each tick counts by its precision, in usual spreads of the signal.
-
-The last scale is kept for each tool while others cut, so a tool that is dull or mounted too long is compared with its own last
-parts. A tail is the size that healthy parts exceed about once in two weeks on that scale and side, so that all of them alarm
-equally often.
+told. So s is a mean in which each tick counts by its precision, in usual spreads of the signal. A tail is the size that healthy
+parts exceed about once in two weeks on that scale and side, so that all of them alarm equally often.
 """
 
 import math
@@ -18,61 +18,49 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-SCALES = ("seconds", "cut", "part", "tool")
-TAUS_S = (3.0, 30.0, 300.0, 120.0)
-TOOL = 3
+SCALES = ("seconds", "cut", "operation", "part", "tool")
+SECONDS, CUT, OPERATION, PART, TOOL = range(5)
+TAUS_S = (3.0, 30.0, 300.0)
 COUNT = len(SCALES)
 CLIP = 12.0
-FORGETS = 0.5
-"""A tool comes back with half of its residual: a fault that all tools had is forgotten soon after it is gone."""
 BLOCK_S = 900.0
 DAY_S, RETURN_S = 86_400.0, 14 * 86_400.0
-TAIL_LEAST = (2.0, 1.5, 1.5, 1.5)
-"""Least tails on each scale, in spreads of a tick: what healthy parts never did in training may still be no fault."""
+TAIL_LEAST = (2.0, 1.5, 4.0, 3.0, 2.5)
+"""Least tails on each scale, in spreads: what healthy parts never did in training may still be no fault."""
 
 
 def shares(tick_s: float) -> tuple[float, ...]:
-    """Return the share of a new tick on each scale.
+    """Return the share of a new tick in the means of 3 s, 30 s and 5 min.
 
     >>> [round(share, 3) for share in shares(1.0)]
-    [0.283, 0.033, 0.003, 0.008]
+    [0.283, 0.033, 0.003]
     """
     return tuple(1.0 - math.exp(-tick_s / tau_s) for tau_s in TAUS_S)
 
 
-def smoothed(before: Sequence[float], z: Sequence[float], tells: Sequence[float], each: Sequence[float]) -> tuple[float, ...]:
+def smoothed(
+    before: Sequence[float], z: Sequence[float], tells: Sequence[float], each: Sequence[float], cuts: Sequence[Sequence[float]]
+) -> tuple[float, ...]:
     """Return the residuals by signal, each on all scales, after one more tick; z: r · z, tells: r², 0 = nothing.
 
-    >>> smoothed((0.0,) * 4, (4.0,), (1.0,), (0.5, 0.25, 0.125, 0.25))
-    (2.0, 1.0, 0.5, 1.0)
+    cuts: of each signal its figures on the last three scales, () where it follows no levels
+
+    >>> smoothed((0.0,) * 5, (4.0,), (1.0,), (0.5, 0.25, 0.125), ((),))
+    (2.0, 1.0, 0.0, 0.5, 0.0)
     """
-    a, b, c, d = each
+    a, b, c = each
     found: list[float] = []
     at = 0
-    for value, told in zip(z, tells, strict=True):
-        s, t, u, v = before[at : at + 4]
-        at += 4
+    for value, told, cut in zip(z, tells, cuts, strict=True):
+        s, t, _, u, _ = before[at : at + 5]
+        at += 5
         if told:
-            found += (
-                s + a * (value - told * s),
-                t + b * (value - told * t),
-                u + c * (value - told * u),
-                v + d * (value - told * v),
-            )
+            s += a * (value - told * s)
+            t += b * (value - told * t)
+        if cut:
+            found += (s, t, *cut)
         else:
-            found += (s, t, u, v)
-    return tuple(found)
-
-
-def of_tool(smooth: Sequence[float]) -> tuple[float, ...]:
-    """Return the residuals of the tool in the spindle, by signal."""
-    return tuple(smooth[TOOL::COUNT])
-
-
-def with_tool(smooth: Sequence[float], slow: Sequence[float]) -> tuple[float, ...]:
-    """Return the residuals once another tool is in the spindle, whose own were `slow` when it left."""
-    found = list(smooth)
-    found[TOOL::COUNT] = [FORGETS * value for value in slow]
+            found += (s, t, 0.0, u + c * (value - told * u) if told else u, 0.0)
     return tuple(found)
 
 

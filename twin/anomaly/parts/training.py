@@ -25,6 +25,7 @@ POWER_MAX = 1.2
 CUTS_PCT_MIN = 8.0
 TWIN_TICKS_MIN = 300
 LINE_TICKS_MIN = 3
+STEPS_MIN = 100
 OVERRIDES_APART = 0.3
 STEADY_QUANTILE = 0.7
 """Of the ticks of a line, above its edges in air."""
@@ -46,11 +47,12 @@ def prepared(one: "Recorded") -> PartsModel:
     idle = _idle(rpm, load, settled)
     first = PartsModel(signals=one.signals, tick_s=one.tick_s, idle=idle)
     x = _quantities(first, one, settled)
-    powers = tuple(_power(one, x[:, at], first.plan.kinds[at]) for at in range(len(one.signals)))
+    powers = tuple(_power(one, x[:, at], first.plan.kinds[at], first.plan.floors[at]) for at in range(len(one.signals)))
     heat = tuple(
         fit_heat(rpm, load, columns[name], one.tick_s, base_s(name)) if kind_of(name) is Kind.TEMPERATURE else ()
         for name in one.signals
     )
+    step = tuple(_step(one, x[:, at]) for at in range(len(one.signals)))
     still = tuple(_still(one, at, rpm) for at in range(len(one.signals)))
     offset, spread = _twin_error(first.changed(power=powers), one, settled)
     return PartsModel(
@@ -62,6 +64,7 @@ def prepared(one: "Recorded") -> PartsModel:
         twin_offset=offset,
         twin_spread=spread,
         still=still,
+        step=step,
     )
 
 
@@ -90,6 +93,16 @@ def _still(one: "Recorded", at: int, rpm: Floats) -> float:
     return float(np.log(np.median(one.values[known, at]) + floor_of(name)))
 
 
+def _step(one: "Recorded", x: Floats) -> float:
+    """Return the deviation of the change of a quantity from a tick to the next one in the same line; 0 = not known."""
+    change = np.diff(x)
+    same = (one.line[1:] == one.line[:-1]) & (one.tool[1:] == one.tool[:-1]) & ~np.isnan(change)
+    if same.sum() < STEPS_MIN:
+        return 0.0
+    low, high = np.percentile(change[same], [25.0, 75.0])
+    return float(high - low) / 1.349
+
+
 def _quantities(model: PartsModel, one: "Recorded", settled: NDArray[np.bool_]) -> Floats:
     """Return the quantities (T, F) without overrides' powers, NaN where they are not told."""
     found = np.full(one.values.shape, np.nan)
@@ -114,8 +127,8 @@ def _groups(one: "Recorded") -> NDArray[np.int64]:
     return np.asarray(np.unique(keys, axis=0, return_inverse=True)[1].ravel(), dtype=np.int64)
 
 
-def _power(one: "Recorded", x: Floats, kind: int) -> float:
-    """Return the power of the feed override in a signal, from lines that were run at several."""
+def _power(one: "Recorded", x: Floats, kind: int, floor: float) -> float:
+    """Return the power of the feed override in a signal, without its floor, from lines that were run at several."""
     usual = quantity.POWERS.get(Kind(kind), 0.0)
     if usual == 0.0:
         return 0.0
@@ -125,7 +138,7 @@ def _power(one: "Recorded", x: Floats, kind: int) -> float:
     group, y, pct = _groups(one)[known], x[known], one.feed_override_pct[known]
     if kind == Kind.LOAD:
         cuts = y > math.log(CUTS_PCT_MIN)
-        group, y, pct = group[cuts], y[cuts], pct[cuts]
+        group, y, pct = group[cuts], np.log(np.exp(y[cuts]) - floor), pct[cuts]
     pairs, place = np.unique(np.stack([group, np.round(pct).astype(np.int64)], axis=1), axis=0, return_inverse=True)
     order = np.argsort(place.ravel(), kind="stable")
     stretches = np.split(y[order], np.flatnonzero(np.diff(place.ravel()[order])) + 1)

@@ -19,14 +19,14 @@ from sparkplug.metric import Change, MetricSpec, NodeId
 from tests.cnctwin.api.served_plant import PATIENCE_S, PlantServer, get, post, served
 from tests.cnctwin.api.small_plant import birth, client_of, data, now, small_plant
 from tests.edge.host_watch import wait
-from tests.twin.anomaly.parts.alarms import alarmed
+from tests.twin.anomaly.parts.alarms.examples import alarmed
 from tests.twin.anomaly.parts.milled import SIGNALS, fitted, parts
 from tests.until_stopped import until_stopped
 from tests.wire.mosquitto import Mosquitto
 from twin.anomaly.model import AnomalyModel
-from twin.anomaly.parts.episodes import Memory
-from twin.anomaly.parts.feedback import told_of
-from twin.anomaly.parts.verdict import corrected_memory, verdict_of
+from twin.anomaly.parts.alarms.episodes import Memory
+from twin.anomaly.parts.alarms.feedback import told_of
+from twin.anomaly.parts.alarms.verdict import corrected_memory, verdict_of
 from twin.anomaly.parts_scorer import PartsScorer
 from twin.anomaly.store import promote, stored
 

@@ -1,8 +1,8 @@
 """Alarms to remember: a signature, and a memory in which one is on or over."""
 
-from twin.anomaly.parts.episodes import Memory, Seen, followed
-from twin.anomaly.parts.signature import Share, Signature, signature_of
-from twin.anomaly.parts.verdict import Verdict, corrected_memory
+from twin.anomaly.parts.alarms.episodes import Memory, Seen, followed
+from twin.anomaly.parts.alarms.signature import Share, Signature, signature_of
+from twin.anomaly.parts.alarms.verdict import Verdict, corrected_memory
 
 LOAD, VIBRATION = "spindle_load_pct", "vibration_rms_g"
 THRESHOLD = 2.0

@@ -11,9 +11,9 @@ import json
 import math
 from typing import Any, NamedTuple
 
-from twin.anomaly.parts.episodes import FALSE, Episode, Memory, all_of
-from twin.anomaly.parts.limits import Tolerated, factor_at
-from twin.anomaly.parts.signature import NAME_MAX
+from twin.anomaly.parts.alarms.episodes import FALSE, Episode, Memory, all_of
+from twin.anomaly.parts.alarms.limits import Tolerated, factor_at
+from twin.anomaly.parts.alarms.signature import NAME_MAX
 
 ALARMS_MAX = 50
 VERDICTS_MIN = 10

@@ -2,9 +2,9 @@
 
 import json
 
-from tests.twin.anomaly.parts.alarms import alarmed, spoken, verdict
-from twin.anomaly.parts.episodes import Memory
-from twin.anomaly.parts.feedback import TEXT_CHARACTERS_MAX, precision, suggested, told_of
+from tests.twin.anomaly.parts.alarms.examples import alarmed, spoken, verdict
+from twin.anomaly.parts.alarms.episodes import Memory
+from twin.anomaly.parts.alarms.feedback import TEXT_CHARACTERS_MAX, precision, suggested, told_of
 
 
 def told(cases: list[tuple[float, str]]) -> Memory:

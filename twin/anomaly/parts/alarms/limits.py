@@ -10,8 +10,8 @@ score that is the length of several is below the threshold then: of two by (Σ u
 from collections.abc import Iterable
 from typing import NamedTuple
 
+from twin.anomaly.parts.alarms.signature import Signature
 from twin.anomaly.parts.scales import SCALES
-from twin.anomaly.parts.signature import Signature
 
 FACTOR_MAX = 6.0
 FACTOR_LEAST = 1.05

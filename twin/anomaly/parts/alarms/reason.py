@@ -7,11 +7,11 @@ import math
 from collections.abc import Sequence
 
 from twin.anomaly.parts import scales
+from twin.anomaly.parts.alarms.why import Why
 from twin.anomaly.parts.model import PartsModel
 from twin.anomaly.parts.own import Own, usual_of
 from twin.anomaly.parts.quantity import UNITS, Kind
 from twin.anomaly.parts.residuals import cut_share
-from twin.anomaly.parts.why import Why
 
 PEER_SHOWS = 0.5
 """A peer shows it too where its residual is at least half as large."""
@@ -38,6 +38,8 @@ def why_of(model: PartsModel, own: Own, peers: Sequence[Own], left: Sequence[flo
     if usual is not None and is_known and kind is not Kind.TEMPERATURE:
         centre = usual.centre[section][at] + own.level[at] * cut_share(plan, usual.centre[section])
     away = s / plan.over_spread[at]
+    if plan.cuts[at] and scale >= scales.OPERATION and own.gathered.weight[at]:
+        away = own.gathered.total[at] / own.gathered.weight[at] / plan.over_spread[at]
     is_share = not is_known and kind not in (Kind.TEMPERATURE, Kind.PLAIN)
     expected, measured = (100.0, round(100.0 * math.exp(away), 2)) if is_share else _in_units(model, own, at, centre, away)
     shows = [

@@ -4,8 +4,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import TypeAdapter
 
-from tests.twin.anomaly.parts.alarms import alarmed, seen, signature, spoken, verdict
-from twin.anomaly.parts.episodes import GONE_S, LABELLED_MAX, OPEN_MAX, Memory, Seen, alarm_of, followed, nearest, part_ended
+from tests.twin.anomaly.parts.alarms.examples import alarmed, seen, signature, spoken, verdict
+from twin.anomaly.parts.alarms.episodes import (
+    GONE_S,
+    LABELLED_MAX,
+    OPEN_MAX,
+    Memory,
+    Seen,
+    alarm_of,
+    followed,
+    nearest,
+    part_ended,
+)
 
 MEMORY = TypeAdapter(Memory)
 

@@ -12,9 +12,9 @@ larger than what was called false. What nobody has spoken of changes nothing.
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from twin.anomaly.parts.limits import FACTOR_MAX, Tolerated, bounded, raised
-from twin.anomaly.parts.signature import GROWTH, LIKE_MIN, NAME_MAX, Signature, envelope, likeness
-from twin.anomaly.parts.why import Like
+from twin.anomaly.parts.alarms.limits import FACTOR_MAX, Tolerated, bounded, raised
+from twin.anomaly.parts.alarms.signature import GROWTH, LIKE_MIN, NAME_MAX, Signature, envelope, likeness
+from twin.anomaly.parts.alarms.why import Like
 
 OPEN_MAX = 50
 LABELLED_MAX = 200

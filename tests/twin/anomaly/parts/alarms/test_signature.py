@@ -3,8 +3,8 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.twin.anomaly.parts.alarms import signature
-from twin.anomaly.parts.signature import SHARES_MAX, Share, Signature, envelope, likeness, signature_of
+from tests.twin.anomaly.parts.alarms.examples import signature
+from twin.anomaly.parts.alarms.signature import SHARES_MAX, Share, Signature, envelope, likeness, signature_of
 
 SHARES = st.builds(
     Share, st.sampled_from("abcdefgh"), st.sampled_from(["seconds", "cut"]), st.floats(-50, 50).map(lambda x: round(x, 2))

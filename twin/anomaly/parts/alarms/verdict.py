@@ -13,7 +13,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from twin.anomaly.parts.episodes import (
+from twin.anomaly.parts.alarms.episodes import (
     FALSE,
     KNOWN,
     TRUE,
@@ -27,7 +27,7 @@ from twin.anomaly.parts.episodes import (
     kept,
     tolerated_of,
 )
-from twin.anomaly.parts.limits import FACTOR_MAX, MARGIN, bounded
+from twin.anomaly.parts.alarms.limits import FACTOR_MAX, MARGIN, bounded
 from twin.anomaly.parts.model import PartsModel
 from twin.anomaly.parts.own import Own
 

@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.twin.anomaly.parts.alarms import LOAD, THRESHOLD, alarmed, seen, signature, spoken, verdict
-from twin.anomaly.parts.episodes import Memory, alarm_of, followed, is_excused
-from twin.anomaly.parts.limits import FACTOR_MAX, HALF_LIFE_S, MARGIN, TOLERATED_MAX, limit_factor, limits_of
+from tests.twin.anomaly.parts.alarms.examples import LOAD, THRESHOLD, alarmed, seen, signature, spoken, verdict
+from twin.anomaly.parts.alarms.episodes import Memory, alarm_of, followed, is_excused
+from twin.anomaly.parts.alarms.limits import FACTOR_MAX, HALF_LIFE_S, MARGIN, TOLERATED_MAX, limit_factor, limits_of
+from twin.anomaly.parts.alarms.signature import Share, Signature, signature_of
+from twin.anomaly.parts.alarms.verdict import Verdict, corrected_memory, refused, verdict_of
 from twin.anomaly.parts.scales import SCALES
-from twin.anomaly.parts.signature import Share, Signature, signature_of
-from twin.anomaly.parts.verdict import Verdict, corrected_memory, refused, verdict_of
 
 WORDS = st.sampled_from(["true", "false", "known"])
 
@@ -110,8 +110,8 @@ def test_what_lasts_raises_the_longer_scales_too_and_a_burst_does_not() -> None:
         tolerated = spoken(alarmed(given=cut), verdict("false")).tolerated
         return [limit_factor(tolerated, "O1|T5|1", LOAD, one, 1, 2000.0) for one in SCALES]
 
-    assert factors("seconds") == [2.0, 1.0, 1.0, 1.0]
-    assert factors("cut") == [1.0, 2.0, 2.0, 2.0]
+    assert factors("seconds") == [2.0, 1.0, 1.0, 1.0, 1.0]
+    assert factors("cut") == [1.0, 2.0, 2.0, 2.0, 2.0]
 
 
 def test_limits_rise_in_all_operations_in_which_the_alarm_was_seen() -> None:

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from twin.anomaly.parts.why import Like, Why
-from twin.anomaly.parts.words import LINE_MAX, in_words
+from twin.anomaly.parts.alarms.why import Like, Why
+from twin.anomaly.parts.alarms.words import LINE_MAX, in_words
 
 WHY = Why("spindle_load_pct", "cut", "O1", 5, (210, 260), 7, 43.66, 37.0, "%", 5.2, 42.0, "12 parts", (Like("dull", 0.9, 1.0),))
 CASES = {
