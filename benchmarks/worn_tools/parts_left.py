@@ -3,7 +3,7 @@
     .venv/bin/python -m benchmarks.worn_tools.parts_left --seeds 101-106 --days 60
     .venv/bin/python -m benchmarks.worn_tools.parts_left --seeds 101-106 --days 60 --fast 3    # one life in five is fast
 
-The machine is benchmarks/worn_tools/world.py, on the reference machine of the blind check. Seeds 1 to 3 were used to develop,
+The machine is benchmarks/worn_tools/world.py, on the reference machine of the blind check. Seeds 1 to 12 were used to develop,
 101 to 106 are for the report. Lives count from the third of a tool on. Nothing is fitted on what is judged: lives before are
 all the model knows.
 """

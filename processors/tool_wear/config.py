@@ -21,7 +21,7 @@ class Config(ProcessorConfig):
     material_pct: float = Field(default=5.0, gt=0.0, le=100.0)
     part_pct: float = Field(default=0.5, gt=0.0, le=20.0)
     parts_min: int = Field(default=8, ge=6, le=1000, description="of a life, before parts left are given")
-    fast_times: float = Field(default=2.0, gt=1.0, le=100.0, description="as fast as its lives before: an alarm")
+    fast_times: float = Field(default=2.0, gt=1.0, le=100.0, description="as fast as its lives before, the least for an alarm")
     block_h: float = Field(default=8.0, ge=0.1, le=168.0, description="the drift is judged once in so long")
     block_parts_min: int = Field(default=5, ge=1, le=10_000)
     healthy_blocks: int = Field(default=60, ge=40, le=10_000, description="that the machine is taken to be healthy at first")

@@ -19,6 +19,7 @@ from sparkplug.datatype import DataType
 from sparkplug.quality import Quality
 from twin.vocabulary import twin_signals
 from twin.wear.cut import Cut, cut_of
+from twin.wear.fast import FAST_LIVES
 from twin.wear.machine import Wear, cut_added
 from twin.wear.status import Status, status_of
 
@@ -144,7 +145,7 @@ def _fast(shown: Mapping[str, Status]) -> Output:
     if any(one.is_fast for one in shown.values()):
         return Output(FAST, True)
     if all(one.is_fast is None for one in shown.values()):
-        return Output.null(FAST, "no tool has two whole lives to compare with yet")
+        return Output.null(FAST, f"not known yet: no tool has {FAST_LIVES} lives to compare with")
     return Output(FAST, False)
 
 

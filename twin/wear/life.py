@@ -106,12 +106,13 @@ def known(lives: Sequence[Life], limit: float | None) -> Known | None:
     """Return what earlier lives say of the next one, else what the configured limit does; None where neither is known."""
     if len(lives) < LIVES_MIN:
         return None if limit is None else Known(limit, 0.0, 0.0, 0.0, LINE, len(lives))
-    end, end_spread = _pooled([log(life.end) for life in lives], END_SPREAD)
-    uses, uses_spread = _pooled([log(life.uses) for life in lives], LENGTH_SPREAD)
+    end, end_spread = pooled([log(life.end) for life in lives], END_SPREAD)
+    uses, uses_spread = pooled([log(life.uses) for life in lives], LENGTH_SPREAD)
     return Known(exp(end), end_spread, exp(uses), uses_spread, mean_curve([life.levels for life in lives]), len(lives))
 
 
-def _pooled(values: Sequence[float], usual: float) -> tuple[float, float]:
+def pooled(values: Sequence[float], usual: float) -> tuple[float, float]:
+    """Return the middle of values and the spread of the next one, by the equation above; usual: k."""
     count = len(values)
     mean = median(values)
     squares = USUAL_LIVES * usual**2 + sum(min(abs(value - mean), FAR * usual) ** 2 for value in values)

@@ -8,6 +8,7 @@ from math import exp, sqrt
 from typing import Any, NamedTuple
 
 from twin.wear.curve import at, slope
+from twin.wear.fast import FAST_LIVES
 from twin.wear.left import Left, left
 from twin.wear.life import LIVES_MIN, Known, known
 from twin.wear.machine import ANCHORS_MIN, Wear
@@ -62,7 +63,7 @@ def status_of(number: str, tool: Tool, wear: Wear, terms: Terms) -> Status:
     off, rate = BAND_90 * steep * sqrt(trend.var), BAND_90 * sqrt(trend.rate_var)
     no_slope = no_level or ("" if tool.uses >= terms.uses_min else f"fewer than {terms.uses_min} parts of this tool")
     uses_left, no_left = (None, no_slope) if no_slope else _left(number, tool, trend, terms)
-    is_fast, not_fast = (tool.is_fast, "") if len(tool.lives) >= LIVES_MIN and tool.is_whole else (None, _no_lives(number))
+    not_fast = "" if tool.is_fast else _why_not_fast(number, tool)
     per_part = steep * exp(level)
     return Status(
         int(number),
@@ -77,7 +78,7 @@ def status_of(number: str, tool: Tool, wear: Wear, terms: Terms) -> Status:
         no_slope,
         uses_left,
         no_left,
-        is_fast,
+        None if not_fast else tool.is_fast,
         not_fast,
         _basis(number, tool, wear, terms),
         None if tool.vibration is None else _pct(tool.vibration),
@@ -92,6 +93,14 @@ def _why_no_level(number: str, tool: Tool) -> str:
 
 def _no_lives(number: str) -> str:
     return f"fewer than {LIVES_MIN} whole lives of tool {number} have been seen"
+
+
+def _why_not_fast(number: str, tool: Tool) -> str:
+    if len(tool.lives) < FAST_LIVES:
+        return f"not known yet: {len(tool.lives)} of {FAST_LIVES} lives of tool {number}"
+    if not tool.is_whole:
+        return f"the life of tool {number} was not seen from its beginning"
+    return f"the load of tool {number} stepped up in this life" if tool.has_stepped else ""
 
 
 def _left(number: str, tool: Tool, trend: Trend, terms: Terms) -> tuple[Left | None, str]:

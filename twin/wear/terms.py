@@ -7,8 +7,8 @@ class Terms(NamedTuple):
     """wear_limit: the level at which a tool is spent, before two lives have told it; None = not configured
 
     material: standard deviation of the load from one batch to another; part: from one part to the next within a batch sharp:
-    standard deviation from one sharp tool to another uses_min: of a tool, before parts left are given; fast: a tool that surely
-    wears so many times as fast as its earlier lives wears too fast
+    standard deviation from one sharp tool to another uses_min: of a tool, before parts left are given; fast: the least ratio to
+    earlier lives at which a tool wears too fast (twin/wear/fast.py)
     """
 
     wear_limit: float | None = None

@@ -14,6 +14,7 @@ from math import sqrt
 from typing import NamedTuple
 
 from twin.wear.curve import LINE, at, slope
+from twin.wear.fast import is_faster
 from twin.wear.life import LIVES_MAX, Course, Known, Life, ended, followed, known
 from twin.wear.terms import Terms
 from twin.wear.trend import HUBER, Trend, Wander, advanced, updated
@@ -26,7 +27,7 @@ LIMIT_ASSUMED = 0.3
 RATE_WIDE, RATE_UNKNOWN = 4.0, 0.05
 SHARE_WANDER, RATE_WANDER = 0.03, 0.15
 WIDE_IS_BETTER = 5.0
-SURE = 2.6
+FAST_USES = 4
 STEPPED_USES, REPLACED_USES = 3, 2
 OPERATIONS_MAX = 40
 MEMORY_USES = 10.0
@@ -183,12 +184,12 @@ def rises_freely(tool: Tool, terms: Terms, level: Level, material: float, materi
 
 
 def _is_fast(tool: Tool, life: Known, terms: Terms) -> bool:
-    """Return True where even the slow end of the rate is so many times that of the median of earlier lives."""
-    if not (tool.is_whole and life.uses > 0.0 and tool.uses >= 4):
+    """Return True where a tool that was seen from its beginning, by its own trend, became so worn far too soon."""
+    share = tool.wide.share
+    if not tool.is_whole or tool.has_stepped or tool.is_learning or tool.uses < FAST_USES or share <= 0.0:
         return False
-    wide = tool.wide
-    is_worn = wide.share - 2.0 * sqrt(wide.var) > 0.1
-    return is_worn and (wide.rate - SURE * sqrt(wide.rate_var)) * life.uses > terms.fast
+    wear = life.end * at(life.curve, share)
+    return is_faster(tool.lives, life.end, wear, tool.uses, sqrt(tool.wide.var) / share, terms.fast)
 
 
 def learned(tool: Tool, told: Told, material: float, wear: float) -> Tool:
