@@ -45,7 +45,7 @@ class Config(ProcessorConfig):
     of_one_machine: ClassVar[frozenset[str] | None] = frozenset({"ratio_cut_pct_min"})
 
     expectations: str = ""
-    ratio_cut_pct_min: float = Field(default=5.0, gt=0.0, le=100.0)
+    ratio_cut_pct_min: float = Field(default=2.0, gt=0.0, le=100.0)
 
 
 def read_expectations(configuration: Configuration[Config]) -> Mapping[str, Mapping[str, Expectation]]:
