@@ -17,7 +17,7 @@ from pydantic import Field
 from processors.config import Configuration, ProcessorConfig
 from processors.contract import Output, OutputSpec, Processor, Provenance, Sample, SampleKind
 from processors.description import Description
-from processors.expected.place import ANYWHERE_MM, BEYOND, Place, placed, window_mm
+from processors.expected.place import ANYWHERE_MM, BEYOND, Place, began, placed, window_mm
 from processors.expected.usual import Air, Ratio, air_after, ratios_after
 from processors.sample import why_unknown
 from sparkplug.datatype import DataType
@@ -118,8 +118,11 @@ def step(given: Described, state: State, sample: Sample) -> tuple[State, Sequenc
     tool = _whole(sample, TOOL)[0]
     feed, rpm = _bounded(sample, FEED), _bounded(sample, SPEED)
     planned = expectation.planned(line, tool)
-    planned_mm_min = 0.0 if planned is None else planned.feed_mm_min * _override(sample)
-    place = placed(state.place, (program, line, tool), sample.at_s, feed, planned_mm_min)
+    override, before = _override(sample), state.place
+    planned_mm_min = 0.0 if planned is None else planned.feed_mm_min * override
+    is_new = line != before.line or tool != before.tool or program != before.program
+    begins = began(expectation, before, (program, line, tool), sample.at_s, override) if is_new else None
+    place = placed(before, (program, line, tool), sample.at_s, feed, planned_mm_min, begins)
     if planned is None:
         return _lost(state, place), _nulls(f"program {program} has no move in this line")
     window = window_mm(place)
@@ -167,7 +170,7 @@ def _compared(ratio_cut_pct_min: float, state: State, now: _Now) -> tuple[State,
         _said(twin_signals.EXPECTED_LINE_S, round(expected.time_s, DIGITS)),
         _said(twin_signals.EXPECTED_BASIS, now.basis),
     ]
-    is_on = now.place.along_mm > 0.0 and at_s - state.place.at_s <= WITHIN_S
+    is_on = state.place.line == now.place.line and now.place.along_mm > 0.0 and at_s - state.place.at_s <= WITHIN_S
     bounds = now.bounds(state.place.feed_mm_min if is_on else None)
     if bounds is None or math.isnan(expected.load_pct):
         why = now.expectation.why_not(now.place.line, now.place.tool) or "no load is expected of this line"
@@ -221,7 +224,7 @@ def _said(name: str, value: float | str) -> Output:
 
 def _lost(state: State, place: Place | None = None) -> State:
     """Return the state with what is known of the spindle and the tools, and the place where there is one."""
-    return State(place=Place() if place is None else place, air=state.air, ratios=state.ratios)
+    return State(place=Place(extra=state.place.extra) if place is None else place, air=state.air, ratios=state.ratios)
 
 
 def _override(sample: Sample) -> float:
