@@ -7,9 +7,9 @@ comes what it moves in SLACK_S, for a twin whose line begins or ends a little so
 
     began ∈ (sample before, sample]  ∩  end of the line before + lines between + n (block ± BLOCK_OFF_S)
 
-so the doubt shrinks from line to line, as in estimation with bounded errors (Schweppe, IEEE Trans. Autom. Control 13, 1968). `block`
-is what a line takes beyond the plan: told lines are late by less than a sample however many there are, so the sum of what lines took
-over the sum of what they should take shows it. An empty intersection leaves the samples alone.
+so the doubt shrinks from line to line, as in estimation with bounded errors (Schweppe, IEEE Trans. Autom. Control 13, 1968).
+`block` is what a line takes beyond the plan: however many lines are told, the first and the last are late by less than a sample,
+so the sum of what lines took over what they should take shows it. An empty intersection leaves the samples alone.
 
 Where the feed that is told is not the
 planned one, the machine is taken to be anywhere between the places that both lead to: a told feed may be wrong.
@@ -27,7 +27,7 @@ ANYWHERE_MM = 1e9
 BLOCK_OFF_S, TIME_OFF = 0.05, 0.005
 """How far a line's time may be off the plan: for itself, and as a share of it."""
 BLOCK_S_MAX, BLOCK_OVER, BLOCK_PRIOR = 0.3, 400.0, 20.0
-"""What a line may take beyond the plan; over how many lines that is learned, and how many stand for a control that is as planned."""
+"""What a line may take beyond the plan; over how many lines that is learned, and how many stand for the plan at first."""
 STRAY_S = 2.0
 LINES_MAX, BETWEEN_S_MAX = 6, 2.0
 """Over more lines, or lines that take longer, nothing is concluded from the line before."""
@@ -43,6 +43,11 @@ class Extra(NamedTuple):
     def block_s(self) -> float:
         """Return what a line takes beyond the plan."""
         return max(-BLOCK_S_MAX, min(BLOCK_S_MAX, self.seconds / (self.lines + BLOCK_PRIOR)))
+
+    @property
+    def off_s(self) -> float:
+        """Return how far `block_s` may be off: more while few lines have been seen."""
+        return BLOCK_OFF_S * (1.0 + BLOCK_PRIOR / (self.lines + 1.0))
 
     def after(self, seconds: float, lines: int) -> "Extra":
         """Return the sums after one more line was told, and those between.
@@ -88,9 +93,7 @@ class Began(NamedTuple):
     extra: Extra
 
 
-def began(
-    expectation: Expectation, before: Place, where: tuple[str, int, int | None], at_s: float, override: float
-) -> Began:
+def began(expectation: Expectation, before: Place, where: tuple[str, int, int | None], at_s: float, override: float) -> Began:
     """Return when a line began that is told now for the first time, from where the machine was in the line before."""
     program, line, tool = where
     ended = before.run if before.program == program and (before.run or 0) < len(expectation.runs) else None
@@ -104,7 +107,7 @@ def began(
         return told
     planned_mm_s = last.feed_mm_min * override / 60.0
     slow, fast = sorted((last.feed_mm_min / 60.0, planned_mm_s))
-    off_s = lines * BLOCK_OFF_S + TIME_OFF * last.time_s
+    off_s = lines * before.extra.off_s + TIME_OFF * last.time_s
     sure_s = before.at_s + between_s + lines * before.extra.block_s
     from_s = max(told.from_s, sure_s + max(last.length_mm - window[1], 0.0) / fast - off_s)
     to_s = min(at_s, sure_s + max(last.length_mm - window[0], 0.0) / slow + off_s)
@@ -119,6 +122,7 @@ def placed(
     at_s: float,
     feed_mm_min: float | None,
     planned_mm_min: float = 0.0,
+    *,
     begins: Began | None = None,
 ) -> Place:
     """Return the place after one more sample. where: program, line, tool; planned_mm_min: of the line; begins: where it is new

@@ -77,7 +77,7 @@ def at_rest(evidence: Evidence, at_s: float) -> Evidence:
 
 def judged(evidence: Evidence, cut_pct: float, healthy_pct: float, at_s: float, needed_s: float = 1.0) -> Evidence:
     """Return the evidence after a sample of a cut that stands out of the noise. needed_s: what raises an alarm"""
-    seconds, before, _, rested_s, noise_pct2, misled = evidence
+    seconds, before, _, _, noise_pct2, misled = evidence
     since_s = _since_s(evidence, at_s)
     rate = max(-1.0, min(1.0, log_ratio(cut_pct, healthy_pct, noise_pct2) / SURE))
     misled = _forgotten(misled, since_s)

@@ -10,7 +10,7 @@ the greatest cut that the twin expects where the machine may be. In air nothing 
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from processors.config import ProcessorConfig
-from processors.contract import Sample
+from processors.contract import Sample, SampleKind
 from processors.rules.alarm import BETWEEN, EXCUSED, UNDER, Judgement, over, unknown
 from processors.rules.broken_tool import USUAL_MAX, Evidence, at_rest, in_air, is_seen, judged
 from processors.rules.spindle import FEED, Motion
@@ -24,6 +24,8 @@ from twin.vocabulary.twin_signals import (
 CUT, LEAST, MOST, RATIO = SPINDLE_CUT_LOAD_PCT, EXPECTED_CUT_LEAST_PCT, EXPECTED_CUT_MOST_PCT, EXPECTED_RATIO
 FEEDS_MM_MIN = 1.0
 ROUNDING_S = 1e-6
+HELD_S = 0.5
+"""A tick tells nothing new: one sample that is merely held has to be held so much longer, so that a later one can object."""
 CLEAR_SHARE = 2.0
 """A tool cuts again where its load is over this times the share at which it was broken."""
 CLEAR_OVER = 0.8
@@ -100,7 +102,8 @@ def tool_broken(limits: ExpectedLimits, moves: Motion, sample: Sample, evidence:
         return EXCUSED
     if cut_pct >= healthy_pct:
         return UNDER
-    if evidence.rate <= 0.0 or evidence.seconds + ROUNDING_S < limits.tool_broken_s * (1.0 + evidence.misled):
+    needed_s = limits.tool_broken_s * (1.0 + evidence.misled) + (HELD_S if sample.kind is SampleKind.TICK else 0.0)
+    if evidence.rate <= 0.0 or evidence.seconds + ROUNDING_S < needed_s:
         return BETWEEN
     return over(f"the cut takes {max(cut_pct, 0.0):.0f} % of spindle load where the twin expects {least_pct:.0f} % or more")
 

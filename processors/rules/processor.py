@@ -250,7 +250,7 @@ def _utc(at_s: float) -> str:
 _INFERRED = Provenance.INFERRED
 PROCESSOR = Processor(
     name="rules",
-    version=1,
+    version=2,
     inputs=frozenset({ANOMALY}).union(*(rule.reads for rule in RULES)),
     outputs=(
         *(OutputSpec(rule.metric, DataType.BOOLEAN, None, rule.meaning, _INFERRED, is_alarm=True) for rule in RULES),
