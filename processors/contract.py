@@ -7,7 +7,7 @@ suite: same stream, same answer; a restart in the middle changes nothing; nothin
 Where machines are compared with each other, a `CellProcessor` folds the samples of all machines of a cell into one state.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, is_dataclass
 from enum import Enum
 from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
@@ -123,6 +123,11 @@ class Output(NamedTuple):
     def null(cls, name: str, reason: str, machine: str | None = None, at_s: float | None = None) -> "Output":
         """A null that says why. Keep live figures out of `reason`: a changed reason is published again."""
         return cls(name, None, Quality.BAD, reason, machine, at_s)
+
+    @classmethod
+    def nulls(cls, names: Iterable[str], reason: str) -> "tuple[Output, ...]":
+        """Return nulls of all these names for one reason: what a step answers while an input is missing."""
+        return tuple(cls.null(name, reason) for name in names)
 
 
 @dataclass(frozen=True, slots=True)

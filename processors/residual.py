@@ -57,10 +57,7 @@ def read_models(configuration: Configuration[Config]) -> "Mapping[str, ResidualM
         from twin.residual.model import load_models  # noqa: PLC0415  numpy comes with it
     except ImportError as error:
         raise ValueError(f"a correction needs {error.name}: pip install 'cnctwin[twin]'") from error
-    try:
-        return load_models(Path(folder))
-    except TwinError as error:
-        raise ValueError(str(error)) from error
+    return load_models(Path(folder))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -117,7 +114,7 @@ def step(given: Described, state: State, sample: Sample) -> tuple[State, Sequenc
     if model is None:
         return state, _UNKNOWN_WITHOUT_MODEL if sample.kind in (SampleKind.TICK, SampleKind.BIRTH) else ()
     if (why_not := given.why_not(model)) is not None:
-        return State(), _nulls(why_not) if sample.kind in (SampleKind.TICK, SampleKind.BIRTH) else ()
+        return State(), Output.nulls(_ALL, why_not) if sample.kind in (SampleKind.TICK, SampleKind.BIRTH) else ()
     if state.version != model.version:
         state = State(model.version)
     if sample.kind is SampleKind.HOLE:
@@ -126,7 +123,7 @@ def step(given: Described, state: State, sample: Sample) -> tuple[State, Sequenc
         return state, ()
     now = _known(config, model, sample)
     if isinstance(now, str):
-        return state, (*_nulls(now)[:4], _gain(config, state.gain), Output(BASIS, model.in_words))
+        return state, (*Output.nulls(_ALL[:4], now), _gain(config, state.gain), Output(BASIS, model.in_words))
     memory = state.memory
     if memory.at_s is not None and sample.at_s - memory.at_s >= config.gap_s_max:
         memory = Memory()
@@ -136,7 +133,7 @@ def step(given: Described, state: State, sample: Sample) -> tuple[State, Sequenc
     except TwinError as error:
         correction_k = str(error)
     if isinstance(correction_k, str):
-        outputs = (*_nulls(correction_k)[:3], Output(IN_REGION, False), _gain(config, state.gain))
+        outputs = (*Output.nulls(_ALL[:3], correction_k), Output(IN_REGION, False), _gain(config, state.gain))
         return replace(state, memory=memory), (*outputs, Output(BASIS, model.in_words))
     corrected_c = now[PHYSICS] + correction_k
     measured_c, no_measured = sample.number(MEASURED)
@@ -194,11 +191,8 @@ def _gain(config: Config, gain: Gain) -> Output:
     return Output(GAIN, round(100.0 * max(1.0 - math.sqrt(gain.corrected_k2_s / gain.physics_k2_s), -10.0), 1))
 
 
-def _nulls(why: str) -> tuple[Output, ...]:
-    return tuple(Output.null(name, why) for name in (CORRECTION, CORRECTED, LEFT, IN_REGION, GAIN, BASIS))
-
-
-_UNKNOWN_WITHOUT_MODEL = _nulls(NO_MODEL)
+_ALL = (CORRECTION, CORRECTED, LEFT, IN_REGION, GAIN, BASIS)
+_UNKNOWN_WITHOUT_MODEL = Output.nulls(_ALL, NO_MODEL)
 
 _DOUBLE, _MODELLED, _INFERRED = DataType.DOUBLE, Provenance.MODELLED, Provenance.INFERRED
 PROCESSOR = Processor(

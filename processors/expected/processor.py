@@ -17,12 +17,11 @@ from pydantic import Field
 from processors.config import Configuration, ProcessorConfig
 from processors.contract import Output, OutputSpec, Processor, Provenance, Sample, SampleKind
 from processors.description import Description
-from processors.expected.place import ANYWHERE_MM, BEYOND, Place, placed, window_mm
+from processors.expected.place import ANYWHERE_MM, BEYOND, Place, began, placed, window_mm
 from processors.expected.usual import Air, Ratio, air_after, ratios_after
 from processors.sample import why_unknown
 from sparkplug.datatype import DataType
 from sparkplug.quality import Quality
-from twin.errors import ExpectationError
 from twin.expected.expectation import Expectation
 from twin.expected.expected import Expected
 from twin.expected.files import load_expectations, stale
@@ -45,18 +44,13 @@ class Config(ProcessorConfig):
     of_one_machine: ClassVar[frozenset[str] | None] = frozenset({"ratio_cut_pct_min"})
 
     expectations: str = ""
-    ratio_cut_pct_min: float = Field(default=5.0, gt=0.0, le=100.0)
+    ratio_cut_pct_min: float = Field(default=2.0, gt=0.0, le=100.0)
 
 
 def read_expectations(configuration: Configuration[Config]) -> Mapping[str, Mapping[str, Expectation]]:
     """Return the expectations in the configured folder by machine and program. Raises ValueError where one cannot be read."""
     folder = configuration.default.expectations
-    if not folder:
-        return {}
-    try:
-        return load_expectations(Path(folder))
-    except ExpectationError as error:
-        raise ValueError(str(error)) from error
+    return load_expectations(Path(folder)) if folder else {}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -108,20 +102,23 @@ def step(given: Described, state: State, sample: Sample) -> tuple[State, Sequenc
         return state, ()
     program, no_program = _text(sample, PROGRAM)
     if program is None:
-        return _lost(state), _nulls(no_program)
+        return _lost(state), Output.nulls(_ALL, no_program)
     expectation = given.expectation(sample.machine, program)
     if isinstance(expectation, str):
-        return _lost(state), _nulls(expectation)
+        return _lost(state), Output.nulls(_ALL, expectation)
     line, no_line = _whole(sample, LINE)
     if line is None:
-        return _lost(state), _nulls(no_line)
+        return _lost(state), Output.nulls(_ALL, no_line)
     tool = _whole(sample, TOOL)[0]
     feed, rpm = _bounded(sample, FEED), _bounded(sample, SPEED)
     planned = expectation.planned(line, tool)
-    planned_mm_min = 0.0 if planned is None else planned.feed_mm_min * _override(sample)
-    place = placed(state.place, (program, line, tool), sample.at_s, feed, planned_mm_min)
+    override, before = _override(sample), state.place
+    planned_mm_min = 0.0 if planned is None else planned.feed_mm_min * override
+    is_new = line != before.line or tool != before.tool or program != before.program
+    begins = began(expectation, before, (program, line, tool), sample.at_s, override) if is_new else None
+    place = placed(before, (program, line, tool), sample.at_s, feed, planned_mm_min, begins=begins)
     if planned is None:
-        return _lost(state, place), _nulls(f"program {program} has no move in this line")
+        return _lost(state, place), Output.nulls(_ALL, f"program {program} has no move in this line")
     window = window_mm(place)
     along_mm = None if window is None or place.doubt_mm >= ANYWHERE_MM else place.along_mm + 0.5 * place.doubt_mm
     run_feed = planned_mm_min if feed is None else feed
@@ -167,11 +164,11 @@ def _compared(ratio_cut_pct_min: float, state: State, now: _Now) -> tuple[State,
         _said(twin_signals.EXPECTED_LINE_S, round(expected.time_s, DIGITS)),
         _said(twin_signals.EXPECTED_BASIS, now.basis),
     ]
-    is_on = now.place.along_mm > 0.0 and at_s - state.place.at_s <= WITHIN_S
+    is_on = state.place.line == now.place.line and now.place.along_mm > 0.0 and at_s - state.place.at_s <= WITHIN_S
     bounds = now.bounds(state.place.feed_mm_min if is_on else None)
     if bounds is None or math.isnan(expected.load_pct):
         why = now.expectation.why_not(now.place.line, now.place.tool) or "no load is expected of this line"
-        return _lost(state, now.place), (*outputs, *_nulls(why, _OF_LOAD))
+        return _lost(state, now.place), (*outputs, *Output.nulls(_OF_LOAD, why))
     least, most = bounds
     least_shown, most_shown, ago_s = least, most, at_s - state.bounds_s
     if state.least_pct is not None and 0.0 <= ago_s < SETTLED_S:
@@ -188,7 +185,7 @@ def _compared(ratio_cut_pct_min: float, state: State, now: _Now) -> tuple[State,
     load_pct, no_load = sample.number(LOAD)
     if load_pct is None or rpm is None:
         why = no_load or f"{SPEED} is unknown"
-        outputs += _nulls(why, (twin_signals.SPINDLE_CUT_LOAD_PCT, twin_signals.SPINDLE_LOAD_RESIDUAL_PCT))
+        outputs += Output.nulls((twin_signals.SPINDLE_CUT_LOAD_PCT, twin_signals.SPINDLE_LOAD_RESIDUAL_PCT), why)
     else:
         idle_pct = expected.load_pct - expected.cut_load_pct
         is_steady = state.rpm is not None and abs(rpm - state.rpm) <= STEADY * abs(rpm) and abs(rpm) >= TURNING_RPM
@@ -221,7 +218,7 @@ def _said(name: str, value: float | str) -> Output:
 
 def _lost(state: State, place: Place | None = None) -> State:
     """Return the state with what is known of the spindle and the tools, and the place where there is one."""
-    return State(place=Place() if place is None else place, air=state.air, ratios=state.ratios)
+    return State(place=Place(extra=state.place.extra) if place is None else place, air=state.air, ratios=state.ratios)
 
 
 def _override(sample: Sample) -> float:
@@ -248,10 +245,6 @@ def _text(sample: Sample, name: str) -> tuple[str | None, str]:
     if (why := why_unknown(reading)) is not None:
         return None, why
     return (reading.value, "") if isinstance(reading.value, str) and reading.value else (None, f"{name} is empty")
-
-
-def _nulls(why: str, names: Sequence[str] | None = None) -> tuple[Output, ...]:
-    return tuple(Output.null(name, why) for name in (_ALL if names is None else names))
 
 
 _OF_LOAD = (
@@ -283,7 +276,7 @@ _OUTPUTS = tuple(
 )
 PROCESSOR = Processor(
     name="expected",
-    version=1,
+    version=2,
     inputs=frozenset({PROGRAM, LINE, TOOL, LOAD, SPEED, FEED, OVERRIDE}),
     outputs=_OUTPUTS,
     config=Config,

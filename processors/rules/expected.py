@@ -10,8 +10,9 @@ the greatest cut that the twin expects where the machine may be. In air nothing 
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from processors.config import ProcessorConfig
-from processors.contract import Sample
+from processors.contract import Sample, SampleKind
 from processors.rules.alarm import BETWEEN, EXCUSED, UNDER, Judgement, over, unknown
+from processors.rules.broken_tool import USUAL_MAX, Evidence, at_rest, in_air, is_seen, judged
 from processors.rules.spindle import FEED, Motion
 from twin.vocabulary.twin_signals import (
     EXPECTED_CUT_LEAST_PCT,
@@ -22,6 +23,9 @@ from twin.vocabulary.twin_signals import (
 
 CUT, LEAST, MOST, RATIO = SPINDLE_CUT_LOAD_PCT, EXPECTED_CUT_LEAST_PCT, EXPECTED_CUT_MOST_PCT, EXPECTED_RATIO
 FEEDS_MM_MIN = 1.0
+ROUNDING_S = 1e-6
+HELD_S = 0.5
+"""A tick tells nothing new: one sample that is merely held has to be held so much longer, so that a later one can object."""
 CLEAR_SHARE = 2.0
 """A tool cuts again where its load is over this times the share at which it was broken."""
 CLEAR_OVER = 0.8
@@ -34,7 +38,8 @@ class ExpectedLimits(ProcessorConfig):
     """
 
     tool_broken_share: float = Field(default=0.2, gt=0.0, lt=0.5)
-    tool_broken_cut_pct: PositiveFloat = 5.0
+    tool_broken_share_known: float = Field(default=0.3, gt=0.0, lt=0.5)
+    tool_broken_cut_pct: PositiveFloat = 1.0
     tool_broken_s: NonNegativeFloat = 1.0
     tool_broken_clear_s: NonNegativeFloat = 2.0
     over_expected_ratio: float = Field(default=2.0, gt=1.0)
@@ -44,7 +49,42 @@ class ExpectedLimits(ProcessorConfig):
     over_expected_clear_s: NonNegativeFloat = 2.0
 
 
-def tool_broken(limits: ExpectedLimits, moves: Motion, sample: Sample) -> Judgement:
+def followed(evidence: Evidence, limits: ExpectedLimits, moves: Motion, sample: Sample) -> Evidence:
+    """Return the evidence that the tool is broken, as of this sample; it ends where the spindle stands."""
+    cut_pct, _ = sample.number(CUT)
+    if cut_pct is None and evidence.at_s is None:
+        return evidence  # nothing is expected of this machine
+    at_s = sample.at_s
+    if moves.rpm is None or not moves.is_turning:
+        return Evidence(at_s=at_s, noise_pct2=evidence.noise_pct2, misled=evidence.misled)
+    least_pct, _ = sample.number(LEAST)
+    if cut_pct is None or least_pct is None or moves.is_ramping:
+        return at_rest(evidence, at_s)
+    if least_pct <= 0.0:
+        most_pct, _ = sample.number(MOST)
+        return in_air(evidence, cut_pct, at_s) if most_pct is not None and most_pct <= 0.0 else at_rest(evidence, at_s)
+    if least_pct < limits.tool_broken_cut_pct or not _feeds(sample):
+        return at_rest(evidence, at_s)
+    healthy_pct = healthy(limits, sample, least_pct)
+    if not is_seen(evidence, healthy_pct):
+        return at_rest(evidence, at_s)
+    return judged(evidence, cut_pct, healthy_pct, at_s, limits.tool_broken_s * (1.0 + evidence.misled))
+
+
+def healthy(limits: ExpectedLimits, sample: Sample, least_pct: float) -> float:
+    """Return m: the least that a healthy tool takes where the twin expects `least_pct`."""
+    usual, _ = sample.number(RATIO)
+    if usual is None:
+        return CLEAR_SHARE * limits.tool_broken_share * least_pct
+    return CLEAR_SHARE * limits.tool_broken_share_known * max(0.5, min(USUAL_MAX, usual)) * least_pct
+
+
+def _feeds(sample: Sample) -> bool:
+    feed, _ = sample.number(FEED)
+    return feed is None or abs(feed) >= FEEDS_MM_MIN
+
+
+def tool_broken(limits: ExpectedLimits, moves: Motion, sample: Sample, evidence: Evidence) -> Judgement:
     """The twin expects a cut, the feed is on, and the spindle runs as in air."""
     cut_pct, no_cut = sample.number(CUT)
     least_pct, no_least = sample.number(LEAST)
@@ -57,9 +97,14 @@ def tool_broken(limits: ExpectedLimits, moves: Motion, sample: Sample) -> Judgem
         return EXCUSED
     if feed is not None and abs(feed) < FEEDS_MM_MIN:
         return EXCUSED
-    limit_pct = limits.tool_broken_share * least_pct
-    if cut_pct >= limit_pct:
-        return UNDER if cut_pct >= CLEAR_SHARE * limit_pct else BETWEEN
+    healthy_pct = healthy(limits, sample, least_pct)
+    if not is_seen(evidence, healthy_pct):
+        return EXCUSED
+    if cut_pct >= healthy_pct:
+        return UNDER
+    needed_s = limits.tool_broken_s * (1.0 + evidence.misled) + (HELD_S if sample.kind is SampleKind.TICK else 0.0)
+    if evidence.rate <= 0.0 or evidence.seconds + ROUNDING_S < needed_s:
+        return BETWEEN
     return over(f"the cut takes {max(cut_pct, 0.0):.0f} % of spindle load where the twin expects {least_pct:.0f} % or more")
 
 

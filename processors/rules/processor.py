@@ -14,7 +14,9 @@ from typing import NamedTuple
 
 from processors.contract import Output, OutputSpec, Processor, Provenance, Sample, SampleKind
 from processors.rules.alarm import IDLE, Judgement, Latch, LimitState, Timing, latched, rested
+from processors.rules.broken_tool import Evidence
 from processors.rules.expected import CUT, LEAST, MOST, RATIO, ExpectedLimits, load_over_expected, tool_broken
+from processors.rules.expected import followed as cut_followed
 from processors.rules.spindle import (
     EXECUTION,
     FEED,
@@ -62,6 +64,7 @@ class State:
     trend: Trend = field(default_factory=Trend)
     zone: Zone | None = None
     latches: Mapping[str, Latch] = field(default_factory=dict)
+    cut: Evidence = field(default_factory=Evidence)
 
 
 class Given(NamedTuple):
@@ -75,6 +78,7 @@ class Given(NamedTuple):
     trend: Trend
     velocity: Known
     zone: Zone | None
+    cut: Evidence
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,9 +133,9 @@ RULES = (
     Rule(
         "tool_broken",
         "the twin expects a cut, and the spindle runs as in air",
-        frozenset({CUT, LEAST, SPEED, FEED}),
-        lambda config: Timing(config.tool_broken_s, config.tool_broken_clear_s),
-        lambda given: tool_broken(given.config, given.moves, given.sample),
+        frozenset({CUT, LEAST, MOST, RATIO, SPEED, FEED}),
+        lambda config: Timing(0.0, config.tool_broken_clear_s),
+        lambda given: tool_broken(given.config, given.moves, given.sample, given.cut),
         is_of_programs=True,
     ),
     Rule(
@@ -157,7 +161,8 @@ def step(config: Config, state: State, sample: Sample) -> tuple[State, Sequence[
     temperature = sample.number(TEMPERATURE)
     trend = trend_followed(state.trend, config, temperature[0], at_s)
     zone, no_zone = _zone(config, state.zone, moves, speed_mm_s)
-    given = tuple.__new__(Given, (config, sample, moves, load, temperature, trend, speed_mm_s, zone))
+    cut = cut_followed(state.cut, config, moves, sample)
+    given = tuple.__new__(Given, (config, sample, moves, load, temperature, trend, speed_mm_s, zone, cut))
     stands: list[Stand] = []
     for name, judge, timing in config.rules:
         judgement = judge(given)
@@ -168,7 +173,7 @@ def step(config: Config, state: State, sample: Sample) -> tuple[State, Sequence[
                 latches = {rule.name: latches.get(rule.name, IDLE) for rule in RULES} | {name: latch}
         stands.append(judgement.reason if limit_state is _UNKNOWN else None if latch.alarm_s is None else latch)
     zone_name = no_zone if zone is None else zone.value
-    return State(spindle, trend, zone, latches), _outputs(tuple(stands), zone is not None, zone_name, _anomaly(sample))
+    return State(spindle, trend, zone, latches, cut), _outputs(tuple(stands), zone is not None, zone_name, _anomaly(sample))
 
 
 def _over_hole(state: State, sample: Sample) -> State:
@@ -176,7 +181,8 @@ def _over_hole(state: State, sample: Sample) -> State:
     latches = {name: rested(latch) for name, latch in state.latches.items()}
     newest_s = max((at_s for at_s, _ in state.trend.points), default=sample.at_s)
     is_ahead = max(newest_s, state.trend.stray_s or newest_s) > sample.at_s
-    return State(Spindle(), Trend() if is_ahead else state.trend, state.zone, latches)
+    cut = Evidence(noise_pct2=state.cut.noise_pct2, misled=state.cut.misled)
+    return State(Spindle(), Trend() if is_ahead else state.trend, state.zone, latches, cut)
 
 
 def _zone(config: Config, before: Zone | None, moves: Motion, found: Known) -> tuple[Zone | None, str]:
@@ -244,7 +250,7 @@ def _utc(at_s: float) -> str:
 _INFERRED = Provenance.INFERRED
 PROCESSOR = Processor(
     name="rules",
-    version=1,
+    version=2,
     inputs=frozenset({ANOMALY}).union(*(rule.reads for rule in RULES)),
     outputs=(
         *(OutputSpec(rule.metric, DataType.BOOLEAN, None, rule.meaning, _INFERRED, is_alarm=True) for rule in RULES),

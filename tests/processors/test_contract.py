@@ -13,6 +13,7 @@ from pydantic import TypeAdapter
 
 from processors.actions import Action, DeadLetter, PlainOutput, Publish, Remove
 from processors.config import Configuration, read_tables
+from processors.contract import Output
 from processors.description import Description, Role
 from processors.discovery import AnyProcessor, discover, modules, sample_configuration
 from processors.running.engine import Engine
@@ -38,6 +39,11 @@ def _day() -> list[HostEvent]:
     unknown = [data(90.0, spindle_load_pct=None), data(95.0, spindle_load_pct=31.0), data(97.0, tool_number=2)]
     again = [death(100.0), birth(130.0, spindle_rpm=0.0, spindle_load_pct=0.0, ambient_temp_c=21.6, tool_number=2)]
     return [start, *cuts, *unknown, *again, data(150.3, spindle_rpm=100.0)]
+
+
+def test_nulls_of_many_names_say_the_same_reason_in_order() -> None:
+    one, other = Output.nulls(("twin/b", "twin/a"), "the feed is unknown")
+    assert (one, other) == (Output.null("twin/b", "the feed is unknown"), Output.null("twin/a", "the feed is unknown"))
 
 
 def test_the_processors_of_the_first_release_are_found() -> None:
