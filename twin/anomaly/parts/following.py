@@ -24,7 +24,17 @@ from twin.anomaly.parts.moment import (
     operation_begun,
     section_at,
 )
-from twin.anomaly.parts.operation import TICKS_MIN, TOGETHER, Gathered, begun_operation, both, clipped, gathered, tested, together
+from twin.anomaly.parts.operation import (
+    TICKS_MIN,
+    TOGETHER,
+    Gathered,
+    begun_operation,
+    both,
+    clipped,
+    gathered,
+    statistic,
+    together,
+)
 from twin.anomaly.parts.own import NEVER, Ended, Own, tool_of, usual_of
 from twin.anomaly.parts.quantity import TURNS_RPM_MIN
 from twin.anomaly.parts.residuals import felt_still, idle_of, residuals
@@ -123,7 +133,7 @@ def _of_cuts(model: PartsModel, own: Own, sums: Gathered) -> list[tuple[float, .
         if not is_levelled:
             found.append(())
             continue
-        t = tested(sums.total[at], sums.weight[at], variance * over * over, alike)
+        t = statistic(sums.total[at], sums.weight[at], variance * over * over, alike)
         found.append((t, together(t, own.past, at), both(t, last[at])))
     return found
 

@@ -20,7 +20,7 @@ HELD_SHARE_MAX = 0.3
 SKIPPED_MAX = 5
 YOUNG_PARTS = 3
 """An operation that so few parts know is learned also where it is suspicious. A part that alarms in it is the odd one, or the
-parts before are: the next one is learned, whatever alarms."""
+parts before are: when the next one alarms too, these are forgotten, and it is learned."""
 OPERATIONS_OF_PART_MAX = 40
 TICKS_MIN = 3
 CUT_SHARE_MIN = 0.3
@@ -125,6 +125,8 @@ def _sections_learned(model: PartsModel, own: Own, ended: Ended) -> Own:
     usual = usual_of(model, own, place.key)
     if usual is None and (not place.is_whole or len(own.usual) >= OPERATIONS_MAX):
         return own
+    if usual is not None and own.odd_parts and usual.parts < YOUNG_PARTS:
+        usual = usual._replace(parts=0, told=((0,) * len(plan.kinds),) * len(usual.marks))
     merged = _merged(ended, 0 if usual is None else len(usual.marks))
     if place.is_whole and place.forming:
         usual, merged = _with_sections(usual, ended, merged, plan.kinds, model.tick_s)

@@ -53,10 +53,10 @@ def gathered(
     )
 
 
-def tested(n: float, s: float, variance: float, alike: float) -> float:
+def statistic(n: float, s: float, variance: float, alike: float) -> float:
     """Return t.
 
-    >>> round(tested(40.0, 20.0, 0.5, 4.0), 2)
+    >>> round(statistic(40.0, 20.0, 0.5, 4.0), 2)
     2.39
     """
     return n / sqrt(s * (variance * s + alike)) if s > 0.0 else 0.0

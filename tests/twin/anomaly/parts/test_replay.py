@@ -113,6 +113,27 @@ def test_a_new_program_is_judged_from_its_second_part() -> None:
     assert highest(shop.recorded(4, 7, program="O2"), 2) < rule().threshold
 
 
+def test_a_program_whose_first_part_was_the_odd_one_is_learned_all_the_same() -> None:
+    """The second part alarms and is not learned; when the third shows the same, it is the first that was odd."""
+    odd = shop.recorded(8, 7, shop.in_part(0, load=0.5, vibration=0.5), program="O2")
+    alarmed = replayed([model()], [odd], [rule()]).is_alarm[:, 0].reshape(8, shop.PART_TICKS).any(axis=1)
+    assert alarmed[1]
+    assert not alarmed[6:].any()
+
+
+def test_a_floor_that_shakes_is_no_fault() -> None:
+    """The same energy on a machine that mills and on one that stands; on one alone it is a fault."""
+
+    def shaken(part: int, row: shop.Row) -> shop.Row:
+        return {**row, "vibration": (row["vibration"] ** 2 + 0.25**2) ** 0.5} if part == 3 else row
+
+    models = fit([shop.recorded(PARTS, seed=seed) for seed in (1, 2, 3)])
+    part = slice(3 * shop.PART_TICKS, 4 * shop.PART_TICKS)
+    together = replayed(models, [shop.recorded(5, seed, shaken) for seed in (9, 10, 11)]).scores[part]
+    alone = replayed(models, [shop.recorded(5, 9, shaken), *(shop.recorded(5, seed) for seed in (10, 11))]).scores[part]
+    assert np.nanmax(alone[:, 0]) > 1.5 * np.nanmax(together)
+
+
 def test_a_new_program_is_judged_in_its_first_part_by_the_twin() -> None:
     """A first part that takes half as much again as expected is found, one as expected is not."""
 
