@@ -10,10 +10,7 @@ with a fault of its own explains nothing to the others; of two it is the mean.
 
 from collections.abc import Sequence
 from math import exp, log, sqrt
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from twin.anomaly.parts.own import Own
+from typing import Protocol
 
 SHAKEN_S, HARDER_S = 4.0, 8.0
 SHAKEN_FRESH_S, HARDER_FRESH_S = 5.0, 30.0
@@ -29,6 +26,22 @@ NOISE_LN = 0.05
 STILL_LEAST = 1e-4
 LEARNED_MAX = 0.02
 """A tick at which the peers share more of a ln ratio is no part's own, and teaches nothing."""
+
+
+class Feels(Protocol):
+    """A machine that tells its peers what it feels, as its state has it (`own.py`)."""
+
+    @property
+    def felt(self) -> tuple[tuple[float, float], ...]:
+        """Of each signal: energy and usual² of a vibration, sum and weight of a load."""
+
+    @property
+    def felt_at(self) -> int:
+        """Tick at which a vibration was last felt while the spindle stood."""
+
+    @property
+    def told_at(self) -> tuple[int, ...]:
+        """Tick at which each signal was last told of in a cut."""
 
 
 def felt_shares(tick_s: float) -> tuple[float, float]:
@@ -49,7 +62,7 @@ def harder_after(before: tuple[float, float], share: float, change: float, tells
     return total + share * (change - total), weight + share * (tells - weight)
 
 
-def shaken(peers: "Sequence[Own]", at: int, oldest: int) -> float:
+def shaken(peers: Sequence[Feels], at: int, oldest: int) -> float:
     """Return the energy that a machine may feel as its peers do, as the peers feel it; at: of the vibration among the signals."""
     total = weights = 0.0
     for peer in peers:
@@ -62,7 +75,7 @@ def shaken(peers: "Sequence[Own]", at: int, oldest: int) -> float:
     return total / weights if total > 0.0 else 0.0
 
 
-def harder(peers: "Sequence[Own]", at: int, oldest: int) -> float:
+def harder(peers: Sequence[Feels], at: int, oldest: int) -> float:
     """Return the change of the cut that peers share, ln; at: of the load among the signals."""
     fresh = [peer for peer in peers if peer.told_at[at] >= oldest and peer.felt[at][1] >= TOLD_MIN]
     changes = sorted([own_shift(peer.felt[at]) for peer in fresh])
@@ -79,7 +92,7 @@ def own_shift(felt: tuple[float, float]) -> float:
     return felt[0] / (felt[1] + LEAST_TOLD)
 
 
-def gain_of(pairs: "Sequence[tuple[float, float]]") -> float:
+def gain_of(pairs: Sequence[tuple[float, float]]) -> float:
     """Return how many times as much a machine is shaken as its peers, from pairs of the energies that it and they feel.
 
     It is what nine in ten ticks stay below at which the peers feel something; SHAKEN_GAIN where there are too few of these.
@@ -97,7 +110,7 @@ def shift_of(energy: float, usual: float, floor: float) -> float:
     """Return by how much a shared energy raises the ln ratio of a vibration that is usually so large.
 
     >>> round(shift_of(0.04, 0.1, 0.05), 2)
-    0.57
+    0.6
     """
     usual = usual if usual > 0.0 else 0.0
     return log((sqrt(usual * usual + energy) + floor) / (usual + floor))
