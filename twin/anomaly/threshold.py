@@ -8,6 +8,8 @@ base u0 that has enough of them are its clusters, with maxima M of the dwell sco
 * Else, from peaks over u0 (Davison and Smith 1990):  rate(u) = rate(u0) · (1 + ξ (u − u0) / σ)^(−1/ξ)
   The posterior of (σ, ξ) on a grid, ξ ~ N(0, 0.25²), rate(u0) ~ Gamma; the threshold is where the mean of rate(u) is what was
   asked for, so that a fleet has what was asked for. Beyond the largest score seen it is an extrapolation, and says so.
+* Alarms that are waited for (`calm_ticks`) are fewer than their clusters; where a stretch has too few of them, it is fitted as if
+  none were waited for, which asks for more.
 * The interval has 90 %: Poisson where it was read off (Garwood 1936), else of the posterior. Where alarms come in bunches from
   block to block, all counts are divided by their index of dispersion first, which widens it.
 * Too short a stretch is an error and no threshold; so are too few clusters, unless an alert is asked for in the stretch itself:
@@ -126,6 +128,8 @@ def fit_threshold(
         return [_episodes(stream, threshold, clear_fraction)[1] for stream in streams]
 
     found = _base(streams, lambda threshold: sum(map(len, maxima(threshold))), max(CLUSTERS, math.ceil(2.0 * asked)))
+    if calm_ticks and (found is None or found[1] < CLUSTERS_MIN):
+        return fit_threshold(scores, gated, tick_s, dwell_ticks, clear_fraction, alerts_per_week)
     if found is None and asked < 1.0:
         raise ModelError(f"no score in {hours:.1f} h is above 0, so no threshold can be fitted on them: calibrate on more hours")
     if found is None:

@@ -59,6 +59,21 @@ def test_a_longer_dwell_needs_a_lower_threshold() -> None:
     assert thresholds == sorted(thresholds, reverse=True)
 
 
+def test_alarms_that_are_waited_for_need_a_lower_threshold_and_keep_their_rate() -> None:
+    """Scores that stay alike for hours: half an hour's wait makes one alarm of several."""
+    scores, shut = stream(4.0, 0.99, 5), np.zeros(4 * WEEK, dtype=bool)
+    several, one = (fit_threshold([scores], [shut], TICK_S, 3, 0.8, 20.0, calm) for calm in (0, 180))
+    assert one.threshold < several.threshold
+    later = stream(20.0, 0.99, 1005)
+    on = is_alarm(AlarmRule(one.threshold, 3, 0.8, 180), later, np.zeros(len(later), dtype=bool))
+    assert len(onsets(on)) / 20.0 == pytest.approx(20.0, rel=0.4)
+
+
+def test_a_short_stretch_is_fitted_as_if_no_alarm_were_waited_for() -> None:
+    scores, shut = stream(0.05, 0.9, 6), np.zeros(int(0.05 * WEEK), dtype=bool)
+    assert fit_threshold([scores], [shut], TICK_S, 3, 0.8, 1.0, 600) == fit_threshold([scores], [shut], TICK_S, 3, 0.8, 1.0)
+
+
 def test_fewer_alerts_need_a_higher_threshold() -> None:
     scores = stream(1.0, 0.5, 4)
     thresholds = [fitted(scores, asked).threshold for asked in (100.0, 20.0, 10.0, 1.0, 0.1)]
