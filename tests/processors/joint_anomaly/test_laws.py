@@ -117,7 +117,9 @@ def expected(shift: Shift, unheard: dict[str, range] | None = None) -> Expected:
     z = raw if config.common_mode is Method.SOURCE else (raw + 0.2) / 0.1
     rule = CommonModeRule(config.common_mode, config.common_mode_factor, config.exclude_gated_peers)
     adjusted, common = adjust_frames(rule, z, gated)
-    alarm = is_alarm(AlarmRule(0.1, config.dwell_ticks, config.clear_fraction, round(config.calm_s / config.tick_s)), adjusted, gated)
+    alarm = is_alarm(
+        AlarmRule(0.1, config.dwell_ticks, config.clear_fraction, round(config.calm_s / config.tick_s)), adjusted, gated
+    )
     return Expected(raw, adjusted, common, gated, alarm)
 
 

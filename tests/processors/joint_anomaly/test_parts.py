@@ -44,7 +44,10 @@ def models() -> tuple[AnomalyModel, ...]:
 def cell(*machines: str, **table: Any) -> Engine:
     by_name = dict(zip(machines, models(), strict=False))
     configuration = Configuration(
-        Config, {"threshold": THRESHOLD, "tail_s": 2.0, "calm_s": 0.0} | table, name="joint_anomaly", reads=lambda one: scorings(one, by_name)
+        Config,
+        {"threshold": THRESHOLD, "tail_s": 2.0, "calm_s": 0.0} | table,
+        name="joint_anomaly",
+        reads=lambda one: scorings(one, by_name),
     )
     return Engine(PROCESSOR, configuration)
 

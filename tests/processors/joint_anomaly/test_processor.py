@@ -41,7 +41,9 @@ class PlainModel:
 def engine_with(models: Mapping[str, Any], table: dict[str, Any]) -> Engine:
     """An engine whose machines have these models; judged by the published rule, where the table says nothing else."""
     table = {"common_mode": "source"} | table
-    configuration = Configuration(Config, {"calm_s": 0.0} | table, name="joint_anomaly", reads=lambda config: scorings(config, models))
+    configuration = Configuration(
+        Config, {"calm_s": 0.0} | table, name="joint_anomaly", reads=lambda config: scorings(config, models)
+    )
     return Engine(PROCESSOR, configuration)
 
 
