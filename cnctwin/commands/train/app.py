@@ -34,6 +34,7 @@ def train_anomaly(
     ] = 1.0,
     tick_s: Annotated[float, typer.Option(min=0.001, max=3600.0, help="A score at each multiple of this")] = 1.0,
     dwell: Annotated[int, typer.Option(min=1, max=3600, help="Ticks in a row that are an alarm")] = 3,
+    calm_s: Annotated[float, typer.Option(min=0.0, max=86_400.0, help="Judged time without it that ends an alarm")] = 600.0,
     common_mode: Annotated[
         str,
         typer.Option(
@@ -70,6 +71,7 @@ def train_anomaly(
         train_share=train_share,
         tick_s=tick_s,
         dwell_ticks=dwell,
+        calm_s=calm_s,
         common_mode=training.Method(common_mode),
         common_mode_factor=common_mode_factor,
         exclude_gated_peers=exclude_gated_peers,

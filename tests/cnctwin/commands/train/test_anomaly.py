@@ -43,7 +43,7 @@ def named(folder: Path, names: str = "abc") -> list[str]:
 
 
 def trained(folder: Path, **asked: Any) -> tuple[Calibrated, ...]:
-    asked = {"alerts_per_week": OFTEN, "common_mode": Method.SOURCE, **asked}
+    asked = {"alerts_per_week": OFTEN, "common_mode": Method.SOURCE, "calm_s": 0.0, **asked}
     given = TrainingSettings(features=FEATURES, detector=SMALL, **asked)
     return calibrated_cell(recorded_cell(named(folder), FEATURES, given.tick_s), given)
 
@@ -61,6 +61,8 @@ QUICK = [
     "4000",
     "--common-mode",
     "source",
+    "--calm-s",
+    "0",
 ]
 
 
@@ -72,6 +74,8 @@ def test_what_it_writes_is_what_the_processor_takes(folder: Path, tmp_path: Path
     assert len(PROCESSOR.configured(table).read) == 3
     with pytest.raises(ConfigurationError, match="dwell_ticks"):
         PROCESSOR.configured({**table, "dwell_ticks": 5})
+    with pytest.raises(ConfigurationError, match="calm_s"):
+        PROCESSOR.configured({**table, "calm_s": 60.0})
 
 
 def test_what_is_usual_in_each_operation_goes_with_the_model(folder: Path, tmp_path: Path) -> None:
