@@ -3,9 +3,10 @@
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.special import stdtrit
 
 from twin.wear.curve import LINE
-from twin.wear.fast import FAST_LIVES, WORN, is_faster, uses_to
+from twin.wear.fast import FAST_LIVES, WORN, is_faster, t_limit, uses_to
 from twin.wear.life import Life
 from twin.wear.machine import Wear
 from twin.wear.status import status_of
@@ -83,3 +84,8 @@ def test_what_is_not_known_has_a_reason(count: int, is_whole: bool, has_stepped:
     found = status_of("7", tool, Wear(), Terms())
     assert reason in found.why_not_fast
     assert found.is_fast is (None if reason else False)
+
+
+def test_the_limit_is_that_of_students_t() -> None:
+    for degrees in range(2, 40):
+        assert t_limit(degrees, 1e-3) == pytest.approx(float(stdtrit(degrees, 0.999)), rel=1e-6)
