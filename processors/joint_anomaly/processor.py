@@ -292,7 +292,7 @@ def _specs() -> tuple[OutputSpec, ...]:
 
 PROCESSOR = CellProcessor(
     name="joint_anomaly",
-    version=2,
+    version=3,
     inputs=NUMBERS | CONTEXT_INPUTS | {CLOCK_OFFSET, STAMP_CLOCK, *CONTEXT, DESCRIBED_BY} | MOMENT_INPUTS,
     outputs=_specs(),
     config=Config,

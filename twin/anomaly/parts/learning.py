@@ -2,6 +2,7 @@
 
 At the end of an operation its levels of wear and material are followed, unless its score was suspicious for long. At the end of
 the part the sections of all its operations are learned. An alarm takes back the levels to those at the beginning of its part.
+Where fewer than three parts know an operation, a second part that alarms in it says that those before were the odd ones.
 """
 
 from twin.anomaly.parts.following import with_levels

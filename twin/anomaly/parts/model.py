@@ -4,9 +4,9 @@ import bisect
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated
+from typing import Annotated, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from twin.anomaly.calibration import Finite, NotNegative, Positive, Record
 from twin.anomaly.common_features import MEMORY_S
@@ -92,6 +92,14 @@ class PartsModel(Record):
     follows_parts: bool = True
     step: tuple[NotNegative, ...] = ()
     gain: tuple[Positive, ...] = ()
+
+    @model_validator(mode="after")
+    def _has_all_tails(self) -> Self:
+        wanted = len(self.signals) * scales.COUNT
+        for name, tails in (("up", self.up), ("down", self.down)):
+            if tails and len(tails) != wanted:
+                raise ValueError(f"{name} has {len(tails)} tails for {len(self.signals)} signals, {wanted} are needed: train it again")
+        return self
 
     def idle_at(self, rpm: float) -> float:
         """Return what the spindle takes idle, %.

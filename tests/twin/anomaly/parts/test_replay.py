@@ -202,6 +202,11 @@ def test_a_record_says_how_much_more_load_a_cut_took() -> None:
     assert {record.reference for record in records} == {"parts"}
 
 
+def test_a_model_with_the_tails_of_other_scales_is_refused() -> None:
+    with pytest.raises(ValueError, match="up has 16 tails for 4 signals, 20 are needed"):
+        model().changed(up=(1.0,) * 16)
+
+
 def test_a_recording_in_which_nothing_works_is_refused() -> None:
     """Training names the machine."""
     one = shop.recorded(2, 1)
