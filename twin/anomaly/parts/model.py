@@ -98,7 +98,9 @@ class PartsModel(Record):
         wanted = len(self.signals) * scales.COUNT
         for name, tails in (("up", self.up), ("down", self.down)):
             if tails and len(tails) != wanted:
-                raise ValueError(f"{name} has {len(tails)} tails for {len(self.signals)} signals, {wanted} are needed: train it again")
+                raise ValueError(
+                    f"{name} has {len(tails)} tails for {len(self.signals)} signals, {wanted} are needed: train again"
+                )
         return self
 
     def idle_at(self, rpm: float) -> float:
