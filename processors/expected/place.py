@@ -25,9 +25,9 @@ BEYOND = 1.05
 DT_S_MAX = 10.0
 ANYWHERE_MM = 1e9
 BLOCK_OFF_S, TIME_OFF = 0.05, 0.005
-"""How far a line's time may be off the plan: for itself, and as a share of it."""
+"""The most that a line's time is off the plan: for itself, and as a share of it."""
 BLOCK_S_MAX, BLOCK_OVER, BLOCK_PRIOR = 0.3, 400.0, 20.0
-"""What a line may take beyond the plan; over how many lines that is learned, and how many stand for the plan at first."""
+"""The most that a line takes beyond the plan; the lines over which it is learned; those that stand for the plan at first."""
 STRAY_S = 2.0
 LINES_MAX, BETWEEN_S_MAX = 6, 2.0
 """Over more lines, or lines that take longer, nothing is concluded from the line before."""

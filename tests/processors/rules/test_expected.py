@@ -68,7 +68,7 @@ def test_what_is_no_fault_raises_nothing(case: str, samples: list[HostEvent]) ->
 
 
 def test_a_light_cut_is_told_too_and_later() -> None:
-    """Of 3 %, with a usual ratio of 1.7: m is 3.06 %, its Λ a third of what decides in a second."""
+    """A cut of 3 % with a usual ratio of 1.7 has an m of 3.06 %; its Λ is a third of what decides in a second."""
     (at_s,) = raised(
         fed(cutting(), *(cut(21.0 + k, 0.1 * (k % 2), 3.0, 3.1, **{"twin/expected_ratio": 1.7}) for k in range(9))), BROKEN
     )

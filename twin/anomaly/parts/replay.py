@@ -36,7 +36,6 @@ MATURE_PARTS, MATURE_SHARE = 8, 0.3
 SPREAD_PARTS_MIN = 2
 LOOSE_TAILS = (6.0, 3.0, 8.0, 6.0, 5.0)
 """Tails so wide that only what stands out is kept from being learned, before the real ones are known."""
-CUT = 1
 STEADY_QUANTILE = 0.35
 """About half of the sections are edges, which spread further."""
 
@@ -189,7 +188,7 @@ def _with_spreads(model: PartsModel, own: Own, seen: "list[Seen]") -> PartsModel
         if known:
             spread[at] = max(float(np.quantile(known, STEADY_QUANTILE)) ** 0.5, SPREAD_LEAST[Kind(kind)])
         elif kind == Kind.TEMPERATURE and len(rows):
-            away = rows[:, at * scales.COUNT + CUT] * LOOSE_TAILS[CUT]
+            away = rows[:, at * scales.COUNT + scales.CUT] * LOOSE_TAILS[scales.CUT]
             spread[at] = max(float(np.sqrt(np.mean(away**2))) * spread[at], SPREAD_LEAST[Kind(kind)])
     return model.changed(spread=tuple(spread), gain=_gains(model, seen))
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 SCALES = ("seconds", "cut", "operation", "part", "tool")
-SECONDS, CUT, OPERATION, PART, TOOL = range(5)
+CUT, OPERATION = 1, 2
 TAUS_S = (3.0, 30.0, 300.0)
 COUNT = len(SCALES)
 CLIP = 12.0

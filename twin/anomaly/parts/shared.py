@@ -1,4 +1,4 @@
-"""What the machines of a hall feel alike at a tick: a floor that shakes all, a coolant whose pressure falls.
+"""The disturbances that all machines of a hall feel at a tick: a floor that shakes, a coolant whose pressure falls.
 
     vibration    E = mean over 4 s of (v² − usual²)          g²; a shaken floor adds the same to quiet and to loud machines
     load         c = mean over 8 s of the change of the cut    ln; a lubricant that fails makes every cut harder
@@ -22,7 +22,7 @@ SHAKEN_GAIN, HARDER_GAIN = 2.0, 3.0
 GAIN_QUANTILE, GAINS = 0.9, (1.5, 6.0)
 SHOWS_G2, TICKS_MIN = 0.002, 30
 NOISE_LN = 0.05
-"""What peers feel of a load by chance."""
+"""The change of a load that chance alone shows."""
 STILL_LEAST = 1e-4
 LEARNED_MAX = 0.02
 """A tick at which the peers share more of a ln ratio is no part's own, and teaches nothing."""
@@ -33,7 +33,7 @@ class Feels(Protocol):
 
     @property
     def felt(self) -> tuple[tuple[float, float], ...]:
-        """Of each signal: energy and usual² of a vibration, sum and weight of a load."""
+        """Two figures of each signal: energy and usual² of a vibration, sum and weight of a load."""
 
     @property
     def felt_at(self) -> int:

@@ -29,7 +29,7 @@ def test_a_healthy_operation_has_a_deviation_of_one_at_any_tick(ticks: int) -> N
 
 
 def test_a_change_stands_out_by_what_the_levels_leave_in_doubt() -> None:
-    """In a long operation a change of three deviations of the levels is one of three deviations."""
+    """A change of three deviations of the levels is one of three deviations, once the operation is long."""
     assert np.mean(figures(200, 400, change=3.0 * LEVELS)) == pytest.approx(3.0, abs=0.35)
 
 
