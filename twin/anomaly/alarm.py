@@ -6,7 +6,7 @@
 A dwell of k ticks is a running minimum over k ticks that reaches the threshold (`dwell_score`); thresholds are fitted on that. A
 tick that is gated or has no score is no evidence, neither that a fault came nor that it went: it interrupts the first count and
 the second one waits. So a fault that stands through a tool change is one alarm, one that comes in a gate is one `dwell_ticks`
-after it, and one that shows in every part anew is one alarm where it is waited for a part.
+after it, and one that shows in every part is one alarm where `calm_ticks` is longer than a part.
 """
 
 from dataclasses import dataclass
