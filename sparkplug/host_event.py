@@ -28,7 +28,8 @@ class HostEvent(NamedTuple):
 
     `names` are those of a DATA event's readings: the same tuple for all messages of one layout, so that it can be recognised by
     identity. It is () where it is not given, and where a reading is historical. Where it is given, `oldest_ms` and `newest_ms`
-    are those of the readings' time stamps.
+    are those of the readings' time stamps. `seq` is the number of the message that the event comes from, -1 where it comes from
+    none, or the node's death.
     """
 
     kind: EventKind
@@ -44,3 +45,4 @@ class HostEvent(NamedTuple):
     newest_ms: int = 0
     refused: int = 0
     refusal: Refusal | None = None
+    seq: int = -1

@@ -259,7 +259,7 @@ class HostSession:
         watched.awaiting = {device for device, owner in picture.devices.items() if owner.online}
         self._requests.born(picture.node)
         self.counts["births"] += 1
-        born = HostEvent(EventKind.BIRTH, picture.node, None, stamp or now_ms, readings)
+        born = HostEvent(EventKind.BIRTH, picture.node, None, stamp or now_ms, readings, seq=message.seq)
         return [*self._hole(watched, lost, now_ms, ask=False), born, *refused]
 
     def _node_death(self, watched: Watched, message: Any, now_ms: int) -> list[HostEvent]:
@@ -318,7 +318,7 @@ class HostSession:
             self.counts["deaths"] += 1
             if watched.awaiting and device is not None:
                 watched.awaiting.discard(device)
-            return _death(picture.node, device, known, stamp, "device offline")
+            return _death(picture.node, device, known, stamp, "device offline", seq=message.seq)
         trimmed = self._gate.trim(message, len(payload))
         data, complete = picture.read_data(known, message, message.timestamp or now_ms, may_tell_quality=tells_quality(payload))
         readings, refused_part = self.admission.kept(picture.node, device, data, trimmed, now_ms)
@@ -332,7 +332,8 @@ class HostSession:
             self._route(watched, topic, known).learn(payload, message, readings, names)
         self.counts["data"] += 1
         stamps_ms = [reading.timestamp_ms for reading in readings] if names else [0]
-        event = HostEvent(_DATA, picture.node, device, stamp, readings, "", "", b"", names, min(stamps_ms), max(stamps_ms))
+        span_ms = min(stamps_ms), max(stamps_ms)
+        event = HostEvent(_DATA, picture.node, device, stamp, readings, "", "", b"", names, *span_ms, seq=message.seq)
         return [event, *refused_part]
 
     def _device_birth(self, watched: Watched, received: Received, device: str, stamp: int, now_ms: int) -> list[HostEvent]:
@@ -363,7 +364,7 @@ class HostSession:
         owner.replace(readings if refused else ())
         self.counts["births"] += 1
         self.counts["sloppy_aliases"] += owner.aliases_shared
-        return [HostEvent(EventKind.BIRTH, node, device, stamp, readings), *refused]
+        return [HostEvent(EventKind.BIRTH, node, device, stamp, readings, seq=message.seq), *refused]
 
     def _route(self, watched: Watched, topic: Topic, owner: Owner) -> Route:
         """Return the route of a data topic whose owner was born."""
@@ -385,5 +386,7 @@ class HostSession:
         return [HostEvent(EventKind.HOLE, node, None, now_ms, detail=f"{lost} messages of {node} are lost")]
 
 
-def _death(node: NodeId, device: str | None, owner: Owner, stamp: int, reason: str) -> list[HostEvent]:
-    return [HostEvent(EventKind.DEATH, node, device, stamp, owner.wither(stamp, reason), reason)] if owner.online else []
+def _death(node: NodeId, device: str | None, owner: Owner, stamp: int, reason: str, *, seq: int = -1) -> list[HostEvent]:
+    if not owner.online:
+        return []
+    return [HostEvent(EventKind.DEATH, node, device, stamp, owner.wither(stamp, reason), reason, seq=seq)]

@@ -249,7 +249,7 @@ class NodePicture:
         return readings, complete
 
 
-class _Told(NamedTuple):
+class Told(NamedTuple):
     """The properties of a metric, and the quality and unit in them."""
 
     properties: PropertySet
@@ -258,18 +258,19 @@ class _Told(NamedTuple):
     reason: str | None
 
 
-_NOTHING_TOLD = _Told({}, None, Quality.GOOD, None)
-_told_before: dict[bytes, _Told] = {}  # by their bytes: machines of one kind declare the same units and meanings
+_NOTHING_TOLD = Told({}, None, Quality.GOOD, None)
+_told_before: dict[bytes, Told] = {}  # by their bytes: machines of one kind declare the same units and meanings
 
 
-def _told(message: Any) -> _Told:
+def told_of(message: Any) -> Told:
+    """Return what a property set says; sets of the same bytes are read once."""
     raw: bytes = message.SerializeToString()
     told = _told_before.get(raw)
     if told is None:
         properties = read_properties(message)
         unit = properties.get(UNIT_PROPERTY)
         of_birth = None if unit is None or unit.value is None else str(unit.value)
-        told = _Told(properties, of_birth, *quality_of(properties))
+        told = Told(properties, of_birth, *quality_of(properties))
         if len(raw) <= TOLD_BYTES_MAX:
             if len(_told_before) >= TOLD_MAX:
                 _told_before.clear()
@@ -291,7 +292,7 @@ def _declared(metric: Any, timestamp_ms: int) -> tuple[int | None, Binding | Non
     code = metric.datatype
     datatype = datatype_of(code) if code or metric.HasField("datatype") else DataType.UNKNOWN
     value = read_value(metric, datatype)
-    told = _told(metric.properties) if metric.HasField("properties") else _NOTHING_TOLD
+    told = told_of(metric.properties) if metric.HasField("properties") else _NOTHING_TOLD
     stamp_ms = metric.timestamp
     if not stamp_ms and not metric.HasField("timestamp"):
         stamp_ms = timestamp_ms

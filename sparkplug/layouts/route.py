@@ -47,7 +47,7 @@ class Route:
             names, oldest_ms, newest_ms = (), 0, 0
         else:
             owner.take_present(names, readings)
-        event = (_DATA, picture.node, self.device, stamp_ms, readings, "", "", b"", names, oldest_ms, newest_ms, 0, None)
+        event = (_DATA, picture.node, self.device, stamp_ms, readings, "", "", b"", names, oldest_ms, newest_ms, 0, None, seq)
         return _NEW(HostEvent, event)
 
     def learn(self, payload: bytes, message: Any, readings: tuple[Reading, ...], names: tuple[str, ...]) -> None:
