@@ -55,12 +55,12 @@ class Engine:
         self._picks = Picks(processor.signals, processor.wakes)
         self._inputs = self._picks.inputs
         self._roster = Roster(processor, configuration, self._picks, self.counts, self.ledger, machines_max=machines_max)
-        self._machines, self._units = self._roster.machines, self._roster.units
-        self._silences = Silences(lateness_margin_s)
+        self._machines, self.known_units = self._roster.machines, self._roster.units
+        self.silences = Silences(lateness_margin_s)
         self._changed: dict[str, None] = {}
         self._codec = SnapshotCodec(processor)
         self._emitted_before = 0
-        self._undescribed: set[str] = set()  # machines whose new description waits for their next message
+        self.undescribed: set[str] = set()  # machines whose new description waits for their next message
         if before is not None:
             self._roster.described_as(before._roster)
         for unit in processor.units_at_start(configuration):
@@ -115,10 +115,10 @@ class Engine:
         machine = machine or self._machines.get(device)
         if machine is not None:
             self._changed[machine.unit.name] = None
-            self._silences.watch(machine)
+            self.silences.watch(machine)
             if is_twin_node(node.node):
                 actions = actions + machine.live.hear_challengers(event.readings)
-            elif device in self._undescribed:
+            elif device in self.undescribed:
                 actions = actions + self._take_up(machine)
         return actions
 
@@ -130,7 +130,7 @@ class Engine:
         machine = self._machines.get(device)
         if machine is None or (take := machine.ways.get(node)) is None:
             return None
-        ledger, changed, unit, lane, silences = self.ledger, self._changed, machine.unit.name, machine.live, self._silences
+        ledger, changed, unit, lane, silences = self.ledger, self._changed, machine.unit.name, machine.live, self.silences
 
         def way(message: Stream, wall_s: float) -> list[Action]:
             actions, fates = take(message, wall_s)
@@ -192,7 +192,7 @@ class Engine:
 
     def _of_no_machine(self, sample: Sample, at_ms: int) -> list[Action]:
         actions: list[Action] = []
-        for unit in self._units.values():
+        for unit in self.known_units.values():
             before = unit.live.state
             actions += unit.live.take(sample._replace(cell=unit.live.cell), at_ms)[0]
             if unit.live.state is not before:
@@ -202,12 +202,12 @@ class Engine:
     def silence(self, wall_s: float) -> list[Action]:
         """No event waits: give ticks up to the present, less the margin. Call it only when the queue is empty."""
         actions: list[Action] = []
-        for machine in self._silences.due(wall_s):
+        for machine in self.silences.due(wall_s):
             clock_ms = machine.live.clock_ms
-            actions += machine.live.silence(wall_s, self._silences.margin_s)
+            actions += machine.live.silence(wall_s, self.silences.margin_s)
             if machine.live.clock_ms != clock_ms:
                 self._changed[machine.unit.name] = None
-            self._silences.watch(machine)
+            self.silences.watch(machine)
         return actions
 
     # Descriptions.
@@ -230,12 +230,12 @@ class Engine:
             if known is not None:
                 known.ways.clear()
                 known.live.is_challenged |= self._roster.challenger(machine) is not None
-                self._undescribed.add(machine)
+                self.undescribed.add(machine)
         return [] if known is None or known.is_online else self._take_up(known)
 
     def _take_up(self, machine: Machine) -> list[Action]:
         """Fold with the descriptions that hold now."""
-        self._undescribed.discard(machine.name)
+        self.undescribed.discard(machine.name)
         return self._roster.take_up(machine)
 
     # Snapshots.
@@ -254,7 +254,7 @@ class Engine:
         except SnapshotError:
             self.counts.snapshots_rejected += 1
             raise
-        self._units[name] = unit
+        self.known_units[name] = unit
         self._machines.update(unit.machines)
         for machine in [one for one in unit.machines if self._roster.unit_name(one) != name]:
             self._roster.forget(machine)  # it has been given to another cell since
@@ -264,7 +264,7 @@ class Engine:
         """Restore, to go on at the very message at which the snapshot was taken: a replay's start. A machine that was online
         still is, by the nodes whose births were heard: `offers` has their signals by machine and node; the first owns."""
         name = self.restore(payload)
-        for machine in self._units[name].machines.values():
+        for machine in self.known_units[name].machines.values():
             own = offers.get(machine.name, {})
             machine.go_on({node: names for node, names in own.items() if self._processor.listens_to(node.node)})
         return name
@@ -276,20 +276,20 @@ class Engine:
 
     def snapshot(self, name: str) -> bytes:
         """The snapshot of a unit. Raises KeyError where there is none of that name."""
-        unit = self._units[name]
+        unit = self.known_units[name]
         lanes = {machine.name: machine.live for machine in unit.machines.values()}
         late = {machine.name: machine.history for machine in unit.machines.values() if machine.history is not None}
         return self._codec.encode(name, unit.live, lanes, unit.history, late)
 
     def take_changed(self) -> list[str]:
         """The units that have moved since this was last called."""
-        changed = [name for name in self._changed if name in self._units]
+        changed = [name for name in self._changed if name in self.known_units]
         self._changed.clear()
         return changed
 
     def mark_all_changed(self) -> None:
         """The broker may have forgotten what it retained."""
-        self._changed.update(dict.fromkeys(self._units))
+        self._changed.update(dict.fromkeys(self.known_units))
 
     def bury_unborn(self, at_ms: int) -> list[Action]:
         """Machines that were restored and have not been born since are offline: say so."""

@@ -41,13 +41,13 @@ class Fold:
         "_plain",
         "_processor",
         "_quiet",
-        "_rows",
         "_step",
         "cell",
         "challenger",
         "emissions",
         "is_history",
         "name",
+        "rows",
         "state",
         "version",
         "wakes",
@@ -73,9 +73,9 @@ class Fold:
         self._plain = plain_topics(processor.name, processor.plain)
         self.wakes = processor.wakes
         self.version, self._config = Given("", processor.given(configuration, name)) if given is None else given
-        self._rows: dict[str, Row] = {}
+        self.rows: dict[str, Row] = {}
         self._quiet: Outputs = ()  # the outputs that were news of nothing, and would be of nothing again
-        self.cell: Mapping[str, Row] = MappingProxyType(self._rows if processor.is_of_cells else {})
+        self.cell: Mapping[str, Row] = MappingProxyType(self.rows if processor.is_of_cells else {})
 
     def join(self, machine: str) -> Emission:
         """A machine is known from now on; what it is told."""
@@ -85,11 +85,11 @@ class Fold:
 
     def show(self, machine: str, row: Row) -> None:
         """The machine is online: its row is to be seen by the others."""
-        self._rows[machine] = row
+        self.rows[machine] = row
 
     def hide(self, machine: str) -> None:
         """The machine is offline."""
-        self._rows.pop(machine, None)
+        self.rows.pop(machine, None)
 
     def leave(self, machine: str) -> None:
         """The machine is forgotten."""

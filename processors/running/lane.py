@@ -44,16 +44,16 @@ class Lane:
     ticking: the machine was online from clock_ms on, so that silence means that nothing changed
     births: of each edge node of the machine, the first birth that was heard since the processor was started, by its stamp: what a
         replay has to know of a life. Restored ones are of the life before, and go with the first of this one.
+    anchor_ms, anchor_wall_s: event time and the time on the wall at the newest message; held: messages that are held back
     is_challenged: the machine has a challenger, which may begin with the next message only
     owner: which node each signal of the row is taken from
     others: what the challengers of other processors say, by the names of the live twin's signals
     """
 
     __slots__ = (
-        "_anchor_ms", "_anchor_wall_s", "_counts", "_fold_in", "_gap_ms", "_held", "_inputs", "_late_ms", "_machine",
-        "_names", "_pick", "_picks", "_tick_ms", "_view", "_wakes",
-        "births", "births_are_old", "clock_ms", "emission", "fold", "is_awaited", "is_challenged", "is_restored", "is_silent",
-        "last_ms", "others", "owner", "row", "ticking",
+        "_counts", "_fold_in", "_gap_ms", "_inputs", "_late_ms", "_machine", "_names", "_pick", "_picks", "_tick_ms", "_view",
+        "_wakes", "anchor_ms", "anchor_wall_s", "births", "births_are_old", "clock_ms", "emission", "fold", "held", "is_awaited",
+        "is_challenged", "is_restored", "is_silent", "last_ms", "others", "owner", "row", "ticking",
     )  # fmt: skip
 
     def __init__(self, fold: Fold, picks: Picks, config: ProcessorConfig, machine: str, counts: Counts) -> None:
@@ -79,8 +79,8 @@ class Lane:
         self._tick_ms = max(1, round(config.tick_s * 1000))
         self._gap_ms = round(config.gap_s_max * 1000)
         self._late_ms = round(config.late_s_max * 1000)
-        self._held: list[Sequence[Reading]] = []
-        self._anchor_ms, self._anchor_wall_s = 0, 0.0
+        self.held: list[Sequence[Reading]] = []
+        self.anchor_ms, self.anchor_wall_s = 0, 0.0
 
     @property
     def state(self) -> Any:
@@ -97,7 +97,7 @@ class Lane:
         if self._inputs is None:
             self.row.update(zip(names, readings))  # noqa: B905 — as long as each other; `strict` is slower
             return self._fold(_DATA, newest_ms if clock_ms is None else clock_ms, names)
-        if clock_ms is None or self._held or oldest_ms < last_ms or newest_ms > last_ms + self._gap_ms:
+        if clock_ms is None or self.held or oldest_ms < last_ms or newest_ms > last_ms + self._gap_ms:
             return self.data(readings, wall_s)
         actions: list[Action] | None = None
         if newest_ms > clock_ms:
@@ -105,7 +105,7 @@ class Lane:
                 actions = self._pass_silence(newest_ms)
             self.clock_ms = clock_ms = newest_ms
         self.last_ms, self.is_silent = newest_ms, False
-        self._anchor_ms, self._anchor_wall_s = clock_ms, wall_s
+        self.anchor_ms, self.anchor_wall_s = clock_ms, wall_s
         if names is not self._names:
             self._names, self._pick = names, self._picks.of(names)
         taken, get, wakes = self._pick
@@ -142,9 +142,9 @@ class Lane:
         if is_of_twin:
             return self._accept(readings, self._if_news(at_ms), wall_s)
         if at_ms is not None and self.clock_ms is not None and at_ms < self.last_ms - self._late_ms:
-            self._held.append(readings)
-            return self._follow_the_clock_back(wall_s) if len(self._held) == REWIND_MESSAGES else ([], HELD)
-        if not self._held:
+            self.held.append(readings)
+            return self._follow_the_clock_back(wall_s) if len(self.held) == REWIND_MESSAGES else ([], HELD)
+        if not self.held:
             return self._accept(readings, at_ms, wall_s)
         late = self.drop_held()
         actions, fates = self._accept(readings, at_ms, wall_s)
@@ -258,26 +258,26 @@ class Lane:
 
     def drop_held(self) -> Fates:
         """Drop the messages that were held back: they were stragglers."""
-        late = (DropReason.LATE,) * len(self._held)
-        self._held.clear()
+        late = (DropReason.LATE,) * len(self.held)
+        self.held.clear()
         return late
 
     # Time.
 
     def silence(self, wall_s: float, margin_s: float) -> list[Action]:
         """No message waits: give the ticks up to the present, held back by a margin for what is still on its way."""
-        if self.ticking and self._anchor_ms and self.clock_ms is not None and not self.is_silent:
-            now_ms = self._anchor_ms + int((wall_s - self._anchor_wall_s - margin_s) * 1000)
+        if self.ticking and self.anchor_ms and self.clock_ms is not None and not self.is_silent:
+            now_ms = self.anchor_ms + int((wall_s - self.anchor_wall_s - margin_s) * 1000)
             if now_ms - self.clock_ms >= self._tick_ms or now_ms > self.last_ms + self._gap_ms:
                 return self._pass_silence(now_ms)
         return []
 
     def silent_at_s(self, margin_s: float) -> float | None:
         """The time on the wall before which `silence` has nothing to give, as things are; None where it never has."""
-        if not (self.ticking and self._anchor_ms and self.clock_ms is not None) or self.is_silent:
+        if not (self.ticking and self.anchor_ms and self.clock_ms is not None) or self.is_silent:
             return None
         due_ms = min(self.clock_ms + self._tick_ms, self.last_ms + self._gap_ms + 1)
-        return self._anchor_wall_s + margin_s + (due_ms - self._anchor_ms) / 1000
+        return self.anchor_wall_s + margin_s + (due_ms - self.anchor_ms) / 1000
 
     def _time_of(self, readings: Sequence[Reading]) -> int | None:
         """Event time of a message: its newest reading; None where it has none to believe. When time leaps, only a good value is
@@ -321,7 +321,7 @@ class Lane:
         else:
             self.last_ms = max(self.last_ms, at_ms)
         self.is_silent = False
-        self._anchor_ms, self._anchor_wall_s = self.clock_ms, wall_s
+        self.anchor_ms, self.anchor_wall_s = self.clock_ms, wall_s
         return actions
 
     def _pass_silence(self, to_ms: int) -> list[Action]:
@@ -343,8 +343,8 @@ class Lane:
         return actions
 
     def _follow_the_clock_back(self, wall_s: float) -> Folded:
-        held = list(self._held)
-        self._held.clear()
+        held = list(self.held)
+        self.held.clear()
         actions = self._jump_back(min(max(map(_timestamp_ms, readings)) for readings in held))
         fates: Fates = ()
         for readings in held:

@@ -107,7 +107,8 @@ _doubles: dict[tuple[str, str | None], bytes] = {}
 
 def _metric(reading: Reading, stamp: bytes) -> tuple[bytes, ...]:
     """Return the bytes of any metric, in parts."""
-    name, value, _, quality, unit, reason, is_historical = reading
+    name, _, _, quality, unit, reason, is_historical = reading
+    value: Any = reading.value
     kind = type(value)
     if kind is float:
         told, field = DataType.DOUBLE, _DOUBLE + pack_double(value)

@@ -160,7 +160,7 @@ def test_a_correction_that_does_harm_shows_a_loss(models: Path) -> None:
 def test_after_a_long_hole_the_means_begin_anew(models: Path) -> None:
     engine = _engine(models)
     fed(engine, *_shift(end=2 * HOUR))
-    (unit,) = engine._units.values()
+    (unit,) = engine.known_units.values()
     memory = unit.live.state.memory
     fed(engine, hole(2 * HOUR * TICK_S + 1.0))  # of unknown length: short
     assert unit.live.state.memory.means == memory.means or not unit.live.state.memory.means
@@ -174,7 +174,7 @@ def test_after_a_long_hole_the_means_begin_anew(models: Path) -> None:
 def test_another_model_begins_its_gain_anew(models: Path) -> None:
     engine = _engine(models)
     fed(engine, *_shift(end=3 * HOUR))
-    (unit,) = engine._units.values()
+    (unit,) = engine.known_units.values()
     state = unit.live.state
     assert state.gain.seconds > 3600.0
     assert state.version == PROCESSOR.configured({"models": str(models)}).read["okuma"].version
@@ -240,9 +240,9 @@ def test_a_model_of_another_heat_than_the_live_description_corrects_nothing_and_
     engine = engine_of(PROCESSOR, models=str(models), tick_s=TICK_S)
     shift = list(_shift(begin=0, end=10))
     fed(engine, *shift[:5])
-    engine._units["okuma"].live._config = described(configuration, other)
+    engine.known_units["okuma"].live._config = described(configuration, other)
     fed(engine, *shift[5:])
-    unit = engine._units["okuma"].live
+    unit = engine.known_units["okuma"].live
     shown = unit.emissions["okuma"].latest
     assert shown[CORRECTED].value is None
     assert shown[CORRECTED].reason == described(configuration, other).why_not(model)

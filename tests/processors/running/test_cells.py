@@ -53,7 +53,7 @@ SUM = CellProcessor(
 
 
 def log(engine: Engine, cell: str = "all") -> tuple[tuple[str, str, tuple[str, ...]], ...]:
-    return engine._units[cell].live.state.log
+    return engine.known_units[cell].live.state.log
 
 
 def test_machines_that_stand_in_no_cell_are_in_one_together() -> None:
@@ -134,5 +134,5 @@ def test_history_of_a_cell_folds_into_a_state_of_its_own() -> None:
     engine = engine_of(SUM)
     fed(engine, birth(0.0, device="a", spindle_rpm=1.0), data(-900.0, device="a", history=True, spindle_rpm=5.0))
     assert len(log(engine)) == 1
-    assert engine._units["all"].history is not None
+    assert engine.known_units["all"].history is not None
     assert json.loads(engine.snapshot("all"))["history"]["machines"]["a"]["row"]["spindle_rpm"][0] == 5.0

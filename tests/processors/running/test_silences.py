@@ -54,8 +54,8 @@ def test_a_machine_that_talks_is_looked_at_every_few_seconds_only() -> None:
     looks = 0
     for tenth in range(1, 601):
         engine.feed(data(tenth / 10, spindle_rpm=float(tenth)), tenth / 10)
-        before = [entry[1] for entry in engine._silences._due]
+        before = [entry[1] for entry in engine.silences._due]
         engine.silence(tenth / 10)
-        looks += before != [entry[1] for entry in engine._silences._due]
+        looks += before != [entry[1] for entry in engine.silences._due]
     assert looks <= 30
-    assert len(engine._silences._due) == 1
+    assert len(engine.silences._due) == 1

@@ -330,7 +330,7 @@ def test_alerts_hear_of_the_lag_of_their_own_process_at_once(monkeypatch: pytest
         clock.leapt_s += passed_s
         host.give(clock.message(waits_s))
         runner.turn()
-    (unit,) = worker.engine._units.values()
+    (unit,) = worker.engine.known_units.values()
     assert unit.live.state.lags["alerts"].report.lag_s == pytest.approx(18.0, abs=0.5)
 
 

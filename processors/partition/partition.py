@@ -1,0 +1,182 @@
+"""One partition of a log, folded by the processors of a process: records in, results out, and what is to be saved.
+
+    restore(kept) ──► the offset to read from        take(offset, record) ──► results        cut(), mark() ──► what to save
+
+Everything that a state depends on is in the records and their order: time on the wall is the writer's, silence is a watermark. So
+a partition that was restored anywhere and folds the rest comes to the same state, bit for bit, as one that has folded all of it.
+
+Saved are, by key: `<processor>/<unit>`, a unit's state; `~description/<topic>`, a description that holds; `~lives/<reader>`,
+which messages were there already; and `~marker/<reader>`, how far this reader has come with each processor: the offset at which
+its states were cut, and that up to which its results went out. What lies between the two is folded again in silence.
+"""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
+
+from processors.actions import Action
+from processors.config import Configuration, ProcessorConfig
+from processors.discovery import AnyProcessor
+from processors.errors import SnapshotError
+from processors.partition.seat import FORMAT, Seat
+from sparkplug.host_event import EventKind, HostEvent
+from sparkplug.records.lives import Lives
+from sparkplug.records.record import Record
+from twin.vocabulary import topics
+
+MARKER, LIVES, DESCRIPTION = "~marker/", "~lives/", "~description/"
+LIVES_MAX = 5000  # devices whose messages are told apart
+_PLAIN, _HOLE = EventKind.PLAIN, EventKind.HOLE
+_to_json = json.JSONEncoder(separators=(",", ":"), ensure_ascii=False).encode
+
+
+class Result(NamedTuple):
+    """The actions that came of one record by one processor."""
+
+    seat: Seat
+    actions: list[Action]
+    at_ms: int
+
+
+class Partition:
+    """See the module. `reader` names who folds it: the consumer group."""
+
+    def __init__(self, reader: str, pairs: Sequence[tuple[AnyProcessor, Configuration[ProcessorConfig]]]) -> None:
+        self.seats = tuple(
+            Seat(processor, configuration) for processor, configuration in sorted(pairs, key=lambda one: one[0].name)
+        )
+        self.next = 0  # the offset behind the newest record that was taken
+        self.repeated = 0  # records that were there before
+        self.refused: list[str] = []  # snapshots that were not restored, and why
+        self._reader = reader
+        self._lives: dict[str, Lives] = {}
+        self._descriptions: dict[str, bytes] = {}
+        self._new_descriptions: dict[str, bytes | None] = {}
+        self._readers: dict[str, tuple[Seat, ...]] = {}
+
+    # Start.
+
+    def restore(self, kept: Mapping[str, bytes]) -> int:
+        """Take what was saved, newest value by key; return the offset to read from. A processor whose states are of another
+        version begins with what the log still holds, and says nothing of what it said before."""
+        markers = [_json(value)["processors"] for key, value in kept.items() if key.startswith(MARKER)]
+        self._descriptions = {key.removeprefix(DESCRIPTION): value for key, value in kept.items() if key.startswith(DESCRIPTION)}
+        for seat in self.seats:
+            self._describe_all(seat)
+            self._restore(seat, kept, markers)
+        self.next = min(seat.from_offset for seat in self.seats)
+        lives = [_json(value) for key, value in kept.items() if key.startswith(LIVES)]
+        known: Mapping[str, dict[str, list[int]]] = next((one["devices"] for one in lives if one["folded"] == self.next), {})
+        self._lives = {device: Lives(of_device) for device, of_device in known.items()}
+        return self.next
+
+    def _restore(self, seat: Seat, kept: Mapping[str, bytes], markers: Sequence[Mapping[str, Sequence[int]]]) -> None:
+        """Restore one processor from the marker that has come furthest with it."""
+        own = max((one[seat.name] for one in markers if seat.name in one), key=lambda one: one[1], default=None)
+        if own is None:
+            return
+        folded, seat.published = own
+        prefix = f"{seat.name}/"
+        try:
+            for key, payload in kept.items():
+                if key.startswith(prefix):
+                    seat.restore(payload)
+        except SnapshotError as error:
+            self.refused.append(f"{seat.name}: {error}; rebuilt from what the log still holds")
+            seat.begin_again()
+            self._describe_all(seat)
+        else:
+            seat.from_offset = folded
+
+    def _describe_all(self, seat: Seat) -> None:
+        for topic, payload in self._descriptions.items():
+            seat.describe(topic, payload)
+
+    # Records.
+
+    def take(self, offset: int, record: Record) -> Iterator[Result]:
+        """Fold a record; yield what came of it that did not go out before."""
+        self.next = offset + 1
+        event, wall_s = record.event, record.received_ms / 1000
+        if event is None:
+            for seat in self.seats:
+                if offset >= seat.from_offset:
+                    yield from self._told(seat, seat.watermark(wall_s), offset, record)
+        elif event.kind is _PLAIN:
+            yield from self._plain(event, offset, record)
+        elif self._is_new(event, record):
+            for seat in self._readers_of(event.node.node):
+                if offset >= seat.from_offset:
+                    yield from self._told(seat, seat.event(event, wall_s), offset, record)
+        else:
+            self.repeated += 1
+
+    def _told(self, seat: Seat, actions: list[Action], offset: int, record: Record) -> Iterator[Result]:
+        if actions and offset >= seat.published:
+            yield Result(seat, actions, record.received_ms)
+
+    def _is_new(self, event: HostEvent, record: Record) -> bool:
+        lives = self._lives.get(device := event.device or "")
+        if lives is None:
+            if len(self._lives) >= LIVES_MAX:
+                self._lives.pop(next(iter(self._lives)))
+            lives = self._lives[device] = Lives()
+        return lives.is_new(str(event.node), record.origin, event.timestamp_ms, is_hole=event.kind is _HOLE)
+
+    def _readers_of(self, node: str) -> tuple[Seat, ...]:
+        readers = self._readers.get(node)
+        if readers is None:
+            readers = self._readers[node] = tuple(seat for seat in self.seats if seat.processor.listens_to(node))
+        return readers
+
+    def _plain(self, event: HostEvent, offset: int, record: Record) -> Iterator[Result]:
+        if event.topic.startswith(topics.DESCRIPTION):
+            if self._descriptions.get(event.topic) == event.payload:
+                return  # retained, and told again
+            self._described(event.topic, event.payload)
+            for seat in self.seats:
+                yield from self._told(seat, seat.describe(event.topic, event.payload), offset, record)
+            return
+        for seat in self.seats:
+            if offset >= seat.from_offset and event.payload and seat.listens(event.topic):
+                yield from self._told(seat, seat.plain(event.topic, event.payload, event.timestamp_ms), offset, record)
+
+    def _described(self, topic: str, payload: bytes) -> None:
+        self._new_descriptions[topic] = payload or None
+        if payload:
+            self._descriptions[topic] = payload
+        else:
+            self._descriptions.pop(topic, None)
+
+    # What is to be saved.
+
+    def cut(self) -> Iterator[tuple[str, bytes | None]]:
+        """Yield what has changed since the last cut, by key; a value of None takes back what was saved. `mark` comes after it."""
+        for topic, payload in self._new_descriptions.items():
+            yield DESCRIPTION + topic, payload
+        self._new_descriptions.clear()
+        for seat in self.seats:
+            seat.from_offset = max(seat.from_offset, self.next)
+            for unit, payload in seat.cut():
+                yield f"{seat.name}/{unit}", payload
+        lives = {"folded": self.next, "devices": {device: known.kept for device, known in self._lives.items()}}
+        yield LIVES + self._reader, _to_json(lives).encode()
+
+    def mark(self) -> tuple[str, bytes]:
+        """Return the marker, by key: what came of all records before `next` goes out with it."""
+        for seat in self.seats:
+            seat.published = max(seat.published, self.next)
+        told = {"format": FORMAT, "processors": {seat.name: [seat.from_offset, seat.published] for seat in self.seats}}
+        return MARKER + self._reader, _to_json(told).encode()
+
+    def faults(self) -> list[str]:
+        """Return what failed since this was last called, in a line each."""
+        faults = [*self.refused, *(fault for seat in self.seats for fault in seat.faults)]
+        self.refused.clear()
+        for seat in self.seats:
+            seat.faults.clear()
+        return faults
+
+
+def _json(value: bytes) -> Any:
+    return json.loads(value)

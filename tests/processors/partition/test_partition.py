@@ -1,0 +1,150 @@
+"""A partition that is killed anywhere comes to the states, and tells the results, of one that never was."""
+
+from collections.abc import Sequence
+from random import Random
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from processors.actions import Action
+from processors.discovery import AnyProcessor, discover
+from processors.partition.partition import Partition
+from sparkplug.host_event import EventKind, HostEvent
+from sparkplug.records.record import Origin, Record, RecordReader, RecordWriter
+from tests.depth import examples
+from tests.processors.describing import DESCRIBING
+from tests.processors.streams import T0_MS, birth, data, death, wild_stream
+
+Kept = dict[str, bytes]
+Told = list[tuple[int, str, Action]]
+every_processor = pytest.mark.parametrize("processor", discover().values(), ids=discover().keys())
+quickly = settings(
+    max_examples=examples(40, 12), deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large]
+)
+
+
+def through_bytes(events: Sequence[HostEvent | None]) -> list[Record]:
+    """The records of events as a reader of the log has them; None is a watermark. A second passes between two."""
+    writer, reader = RecordWriter("bridge"), RecordReader()
+    records = []
+    for place, event in enumerate(events):
+        at_ms = T0_MS + 1000 * place
+        if event is None:
+            records.append(reader.read(writer.watermark(at_ms), None))
+        else:
+            records.append(reader.read(*writer.written(event, at_ms, Origin(0, 1, place % 256))))
+    return records
+
+
+def log_of(length: int, seed: int) -> list[Record]:
+    """A log of anything that a bridge could ever write."""
+    chance = Random(seed)
+    events: list[HostEvent | None] = []
+    for event in wild_stream(length, seed):
+        if event.device is not None or event.kind is EventKind.HOLE:
+            events.append(event if event.device is not None else event._replace(device="okuma"))
+        if chance.random() < 0.3:
+            events.append(None)
+    return through_bytes(events)
+
+
+def partition_of(processor: AnyProcessor) -> Partition:
+    return Partition("test", [(processor, processor.configured({}))])
+
+
+def saved(partition: Partition, kept: Kept) -> None:
+    for key, payload in partition.cut():
+        if payload is None:
+            kept.pop(key, None)
+        else:
+            kept[key] = payload
+
+
+def states(partition: Partition) -> dict[str, bytes]:
+    """The states of all units as they are saved, whether they have changed or not."""
+    return {
+        f"{seat.name}/{unit}": seat.state_of(unit).replace(b'"births_are_old":true', b'"births_are_old":false')
+        for seat in partition.seats
+        for unit in seat.engine.known_units
+    }
+
+
+def run(processor: AnyProcessor, records: Sequence[Record], chance: Random | None = None) -> tuple[Told, dict[str, bytes]]:
+    """Fold a log; with `chance` commit, cut and be killed now and then. What was told counts once it is committed."""
+    partition, kept, told, waiting = partition_of(processor), dict[str, bytes](), Told(), Told()
+    offset = partition.restore(kept)
+    while offset < len(records):
+        waiting += [(offset, r.seat.name, action) for r in partition.take(offset, records[offset]) for action in r.actions]
+        offset += 1
+        fate = 1.0 if chance is None else chance.random()
+        if fate < 0.4:  # a transaction
+            if fate < 0.15:
+                saved(partition, kept)
+            key, marker = partition.mark()
+            kept[key] = marker
+            told += waiting
+            waiting = []
+        elif fate < 0.55:  # a kill
+            partition, waiting = partition_of(processor), []
+            offset = partition.restore(kept)
+    return told + waiting, states(partition)
+
+
+@every_processor
+@quickly
+@given(length=st.integers(0, 25), seed=st.integers(0, 2**32), kills=st.integers(0, 2**32))
+def test_killed_anywhere_it_tells_the_same_and_comes_to_the_same(processor: AnyProcessor, length: int, seed: int, kills: int) -> None:
+    records = log_of(length, seed)
+    assert run(processor, records, Random(kills)) == run(processor, records)
+
+
+def shift() -> list[Record]:
+    """A shift in short, with silence in it."""
+    start = birth(0.0, spindle_rpm=0.0, spindle_load_pct=0.0, ambient_temp_c=21.5, spindle_temp_c=24.0, tool_number=1)
+    cuts = [data(1.0 + i, spindle_rpm=4000.0 + 10 * i, spindle_load_pct=20.0 + i % 7) for i in range(60)]
+    again = [death(100.0), birth(130.0, spindle_rpm=0.0, spindle_load_pct=0.0, ambient_temp_c=21.6, tool_number=2)]
+    return through_bytes([start, *cuts, *[None] * 40, *again, data(150.3, spindle_rpm=100.0), *[None] * 5])
+
+
+@every_processor
+@pytest.mark.parametrize("kills", range(5))
+def test_a_shift_with_kills_is_the_shift_without(processor: AnyProcessor, kills: int) -> None:
+    told, state = run(processor, shift())
+    assert (told, state) == run(processor, shift(), Random(kills))
+
+
+def test_what_a_second_writer_says_again_is_folded_once() -> None:
+    processor = discover()["thermal"]
+    records = shift()
+    twice = [copy for record in records for copy in ((record, record) if record.event is not None else (record,))]
+    once, again = partition_of(processor), partition_of(processor)
+    for offset, record in enumerate(records):
+        list(once.take(offset, record))
+    for offset, record in enumerate(twice):
+        list(again.take(offset, record))
+    assert states(once) == states(again)
+    assert again.repeated == len(twice) - len(records)
+
+
+def test_a_state_of_another_version_is_rebuilt_from_the_log_and_nothing_is_told_twice() -> None:
+    processor = discover()["thermal"]
+    partition, kept = partition_of(processor), dict[str, bytes]()
+    for offset, record in enumerate(shift()[:50]):
+        list(partition.take(offset, record))
+    saved(partition, kept)
+    kept.update([partition.mark()])
+    key = "thermal/okuma"
+    kept[key] = kept[key].replace(b'"version":', b'"version":9')
+    upgraded = partition_of(processor)
+    assert upgraded.restore(kept) == 0
+    assert "rebuilt" in upgraded.faults()[0]
+    told = [result for offset, record in enumerate(shift()[:50]) for result in upgraded.take(offset, record)]
+    assert told == []
+    assert states(upgraded) == states(partition)
+
+
+def test_a_description_holds_after_a_restart() -> None:
+    ((name, message),) = list(DESCRIBING.items())[:1]
+    assert name
+    assert message
