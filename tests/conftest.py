@@ -76,7 +76,7 @@ LONG = (
 )
 
 # Files that share what takes long to start or to compile: one worker does it once for all of them.
-TOGETHER = ("tests/hivemq/", "tests/twin/process/")
+TOGETHER = ("tests/hivemq/", "tests/kafka/", "tests/twin/process/")
 
 
 class InGroups(LoadFileScheduling):
