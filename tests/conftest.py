@@ -49,6 +49,7 @@ LONG = (
     "twin/gap/programs/test_diagnose.py",
     "cnctwin/demo/test_demo_by_peer.py",
     "hivemq/test_barrier.py",
+    "kafka/test_server.py",
     "peers/test_hosts_of_peers.py",
     "peers/test_edges_of_peers.py",
     "processors/test_contract.py",

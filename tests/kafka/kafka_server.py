@@ -58,10 +58,10 @@ class KafkaServer:
     `allow` gives them. `settings` are those of server.properties and go before ours.
 
     `file_bytes_max` stands in for a full disk: no file of the process may grow beyond it (RLIMIT_FSIZE, the soft limit, which
-    `limit_files` sets and lifts while Kafka runs). A write past it fails with EFBIG where a full disk fails with ENOSPC; Java makes
-    an IOException of both, and Kafka, whose only log directory has failed, ends. Unlike a full disk it meets single files: a segment
-    that reaches the limit, not one that is small. Take more than 10,485,760, which Kafka reserves for each index: with less it does
-    not start, and while it runs it names a new topic and cannot write it.
+    `limit_files` sets and lifts while Kafka runs). A write past it fails with EFBIG where a full disk fails with ENOSPC; Java
+    makes an IOException of both, and Kafka, whose only log directory has failed, ends. Unlike a full disk it meets single files:
+    a segment that reaches the limit, not one that is small. Take more than 10,485,760, which Kafka reserves for each index: with
+    less it does not start, and while it runs it names a new topic and cannot write it.
     """
 
     def __init__(

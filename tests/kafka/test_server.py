@@ -16,7 +16,6 @@ from tests.kafka.kafka_server import KafkaServer, built
 pytest.importorskip("confluent_kafka", reason="no confluent-kafka in this Python; install the extra kafka")
 
 from confluent_kafka import Consumer, KafkaError, KafkaException, Message, Producer, TopicPartition
-from confluent_kafka.admin import AdminClient
 
 WAIT_S_MAX = 60.0
 
@@ -111,7 +110,7 @@ def test_a_kill_takes_nothing_that_was_committed(kafka: KafkaServer) -> None:
 def _refused(settings: dict[str, str | int | float | bool]) -> set[int]:
     """The codes of the errors that a client meets until one is of its papers."""
     codes: set[int] = set()
-    client = AdminClient(settings | {"error_cb": lambda error: codes.add(error.code())})
+    client = Producer(settings | {"error_cb": lambda error: codes.add(error.code())})
     until(lambda: client.poll(0.1) >= 0 and bool(codes & {KafkaError._AUTHENTICATION, KafkaError._SSL}), "it is refused")
     with pytest.raises(KafkaException):
         client.list_topics(timeout=0.5)
