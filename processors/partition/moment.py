@@ -6,11 +6,11 @@ log has missed nothing: who was online still is, silence goes on, and what was h
 
 import base64
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any
 
 from processors.errors import SnapshotError
 from processors.running.engine import Engine
-from processors.running.fold import Fold
 from processors.running.lane import Lane
 from processors.running.snapshot import PLAIN_TYPES
 from processors.running.unit import Machine, Unit
@@ -32,7 +32,9 @@ def go_on(engine: Engine, unit: Unit, moment: Mapping[str, Any]) -> None:
     try:
         for name, told in moment["machines"].items():
             _go_on(engine, unit.machines[name], told)
-        _show_in_order(unit.live, moment["shown"])
+        unit.live.rows.clear()
+        for name in moment["shown"]:  # in the order in which they came online
+            unit.live.show(name, MappingProxyType(unit.machines[name].live.row))
     except (KeyError, TypeError, ValueError, AttributeError, PayloadError) as error:
         raise SnapshotError(f"moment of {unit.name}: {type(error).__name__}: {error}") from error
 
@@ -88,14 +90,6 @@ def _into_lane(lane: Lane, told: Mapping[str, Any]) -> None:
         rows = lane.row | {reading.name: reading for reading in _unpacked(told["odd"])}
         lane.row.clear()
         lane.row.update((name, rows[name]) for name in told["order"])
-
-
-def _show_in_order(fold: Fold, names: list[str]) -> None:
-    """Have the machines of a cell stand in the order in which they came online."""
-    rows = dict(fold.rows)
-    fold.rows.clear()
-    for name in names:
-        fold.rows[name] = rows[name]
 
 
 def _node(text: str) -> NodeId:

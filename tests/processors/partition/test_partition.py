@@ -13,7 +13,7 @@ from processors.partition.partition import Partition
 from sparkplug.host_event import EventKind, HostEvent
 from sparkplug.records.record import Origin, Record, RecordReader, RecordWriter
 from tests.depth import examples
-from tests.processors.describing import DESCRIBING
+from tests.processors.describing import DESCRIBING, message
 from tests.processors.streams import T0_MS, birth, data, death, wild_stream
 
 Kept = dict[str, bytes]
@@ -145,6 +145,9 @@ def test_a_state_of_another_version_is_rebuilt_from_the_log_and_nothing_is_told_
 
 
 def test_a_description_holds_after_a_restart() -> None:
-    ((name, message),) = list(DESCRIBING.items())[:1]
-    assert name
-    assert message
+    machine = [birth(0.0, spindle_rpm=0.0), message(11.0), *[data(1.0 + i, spindle_rpm=100.0 * i) for i in range(30)]]
+    records = through_bytes(machine)
+    told, state = run(DESCRIBING, records)
+    assert any("version" in str(action) for _, _, action in told)
+    for kills in range(5):
+        assert run(DESCRIBING, records, Random(kills)) == (told, state)

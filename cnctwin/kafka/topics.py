@@ -1,0 +1,145 @@
+"""The topics of one MQTT group on Kafka: names, and their making.
+
+All have the same number of partitions, so that a machine's readings, its results and its states stand in partitions of one
+number, and one runner has them all.
+"""
+
+import time
+from collections.abc import Sequence
+from concurrent.futures import Future
+from dataclasses import dataclass
+
+from confluent_kafka import KafkaError, KafkaException
+from confluent_kafka.admin import AdminClient, NewTopic
+
+from cnctwin.kafka.settings import KafkaSettings
+from processors.errors import ConfigurationError
+
+ANSWER_S = 30.0
+MADE_S_MAX = 60.0
+HOUR_MS = 3_600_000
+COMPACTED = {
+    "cleanup.policy": "compact",
+    "min.cleanable.dirty.ratio": "0.3",
+    "segment.ms": "600000",
+    "segment.bytes": "67108864",
+    "max.compaction.lag.ms": "3600000",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Topics:
+    """The names. `group` is the Sparkplug group."""
+
+    group: str
+
+    @property
+    def readings(self) -> str:
+        """What machines say, by machine."""
+        return f"cnctwin.{self.group}.readings"
+
+    def cells(self, processor: str) -> str:
+        """Return the topic of what a processor that compares machines reads, by cell."""
+        return f"cnctwin.{self.group}.cells.{processor}"
+
+    @property
+    def results(self) -> str:
+        """What processors say, by machine or cell."""
+        return f"cnctwin.{self.group}.results"
+
+    @property
+    def snapshots(self) -> str:
+        """The states of units."""
+        return f"cnctwin.{self.group}.snapshots"
+
+    @property
+    def births(self) -> str:
+        """The newest birth certificates, as they came."""
+        return f"cnctwin.{self.group}.births"
+
+    @property
+    def health(self) -> str:
+        """The health of runners and bridges, as JSON."""
+        return f"cnctwin.{self.group}.health"
+
+    @property
+    def deadletters(self) -> str:
+        """What could not be folded or read."""
+        return f"cnctwin.{self.group}.deadletters"
+
+    def runners(self, processors: Sequence[str]) -> str:
+        """Return the consumer group of the runners of these processors.
+
+        >>> Topics("cnc").runners(["thermal", "gap"])
+        'cnctwin.cnc.gap+thermal'
+        """
+        return f"cnctwin.{self.group}.{'+'.join(sorted(processors))}"
+
+    def bridge(self, name: str) -> str:
+        """Return the consumer group of a bridge."""
+        return f"cnctwin.{self.group}.bridge.{name}"
+
+    def all(self, cell_processors: Sequence[str]) -> dict[str, dict[str, str]]:
+        """Return all topics with their configuration."""
+        kept: dict[str, str] = {"cleanup.policy": "delete"}
+        logs = [self.readings, *map(self.cells, cell_processors), self.results, self.deadletters]
+        return {**{name: kept for name in logs}, **{name: COMPACTED for name in (self.snapshots, self.births, self.health)}}
+
+
+def ensure(settings: KafkaSettings, topics: Topics, cell_processors: Sequence[str]) -> None:
+    """Make the topics that are missing, or say which are. Raises ConfigurationError: for topics that are missing where we may not
+    make them, and for one with another number of partitions."""
+    admin = AdminClient(settings.client())
+    wanted = topics.all(cell_processors)
+    retention = {"retention.ms": str(round(settings.retention_hours * HOUR_MS))}
+    missing = [name for name in wanted if name not in _present(admin)]
+    if missing and not settings.create_topics:
+        raise ConfigurationError(
+            f"kafka: the topics {', '.join(missing)} are missing; make them (docs/kafka.md), or set create_topics"
+        )
+    made: dict[str, Future[None]] = {}
+    if missing:
+        made = admin.create_topics(
+            [
+                NewTopic(
+                    name,
+                    num_partitions=settings.partitions,
+                    replication_factor=settings.replication_factor,
+                    config=wanted[name] if wanted[name] is COMPACTED else wanted[name] | retention,
+                )
+                for name in missing
+            ]
+        )
+    for name, future in made.items():
+        try:
+            future.result(ANSWER_S)
+        except KafkaException as error:
+            if error.args[0].code() != KafkaError.TOPIC_ALREADY_EXISTS:  # another process was quicker
+                raise ConfigurationError(f"kafka: topic {name} cannot be made: {error.args[0].str()}") from error
+    _await_leaders(admin, wanted, settings.partitions)
+
+
+def _present(admin: AdminClient) -> dict[str, int]:
+    """Return the topics that have a leader for each partition, with their number of partitions."""
+    try:
+        found = admin.list_topics(timeout=ANSWER_S).topics
+    except KafkaException as error:
+        raise ConfigurationError(f"kafka: no answer from the cluster: {error.args[0].str()}") from error
+    return {name: len(topic.partitions) for name, topic in found.items() if topic.error is None}
+
+
+def _await_leaders(admin: AdminClient, wanted: dict[str, dict[str, str]], partitions: int) -> None:
+    until_s = time.monotonic() + MADE_S_MAX
+    while True:
+        found = _present(admin)
+        missing = [name for name in wanted if name not in found]
+        if not missing:
+            break
+        if time.monotonic() > until_s:
+            raise ConfigurationError(f"kafka: the topics {', '.join(missing)} have no leader after {MADE_S_MAX:g} s")
+        time.sleep(0.1)
+    for name in wanted:
+        if found[name] != partitions:
+            raise ConfigurationError(
+                f"kafka: topic {name} has {found[name]} partitions, and partitions is {partitions}; set it to what the topics have"
+            )
