@@ -12,6 +12,7 @@ import typer
 from typer.exceptions import TyperException
 
 from cnctwin.commands.alerts import alerts_app
+from cnctwin.commands.bridge import bridge
 from cnctwin.commands.demo import demo
 from cnctwin.commands.doctor import doctor
 from cnctwin.commands.edge import edge_app
@@ -64,6 +65,7 @@ app.command()(demo)
 app.command()(watch)
 app.command()(doctor)
 app.command()(process)
+app.command()(bridge)
 app.command()(simulate)
 app.command()(expect)
 app.command()(identify)

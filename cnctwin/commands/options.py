@@ -8,6 +8,13 @@ import typer
 AsJson = Annotated[bool, typer.Option("--json", help="For a program to read")]
 Broker = Annotated[str | None, typer.Option(help="mqtt[s]://[user@]host[:port]; else $CNCTWIN_BROKER", show_default=False)]
 Group = Annotated[str, typer.Option(help="Sparkplug group: the plant")]
+Kafka = Annotated[
+    str | None,
+    typer.Option("--kafka", help="Bootstrap servers; else of --kafka-config or $CNCTWIN_KAFKA_BOOTSTRAP", show_default=False),
+]
+KafkaConfig = Annotated[
+    Path | None, typer.Option("--kafka-config", help="TOML with the cluster and its topics", show_default=False)
+]
 Machines = Annotated[
     Path | None,
     typer.Option(

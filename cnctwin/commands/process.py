@@ -1,11 +1,12 @@
 """`cnctwin process`: processors until they are stopped."""
 
+import socket
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from cnctwin.commands.options import Broker, Group, Machines
+from cnctwin.commands.options import Broker, Group, Kafka, KafkaConfig, Machines
 from cnctwin.machines.place import machines_folder
 from cnctwin.processes.given_broker import address, broker_or_own
 from cnctwin.processes.stopping import stopped_by_signals
@@ -21,12 +22,20 @@ def process(
         Path | None, typer.Option(help="Keeps birth/death numbers; else $CNCTWIN_STATE_DIR or ~/.local/state/cnctwin")
     ] = None,
     machines: Machines = None,
+    kafka: Kafka = None,
+    kafka_config: KafkaConfig = None,
+    member: Annotated[
+        str, typer.Option(help="With Kafka: name of this runner, the same at each start; else the computer's")
+    ] = "",
 ) -> None:
     """Run processors until SIGTERM or Ctrl-C; beside alerts the courier that sends, beside historian the store that it keeps."""
     from cnctwin.running.processors import process as run_processors
     from processors.running.limits import limits_of
     from processors.running.runtime import configured
 
+    if kafka or kafka_config is not None:
+        _over_kafka(names, config, broker, group, kafka, kafka_config, member)
+        return
     pairs, limits = configured(names, config), limits_of(config)
     with stopped_by_signals() as stop, broker_or_own(address(broker)) as where:
         run_processors(
@@ -38,3 +47,24 @@ def process(
             limits=limits,
             machines=machines_folder(machines, config),
         )
+
+
+def _over_kafka(
+    names: list[str],
+    config: Path | None,
+    broker: str | None,
+    group: str,
+    kafka: str | None,
+    kafka_config: Path | None,
+    member: str,
+) -> None:
+    """Run processors as the members of a consumer group; only the courier of alerts needs a broker."""
+    from cnctwin.commands.extras import needed_by
+    from cnctwin.kafka.settings import settings_of
+    from processors.running.runtime import configured
+
+    with needed_by("cnctwin process --kafka", "kafka"):
+        from cnctwin.kafka.running import run_over_kafka
+    settings, pairs = settings_of(kafka, kafka_config), configured(names, config)
+    with stopped_by_signals() as stop:
+        run_over_kafka(settings, pairs, stop, group=group, member=member or socket.gethostname(), broker=address(broker))

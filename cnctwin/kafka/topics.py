@@ -83,7 +83,7 @@ class Topics:
         """Return all topics with their configuration."""
         kept: dict[str, str] = {"cleanup.policy": "delete"}
         logs = [self.readings, *map(self.cells, cell_processors), self.results, self.deadletters]
-        return {**{name: kept for name in logs}, **{name: COMPACTED for name in (self.snapshots, self.births, self.health)}}
+        return {**dict.fromkeys(logs, kept), **dict.fromkeys((self.snapshots, self.births, self.health), COMPACTED)}
 
 
 def ensure(settings: KafkaSettings, topics: Topics, cell_processors: Sequence[str]) -> None:
@@ -141,5 +141,5 @@ def _await_leaders(admin: AdminClient, wanted: dict[str, dict[str, str]], partit
     for name in wanted:
         if found[name] != partitions:
             raise ConfigurationError(
-                f"kafka: topic {name} has {found[name]} partitions, and partitions is {partitions}; set it to what the topics have"
+                f"kafka: topic {name} has {found[name]} partitions, and partitions is {partitions}; set it to {found[name]}"
             )

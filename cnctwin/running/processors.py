@@ -7,6 +7,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from cnctwin.processes.look_around import refuse_second
+from processors.errors import ConfigurationError
 from processors.running.ports import Recorder
 from processors.running.runtime import Configured, run
 from sparkplug.admission.limits import DEFAULTS, Limits
@@ -38,7 +39,7 @@ def process(
             stack.callback(SessionLock(state_dir / f"{node.node}.json", f"{node.group}/{node.node}").release)
         refuse_second(broker, nodes, "end that one first, or give this one other processors or another --group")
         recorder = stack.enter_context(_recorder(pairs, group))
-        stack.enter_context(_courier(pairs, broker, group))
+        stack.enter_context(courier_of(pairs, broker, group))
         run(pairs, broker, stop, group=group, session_dir=state_dir, recorder=recorder, limits=limits, machines=machines)
 
 
@@ -62,8 +63,9 @@ def _recorder(pairs: Sequence[Configured], group: str) -> Iterator[Recorder | No
 
 
 @contextmanager
-def _courier(pairs: Sequence[Configured], broker: BrokerAddress, group: str) -> Iterator[None]:
-    """The courier, where alerts run and somebody is to be told; else nothing, and httpx is not loaded."""
+def courier_of(pairs: Sequence[Configured], broker: BrokerAddress | None, group: str) -> Iterator[None]:
+    """The courier, where alerts run and somebody is to be told; else nothing, and httpx is not loaded. Raises ConfigurationError
+    where there is no broker from which it could learn what is to be sent."""
     config = next((one.default for processor, one in pairs if processor.name == ALERTS), None)
     if config is None:
         yield
@@ -74,6 +76,8 @@ def _courier(pairs: Sequence[Configured], broker: BrokerAddress, group: str) -> 
     if not config.receivers:
         yield
         return
+    if broker is None:
+        raise ConfigurationError("alerts: the courier reads from the broker what is to be sent; give --broker or CNCTWIN_BROKER")
     from processors.alerts.courier.thread import Courier  # noqa: PLC0415
 
     courier = Courier(broker, config, group)

@@ -46,8 +46,28 @@ STORE = (
     MetricSpec("health/store_trouble", DataType.STRING, properties={"meaning": "what is wrong with the store; empty: nothing"}),
 )
 
+ON_LOG = (
+    MetricSpec("health/runners", DataType.INT64, properties={"meaning": "runners that report"}),
+    MetricSpec("health/partitions", DataType.INT64, properties={"meaning": "partitions that they fold"}),
+    MetricSpec("health/lag_records", DataType.INT64, properties={"meaning": "records that wait in the log"}),
+    MetricSpec("health/transactions", DataType.INT64, properties={"meaning": "committed since the runners were started"}),
+    MetricSpec("health/transactions_aborted", DataType.INT64, properties={"meaning": "that came to nothing, and were repeated"}),
+    MetricSpec("health/rebalances", DataType.INT64, properties={"meaning": "times that partitions came or went"}),
+    MetricSpec("health/restored_s", DataType.DOUBLE, unit="s", properties={"meaning": "the longest of the last restorations"}),
+    MetricSpec("health/lost_by_retention", DataType.INT64, properties={"meaning": "records that were gone before their turn"}),
+    MetricSpec("health/repeated", DataType.INT64, properties={"meaning": "records that were there already, and dropped"}),
+    MetricSpec("health/bridge_events", DataType.INT64, properties={"meaning": "events that the bridge has taken in"}),
+    MetricSpec("health/bridge_delivered", DataType.INT64, properties={"meaning": "records that the cluster has acknowledged"}),
+    MetricSpec("health/bridge_waiting", DataType.INT64, properties={"meaning": "records that it has not"}),
+    MetricSpec("health/bridge_dropped", DataType.INT64, properties={"meaning": "records that found no room"}),
+    MetricSpec(
+        "health/bridge_busy_pct", DataType.DOUBLE, unit="%", properties={"meaning": "CPU time of the bridge; 100 is a core"}
+    ),
+)
 
-def node_metrics(*, records: bool = False) -> tuple[MetricSpec, ...]:
-    """All metrics of the node: its ledger, in messages of devices, its health, and that of the store where it keeps one."""
+
+def node_metrics(*, records: bool = False, on_log: bool = False) -> tuple[MetricSpec, ...]:
+    """All metrics of the node: its ledger, in messages of devices, its health, that of the store where it keeps one, and that of
+    runners and bridge where it is folded on a log."""
     ledger = (MetricSpec(name, DataType.INT64, unit="messages") for name in Ledger().metrics())
-    return (*ledger, *HEALTH, *(STORE if records else ()))
+    return (*ledger, *HEALTH, *(STORE if records else ()), *(ON_LOG if on_log else ()))

@@ -170,6 +170,11 @@ def _latest(emission: Emission) -> dict[str, Any]:
     return {name: change[_TOLD_OF_CHANGE] for name, change in emission.latest.items()}
 
 
+def latest_of(entry: Mapping[str, Any]) -> tuple[Change, ...]:
+    """Return what a machine's twin device said last, by the entry of a machine in a snapshot."""
+    return tuple(_change(name, change, False) for name, change in entry["latest"].items())
+
+
 _Values = tuple[int | None, int, bool, bool, dict[str, Reading], dict[str, Change], dict[str, int], dict[str, NodeId]]
 
 

@@ -21,7 +21,7 @@ bdSeq, NBIRTH and seq name a message for good: who reads a log with two writers 
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from sparkplug.errors import PayloadError
 from sparkplug.host_event import EventKind, HostEvent
@@ -33,7 +33,7 @@ VERSION = b"1"
 WATERMARK = b"watermark"
 SOURCES_MAX = 20_000  # whose layouts are remembered
 NO_NODE = NodeId("", "")
-Headers = list[tuple[str, bytes]]
+Headers = list[tuple[str, str | bytes | None]]
 _KINDS = {kind.value.encode(): kind for kind in EventKind if kind is not EventKind.REFUSED}
 _DATA, _PLAIN = EventKind.DATA, EventKind.PLAIN
 
@@ -74,7 +74,7 @@ class RecordWriter:
         if kind is _DATA:
             common = self._known.get((node, device)) or self._of_source(node, device)
             return [*common, ("at", at)], written(stamp_ms, readings, max(origin[2], 0))
-        headers = [("version", VERSION), ("kind", kind.value.encode()), ("writer", self._name), ("at", at)]
+        headers: Headers = [("version", VERSION), ("kind", kind.value.encode()), ("writer", self._name), ("at", at)]
         if kind is _PLAIN:
             return [*headers, ("topic", topic.encode()), ("retain", b"1" if retain else b"0")], payload
         headers += [("node", str(node).encode()), ("device", (device or "").encode()), ("detail", detail.encode())]
@@ -87,7 +87,7 @@ class RecordWriter:
     def _of_source(self, node: NodeId, device: str | None) -> Headers:
         if len(self._known) >= SOURCES_MAX:
             self._known.clear()
-        of_source = [("node", str(node).encode()), ("device", (device or "").encode())]
+        of_source: Headers = [("node", str(node).encode()), ("device", (device or "").encode())]
         common: Headers = [("version", VERSION), ("kind", b"data"), *of_source, ("writer", self._name)]
         self._known[node, device] = common
         return common
@@ -100,9 +100,9 @@ class RecordReader:
         self._room = Room()
         self._sources: dict[tuple[bytes, bytes], tuple[NodeId, str, NamedPayloads]] = {}
 
-    def read(self, headers: Sequence[tuple[str, bytes]] | None, value: bytes | None) -> Record:
+    def read(self, headers: Sequence[tuple[str, Any]] | None, value: bytes | None) -> Record:
         """Return the record. Raises RecordError where it is none of this version."""
-        told = dict(headers or ())
+        told: dict[str, Any] = dict(headers or ())
         if told.get("version") != VERSION:
             raise RecordError(f"record of version {told.get('version', b'')!r:.40}; this program reads {VERSION.decode()}")
         try:
@@ -115,7 +115,7 @@ class RecordReader:
         except (KeyError, ValueError, TypeError, PayloadError) as error:
             raise RecordError(f"{type(error).__name__}: {error}") from error
 
-    def _event(self, kind: EventKind, told: dict[str, bytes], value: bytes, received_ms: int) -> HostEvent:
+    def _event(self, kind: EventKind, told: dict[str, Any], value: bytes, received_ms: int) -> HostEvent:
         if kind is _PLAIN:
             return HostEvent(kind, NO_NODE, None, received_ms, topic=told["topic"].decode(), payload=value)
         place = told["node"], told["device"]

@@ -94,7 +94,9 @@ def run(processor: AnyProcessor, records: Sequence[Record], chance: Random | Non
 @every_processor
 @quickly
 @given(length=st.integers(0, 25), seed=st.integers(0, 2**32), kills=st.integers(0, 2**32))
-def test_killed_anywhere_it_tells_the_same_and_comes_to_the_same(processor: AnyProcessor, length: int, seed: int, kills: int) -> None:
+def test_killed_anywhere_it_tells_the_same_and_comes_to_the_same(
+    processor: AnyProcessor, length: int, seed: int, kills: int
+) -> None:
     records = log_of(length, seed)
     assert run(processor, records, Random(kills)) == run(processor, records)
 

@@ -1,0 +1,164 @@
+"""Results of the log as edge nodes on the broker: births, wills and aliases as where a processor publishes them itself.
+
+A bridge that begins has to give birth to twin devices whose values were told before it was there. What was known at the last
+cut is in the saved states; what came since is read from the results, and told nobody again. From where the bridge before stopped
+on, results go out as they come.
+"""
+
+import json
+import logging
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from confluent_kafka import Consumer, KafkaException, TopicPartition
+
+from cnctwin.kafka.kept import read_kept
+from cnctwin.kafka.settings import KafkaSettings
+from cnctwin.kafka.topics import Topics
+from processors.actions import Declare
+from processors.partition.results import action_of
+from processors.running.counts import Counts
+from processors.running.ports import EdgePort, HostPort
+from processors.running.runtime import Configured
+from processors.running.sender import Sender
+from processors.running.snapshot import latest_of
+from sparkplug.errors import PayloadError
+from sparkplug.records.record import RecordReader
+
+ANSWER_S = 10.0
+COMMIT_S = 1.0
+RESULTS_A_TURN = 500
+BEFORE_CUT_MS = 60_000
+_log = logging.getLogger(__name__)
+
+
+class Back:
+    """See the module. `nodes` are the edge nodes of the processors, by name; all belong to the bridge's own thread."""
+
+    def __init__(
+        self,
+        settings: KafkaSettings,
+        topics: Topics,
+        name: str,
+        pairs: Sequence[Configured],
+        *,
+        host: HostPort,
+        nodes: Mapping[str, EdgePort],
+    ) -> None:
+        self.published = self.unreadable = 0
+        self.counts = Counts()
+        self._settings, self._topics = settings, topics
+        self._qos = {spec.prefix: spec.qos for processor, _ in pairs for spec in processor.plain}
+        self._senders = {
+            processor.name: Sender(processor, host, nodes[processor.name], alarmed=lambda _: None, pin=lambda _: None)
+            for processor, _ in pairs
+        }
+        self._records = RecordReader()
+        self._committed_s = 0.0
+        self._consumer = Consumer(
+            settings.client()
+            | {
+                "group.id": topics.bridge(name),
+                "enable.auto.commit": False,
+                "isolation.level": "read_committed",
+                "auto.offset.reset": "earliest",
+                "fetch.wait.max.ms": 50,
+            }
+        )
+        self._next: dict[int, int] = {}
+
+    def begin(self) -> None:
+        """Learn what is known by now, before the edge nodes are started. Raises SnapshotError where the log does not answer."""
+        numbers = range(self._settings.partitions)
+        kept = read_kept(self._settings.client(), self._topics.snapshots, list(numbers), timeout_s=120.0)
+        cut_ms = int(time.time() * 1000) - BEFORE_CUT_MS
+        for of_partition in kept.values():
+            for machine, name, action in _declared(of_partition):
+                if (sender := self._senders.get(name)) is not None and machine:
+                    sender.apply([action], self.counts)
+        own = [TopicPartition(self._topics.results, number) for number in numbers]
+        stopped = {one.partition: one.offset for one in self._consumer.committed(own, ANSWER_S)}
+        since = self._consumer.offsets_for_times([TopicPartition(self._topics.results, n, cut_ms) for n in numbers], ANSWER_S)
+        begin = [self._from(one.partition, one.offset, stopped[one.partition]) for one in since]
+        self._consumer.assign(begin)
+        self._catch_up({one.partition: one.offset for one in begin}, stopped)
+
+    def _from(self, number: int, since: int, stopped: int) -> TopicPartition:
+        """Return from where results are read: what came since the last cut, but at least what did not go out."""
+        if stopped < 0:  # this bridge never was: nobody was told anything
+            return TopicPartition(self._topics.results, number, 0)
+        offset = stopped if since < 0 else min(since, stopped)
+        return TopicPartition(self._topics.results, number, offset)
+
+    def _catch_up(self, begins: Mapping[int, int], stopped: Mapping[int, int]) -> None:
+        """Take results that went out before; nothing goes out, since no node is online."""
+        self._next = dict(begins)
+        until_s = time.monotonic() + 60.0
+        while any(self._next[number] < stopped[number] for number in begins) and time.monotonic() < until_s:
+            before = dict(self._next)
+            self.turn(0.2)
+            if before == self._next:
+                for number in begins:  # control records at the end
+                    self._next[number] = max(self._next[number], stopped[number])
+        for number in begins:
+            self._next[number] = max(self._next[number], stopped[number])
+
+    def turn(self, timeout_s: float = 0.0) -> int:
+        """Publish what has come; return how many results."""
+        messages = self._consumer.consume(RESULTS_A_TURN, timeout_s)
+        for message in messages:
+            if (error := message.error()) is not None:
+                _log.warning("kafka: %s", error.str())
+                continue
+            self._next[message.partition() or 0] = (message.offset() or 0) + 1
+            headers: Any = message.headers()
+            try:
+                record = self._records.read(headers, message.value())
+            except PayloadError as why:
+                self.unreadable += 1
+                _log.warning("a result is not published: %s", why)
+                continue
+            sender = self._senders.get(dict(headers).get("processor", b"").decode())
+            if sender is None or record.event is None:
+                continue  # another bridge publishes it
+            event = record.event
+            qos = next((q for prefix, q in self._qos.items() if event.topic.startswith(prefix)), 0) if event.topic else 0
+            sender.apply([action_of(event, qos, retain=record.retain)], self.counts)
+            self.published += 1
+        return len(messages)
+
+    def commit(self, now_s: float) -> None:
+        """Say once a second what went out."""
+        if now_s - self._committed_s < COMMIT_S or not self._next:
+            return
+        self._committed_s = now_s
+        positions = [TopicPartition(self._topics.results, number, offset) for number, offset in self._next.items() if offset >= 0]
+        try:
+            self._consumer.commit(offsets=positions, asynchronous=True)
+        except KafkaException as error:
+            _log.warning("kafka: %s", error.args[0].str())
+
+    def reported(self) -> None:
+        """Let dead letters out again."""
+        for sender in self._senders.values():
+            sender.reported()
+
+    def close(self) -> None:
+        """Leave."""
+        self._committed_s = 0.0
+        self.commit(time.monotonic())
+        self._consumer.close()
+
+
+def _declared(kept: Mapping[str, bytes]) -> Iterator[tuple[str, str, Declare]]:
+    """Yield the machines that were online when their states were cut, with what was known of them, by processor."""
+    for key, payload in kept.items():
+        name, _, _ = key.partition("/")
+        if key.startswith("~"):
+            continue
+        first, _, snapshot = payload.partition(b"\n")
+        moment, document = json.loads(first), json.loads(snapshot)
+        for machine, told in document["live"]["machines"].items():
+            if any("/twin-" not in node for node in moment["machines"][machine]["online"]):
+                yield machine, name, Declare(machine, latest_of(told))

@@ -1,0 +1,120 @@
+"""Records to the log: bounded, in order, and counted where there is no room.
+
+While the cluster is away, records wait in memory, as many as there is room for. Then data are dropped, and a hole is told of each
+machine before the next record that goes out. A birth or a death that finds no room is told again from what is known of the
+machine.
+"""
+
+import logging
+from collections import Counter
+from collections.abc import Callable
+
+from confluent_kafka import KafkaError, Message, Producer
+
+from cnctwin.kafka.settings import KafkaSettings
+from sparkplug.host_event import EventKind, HostEvent
+from sparkplug.metric import NodeId
+from sparkplug.records.record import Headers, Origin, RecordWriter
+
+MESSAGES_MAX = 1_000_000
+FLUSH_S = 10.0
+_DATA, _HOLE = EventKind.DATA, EventKind.HOLE
+_log = logging.getLogger(__name__)
+Source = tuple[str, str, NodeId, str]
+"""Topic, key, node and device of a record."""
+
+
+class Outward:
+    """See the module. `on_kept` is called with the token of each record that the cluster has acknowledged."""
+
+    def __init__(self, settings: KafkaSettings, name: str, on_kept: Callable[[object], None] | None = None) -> None:
+        self.delivered = self.dropped = self.failed = 0
+        self.trouble = ""
+        self._writer = RecordWriter(name)
+        self._lost: Counter[Source] = Counter()
+        self._untold: dict[tuple[NodeId, str], None] = {}
+        self._on_kept = on_kept
+        self._producer = Producer(
+            settings.client()
+            | {
+                "client.id": name,
+                "enable.idempotence": True,
+                "acks": "all",
+                "compression.type": "lz4",
+                "linger.ms": 5,
+                "partitioner": "murmur2_random",
+                "message.timeout.ms": 0,  # a record waits for as long as it takes
+                "queue.buffering.max.messages": MESSAGES_MAX,
+                "queue.buffering.max.kbytes": round(settings.buffer_mb * 1024),
+            },
+            logger=_log,
+        )
+
+    @property
+    def waiting(self) -> int:
+        """The number of records that the cluster has not acknowledged."""
+        return len(self._producer)
+
+    def put(self, topic: str, key: str, event: HostEvent, received_ms: int, origin: Origin) -> bool:
+        """Have an event go out; False where there was no room."""
+        device = event.device or ""
+        source = topic, key, event.node, device
+        if self._lost and (lost := self._lost.get(source)):
+            detail = f"{lost} messages of {device} found no room on the way to the log"
+            hole = HostEvent(_HOLE, event.node, device, event.timestamp_ms, detail=detail)
+            if not self._send(topic, key, *self._writer.written(hole, received_ms, origin._replace(seq=-1))):
+                self._lost[source] += 1
+                self.dropped += 1
+                return False
+            del self._lost[source]
+        if self._send(topic, key, *self._writer.written(event, received_ms, origin)):
+            return True
+        self.dropped += 1
+        self._lost[source] += 1
+        if event.kind is not _DATA:
+            self._untold[event.node, device] = None
+        return False
+
+    def put_plain(self, topic: str, key: str, partition: int, event: HostEvent, received_ms: int) -> bool:
+        """Have a plain message go out to one partition."""
+        headers, value = self._writer.written(event, received_ms, Origin())
+        return self._send(topic, key, headers, value, partition)
+
+    def watermark(self, topic: str, partition: int, at_ms: int) -> None:
+        """Have a watermark go out; one that finds no room is no loss, since the next one says more."""
+        self._send(topic, "", self._writer.watermark(at_ms), b"", partition)
+
+    def keep(self, topic: str, key: str, value: bytes | None) -> bool:
+        """Have a value kept on a compacted topic."""
+        return self._send(topic, key, [], value)
+
+    def take_untold(self) -> list[tuple[NodeId, str]]:
+        """Return the devices whose birth or death found no room, once there is room again."""
+        if not self._untold or len(self._producer) > MESSAGES_MAX // 2:
+            return []
+        untold, self._untold = list(self._untold), {}
+        return untold
+
+    def poll(self) -> None:
+        """Have delivery reports come in."""
+        self._producer.poll(0)
+
+    def close(self) -> int:
+        """Wait for what is on its way; return the number of records that were not acknowledged."""
+        return int(self._producer.flush(FLUSH_S))
+
+    def _send(self, topic: str, key: str, headers: Headers, value: bytes | None, partition: int = -1) -> bool:
+        try:
+            self._producer.produce(topic, value, key.encode(), partition, self._delivered, headers=headers)
+        except BufferError:
+            self._producer.poll(0)
+            return False
+        return True
+
+    def _delivered(self, error: KafkaError | None, message: Message) -> None:
+        if error is None:
+            self.delivered += 1
+            return
+        self.failed += 1
+        self.trouble = error.str()
+        _log.warning("kafka: a record on %s is lost: %s", message.topic(), error.str())

@@ -1,0 +1,107 @@
+"""A bridge from its options: the host session, the edge nodes of the processors that it publishes, and the courier of alerts."""
+
+import fnmatch
+import logging
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from threading import Event
+
+from cnctwin.kafka.bridge.bridge import Bridge
+from cnctwin.kafka.settings import KafkaSettings
+from cnctwin.kafka.topics import Topics, ensure
+from cnctwin.processes.look_around import refuse_second
+from processors.discovery import discover
+from processors.errors import ConfigurationError
+from processors.running.health import node_metrics
+from processors.running.runtime import Configured
+from sparkplug.admission.limits import DEFAULTS, Limits
+from sparkplug.broker import BrokerAddress
+from sparkplug.edge_node import EdgeNode
+from sparkplug.host import HostApplication
+from sparkplug.metric import NodeId
+from sparkplug.session_files.session_lock import SessionLock
+from sparkplug.topics import uncommanded_filters
+from sparkplug.transport.loop import Loop
+from twin.vocabulary.nodes import is_twin_node
+from twin.vocabulary.topics import RESERVED_MACHINES
+
+_log = logging.getLogger(__name__)
+
+
+def bridge(
+    settings: KafkaSettings,
+    pairs: Sequence[Configured],
+    broker: BrokerAddress,
+    stop: Event,
+    *,
+    name: str,
+    group: str,
+    nodes: Sequence[str],
+    results: Sequence[str],
+    state_dir: Path,
+    limits: Limits = DEFAULTS,
+    machines: Path | None = None,
+) -> None:
+    """Run a bridge until `stop` is set. `pairs`: the processors that run on the log; `nodes`: patterns of the edge nodes that
+    this bridge reads; `results`: the processors whose results it publishes. Raises ConfigurationError, AnotherRunsError.
+    """
+    topics = Topics(group)
+    own = [NodeId(group, processor.node) for processor, _ in pairs if processor.name in results]
+    with ExitStack() as stack:
+        lock = NodeId(group, f"bridge-{name}")
+        for node in (lock, *own):
+            stack.callback(SessionLock(state_dir / f"{node.node}.json", f"{node.group}/{node.node}").release)
+        refuse_second(broker, own, "end that one first, or give this bridge other --results")
+        ensure(settings, topics, cell_processors(pairs))
+        loop = Loop("bridge")
+        host = HostApplication(
+            broker,
+            f"bridge-{name}",
+            uncommanded_filters(group),
+            wanted=lambda node: _is_read(node, nodes, own),
+            loop=loop,
+            limits=limits,
+            reserved=RESERVED_MACHINES,
+            trusted=lambda node: is_twin_node(node.node),
+        )
+        edges = {
+            processor.name: EdgeNode(
+                broker,
+                NodeId(group, processor.node),
+                node_metrics(on_log=True),
+                session_file=state_dir / f"{processor.node}.json",
+                loop=loop,
+            )
+            for processor, _ in pairs
+            if processor.name in results
+        }
+        Bridge(settings, topics, name, pairs, host=host, nodes=edges, machines=machines).run(stop)
+
+
+def _is_read(node: NodeId, patterns: Sequence[str], own: Sequence[NodeId]) -> bool:
+    """Return True for a node of this bridge's share: a processor's node is read by the bridge that publishes it."""
+    if is_twin_node(node.node):
+        return node in own
+    return any(fnmatch.fnmatchcase(node.node, pattern) for pattern in patterns)
+
+
+def cell_processors(pairs: Sequence[Configured]) -> list[str]:
+    """Return the names of those that compare machines."""
+    return [processor.name for processor, _ in pairs if processor.is_of_cells]
+
+
+def published_by(results: str, names: Sequence[str]) -> list[str]:
+    """Return the processors whose results a bridge publishes: all that run on the log, none, or those named.
+
+    Raises ConfigurationError for a name that no processor has.
+    """
+    if results in ("", "all"):
+        return list(names)
+    if results == "none":
+        return []
+    chosen = [name.strip() for name in results.split(",") if name.strip()]
+    unknown = [name for name in chosen if name not in discover()]
+    if unknown:
+        raise ConfigurationError(f"--results {unknown[0]}: no processor has that name; `cnctwin process --help` lists them")
+    return chosen

@@ -1,0 +1,113 @@
+"""Compacted partitions, read from the beginning to the high watermark: the newest value of each key.
+
+Not to the last stable offset: behind the open transaction of a writer that died, committed values may stand. Whoever reads has to
+wait until that transaction has ended. It ends by its time-out, or at once where the dead writer's name is taken (`Fence`).
+"""
+
+import logging
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from confluent_kafka import OFFSET_BEGINNING, Consumer, KafkaError, KafkaException, Message, TopicPartition
+
+from cnctwin.kafka.settings import Conf
+from processors.errors import SnapshotError
+
+ANSWER_S = 10.0
+POLL_S = 0.2
+STUCK_S = 0.3  # behind the end without anything new: a transaction is open
+WRITER = "writer"
+Kept = dict[int, dict[str, bytes]]
+Fence = Callable[[str], None]
+"""Ends the transaction of a writer that is gone; does nothing for one that lives."""
+_log = logging.getLogger(__name__)
+
+
+def read_kept(client: Conf, topic: str, partitions: Sequence[int], *, timeout_s: float, fence: Fence = lambda _: None) -> Kept:
+    """Return what is kept in some partitions of a topic. Raises SnapshotError where their end is not reached in time."""
+    common = client | {"group.id": f"{topic}.read", "enable.auto.commit": False, "auto.offset.reset": "earliest"}
+    uncommitted = Consumer(common | {"isolation.level": "read_uncommitted"})
+    consumer = Consumer(common | {"isolation.level": "read_committed", "enable.partition.eof": True, "fetch.wait.max.ms": 20})
+    try:
+        ends = {
+            number: high
+            for number in partitions
+            for low, high in [uncommitted.get_watermark_offsets(TopicPartition(topic, number), ANSWER_S)]
+            if high > low
+        }
+        return _read(consumer, uncommitted, _Reading(topic, ends, partitions), topic, timeout_s=timeout_s, fence=fence)
+    except KafkaException as error:
+        raise SnapshotError(f"{topic}: {error.args[0].str()}") from error
+    finally:
+        consumer.close()
+        uncommitted.close()
+
+
+class _Reading:
+    """The reading of some partitions, as far as it has come."""
+
+    def __init__(self, topic: str, ends: dict[int, int], partitions: Sequence[int]) -> None:
+        self.kept: Kept = {number: {} for number in partitions}
+        self.reached = dict.fromkeys(ends, 0)
+        self.news_s = time.monotonic()
+        self._topic, self.ends = topic, ends
+
+    @property
+    def behind(self) -> dict[int, int]:
+        """Return the partitions whose end is not reached, and how far they have come."""
+        return {number: at for number, at in self.reached.items() if at < self.ends[number]}
+
+    def take(self, message: Message) -> None:
+        """Take a message, or the news that there are no more for now."""
+        number, error = message.partition() or 0, message.error()
+        if error is None:
+            self.news_s = time.monotonic()
+            raw, value = message.key(), message.value()
+            key = raw.decode() if isinstance(raw, bytes) else ""
+            if isinstance(value, bytes):
+                self.kept[number][key] = value
+            else:
+                self.kept[number].pop(key, None)
+        elif error.code() == KafkaError._PARTITION_EOF:
+            self.reached[number] = max(self.reached[number], message.offset() or 0)
+        elif not error.retriable():
+            raise KafkaException(error)
+
+
+def _read(consumer: Consumer, uncommitted: Consumer, reading: _Reading, topic: str, *, timeout_s: float, fence: Fence) -> Kept:
+    consumer.assign([TopicPartition(topic, number, OFFSET_BEGINNING) for number in reading.ends])
+    began_s = time.monotonic()
+    is_fenced = False
+    while behind := reading.behind:
+        if time.monotonic() - began_s > timeout_s:
+            raise SnapshotError(f"{topic}: the end of partitions {list(behind)} is not reached within {timeout_s:g} s")
+        for message in consumer.consume(1000, POLL_S):
+            reading.take(message)
+        if not is_fenced and any(behind.values()) and time.monotonic() - reading.news_s > STUCK_S:
+            is_fenced = True
+            stuck = {number: at for number, at in reading.behind.items() if at}
+            for writer in _writers(uncommitted, topic, stuck, reading.ends):
+                _log.warning("%s: a transaction of %s is open", topic, writer)
+                fence(writer)
+    return reading.kept
+
+
+def _writers(consumer: Consumer, topic: str, begins: dict[int, int], ends: dict[int, int]) -> set[str]:
+    """Return who wrote what stands behind the last stable offset."""
+    writers: set[str] = set()
+    consumer.assign([TopicPartition(topic, number, begin) for number, begin in begins.items()])
+    until_s = time.monotonic() + ANSWER_S
+    left = set(begins)
+    while left and time.monotonic() < until_s:
+        messages = consumer.consume(1000, POLL_S)
+        for message in messages:
+            if message.error() is None:
+                told: dict[str, Any] = dict(message.headers() or ())
+                writers.add(told.get(WRITER, b"").decode())
+                if (message.offset() or 0) >= ends[message.partition() or 0] - 1:
+                    left.discard(message.partition() or 0)
+        if not messages:
+            break
+    writers.discard("")
+    return writers

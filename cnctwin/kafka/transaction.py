@@ -1,0 +1,125 @@
+"""Transactions of one runner: results, states and offsets go out together, or none of them.
+
+What the cluster says of a failure decides: try again, abort and begin from what was saved, or end, where another runner has taken
+this one's name.
+"""
+
+import time
+from collections.abc import Callable, Sequence
+
+from confluent_kafka import Consumer, KafkaError, KafkaException, Producer, TopicPartition
+
+from cnctwin.kafka.kept import WRITER
+from cnctwin.kafka.settings import KafkaSettings
+from processors.errors import ProcessorError
+from sparkplug.records.record import Headers
+
+REQUEST_S = 10.0
+PAUSE_S = 0.2
+
+
+class AbortedError(Exception):
+    """A transaction came to nothing: what was folded in it has to be folded again."""
+
+
+class FencedError(ProcessorError):
+    """Another runner has this one's name."""
+
+
+class Transactions:
+    """See the module. `is_stopping` ends waiting for a cluster that does not answer."""
+
+    def __init__(self, settings: KafkaSettings, name: str, is_stopping: Callable[[], bool]) -> None:
+        self.name = name
+        self.committed = self.aborted = 0
+        self.is_open = False
+        self._settings, self._is_stopping = settings, is_stopping
+        self._producer = self._begun()
+
+    def _begun(self) -> Producer:
+        producer = producer_of(self._settings, self.name)
+        self._insist(lambda: producer.init_transactions(REQUEST_S))
+        return producer
+
+    def produce(self, topic: str, key: str, value: bytes | None, partition: int, headers: Headers) -> None:
+        """Have a message go out with the transaction, which begins with its first."""
+        self.open()
+        while True:
+            try:
+                self._producer.produce(topic, value, key.encode(), partition, headers=headers)
+            except BufferError:
+                self._producer.poll(PAUSE_S)
+                continue
+            except KafkaException as error:
+                self._failed(error.args[0])
+            return
+
+    def open(self) -> None:
+        """Begin a transaction where none is open."""
+        if not self.is_open:
+            self._producer.begin_transaction()
+            self.is_open = True
+
+    def commit(self, positions: Sequence[TopicPartition], consumer: Consumer) -> None:
+        """Commit what was produced, with the consumer's positions. Raises AbortedError, FencedError."""
+        self.open()
+        self._insist(
+            lambda: self._producer.send_offsets_to_transaction(list(positions), consumer.consumer_group_metadata(), REQUEST_S)
+        )
+        self._insist(lambda: self._producer.commit_transaction(REQUEST_S))
+        self.is_open = False
+        self.committed += 1
+
+    def abort(self) -> None:
+        """Give up what is open. A producer that cannot any more is replaced by another of its name."""
+        self.aborted += 1
+        self.is_open = False
+        try:
+            self._producer.abort_transaction(REQUEST_S)
+        except KafkaException:
+            self._producer = self._begun()
+
+    def _insist(self, ask: Callable[[], object]) -> None:
+        """Ask until there is an answer."""
+        while True:
+            try:
+                ask()
+            except KafkaException as error:
+                reason = error.args[0]
+                if not reason.retriable() or reason.txn_requires_abort() or self._is_stopping():
+                    self._failed(reason)
+                time.sleep(PAUSE_S)
+            else:
+                return
+
+    def _failed(self, reason: KafkaError) -> None:
+        """A transaction that took too long is fenced too: whether another runner has the name, the consumer group knows."""
+        if reason.code() == KafkaError.FENCED_INSTANCE_ID:
+            raise FencedError(f"kafka: {self.name} is taken by another process; give each runner a --member of its own")
+        raise AbortedError(reason.str())
+
+
+def producer_of(settings: KafkaSettings, transactional_id: str) -> Producer:
+    """Return a transactional producer."""
+    return Producer(
+        settings.client()
+        | {
+            "transactional.id": transactional_id,
+            "transaction.timeout.ms": round(settings.transaction_s * 1000),
+            "message.timeout.ms": round(settings.transaction_s * 1000),
+            "compression.type": "lz4",
+            "linger.ms": 2,
+            "partitioner": "murmur2_random",
+            "queue.buffering.max.kbytes": round(settings.buffer_mb * 1024),
+        }
+    )
+
+
+def fence(settings: KafkaSettings, transactional_id: str) -> None:
+    """Take the name of a writer that is gone, for a moment: the cluster aborts what it left open."""
+    producer_of(settings, transactional_id).init_transactions(REQUEST_S)
+
+
+def written_by(name: str) -> Headers:
+    """Return the header that says who wrote a state."""
+    return [(WRITER, name.encode())]
