@@ -49,6 +49,7 @@ LONG = (
     "twin/gap/programs/test_diagnose.py",
     "cnctwin/demo/test_demo_by_peer.py",
     "hivemq/test_barrier.py",
+    "kafka/test_server.py",
     "peers/test_hosts_of_peers.py",
     "peers/test_edges_of_peers.py",
     "processors/test_contract.py",
@@ -76,7 +77,7 @@ LONG = (
 )
 
 # Files that share what takes long to start or to compile: one worker does it once for all of them.
-TOGETHER = ("tests/hivemq/", "tests/twin/process/")
+TOGETHER = ("tests/hivemq/", "tests/kafka/", "tests/twin/process/")
 
 
 class InGroups(LoadFileScheduling):

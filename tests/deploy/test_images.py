@@ -17,7 +17,7 @@ from tests.recordings import PROJECT
 
 IMAGE = DEPLOY / "image"
 DOCKERFILE = IMAGE / "Dockerfile"
-RUNTIME_EXTRAS = ("twin", "optimise", "cluster", "opcua", "heidenhain", "historian", "influx", "page", "apprise")
+RUNTIME_EXTRAS = ("twin", "optimise", "cluster", "opcua", "heidenhain", "historian", "influx", "kafka", "page", "apprise")
 
 
 def installed(tool: str) -> str:

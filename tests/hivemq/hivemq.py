@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import re
 import shutil
 import subprocess
 import sys
-import tempfile
 import threading
 from dataclasses import replace
-from functools import lru_cache
 from pathlib import Path
 from types import TracebackType
 
@@ -20,12 +17,11 @@ import pytest
 from sparkplug.broker import BrokerAddress
 from tests.deploy.plant import certificates, password_of
 from tests.recordings import PROJECT
+from tests.wire import maven
 from tests.wire.mosquitto import free_port
 
 HERE = Path(__file__).parent
-CACHE = PROJECT / ".cache" / "hivemq"
 DEPLOY = PROJECT / "deploy" / "hivemq"
-BUILD_S_MAX = 300.0
 START_S_MAX = 120.0
 MACHINES, PEOPLE, LOOPBACK, OPEN = 8883, 8885, 1883, 0
 USERS = {"edge-okuma": "edge", "edge-other": "edge", "processors": "processors", "viewer": "viewer", "operator": "operator"}
@@ -34,38 +30,9 @@ KEYSTORE_PASSWORD = "of the key stores"
 JAVA_OPTIONS = ("-Xmx384m", "-XX:+UseSerialGC", "-XX:TieredStopAtLevel=1", "-Djava.awt.headless=true")
 
 
-@lru_cache(maxsize=1)
 def built() -> Path:
     """The folder with our classes and HiveMQ's; skips the test where it cannot be made."""
-    for program in ("java", "mvn"):
-        if shutil.which(program) is None:
-            pytest.skip(f"no {program} on this machine; install the packages default-jdk-headless and maven")
-    sources = [HERE / "pom.xml", *sorted(HERE.glob("src/**/*.java"))]
-    folder = CACHE / hashlib.sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()[:16]
-    if not folder.exists():
-        _build(folder)
-    return folder
-
-
-def _build(folder: Path) -> None:
-    """Build beside `folder` and rename, so that a folder that is there is whole."""
-    CACHE.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=CACHE) as scratch:
-        shutil.copy(HERE / "pom.xml", scratch)
-        shutil.copytree(HERE / "src", Path(scratch) / "src")
-        goals = ["compile", "dependency:copy-dependencies", "-DoutputDirectory=target/lib"]
-        try:
-            command = ["mvn", "-B", "-q", *goals]
-            done = subprocess.run(command, cwd=scratch, capture_output=True, text=True, timeout=BUILD_S_MAX, check=False)
-            said = done.stdout if done.returncode else ""
-        except subprocess.TimeoutExpired:
-            said = f"it took more than {BUILD_S_MAX:g} s"
-        if said:
-            # On the build server a peer that cannot be had is a failure: a skip there would be read by nobody.
-            give_up = pytest.fail if os.environ.get("CI") else pytest.skip
-            give_up(f"Maven cannot fetch or build HiveMQ (is there a network?): {said.strip()[:300]}")
-        if not folder.exists():
-            (Path(scratch) / "target").rename(folder)
+    return maven.built(HERE, "HiveMQ")
 
 
 def hashed(password: str) -> str:
