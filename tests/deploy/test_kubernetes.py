@@ -196,8 +196,12 @@ def test_what_a_pod_is_told_to_read_or_write_is_mounted(name: str, site: Site) -
     volumes = [volume["name"] for volume in one.pod["volumes"]] + claims
     assert {mount["name"] for mount in mounted.values()} == set(volumes) and len(volumes) == len(set(volumes))
     values = [site.variable(one, key) for key, value in one.environment.items() if "secretKeyRef" not in value]
+    if name in ON_KAFKA:
+        values.append(tomllib.loads((site.home / "kafka.toml").read_text())["ca_file"])
     paths = re.findall(r"(?:^|[ =])(/[\w./-]+)", "\n".join([*site.command(one), *values]), re.M)
     assert paths and [path for path in paths if not any(path == at or path.startswith(f"{at}/") for at in mounted)] == []
+    configured_by = {path.removeprefix("/etc/cnctwin/config/") for path in paths if path.startswith("/etc/cnctwin/config/")}
+    assert "processors.toml" in configured_by and all((site.home / file).is_file() for file in configured_by)
     writable = {at for at, mount in mounted.items() if not mount.get("readOnly")}
     assert writable == {"/tmp", "/var/lib/cnctwin"}, "and nothing else, as the image says"
     for volume in one.pod["volumes"]:
