@@ -115,6 +115,7 @@ def test_what_numba_keeps_has_a_place_in_the_image_and_in_the_unit_of_jobs() -> 
 
 def test_shellcheck_finds_nothing() -> None:
     scripts = [DEPLOY / "compose" / "prepare", DEPLOY / "compose" / "influxdb-buckets.sh", DEPLOY / "certificates"]
+    scripts += [*(DEPLOY / "kafka" / name for name in ("acls", "start", "topics")), DEPLOY / "kubernetes" / "prepare"]
     checked = subprocess.run([installed("shellcheck"), *map(str, scripts)], capture_output=True, text=True, check=False)
     assert (checked.returncode, checked.stdout) == (0, "")
 
