@@ -18,6 +18,7 @@ ANSWER_S = 10.0
 POLL_S = 0.2
 STUCK_S = 0.3  # behind the end without anything new: a transaction is open
 WRITER = "writer"
+PASSING = (KafkaError.NOT_LEADER_FOR_PARTITION, KafkaError.LEADER_NOT_AVAILABLE, KafkaError.UNKNOWN_TOPIC_OR_PART)
 Kept = dict[int, dict[str, bytes]]
 Fence = Callable[[str], None]
 """Ends the transaction of a writer that is gone; does nothing for one that lives."""
@@ -30,18 +31,29 @@ def read_kept(client: Conf, topic: str, partitions: Sequence[int], *, timeout_s:
     uncommitted = Consumer(common | {"isolation.level": "read_uncommitted"})
     consumer = Consumer(common | {"isolation.level": "read_committed", "enable.partition.eof": True, "fetch.wait.max.ms": 20})
     try:
-        ends = {
-            number: high
-            for number in partitions
-            for low, high in [uncommitted.get_watermark_offsets(TopicPartition(topic, number), ANSWER_S)]
-            if high > low
-        }
+        marks = {number: _watermarks(uncommitted, topic, number, timeout_s) for number in partitions}
+        ends = {number: high for number, (low, high) in marks.items() if high > low}
         return _read(consumer, uncommitted, _Reading(topic, ends, partitions), topic, timeout_s=timeout_s, fence=fence)
     except KafkaException as error:
         raise SnapshotError(f"{topic}: {error.args[0].str()}") from error
     finally:
         consumer.close()
         uncommitted.close()
+
+
+def _watermarks(consumer: Consumer, topic: str, number: int, timeout_s: float) -> tuple[int, int]:
+    """Return the first offset of a partition and the one behind its last; waits while it has no leader."""
+    until_s = time.monotonic() + timeout_s
+    while True:
+        try:
+            found = consumer.get_watermark_offsets(TopicPartition(topic, number), ANSWER_S)
+        except KafkaException as error:
+            if (not error.args[0].retriable() and error.args[0].code() not in PASSING) or time.monotonic() > until_s:
+                raise
+        else:
+            if found is not None:
+                return found
+        time.sleep(POLL_S)
 
 
 class _Reading:
