@@ -49,7 +49,7 @@ class Runner:
         self.group = topics.runners(names)
         self._settings, self._topics, self._member, self._sink = settings, topics, member, sink
         self._name = f"{self.group}.{member}"
-        self._assigned = Assigned(settings, topics, pairs)
+        self._assigned = Assigned(settings, topics, pairs, *(() if sink is None else (sink.begin,)))
         self._results = {processor.name: Results(topics.group, processor) for processor, _ in pairs}
         self._writer = RecordWriter(self._name)
         self._waiting: deque[Message] = deque()

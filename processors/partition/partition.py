@@ -49,6 +49,7 @@ class Partition:
         self.repeated = 0  # records that were there before
         self.refused: list[str] = []  # snapshots that were not restored, and why
         self._reader = reader
+        self._begin = 0  # records before it are in all states
         self._lives: dict[str, Lives] = {}
         self._descriptions: dict[str, bytes] = {}
         self._new_descriptions: dict[str, bytes | None] = {}
@@ -64,7 +65,7 @@ class Partition:
         for seat in self.seats:
             self._describe_all(seat)
             self._restore(seat, kept, markers)
-        self.next = min(seat.from_offset for seat in self.seats)
+        self.next = self._begin = min(seat.from_offset for seat in self.seats)
         lives = [_json(value) for key, value in kept.items() if key.startswith(LIVES)]
         known: Mapping[str, dict[str, list[int]]] = next((one["devices"] for one in lives if one["folded"] == self.next), {})
         self._lives = {device: Lives(of_device) for device, of_device in known.items()}
@@ -98,6 +99,8 @@ class Partition:
         """Fold a record; yield what came of it that did not go out before."""
         self.next = offset + 1
         event, wall_s = record.event, record.received_ms / 1000
+        if offset < self._begin:
+            return
         if event is None:
             for seat in self.seats:
                 if offset >= seat.from_offset:
