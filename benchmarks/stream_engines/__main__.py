@@ -56,10 +56,17 @@ def main() -> int:
     """Make the environments, start a broker, compare, and print the table."""
     asked = options()
     asked.scratch.mkdir(parents=True, exist_ok=True)
-    environments = ["plain", *(name for name in ("quix", "flink") if name in asked.engines)]
-    pythons = {name: str(python_of(name, asked.scratch)) for name in environments}
-    flink = jars("flink-jars", [FLINK_JAR], asked.scratch, alone=True) if "flink" in environments else None
-    jar = str(next(flink.glob("*.jar")).absolute()) if flink else ""
+    pythons = {"plain": str(python_of("plain", asked.scratch))}
+    jar, refused = "", list[str]()
+    for name in {"quix", "flink"} & set(asked.engines):
+        try:
+            python = python_of(name, asked.scratch)
+            if name == "flink":
+                jar = str(next(jars("flink-jars", [FLINK_JAR], asked.scratch, alone=True).glob("*.jar")).absolute())
+            pythons[name] = str(python)
+        except (RuntimeError, OSError) as failure:
+            refused.append(f"{name} could not be installed, so it has no figures: {failure}")
+            asked.engines.remove(name)
     folder = Path(tempfile.mkdtemp(dir=asked.scratch, prefix="run-")).absolute()
 
     def compare(kafka: str) -> int:
@@ -78,7 +85,7 @@ def main() -> int:
     if code:
         sys.stderr.write(f"The comparison ended with {code}; the logs are in {folder}\n")
         return code
-    sys.stdout.write(conditions(asked, environments))
+    sys.stdout.write("".join(f"\n{line}\n" for line in refused) + conditions(asked, list(pythons)))
     shutil.rmtree(folder)
     return 0
 

@@ -55,17 +55,18 @@ class Bench:
     def trial(self, engine: Engine, state_bytes: int, messages: int, members: str = "a") -> "Iterator[Trial]":
         """Lay topics, workers that are not started yet, feed and reader; end all of them afterwards."""
         name = f"{engine.name}-{next(self.numbers)}"
-        topics = [f"{name}.{end}" for end in ("in", "out", "snapshots")]
+        inputs, outputs, snapshots = topics = [f"{name}.{end}" for end in ("in", "out", "snapshots")]
         for topic in topics:
-            create(self.admin, topic, compacted=topic.endswith("snapshots"))
+            create(self.admin, topic, compacted=topic == snapshots)
         workers = []
         for member in members:
-            state = self.folder / name / member
-            order = Order(self.kafka, *topics, name, member, str(state), state_bytes, engine.commit_s, engine.mode, engine.jar)
+            state = str(self.folder / name / member)
+            names = self.kafka, inputs, outputs, snapshots, name, member
+            order = Order(*names, state, state_bytes, engine.commit_s, engine.mode, engine.jar)
             workers.append(Worker(engine.python, engine.module, order, self.folder / f"{name}-{member}.log"))
-        reader = Reader(self.kafka, topics[1], Ledger(messages, state_bytes))
+        reader = Reader(self.kafka, outputs, Ledger(messages, state_bytes))
         try:
-            yield Trial(self.admin, name, Feed(self.kafka, topics[0]), reader, workers)
+            yield Trial(self.admin, name, Feed(self.kafka, inputs), reader, workers)
         finally:
             for worker in workers:
                 worker.kill()
