@@ -12,8 +12,8 @@ Cost: processor time of the worker with its children and threads, from the momen
 in one transaction) until a read_committed reader has all its outputs; 20,000 messages before that warm up. Kill: messages come
 at a rate, the worker gets kill -9, its local state is deleted, it is started again half a second later; seconds are from that
 start to the first output that was not there before. Takeover: one of two workers is killed and stays away; seconds are from the
-kill until every key has a new output. Outputs that come twice are counted by the reader, and a key is exact if all its outputs
-came and each is what an undisturbed fold gives.
+kill until every key has the output of a message sent after it. Outputs that come twice are counted by the reader, and a key is
+exact if all its outputs came and each is what an undisturbed fold gives.
 
 The broker is one of Maven's jars, each engine has a virtual environment; both stay in the folder of `--scratch`.
 """

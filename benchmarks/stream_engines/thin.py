@@ -4,6 +4,8 @@ The name of the member is static and is also the transactional id, so a restart 
 transaction of the one that died. Any error of Kafka ends the process; whoever supervises it starts it again.
 """
 
+from typing import Any
+
 from confluent_kafka import OFFSET_BEGINNING, Consumer, KafkaError, Producer, TopicPartition
 
 from benchmarks.stream_engines.fold import folded
@@ -63,7 +65,7 @@ class Runner:
             if batch := self.consumer.consume(BATCH_MAX, self.order.commit_s):
                 self.fold(batch)
 
-    def fold(self, batch: list) -> None:
+    def fold(self, batch: list[Any]) -> None:
         """Fold a batch in one transaction."""
         order, producer, ends = self.order, self.producer, dict[int, int]()
         dirty = set[tuple[int, bytes]]()
