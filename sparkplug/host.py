@@ -90,13 +90,13 @@ class HostApplication:
         reserved: Collection[str] = (),
         trusted: Callable[[NodeId], bool] = lambda _: False,
         keep_s: int = 0,
-        on_life: Callable[[Topic, bytes], None] | None = None,
     ) -> None:
         self.dropped = 0
         self.faults = 0  # messages that a bug of ours has lost
         self._queue_max = queue_max
         self._stale_s_max = math.inf if keep_s else stale_s_max
-        self._keep_s, self._on_life = keep_s, on_life
+        self._keep_s = keep_s
+        self.on_life: Callable[[Topic, bytes], None] | None = None
         self._held: list[Held] = []
         self._is_lost = False  # the connection of a kept session
         self._wanted = wanted
@@ -315,8 +315,8 @@ class HostApplication:
             elif isinstance(topic, str) and topic.startswith(NAMESPACE):
                 try:
                     events += session.message(topic, payload, now_ms())
-                    if self._on_life is not None and ("BIRTH/" in topic or "DEATH/" in topic):
-                        self._on_life(Topic.parse(topic), payload)
+                    if self.on_life is not None and ("BIRTH/" in topic or "DEATH/" in topic):
+                        self.on_life(Topic.parse(topic), payload)
                 except Exception:
                     self._fail(f"a message on {shortened(topic)} could not be taken")
             elif isinstance(topic, Overrun):

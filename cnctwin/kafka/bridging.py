@@ -42,9 +42,11 @@ def bridge(
     state_dir: Path,
     limits: Limits = DEFAULTS,
     machines: Path | None = None,
+    keep_s: int = 0,
 ) -> None:
     """Run a bridge until `stop` is set. `pairs`: the processors that run on the log; `nodes`: patterns of the edge nodes that
-    this bridge reads; `results`: the processors whose results it publishes. Raises ConfigurationError, AnotherRunsError.
+    this bridge reads; `results`: the processors whose results it publishes; `keep_s`: for how long the broker keeps what it could
+    not deliver to this bridge. Raises ConfigurationError, AnotherRunsError.
     """
     topics = Topics(group)
     own = [NodeId(group, processor.node) for processor, _ in pairs if processor.name in results]
@@ -64,6 +66,7 @@ def bridge(
             limits=limits,
             reserved=RESERVED_MACHINES,
             trusted=lambda node: is_twin_node(node.node),
+            keep_s=keep_s,
         )
         edges = {
             processor.name: EdgeNode(
@@ -76,7 +79,7 @@ def bridge(
             for processor, _ in pairs
             if processor.name in results
         }
-        Bridge(settings, topics, name, pairs, host=host, nodes=edges, machines=machines).run(stop)
+        Bridge(settings, topics, name, pairs, host=host, nodes=edges, machines=machines, keeps_session=keep_s > 0).run(stop)
 
 
 def _is_read(node: NodeId, patterns: Sequence[str], own: Sequence[NodeId]) -> bool:

@@ -14,10 +14,12 @@ from zlib import crc32
 from paho.mqtt.client import topic_matches_sub
 
 from cnctwin.kafka.bridge.back import Back
+from cnctwin.kafka.bridge.births import Births
 from cnctwin.kafka.bridge.keying import Keying
 from cnctwin.kafka.bridge.origins import Origins
 from cnctwin.kafka.bridge.outward import Outward
 from cnctwin.kafka.bridge.reports import Reports
+from cnctwin.kafka.kept import read_kept
 from cnctwin.kafka.settings import KafkaSettings
 from cnctwin.kafka.topics import Topics
 from processors.description import machine_and_role
@@ -34,6 +36,7 @@ from twin.vocabulary.nodes import is_twin_node
 POLL_S = 0.02
 GATHER_S = 0.005
 WATERMARK_MS = 1000
+RESTORE_S_MAX = 120.0
 REFRESH_SHARE = 4  # births are asked for again so many times while a record is kept
 _log = logging.getLogger(__name__)
 _PLAIN, _REFUSED, _HOLE = EventKind.PLAIN, EventKind.REFUSED, EventKind.HOLE
@@ -55,11 +58,16 @@ class Bridge:
         host: HostApplication,
         nodes: dict[str, EdgeNode],
         machines: Path | None = None,
+        keeps_session: bool = False,
     ) -> None:
+        self._keeps_session = keeps_session
         self._settings, self._topics, self._name, self._host, self._nodes = settings, topics, name, host, nodes
         self._keying = Keying(topics, pairs)
         self._origins = Origins(host.picture)
         self._outward = Outward(settings, name)
+        self._births = Births(lambda topic, payload: self._outward.keep(topics.births, topic, payload))
+        if keeps_session:
+            host.on_life = self._births.take
         published = [(processor, one) for processor, one in pairs if processor.name in nodes]
         self._back = Back(settings, topics, name, published, host=host, nodes=nodes) if nodes else None
         self._cell_listeners = [(topics.cells(one.name), one) for one, _ in pairs if one.is_of_cells]
@@ -76,6 +84,8 @@ class Bridge:
             self._host.subscribe_plain(topic_filter)
         if self._back is not None:
             self._back.begin()
+        if self._keeps_session:
+            self._host.restore(self._births.restored(self._known_births()))
         self._host.start()
         for node in self._nodes.values():
             node.start()
@@ -92,6 +102,11 @@ class Bridge:
                 _log.warning("%d records were not acknowledged", waiting)
             self._reports.close()
 
+    def _known_births(self) -> dict[str, bytes]:
+        numbers = list(range(self._settings.partitions))
+        kept = read_kept(self._settings.client(), self._topics.births, numbers, timeout_s=RESTORE_S_MAX)
+        return {topic: payload for of_partition in kept.values() for topic, payload in of_partition.items()}
+
     def _plain_filters(self) -> Sequence[str]:
         listened = [wanted for _, processor in self._cell_listeners for wanted in processor.listens]
         return [plain_topics.DESCRIPTION + "#", *listened]
@@ -102,9 +117,12 @@ class Bridge:
         now_ms = self._now_ms()
         for event in events:
             self._take(event, now_ms)
+        self._births.catch_up()
+        self._outward.owe(self._host.take_held())
         if self._back is not None:
             self._back.turn()
         self._outward.poll()
+        self._host.acknowledge(self._outward.take_safe())
         now_s = time.monotonic()
         if not self._host.queue_depth:
             self._mark(now_ms)
