@@ -2,7 +2,7 @@
 
 import fnmatch
 import logging
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from threading import Event
@@ -50,6 +50,7 @@ def bridge(
     """
     topics = Topics(group)
     own = [NodeId(group, processor.node) for processor, _ in pairs if processor.name in results]
+    on_log = frozenset(processor.node for processor, _ in pairs)
     with ExitStack() as stack:
         lock = NodeId(group, f"bridge-{name}")
         for node in (lock, *own):
@@ -61,7 +62,7 @@ def bridge(
             broker,
             f"bridge-{name}",
             uncommanded_filters(group),
-            wanted=lambda node: _is_read(node, nodes, own),
+            wanted=lambda node: _is_read(node, nodes, own, on_log),
             loop=loop,
             limits=limits,
             reserved=RESERVED_MACHINES,
@@ -82,10 +83,11 @@ def bridge(
         Bridge(settings, topics, name, pairs, host=host, nodes=edges, machines=machines, keeps_session=keep_s > 0).run(stop)
 
 
-def _is_read(node: NodeId, patterns: Sequence[str], own: Sequence[NodeId]) -> bool:
-    """Return True for a node of this bridge's share: a processor's node is read by the bridge that publishes it."""
+def _is_read(node: NodeId, patterns: Sequence[str], own: Sequence[NodeId], on_log: Collection[str]) -> bool:
+    """Return True for a node of this bridge's share: a processor's node is read by the bridge that publishes it, and one of a
+    processor that does not run on the log by whoever publishes any."""
     if is_twin_node(node.node):
-        return node in own
+        return node in own or (bool(own) and node.node not in on_log)
     return any(fnmatch.fnmatchcase(node.node, pattern) for pattern in patterns)
 
 
