@@ -90,7 +90,7 @@ def of_log(pictures: Pictures, first: FirstLook) -> list[Said]:
         found += _of_silent(alive)
     groups: dict[str, list[_Seen]] = {}
     for one in alive:
-        groups.setdefault(one.text("process") or one.name, []).append(one)
+        groups.setdefault(one.text("process") if one.count("runners") else "", []).append(one)
     for group in groups.values():
         found += _of_runners(_listed(one.name for one in group), group[0])
     return found
@@ -145,7 +145,8 @@ def _of_silent(alive: list[_Seen]) -> list[Said]:
         Said(
             False,
             f"{', '.join(names)}: silent, and did not say goodbye; start it again under its name (what a silent bridge reads "
-            "does not come into the log; the partitions of a silent runner go to the others)",
+            "does not come into the log; the partitions of a silent runner go to the others); one that is gone for good is told "
+            "for a day",
         )
     ]
 

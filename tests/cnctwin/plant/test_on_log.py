@@ -90,6 +90,14 @@ def test_nobody_who_folds_is_one_bad_line_and_no_lag_of_nothing() -> None:
     assert lag_reports(own_values(alone)) == []
 
 
+def test_processors_that_nobody_folds_share_a_line() -> None:
+    pictures = plant(nodes=("twin-gap",), process="kafka: gap", runners=0)
+    rules = WELL | {"process": "kafka: rules", "runners": 0}
+    pictures.add("twin-rules", owner({f"health/{name}": value for name, value in rules.items()}))
+    (line,) = bad(pictures)
+    assert line.startswith("gap, rules: no runner reports")
+
+
 def test_runners_that_are_behind_need_one_more_of_them_or_a_look_at_the_log() -> None:
     (full,) = lag_reports(own_values(plant(lag_s=18.0, lag_records=40_213, busy_pct=98.0)))
     assert full.sentence == (
