@@ -120,7 +120,7 @@ class Runner:
             partition.next = offset + 1
             self._post(message, f"{place[0]}-{place[1]}@{offset}: {error}")
             return
-        self._health.took(record)
+        self._health.took(place, record)
         if self._sink is not None:
             self._sink.keep(place, offset, record)
         for result in partition.take(offset, record):
@@ -173,7 +173,7 @@ class Runner:
             positions.append(TopicPartition(topic, number, partition.next))
             for fault in partition.faults():
                 _log.warning("%s", fault)
-                self._health.fault = fault
+                self._health.failed(fault)
         self._transactions.commit(positions, self._consumer)
         self._touched.clear()
         self._folded_s = now_s

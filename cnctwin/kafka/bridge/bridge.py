@@ -98,6 +98,7 @@ class Bridge:
             self._host.stop()
             if self._back is not None:
                 self._back.close()
+            self._reports.leave(self._outward)
             if waiting := self._outward.close():
                 _log.warning("%d records were not acknowledged", waiting)
             self._reports.close()
@@ -194,7 +195,7 @@ class Bridge:
         if self._descriptions is not None:
             self._descriptions.look()
         self._refresh(now_s)
-        self._reports.report(now_s, self._host, self._outward, self._back, self.events)
+        self._reports.report(now_s, self._host, self._outward, self.events)
 
     def _refresh(self, now_s: float) -> None:
         """Ask each node for its births before the log forgets the last ones."""
