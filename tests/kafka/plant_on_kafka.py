@@ -117,8 +117,8 @@ class Plant:
     def read(self, topic: str, *, committed: bool = True) -> dict[int, list[Message]]:
         """All messages of a topic by partition, up to where a reader of this kind gets."""
         isolation = "read_committed" if committed else "read_uncommitted"
-        options = {"group.id": "look", "enable.auto.commit": False, "enable.partition.eof": True, "isolation.level": isolation}
-        consumer = Consumer(self.kafka.client() | options)
+        options = {"group.id": "look", "enable.auto.commit": False, "enable.partition.eof": True, "fetch.wait.max.ms": 10}
+        consumer = Consumer(self.kafka.client() | options | {"isolation.level": isolation})
         found: dict[int, list[Message]] = {number: [] for number in range(self.settings.partitions)}
         left = set(found)
         end_s = time.monotonic() + WAIT_S_MAX
@@ -126,7 +126,7 @@ class Plant:
             consumer.assign([TopicPartition(topic, number, OFFSET_BEGINNING) for number in found])
             while left:
                 assert time.monotonic() < end_s, f"no end of {topic} in {WAIT_S_MAX:g} s"
-                for message in consumer.consume(1000, 0.2):
+                for message in consumer.consume(1000, 0.02):
                     if (error := message.error()) is None:
                         found[message.partition() or 0].append(message)
                     elif error.code() == KafkaError._PARTITION_EOF:
