@@ -185,8 +185,8 @@ class Plant:
             replayed = {f"{seat.name}/{unit}": seat.state_of(unit) for seat in partition.seats for unit in seat.engine.known_units}
             assert own == {key: _settled(value) for key, value in replayed.items()}, f"states of partition {number}"
 
-    def lag(self) -> int:
-        """The number of records that no runner has committed; those of the log's own are counted too."""
+    def lags(self) -> dict[int, int]:
+        """The number of records of each partition that no runner has committed, where there are any."""
         places = [TopicPartition(self.topics.readings, number) for number in range(self.settings.partitions)]
         consumer = Consumer(self.kafka.client() | {"group.id": self.reader})
         try:
@@ -194,7 +194,8 @@ class Plant:
             ends = {one.partition: consumer.get_watermark_offsets(one, WAIT_S_MAX) for one in places}
         finally:
             consumer.close()
-        return sum(end[1] - committed[number] for number, end in ends.items() if end is not None)
+        lags = {number: end[1] - committed[number] for number, end in ends.items() if end is not None}
+        return {number: lag for number, lag in lags.items() if lag}
 
     def folded(self) -> None:
         """Wait until runners have committed all that is in the log."""
@@ -202,7 +203,7 @@ class Plant:
 
     def _is_folded(self) -> bool:
         try:
-            return self.lag() == 0
+            return not self.lags()
         except KafkaException as error:  # of a cluster that has just begun
             assert error.args[0].retriable() or error.args[0].code() in PASSING, error
             return False

@@ -1,5 +1,7 @@
 """Runners that stop, die and come: results and states are those of a pure replay of the log, bit for bit."""
 
+from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -29,8 +31,7 @@ def test_one_runner_and_its_successor_tell_what_a_replay_tells(kafka: KafkaServe
         plant.holds_as_replayed()
 
 
-@pytest.mark.parametrize("place", PLACES)
-@pytest.mark.parametrize("heir", ["r0", "r1"])
+@pytest.mark.parametrize(("place", "heir"), [*((place, "r0") for place in PLACES), ("produced", "r1")])
 def test_killed_anywhere_in_a_transaction(kafka: KafkaServer, tmp_path: Path, place: str, heir: str) -> None:
     """Its own successor ends what it left open; another member does so once the group has given it up."""
     with Plant(kafka, f"dead.{place.split()[0]}.{heir}", processors(*NAMES)) as plant:
@@ -50,3 +51,30 @@ def test_killed_anywhere_in_a_transaction(kafka: KafkaServer, tmp_path: Path, pl
             plant.folded()
             runner.check()
         plant.holds_as_replayed()
+
+
+def test_runners_come_and_go_under_load(kafka: KafkaServer) -> None:
+    """One, two, four, and back to one: each machine's results are whole, in order and told once."""
+    with Plant(kafka, "scaled", processors("mirror"), session_s=1.0) as plant, ExitStack() as stack:
+        plant.play(5)
+        runners = [stack.enter_context(RunnerHere(plant, "r0"))]
+        for number in (2, 4):
+            while len(runners) < number:
+                runners.append(stack.enter_context(RunnerHere(plant, f"r{len(runners)}")))
+            share = plant.settings.partitions // number
+            _load_until(plant, lambda share=share: all(one.partitions == share for one in runners))  # type: ignore[misc]
+        while len(runners) > 1:
+            runners.pop().stop()
+        _load_until(plant, lambda: runners[0].partitions == plant.settings.partitions)
+        plant.folded()
+        runners[0].stop()
+        plant.holds_as_replayed()
+
+
+def _load_until(plant: Plant, condition: Callable[[], bool]) -> None:
+    def loaded() -> bool:
+        plant.play(1)
+        return condition()
+
+    until(loaded, "the partitions are shared out")
+    plant.play(3)
