@@ -11,7 +11,6 @@ to nothing throws away what was folded, and the partitions are restored: there i
 
 import logging
 import time
-from collections import deque
 from collections.abc import Sequence
 from threading import Event
 
@@ -23,6 +22,7 @@ from cnctwin.kafka.settings import KafkaSettings
 from cnctwin.kafka.sink import Sink
 from cnctwin.kafka.topics import Topics
 from cnctwin.kafka.transaction import AbortedError, FencedError, Transactions, written_by
+from cnctwin.kafka.waiting import Waiting
 from processors.actions import DeadLetter, Pin
 from processors.errors import SnapshotError
 from processors.partition.partition import Partition
@@ -52,7 +52,7 @@ class Runner:
         self._assigned = Assigned(settings, topics, pairs, *(() if sink is None else (sink.begin,)))
         self._results = {processor.name: Results(topics.group, processor) for processor, _ in pairs}
         self._writer = RecordWriter(self._name)
-        self._waiting: deque[Message] = deque()
+        self._waiting = Waiting()
         self._touched: dict[Place, Partition] = {}
         self._folded_s = 0.0
         self._stop = Event()
@@ -95,12 +95,12 @@ class Runner:
         try:
             for message in self._consumer.consume(MESSAGES_A_TURN, 0.0 if self._waiting else POLL_S):
                 if (error := message.error()) is None:
-                    self._waiting.append(message)
+                    self._waiting.add(message)
                 else:
                     self._complain(error)
-            began_s = time.monotonic()
-            while self._waiting and time.monotonic() - began_s < FOLD_S:
-                self._take(self._waiting.popleft())
+            for message in self._waiting.due(FOLD_S):
+                self._take(message)
+            self._waiting.pace(self._consumer)
             self._commit_if_due(time.monotonic())
             self._health.report(time.monotonic(), self._assigned, self._transactions, self._consumer)
         except AbortedError as error:
@@ -237,4 +237,4 @@ class Runner:
         gone = set(places)
         for place in gone & self._touched.keys():
             del self._touched[place]
-        self._waiting = deque(one for one in self._waiting if (one.topic(), one.partition()) not in gone)
+        self._waiting.forget(places)
