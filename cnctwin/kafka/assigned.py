@@ -48,7 +48,7 @@ class Assigned:
         )
         positions = []
         for place, (topic, number) in enumerate(places):
-            partition = Partition(self._reader, self._pairs[topic])
+            partition = Partition(self._reader, self._pairs[topic], topic)
             offset = partition.restore(kept[number])
             self.partitions[topic, number] = partition
             # Cuts of several partitions are spread over the time between two.
