@@ -57,7 +57,7 @@ class Assigned:
         )
         positions = []
         for place, (topic, number) in enumerate(places):
-            partition = Partition(self._reader, self._pairs[topic])
+            partition = Partition(self._reader, self._pairs[topic], topic)
             offset = self._begin((topic, number), partition.restore(kept[number]))
             partition.next = offset
             self._retire((topic, number))

@@ -5,9 +5,10 @@
 Everything that a state depends on is in the records and their order: time on the wall is the writer's, silence is a watermark. So
 a partition that was restored anywhere and folds the rest comes to the same state, bit for bit, as one that has folded all of it.
 
-Saved are, by key: `<processor>/<unit>`, a unit's state; `~description/<topic>`, a description that holds; `~lives/<reader>`,
-which messages were there already; and `~marker/<reader>`, how far this reader has come with each processor: the offset at which
-its states were cut, and that up to which its results went out. What lies between the two is folded again in silence.
+Saved are, by key: `<processor>/<unit>`, a unit's state; `~description/<topic>`, a description that holds;
+`~lives/<topic>/<reader>`, which messages were there already; and `~marker/<topic>/<reader>`, how far this reader has come with
+each processor: the offset at which its states were cut, and that up to which its results went out. What lies between the two is
+folded again in silence.
 """
 
 import json
@@ -39,16 +40,20 @@ class Result(NamedTuple):
 
 
 class Partition:
-    """See the module. `reader` names who folds it: the consumer group."""
+    """See the module. `reader` names who folds it: the consumer group. `topic`: what is folded; each topic of a reader
+    has places of its own among what is saved."""
 
-    def __init__(self, reader: str, pairs: Sequence[tuple[AnyProcessor, Configuration[ProcessorConfig]]]) -> None:
+    def __init__(
+        self, reader: str, pairs: Sequence[tuple[AnyProcessor, Configuration[ProcessorConfig]]], topic: str = ""
+    ) -> None:
         self.seats = tuple(
             Seat(processor, configuration) for processor, configuration in sorted(pairs, key=lambda one: one[0].name)
         )
         self.next = 0  # the offset behind the newest record that was taken
         self.repeated = 0  # records that were there before
         self.refused: list[str] = []  # snapshots that were not restored, and why
-        self._reader = reader
+        self._topic = f"{topic}/" if topic else ""
+        self._reader = f"{self._topic}{reader}"
         self._begin = 0  # records before it are in all states
         self._lives: dict[str, Lives] = {}
         self._descriptions: dict[str, bytes] = {}
@@ -66,7 +71,7 @@ class Partition:
             self._describe_all(seat)
             self._restore(seat, kept, markers)
         self.next = self._begin = min(seat.from_offset for seat in self.seats)
-        lives = [_json(value) for key, value in kept.items() if key.startswith(LIVES)]
+        lives = [_json(value) for key, value in kept.items() if key.startswith(LIVES + self._topic)]
         known: Mapping[str, dict[str, list[int]]] = next((one["devices"] for one in lives if one["folded"] == self.next), {})
         self._lives = {device: Lives(of_device) for device, of_device in known.items()}
         return self.next

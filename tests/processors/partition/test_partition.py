@@ -153,3 +153,21 @@ def test_a_description_holds_after_a_restart() -> None:
     assert any("version" in str(action) for _, _, action in told)
     for kills in range(5):
         assert run(DESCRIBING, records, Random(kills)) == (told, state)
+
+
+def test_topics_of_one_reader_do_not_write_over_each_other() -> None:
+    """Their partitions of one number are kept in the same place."""
+    kept: Kept = {}
+    folded = {"readings": ("thermal", [birth(0.0), data(1.0)]), "cells": ("alerts", [birth(0.0)])}
+    for topic, (name, events) in folded.items():
+        partition = _of_topic(name, topic)
+        for offset, record in enumerate(through_bytes(events)):
+            list(partition.take(offset, record))
+        kept |= {key: value for key, value in partition.cut() if value is not None}
+        kept |= [partition.mark()]
+    assert {topic: _of_topic(name, topic).restore(kept) for topic, (name, _) in folded.items()} == {"readings": 2, "cells": 1}
+
+
+def _of_topic(name: str, topic: str) -> Partition:
+    processor = discover()[name]
+    return Partition("runners", [(processor, processor.configured({}))], topic)
