@@ -4,6 +4,7 @@ broker ──► host session ──► records by machine and by cell ──►
 broker ◄── edge nodes twin-… ◄────────────────────────────────── results
 """
 
+import gc
 import logging
 import time
 from collections.abc import Sequence
@@ -25,6 +26,7 @@ from cnctwin.kafka.topics import Topics
 from processors.description import machine_and_role
 from processors.description_folder import DescriptionFolder
 from processors.running.descriptions import Descriptions
+from processors.running.runner import SELDOM
 from processors.running.runtime import Configured
 from sparkplug.edge_node import EdgeNode
 from sparkplug.host import HostApplication
@@ -80,6 +82,14 @@ class Bridge:
 
     def run(self, stop: Event) -> None:
         """Work until `stop` is set."""
+        thresholds = gc.get_threshold()
+        gc.set_threshold(*SELDOM)
+        try:
+            self._run(stop)
+        finally:
+            gc.set_threshold(*thresholds)
+
+    def _run(self, stop: Event) -> None:
         for topic_filter in dict.fromkeys(self._plain_filters()):
             self._host.subscribe_plain(topic_filter)
         if self._back is not None:
