@@ -182,7 +182,9 @@ class Plant:
         kept = read_kept(self.kafka.client(), self.topics.snapshots, list(partitions), timeout_s=WAIT_S_MAX)
         for number, partition in partitions.items():
             own = {key: _settled(value) for key, value in kept[number].items() if not key.startswith("~")}
-            replayed = {f"{seat.name}/{unit}": seat.state_of(unit) for seat in partition.seats for unit in seat.engine.known_units}
+            replayed = {
+                f"{seat.name}/{unit}": seat.state_of(unit) for seat in partition.seats for unit in seat.engine.known_units
+            }
             assert own == {key: _settled(value) for key, value in replayed.items()}, f"states of partition {number}"
 
     def lags(self) -> dict[int, int]:
@@ -334,5 +336,3 @@ def environment_of(settings: KafkaSettings) -> dict[str, str]:
     """The settings of a plant as a process is given them."""
     keys = ("partitions", "session_s", "snapshot_s", "transaction_s", "buffer_mb")
     return {f"CNCTWIN_KAFKA_{key.upper()}": str(getattr(settings, key)) for key in keys}
-
-

@@ -113,7 +113,12 @@ def test_an_upgraded_processor_is_rebuilt_from_the_log_and_tells_nothing_twice(k
 
 def test_states_are_whole_after_their_topic_was_compacted(kafka: KafkaServer) -> None:
     with Plant(kafka, "compacted", processors("mirror"), snapshot_s=0.1) as plant:
-        tiny = {"segment.ms": "100", "min.cleanable.dirty.ratio": "0.01", "max.compaction.lag.ms": "100", "delete.retention.ms": "0"}
+        tiny = {
+            "segment.ms": "100",
+            "min.cleanable.dirty.ratio": "0.01",
+            "max.compaction.lag.ms": "100",
+            "delete.retention.ms": "0",
+        }
         entries = [ConfigEntry(name, value, incremental_operation=AlterConfigOpType.SET) for name, value in tiny.items()]
         resource = ConfigResource(ResourceType.TOPIC, plant.topics.snapshots, incremental_configs=entries)
         admin = kafka.admin()
