@@ -62,6 +62,7 @@ def bridge(
             broker,
             f"bridge-{name}",
             uncommanded_filters(group),
+            publish_state=False,  # no edge waits for it: who wants a host to be there names the historian
             wanted=lambda node: _is_read(node, nodes, own, on_log),
             loop=loop,
             limits=limits,
