@@ -13,6 +13,7 @@ from cnctwin.kafka.bridge.outward import Outward
 from cnctwin.kafka.report import BRIDGE_PREFIX, BridgeReport, payload_of
 from cnctwin.kafka.settings import KafkaSettings
 from cnctwin.kafka.topics import Topics
+from processors.lag_report import SPOKEN_OF_S, LagReport, topic_of
 from processors.running.health import node_metrics
 from processors.running.ports import EdgePort, HostPort
 from processors.running.quarantine import quarantine_health
@@ -33,6 +34,7 @@ class Reports:
         self._members = Members(spec.name.removeprefix(HEALTH_PREFIX) for spec in node_metrics(on_log=True))
         self._reported_s = 0.0
         self._cpu_s = 0.0
+        self._lagging: set[str] = set()
         self._consumer = Consumer(settings.client() | {"group.id": topics.bridge(name), "enable.auto.commit": False})
         self._consumer.assign([TopicPartition(topics.health, number, OFFSET_BEGINNING) for number in range(settings.partitions)])
 
@@ -68,6 +70,17 @@ class Reports:
             told = own | self._members.of_processor(name, at_ms)
             named = {key if key.startswith(LEDGER_PREFIX) else HEALTH_PREFIX + key: value for key, value in told.items()}
             node.publish(None, [Change(key, value, at_ms) for key, value in named.items()])
+            self._speak_of_lag(host, name, told, at_ms)
+
+    def _speak_of_lag(self, host: HostPort, name: str, told: Mapping[str, int | float | str], at_ms: int) -> None:
+        """Say on the plain topic that a processor is behind, as one without a log does, and once more when it has caught up: the
+        alerts hear of it there."""
+        lag_s = float(told["lag_s"])
+        if lag_s < SPOKEN_OF_S and name not in self._lagging:
+            return
+        report = LagReport((name,), str(told["process"]), at_ms, lag_s, int(told["machines"]), float(told["busy_pct"]))
+        host.publish_plain(topic_of(name), report.payload())
+        (self._lagging.add if lag_s >= SPOKEN_OF_S else self._lagging.discard)(name)
 
     def _hear(self, at_ms: int) -> None:
         """Take the newest report of each member; the topic may hold an hour of them that is not compacted yet."""
