@@ -6,6 +6,7 @@ The plain loop consumes, reads the records, feeds the same engines, and produces
 marks, health, and without looking whether a message was there before. It has the runner's rare collections of garbage too.
 """
 
+import cProfile
 import gc
 import json
 import resource
@@ -14,15 +15,18 @@ import time
 from collections import Counter
 from dataclasses import asdict, dataclass
 from threading import Event
+from typing import ClassVar
 
 from confluent_kafka import Consumer, Producer
 
 from benchmarks.hall.machine import GROUP
+from cnctwin.kafka import runner as runner_module
 from cnctwin.kafka.assigned import by_topic
 from cnctwin.kafka.runner import Runner
 from cnctwin.kafka.settings import KafkaSettings
 from cnctwin.kafka.topics import Topics, ensure
 from cnctwin.kafka.transaction import Transactions
+from cnctwin.processes.stopping import stopped_by_signals
 from processors.partition.results import Results
 from processors.running.engine import Engine
 from processors.running.runner import SELDOM
@@ -44,6 +48,7 @@ class Task:
     run: str
     records: int
     snapshot_s: float = 5.0
+    member: str = "r0"
     profile: str = ""
 
 
@@ -83,8 +88,8 @@ def cpu_s() -> float:
 class _Counted(Transactions):
     """Transactions whose messages are counted by topic."""
 
-    counts: Counter[str] = Counter()
-    sizes: Counter[str] = Counter()
+    counts: ClassVar[Counter[str]] = Counter()
+    sizes: ClassVar[Counter[str]] = Counter()
 
     def produce(self, topic: str, key: str, value: bytes | None, partition: int, headers: Headers) -> None:
         kind = "marks" if key.startswith("~") else topic.rpartition(".")[2]
@@ -117,10 +122,8 @@ def by_runner(task: Task, pairs: list[Configured]) -> Spent:
                 ended[:] = cpu_s(), time.monotonic()
 
     ended = [0.0, 0.0]
-    import cnctwin.kafka.runner
-
-    cnctwin.kafka.runner.Transactions = _Counted  # type: ignore[misc]
-    runner = Measured(settings, topics, pairs, "r0")
+    runner_module.Transactions = _Counted  # type: ignore[misc]
+    runner = Measured(settings, topics, pairs, task.member)
     runner.run(stop)
     return Spent(
         ended[0] - began[0],
@@ -132,6 +135,14 @@ def by_runner(task: Task, pairs: list[Configured]) -> Spent:
         runner._transactions.committed,
         rss_mb(),
     )
+
+
+def as_member(task: Task, pairs: list[Configured]) -> None:
+    """Fold as one of several runners until told to stop."""
+    settings, topics = settings_of(task), Again(task.run)
+    ensure(settings, topics, [])
+    with stopped_by_signals() as stop:
+        Runner(settings, topics, pairs, task.member).run(stop)
 
 
 def by_plain_loop(task: Task, pairs: list[Configured]) -> Spent:
@@ -197,10 +208,11 @@ def main() -> None:
     """Do a task and print what it took."""
     task = Task(**json.loads(sys.argv[1]))
     pairs = configured(task.processors, None)
+    if task.kind == "member":
+        as_member(task, pairs)
+        return
     fold = by_runner if task.kind == "runner" else by_plain_loop
     if task.profile:
-        import cProfile
-
         profile = cProfile.Profile()
         spent = profile.runcall(fold, task, pairs)
         profile.dump_stats(task.profile)

@@ -10,12 +10,11 @@ from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from pathlib import Path
 
-from confluent_kafka import Consumer
-
 from benchmarks.hall import load
 from benchmarks.hall.load import Order, Tally
 from benchmarks.hall.machine import GROUP
 from benchmarks.hall.usage import busy_s, usage_of
+from cnctwin.kafka.kept import read_kept
 from cnctwin.kafka.settings import KafkaSettings
 from cnctwin.kafka.topics import Topics, ensure
 from cnctwin.processes.child import Child
@@ -54,6 +53,7 @@ class Plant:
     children: dict[str, Child] = field(default_factory=dict)
     loads: list[tuple[Connection, int]] = field(default_factory=list)
     machines: int = 0
+    is_preferred: bool = False
 
     def options(self) -> list[str]:
         """Return the options that bridge and runner share."""
@@ -67,6 +67,12 @@ class Plant:
         """Start a program of ours."""
         child = self.children[name] = Child(name, [*COMMAND, *command], self.folder / f"{name}.log")
         child.start()
+        self._prefer(child.pid)
+
+    def _prefer(self, pid: int | None) -> None:
+        """Give a process precedence over others of this computer, where that is wanted and allowed."""
+        if self.is_preferred and pid is not None:
+            load.prefer(pid)
 
     def bridge(self, processors: Sequence[str], *, results: str) -> None:
         """Start the bridge."""
@@ -146,24 +152,14 @@ class Plant:
 
     def _health(self) -> list[dict[str, float]]:
         """Return the newest word of each runner."""
-        consumer = Consumer(self.settings.client() | {"group.id": "look", "auto.offset.reset": "earliest"})
-        found: dict[bytes, dict[str, float]] = {}
-        try:
-            from confluent_kafka import OFFSET_BEGINNING, TopicPartition
-
-            consumer.assign([TopicPartition(Topics(GROUP).health, n, OFFSET_BEGINNING) for n in range(self.settings.partitions)])
-            while messages := consumer.consume(1000, 0.5):
-                for message in messages:
-                    value, key = message.value(), message.key()
-                    if message.error() is None and isinstance(value, bytes) and isinstance(key, bytes):
-                        found[key] = json.loads(value)
-        finally:
-            consumer.close()
-        return list(found.values())
+        kept = read_kept(self.settings.client(), Topics(GROUP).health, range(self.settings.partitions), timeout_s=10.0)
+        return [json.loads(value) for of_partition in kept.values() for value in of_partition.values()]
 
 
 @contextmanager
-def plant(folder: Path, *, partitions: int = 12, snapshot_s: float = 5.0, cells: Sequence[str] = ()) -> Iterator[Plant]:
+def plant(
+    folder: Path, *, partitions: int = 12, snapshot_s: float = 5.0, cells: Sequence[str] = (), prefer: bool = False
+) -> Iterator[Plant]:
     """Start Kafka and Mosquitto; what is started on them ends with them. `cells`: processors that compare machines."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "kafka").mkdir()
@@ -176,7 +172,9 @@ def plant(folder: Path, *, partitions: int = 12, snapshot_s: float = 5.0, cells:
             bootstrap=kafka.bootstrap, partitions=partitions, replication_factor=1, snapshot_s=snapshot_s, session_s=10.0
         )
         ensure(settings, Topics(GROUP), cells)
-        running = Plant(kafka, broker, folder, settings)
+        running = Plant(kafka, broker, folder, settings, is_preferred=prefer)
+        for pid in (kafka.pid, broker.child.pid):
+            running._prefer(pid)
         try:
             yield running
         finally:

@@ -37,6 +37,7 @@ POLL_S = 0.05
 FOLD_S = 0.5  # of one transaction; what waits then goes into the next one
 IDLE_S = 1.0  # after which positions are saved although nothing came of the records
 PAUSE_S = 1.0
+FETCH_BYTES = 65_536  # for which the cluster waits 50 ms: to answer each few records costs it more than the records
 _log = logging.getLogger(__name__)
 
 
@@ -90,6 +91,7 @@ class Runner:
             "auto.offset.reset": "earliest",
             "partition.assignment.strategy": "cooperative-sticky",
             "fetch.wait.max.ms": 50,
+            "fetch.min.bytes": FETCH_BYTES,
             "queued.max.messages.kbytes": 32_768,
         }
 

@@ -36,7 +36,7 @@ from twin.vocabulary import topics as plain_topics
 from twin.vocabulary.nodes import is_twin_node
 
 POLL_S = 0.02
-GATHER_S = 0.005
+GATHER_S = 0.02
 WATERMARK_MS = 1000
 RESTORE_S_MAX = 120.0
 REFRESH_SHARE = 4  # births are asked for again so many times while a record is kept

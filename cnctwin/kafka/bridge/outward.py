@@ -59,7 +59,7 @@ class Outward:
                 "enable.idempotence": True,
                 "acks": "all",
                 "compression.type": "lz4",
-                "linger.ms": 5,
+                "linger.ms": 20,
                 "partitioner": "murmur2_random",
                 "message.timeout.ms": 0,  # a record waits for as long as it takes
                 "queue.buffering.max.messages": MESSAGES_MAX,
