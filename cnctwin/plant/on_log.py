@@ -85,6 +85,15 @@ def of_log(pictures: Pictures, first: FirstLook) -> list[Said]:
                 "again with its --name and --state-dir",
             )
         )
+    if away := [one for one in alive if _is_away(one)]:
+        found.append(
+            Said(
+                False,
+                f"the log takes nothing: {away[0].count('bridge_waiting')} records wait at the bridge, none went out while "
+                "listening, and no runner can report; bring the cluster back, or see in the bridge's log why it cannot come in",
+            )
+        )
+        return found
     if alive:
         found += _of_bridges(alive)
         found += _of_silent(alive)
@@ -104,6 +113,11 @@ def _seen(pictures: Pictures, first: FirstLook) -> Iterable[_Seen]:
         now = {name.removeprefix(_HEALTH): reading.value for name, reading in picture.own.readings.items()}
         before = {name.removeprefix(_HEALTH): value for name, value in first.of(node.node).items()}
         yield _Seen(node.node.removeprefix(TWIN_NODE_PREFIX), picture.online, now, before)
+
+
+def _is_away(one: _Seen) -> bool:
+    """Return True if events came in while listening and no record went out, though each second has its watermarks."""
+    return one.rise("bridge_events") > 0 and one.count("bridge_waiting") > 0 and not one.rise("bridge_delivered")
 
 
 def _of_bridges(alive: list[_Seen]) -> list[Said]:

@@ -72,6 +72,13 @@ def test_many_records_that_wait_at_the_bridge_are_bad_news(waiting: int, is_bad:
     assert all(line.startswith(f"the bridge: {waiting} records wait for the log") and "buffer_mb" in line for line in lines)
 
 
+def test_a_log_that_takes_nothing_is_one_bad_line_that_blames_no_runner() -> None:
+    (line,) = bad(plant(bridge_events=540, bridge_waiting=44, runners=0, silent="gap+thermal.r0"), before=plant())
+    assert line.startswith("the log takes nothing: 44 records wait at the bridge, none went out while listening")
+    assert bad(plant(bridge_events=540, bridge_delivered=640, bridge_waiting=44), before=plant()) == []
+    assert bad(plant(bridge_waiting=44), before=plant()) == [], "nothing came in meanwhile: it was not looked at twice"
+
+
 def test_records_without_room_are_bad_news_while_they_grow_and_counted_after() -> None:
     (line,) = bad(plant(bridge_dropped=7), before=plant(bridge_dropped=5))
     assert line.startswith("the bridge: no room for 2 records while listening, 7 so far; ")
@@ -121,7 +128,7 @@ def test_records_that_retention_took_are_bad_news_for_as_long_as_they_are_counte
 
 
 def test_records_that_come_twice_are_bad_news_where_two_bridges_must_be_reading_the_same() -> None:
-    before = plant(repeated=10, bridge_events=1000)
+    before = plant(repeated=10, bridge_events=1000, bridge_delivered=0)
     few, all_twice = (plant(repeated=10 + repeated, bridge_events=2000) for repeated in (round(1000 * REPEATED_SHARE), 500))
     assert bad(few, before) == []
     assert good(few, before)[-1] == "gap, thermal: 110 records came twice so far, and were left out"
