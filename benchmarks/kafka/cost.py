@@ -5,8 +5,8 @@
     .venv/bin/python -m benchmarks.kafka.cost --only bridge --machines 20,100,200 --prefer
 
 One Kafka (tests/kafka/kafka_server.py) and one Mosquitto on this computer. The runner and its peer, a plain loop of
-confluent-kafka that does the same without guarantees (benchmarks/kafka/fold.py), take turns on one log; medians are told. CPU time is what the
-kernel counts for the whole process, all threads. On two cores Kafka, broker, load and runners are in each other's way: figures
+confluent-kafka that does the same without guarantees (benchmarks/kafka/fold.py), take turns on one log; medians are told. CPU
+time is what the kernel counts for the whole process, all threads. On two cores Kafka, broker, load and runners are in each other's way: figures
 beyond two runners say how well they share, not how far they scale.
 """
 

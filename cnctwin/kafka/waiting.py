@@ -1,6 +1,7 @@
 """Messages that wait to be folded, by partition: bounded, and each partition has its share of the time.
 
-A unit whose step takes long holds up its own partition. The others go on beside it, and the cluster keeps what there is no room for.
+A unit whose step takes long holds up its own partition. The others go on beside it; what there is no room for stays in the
+cluster.
 """
 
 import time
@@ -34,7 +35,7 @@ class Waiting:
         waiting.append(message)
 
     def due(self, for_s: float) -> Iterator[Message]:
-        """Yield messages for so long: of each partition for its share, and one at least. What short ones leave, longer ones have."""
+        """Yield messages for so long: of each partition for its share, and one at least. Longer ones have what short ones leave."""
         own = sorted((waiting for waiting in self._messages.values() if waiting), key=len)
         end_s = time.monotonic() + for_s
         for left, waiting in zip(range(len(own), 0, -1), own, strict=True):
