@@ -6,8 +6,8 @@
 
 One Kafka (tests/kafka/kafka_server.py) and one Mosquitto on this computer. The runner and its peer, a plain loop of
 confluent-kafka that does the same without guarantees (benchmarks/kafka/fold.py), take turns on one log; medians are told. CPU
-time is what the kernel counts for the whole process, all threads. On two cores Kafka, broker, load and runners are in each other's way: figures
-beyond two runners say how well they share, not how far they scale.
+time is what the kernel counts for the whole process, all threads. On two cores Kafka, broker, load and runners are in each
+other's way: figures beyond two runners say how well they share, not how far they scale.
 """
 
 import argparse

@@ -35,7 +35,7 @@ class Waiting:
         waiting.append(message)
 
     def due(self, for_s: float) -> Iterator[Message]:
-        """Yield messages for so long: of each partition for its share, and one at least. Longer ones have what short ones leave."""
+        """Yield messages for so long: of each partition for its share, and one at least. Long ones have what short ones leave."""
         own = sorted((waiting for waiting in self._messages.values() if waiting), key=len)
         end_s = time.monotonic() + for_s
         for left, waiting in zip(range(len(own), 0, -1), own, strict=True):
