@@ -11,6 +11,7 @@ CPU time is in µs a message of a machine, with 11 changing values. `each_us` is
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,3 +65,43 @@ MEASURED = Measured(
     machine_mb=0.8,
     calibration_us=134.5,
 )
+
+
+class Each(NamedTuple):
+    """The cost of a message of a machine, of a result of a processor, and of a value of the mirror."""
+
+    message: float
+    result: float
+    value: float
+
+
+@dataclass(frozen=True, slots=True)
+class MeasuredOnKafka:
+    """Figures of the folds on Kafka, CPU µs. Messages are those of machines, with 11 changing values.
+
+        python -m benchmarks.kafka.cost --only bridge --prefer    # bridge_us, kafka_us, mosquitto_us, log_bytes, live_factor
+        python -m benchmarks.kafka.cost --only each               # read_us, fold_us
+        python -m benchmarks.kafka.cost --only snapshots          # state_us
+
+    bridge_us: a result's is to publish it, and to hand it back to the log; kafka_us: with one replica and one reader
+    log_bytes: on the disk after lz4, with one replica, what cells read and what comes of a result included
+    read_us: a runner's to read a message; fold_us: what a processor adds, with its results; state_us: to save a state
+    live_factor: what a message costs as it comes over what it costs while a log is caught up with
+    results_a_machine_s: what a processor says of a machine a second, the mean of all but the mirror
+    process_mb, machine_mb: memory of a runner without machines, and of a machine in all processors
+    """
+
+    date: str
+    computer: str
+    bridge_us: Each
+    kafka_us: Each
+    mosquitto_us: Each
+    log_bytes: Each
+    state_bytes: float
+    read_us: float
+    fold_us: Mapping[str, float]
+    state_us: float
+    live_factor: float
+    results_a_machine_s: float
+    process_mb: float
+    machine_mb: float
