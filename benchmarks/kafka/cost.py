@@ -28,6 +28,7 @@ from benchmarks.kafka.fold import Spent, Task
 from benchmarks.kafka.log import Filled, fill
 from benchmarks.kafka.plant import Live, plant
 from benchmarks.kafka.scale import caught_up, home_of, pauses, settings_on
+from cnctwin.kafka.assigned import by_topic
 from cnctwin.kafka.topics import Topics, ensure
 from processors.discovery import discover
 from processors.running.runtime import configured
@@ -68,7 +69,7 @@ class Log:
 
     def task(self, kind: str, names: Sequence[str], snapshot_s: float = 5.0) -> Task:
         """Return the task to fold it once more."""
-        records = self.filled.records(with_cells=bool(cells_of(names)))
+        records = self.filled.records(by_topic(Topics(GROUP), configured(names, None)))
         return Task(kind, self.kafka.bootstrap, PARTITIONS, list(names), next(_names), records, snapshot_s)
 
     def folded(self, kind: str, names: Sequence[str], snapshot_s: float = 5.0) -> Spent:
