@@ -108,8 +108,8 @@ class MeasuredOnKafka:
 
 
 # With 100 machines at 10 Hz. A result is what all but the mirror cost beyond a message, over 1.1 results a message; a value is
-# what the mirror costs beyond it, over 11. `state_us` is that of cProfile, an upper bound: saving each second or each 30 s made no
-# difference beyond the noise of some per cent. Up to 1.2 cores were busy elsewhere while the mirror was measured, 0.2 else.
+# what the mirror costs beyond it, over 11. `state_us` is that of cProfile, an upper bound: saving each second or each 30 s made
+# no difference beyond the noise of some per cent. Up to 1.2 cores were busy elsewhere while the mirror was measured, 0.2 else.
 ON_KAFKA = MeasuredOnKafka(
     date="2026-11-24",
     computer="AMD EPYC, 2 cores, Kafka 4.3 and the load on them too",
