@@ -5,9 +5,9 @@
     .venv/bin/python -m benchmarks.kafka.cost --only bridge --machines 20,100,200 --prefer
 
 One Kafka (tests/kafka/kafka_server.py) and one Mosquitto on this computer. The runner and its peer, a plain loop of
-confluent-kafka that does the same without guarantees (benchmarks/kafka/fold.py), take turns on one log; medians are told. CPU
-time is what the kernel counts for the whole process, all threads. On two cores Kafka, broker, load and runners are in each
-other's way: figures beyond two runners say how well they share, not how far they scale.
+confluent-kafka that does the same without guarantees (benchmarks/kafka/fold.py), take turns on one log; medians are told.
+CPU time is what the kernel counts for the whole process, all threads. On two cores Kafka, broker, load and runners are in
+each other's way: figures beyond two runners say how well they share, not how far they scale.
 """
 
 import argparse
@@ -28,6 +28,7 @@ from benchmarks.kafka.fold import Spent, Task
 from benchmarks.kafka.log import Filled, fill
 from benchmarks.kafka.plant import Live, plant
 from benchmarks.kafka.scale import caught_up, home_of, pauses, settings_on
+from cnctwin.kafka.assigned import by_topic
 from cnctwin.kafka.topics import Topics, ensure
 from processors.discovery import discover
 from processors.running.runtime import configured
@@ -68,7 +69,7 @@ class Log:
 
     def task(self, kind: str, names: Sequence[str], snapshot_s: float = 5.0) -> Task:
         """Return the task to fold it once more."""
-        records = self.filled.records(with_cells=bool(cells_of(names)))
+        records = self.filled.records(by_topic(Topics(GROUP), configured(names, None)))
         return Task(kind, self.kafka.bootstrap, PARTITIONS, list(names), next(_names), records, snapshot_s)
 
     def folded(self, kind: str, names: Sequence[str], snapshot_s: float = 5.0) -> Spent:
@@ -100,6 +101,16 @@ def runner(log: Log, options: argparse.Namespace) -> None:
         )
     print(f"### Runner: CPU µs a message of a machine, {log.filled.messages} messages, medians of {options.rounds}\n")
     table(["processors", "plain loop", "runner", "", "results a message", "transactions", "memory"], rows)
+
+
+def each(log: Log, options: argparse.Namespace) -> None:
+    """Fold by a runner of every processor alone, then of all: the figures that `cnctwin plan fleet` rests on."""
+    alone = {name: log.us([log.folded("runner", (name,)) for _ in range(options.rounds)]) for name in ALL}
+    together = log.us([log.folded("runner", ALL) for _ in range(options.rounds)])
+    # Alone, each pays what is shared; together it is paid once.
+    shared = min(max(0.0, (sum(alone.values()) - together) / (len(alone) - 1)), *alone.values())
+    print(f"read_us={shared:.1f}\nfold_us={ {name: round(us - shared, 1) for name, us in alone.items()} }")
+    print(f"sum {shared + sum(us - shared for us in alone.values()):.0f} us, together {together:.0f} us\n", flush=True)
 
 
 def snapshots(log: Log, options: argparse.Namespace) -> None:
@@ -139,7 +150,8 @@ def bridge(options: argparse.Namespace, folder: Path) -> None:
     """Measure bridge, runner, Kafka and Mosquitto under the load of machines at 10 Hz."""
     rows, homes = [], count()
     wanted = [(int(one), ()) for one in options.machines.split(",")]
-    for machines, names in [*wanted, (100, SETS["thermal"]), (20, SETS["all but mirror"]), (20, SETS["all"])]:
+    folded = [(100, SETS["thermal"]), (20, SETS["all but mirror"]), (100, SETS["all but mirror"]), (20, SETS["all"])]
+    for machines, names in [*wanted, *folded]:
         live = lived(options, folder / f"live{next(homes)}", machines, names)
         told = next((label for label, one in SETS.items() if one == names), "nobody")
         parts = [f"{live.us[name]:.0f}" if name in live.us else "–" for name in ("bridge", "r0", "kafka", "mosquitto")]
@@ -178,7 +190,7 @@ def rebalance(options: argparse.Namespace, folder: Path) -> None:
 
 def parts(options: argparse.Namespace, folder: Path) -> Iterator[tuple[str, Callable[[], None]]]:
     """Yield what is to be measured, by name; those that fold a log share one Kafka."""
-    on_log = {"runner": runner, "snapshots": snapshots, "scale": scale}
+    on_log = {"runner": runner, "snapshots": snapshots, "scale": scale, "each": each}
     wanted = [name for name in on_log if options.only in ("", name)]
     if wanted:
         with KafkaServer(home_of(folder, "log")) as kafka:
@@ -193,7 +205,7 @@ def parts(options: argparse.Namespace, folder: Path) -> Iterator[tuple[str, Call
 def main() -> None:
     """Measure, and print what was found."""
     parser = argparse.ArgumentParser(description="The cost of the folds on Kafka")
-    parser.add_argument("--only", default="", choices=["", "runner", "snapshots", "scale", "bridge", "rebalance"])
+    parser.add_argument("--only", default="", choices=["", "runner", "snapshots", "scale", "each", "bridge", "rebalance"])
     parser.add_argument("--messages", type=int, default=100_000, help="of 100 machines, in the log that is folded")
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--machines", default="20,100,200", help="of the bridge's trials, with commas")

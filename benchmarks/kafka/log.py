@@ -4,6 +4,7 @@ The machines' packets go through a host session and the bridge's own `Keying` an
 seconds of a hall are there in some seconds. Twins say nothing in it: their results would have to be folded first.
 """
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from random import Random
 
@@ -26,15 +27,14 @@ ROUND, CHANGE = 1200, 50
 
 @dataclass(frozen=True, slots=True)
 class Filled:
-    """The size of a log: messages of machines, and all records on the topics that each processor's kind reads."""
+    """The size of a log: messages of machines, and records by topic."""
 
     messages: int
-    readings: int
-    cells: int
+    of_topic: Mapping[str, int]
 
-    def records(self, *, with_cells: bool) -> int:
-        """Return how many records a reader has to come by."""
-        return self.readings + (self.cells if with_cells else 0)
+    def records(self, topics: Iterable[str]) -> int:
+        """Return how many records a reader of these topics has to come by."""
+        return sum(self.of_topic[topic] for topic in topics)
 
 
 class _Writer:
@@ -91,5 +91,4 @@ def fill(settings: KafkaSettings, pairs: list[Configured], machines: int, messag
         if step * STEP_MS % 1000 == 0:
             writer.mark(at_ms + STEP_MS)
     assert writer.outward.close() == 0, "records were not acknowledged"
-    readings = writer.counts[writer.topics.readings]
-    return Filled(each * machines, readings, sum(writer.counts.values()) - readings)
+    return Filled(each * machines, writer.counts)

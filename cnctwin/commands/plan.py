@@ -18,6 +18,7 @@ from cnctwin.commands.options import AsJson
 
 if TYPE_CHECKING:
     from cnctwin.planning.fleet import FleetPlan
+    from cnctwin.planning.kafka import KafkaPlan
 
 plan_app = typer.Typer(no_args_is_help=True, help="What a plant needs: processes, cores, memory, disk.")
 
@@ -32,7 +33,7 @@ def plan_fleet_command(
     machines: Annotated[int, typer.Option(help="How many machines", min=1)],
     hz: Annotated[float, typer.Option(help="Messages a second of each")] = 10.0,
     metrics: Annotated[int, typer.Option(help="Metrics of each; 11 of 13 are taken to change in a message", min=1)] = 13,
-    processors: Annotated[str, typer.Option(help="all, or names with commas")] = "all",
+    processors: Annotated[str, typer.Option(help="all, names with commas, or how many: the dearest")] = "all",
     cores: Annotated[int | None, typer.Option(help="Cores of the computer; else as this one has", min=1)] = None,
     disk: Annotated[float | None, typer.Option("--disk-gb", help="Room for the store; else what is free here", min=0.001)] = None,
     measure: Annotated[
@@ -42,19 +43,24 @@ def plan_fleet_command(
 ) -> None:
     """Say what a fleet needs (processes, cores, memory, disk, network), and when one computer is not enough."""
     from cnctwin.planning.calibration import calibrated_us
-    from cnctwin.planning.fleet import Computer, Fleet, plan_fleet
+    from cnctwin.planning.fleet import Computer, Fleet, chosen, plan_fleet
+    from cnctwin.planning.kafka import plan_kafka
     from cnctwin.planning.measured import MEASURED
 
-    names = tuple(MEASURED.each_us) if processors == "all" else tuple(dict.fromkeys(processors.split(",")))
+    names = chosen(processors, MEASURED)
     fleet = Fleet(machines, hz, metrics)
     disk_bytes = shutil.disk_usage(Path.home()).free if disk is None else round(disk * 1e9)
     calibration_us = calibrated_us() if measure else None
     slowness = 1.0 if calibration_us is None else calibration_us / MEASURED.calibration_us
     made = plan_fleet(fleet, names, Computer(cores or os.cpu_count() or 1, disk_bytes), slowness=slowness)
+    beyond = plan_kafka(fleet, names, slowness=slowness) if made.limits else None
     if as_json:
-        sys.stdout.write(json.dumps(made.as_json() | {"calibration_us": calibration_us}) + "\n")
+        kafka = None if beyond is None else beyond.as_json()
+        sys.stdout.write(json.dumps(made.as_json() | {"calibration_us": calibration_us, "kafka": kafka}) + "\n")
     else:
         _show(made, Console())
+        if beyond is not None:
+            _show_kafka(beyond, Console())
     raise typer.Exit(1 if made.limits else 0)
 
 
@@ -93,8 +99,7 @@ def _show(made: "FleetPlan", console: Console) -> None:
     if made.limits:
         console.print(
             f"One computer is not enough: {'; '.join(made.limits)}. With a margin it holds about {made.machines_max} machines "
-            "like these. Beyond that take several computers with a group of machines each, or a broker cluster and Kafka "
-            "under the folds.",
+            "like these. Beyond that take several computers with a group of machines each, or Kafka under the folds.",
             soft_wrap=True,
             highlight=False,
         )
@@ -102,3 +107,17 @@ def _show(made: "FleetPlan", console: Console) -> None:
         console.print(
             f"One computer is enough, up to about {made.machines_max} machines like these.", soft_wrap=True, highlight=False
         )
+
+
+def _show_kafka(beyond: "KafkaPlan", console: Console) -> None:
+    from cnctwin.planning.measured import ON_KAFKA
+
+    console.print(
+        f"\nOn Kafka (docs/kafka.md), by what was measured {ON_KAFKA.date} on {ON_KAFKA.computer}; ~ is an extrapolation:",
+        soft_wrap=True,
+        highlight=False,
+    )
+    for need in beyond.needs:
+        mark = "~" if need.is_extrapolated else " "
+        console.print(f"{mark} {need.what + ':':15} {need.need}", soft_wrap=True, highlight=False, markup=False)
+        console.print(f"{'':18}from {need.basis}", soft_wrap=True, highlight=False, markup=False)

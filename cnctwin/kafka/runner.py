@@ -35,6 +35,7 @@ from sparkplug.records.record import Origin, RecordError, RecordWriter
 MESSAGES_A_TURN = 1000
 POLL_S = 0.05
 FOLD_S = 0.5  # of one transaction; what waits then goes into the next one
+COMMIT_S = 0.1  # between two transactions, each of which has a marker of each partition
 IDLE_S = 1.0  # after which positions are saved although nothing came of the records
 PAUSE_S = 1.0
 FETCH_BYTES = 65_536  # for which the cluster waits 50 ms: to answer each few records costs it more than the records
@@ -162,7 +163,7 @@ class Runner:
     # Commits.
 
     def _commit_if_due(self, now_s: float) -> None:
-        if self._touched and (self._transactions.is_open or now_s - self._folded_s >= IDLE_S):
+        if self._touched and now_s - self._folded_s >= (COMMIT_S if self._transactions.is_open else IDLE_S):
             self._commit(now_s, list(self._assigned.due(now_s, touched=self._touched)))
 
     def _commit(self, now_s: float, cuts: Sequence[Place]) -> None:

@@ -128,6 +128,22 @@ def plan_fleet(
     )
 
 
+def chosen(processors: str, measured: Measured = MEASURED) -> tuple[str, ...]:
+    """Return the processors that are meant: all, those named, or a number of them, the dearest first, so that it is enough.
+
+    >>> chosen("2")
+    ('mirror', 'rules')
+    """
+    known = tuple(measured.each_us)
+    if processors == "all":
+        return known
+    if not processors.isdecimal():
+        return tuple(dict.fromkeys(processors.split(",")))
+    if not 1 <= int(processors) <= len(known):
+        raise UsageError(f"--processors {processors}: there are {len(known)}; give a number from 1 to {len(known)}, or names")
+    return tuple(sorted(known, key=lambda name: -measured.each_us[name])[: int(processors)])
+
+
 @dataclass(frozen=True, slots=True)
 class _Cost:
     """CPU time a message, µs, of machines with so many changing values on a computer that is so slow."""

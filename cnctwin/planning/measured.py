@@ -11,6 +11,7 @@ CPU time is in µs a message of a machine, with 11 changing values. `each_us` is
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,4 +64,79 @@ MEASURED = Measured(
     process_mb=85.0,
     machine_mb=0.8,
     calibration_us=134.5,
+)
+
+
+class Each(NamedTuple):
+    """The cost of a message of a machine, of a result of a processor, and of a value of the mirror."""
+
+    message: float
+    result: float
+    value: float
+
+
+@dataclass(frozen=True, slots=True)
+class MeasuredOnKafka:
+    """Figures of the folds on Kafka, CPU µs. Messages are those of machines, with 11 changing values.
+
+        python -m benchmarks.kafka.cost --only bridge --prefer    # bridge_us, kafka_us, mosquitto_us, log_bytes, live_factor
+        python -m benchmarks.kafka.cost --only each               # read_us, fold_us
+        python -m benchmarks.kafka.cost --only snapshots          # state_us
+
+    bridge_us: a result's is to publish it, and to hand it back to the log; kafka_us: with one replica and one reader
+    log_bytes: on the disk after lz4, with one replica, what cells read and what comes of a result included
+    read_us: a runner's to read a message; fold_us: what a processor adds, with its results; state_us: to save a state
+    live_factor: what a message costs as it comes over what it costs while a log is caught up with
+    results_a_machine_s: what a processor says of a machine a second, the mean of all but the mirror
+    process_mb, machine_mb: memory of a runner without machines, and of a machine in all processors
+    """
+
+    date: str
+    computer: str
+    bridge_us: Each
+    kafka_us: Each
+    mosquitto_us: Each
+    log_bytes: Each
+    state_bytes: float
+    read_us: float
+    fold_us: Mapping[str, float]
+    state_us: float
+    live_factor: float
+    results_a_machine_s: float
+    process_mb: float
+    machine_mb: float
+
+
+# With 100 machines at 10 Hz. A result is what all but the mirror cost beyond a message, over 1.1 results a message; a value is
+# what the mirror costs beyond it, over 11. `state_us` is that of cProfile, an upper bound: saving each second or each 30 s made
+# no difference beyond the noise of some per cent. Up to 1.2 cores were busy elsewhere while the mirror was measured, 0.2 else.
+ON_KAFKA = MeasuredOnKafka(
+    date="2026-11-24",
+    computer="AMD EPYC, 2 cores, Kafka 4.3 and the load on them too",
+    bridge_us=Each(83.0, 130.0, 12.0),
+    kafka_us=Each(262.0, 200.0, 10.5),
+    mosquitto_us=Each(26.0, 11.0, 4.5),
+    log_bytes=Each(474.0, 190.0, 40.0),
+    state_bytes=725.0,
+    read_us=11.9,
+    fold_us={
+        "alerts": 0.0,
+        "cutting_force": 49.7,
+        "events": 21.5,
+        "expected": 22.5,
+        "gap": 19.4,
+        "joint_anomaly": 12.3,
+        "mirror": 122.0,
+        "residual": 11.1,
+        "rules": 24.6,
+        "thermal": 19.5,
+        "tool_change_detector": 12.5,
+        "tool_wear": 10.0,
+        "vibration": 8.7,
+    },
+    state_us=104.0,
+    live_factor=2.0,
+    results_a_machine_s=0.92,
+    process_mb=100.0,
+    machine_mb=0.7,
 )

@@ -23,6 +23,23 @@ def test_a_fleet_that_is_too_large_says_what_follows() -> None:
     assert "One computer is not enough" in done.stdout and "Kafka" in done.stdout and "groups of" in done.stdout
 
 
+def test_past_one_computer_the_layout_on_kafka_is_told_with_what_it_rests_on() -> None:
+    given = ["plan", "fleet", "--machines", "5000", "--hz", "10", "--processors", "12", "--cores", "2", "--disk-gb", "100"]
+    done = RUNNER.invoke(app, given)
+    assert done.exit_code == 1
+    for what in ("MQTT brokers:", "bridges:", "runners:", "partitions:", "Kafka brokers:", "Kafka disk:", "network:", "pages:"):
+        assert what in done.stdout, what
+    assert "is an extrapolation" in done.stdout and done.stdout.count("from ") >= 8
+    told = json.loads(RUNNER.invoke(app, [*given, "--json"]).stdout)
+    assert told["kafka"]["runners"] >= 1 and sum(len(one["processors"]) for one in told["processes"]) == 12
+
+
+def test_on_one_computer_nothing_is_said_of_kafka() -> None:
+    given = ["plan", "fleet", "--machines", "2", "--cores", "2", "--disk-gb", "100"]
+    assert "Kafka" not in RUNNER.invoke(app, given).stdout
+    assert json.loads(RUNNER.invoke(app, [*given, "--json"]).stdout)["kafka"] is None
+
+
 def test_some_processors_only() -> None:
     given = ["plan", "fleet", "--machines", "3", "--processors", "thermal,mirror", "--cores", "2"]
     done = RUNNER.invoke(app, given)
