@@ -31,7 +31,7 @@ from benchmarks.kafka.plant import PROCESSORS, Plant, Setup
 from benchmarks.kafka.replay import Difference, Found, Replay, Stood
 from benchmarks.kafka.watcher import Awaited, Watcher
 from benchmarks.kafka.webhook import Webhook
-from benchmarks.kafka.witness import Noted, Witness
+from benchmarks.kafka.witness import Witness
 from cnctwin.kafka.bridging import cell_processors
 from cnctwin.kafka.topics import Topics
 from processors.running.runtime import configured
@@ -113,7 +113,8 @@ class KillRun:
     def _kill_in_turn(self) -> None:
         """Kill one after the other; the last one has as much time as the others."""
         setup = self.setup
-        kills = [self._takeover] if setup.is_takeover else [self._kill_bridge, self._kill_runner, self._kill_kafka]
+        ways = {"bridge": self._kill_bridge, "runner": self._kill_runner, "kafka": self._kill_kafka, "takeover": self._takeover}
+        kills = [ways[name] for name in setup.kills]
         began_s = time.monotonic()
         due_s = began_s + setup.every_s
         while due_s + setup.every_s <= began_s + setup.minutes * 60.0 + 1.0:
@@ -208,7 +209,7 @@ class KillRun:
         found = Replay(self.plant.kafka.bootstrap, self.topics, self.pairs, self.setup.partitions).compared(stood, inputs)
         missing = inputs.missing(noted, self.course.bridge_kills)
         notices = judged(emitted, self.webhook.received, noted.fates)
-        table = Table(self, found, inputs, missing, notices, noted)
+        table = Table(self, found, inputs, missing=missing, notices=notices, seen=noted.count)
         table.print()
         return table.is_well
 
@@ -216,10 +217,11 @@ class KillRun:
 class Table:
     """What has come of a run, as Markdown."""
 
-    def __init__(self, run: KillRun, found: Found, inputs: Inputs, missing: Missing, notices: Notices, noted: Noted) -> None:
+    def __init__(self, run: KillRun, found: Found, inputs: Inputs, *, missing: Missing, notices: Notices, seen: int) -> None:
+        """`seen`: the data messages that the witness saw."""
         self.is_well = True
         self._run, self._found, self._inputs = run, found, inputs
-        self._missing, self._notices, self._noted = missing, notices, noted
+        self._missing, self._notices, self._seen = missing, notices, seen
         self._faults: list[str] = []
 
     def print(self) -> None:
@@ -272,11 +274,11 @@ class Table:
         self._row(f"{what} that differ", figure, one.total == 0, one.first)
 
     def _of_inputs(self) -> None:
-        inputs, missing, noted = self._inputs, self._missing, self._noted
+        inputs, missing, seen = self._inputs, self._missing, self._seen
         self._row("records of the log that were there already, dropped", self._found.repeated)
         self._row("gaps in the numbers of a life without a hole", inputs.gaps, inputs.gaps == 0, inputs.first_gap)
         self._row("holes told", inputs.holes)
-        self._row("data messages: witness saw, log holds", f"{noted.count:,}, {inputs.data:,}", noted.count > 0)
+        self._row("data messages: witness saw, log holds", f"{seen:,}, {inputs.data:,}", seen > 0)
         self._row("missing: bridge away, or births not asked for yet (QoS 0)", missing.unbridged)
         self._row("missing: on the way through a bridge that was killed", missing.in_memory)
         self._row("missing otherwise", missing.otherwise, missing.otherwise == 0, missing.first)
@@ -327,6 +329,7 @@ def main() -> None:
     parser.add_argument("--every", type=float, default=defaults.every_s, help="seconds between two kills")
     parser.add_argument("--partitions", type=int, default=defaults.partitions)
     parser.add_argument("--processors", default=",".join(PROCESSORS), help="names, with commas between")
+    parser.add_argument("--kills", default="bridge,runner,kafka", help="what is killed in turn")
     parser.add_argument("--takeover", action="store_true", help="two runners, of which one is killed for 20 s")
     parser.add_argument("--home", type=Path, help="where logs and data are kept; else a folder that goes with the run")
     given = parser.parse_args()
@@ -338,7 +341,7 @@ def main() -> None:
         partitions=given.partitions,
         processors=tuple(one.strip() for one in given.processors.split(",") if one.strip()),
         members=("r0", "r1") if given.takeover else ("r0",),
-        is_takeover=given.takeover,
+        kills=("takeover",) if given.takeover else tuple(given.kills.split(",")),
     )
     with tempfile.TemporaryDirectory(prefix="cnctwin-kills-") as folder:
         home = Path(folder) if given.home is None else given.home

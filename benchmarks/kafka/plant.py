@@ -1,4 +1,4 @@
-"""The plant of a kill run: Kafka, Mosquitto, the load, a bridge and runners, each a process that can be killed and begun again."""
+"""The plant of a kill run: Kafka, Mosquitto, the load, a bridge and runners, each a process that can be killed."""
 
 import os
 import subprocess
@@ -56,7 +56,7 @@ class Setup:
     partitions: int = 4
     processors: tuple[str, ...] = PROCESSORS
     members: tuple[str, ...] = ("r0",)
-    is_takeover: bool = False
+    kills: tuple[str, ...] = ("bridge", "runner", "kafka")
 
 
 class Command:
@@ -81,7 +81,7 @@ class Command:
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=log,
-                env={**os.environ, "CNCTWIN_LOG": "INFO"},
+                env={**os.environ, "CNCTWIN_LOG": "INFO", "PYTHONFAULTHANDLER": "1"},
             )
         return began_s
 
