@@ -21,6 +21,7 @@ BUSY_PCT = 70.0
 """Below this a process that is behind does not lack a core of its own, but the time on it."""
 TEXT_MAX = 4000
 _Name = Annotated[str, Field(min_length=1, max_length=200)]
+_Count = Annotated[int, Field(ge=0, le=2**62)]
 _Amount = Annotated[float, Field(ge=0.0, le=1e9, allow_inf_nan=False)]
 
 
@@ -30,6 +31,8 @@ class LagReport:
 
     at_ms: when it was reported, UTC
     process: any text that is the same for processors of one process, and for no others
+    runners, partitions, waiting: of processors that are folded on a log, the runners that share them, the partitions that these
+        have, and the records that wait; 0 runners: one process folds it all
     """
 
     processors: Annotated[tuple[_Name, ...], Field(max_length=100)]
@@ -38,6 +41,21 @@ class LagReport:
     lag_s: _Amount
     machines: Annotated[int, Field(ge=0, le=10**9)]
     busy_pct: _Amount
+    runners: _Count = 0
+    partitions: _Count = 0
+    waiting: _Count = 0
+
+    @property
+    def load(self) -> str:
+        """What they have to do, and with what.
+
+        >>> LagReport(("thermal",), "kafka: thermal", 0, 18.2, 20, 98.0, 2, 12, 40_213).load
+        '20 machines, 40213 records wait, 2 runners with 12 partitions, the busiest 98 % busy'
+        """
+        if not self.runners:
+            return f"{self.machines} machines, one core, {self.busy_pct:.0f} % busy"
+        runners = f"{self.runners} runner{'s' if self.runners > 1 else ''} with {self.partitions} partitions"
+        return f"{self.machines} machines, {self.waiting} records wait, {runners}, the busiest {self.busy_pct:.0f} % busy"
 
     @property
     def sentence(self) -> str:
@@ -46,11 +64,14 @@ class LagReport:
         >>> LagReport(("thermal", "mirror"), "hall-3:4711", 0, 18.2, 20, 104.8).sentence
         'processors are 18 s behind: 20 machines, one core, 105 % busy; `cnctwin plan fleet` says what it takes (mirror, thermal)'
         """
-        way_out = "`cnctwin plan fleet` says what it takes"
         if self.busy_pct < BUSY_PCT:
-            way_out = "that is less than a core: look at what else runs there, and at the broker"
-        load = f"{self.machines} machines, one core, {self.busy_pct:.0f} % busy"
-        return f"processors are {self.lag_s:.0f} s behind: {load}; {way_out} ({', '.join(sorted(self.processors))})"
+            elsewhere = "the log" if self.runners else "the broker"
+            way_out = f"that is less than a core: look at what else runs there, and at {elsewhere}"
+        elif self.runners:
+            way_out = "start one more with the same processors (no more of them than partitions)"
+        else:
+            way_out = "`cnctwin plan fleet` says what it takes"
+        return f"processors are {self.lag_s:.0f} s behind: {self.load}; {way_out} ({', '.join(sorted(self.processors))})"
 
     def payload(self) -> bytes:
         """The report as JSON."""
@@ -88,6 +109,9 @@ def by_process(reports: Iterable[LagReport]) -> list[LagReport]:
             lag_s=max(one.lag_s for one in group),
             machines=max(one.machines for one in group),
             busy_pct=max(one.busy_pct for one in group),
+            runners=max(one.runners for one in group),
+            partitions=max(one.partitions for one in group),
+            waiting=max(one.waiting for one in group),
         )
         for process, group in shared.items()
     ]

@@ -25,9 +25,19 @@ class Subscribe(NamedTuple):
 
 
 class Connect(NamedTuple):
-    """Open a connection with a clean session (3.1.1) or a clean start and no session expiry (5.0), and this will (if any)."""
+    """Open a connection with this will (if any), and a clean session (3.1.1) or a clean start and no session expiry (5.0).
+
+    keep_s: the broker is to keep the session, and what it could not deliver, for so long (5.0) or for good (3.1.1); 0 = clean
+    """
 
     will: Publish | None
+    keep_s: int = 0
+
+
+class Acknowledge(NamedTuple):
+    """Tell the broker that these messages of QoS 1 need not be delivered again; they came on the present connection."""
+
+    packet_ids: tuple[int, ...]
 
 
 class Disconnect(NamedTuple):
@@ -50,7 +60,7 @@ class Barrier(NamedTuple):
     token: int
 
 
-Action = Barrier | Publish | Subscribe | Disconnect | WalkToNextServer
+Action = Acknowledge | Barrier | Publish | Subscribe | Disconnect | WalkToNextServer
 
 
 class HostState(NamedTuple):

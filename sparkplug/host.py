@@ -7,14 +7,16 @@ than a value.
 """
 
 import logging
+import math
 import threading
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from enum import Enum
 from random import Random
+from typing import NamedTuple
 
-from sparkplug.actions import Connect, Publish, Subscribe
+from sparkplug.actions import Acknowledge, Connect, Publish, Subscribe
 from sparkplug.admission.gate import Gate
 from sparkplug.admission.limits import DEFAULTS, Limits
 from sparkplug.admission.rates import Overrun, Rates
@@ -26,6 +28,7 @@ from sparkplug.errors import TopicError
 from sparkplug.host_session import EventKind, HostEvent, HostSession
 from sparkplug.metric import Change, NodeId
 from sparkplug.node_picture import NodePicture
+from sparkplug.plain_topics import PlainTopics
 from sparkplug.topics import NAMESPACE, STATE_PREFIX, Topic, Verb, check_id, group_filter
 from sparkplug.transport.connection import MqttConnection
 from sparkplug.transport.listener import Listener
@@ -37,12 +40,9 @@ __all__ = ["EventKind", "HostApplication", "HostEvent"]
 EVENTS_A_POLL = 1000
 TICK_S = 0.1
 EXCESS_S = 1.0
-PLAIN_TOPICS_MAX = 20_000
-PLAIN_BYTES_MAX = 1000  # every broker takes a message of that size
 STALE_S_MAX = 60.0
 FAILURE_TOLD_S = 10.0
 _NOWHERE = NodeId("", "")
-_NAMESPACE_LEVEL = f"{NAMESPACE}/"
 _log = logging.getLogger(__name__)
 
 
@@ -53,12 +53,23 @@ class _Mark(Enum):
     LOST = "lost"
 
 
+class Held(NamedTuple):
+    """A message of QoS 1 that the broker keeps until it is acknowledged, on the connection of this number."""
+
+    packet_id: int
+    connection: int
+
+
 class HostApplication:
     """Listens to edge nodes; `wanted` picks them, `topic_filters` tells the broker what to send.
 
     `loop` serves the connection, which has a loop of its own otherwise. Data that have waited for longer than `stale_s_max` are
     dropped. What is beyond `limits` is refused: so are devices with a `reserved` name. `trusted` nodes are free of the limits on
     numbers and rates.
+
+    With `keep_s` the broker keeps the session for so long, and what it delivers at QoS 1 until the application acknowledges it:
+    `take_held` returns what `poll` has dealt with since it was last called, and `acknowledge` takes it. Nothing is dropped for
+    its age then, and a connection that ends makes nothing stale. `on_life` hears each birth and death.
     """
 
     def __init__(
@@ -78,11 +89,16 @@ class HostApplication:
         limits: Limits = DEFAULTS,
         reserved: Collection[str] = (),
         trusted: Callable[[NodeId], bool] = lambda _: False,
+        keep_s: int = 0,
     ) -> None:
         self.dropped = 0
         self.faults = 0  # messages that a bug of ours has lost
         self._queue_max = queue_max
-        self._stale_s_max = stale_s_max
+        self._stale_s_max = math.inf if keep_s else stale_s_max
+        self._keep_s = keep_s
+        self.on_life: Callable[[Topic, bytes], None] | None = None
+        self._held: list[Held] = []
+        self._is_lost = False  # the connection of a kept session
         self._wanted = wanted
         self._session = HostSession(
             host_id,
@@ -95,8 +111,7 @@ class HostApplication:
             gate=Gate(limits, reserved, trusted),
         )
         self._plain_filters: list[str] = []
-        self._plain_topics: set[str] = set()  # on which a message can be sent
-        self._inbox: deque[tuple[str | _Mark | Overrun, bytes, float]] = deque()  # with the time of time.monotonic
+        self._inbox: deque[tuple[str | _Mark | Overrun | Held, bytes, float]] = deque()  # with the time of time.monotonic
         self._waits = False
         self._filled = threading.Event()
         self._ticked_s = self._told_s = 0.0
@@ -106,12 +121,12 @@ class HostApplication:
         self._thinned: Counter[tuple[NodeId, bool]] = Counter()
         self._plain_bytes_max = limits.plain_bytes_max
         self._failure_told_s = -FAILURE_TOLD_S
-        listener = Listener(
-            self._connecting, lambda: None, self._connected, self._message, self._lost, lambda: None, wanted=self._is_read
-        )
+        called = self._connecting, lambda: None, self._connected, self._message, self._lost, lambda: None
+        listener = Listener(*called, wanted=self._is_read, holds=self._hold)
         self._connection = MqttConnection(
             (broker,), f"host-{host_id}", listener, mqtt_version=mqtt_version or broker.mqtt_version, loop=loop
         )
+        self._plain_topics = PlainTopics(self._connection.sendable)
 
     def start(self) -> None:
         """Begin to connect; returns at once."""
@@ -192,13 +207,28 @@ class HostApplication:
                 except Exception:
                     self._fail("a tick of the session failed")
                 events += self._refused_by_rate(now_s)
-                if self._lateness.is_lasting(now_s - self._inbox[0][2] if self._inbox else 0.0, now_s):
+                if not self._keep_s and self._lateness.is_lasting(now_s - self._inbox[0][2] if self._inbox else 0.0, now_s):
                     self._thin()
             if self._session.actions:
                 self._connection.send(self._session.actions)
                 self._session.actions = []
             if events or now_s >= deadline_s:
                 return events
+
+    def restore(self, births: Iterable[tuple[str, bytes]]) -> None:
+        """As `HostSession.restore`, before `start`."""
+        self._session.restore(births, now_ms())
+
+    def take_held(self) -> list[Held]:
+        """Return the messages that were dealt with, and that the broker keeps until they are acknowledged."""
+        held, self._held = self._held, []
+        return held
+
+    def acknowledge(self, held: Iterable[Held]) -> None:
+        """Let the broker forget messages; those of an earlier connection it delivers again."""
+        present = self._connection.connects
+        if packet_ids := tuple(one.packet_id for one in held if one.connection == present):
+            self._connection.send((Acknowledge(packet_ids),))
 
     def take_thinned(self) -> dict[NodeId, int]:
         """Return the messages of devices, by node, that were left out since the last call: more came than can be read."""
@@ -228,29 +258,11 @@ class HostApplication:
 
     def publish_all(self, messages: Sequence[Publish]) -> bool:
         """Publish several messages outside the Sparkplug namespace; False where not all were sent, as in `publish_plain`."""
-        topics = self._plain_topics
-        can_all = True
-        for message in messages:
-            if message[0] not in topics or len(message[1]) > PLAIN_BYTES_MAX:
-                can_all = self._may_publish(message) and can_all
+        sent = self._plain_topics.sent(list(messages))
         if not self._session.online or self._connection.full:
             return False
-        self._connection.send(messages if can_all else [one for one in messages if one[0] in topics])
-        return can_all
-
-    def _may_publish(self, message: Publish) -> bool:
-        """Look at a topic that is new, or at a long message. Raises ValueError for what a host writes by commands only."""
-        topic = message.topic
-        if topic.startswith(_NAMESPACE_LEVEL):
-            raise ValueError(f"{topic!r} lies in the Sparkplug namespace; a host writes there by commands only")
-        if len(self._plain_topics) >= PLAIN_TOPICS_MAX:
-            self._plain_topics.clear()
-        can_be_sent = self._connection.sendable.takes(message)
-        if can_be_sent:
-            self._plain_topics.add(topic)
-        else:
-            self._plain_topics.discard(topic)
-        return can_be_sent
+        self._connection.send(sent)
+        return len(sent) == len(messages)
 
     def subscribe_plain(self, topic_filter: str) -> None:
         """Have messages outside the Sparkplug namespace come out of `poll` as PLAIN; kept over reconnects."""
@@ -289,15 +301,22 @@ class HostApplication:
             topic, payload, came_s = inbox.popleft()
             if came_s < stale_s and isinstance(topic, str) and topic.startswith(NAMESPACE) and "DATA/" in topic:
                 self.dropped += 1
+            elif isinstance(topic, Held):
+                self._held.append(topic)
             elif topic is _Mark.CONNECTED:
-                events += session.connected(now_ms())
+                events += self._session_begun()
                 self._connection.send([*session.actions, *(Subscribe(plain) for plain in self._plain_filters)])
                 session.actions = []
+            elif topic is _Mark.LOST and self._keep_s:
+                self._is_lost, session.online = True, False
+                session.actions.clear()
             elif topic is _Mark.LOST:
                 events += session.lost(now_ms())
             elif isinstance(topic, str) and topic.startswith(NAMESPACE):
                 try:
                     events += session.message(topic, payload, now_ms())
+                    if self.on_life is not None and ("BIRTH/" in topic or "DEATH/" in topic):
+                        self.on_life(Topic.parse(topic), payload)
                 except Exception:
                     self._fail(f"a message on {shortened(topic)} could not be taken")
             elif isinstance(topic, Overrun):
@@ -307,6 +326,13 @@ class HostApplication:
             elif isinstance(topic, str):
                 events.append(HostEvent(EventKind.PLAIN, _NOWHERE, None, now_ms(), topic=topic, payload=payload))
         return events
+
+    def _session_begun(self) -> list[HostEvent]:
+        """The broker has accepted the connection; where it has not kept the session, what is known is good no more."""
+        is_kept = bool(self._keep_s) and self._connection.session_present
+        withered = self._session.lost(now_ms()) if self._is_lost and not is_kept else []
+        self._is_lost = False
+        return [*withered, *self._session.connected(now_ms(), is_kept=is_kept)]
 
     def _fail(self, what: str) -> None:
         """Count a bug of ours: it costs this message, and no other."""
@@ -323,7 +349,7 @@ class HostApplication:
             self._filled.wait(wait_s)
         self._waits = False
 
-    def _put(self, topic: str | _Mark | Overrun, payload: bytes, now_s: float) -> None:
+    def _put(self, topic: str | _Mark | Overrun | Held, payload: bytes, now_s: float) -> None:
         self._inbox.append((topic, payload, now_s))
         if self._waits:
             self._filled.set()
@@ -342,13 +368,19 @@ class HostApplication:
         return verb not in (Verb.NCMD, Verb.DCMD) and self._wanted(node)
 
     def _connecting(self, _server: int) -> Connect:
-        return self._session.connecting(now_ms())
+        return self._session.connecting(now_ms(), self._keep_s)
 
     def _connected(self) -> None:
         self._put(_Mark.CONNECTED, b"", time.monotonic())
 
     def _lost(self) -> None:
         self._put(_Mark.LOST, b"", time.monotonic())
+
+    def _hold(self, packet_id: int) -> bool:
+        """Have a message acknowledged once the application has dealt with it."""
+        if self._keep_s:
+            self._put(Held(packet_id, self._connection.connects), b"", time.monotonic())
+        return self._keep_s > 0
 
     def _message(self, topic: str, payload: bytes) -> None:
         now_s = time.monotonic()

@@ -71,20 +71,28 @@ class HostSession:
 
     # What the transport tells.
 
-    def connecting(self, now_ms: int) -> Connect:
+    def connecting(self, now_ms: int, keep_s: int = 0) -> Connect:
         """A connection is about to be opened; its will says when this host was last seen."""
         self._connect_ms = now_ms
-        return Connect(will=self._state(online=False, timestamp_ms=now_ms) if self._publish_state else None)
+        return Connect(self._state(online=False, timestamp_ms=now_ms) if self._publish_state else None, keep_s)
 
-    def connected(self, now_ms: int) -> list[HostEvent]:
-        """The broker has accepted the connection: subscribe, then say that this host is online, then ask who is there."""
+    def restore(self, births: Iterable[tuple[str, bytes]], now_ms: int) -> None:
+        """Take births that an earlier run has heard, NBIRTHs first: what comes in a kept session is read by them."""
+        for topic, payload in births:
+            self.message(topic, payload, now_ms)
+        for watched in self._nodes.values():
+            watched.window.skip()
+            watched.awaiting = None
+
+    def connected(self, now_ms: int, *, is_kept: bool = False) -> list[HostEvent]:
+        """The broker has accepted the connection: subscribe, say so, and ask who is there unless the session was kept."""
         self.online = True
         if self._publish_state:
             self.actions.append(Subscribe(self.state_topic))
         self.actions += [Subscribe(topic_filter) for topic_filter in self._topic_filters]
         if self._publish_state:
             self.actions.append(self._state(online=True, timestamp_ms=self._connect_ms))
-        for node in self._nodes:
+        for node in self._nodes if not is_kept else ():
             self._requests.want(node, now_ms)
         return []
 

@@ -93,7 +93,7 @@ def test_a_processor_reads_what_somebody_publishes(name: str) -> None:
 
 
 def test_the_metrics_for_prometheus_come_from_signals_that_somebody_publishes() -> None:
-    nodes = {spec.name for spec in (*HEALTH, *node_metrics(records=True))}
+    nodes = {spec.name for spec in (*HEALTH, *node_metrics(records=True, on_log=True))}
     assert {name for name, _ in (*NODE_GAUGES.values(), *NODE_COUNTERS.values())} <= nodes
     assert {name for name, _ in MACHINE_GAUGES.values() if canonical(name) is None} <= PUBLISHED
 

@@ -41,7 +41,7 @@ def usage_of(pid: int) -> Usage:
                 status = dict(line.partition(":")[::2] for line in (task / "status").read_text().splitlines())
                 switches += int(status["voluntary_ctxt_switches"])
                 threads += 1
-            rss_mb += int(status["VmRSS"].split()[0]) * 1024 / 1e6
+            rss_mb += int(status.get("VmRSS", "0").split()[0]) * 1024 / 1e6
     return Usage(cpu_s, rss_mb, threads, switches)
 
 

@@ -27,7 +27,7 @@ from benchmarks.hall.machine import GROUP, name_of
 from benchmarks.kafka.inputs import Inputs, Kill, Missing
 from benchmarks.kafka.log import behind
 from benchmarks.kafka.notices import Notices, judged
-from benchmarks.kafka.plant import PROCESSORS, Plant, Setup
+from benchmarks.kafka.supervised import PROCESSORS, Plant, Setup
 from benchmarks.kafka.replay import Difference, Found, Replay, Stood
 from benchmarks.kafka.watcher import Awaited, Watcher
 from benchmarks.kafka.webhook import Webhook

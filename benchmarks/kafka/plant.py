@@ -1,195 +1,183 @@
-"""The plant of a kill run: Kafka, Mosquitto, the load, a bridge and runners, each a process that can be killed."""
+"""A plant on Kafka: machines, Mosquitto, bridge, Kafka and runners as a user starts them, and what each takes of the computer."""
 
-import os
-import subprocess
+import json
+import multiprocessing
 import sys
 import time
-from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass
-from multiprocessing import Pipe, Process
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from pathlib import Path
 
-from benchmarks.hall.load import Order, serve
+from benchmarks.hall import load
+from benchmarks.hall.load import Order, Tally
+from benchmarks.hall.machine import GROUP
 from benchmarks.hall.usage import busy_s, usage_of
+from cnctwin.kafka.kept import read_kept
+from cnctwin.kafka.settings import KafkaSettings
+from cnctwin.kafka.topics import Topics, ensure
+from cnctwin.processes.child import Child
+from cnctwin.processes.port import free_port
 from cnctwin.processes.private_broker import PrivateBroker
 from tests.kafka.kafka_server import KafkaServer
-from tests.wire.mosquitto import free_port
 
-STOP_S_MAX = 60.0
-BORN_S_MAX = 60.0
-PROCESSORS = ("thermal", "cutting_force", "gap", "rules", "events", "tool_change_detector", "alerts", "mirror")
-# A machine of the load changes its tool every two minutes: the load of its spindle falls to 0, and the alarm ends.
-CONFIGURATION = """\
-[rules]
-load_limit_pct = 30.0
-load_clear_pct = 25.0
-load_dwell_s = 1.0
-load_clear_s = 1.0
-
-[alerts]
-group_wait_s = 1.0
-group_interval_s = 1.0
-flap_episodes = 50
-flap_window_s = 60.0
-
-[alerts.signals]
-"twin/rule_load_over_limit" = {{ severity = "high", for_s = 0.0, keep_firing_for_s = 1.0 }}
-
-[alerts.receivers.run]
-type = "webhook"
-url = "{url}"
-rate_per_hour = 10000
-rate_high_per_hour = 10000
-"""
+_SPAWN = multiprocessing.get_context("spawn")
+COMMAND = (sys.executable, "-m", "cnctwin")
 
 
 @dataclass(frozen=True, slots=True)
-class Setup:
-    """The options of a run. `members`: the static names of the runners."""
+class Live:
+    """The figures of a window: CPU time of each part, µs a message that the machines sent."""
 
-    machines: int = 100
-    hz: float = 10.0
-    minutes: float = 15.0
-    every_s: float = 30.0
-    partitions: int = 4
-    processors: tuple[str, ...] = PROCESSORS
-    members: tuple[str, ...] = ("r0",)
-    kills: tuple[str, ...] = ("bridge", "runner", "kafka")
-
-
-class Command:
-    """A command that a supervisor would keep running. `cpu_s` sums over all its lives."""
-
-    def __init__(self, name: str, arguments: Sequence[str], log: Path) -> None:
-        self.name, self._arguments, self._log = name, list(arguments), log
-        self.cpu_s = 0.0
-        self._process: subprocess.Popen[bytes] | None = None
-
-    @property
-    def running(self) -> bool:
-        """True while the process lives."""
-        return self._process is not None and self._process.poll() is None
-
-    def start(self) -> float:
-        """Begin it; return the moment, by the wall clock."""
-        began_s = time.time()
-        with self._log.open("ab") as log:
-            self._process = subprocess.Popen(
-                [sys.executable, "-m", "cnctwin", *self._arguments],
-                stdin=subprocess.DEVNULL,
-                stdout=log,
-                stderr=log,
-                env={**os.environ, "CNCTWIN_LOG": "INFO", "PYTHONFAULTHANDLER": "1"},
-            )
-        return began_s
-
-    def kill(self) -> None:
-        """End it by -9."""
-        assert self._process is not None
-        self.cpu_s += usage_of(self._process.pid).cpu_s
-        self._process.kill()
-        self._process.wait()
-
-    def stop(self) -> int:
-        """Ask it to end (SIGTERM); return its exit status, -9 where it had to be killed."""
-        assert self._process is not None
-        self.cpu_s += usage_of(self._process.pid).cpu_s
-        self._process.terminate()
-        try:
-            return self._process.wait(STOP_S_MAX)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            return self._process.wait()
-
-    def last_words(self) -> str:
-        """Return the end of what it has said."""
-        return self._log.read_text(errors="replace")[-2000:] if self._log.exists() else ""
+    machines: int
+    messages: int
+    us: dict[str, float]
+    cores: dict[str, float]
+    rss_mb: dict[str, float]
+    elsewhere: float
+    late_ms: float
+    kafka_bytes: dict[str, float]
+    lag_s: float
+    transactions: float
 
 
+@dataclass(slots=True)
 class Plant:
-    """See the module. `webhook`: the address that alerts are told at."""
+    """What runs."""
 
-    def __init__(self, setup: Setup, home: Path, webhook: str) -> None:
-        self.setup, self.home = setup, home
-        for name in ("kafka", "mqtt"):
-            (home / name).mkdir()
-        self.kafka = KafkaServer(home / "kafka")
-        self.mqtt = PrivateBroker(home / "mqtt", free_port())
-        self.config = home / "processors.toml"
-        self.config.write_text(CONFIGURATION.format(url=webhook))
-        self._kafka_config = home / "kafka.toml"
-        self._kafka_config.write_text(f"partitions = {setup.partitions}\nreplication_factor = 1\n")
-        self.kills: Counter[str] = Counter()
-        self.kafka_cpu_s = 0.0
-        self._load: Process | None = None
-        self._pipe: Connection | None = None
-        self._began = (0.0, 0.0)
-        self.bridge = Command("bridge", [], home / "bridge.log")
-        self.runners: dict[str, Command] = {}
+    kafka: KafkaServer
+    broker: PrivateBroker
+    folder: Path
+    settings: KafkaSettings
+    children: dict[str, Child] = field(default_factory=dict)
+    loads: list[tuple[Connection, int]] = field(default_factory=list)
+    machines: int = 0
+    is_preferred: bool = False
 
-    def start(self) -> None:
-        """Start the two brokers, then the bridge and the runners."""
-        self.kafka.start()
-        self.mqtt.start()
-        common = ["--kafka", self.kafka.bootstrap, "--kafka-config", str(self._kafka_config), "--config", str(self.config)]
-        common += ["--broker", self.mqtt.address.url]
-        names = ",".join(self.setup.processors)
-        state = str(self.home / "state")
-        self.bridge = Command(
-            "bridge", ["bridge", *common, "--name", "b0", "--processors", names, "--state-dir", state], self.home / "bridge.log"
+    def options(self) -> list[str]:
+        """Return the options that bridge and runner share."""
+        path = self.folder / "kafka.toml"
+        path.write_text(
+            f"partitions = {self.settings.partitions}\nreplication_factor = 1\nsnapshot_s = {self.settings.snapshot_s}\n"
         )
-        self.runners = {
-            member: Command(member, ["process", *self.setup.processors, *common, "--member", member], self.home / f"{member}.log")
-            for member in self.setup.members
-        }
-        self.bridge.start()
-        for runner in self.runners.values():
-            runner.start()
-        self._began = time.monotonic(), busy_s()
+        return ["--kafka", self.kafka.bootstrap, "--kafka-config", str(path)]
 
-    def bear(self) -> None:
-        """Have the machines be born and begin to talk."""
-        self._pipe, end = Pipe()
-        order = Order(self.mqtt.address.port, list(range(self.setup.machines)), self.setup.hz)
-        self._load = Process(target=serve, args=(order, end), daemon=True)
-        self._load.start()
-        if not self._pipe.poll(BORN_S_MAX):
-            raise SystemExit(f"the load does not come up within {BORN_S_MAX:g} s")
-        self._pipe.recv()
-        self._pipe.send("born")
+    def start(self, name: str, *command: str) -> None:
+        """Start a program of ours."""
+        child = self.children[name] = Child(name, [*COMMAND, *command], self.folder / f"{name}.log")
+        child.start()
+        self._prefer(child.pid)
 
-    def end_load(self) -> None:
-        """Have the machines fall silent, and be offline."""
-        if self._load is not None and self._pipe is not None:
-            self._pipe.send(None)
-            self._load.join(10.0)
-            self._load.kill()
-            self._load = None
+    def _prefer(self, pid: int | None) -> None:
+        """Give a process precedence over others of this computer, where that is wanted and allowed."""
+        if self.is_preferred and pid is not None:
+            load.prefer(pid)
 
-    def restart_kafka(self) -> None:
-        """Kill Kafka and start it again."""
-        self.kafka_cpu_s += usage_of(self.kafka.pid).cpu_s
-        self.kafka.restart()
+    def bridge(self, processors: Sequence[str], *, results: str) -> None:
+        """Start the bridge."""
+        own = ["--broker", self.broker.address.url, "--state-dir", str(self.folder / "state"), "--name", "b0"]
+        self.start("bridge", "bridge", *self.options(), *own, "--processors", ",".join(processors), "--results", results)
 
-    def busy(self) -> tuple[float, float]:
-        """Return the seconds since the start, and the busy share of all processors of the computer, in per cent."""
-        passed_s = time.monotonic() - self._began[0]
-        return passed_s, 100.0 * (busy_s() - self._began[1]) / passed_s / (os.cpu_count() or 1)
+    def runner(self, name: str, processors: Sequence[str]) -> None:
+        """Start a runner."""
+        self.start(name, "process", *processors, *self.options(), "--member", name)
 
-    def watch(self) -> None:
-        """Raise SystemExit where a process has ended by itself."""
-        for one in (self.bridge, *self.runners.values()):
-            if not one.running:
-                raise SystemExit(f"{one.name} has ended by itself: {one.last_words()}")
+    def bear(self, machines: int, hz: float) -> None:
+        """Have machines connected and born; then they send."""
+        ours, theirs = _SPAWN.Pipe()
+        process = _SPAWN.Process(target=load.serve, args=(Order(self.broker.port, range(machines), hz), theirs), daemon=True)
+        process.start()
+        theirs.close()
+        if not ours.poll(60.0):
+            raise SystemExit("the load does not start")
+        ours.recv()
+        ours.send("go")
+        assert process.pid is not None
+        self.loads.append((ours, process.pid))
+        self.machines = machines
 
-    def stop(self) -> None:
-        """End all that is left."""
-        self.end_load()
-        for one in (self.bridge, *self.runners.values()):
-            if one.running:
-                one.kill()
-        self.mqtt.stop()
-        if self.kafka.running:
-            self.kafka.kill()
+    def silence(self) -> None:
+        """End the load."""
+        for pipe, pid in self.loads:
+            pipe.send(None)
+            for process in multiprocessing.active_children():
+                if process.pid == pid:
+                    process.join(10.0)
+        self.loads.clear()
+
+    def _used(self) -> dict[str, tuple[float, float]]:
+        pids = {"mosquitto": self.broker.child.pid, "kafka": self.kafka.pid, "load": self.loads[0][1]}
+        pids |= {name: child.pid for name, child in self.children.items()}
+        used = {name: usage_of(pid) for name, pid in pids.items() if pid is not None}
+        return {name: (one.cpu_s, one.rss_mb) for name, one in used.items()}
+
+    def log_bytes(self) -> dict[str, int]:
+        """Return the bytes of each topic's segments."""
+        found: dict[str, int] = {}
+        for path in (self.kafka.home / "data").glob(f"cnctwin.{GROUP}.*/*.log"):
+            name = path.parent.name.rpartition("-")[0].removeprefix(f"cnctwin.{GROUP}.")
+            found[name] = found.get(name, 0) + path.stat().st_size
+        return found
+
+    def look(self, seconds: float) -> Live:
+        """Return the figures of a window that begins now."""
+        ((pipe, _),) = self.loads
+        begin_s = time.time()
+        pipe.send(("window", (round(begin_s * 1000), round((begin_s + seconds) * 1000))))
+        before, busy_before, bytes_before, committed = self._used(), busy_s(), self.log_bytes(), self._health()
+        began_s = time.monotonic()
+        time.sleep(seconds)
+        after, busy_after, bytes_after, told = self._used(), busy_s(), self.log_bytes(), self._health()
+        wall_s = time.monotonic() - began_s
+        pipe.send(("report", None))
+        tally: Tally = pipe.recv()[0]
+        for name, child in self.children.items():
+            if not child.running:
+                raise SystemExit(f"{name} has ended: {child.last_words()}")
+        spent = {name: after[name][0] - before[name][0] for name in after}
+        late = sorted(tally.late_ms)
+        return Live(
+            machines=self.machines,
+            messages=tally.sent,
+            us={name: one / tally.sent * 1e6 for name, one in spent.items()},
+            cores={name: one / wall_s for name, one in spent.items()},
+            rss_mb={name: after[name][1] for name in after},
+            elsewhere=max(0.0, (busy_after - busy_before - sum(spent.values())) / wall_s),
+            late_ms=late[len(late) * 99 // 100] if late else 0.0,
+            kafka_bytes={name: (bytes_after[name] - bytes_before.get(name, 0)) / tally.sent for name in bytes_after},
+            lag_s=max((one["lag_s"] for one in told), default=0.0),
+            transactions=(sum(one["transactions"] for one in told) - sum(one["transactions"] for one in committed)) / wall_s,
+        )
+
+    def _health(self) -> list[dict[str, float]]:
+        """Return the newest word of each runner."""
+        kept = read_kept(self.settings.client(), Topics(GROUP).health, range(self.settings.partitions), timeout_s=10.0)
+        return [json.loads(value) for of_partition in kept.values() for value in of_partition.values()]
+
+
+@contextmanager
+def plant(
+    folder: Path, *, partitions: int = 12, snapshot_s: float = 5.0, cells: Sequence[str] = (), prefer: bool = False
+) -> Iterator[Plant]:
+    """Start Kafka and Mosquitto; what is started on them ends with them. `cells`: processors that compare machines."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "kafka").mkdir()
+    with ExitStack() as stack:
+        kafka = stack.enter_context(KafkaServer(folder / "kafka"))
+        broker = PrivateBroker(folder / "broker", free_port())
+        broker.start()
+        stack.callback(broker.stop)
+        settings = KafkaSettings(
+            bootstrap=kafka.bootstrap, partitions=partitions, replication_factor=1, snapshot_s=snapshot_s, session_s=10.0
+        )
+        ensure(settings, Topics(GROUP), cells)
+        running = Plant(kafka, broker, folder, settings, is_preferred=prefer)
+        for pid in (kafka.pid, broker.child.pid):
+            running._prefer(pid)
+        try:
+            yield running
+        finally:
+            running.silence()
+            for child in reversed(running.children.values()):
+                child.stop()

@@ -27,6 +27,9 @@ def bridge(
         Path | None, typer.Option(help="Keeps birth/death numbers; else $CNCTWIN_STATE_DIR or ~/.local/state/cnctwin")
     ] = None,
     machines: Machines = None,
+    keep_session: Annotated[
+        float, typer.Option(help="Hours for which the broker keeps what it cannot deliver; 0 = none (docs/kafka.md)", min=0.0)
+    ] = 0.0,
 ) -> None:
     """Hand what machines say to Kafka, and publish what processors on Kafka say (docs/kafka.md)."""
     from cnctwin.commands.extras import needed_by
@@ -55,4 +58,5 @@ def bridge(
             state_dir=folder_for_state(state_dir),
             limits=limits,
             machines=machines_folder(machines, config),
+            keep_s=round(keep_session * 3600),
         )

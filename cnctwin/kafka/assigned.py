@@ -2,11 +2,12 @@
 
 import logging
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from confluent_kafka import KafkaException, Message, TopicPartition
 from confluent_kafka.admin import AdminClient
 
+from cnctwin.kafka.counted import Counted
 from cnctwin.kafka.kept import ANSWER_S, read_kept
 from cnctwin.kafka.settings import KafkaSettings
 from cnctwin.kafka.topics import Topics
@@ -24,11 +25,19 @@ _log = logging.getLogger(__name__)
 class Assigned:
     """See the module."""
 
-    def __init__(self, settings: KafkaSettings, topics: Topics, pairs: Sequence[Configured]) -> None:
+    def __init__(
+        self,
+        settings: KafkaSettings,
+        topics: Topics,
+        pairs: Sequence[Configured],
+        begin: Callable[[Place, int], int] = lambda _, offset: offset,
+    ) -> None:
+        """`begin`: takes a partition and the offset from which its folds go on; returns that from which it is read."""
         self.partitions: dict[Place, Partition] = {}
         self.restored_s = 0.0  # that the last restoration took
         self.lost = 0  # records that the log held no more when their turn came
-        self._settings, self._topics = settings, topics
+        self.counted = Counted()
+        self._settings, self._topics, self._begin = settings, topics, begin
         self._reader = topics.runners([processor.name for processor, _ in pairs])
         self._pairs = by_topic(topics, pairs)
         self._records = RecordReader()
@@ -49,7 +58,9 @@ class Assigned:
         positions = []
         for place, (topic, number) in enumerate(places):
             partition = Partition(self._reader, self._pairs[topic], topic)
-            offset = partition.restore(kept[number])
+            offset = self._begin((topic, number), partition.restore(kept[number]))
+            partition.next = offset
+            self._retire((topic, number))
             self.partitions[topic, number] = partition
             # Cuts of several partitions are spread over the time between two.
             self._cut_s[topic, number] = began_s + self._settings.snapshot_s * place / max(len(places), 1)
@@ -61,8 +72,12 @@ class Assigned:
     def drop(self, places: Sequence[Place]) -> None:
         """Forget partitions that have gone."""
         for place in places:
-            self.partitions.pop(place, None)
+            self._retire(place)
             self._cut_s.pop(place, None)
+
+    def _retire(self, place: Place) -> None:
+        if (partition := self.partitions.pop(place, None)) is not None:
+            self.counted.retire(partition)
 
     def of(self, message: Message) -> tuple[Partition, int] | None:
         """Return whose a message is, and its offset; None where its partition has gone, or it was taken already."""

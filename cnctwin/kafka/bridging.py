@@ -2,7 +2,7 @@
 
 import fnmatch
 import logging
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from threading import Event
@@ -42,12 +42,15 @@ def bridge(
     state_dir: Path,
     limits: Limits = DEFAULTS,
     machines: Path | None = None,
+    keep_s: int = 0,
 ) -> None:
     """Run a bridge until `stop` is set. `pairs`: the processors that run on the log; `nodes`: patterns of the edge nodes that
-    this bridge reads; `results`: the processors whose results it publishes. Raises ConfigurationError, AnotherRunsError.
+    this bridge reads; `results`: the processors whose results it publishes; `keep_s`: for how long the broker keeps what it could
+    not deliver to this bridge. Raises ConfigurationError, AnotherRunsError.
     """
     topics = Topics(group)
     own = [NodeId(group, processor.node) for processor, _ in pairs if processor.name in results]
+    on_log = frozenset(processor.node for processor, _ in pairs)
     with ExitStack() as stack:
         lock = NodeId(group, f"bridge-{name}")
         for node in (lock, *own):
@@ -59,11 +62,13 @@ def bridge(
             broker,
             f"bridge-{name}",
             uncommanded_filters(group),
-            wanted=lambda node: _is_read(node, nodes, own),
+            publish_state=False,  # no edge waits for it: who wants a host to be there names the historian
+            wanted=lambda node: _is_read(node, nodes, own, on_log),
             loop=loop,
             limits=limits,
             reserved=RESERVED_MACHINES,
             trusted=lambda node: is_twin_node(node.node),
+            keep_s=keep_s,
         )
         edges = {
             processor.name: EdgeNode(
@@ -76,13 +81,14 @@ def bridge(
             for processor, _ in pairs
             if processor.name in results
         }
-        Bridge(settings, topics, name, pairs, host=host, nodes=edges, machines=machines).run(stop)
+        Bridge(settings, topics, name, pairs, host=host, nodes=edges, machines=machines, keeps_session=keep_s > 0).run(stop)
 
 
-def _is_read(node: NodeId, patterns: Sequence[str], own: Sequence[NodeId]) -> bool:
-    """Return True for a node of this bridge's share: a processor's node is read by the bridge that publishes it."""
+def _is_read(node: NodeId, patterns: Sequence[str], own: Sequence[NodeId], on_log: Collection[str]) -> bool:
+    """Return True for a node of this bridge's share: a processor's node is read by the bridge that publishes it, and one of a
+    processor that does not run on the log by whoever publishes any."""
     if is_twin_node(node.node):
-        return node in own
+        return node in own or (bool(own) and node.node not in on_log)
     return any(fnmatch.fnmatchcase(node.node, pattern) for pattern in patterns)
 
 

@@ -9,9 +9,9 @@ cut and the last commit is folded again in silence after a restart (processors/p
 to nothing throws away what was folded, and the partitions are restored: there is one way back, whatever failed.
 """
 
+import gc
 import logging
 import time
-from collections import deque
 from collections.abc import Sequence
 from threading import Event
 
@@ -23,10 +23,12 @@ from cnctwin.kafka.settings import KafkaSettings
 from cnctwin.kafka.sink import Sink
 from cnctwin.kafka.topics import Topics
 from cnctwin.kafka.transaction import AbortedError, FencedError, Transactions, written_by
+from cnctwin.kafka.waiting import Waiting
 from processors.actions import DeadLetter, Pin
 from processors.errors import SnapshotError
 from processors.partition.partition import Partition
 from processors.partition.results import Results
+from processors.running.runner import SELDOM
 from processors.running.runtime import Configured
 from sparkplug.records.record import Origin, RecordError, RecordWriter
 
@@ -35,6 +37,7 @@ POLL_S = 0.05
 FOLD_S = 0.5  # of one transaction; what waits then goes into the next one
 IDLE_S = 1.0  # after which positions are saved although nothing came of the records
 PAUSE_S = 1.0
+FETCH_BYTES = 65_536  # for which the cluster waits 50 ms: to answer each few records costs it more than the records
 _log = logging.getLogger(__name__)
 
 
@@ -49,10 +52,10 @@ class Runner:
         self.group = topics.runners(names)
         self._settings, self._topics, self._member, self._sink = settings, topics, member, sink
         self._name = f"{self.group}.{member}"
-        self._assigned = Assigned(settings, topics, pairs)
+        self._assigned = Assigned(settings, topics, pairs, *(() if sink is None else (sink.begin,)))
         self._results = {processor.name: Results(topics.group, processor) for processor, _ in pairs}
         self._writer = RecordWriter(self._name)
-        self._waiting: deque[Message] = deque()
+        self._waiting = Waiting()
         self._touched: dict[Place, Partition] = {}
         self._folded_s = 0.0
         self._stop = Event()
@@ -66,10 +69,13 @@ class Runner:
         self._consumer.subscribe(
             self._assigned.topics, on_assign=self._on_assign, on_revoke=self._on_revoke, on_lost=self._on_lost
         )
+        thresholds = gc.get_threshold()
+        gc.set_threshold(*SELDOM)
         try:
             while not stop.is_set():
                 self.turn()
         finally:
+            gc.set_threshold(*thresholds)
             self._consumer.close()  # partitions are revoked, and so saved
             self._health.close()
 
@@ -85,6 +91,7 @@ class Runner:
             "auto.offset.reset": "earliest",
             "partition.assignment.strategy": "cooperative-sticky",
             "fetch.wait.max.ms": 50,
+            "fetch.min.bytes": FETCH_BYTES,
             "queued.max.messages.kbytes": 32_768,
         }
 
@@ -95,12 +102,12 @@ class Runner:
         try:
             for message in self._consumer.consume(MESSAGES_A_TURN, 0.0 if self._waiting else POLL_S):
                 if (error := message.error()) is None:
-                    self._waiting.append(message)
+                    self._waiting.add(message)
                 else:
                     self._complain(error)
-            began_s = time.monotonic()
-            while self._waiting and time.monotonic() - began_s < FOLD_S:
-                self._take(self._waiting.popleft())
+            for message in self._waiting.due(FOLD_S):
+                self._take(message)
+            self._waiting.pace(self._consumer)
             self._commit_if_due(time.monotonic())
             self._health.report(time.monotonic(), self._assigned, self._transactions, self._consumer)
         except AbortedError as error:
@@ -120,7 +127,7 @@ class Runner:
             partition.next = offset + 1
             self._post(message, f"{place[0]}-{place[1]}@{offset}: {error}")
             return
-        self._health.took(record)
+        self._health.took(place, record)
         if self._sink is not None:
             self._sink.keep(place, offset, record)
         for result in partition.take(offset, record):
@@ -173,7 +180,7 @@ class Runner:
             positions.append(TopicPartition(topic, number, partition.next))
             for fault in partition.faults():
                 _log.warning("%s", fault)
-                self._health.fault = fault
+                self._health.failed(fault)
         self._transactions.commit(positions, self._consumer)
         self._touched.clear()
         self._folded_s = now_s
@@ -237,4 +244,4 @@ class Runner:
         gone = set(places)
         for place in gone & self._touched.keys():
             del self._touched[place]
-        self._waiting = deque(one for one in self._waiting if (one.topic(), one.partition()) not in gone)
+        self._waiting.forget(places)

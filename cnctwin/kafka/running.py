@@ -1,15 +1,24 @@
 """A runner from its options: the consumer group's member, and beside alerts the courier that sends."""
 
-from collections.abc import Sequence
+import logging
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from threading import Event
 
 from cnctwin.kafka.bridging import cell_processors
 from cnctwin.kafka.runner import Runner
 from cnctwin.kafka.settings import KafkaSettings
+from cnctwin.kafka.sink import Sink
 from cnctwin.kafka.topics import Topics, ensure
+from cnctwin.kafka.transaction import FencedError
 from cnctwin.running.processors import courier_of
+from processors.historian import HistorianConfig
 from processors.running.runtime import Configured
 from sparkplug.broker import BrokerAddress
+
+SETTLED_S = 60.0  # a runner that was in for so long has its name by right
+_log = logging.getLogger(__name__)
 
 
 def run_over_kafka(
@@ -27,5 +36,31 @@ def run_over_kafka(
     """
     topics = Topics(group)
     ensure(settings, topics, cell_processors(pairs))
-    with courier_of(pairs, broker, group):
-        Runner(settings, topics, pairs, member).run(stop)
+    with courier_of(pairs, broker, group), _sink(pairs) as sink:
+        while not stop.is_set():
+            began_s = time.monotonic()
+            try:
+                Runner(settings, topics, pairs, member, sink).run(stop)
+            except FencedError as error:
+                # A cluster that hung has two requests to join of one runner, and fences the one that waits for the first. So it
+                # comes in once more; where another process has the name, the one that came last ends.
+                if time.monotonic() - began_s < SETTLED_S:
+                    raise
+                _log.warning("%s; unless the cluster was away: this one comes in once more", error)
+
+
+@contextmanager
+def _sink(pairs: Sequence[Configured]) -> Iterator[Sink | None]:
+    """The historian's store, where it is among the processors; else nothing, and no store is loaded."""
+    config = next((one.default for processor, one in pairs if processor.records), None)
+    if config is None:
+        yield None
+        return
+    from cnctwin.kafka.store_sink import sink_of  # noqa: PLC0415  only what runs is loaded
+
+    assert isinstance(config, HistorianConfig)
+    sink = sink_of(config)
+    try:
+        yield sink
+    finally:
+        sink.close()

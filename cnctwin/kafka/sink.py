@@ -9,6 +9,9 @@ from sparkplug.records.record import Record
 class Sink(Protocol):
     """A store that keeps records with their offsets in one transaction of its own."""
 
+    def begin(self, place: tuple[str, int], offset: int) -> int:
+        """Return from where a partition is to be read, so that the store misses nothing; its folds go on at `offset`."""
+
     def keep(self, place: tuple[str, int], offset: int, record: Record) -> None:
         """Have a record kept with the next `write`; one that is kept already changes nothing."""
 

@@ -8,6 +8,7 @@ from typing import Any
 from cnctwin.plant.described import DescribedMachine, described_machines, sentences
 from cnctwin.plant.descriptions import LiveDescriptions
 from cnctwin.plant.lags import lag_reports
+from cnctwin.plant.on_log import FirstLook, of_log
 from cnctwin.plant.quarantine import refused_lines
 from cnctwin.plant.view import StageLedger, health, ledgers, machines, own_values
 from cnctwin.plant.watch import viewer
@@ -57,7 +58,7 @@ class Report:
 
 def examine(broker: BrokerAddress, group: str, seconds: float) -> Report:
     """Listen to a broker for a while and report; asks nodes for their births where it has to."""
-    host, descriptions = viewer(broker, group), LiveDescriptions()
+    host, descriptions, first = viewer(broker, group), LiveDescriptions(), FirstLook()
     for topic in descriptions.filters:
         host.subscribe_plain(topic)
     host.start()
@@ -67,13 +68,14 @@ def examine(broker: BrokerAddress, group: str, seconds: float) -> Report:
             for event in host.poll(0.1):
                 if event.kind is EventKind.PLAIN:
                     descriptions.take(event.topic, event.payload)
-        return diagnose(host, broker.url, descriptions)
+            first.take(host)
+        return diagnose(host, broker.url, descriptions, first)
     finally:
         host.stop()
 
 
-def diagnose(host: HostApplication, url: str, descriptions: LiveDescriptions) -> Report:
-    """Return what a host application that has listened for a while can say."""
+def diagnose(host: HostApplication, url: str, descriptions: LiveDescriptions, first: FirstLook) -> Report:
+    """Return what a host application that has listened for a while can say; `first`: how nodes were when it began."""
     if not host.online:
         return Report((Finding(False, host.last_error or f"no connection to {url}"),), ())
     findings = [Finding(True, f"{url} answers")]
@@ -113,6 +115,7 @@ def diagnose(host: HostApplication, url: str, descriptions: LiveDescriptions) ->
     findings += of_history(health(host).values())
     findings += [Finding(False, line) for line in refused_lines(host.quarantine, own_values(host))]
     findings += of_overload(health(host).values())
+    findings += [Finding(said.good, said.text) for said in of_log(host, first)]
     findings += of_lags(lag_reports(own_values(host)))
     counts = host.counts
     findings += of_sloppy_peers(counts)
@@ -133,8 +136,7 @@ def of_lags(reports: Sequence[LagReport]) -> list[Finding]:
         if report.lag_s >= BEHIND_S
         else Finding(
             True,
-            f"processors are in time: {report.lag_s:.1f} s behind, {report.machines} machines, one core, "
-            f"{report.busy_pct:.0f} % busy ({', '.join(report.processors)})",
+            f"processors are in time: {report.lag_s:.1f} s behind, {report.load} ({', '.join(report.processors)})",
         )
         for report in reports
     ]

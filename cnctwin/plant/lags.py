@@ -20,12 +20,17 @@ def behind(reports: Iterable[LagReport]) -> str | None:
 
 
 def _report(node: str, values: Mapping[str, Value]) -> LagReport | None:
-    """Return what a processor's node reports; None for a node that is no processor, or has not reported yet."""
+    """Return what a processor's node reports; None for a node that is no processor, has not reported yet, or has no runner."""
+    if values.get(f"{_PREFIX}runners") == 0:
+        return None
     lags_s = [_amount(values.get(f"{_PREFIX}{name}")) for name in ("lag_s", "published_lag_s")]
     known_s = [lag_s for lag_s in lags_s if lag_s is not None]
     if not known_s:
         return None
     process = values.get(f"{_PREFIX}process")
+    runners, partitions, waiting = (
+        round(_amount(values.get(f"{_PREFIX}{name}")) or 0.0) for name in ("runners", "partitions", "lag_records")
+    )
     return LagReport(
         processors=(node.removeprefix(TWIN_NODE_PREFIX),),
         process=process if isinstance(process, str) and process else node,
@@ -33,6 +38,9 @@ def _report(node: str, values: Mapping[str, Value]) -> LagReport | None:
         lag_s=max(known_s),
         machines=round(_amount(values.get(f"{_PREFIX}machines")) or 0.0),
         busy_pct=_amount(values.get(f"{_PREFIX}busy_pct")) or 0.0,
+        runners=runners,
+        partitions=partitions,
+        waiting=waiting,
     )
 
 

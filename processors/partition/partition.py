@@ -20,14 +20,17 @@ from processors.config import Configuration, ProcessorConfig
 from processors.discovery import AnyProcessor
 from processors.errors import SnapshotError
 from processors.partition.seat import FORMAT, Seat
+from processors.running.engine import Way
+from processors.running.picks import stream_of
 from sparkplug.host_event import EventKind, HostEvent
+from sparkplug.metric import NodeId
 from sparkplug.records.lives import Lives
 from sparkplug.records.record import Record
 from twin.vocabulary import topics
 
 MARKER, LIVES, DESCRIPTION = "~marker/", "~lives/", "~description/"
 LIVES_MAX = 5000  # devices whose messages are told apart
-_PLAIN, _HOLE = EventKind.PLAIN, EventKind.HOLE
+_DATA, _PLAIN, _HOLE = EventKind.DATA, EventKind.PLAIN, EventKind.HOLE
 _to_json = json.JSONEncoder(separators=(",", ":"), ensure_ascii=False).encode
 
 
@@ -54,10 +57,12 @@ class Partition:
         self.refused: list[str] = []  # snapshots that were not restored, and why
         self._topic = f"{topic}/" if topic else ""
         self._reader = f"{self._topic}{reader}"
+        self._begin = 0  # records before it are in all states
         self._lives: dict[str, Lives] = {}
         self._descriptions: dict[str, bytes] = {}
         self._new_descriptions: dict[str, bytes | None] = {}
         self._readers: dict[str, tuple[Seat, ...]] = {}
+        self._ways: dict[str, dict[NodeId, list[tuple[Seat, Way | None]]]] = {}  # by device and node
 
     # Start.
 
@@ -69,7 +74,7 @@ class Partition:
         for seat in self.seats:
             self._describe_all(seat)
             self._restore(seat, kept, markers)
-        self.next = min(seat.from_offset for seat in self.seats)
+        self.next = self._begin = min(seat.from_offset for seat in self.seats)
         lives = [_json(value) for key, value in kept.items() if key.startswith(LIVES + self._topic)]
         known: Mapping[str, dict[str, list[int]]] = next((one["devices"] for one in lives if one["folded"] == self.next), {})
         self._lives = {device: Lives(of_device) for device, of_device in known.items()}
@@ -99,26 +104,68 @@ class Partition:
 
     # Records.
 
-    def take(self, offset: int, record: Record) -> Iterator[Result]:
-        """Fold a record; yield what came of it that did not go out before."""
+    def take(self, offset: int, record: Record) -> Sequence[Result]:
+        """Fold a record; return what came of it that did not go out before."""
         self.next = offset + 1
-        event, wall_s = record.event, record.received_ms / 1000
+        if offset < self._begin:
+            return ()
+        event = record.event
         if event is None:
-            for seat in self.seats:
-                if offset >= seat.from_offset:
-                    yield from self._told(seat, seat.watermark(wall_s), offset, record)
-        elif event.kind is _PLAIN:
-            yield from self._plain(event, offset, record)
-        elif self._is_new(event, record):
-            for seat in self._readers_of(event.node.node):
-                if offset >= seat.from_offset:
-                    yield from self._told(seat, seat.event(event, wall_s), offset, record)
-        else:
+            return self._watermark(offset, record)
+        if event.kind is _PLAIN:
+            return list(self._plain(event, offset, record))
+        if not self._is_new(event, record):
             self.repeated += 1
+            return ()
+        if event.names:
+            return self._stream(event, offset, record)
+        if event.kind is not _DATA:
+            self._ways.pop(event.device or "", None)
+        told: list[Result] = []
+        for seat in self._readers_of(event.node.node):
+            if offset >= seat.from_offset:
+                told += self._told(seat, seat.event(event, record.received_ms / 1000), offset, record)
+        return told
 
-    def _told(self, seat: Seat, actions: list[Action], offset: int, record: Record) -> Iterator[Result]:
-        if actions and offset >= seat.published:
-            yield Result(seat, actions, record.received_ms)
+    def _stream(self, event: HostEvent, offset: int, record: Record) -> Sequence[Result]:
+        """Data whose names are given take the engines' shortest ways, from one birth or death of the machine to the next."""
+        source, device = event.node, event.device or ""
+        of_device = self._ways.get(device)
+        if of_device is None:
+            if len(self._ways) >= LIVES_MAX:
+                self._ways.clear()
+            of_device = self._ways[device] = {}
+        ways = of_device.get(source)
+        if ways is None:
+            ways = of_device[source] = [(seat, None) for seat in self._readers_of(source.node)]
+        received_ms = record.received_ms
+        message, wall_s = stream_of(event), received_ms / 1000
+        told: list[Result] = []
+        for place, (seat, way) in enumerate(ways):
+            if offset < seat.from_offset:
+                continue
+            if way is None:  # the first message shows the way
+                actions = seat.event(event, wall_s)
+                ways[place] = seat, seat.engine.way_of(source, device)
+            else:
+                try:
+                    actions = way(message, wall_s)
+                except Exception as error:
+                    actions = seat.failed(event, error)
+            if actions and offset >= seat.published:
+                told.append(Result(seat, actions, received_ms))
+        return told
+
+    def _watermark(self, offset: int, record: Record) -> Sequence[Result]:
+        told: list[Result] = []
+        for seat in self.seats:
+            if offset >= seat.from_offset:
+                told += self._told(seat, seat.watermark(record.received_ms / 1000), offset, record)
+        return told
+
+    @staticmethod
+    def _told(seat: Seat, actions: list[Action], offset: int, record: Record) -> Sequence[Result]:
+        return (Result(seat, actions, record.received_ms),) if actions and offset >= seat.published else ()
 
     def _is_new(self, event: HostEvent, record: Record) -> bool:
         lives = self._lives.get(device := event.device or "")
@@ -139,6 +186,7 @@ class Partition:
             if self._descriptions.get(event.topic) == event.payload:
                 return  # retained, and told again
             self._described(event.topic, event.payload)
+            self._ways.clear()
             for seat in self.seats:
                 yield from self._told(seat, seat.describe(event.topic, event.payload), offset, record)
             return

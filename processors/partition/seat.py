@@ -95,10 +95,14 @@ class Seat:
         """Fold an event of a node that the processor reads."""
         try:
             return self.engine.feed(event, wall_s)
-        except Exception as error:  # it is deterministic: a replay comes to the same
-            self.engine.lost(event, DropReason.FAULT)
-            self._note(f"a message of {event.device}", error)
-            return [DeadLetter(event.device or str(event.node), letter_of_message(self.name, event, error))]
+        except Exception as error:
+            return self.failed(event, error)
+
+    def failed(self, event: HostEvent, error: Exception) -> list[Action]:
+        """Note a fault at an event, which becomes a dead letter. It is deterministic: a replay comes to the same."""
+        self.engine.lost(event, DropReason.FAULT)
+        self._note(f"a message of {event.device}", error)
+        return [DeadLetter(event.device or str(event.node), letter_of_message(self.name, event, error))]
 
     def watermark(self, wall_s: float) -> list[Action]:
         """Fold the silence up to a moment, and the beat of the wall clock."""

@@ -48,20 +48,32 @@ STORE = (
 
 ON_LOG = (
     MetricSpec("health/runners", DataType.INT64, properties={"meaning": "runners that report"}),
+    MetricSpec("health/runners_silent", DataType.INT64, properties={"meaning": "runners that ended without a word, for a day"}),
+    MetricSpec("health/records", DataType.INT64, properties={"meaning": "records that the runners have taken from the log"}),
     MetricSpec("health/partitions", DataType.INT64, properties={"meaning": "partitions that they fold"}),
     MetricSpec("health/lag_records", DataType.INT64, properties={"meaning": "records that wait in the log"}),
-    MetricSpec("health/transactions", DataType.INT64, properties={"meaning": "committed since the runners were started"}),
-    MetricSpec("health/transactions_aborted", DataType.INT64, properties={"meaning": "that came to nothing, and were repeated"}),
+    MetricSpec("health/transactions", DataType.INT64, properties={"meaning": "transactions that were committed"}),
+    MetricSpec(
+        "health/transactions_aborted",
+        DataType.INT64,
+        properties={"meaning": "transactions that came to nothing, and were repeated"},
+    ),
     MetricSpec("health/rebalances", DataType.INT64, properties={"meaning": "times that partitions came or went"}),
     MetricSpec("health/restored_s", DataType.DOUBLE, unit="s", properties={"meaning": "the longest of the last restorations"}),
     MetricSpec("health/lost_by_retention", DataType.INT64, properties={"meaning": "records that were gone before their turn"}),
     MetricSpec("health/repeated", DataType.INT64, properties={"meaning": "records that were there already, and dropped"}),
-    MetricSpec("health/bridge_events", DataType.INT64, properties={"meaning": "events that the bridge has taken in"}),
+    MetricSpec("health/bridges", DataType.INT64, properties={"meaning": "bridges that report"}),
+    MetricSpec("health/bridges_silent", DataType.INT64, properties={"meaning": "bridges that ended without a word, for a day"}),
+    MetricSpec("health/silent", DataType.STRING, properties={"meaning": "the silent bridges and runners; empty: none"}),
+    MetricSpec("health/bridge_events", DataType.INT64, properties={"meaning": "events that the bridges have taken in"}),
     MetricSpec("health/bridge_delivered", DataType.INT64, properties={"meaning": "records that the cluster has acknowledged"}),
     MetricSpec("health/bridge_waiting", DataType.INT64, properties={"meaning": "records that it has not"}),
     MetricSpec("health/bridge_dropped", DataType.INT64, properties={"meaning": "records that found no room"}),
     MetricSpec(
-        "health/bridge_busy_pct", DataType.DOUBLE, unit="%", properties={"meaning": "CPU time of the bridge; 100 is a core"}
+        "health/bridge_busy_pct",
+        DataType.DOUBLE,
+        unit="%",
+        properties={"meaning": "CPU time of the busiest bridge; 100 is a core"},
     ),
 )
 

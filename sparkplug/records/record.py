@@ -31,6 +31,7 @@ from sparkplug.records.named import NamedPayloads, written
 
 VERSION = b"1"
 WATERMARK = b"watermark"
+NUMBER_MAX = 2**64 - 1  # as in a payload
 SOURCES_MAX = 20_000  # whose layouts are remembered
 NO_NODE = NodeId("", "")
 Headers = list[tuple[str, str | bytes | None]]
@@ -107,12 +108,16 @@ class RecordReader:
             raise RecordError(f"record of version {told.get('version', b'')!r:.40}; this program reads {VERSION.decode()}")
         try:
             received_ms, *origin = map(int, told["at"].split())
+            if not 0 <= received_ms <= NUMBER_MAX or not all(-1 <= number <= NUMBER_MAX for number in origin):
+                raise RecordError(f"no such time or number: {told['at']!r:.60}")
             writer, kind = told["writer"].decode(), told["kind"]
             if kind == WATERMARK:
                 return Record(None, received_ms, writer)
             event = self._event(_KINDS[kind], told, value or b"", received_ms)
             return Record(event, received_ms, writer, Origin(*origin), told.get("retain") == b"1")
-        except (KeyError, ValueError, TypeError, PayloadError) as error:
+        except RecordError:
+            raise
+        except (KeyError, ValueError, TypeError, AttributeError, PayloadError) as error:  # a header may be without value
             raise RecordError(f"{type(error).__name__}: {error}") from error
 
     def _event(self, kind: EventKind, told: dict[str, Any], value: bytes, received_ms: int) -> HostEvent:

@@ -19,7 +19,7 @@ from paho.mqtt.enums import MQTTProtocolVersion
 from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.reasoncodes import ReasonCode
 
-from sparkplug.actions import Action, Barrier, Connect, Disconnect, Publish, Subscribe
+from sparkplug.actions import Acknowledge, Action, Barrier, Connect, Disconnect, Publish, Subscribe
 from sparkplug.broker import BrokerAddress
 from sparkplug.errors import BrokerAddressError
 from sparkplug.transport.data_path import DataPath
@@ -70,6 +70,7 @@ class MqttConnection:
                     raise BrokerAddressError(f"broker {broker.url}: there is no file {path}")
         self.last_error = ""
         self.connects = 0
+        self.session_present = False  # the broker has kept the session, and what it could not deliver
         self.unsent = 0  # messages that were given to us for a connection that ended before it took them
         self.sendable = Sendable(client_id)
         self.loop = loop or Loop(f"mqtt {client_id}")
@@ -292,6 +293,8 @@ class MqttConnection:
                 if not path.barrier(action.topic, action.token):
                     outbox.appendleft(action)
                     return False
+            elif isinstance(action, Acknowledge):
+                path.acknowledge(action.packet_ids)
             elif isinstance(action, Subscribe):
                 client.subscribe(action.topic_filter, action.qos)
             else:
@@ -362,11 +365,12 @@ class MqttConnection:
 
     # What paho calls.
 
-    def _on_connect(self, _client: Any, _userdata: Any, _flags: Any, reason: Any, properties: Any) -> None:
+    def _on_connect(self, _client: Any, _userdata: Any, flags: Any, reason: Any, properties: Any) -> None:
         if reason.is_failure:
             self._note(f"{self._itinerary.broker.url} refused the connection: {reason}")
             return
         self.connects += 1
+        self.session_present = flags.session_present
         self.last_error = ""
         self._accepted = True
         self._rival.began(time.monotonic())

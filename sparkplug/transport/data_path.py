@@ -4,7 +4,7 @@ Packet ids of ours are the upper half. paho numbers its own, which are those of 
 """
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from sparkplug.actions import Action, Publish
 from sparkplug.transport.listener import Listener
@@ -96,8 +96,13 @@ class DataPath(PahoPath):
         self._unacknowledged[packet_id] = token
         return True
 
+    def acknowledge(self, packet_ids: Sequence[int]) -> None:
+        """Acknowledge messages that the listener has held."""
+        self._stream.add_all([puback(packet_id) for packet_id in packet_ids])
+
     def _acknowledge(self, packet_id: int) -> None:
-        self._stream.add(puback(packet_id))
+        if not self._listener.holds(packet_id):
+            self._stream.add(puback(packet_id))
 
     def _acknowledged(self, packet_id: int, code: int) -> bool:
         if packet_id not in self._unacknowledged:

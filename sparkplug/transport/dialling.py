@@ -31,8 +31,8 @@ def dialled(broker: BrokerAddress, client_id: str, version: MQTTProtocolVersion,
     try:
         if version == MQTTProtocolVersion.MQTTv5:
             properties: Any = Properties(PacketTypes.CONNECT)  # type: ignore[no-untyped-call]
-            properties.SessionExpiryInterval = 0
-            client.connect(broker.host, broker.port, KEEPALIVE_S, clean_start=True, properties=properties)
+            properties.SessionExpiryInterval = connect.keep_s
+            client.connect(broker.host, broker.port, KEEPALIVE_S, clean_start=not connect.keep_s, properties=properties)
         else:
             client.connect(broker.host, broker.port, KEEPALIVE_S)
     except OSError as error:
@@ -43,7 +43,8 @@ def dialled(broker: BrokerAddress, client_id: str, version: MQTTProtocolVersion,
 
 def _new_client(broker: BrokerAddress, client_id: str, version: MQTTProtocolVersion, connect: Connect) -> StreamClient:
     # paho would answer a refused version by another connection of its own, in the thread that reads.
-    options: Any = {"clean_session": None if version == MQTTProtocolVersion.MQTTv5 else True, "reconnect_on_failure": False}
+    is_clean = None if version == MQTTProtocolVersion.MQTTv5 else not connect.keep_s
+    options: Any = {"clean_session": is_clean, "reconnect_on_failure": False}
     client = StreamClient(CallbackAPIVersion.VERSION2, client_id, protocol=version, **options)
     client.connect_timeout = CONNECT_TIMEOUT_S
     # paho would hold back what exceeds 20 unacknowledged messages, and lose it, a death among them, at DISCONNECT.

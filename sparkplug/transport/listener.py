@@ -18,3 +18,4 @@ class Listener:
     tick: Callable[[], None]
     confirmed: Callable[[int], None] = lambda _: None  # the broker has taken all that was sent before this barrier
     wanted: Callable[[str], bool] = lambda _: True  # whether messages of a topic are; the answer may be kept
+    holds: Callable[[int], bool] = lambda _: False  # whether the message of QoS 1 that was just given is acknowledged later

@@ -1,7 +1,7 @@
 """The way of messages through paho: all that comes is paho's to read, and all that goes out is paho's to write."""
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import paho.mqtt.client as paho
@@ -61,6 +61,9 @@ class PahoPath:
         if told.rc == MQTTErrorCode.MQTT_ERR_SUCCESS:  # else an older barrier, 65,535 packets ago, still has that id
             self._barriers[told.mid] = token
         return True
+
+    def acknowledge(self, _packet_ids: Sequence[int]) -> None:
+        """Do nothing: paho has acknowledged them as they came."""
 
     def _let_paho_read(self, data: bytes) -> bool:
         """Give paho bytes to read; False when it has ended the connection."""

@@ -64,7 +64,9 @@ def test_a_cited_command_is_there_with_its_options(path: Path) -> None:
     text = path.read_text(encoding="utf-8")
     assert [place for place in PLACE.findall(text) if not (ROOT / place).exists()] == []
     for one in SCRIPT.finditer(text):
-        assert list(untaken(f"{(one[1] or one[2]).replace('.', '/')}.py", one[3])) == [], one[0]
+        place = (one[1] or one[2]).replace(".", "/")
+        script = f"{place}/__main__.py" if f"{place}/__main__.py" in SCRIPTS else f"{place}.py"
+        assert list(untaken(script, one[3])) == [], one[0]
     for one in PROGRAM.finditer(text):
         command, words = CNCTWIN, one[1].split()
         while words and (inner := getattr(command, "commands", {}).get(words[0])):

@@ -80,6 +80,9 @@ GAUGES = {
     'twin_model_missing{model="residual"}': 1, 'twin_alerts{state="firing"}': 2, f"twin_processor_lag_seconds{GAP}": 0.1,
     f"twin_processor_queue_depth{GAP}": 0, f"twin_state_checkpoint_age_seconds{GAP}": 1.5,
     f"twin_buffer_depth{EDGE}": 3, f"twin_clock_offset_seconds{OKUMA}": -0.2,
+    f"twin_kafka_runners{GAP}": 2, f"twin_kafka_runners_silent{GAP}": 0, f"twin_kafka_partitions{GAP}": 12,
+    f"twin_kafka_lag_records{GAP}": 40, f"twin_kafka_restore_seconds{GAP}": 1.5, f"twin_kafka_bridges_silent{GAP}": 0,
+    f"twin_kafka_bridge_waiting{GAP}": 7, f"twin_kafka_bridge_busy_percent{GAP}": 31, f"twin_processor_busy_percent{GAP}": 55,
     f"twin_validation_nights_over_budget{OKUMA}": 1, f"twin_validation_last_run_timestamp_seconds{OKUMA}": 1.78e9,
 }  # fmt: skip
 NIGHT = (
@@ -88,7 +91,11 @@ NIGHT = (
 )  # fmt: skip
 COUNTERS = (
     'twin_dropped_total{node="edge-okuma",reason="store_age"}', f"twin_emitted_total{EDGE}",
-    'twin_seq_gaps_total{layer="control",node="edge-okuma"}', "twin_store_samples_total",
+    'twin_seq_gaps_total{layer="control",node="edge-okuma"}', "twin_store_samples_total", f"twin_emitted_total{GAP}",
+    *(f"twin_kafka_{name}_total{GAP}" for name in (
+        "records", "transactions", "transactions_aborted", "rebalances", "lost_by_retention", "repeated",
+        "bridge_events", "bridge_delivered", "bridge_dropped",
+    )),
 )  # fmt: skip
 
 

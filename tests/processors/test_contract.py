@@ -152,7 +152,7 @@ def test_a_restart_in_the_middle_changes_nothing(processor: AnyProcessor, stream
     expected = fed(whole, *stream[:cut])
     assert _same(fed(restarted, *stream[:cut]), expected)
     adapter: TypeAdapter[Any] = TypeAdapter(processor.state)
-    for unit in restarted._units.values():
+    for unit in restarted.known_units.values():
         for fold in (unit.live, unit.history):
             if fold is not None:
                 fold.state = decode_state(adapter, json.loads(json.dumps(encode_state(adapter, fold.state))))
@@ -284,9 +284,9 @@ def test_a_challenger_that_is_promoted_goes_on_as_the_live_one(processor: AnyPro
     for event in stream[cut:]:
         fed(shadow, event)
         fed(promoted, event)
-        challenger = shadow._units["okuma"].live.challenger
+        challenger = shadow.known_units["okuma"].live.challenger
         assert challenger is not None
-        assert repr(promoted._units["okuma"].live.state) == repr(challenger.state)
+        assert repr(promoted.known_units["okuma"].live.state) == repr(challenger.state)
 
 
 @described

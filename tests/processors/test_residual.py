@@ -193,7 +193,7 @@ def test_with_a_model_a_restart_in_the_middle_changes_nothing_and_nothing_crashe
     expected = fed(whole, *stream[:cut])
     assert repr(fed(restarted, *stream[:cut])) == repr(expected)
     adapter: TypeAdapter[Any] = TypeAdapter(PROCESSOR.state)
-    for unit in restarted._units.values():
+    for unit in restarted.known_units.values():
         for fold in (unit.live, unit.history):
             if fold is not None:
                 fold.state = decode_state(adapter, json.loads(json.dumps(encode_state(adapter, fold.state))))

@@ -31,6 +31,15 @@ NODE_GAUGES = {
     ),
     "twin_buffer_rows": ("health/store_rows", "rows that no broker, or no historian, has confirmed"),
     "twin_buffer_bytes": ("health/store_bytes", "size of the edge's ring"),
+    "twin_kafka_runners": ("health/runners", "runners of a processor that report"),
+    "twin_kafka_runners_silent": ("health/runners_silent", "runners of it that ended without a word"),
+    "twin_kafka_partitions": ("health/partitions", "partitions that they fold"),
+    "twin_kafka_lag_records": ("health/lag_records", "records that wait in the log"),
+    "twin_kafka_restore_seconds": ("health/restored_s", "the longest of the last restorations of a runner"),
+    "twin_kafka_bridges": ("health/bridges", "bridges that report; each node says the same"),
+    "twin_kafka_bridges_silent": ("health/bridges_silent", "bridges that ended without a word; each node says the same"),
+    "twin_kafka_bridge_waiting": ("health/bridge_waiting", "records that the cluster has not acknowledged, of all bridges"),
+    "twin_kafka_bridge_busy_percent": ("health/bridge_busy_pct", "CPU time of the busiest bridge; 100 is a core"),
     "twin_control_online": ("health/control_online", "whether the edge has its control"),
 }
 NODE_COUNTERS = {
@@ -38,6 +47,15 @@ NODE_COUNTERS = {
     "twin_dead_letters": ("health/dead_letters", "samples that a fold could not take"),
     "twin_reconnects": ("health/reconnects", "connections made again"),
     "twin_replayed": ("health/store_history_rows", "rows sent as history"),
+    "twin_kafka_records": ("health/records", "records that runners have taken from the log"),
+    "twin_kafka_transactions": ("health/transactions", "transactions that runners have committed"),
+    "twin_kafka_transactions_aborted": ("health/transactions_aborted", "transactions that came to nothing, and were repeated"),
+    "twin_kafka_rebalances": ("health/rebalances", "times that partitions came or went"),
+    "twin_kafka_lost_by_retention": ("health/lost_by_retention", "records that were deleted before they were folded"),
+    "twin_kafka_repeated": ("health/repeated", "records that came twice, and were left out"),
+    "twin_kafka_bridge_events": ("health/bridge_events", "events that the bridges have taken in"),
+    "twin_kafka_bridge_delivered": ("health/bridge_delivered", "records that the cluster has acknowledged, of all bridges"),
+    "twin_kafka_bridge_dropped": ("health/bridge_dropped", "records that found no room, of all bridges"),
     "twin_evicted": ("health/store_evicted_rows", "rows lost to a limit of the edge's ring"),
 }
 MACHINE_GAUGES = {

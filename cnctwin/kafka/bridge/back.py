@@ -8,10 +8,10 @@ on, results go out as they come.
 import json
 import logging
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
-from confluent_kafka import Consumer, KafkaException, TopicPartition
+from confluent_kafka import Consumer, KafkaError, KafkaException, TopicPartition
 
 from cnctwin.kafka.kept import read_kept
 from cnctwin.kafka.settings import KafkaSettings
@@ -30,6 +30,14 @@ ANSWER_S = 10.0
 COMMIT_S = 1.0
 RESULTS_A_TURN = 500
 BEFORE_CUT_MS = 60_000
+READY_S_MAX = 60.0
+PAUSE_S = 0.2
+NOT_READY = (
+    KafkaError.NOT_COORDINATOR,
+    KafkaError.COORDINATOR_NOT_AVAILABLE,
+    KafkaError.COORDINATOR_LOAD_IN_PROGRESS,
+    KafkaError._WAIT_COORD,
+)
 _log = logging.getLogger(__name__)
 
 
@@ -78,8 +86,9 @@ class Back:
                 if (sender := self._senders.get(name)) is not None and machine:
                     sender.apply([action], self.counts)
         own = [TopicPartition(self._topics.results, number) for number in numbers]
-        stopped = {one.partition: one.offset for one in self._consumer.committed(own, ANSWER_S)}
-        since = self._consumer.offsets_for_times([TopicPartition(self._topics.results, n, cut_ms) for n in numbers], ANSWER_S)
+        at_cut = [TopicPartition(self._topics.results, number, cut_ms) for number in numbers]
+        stopped = {one.partition: one.offset for one in _answered(lambda: self._consumer.committed(own, ANSWER_S))}
+        since = _answered(lambda: self._consumer.offsets_for_times(at_cut, ANSWER_S))
         begin = [self._from(one.partition, one.offset, stopped[one.partition]) for one in since]
         self._consumer.assign(begin)
         self._catch_up({one.partition: one.offset for one in begin}, stopped)
@@ -149,6 +158,20 @@ class Back:
         self._committed_s = 0.0
         self.commit(time.monotonic())
         self._consumer.close()
+
+
+def _answered(ask: Callable[[], list[TopicPartition]]) -> list[TopicPartition]:
+    """Ask again while the cluster is not ready to answer, as one that has just started is not for a moment."""
+    until_s = time.monotonic() + READY_S_MAX
+    while True:
+        try:
+            return ask()
+        except KafkaException as error:
+            reason = error.args[0]
+            if not (reason.retriable() or reason.code() in NOT_READY) or time.monotonic() > until_s:
+                raise
+            _log.warning("kafka: %s", reason.str())
+            time.sleep(PAUSE_S)
 
 
 def _declared(kept: Mapping[str, bytes]) -> Iterator[tuple[str, str, Declare]]:

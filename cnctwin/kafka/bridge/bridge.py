@@ -4,6 +4,7 @@ broker ──► host session ──► records by machine and by cell ──►
 broker ◄── edge nodes twin-… ◄────────────────────────────────── results
 """
 
+import gc
 import logging
 import time
 from collections.abc import Sequence
@@ -14,15 +15,18 @@ from zlib import crc32
 from paho.mqtt.client import topic_matches_sub
 
 from cnctwin.kafka.bridge.back import Back
+from cnctwin.kafka.bridge.births import Births
 from cnctwin.kafka.bridge.keying import Keying
 from cnctwin.kafka.bridge.origins import Origins
 from cnctwin.kafka.bridge.outward import Outward
 from cnctwin.kafka.bridge.reports import Reports
+from cnctwin.kafka.kept import read_kept
 from cnctwin.kafka.settings import KafkaSettings
 from cnctwin.kafka.topics import Topics
 from processors.description import machine_and_role
 from processors.description_folder import DescriptionFolder
 from processors.running.descriptions import Descriptions
+from processors.running.runner import SELDOM
 from processors.running.runtime import Configured
 from sparkplug.edge_node import EdgeNode
 from sparkplug.host import HostApplication
@@ -32,8 +36,9 @@ from twin.vocabulary import topics as plain_topics
 from twin.vocabulary.nodes import is_twin_node
 
 POLL_S = 0.02
-GATHER_S = 0.005
+GATHER_S = 0.02
 WATERMARK_MS = 1000
+RESTORE_S_MAX = 120.0
 REFRESH_SHARE = 4  # births are asked for again so many times while a record is kept
 _log = logging.getLogger(__name__)
 _PLAIN, _REFUSED, _HOLE = EventKind.PLAIN, EventKind.REFUSED, EventKind.HOLE
@@ -55,11 +60,16 @@ class Bridge:
         host: HostApplication,
         nodes: dict[str, EdgeNode],
         machines: Path | None = None,
+        keeps_session: bool = False,
     ) -> None:
+        self._keeps_session = keeps_session
         self._settings, self._topics, self._name, self._host, self._nodes = settings, topics, name, host, nodes
         self._keying = Keying(topics, pairs)
         self._origins = Origins(host.picture)
         self._outward = Outward(settings, name)
+        self._births = Births(lambda topic, payload: self._outward.keep(topics.births, topic, payload))
+        if keeps_session:
+            host.on_life = self._births.take
         published = [(processor, one) for processor, one in pairs if processor.name in nodes]
         self._back = Back(settings, topics, name, published, host=host, nodes=nodes) if nodes else None
         self._cell_listeners = [(topics.cells(one.name), one) for one, _ in pairs if one.is_of_cells]
@@ -72,10 +82,20 @@ class Bridge:
 
     def run(self, stop: Event) -> None:
         """Work until `stop` is set."""
+        thresholds = gc.get_threshold()
+        gc.set_threshold(*SELDOM)
+        try:
+            self._run(stop)
+        finally:
+            gc.set_threshold(*thresholds)
+
+    def _run(self, stop: Event) -> None:
         for topic_filter in dict.fromkeys(self._plain_filters()):
             self._host.subscribe_plain(topic_filter)
         if self._back is not None:
             self._back.begin()
+        if self._keeps_session:
+            self._host.restore(self._births.restored(self._known_births()))
         self._host.start()
         for node in self._nodes.values():
             node.start()
@@ -88,9 +108,15 @@ class Bridge:
             self._host.stop()
             if self._back is not None:
                 self._back.close()
+            self._reports.leave(self._outward)
             if waiting := self._outward.close():
                 _log.warning("%d records were not acknowledged", waiting)
             self._reports.close()
+
+    def _known_births(self) -> dict[str, bytes]:
+        numbers = list(range(self._settings.partitions))
+        kept = read_kept(self._settings.client(), self._topics.births, numbers, timeout_s=RESTORE_S_MAX)
+        return {topic: payload for of_partition in kept.values() for topic, payload in of_partition.items()}
 
     def _plain_filters(self) -> Sequence[str]:
         listened = [wanted for _, processor in self._cell_listeners for wanted in processor.listens]
@@ -102,9 +128,12 @@ class Bridge:
         now_ms = self._now_ms()
         for event in events:
             self._take(event, now_ms)
+        self._births.catch_up()
+        self._outward.owe(self._host.take_held())
         if self._back is not None:
             self._back.turn()
         self._outward.poll()
+        self._host.acknowledge(self._outward.take_safe())
         now_s = time.monotonic()
         if not self._host.queue_depth:
             self._mark(now_ms)
@@ -176,7 +205,7 @@ class Bridge:
         if self._descriptions is not None:
             self._descriptions.look()
         self._refresh(now_s)
-        self._reports.report(now_s, self._host, self._outward, self._back, self.events)
+        self._reports.report(now_s, self._host, self._outward, self.events)
 
     def _refresh(self, now_s: float) -> None:
         """Ask each node for its births before the log forgets the last ones."""

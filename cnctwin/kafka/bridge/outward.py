@@ -6,12 +6,13 @@ machine.
 """
 
 import logging
-from collections import Counter
-from collections.abc import Callable
+from collections import Counter, deque
+from collections.abc import Sequence
 
 from confluent_kafka import KafkaError, Message, Producer
 
 from cnctwin.kafka.settings import KafkaSettings
+from sparkplug.host import Held
 from sparkplug.host_event import EventKind, HostEvent
 from sparkplug.metric import NodeId
 from sparkplug.records.record import Headers, Origin, RecordWriter
@@ -24,16 +25,33 @@ Source = tuple[str, str, NodeId, str]
 """Topic, key, node and device of a record."""
 
 
-class Outward:
-    """See the module. `on_kept` is called with the token of each record that the cluster has acknowledged."""
+class Lot:
+    """The records of one turn, and what is owed to the broker once the cluster has acknowledged all of them."""
 
-    def __init__(self, settings: KafkaSettings, name: str, on_kept: Callable[[object], None] | None = None) -> None:
+    __slots__ = ("held", "outward", "waiting")
+
+    def __init__(self, outward: "Outward") -> None:
+        self.outward = outward
+        self.waiting = 0
+        self.held: Sequence[Held] = ()
+
+    def delivered(self, error: KafkaError | None, message: Message) -> None:
+        """Take the report of one record."""
+        self.waiting -= 1
+        self.outward.delivered_one(error, message)
+
+
+class Outward:
+    """See the module."""
+
+    def __init__(self, settings: KafkaSettings, name: str) -> None:
         self.delivered = self.dropped = self.failed = 0
         self.trouble = ""
         self._writer = RecordWriter(name)
         self._lost: Counter[Source] = Counter()
         self._untold: dict[tuple[NodeId, str], None] = {}
-        self._on_kept = on_kept
+        self._lot = Lot(self)
+        self._lots: deque[Lot] = deque()
         self._producer = Producer(
             settings.client()
             | {
@@ -41,7 +59,7 @@ class Outward:
                 "enable.idempotence": True,
                 "acks": "all",
                 "compression.type": "lz4",
-                "linger.ms": 5,
+                "linger.ms": 20,
                 "partitioner": "murmur2_random",
                 "message.timeout.ms": 0,  # a record waits for as long as it takes
                 "queue.buffering.max.messages": MESSAGES_MAX,
@@ -105,13 +123,29 @@ class Outward:
 
     def _send(self, topic: str, key: str, headers: Headers, value: bytes | None, partition: int = -1) -> bool:
         try:
-            self._producer.produce(topic, value, key.encode(), partition, self._delivered, headers=headers)
+            self._producer.produce(topic, value, key.encode(), partition, self._lot.delivered, headers=headers)
         except BufferError:
             self._producer.poll(0)
             return False
+        self._lot.waiting += 1
         return True
 
-    def _delivered(self, error: KafkaError | None, message: Message) -> None:
+    def owe(self, held: Sequence[Held]) -> None:
+        """Note that the records since this was last called are of these messages; the broker keeps them until they are safe."""
+        if held:
+            self._lot.held = held
+            self._lots.append(self._lot)
+            self._lot = Lot(self)
+
+    def take_safe(self) -> list[Held]:
+        """Return the messages whose records the cluster has acknowledged, in the order in which they came."""
+        safe: list[Held] = []
+        while self._lots and self._lots[0].waiting == 0:
+            safe += self._lots.popleft().held
+        return safe
+
+    def delivered_one(self, error: KafkaError | None, message: Message) -> None:
+        """Count a record that the cluster has acknowledged, or refused."""
         if error is None:
             self.delivered += 1
             return

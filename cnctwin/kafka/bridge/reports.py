@@ -1,27 +1,28 @@
-"""The health of runners as metrics of the processors' nodes, so that doctor, page and Prometheus see them as ever; and the
-bridge's own."""
+"""The health of runners and bridges as metrics of the processors' nodes, so that doctor, page and Prometheus see them as ever.
 
-import json
-import logging
+Each bridge reports on the topic `health`, as runners do, so that the one that publishes tells of those that have no node.
+"""
+
 import time
-from collections import Counter
 from collections.abc import Mapping
-from typing import Any
 
 from confluent_kafka import OFFSET_BEGINNING, Consumer, TopicPartition
 
+from cnctwin.kafka.bridge.members import Members
 from cnctwin.kafka.bridge.outward import Outward
+from cnctwin.kafka.report import BRIDGE_PREFIX, BridgeReport, payload_of
 from cnctwin.kafka.settings import KafkaSettings
 from cnctwin.kafka.topics import Topics
+from processors.lag_report import SPOKEN_OF_S, LagReport, topic_of
+from processors.running.health import node_metrics
 from processors.running.ports import EdgePort, HostPort
 from processors.running.quarantine import quarantine_health
 from sparkplug.metric import Change
 from twin.vocabulary.node_ledger import LEDGER_PREFIX
 
 REPORT_S = 1.0
-GONE_S = 10.0  # a runner that says nothing for so long is left out
-RUNNERS_MAX = 1000
-_log = logging.getLogger(__name__)
+BATCH, BATCHES_MAX = 1000, 20
+HEALTH_PREFIX = "health/"
 
 
 class Reports:
@@ -29,9 +30,11 @@ class Reports:
 
     def __init__(self, settings: KafkaSettings, topics: Topics, name: str, nodes: Mapping[str, EdgePort]) -> None:
         self._topics, self._name, self._nodes = topics, name, nodes
-        self._runners: dict[str, dict[str, Any]] = {}
+        self._member = BRIDGE_PREFIX + name
+        self._members = Members(spec.name.removeprefix(HEALTH_PREFIX) for spec in node_metrics(on_log=True))
         self._reported_s = 0.0
         self._cpu_s = 0.0
+        self._lagging: set[str] = set()
         self._consumer = Consumer(settings.client() | {"group.id": topics.bridge(name), "enable.auto.commit": False})
         self._consumer.assign([TopicPartition(topics.health, number, OFFSET_BEGINNING) for number in range(settings.partitions)])
 
@@ -39,72 +42,65 @@ class Reports:
         """Return True once a second."""
         return now_s - self._reported_s >= REPORT_S
 
-    def report(self, now_s: float, host: HostPort, outward: Outward, back: Any, events: int) -> None:
-        """Publish how runners and bridge stand."""
+    def report(self, now_s: float, host: HostPort, outward: Outward, events: int) -> None:
+        """Publish how runners and bridges stand."""
         cpu_s = time.process_time()
         busy_pct = 100.0 * (cpu_s - self._cpu_s) / (now_s - self._reported_s) if self._reported_s else 0.0
         self._reported_s, self._cpu_s = now_s, cpu_s
-        self._hear()
         at_ms = time.time_ns() // 1_000_000
-        alive = [one for one in self._runners.values() if at_ms - one["t"] < GONE_S * 1000]
-        own: dict[str, int | float | str] = {
+        self._hear(at_ms)
+        report = BridgeReport(
+            t=at_ms,
+            bridge=self._name,
+            events=events,
+            delivered=outward.delivered,
+            waiting=outward.waiting,
+            dropped=outward.dropped + outward.failed,
+            busy_pct=round(busy_pct, 1),
+        )
+        outward.keep(self._topics.health, self._member, payload_of(report))
+        self._members.hear(self._member, payload_of(report), at_ms)  # by itself, since the cluster may be away
+        own = {
             "queue_depth": host.queue_depth,
             "reconnects": host.reconnects,
-            "process": f"kafka bridge {self._name}",
-            "bridge_events": events,
-            "bridge_delivered": outward.delivered,
-            "bridge_waiting": outward.waiting,
-            "bridge_dropped": outward.dropped + outward.failed,
-            "bridge_busy_pct": round(busy_pct, 1),
+            **self._members.of_bridges(at_ms),
             **quarantine_health(host.quarantine),
         }
         for name, node in self._nodes.items():
-            told = own | self._of_processor(name, [one for one in alive if name in one["processors"]])
-            named = {key if key.startswith(LEDGER_PREFIX) else f"health/{key}": value for key, value in told.items()}
+            told = own | self._members.of_processor(name, at_ms)
+            named = {key if key.startswith(LEDGER_PREFIX) else HEALTH_PREFIX + key: value for key, value in told.items()}
             node.publish(None, [Change(key, value, at_ms) for key, value in named.items()])
+            self._speak_of_lag(host, name, told, at_ms)
 
-    def _of_processor(self, name: str, runners: list[dict[str, Any]]) -> dict[str, Any]:
-        total: Counter[str] = Counter()
-        for one in runners:
-            total.update(one["ledgers"].get(name, {}))
-        return {
-            **total,
-            "machines": total["machines"],
-            "processors": max((len(one["processors"]) for one in runners), default=0),
-            "lag_s": round(max((one["lag_s"] for one in runners), default=0.0), 3),
-            "published_lag_s": round(max((one["lag_s"] for one in runners), default=0.0), 3),
-            "busy_pct": max((one["busy_pct"] for one in runners), default=0.0),
-            "runners": len(runners),
-            "partitions": sum(one["partitions"] for one in runners),
-            "lag_records": sum(one["lag_records"] for one in runners),
-            "transactions": sum(one["transactions"] for one in runners),
-            "transactions_aborted": sum(one["transactions_aborted"] for one in runners),
-            "rebalances": sum(one["rebalances"] for one in runners),
-            "restored_s": max((one["restored_s"] for one in runners), default=0.0),
-            "lost_by_retention": sum(one["lost_by_retention"] for one in runners),
-            "repeated": sum(one["repeated"] for one in runners),
-            "dead_letters": sum(one["dead_letters"] for one in runners),
-            "fault": next((one["fault"] for one in runners if one["fault"]), ""),
-        }
+    def _speak_of_lag(self, host: HostPort, name: str, told: Mapping[str, int | float | str], at_ms: int) -> None:
+        """Say on the plain topic that a processor is behind, as one without a log does, and once more when it has caught up: the
+        alerts hear of it there."""
+        lag_s = float(told["lag_s"])
+        if lag_s < SPOKEN_OF_S and name not in self._lagging:
+            return
+        report = LagReport((name,), str(told["process"]), at_ms, lag_s, int(told["machines"]), float(told["busy_pct"]))
+        host.publish_plain(topic_of(name), report.payload())
+        (self._lagging.add if lag_s >= SPOKEN_OF_S else self._lagging.discard)(name)
 
-    def _hear(self) -> None:
-        for message in self._consumer.consume(1000, 0.0):
-            if message.error() is not None:
-                continue
-            key, value = message.key(), message.value()
-            name = key.decode("utf-8", "replace") if isinstance(key, bytes) else ""
-            if not isinstance(value, bytes):
-                self._runners.pop(name, None)
-                continue
-            try:
-                told = json.loads(value)
-                if isinstance(told, dict) and told["format"] == 1 and isinstance(told["ledgers"], dict):
-                    if len(self._runners) >= RUNNERS_MAX:
-                        self._runners.clear()
-                    self._runners[name] = told
-            except (ValueError, KeyError, RecursionError) as error:
-                _log.warning("the health of %.60s cannot be read: %s", name, error)
+    def _hear(self, at_ms: int) -> None:
+        """Take the newest report of each member; the topic may hold an hour of them that is not compacted yet."""
+        newest: dict[str, bytes | None] = {}
+        for _ in range(BATCHES_MAX):
+            messages = self._consumer.consume(BATCH, 0.0)
+            for message in messages:
+                key, value = message.key(), message.value()
+                if message.error() is None and isinstance(key, bytes):
+                    newest[key.decode("utf-8", "replace")] = value if isinstance(value, bytes) else None
+            if len(messages) < BATCH:
+                break
+        for name, payload in newest.items():
+            if name != self._member:
+                self._members.hear(name, payload, at_ms)
+
+    def leave(self, outward: Outward) -> None:
+        """Take the report back: this bridge ends by intent."""
+        outward.keep(self._topics.health, self._member, None)
 
     def close(self) -> None:
-        """Leave."""
+        """Leave the log."""
         self._consumer.close()

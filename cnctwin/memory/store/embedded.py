@@ -5,7 +5,7 @@ One process writes (`writer_lock`), any number of others read beside it.
 
 import shutil
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from cnctwin.memory.store import hot
@@ -26,7 +26,7 @@ from cnctwin.memory.store.contract import (
 from cnctwin.memory.store.database import FILE_NAME, Readers
 from cnctwin.memory.store.retention import Retention
 from cnctwin.memory.store.store_status import status
-from cnctwin.memory.store.writer import MARGIN_MS, Writer
+from cnctwin.memory.store.writer import MARGIN_MS, PLACE, Writer
 
 
 def _wall_ms() -> int:
@@ -70,6 +70,16 @@ class EmbeddedStore:
     def append(self, messages: Sequence[Message]) -> Appended:
         """Keep messages; when this returns, neither a kill -9 nor the loss of power loses any."""
         return self._writer.append(messages)
+
+    def append_from(self, messages: Sequence[Message], places: Mapping[str, int]) -> Appended:
+        """Keep messages that come from logs, with the offset behind the last one of each log: all of it, or nothing."""
+        return self._writer.append(messages, places)
+
+    def places(self) -> dict[str, int]:
+        """Return how far each log was read from which messages were appended."""
+        with self._readers.snapshot() as db:
+            rows = db.execute("SELECT name, value FROM meta WHERE substr(name, 1, ?) = ?", (len(PLACE), PLACE)).fetchall()
+        return {str(name).removeprefix(PLACE): int(at) for name, at in rows}
 
     def pin(self, pinned: Pinned) -> None:
         """Keep a stretch from being swept."""

@@ -4,9 +4,10 @@ import contextlib
 import json
 import logging
 import sqlite3
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from cnctwin.files.synced import make_folder
@@ -23,6 +24,9 @@ if TYPE_CHECKING:
     from cnctwin.memory.store.sealed.tier import SealedTier
 
 MARGIN_MS = 600_000
+PLACE = "read "
+"""Before the name of a log among what the store knows of itself."""
+NOWHERE: Mapping[str, int] = MappingProxyType({})
 _log = logging.getLogger(__name__)
 
 
@@ -111,8 +115,8 @@ class Writer:
     def _nothing(self, signal: Signal, stored_class: StoredClass, stamp_ms: int) -> Sequence[Known]:
         return ()
 
-    def append(self, messages: Sequence[Message]) -> Appended:
-        """Keep messages, in one transaction."""
+    def append(self, messages: Sequence[Message], places: Mapping[str, int] = NOWHERE) -> Appended:
+        """Keep messages, in one transaction, and in the same one how far each log was read that they come from."""
         self._check_disk()
         if self._must_load:
             self._load()
@@ -120,6 +124,7 @@ class Writer:
         try:
             with transaction(self.db, self.file):
                 done = batch.take(messages)
+                insert(self.db, "INSERT OR REPLACE INTO meta VALUES", [(PLACE + log, at) for log, at in places.items()])
         except BaseException as error:
             self._note(error)
             self._must_load = True  # what was begun is in memory, and not on the disk

@@ -14,20 +14,20 @@ FIGURES_OF_A_NIGHT = (
 BAD_FROM_1 = (Limit(None, words.GREEN), Limit(1.0, words.RED))
 
 
-def _rising(yellow: float, red: float) -> tuple[Limit, ...]:
+def rising(yellow: float, red: float) -> tuple[Limit, ...]:
     return (Limit(None, words.GREEN), Limit(yellow, words.YELLOW), Limit(red, words.RED))
 
 
-def _lines(title: str, says: str, expression: str, legend: str, *, unit: str = "") -> Panel:
+def lines(title: str, says: str, expression: str, legend: str, *, unit: str = "") -> Panel:
     return Panel(title=title, says=says, series=(Metric(expression=expression, legend=legend),), unit=unit, width=8)
 
 
-def _figure(title: str, says: str, expression: str, *, limits: tuple[Limit, ...] = BAD_FROM_1, unit: str = "") -> Panel:
+def figure(title: str, says: str, expression: str, *, limits: tuple[Limit, ...] = BAD_FROM_1, unit: str = "") -> Panel:
     series = (Metric(expression=expression, legend=title),)
     return Panel(title=title, says=says, series=series, view=View.FIGURE, unit=unit, limits=limits, width=4, height=4)
 
 
-def _rate(name: str, by: str) -> str:
+def rate(name: str, by: str) -> str:
     return f"sum by ({by}) (rate({name}[$__rate_interval]))"
 
 
@@ -62,7 +62,7 @@ VALIDATION = Board(
                 Metric(expression=f"abs({ERRORS}) / twin_validation_budget", legend="{{quantity}} {{measure}}"),
                 Metric(expression=f"twin_validation_budget / {CORRELATION}", legend="{{quantity}} {{measure}}"),
             ),
-            limits=_rising(0.8, 1.0),
+            limits=rising(0.8, 1.0),
             unit="percentunit",
             width=16,
             height=9,
@@ -72,7 +72,7 @@ VALIDATION = Board(
             says="From two on a new model is to be trained.",
             series=(Metric(expression='twin_validation_nights_over_budget{machine="$machine"}', legend="nights"),),
             view=View.FIGURE,
-            limits=_rising(1.0, 2.0),
+            limits=rising(1.0, 2.0),
             width=4,
             height=9,
         ),
@@ -82,7 +82,7 @@ VALIDATION = Board(
             series=(Metric(expression='time() - twin_validation_last_run_timestamp_seconds{machine="$machine"}', legend="age"),),
             view=View.FIGURE,
             unit="dtdurations",
-            limits=_rising(90_000.0, 129_600.0),
+            limits=rising(90_000.0, 129_600.0),
             width=4,
             height=9,
         ),
@@ -91,57 +91,57 @@ VALIDATION = Board(
 )
 
 FIGURES = (
-    _figure("Machines offline", "Edges that have said goodbye, or were lost.", "sum(1 - twin_source_online)"),
-    _figure(
+    figure("Machines offline", "Edges that have said goodbye, or were lost.", "sum(1 - twin_source_online)"),
+    figure(
         "Oldest value",
         "Event time of the newest message until now, of the worst machine.",
         "max(twin_source_age_seconds)",
-        limits=_rising(30.0, 300.0),
+        limits=rising(30.0, 300.0),
         unit="s",
     ),
-    _figure("Ledger difference", "What is neither emitted, dropped nor buffered.", "max(abs(twin_ledger_difference))"),
-    _figure(
+    figure("Ledger difference", "What is neither emitted, dropped nor buffered.", "max(abs(twin_ledger_difference))"),
+    figure(
         "Store, days left",
         "Until the disk is full at the present rate.",
         "min(twin_store_days_left)",
         limits=(Limit(None, words.RED), Limit(7.0, words.YELLOW), Limit(30.0, words.GREEN)),
         unit="suffix: d",
     ),
-    _figure("Models missing", "Configured, and not there.", "sum(twin_model_missing)"),
-    _figure("Alerts firing", "Acknowledged ones too.", 'sum(twin_alerts{state=~"firing|acknowledged"})'),
+    figure("Models missing", "Configured, and not there.", "sum(twin_model_missing)"),
+    figure("Alerts firing", "Acknowledged ones too.", 'sum(twin_alerts{state=~"firing|acknowledged"})'),
 )
 LINES = (
-    _lines("Age of the newest value", "The one that fails quietly.", "twin_source_age_seconds", "{{machine}}", unit="s"),
-    _lines(
+    lines("Age of the newest value", "The one that fails quietly.", "twin_source_age_seconds", "{{machine}}", unit="s"),
+    lines(
         "Dropped",
         "Each with its reason; none of it is silent.",
-        _rate("twin_dropped_total", "node, reason"),
+        rate("twin_dropped_total", "node, reason"),
         "{{node}} {{reason}}",
         unit="suffix: /s",
     ),
-    _lines("Emitted", "By each edge and processor.", _rate("twin_emitted_total", "node"), "{{node}}", unit="suffix: /s"),
-    _lines(
+    lines("Emitted", "By each edge and processor.", rate("twin_emitted_total", "node"), "{{node}}", unit="suffix: /s"),
+    lines(
         "Holes in sequences",
         "Messages that were lost on the way, by layer.",
         "sum by (layer, node) (increase(twin_seq_gaps_total[$__rate_interval]))",
         "{{node}} {{layer}}",
     ),
-    _lines("Lag of the processors", "Age of a message when it is folded.", "twin_processor_lag_seconds", "{{node}}", unit="s"),
-    _lines("Queues of the processors", "Messages behind the network thread.", "twin_processor_queue_depth", "{{node}}"),
-    _lines(
+    lines("Lag of the processors", "Age of a message when it is folded.", "twin_processor_lag_seconds", "{{node}}", unit="s"),
+    lines("Queues of the processors", "Messages behind the network thread.", "twin_processor_queue_depth", "{{node}}"),
+    lines(
         "Unsaved state",
         "Age of the oldest state that has no snapshot yet.",
         "twin_state_checkpoint_age_seconds",
         "{{node}}",
         unit="s",
     ),
-    _lines("Buffered", "By each edge and processor.", "twin_buffer_depth", "{{node}}"),
-    _lines(
+    lines("Buffered", "By each edge and processor.", "twin_buffer_depth", "{{node}}"),
+    lines(
         "Store: samples", "Written a second.", "rate(twin_store_samples_total[$__rate_interval])", "samples", unit="suffix: /s"
     ),
-    _lines("Store: waiting", "Samples that are not on the disk yet.", "twin_store_waiting", "waiting"),
-    _lines("Store: size", "On the disk.", "twin_store_bytes", "bytes", unit="decbytes"),
-    _lines("Clocks", "Control minus edge.", "twin_clock_offset_seconds", "{{machine}}", unit="s"),
+    lines("Store: waiting", "Samples that are not on the disk yet.", "twin_store_waiting", "waiting"),
+    lines("Store: size", "On the disk.", "twin_store_bytes", "bytes", unit="decbytes"),
+    lines("Clocks", "Control minus edge.", "twin_clock_offset_seconds", "{{machine}}", unit="s"),
 )
 PIPELINE = Board(
     uid="cnctwin-pipeline",

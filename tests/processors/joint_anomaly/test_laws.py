@@ -349,9 +349,9 @@ def test_a_clock_that_is_set_costs_that_machine_its_dwell_and_its_peers_nothing(
 def test_what_is_known_of_a_machine_is_kept_while_it_is_offline_and_others_are_born() -> None:
     engine = cell("a", "b")
     fed(engine, *born("a", "b"), *(says(s + 0.5, m, spindle_load_pct=30.0 + s) for s in range(20) for m in "ab"))
-    known = engine._units["all"].live.state.members["a"]
+    known = engine.known_units["all"].live.state.members["a"]
     fed(engine, death(20.0, device="a", node=NodeId("cnc", "a")), *born("b"))
-    kept = engine._units["all"].live.state.members["a"]
+    kept = engine.known_units["all"].live.state.members["a"]
     assert (known.tick, kept.tick) == (T0_MS // 1000 + 19, None)
     assert (kept.drift, kept.alarm, kept.gate.changes) == (known.drift, known.alarm, known.gate.changes)
     assert kept.total_s >= known.total_s > 0.0

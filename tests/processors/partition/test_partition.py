@@ -116,6 +116,17 @@ def test_a_shift_with_kills_is_the_shift_without(processor: AnyProcessor, kills:
     assert (told, state) == run(processor, shift(), Random(kills))
 
 
+@every_processor
+@quickly
+@given(length=st.integers(0, 40), seed=st.integers(0, 2**32))
+def test_the_shortest_ways_tell_the_same_and_come_to_the_same(processor: AnyProcessor, length: int, seed: int) -> None:
+    records = [*shift()[:30], *log_of(length, seed), *shift()]
+    named = [record for record in records if record.event is not None and record.event.names]
+    assert len(named) > 20, "the log holds no data that could take a short way"
+    without = [record if record.event is None else record._replace(event=record.event._replace(names=())) for record in records]
+    assert run(processor, records) == run(processor, without)
+
+
 def test_what_a_second_writer_says_again_is_folded_once() -> None:
     processor = discover()["thermal"]
     records = shift()

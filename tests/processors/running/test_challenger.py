@@ -41,7 +41,7 @@ def declared(actions: list[Action]) -> list[dict[str, Any]]:
 
 def state(one: Engine) -> tuple[float, float | None]:
     """The totals of the live fold and of the challenger."""
-    live = one._units["okuma"].live
+    live = one.known_units["okuma"].live
     return live.state.total, None if live.challenger is None else live.challenger.state.total
 
 
@@ -156,7 +156,7 @@ def test_what_another_challenger_said_is_stale_with_it() -> None:
 def test_a_challenger_that_fails_is_a_dead_letter_and_the_live_fold_goes_on() -> None:
     one = engine()
     fed(one, birth(0.0, spindle_rpm=10.0))
-    challenger = one._units["okuma"].live.challenger
+    challenger = one.known_units["okuma"].live.challenger
     assert challenger is not None
     challenger._given = None
     actions = fed(one, data(0.1, spindle_rpm=20.0))
@@ -257,7 +257,7 @@ def test_a_processor_that_heeds_no_description_has_no_challenger() -> None:
     one.describe("okuma", Role.CHALLENGER, description(1.0))
     fed(one, birth(0.0, spindle_rpm=10.0))
     assert not one.is_described
-    assert one._units["okuma"].live.challenger is None
+    assert one.known_units["okuma"].live.challenger is None
 
 
 def test_history_has_no_challenger() -> None:

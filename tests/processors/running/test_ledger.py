@@ -24,7 +24,7 @@ def test_every_message_is_accounted_for_after_every_event(stream: list[HostEvent
         ledger = engine.ledger
         assert ledger.balance == 0
         assert ledger.buffered == sum(
-            len(lane._held)
+            len(lane.held)
             for machine in engine._machines.values()
             for lane in (machine.live, machine.history)
             if lane is not None

@@ -89,7 +89,7 @@ def test_together_they_come_to_what_each_comes_to_alone() -> None:
         host = FakeHost(*stream)
         (alone,) = workers_on(host, worker._processor)
         Runner(host, [alone]).run(host.until_empty())
-        (unit,) = worker.engine._units
+        (unit,) = worker.engine.known_units
         assert worker.engine.snapshot(unit) == alone.engine.snapshot(unit)
         assert worker.engine.ledger.metrics() == alone.engine.ledger.metrics()
 

@@ -28,8 +28,8 @@ class Asked(Silences):
 def test_the_ticks_are_those_of_asking_every_machine_at_every_turn(seed: int) -> None:
     chance = Random(seed)
     watched, asked = (engine_of(RECORDER, gap_s_max=20.0) for _ in range(2))
-    asked._silences = Asked(asked._silences.margin_s)
-    asked._silences.engine = asked
+    asked.silences = Asked(asked.silences.margin_s)
+    asked.silences.engine = asked
     wall_s = at_s = 0.0
     for _ in range(60):
         machine = chance.choice(MACHINES)
@@ -44,7 +44,7 @@ def test_the_ticks_are_those_of_asking_every_machine_at_every_turn(seed: int) ->
         assert watched.feed(event, wall_s) == asked.feed(event, wall_s)
         assert watched.silence(wall_s) == asked.silence(wall_s)
     assert watched.counts == asked.counts
-    for unit in sorted(watched._units):
+    for unit in sorted(watched.known_units):
         assert watched.snapshot(unit) == asked.snapshot(unit)
 
 

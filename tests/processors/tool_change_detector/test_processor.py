@@ -159,7 +159,7 @@ def test_a_restart_in_the_middle_changes_nothing(model: str, cut: int) -> None:
     whole, restarted = engine_of(PROCESSOR, model=model), engine_of(PROCESSOR, model=model)
     assert fed(whole, *stream[:cut]) == fed(restarted, *stream[:cut])
     adapter: TypeAdapter[Any] = TypeAdapter(PROCESSOR.state)
-    fold = restarted._units["okuma"].live
+    fold = restarted.known_units["okuma"].live
     fold.state = decode_state(adapter, json.loads(json.dumps(encode_state(adapter, fold.state))))
     after, again = fed(whole, *stream[cut:]), fed(restarted, *stream[cut:])
     assert repr(after) == repr(again)

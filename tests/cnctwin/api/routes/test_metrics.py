@@ -9,8 +9,10 @@ import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
 from cnctwin.api.nights import Nights
-from cnctwin.api.prometheus.text import PHASES
+from cnctwin.api.prometheus.text import NODE_COUNTERS, NODE_GAUGES, PHASES
 from cnctwin.validation.history import file_of
+from processors.running.health import ON_LOG
+from sparkplug.datatype import DataType
 from tests.cnctwin.api.small_plant import EDGE, THERMAL, birth, client_of, death, now, small_plant
 
 EDGE_OWN = {
@@ -32,6 +34,13 @@ THERMAL_OWN = {
     "health/lag_s": 0.25,
     "health/published_lag_s": 0.5,
     "health/busy_pct": 42.0,
+    "health/runners": 2,
+    "health/lag_records": 40_213,
+    "health/restored_s": 1.25,
+    "health/transactions_aborted": 3,
+    "health/bridge_waiting": 17,
+    "health/bridge_dropped": 4,
+    "health/silent": "bridge.hall-2",
 }
 NIGHT = {
     "night": "2026-05-01",
@@ -93,6 +102,12 @@ def value(text: str, name: str, **labels: str) -> float:
         ("twin_processor_busy_percent", {"node": "twin-thermal"}, 42.0),
         ("twin_processor_lag_events", {"node": "twin-thermal"}, 7.0),
         ("twin_processor_queue_depth", {"node": "twin-thermal"}, 7.0),
+        ("twin_kafka_runners", {"node": "twin-thermal"}, 2.0),
+        ("twin_kafka_lag_records", {"node": "twin-thermal"}, 40_213.0),
+        ("twin_kafka_restore_seconds", {"node": "twin-thermal"}, 1.25),
+        ("twin_kafka_transactions_aborted_total", {"node": "twin-thermal"}, 3.0),
+        ("twin_kafka_bridge_waiting", {"node": "twin-thermal"}, 17.0),
+        ("twin_kafka_bridge_dropped_total", {"node": "twin-thermal"}, 4.0),
         ("twin_gate_active", {"machine": "vmc"}, 1.0),
         ("twin_raw_score", {"machine": "vmc"}, 0.5),
         ("twin_alerts", {"state": "firing"}, 2.0),
@@ -135,6 +150,17 @@ def test_a_machine_that_is_offline_is_said_to_be() -> None:
     live.take([death({"spindle_load_pct": 1.0}, 2_000)], 2_000)
     with client_of(live) as client:
         assert 'twin_source_online{machine="vmc"} 0.0' in client.get("/metrics").text
+
+
+def test_every_number_about_the_log_is_exported(text: str) -> None:
+    numbers = {spec.name for spec in ON_LOG if spec.datatype is not DataType.STRING}
+    exported = {name for table in (NODE_GAUGES, NODE_COUNTERS) for name, _ in table.values()}
+    assert numbers - exported == set()
+
+
+def test_a_node_that_is_folded_without_a_log_has_no_word_of_one(text: str) -> None:
+    with pytest.raises(KeyError):
+        value(text, "twin_kafka_runners", node="edge-vmc")
 
 
 def test_promtool_takes_it(text: str, tmp_path: Path) -> None:
