@@ -59,6 +59,7 @@ class Runner:
         self._waiting = Waiting()
         self._touched: dict[Place, Partition] = {}
         self._folded_s = 0.0
+        self._torn = ""  # why the open transaction can come to nothing, found out while partitions went
         self._stop = Event()
         self._health = RunnerHealth(settings, topics, member, names)
 
@@ -101,6 +102,8 @@ class Runner:
     def turn(self) -> None:
         """Take what has come, fold for a while, commit."""
         try:
+            if self._torn:
+                raise AbortedError(self._torn)
             for message in self._consumer.consume(MESSAGES_A_TURN, 0.0 if self._waiting else POLL_S):
                 if (error := message.error()) is None:
                     self._waiting.add(message)
@@ -189,9 +192,16 @@ class Runner:
     def _begin_again(self, why: str) -> None:
         """Throw away what was folded and not committed, and restore."""
         _log.warning("a transaction has come to nothing, what it held is folded again: %s", why)
-        self._transactions.abort()
+        self._torn = ""
         self._waiting.clear()
         self._touched.clear()
+        try:
+            self._transactions.abort()
+        except AbortedError as error:  # the cluster does not answer, and we are to stop: it aborts what is open by itself
+            if not self._stop.is_set():
+                raise
+            _log.warning("not aborted: %s", error)
+            return
         places = list(self._assigned.partitions)
         while not self._stop.is_set():
             try:
@@ -228,7 +238,7 @@ class Runner:
                 self._commit(time.monotonic(), list(mine))
         except (AbortedError, KafkaException) as error:
             _log.warning("the partitions are handed over as they were committed before: %s", error)
-            self._transactions.abort()
+            self._torn = str(error)
         self._forget(places)
         if partitions:
             consumer.incremental_unassign(partitions)
@@ -236,7 +246,7 @@ class Runner:
     def _on_lost(self, consumer: Consumer, partitions: list[TopicPartition]) -> None:
         """Another runner has them by now: nothing of them is to be saved."""
         if self._transactions.is_open:
-            self._transactions.abort()
+            self._torn = "partitions were lost to another runner"
         self._forget([(one.topic, one.partition) for one in partitions])
         consumer.incremental_unassign(partitions)
 

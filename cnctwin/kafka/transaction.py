@@ -18,7 +18,7 @@ REQUEST_S = 10.0
 PAUSE_S = 0.2
 
 
-class AbortedError(Exception):
+class AbortedError(ProcessorError):
     """A transaction came to nothing: what was folded in it has to be folded again."""
 
 
@@ -57,7 +57,10 @@ class Transactions:
     def open(self) -> None:
         """Begin a transaction where none is open."""
         if not self.is_open:
-            self._producer.begin_transaction()
+            try:
+                self._producer.begin_transaction()
+            except KafkaException as error:
+                self._failed(error.args[0])
             self.is_open = True
 
     def commit(self, positions: Sequence[TopicPartition], consumer: Consumer) -> None:
