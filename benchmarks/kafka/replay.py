@@ -12,7 +12,7 @@ from hashlib import blake2b
 from typing import Any
 
 from benchmarks.kafka.inputs import Inputs
-from benchmarks.kafka.log import headers_of, messages
+from benchmarks.kafka.whole_log import headers_of, messages
 from cnctwin.kafka.assigned import by_topic
 from cnctwin.kafka.kept import read_kept
 from cnctwin.kafka.topics import Topics
