@@ -255,6 +255,7 @@ class Table:
         self._row("CPU of one processor", ", ".join(use))
         self._row("oldest result at its commit, between the kills", f"{course.lag_s:.1f} s")
         statuses = ", ".join(f"{name} {status}" for name, status in course.statuses.items())
+        self._row("processes that ended by themselves", plant.ended.total(), plant.ended.total() == 0, str(dict(plant.ended)))
         self._row("exit at SIGTERM", statuses, not any(course.statuses.values()))
         self._row("records that the runners left", course.left, course.left == 0)
 
@@ -329,9 +330,11 @@ def main() -> None:
     parser.add_argument("--every", type=float, default=defaults.every_s, help="seconds between two kills")
     parser.add_argument("--partitions", type=int, default=defaults.partitions)
     parser.add_argument("--processors", default=",".join(PROCESSORS), help="names, with commas between")
+    # The one broker is the whole cluster: while it is away nobody can say that he lives, so a session outlasts its restart.
     parser.add_argument("--kills", default="bridge,runner,kafka", help="what is killed in turn")
     parser.add_argument("--takeover", action="store_true", help="two runners, of which one is killed for 20 s")
     parser.add_argument("--home", type=Path, help="where logs and data are kept; else a folder that goes with the run")
+    parser.add_argument("--session", type=float, help="session_s of the runners; else 30, and 6 with --takeover")
     given = parser.parse_args()
     setup = Setup(
         machines=given.machines,
@@ -341,6 +344,7 @@ def main() -> None:
         partitions=given.partitions,
         processors=tuple(one.strip() for one in given.processors.split(",") if one.strip()),
         members=("r0", "r1") if given.takeover else ("r0",),
+        session_s=given.session or (6.0 if given.takeover else defaults.session_s),
         kills=("takeover",) if given.takeover else tuple(given.kills.split(",")),
     )
     with tempfile.TemporaryDirectory(prefix="cnctwin-kills-") as folder:

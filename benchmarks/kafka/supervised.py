@@ -47,7 +47,7 @@ rate_high_per_hour = 10000
 
 @dataclass(frozen=True, slots=True)
 class Setup:
-    """The options of a run. `members`: the static names of the runners."""
+    """The options of a run. `members`: the static names of the runners; `session_s`: after which one that is gone is given up."""
 
     machines: int = 100
     hz: float = 10.0
@@ -56,6 +56,7 @@ class Setup:
     partitions: int = 4
     processors: tuple[str, ...] = PROCESSORS
     members: tuple[str, ...] = ("r0",)
+    session_s: float = 30.0
     kills: tuple[str, ...] = ("bridge", "runner", "kafka")
 
 
@@ -120,8 +121,8 @@ class Plant:
         self.config = home / "processors.toml"
         self.config.write_text(CONFIGURATION.format(url=webhook))
         self._kafka_config = home / "kafka.toml"
-        self._kafka_config.write_text(f"partitions = {setup.partitions}\nreplication_factor = 1\n")
-        self.kills: Counter[str] = Counter()
+        self._kafka_config.write_text(f"partitions = {setup.partitions}\nreplication_factor = 1\nsession_s = {setup.session_s}\n")
+        self.ended: Counter[str] = Counter()
         self.kafka_cpu_s = 0.0
         self._load: Process | None = None
         self._pipe: Connection | None = None
@@ -179,10 +180,12 @@ class Plant:
         return passed_s, 100.0 * (busy_s() - self._began[1]) / passed_s / (os.cpu_count() or 1)
 
     def watch(self) -> None:
-        """Raise SystemExit where a process has ended by itself."""
+        """Begin again what has ended by itself, as a supervisor would, and count it."""
         for one in (self.bridge, *self.runners.values()):
             if not one.running:
-                raise SystemExit(f"{one.name} has ended by itself: {one.last_words()}")
+                self.ended[one.name] += 1
+                print(f"{one.name} has ended by itself: {one.last_words()[-400:]}", flush=True)
+                one.start()
 
     def stop(self) -> None:
         """End all that is left."""

@@ -14,6 +14,7 @@ import logging
 import time
 from collections.abc import Sequence
 from threading import Event
+from typing import Any
 
 from confluent_kafka import Consumer, KafkaError, KafkaException, Message, TopicPartition
 
@@ -60,6 +61,7 @@ class Runner:
         self._touched: dict[Place, Partition] = {}
         self._folded_s = 0.0
         self._torn = ""  # why the open transaction can come to nothing, found out while partitions went
+        self._beyond_help: KafkaError | None = None
         self._stop = Event()
         self._health = RunnerHealth(settings, topics, member, names)
 
@@ -81,9 +83,10 @@ class Runner:
             self._consumer.close()  # partitions are revoked, and so saved
             self._health.close()
 
-    def _conf(self) -> dict[str, str | int | float | bool]:
+    def _conf(self) -> dict[str, Any]:
         session_ms = round(self._settings.session_s * 1000)
         return self._settings.client() | {
+            "error_cb": self._on_error,
             "group.id": self.group,
             "group.instance.id": self._member,
             "session.timeout.ms": session_ms,
@@ -109,6 +112,8 @@ class Runner:
                     self._waiting.add(message)
                 else:
                     self._complain(error)
+            if self._beyond_help is not None:
+                self._complain(self._beyond_help)
             for message in self._waiting.due(FOLD_S):
                 self._take(message)
             self._waiting.pace(self._consumer)
@@ -213,10 +218,15 @@ class Runner:
             else:
                 return
 
+    def _on_error(self, error: KafkaError) -> None:
+        """A consumer that is beyond help reads nothing more, and does not always say so among the messages."""
+        if error.fatal() or error.code() == KafkaError._FATAL:
+            self._beyond_help = error
+
     def _complain(self, error: KafkaError) -> None:
-        if error.code() == KafkaError.FENCED_INSTANCE_ID or (error.fatal() and "fenced" in error.str().lower()):
+        if error.code() == KafkaError.FENCED_INSTANCE_ID or "fenced" in error.str().lower():
             raise FencedError(f"kafka: {self._name} is taken by another process; give each runner a --member of its own")
-        if error.fatal():
+        if error.fatal() or error.code() == KafkaError._FATAL:
             raise KafkaException(error)
         _log.warning("kafka: %s", error.str())
 

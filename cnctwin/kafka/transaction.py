@@ -4,6 +4,7 @@ What the cluster says of a failure decides: try again, abort and begin from what
 this one's name.
 """
 
+import logging
 import time
 from collections.abc import Callable, Sequence
 
@@ -16,6 +17,7 @@ from sparkplug.records.record import Headers
 
 REQUEST_S = 10.0
 PAUSE_S = 0.2
+_log = logging.getLogger(__name__)
 
 
 class AbortedError(ProcessorError):
@@ -83,13 +85,16 @@ class Transactions:
             self._producer = self._begun()
 
     def _insist(self, ask: Callable[[], object]) -> None:
-        """Ask until there is an answer."""
+        """Ask until there is an answer, but no longer than the cluster keeps a transaction."""
+        until_s = time.monotonic() + self._settings.transaction_s
         while True:
             try:
                 ask()
             except KafkaException as error:
                 reason = error.args[0]
-                if not reason.retriable() or reason.txn_requires_abort() or self._is_stopping():
+                _log.warning("%s: %s", self.name, reason.str())
+                is_late = time.monotonic() > until_s
+                if not reason.retriable() or reason.txn_requires_abort() or self._is_stopping() or is_late:
                     self._failed(reason)
                 time.sleep(PAUSE_S)
             else:
