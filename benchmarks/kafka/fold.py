@@ -122,7 +122,7 @@ def by_runner(task: Task, pairs: list[Configured]) -> Spent:
                 ended[:] = cpu_s(), time.monotonic()
 
     ended = [0.0, 0.0]
-    runner_module.Transactions = _Counted  # type: ignore[misc]
+    runner_module.__dict__["Transactions"] = _Counted
     runner = Measured(settings, topics, pairs, task.member)
     runner.run(stop)
     return Spent(
