@@ -25,12 +25,12 @@ from confluent_kafka.admin import AdminClient
 
 from benchmarks.hall.machine import GROUP, name_of
 from benchmarks.kafka.inputs import Inputs, Kill, Missing
-from benchmarks.kafka.whole_log import behind
 from benchmarks.kafka.notices import Notices, judged
-from benchmarks.kafka.supervised import PROCESSORS, Plant, Setup
 from benchmarks.kafka.replay import Difference, Found, Replay, Stood
+from benchmarks.kafka.supervised import PROCESSORS, Plant, Setup
 from benchmarks.kafka.watcher import Awaited, Watcher
 from benchmarks.kafka.webhook import Webhook
+from benchmarks.kafka.whole_log import behind
 from benchmarks.kafka.witness import Witness
 from cnctwin.kafka.bridging import cell_processors
 from cnctwin.kafka.topics import Topics
