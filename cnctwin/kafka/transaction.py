@@ -5,8 +5,10 @@ this one's name.
 """
 
 import logging
+import threading
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 
 from confluent_kafka import Consumer, KafkaError, KafkaException, Producer, TopicPartition
 
@@ -15,7 +17,8 @@ from cnctwin.kafka.settings import KafkaSettings
 from processors.errors import ProcessorError
 from sparkplug.records.record import Headers
 
-REQUEST_S = 10.0
+REQUEST_S = 5.0
+HUNG_S = REQUEST_S + 2.0
 PAUSE_S = 0.2
 _log = logging.getLogger(__name__)
 
@@ -34,14 +37,21 @@ class Transactions:
     def __init__(self, settings: KafkaSettings, name: str, is_stopping: Callable[[], bool]) -> None:
         self.name = name
         self.committed = self.aborted = 0
-        self.is_open = False
+        self.is_open = self._is_hung = False
         self._settings, self._is_stopping = settings, is_stopping
         self._producer = self._begun()
 
     def _begun(self) -> Producer:
-        producer = producer_of(self._settings, self.name)
-        self._insist(lambda: producer.init_transactions(REQUEST_S))
-        return producer
+        while True:
+            self._is_hung = False
+            producer = producer_of(self._settings, self.name)
+            try:
+                self._insist(partial(producer.init_transactions, REQUEST_S))
+            except AbortedError:
+                if not self._is_hung or self._is_stopping():
+                    raise
+            else:
+                return producer
 
     def produce(self, topic: str, key: str, value: bytes | None, partition: int, headers: Headers) -> None:
         """Have a message go out with the transaction, which begins with its first."""
@@ -68,9 +78,8 @@ class Transactions:
     def commit(self, positions: Sequence[TopicPartition], consumer: Consumer) -> None:
         """Commit what was produced, with the consumer's positions. Raises AbortedError, FencedError."""
         self.open()
-        self._insist(
-            lambda: self._producer.send_offsets_to_transaction(list(positions), consumer.consumer_group_metadata(), REQUEST_S)
-        )
+        member = consumer.consumer_group_metadata()
+        self._insist(lambda: self._producer.send_offsets_to_transaction(list(positions), member, REQUEST_S))
         self._insist(lambda: self._producer.commit_transaction(REQUEST_S))
         self.is_open = False
         self.committed += 1
@@ -79,17 +88,21 @@ class Transactions:
         """Give up what is open. A producer that cannot any more is replaced by another of its name."""
         self.aborted += 1
         self.is_open = False
-        try:
-            self._producer.abort_transaction(REQUEST_S)
-        except KafkaException:
-            self._producer = self._begun()
+        if not self._is_hung:
+            try:
+                self._answered(lambda: self._producer.abort_transaction(REQUEST_S))
+            except (KafkaException, AbortedError):
+                pass
+            else:
+                return
+        self._producer = self._begun()
 
     def _insist(self, ask: Callable[[], object]) -> None:
         """Ask until there is an answer, but no longer than the cluster keeps a transaction."""
         until_s = time.monotonic() + self._settings.transaction_s
         while True:
             try:
-                ask()
+                self._answered(ask)
             except KafkaException as error:
                 reason = error.args[0]
                 _log.warning("%s: %s", self.name, reason.str())
@@ -99,6 +112,25 @@ class Transactions:
                 time.sleep(PAUSE_S)
             else:
                 return
+
+    def _answered(self, ask: Callable[[], object]) -> None:
+        """Ask in a thread that may be left behind: where the broker ended in the middle of it, librdkafka may never return."""
+        errors: list[BaseException] = []
+
+        def run() -> None:
+            try:
+                ask()
+            except BaseException as error:
+                errors.append(error)
+
+        thread = threading.Thread(target=run, daemon=True)
+        thread.start()
+        thread.join(HUNG_S)
+        if thread.is_alive():
+            self._is_hung = True
+            raise AbortedError(f"no answer, not even a refusal, within {HUNG_S:g} s")
+        if errors:
+            raise errors[0]
 
     def _failed(self, reason: KafkaError) -> None:
         """A transaction that took too long is fenced too: whether another runner has the name, the consumer group knows."""
