@@ -45,7 +45,7 @@ class Missing:
     otherwise: int = 0
     first: str = ""
     blind_s: list[float] = field(default_factory=list)
-    """Of each machine and kill: the time from the kill to the first data that came again."""
+    """The time, of each machine and kill, from the kill to the first data that came again."""
 
 
 class Inputs:

@@ -215,7 +215,7 @@ class KillRun:
 
 
 class Table:
-    """What has come of a run, as Markdown."""
+    """Return the outcome of a run, as Markdown."""
 
     def __init__(self, run: KillRun, found: Found, inputs: Inputs, *, missing: Missing, notices: Notices, seen: int) -> None:
         """`seen`: the data messages that the witness saw."""

@@ -44,7 +44,7 @@ class Live:
 
 @dataclass(slots=True)
 class Plant:
-    """What runs."""
+    """The processes of a trial."""
 
     kafka: KafkaServer
     broker: PrivateBroker

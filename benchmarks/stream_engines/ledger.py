@@ -7,7 +7,7 @@ from benchmarks.stream_engines.fold import expected
 
 
 class Ledger:
-    """What was read of the outputs: how often each came, and which were wrong."""
+    """An account of the outputs that were read: how often each came, and which were wrong."""
 
     def __init__(self, messages: int, state_bytes: int) -> None:
         self.due = {(machine, count): result for machine, count, result in expected(messages, state_bytes)}

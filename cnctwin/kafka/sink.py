@@ -1,4 +1,4 @@
-"""Where a runner keeps what it reads, beside its folds: each record once, since the offset is kept with it."""
+"""A place in which a runner keeps what it reads, beside its folds: each record once, since the offset is kept with it."""
 
 from typing import Protocol
 

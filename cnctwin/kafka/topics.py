@@ -35,7 +35,7 @@ class Topics:
 
     @property
     def readings(self) -> str:
-        """What machines say, by machine."""
+        """The topic of what machines say, by machine."""
         return f"cnctwin.{self.group}.readings"
 
     def cells(self, processor: str) -> str:
@@ -44,27 +44,27 @@ class Topics:
 
     @property
     def results(self) -> str:
-        """What processors say, by machine or cell."""
+        """The topic of what processors say, by machine or cell."""
         return f"cnctwin.{self.group}.results"
 
     @property
     def snapshots(self) -> str:
-        """The states of units."""
+        """The topic of the states of units."""
         return f"cnctwin.{self.group}.snapshots"
 
     @property
     def births(self) -> str:
-        """The newest birth certificates, as they came."""
+        """The topic of the newest birth certificates, as they came."""
         return f"cnctwin.{self.group}.births"
 
     @property
     def health(self) -> str:
-        """The health of runners and bridges, as JSON."""
+        """The topic of the health of runners and bridges, as JSON."""
         return f"cnctwin.{self.group}.health"
 
     @property
     def deadletters(self) -> str:
-        """What could not be folded or read."""
+        """The topic of what could not be folded or read."""
         return f"cnctwin.{self.group}.deadletters"
 
     def runners(self, processors: Sequence[str]) -> str:

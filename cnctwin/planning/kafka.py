@@ -23,7 +23,7 @@ BROKER_CORES = 8
 RETENTION_HOURS, SNAPSHOT_S = 48.0, 5.0
 PARTITIONS_LEAST = 12
 UNCOMPACTED_S = 3600.0
-"""How long a compacted topic may hold states that newer ones have replaced (`max.compaction.lag.ms`)."""
+"""The time for which a compacted topic may hold states that newer ones have replaced (`max.compaction.lag.ms`)."""
 MIRROR, HISTORIAN = "mirror", "historian"
 
 
@@ -60,7 +60,7 @@ class KafkaPlan:
 
 @dataclass(frozen=True, slots=True)
 class _Rates:
-    """What comes a second: messages of machines, results, and values of the mirror."""
+    """The load of a second: messages of machines, results, and values of the mirror."""
 
     messages: float
     results: float

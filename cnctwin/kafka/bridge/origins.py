@@ -1,4 +1,4 @@
-"""Which life of its node a message belongs to: the number of its birth, and the time stamp of its NBIRTH."""
+"""The life of its node that a message belongs to: the number of its birth, and the time stamp of its NBIRTH."""
 
 from collections.abc import Callable
 
