@@ -38,8 +38,9 @@ from cnctwin.processes.private_broker import PrivateBroker
 from processors.actions import Publish as PublishAction
 from processors.config import Configuration, ProcessorConfig
 from processors.contract import NoState, Output, OutputSpec, Processor, Provenance, Sample, SampleKind
+from processors.running.cycles import SELDOM
 from processors.running.engine import Engine
-from processors.running.runner import GATHER_S, SELDOM
+from processors.running.runner import GATHER_S
 from processors.running.runtime import runner_of
 from sparkplug.actions import Publish
 from sparkplug.admission.limits import Limits

@@ -28,8 +28,8 @@ from cnctwin.kafka.topics import Topics, ensure
 from cnctwin.kafka.transaction import Transactions
 from cnctwin.processes.stopping import stopped_by_signals
 from processors.partition.results import Results
+from processors.running.cycles import SELDOM
 from processors.running.engine import Engine
-from processors.running.runner import SELDOM
 from processors.running.runtime import Configured, configured
 from sparkplug.host_event import EventKind
 from sparkplug.records.record import Headers, Origin, RecordReader, RecordWriter

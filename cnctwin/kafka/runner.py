@@ -9,7 +9,6 @@ cut and the last commit is folded again in silence after a restart (processors/p
 to nothing throws away what was folded, and the partitions are restored: there is one way back, whatever failed.
 """
 
-import gc
 import logging
 import time
 from collections.abc import Sequence
@@ -29,7 +28,7 @@ from processors.actions import DeadLetter, Pin
 from processors.errors import SnapshotError
 from processors.partition.partition import Partition
 from processors.partition.results import Results
-from processors.running.runner import SELDOM
+from processors.running.cycles import seldom_looked_for
 from processors.running.runtime import Configured
 from sparkplug.records.record import Origin, RecordError, RecordWriter
 
@@ -73,13 +72,11 @@ class Runner:
         self._consumer.subscribe(
             self._assigned.topics, on_assign=self._on_assign, on_revoke=self._on_revoke, on_lost=self._on_lost
         )
-        thresholds = gc.get_threshold()
-        gc.set_threshold(*SELDOM)
         try:
-            while not stop.is_set():
-                self.turn()
+            with seldom_looked_for():
+                while not stop.is_set():
+                    self.turn()
         finally:
-            gc.set_threshold(*thresholds)
             self._consumer.close()  # partitions are revoked, and so saved
             self._health.close()
 

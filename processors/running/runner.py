@@ -12,7 +12,6 @@ The order is the broker's, for what the processors of this process say of each o
 them, see one order. A message is folded by its readers in the order of their names, before the next one is looked at.
 """
 
-import gc
 import logging
 import os
 import socket
@@ -25,6 +24,7 @@ from processors.description_folder import DescriptionFolder
 from processors.errors import ProcessorsFailedError
 from processors.lag_report import SPOKEN_OF_S, LagReport, topic_of
 from processors.running.backlog import Backlog
+from processors.running.cycles import seldom_looked_for
 from processors.running.descriptions import Descriptions
 from processors.running.engine import Way
 from processors.running.lag import Lag
@@ -43,9 +43,6 @@ PROCESS = f"{socket.gethostname()}:{os.getpid()}"
 POLL_S = 0.05
 GATHER_S = 0.02  # what comes within it is read together: at the rates of a cell it is waking up that costs most
 REPORT_S = 1.0
-# What a message brings lives until the next one of its machine comes. To look for cycles after each 700 objects, as Python does
-# by itself, would be a quarter of all work; there are hardly any cycles.
-SELDOM = (50_000, 20, 100)
 IN_ORDER_S_MAX = 0.5  # of work; what goes beyond it is folded as the backlog says
 WAITING_IN_ORDER_MAX = 1000  # messages, behind those that were read
 READ_S_MAX = 0.25  # to read what has come, before what waits is folded
@@ -86,12 +83,8 @@ class Runner:
 
     def run(self, stop: Event) -> None:
         """Work until `stop` is set, then save, say goodbye and disconnect."""
-        thresholds = gc.get_threshold()
-        gc.set_threshold(*SELDOM)
-        try:
+        with seldom_looked_for():
             self._run(stop)
-        finally:
-            gc.set_threshold(*thresholds)
 
     def _run(self, stop: Event) -> None:
         of_workers = (topic_filter for worker in self.workers for topic_filter in worker.plain_filters())

@@ -4,7 +4,6 @@ broker ──► host session ──► records by machine and by cell ──►
 broker ◄── edge nodes twin-… ◄────────────────────────────────── results
 """
 
-import gc
 import logging
 import time
 from collections.abc import Sequence
@@ -25,8 +24,8 @@ from cnctwin.kafka.settings import KafkaSettings
 from cnctwin.kafka.topics import Topics
 from processors.description import machine_and_role
 from processors.description_folder import DescriptionFolder
+from processors.running.cycles import seldom_looked_for
 from processors.running.descriptions import Descriptions
-from processors.running.runner import SELDOM
 from processors.running.runtime import Configured
 from sparkplug.edge_node import EdgeNode
 from sparkplug.host import HostApplication
@@ -82,12 +81,8 @@ class Bridge:
 
     def run(self, stop: Event) -> None:
         """Work until `stop` is set."""
-        thresholds = gc.get_threshold()
-        gc.set_threshold(*SELDOM)
-        try:
+        with seldom_looked_for():
             self._run(stop)
-        finally:
-            gc.set_threshold(*thresholds)
 
     def _run(self, stop: Event) -> None:
         for topic_filter in dict.fromkeys(self._plain_filters()):
