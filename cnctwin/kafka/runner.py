@@ -203,9 +203,10 @@ class Runner:
                 return
 
     def _complain(self, error: KafkaError) -> None:
-        if error.code() == KafkaError.FENCED_INSTANCE_ID or (error.fatal() and "fenced" in error.str().lower()):
+        is_fatal = error.fatal() or error.code() == KafkaError._FATAL  # that comes as a message does not call itself fatal
+        if error.code() == KafkaError.FENCED_INSTANCE_ID or (is_fatal and "fenced" in error.str().lower()):
             raise FencedError(f"kafka: {self._name} is taken by another process; give each runner a --member of its own")
-        if error.fatal():
+        if is_fatal:
             raise KafkaException(error)
         _log.warning("kafka: %s", error.str())
 

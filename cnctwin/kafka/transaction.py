@@ -6,6 +6,7 @@ this one's name.
 
 import time
 from collections.abc import Callable, Sequence
+from threading import Thread
 
 from confluent_kafka import Consumer, KafkaError, KafkaException, Producer, TopicPartition
 
@@ -15,6 +16,7 @@ from processors.errors import ProcessorError
 from sparkplug.records.record import Headers
 
 REQUEST_S = 10.0
+GRACE_S = 2.0  # beyond which a call that should have timed out never returns
 PAUSE_S = 0.2
 
 
@@ -32,7 +34,7 @@ class Transactions:
     def __init__(self, settings: KafkaSettings, name: str, is_stopping: Callable[[], bool]) -> None:
         self.name = name
         self.committed = self.aborted = 0
-        self.is_open = False
+        self.is_open = self._is_stuck = False
         self._settings, self._is_stopping = settings, is_stopping
         self._producer = self._begun()
 
@@ -63,21 +65,48 @@ class Transactions:
     def commit(self, positions: Sequence[TopicPartition], consumer: Consumer) -> None:
         """Commit what was produced, with the consumer's positions. Raises AbortedError, FencedError."""
         self.open()
-        self._insist(
-            lambda: self._producer.send_offsets_to_transaction(list(positions), consumer.consumer_group_metadata(), REQUEST_S)
-        )
+        metadata = consumer.consumer_group_metadata()
+        self._insist(lambda: self._within_reach(lambda: self._send(list(positions), metadata)))
         self._insist(lambda: self._producer.commit_transaction(REQUEST_S))
         self.is_open = False
         self.committed += 1
+
+    def _send(self, positions: list[TopicPartition], metadata: object) -> None:
+        self._producer.send_offsets_to_transaction(positions, metadata, REQUEST_S)
+
+    def _within_reach(self, ask: Callable[[], None]) -> None:
+        """Ask in a thread beside, which is left behind with its producer where no answer ever comes: after a restart of the
+        cluster this call may never return, whatever its time-out (librdkafka issues 5456 and 5511). Raises AbortedError."""
+        errors: list[KafkaException] = []
+
+        def asked() -> None:
+            try:
+                ask()
+            except KafkaException as error:
+                errors.append(error)
+
+        beside = Thread(target=asked, name="offsets", daemon=True)
+        beside.start()
+        beside.join(REQUEST_S + GRACE_S)
+        if beside.is_alive():
+            self._is_stuck = True
+            raise AbortedError(f"the cluster did not take the offsets within {REQUEST_S + GRACE_S:g} s")
+        if errors:
+            raise errors[0]
 
     def abort(self) -> None:
         """Give up what is open. A producer that cannot any more is replaced by another of its name."""
         self.aborted += 1
         self.is_open = False
-        try:
-            self._producer.abort_transaction(REQUEST_S)
-        except KafkaException:
-            self._producer = self._begun()
+        if not self._is_stuck:
+            try:
+                self._producer.abort_transaction(REQUEST_S)
+            except KafkaException:
+                pass
+            else:
+                return
+        self._is_stuck = False
+        self._producer = self._begun()
 
     def _insist(self, ask: Callable[[], object]) -> None:
         """Ask until there is an answer."""
