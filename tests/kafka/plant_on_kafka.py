@@ -35,7 +35,7 @@ from sparkplug.records.record import Origin, RecordError, RecordReader, RecordWr
 from tests.kafka.kafka_server import KafkaServer
 from tests.processors.streams import T0_MS, birth, data
 
-WAIT_S_MAX = 60.0
+WAIT_S_MAX = 45.0
 WRITER = "bridge-0"
 PASSING = (KafkaError.NOT_COORDINATOR, KafkaError.COORDINATOR_NOT_AVAILABLE, KafkaError.COORDINATOR_LOAD_IN_PROGRESS)
 Told = tuple[bytes, frozenset[tuple[str, bytes]], bytes]

@@ -17,6 +17,7 @@ from cnctwin.kafka.kept import read_kept
 from cnctwin.kafka.settings import KafkaSettings
 from cnctwin.kafka.topics import Topics
 from processors.actions import Declare
+from processors.errors import SnapshotError
 from processors.partition.results import action_of
 from processors.running.counts import Counts
 from processors.running.ports import EdgePort, HostPort
@@ -31,6 +32,7 @@ COMMIT_S = 1.0
 RESULTS_A_TURN = 500
 BEFORE_CUT_MS = 60_000
 READY_S_MAX = 60.0
+CATCH_UP_S_MAX = 60.0
 PAUSE_S = 0.2
 NOT_READY = (
     KafkaError.NOT_COORDINATOR,
@@ -71,6 +73,7 @@ class Back:
                 "enable.auto.commit": False,
                 "isolation.level": "read_committed",
                 "auto.offset.reset": "earliest",
+                "enable.partition.eof": True,
                 "fetch.wait.max.ms": 50,
             }
         )
@@ -103,22 +106,21 @@ class Back:
     def _catch_up(self, begins: Mapping[int, int], stopped: Mapping[int, int]) -> None:
         """Take results that went out before; nothing goes out, since no node is online."""
         self._next = dict(begins)
-        until_s = time.monotonic() + 60.0
-        while any(self._next[number] < stopped[number] for number in begins) and time.monotonic() < until_s:
-            before = dict(self._next)
+        until_s = time.monotonic() + CATCH_UP_S_MAX
+        while behind := [number for number in begins if self._next[number] < stopped[number]]:
+            if time.monotonic() > until_s:
+                raise SnapshotError(f"{self._topics.results}: partitions {behind} are not read within {CATCH_UP_S_MAX:g} s")
             self.turn(0.2)
-            if before == self._next:
-                for number in begins:  # control records at the end
-                    self._next[number] = max(self._next[number], stopped[number])
-        for number in begins:
-            self._next[number] = max(self._next[number], stopped[number])
 
     def turn(self, timeout_s: float = 0.0) -> int:
         """Publish what has come; return how many results."""
         messages = self._consumer.consume(RESULTS_A_TURN, timeout_s)
         for message in messages:
             if (error := message.error()) is not None:
-                _log.warning("kafka: %s", error.str())
+                if error.code() == KafkaError._PARTITION_EOF:  # behind the ends of transactions, which are no messages
+                    self._next[message.partition() or 0] = message.offset() or 0
+                else:
+                    _log.warning("kafka: %s", error.str())
                 continue
             self._next[message.partition() or 0] = (message.offset() or 0) + 1
             headers: Any = message.headers()
@@ -161,7 +163,7 @@ class Back:
 
 
 def _answered(ask: Callable[[], list[TopicPartition]]) -> list[TopicPartition]:
-    """Ask again while the cluster is not ready to answer, as one that has just started is not for a moment."""
+    """Ask again while the cluster is not ready to answer, as one that has just started is not for a moment. Raises SnapshotError."""
     until_s = time.monotonic() + READY_S_MAX
     while True:
         try:
@@ -169,7 +171,7 @@ def _answered(ask: Callable[[], list[TopicPartition]]) -> list[TopicPartition]:
         except KafkaException as error:
             reason = error.args[0]
             if not (reason.retriable() or reason.code() in NOT_READY) or time.monotonic() > until_s:
-                raise
+                raise SnapshotError(f"kafka: {reason.str()}") from error
             _log.warning("kafka: %s", reason.str())
             time.sleep(PAUSE_S)
 

@@ -184,13 +184,15 @@ class Bridge:
                 self._outward.watermark(topic, number, at_ms)
 
     def _tell_again(self, node: NodeId, device: str, now_ms: int) -> None:
-        """A birth or a death found no room: say what holds by now."""
+        """Something found no room: say what holds by now."""
         picture = self._host.picture(node)
         owner = None if picture is None else picture.devices.get(device)
         if owner is None:
             return
         kind = EventKind.BIRTH if owner.online else EventKind.DEATH
-        self._take(HostEvent(kind, node, device, owner.birth_ms, tuple(owner.readings.values()), "told again"), now_ms)
+        readings = tuple(owner.readings.values())
+        at_ms = max((owner.birth_ms, *(one.timestamp_ms for one in readings)))
+        self._take(HostEvent(kind, node, device, at_ms, readings, "told again"), now_ms)
 
     # Once a second.
 

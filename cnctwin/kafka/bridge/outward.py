@@ -1,15 +1,15 @@
 """Records to the log: bounded, in order, and counted where there is no room.
 
-While the cluster is away, records wait in memory, as many as there is room for. Then data are dropped, and a hole is told of each
-machine before the next record that goes out. A birth or a death that finds no room is told again from what is known of the
-machine.
+While the cluster is away, records wait in memory, as many as there is room for. Then they are dropped, and a hole is told of each
+machine before the next record that goes out. Once there is room again, what holds of such a machine by then is told again: values
+that changed in the hole may not change for long.
 """
 
 import logging
 from collections import Counter, deque
 from collections.abc import Sequence
 
-from confluent_kafka import KafkaError, Message, Producer
+from confluent_kafka import KafkaError, KafkaException, Message, Producer
 
 from cnctwin.kafka.settings import KafkaSettings
 from sparkplug.host import Held
@@ -18,11 +18,14 @@ from sparkplug.metric import NodeId
 from sparkplug.records.record import Headers, Origin, RecordWriter
 
 MESSAGES_MAX = 1_000_000
+UNSAID_MAX = 10_000
 FLUSH_S = 10.0
-_DATA, _HOLE = EventKind.DATA, EventKind.HOLE
+_HOLE = EventKind.HOLE
 _log = logging.getLogger(__name__)
 Source = tuple[str, str, NodeId, str]
 """Topic, key, node and device of a record."""
+Unsaid = tuple[str, str, int, str]
+"""Topic, key and partition of a plain message's record, and the topic of the message."""
 
 
 class Lot:
@@ -50,6 +53,8 @@ class Outward:
         self._writer = RecordWriter(name)
         self._lost: Counter[Source] = Counter()
         self._untold: dict[tuple[NodeId, str], None] = {}
+        self._unsaid: dict[Unsaid, tuple[Headers, bytes]] = {}
+        self._full = 0  # records that waited when there was no room
         self._lot = Lot(self)
         self._lots: deque[Lot] = deque()
         self._producer = Producer(
@@ -81,22 +86,32 @@ class Outward:
             detail = f"{lost} messages of {device} found no room on the way to the log"
             hole = HostEvent(_HOLE, event.node, device, event.timestamp_ms, detail=detail)
             if not self._send(topic, key, *self._writer.written(hole, received_ms, origin._replace(seq=-1))):
-                self._lost[source] += 1
-                self.dropped += 1
-                return False
+                return self._drop(source)
             del self._lost[source]
-        if self._send(topic, key, *self._writer.written(event, received_ms, origin)):
-            return True
+        failed = self.failed
+        if not self._send(topic, key, *self._writer.written(event, received_ms, origin)):
+            return self._drop(source)
+        if self.failed > failed:  # whoever tells it again fares no better
+            self._lost[source] += 1
+        return True
+
+    def _drop(self, source: Source) -> bool:
         self.dropped += 1
         self._lost[source] += 1
-        if event.kind is not _DATA:
-            self._untold[event.node, device] = None
+        self._untold[source[2], source[3]] = None
         return False
 
     def put_plain(self, topic: str, key: str, partition: int, event: HostEvent, received_ms: int) -> bool:
-        """Have a plain message go out to one partition."""
+        """Have a plain message go out to one partition. Of those that find no room the newest of each topic goes out later."""
         headers, value = self._writer.written(event, received_ms, Origin())
-        return self._send(topic, key, headers, value, partition)
+        place = topic, key, partition, event.topic
+        if self._send(topic, key, headers, value, partition):
+            self._unsaid.pop(place, None)
+            return True
+        self.dropped += place in self._unsaid or len(self._unsaid) >= UNSAID_MAX
+        if place in self._unsaid or len(self._unsaid) < UNSAID_MAX:
+            self._unsaid[place] = headers, value
+        return False
 
     def watermark(self, topic: str, partition: int, at_ms: int) -> None:
         """Have a watermark go out; one that finds no room is no loss, since the next one says more."""
@@ -106,9 +121,14 @@ class Outward:
         """Have a value kept on a compacted topic."""
         return self._send(topic, key, [], value)
 
+    @property
+    def _has_room(self) -> bool:
+        """True once half of what waited is gone: room for one record is none."""
+        return len(self._producer) <= self._full // 2
+
     def take_untold(self) -> list[tuple[NodeId, str]]:
-        """Return the devices whose birth or death found no room, once there is room again."""
-        if not self._untold or len(self._producer) > MESSAGES_MAX // 2:
+        """Return the devices of which something found no room, once there is room again."""
+        if not self._untold or not self._has_room:
             return []
         untold, self._untold = list(self._untold), {}
         return untold
@@ -116,6 +136,12 @@ class Outward:
     def poll(self) -> None:
         """Have delivery reports come in."""
         self._producer.poll(0)
+        if self._unsaid and self._has_room:
+            for place, (headers, value) in list(self._unsaid.items()):
+                topic, key, partition, _ = place
+                if not self._send(topic, key, headers, value, partition):
+                    break
+                del self._unsaid[place]
 
     def close(self) -> int:
         """Wait for what is on its way; return the number of records that were not acknowledged."""
@@ -125,8 +151,12 @@ class Outward:
         try:
             self._producer.produce(topic, value, key.encode(), partition, self._lot.delivered, headers=headers)
         except BufferError:
+            self._full = len(self._producer)
             self._producer.poll(0)
             return False
+        except KafkaException as error:  # too large for the cluster, whenever it is tried
+            self._refused(topic, error.args[0])
+            return True
         self._lot.waiting += 1
         return True
 
@@ -149,6 +179,9 @@ class Outward:
         if error is None:
             self.delivered += 1
             return
+        self._refused(message.topic() or "", error)
+
+    def _refused(self, topic: str, error: KafkaError) -> None:
         self.failed += 1
         self.trouble = error.str()
-        _log.warning("kafka: a record on %s is lost: %s", message.topic(), error.str())
+        _log.warning("kafka: a record on %s is lost: %s", topic, error.str())
