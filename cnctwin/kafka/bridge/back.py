@@ -111,6 +111,10 @@ class Back:
             if time.monotonic() > until_s:
                 raise SnapshotError(f"{self._topics.results}: partitions {behind} are not read within {CATCH_UP_S_MAX:g} s")
             self.turn(0.2)
+        for number, stop in stopped.items():
+            if 0 <= stop < self._next[number]:  # of these nobody was told: they are read again when somebody can be
+                self._next[number] = stop
+                self._consumer.seek(TopicPartition(self._topics.results, number, stop))
 
     def turn(self, timeout_s: float = 0.0) -> int:
         """Publish what has come; return how many results."""

@@ -125,8 +125,8 @@ class Bridge:
             self._take(event, now_ms)
         self._births.catch_up()
         self._outward.owe(self._host.take_held())
-        if self._back is not None:
-            self._back.turn()
+        if self._back is not None and self._host.online and all(node.online for node in self._nodes.values()):
+            self._back.turn()  # else results wait in the log: what is published while nobody listens is lost
         self._outward.poll()
         self._host.acknowledge(self._outward.take_safe())
         now_s = time.monotonic()
