@@ -1,4 +1,4 @@
-"""A runner killed by -9 at a certain place of one of its transactions: `GROUP MEMBER BOOTSTRAP PLACE TRANSACTION NAMES…`."""
+"""A runner that is killed by -9 in one of its transactions: `GROUP MEMBER BOOTSTRAP PLACE TRANSACTION NAMES…`."""
 
 import os
 import signal

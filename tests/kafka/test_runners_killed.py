@@ -34,7 +34,7 @@ def test_one_runner_and_its_successor_tell_what_a_replay_tells(kafka: KafkaServe
 @pytest.mark.parametrize(("place", "heir"), [*((place, "r0") for place in PLACES), ("produced", "r1")])
 def test_killed_anywhere_in_a_transaction(kafka: KafkaServer, tmp_path: Path, place: str, heir: str) -> None:
     """Its own successor ends what it left open; another member does so once the group has given it up."""
-    with Plant(kafka, f"dead.{place.partition(' ')[0]}.{heir}", processors(*NAMES)) as plant:
+    with Plant(kafka, f"dead.{place.split(maxsplit=1)[0]}.{heir}", processors(*NAMES)) as plant:
         plant.play(10)
         command = ("tests.kafka.dying_runner", plant.topics.group, "r0", kafka.bootstrap, place, "3", *NAMES)
         with Program(tmp_path, "dying", *command, environment=environment_of(plant.settings)) as dying:
