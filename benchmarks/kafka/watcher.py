@@ -13,7 +13,7 @@ from twin.vocabulary.nodes import is_twin_node
 from twin.vocabulary.topics import ALERT_OUTBOX
 
 Headers = dict[str, Any]
-GONE_S = 5.0
+GONE_S = 10.0
 _OUTBOX = ALERT_OUTBOX.encode()
 
 

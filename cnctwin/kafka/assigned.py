@@ -8,7 +8,7 @@ from confluent_kafka import KafkaException, Message, TopicPartition
 from confluent_kafka.admin import AdminClient
 
 from cnctwin.kafka.counted import Counted
-from cnctwin.kafka.kept import ANSWER_S, read_kept
+from cnctwin.kafka.kept import ANSWER_S, fence_open, read_kept
 from cnctwin.kafka.settings import KafkaSettings
 from cnctwin.kafka.topics import Topics
 from cnctwin.kafka.transaction import fence
@@ -52,9 +52,9 @@ class Assigned:
         """Restore partitions that have come; return from where each is to be read. Raises SnapshotError."""
         began_s = time.monotonic()
         numbers = sorted({number for _, number in places})
-        kept = read_kept(
-            self._settings.client(), self._topics.snapshots, numbers, timeout_s=RESTORE_S_MAX, fence=self._fence_if_gone
-        )
+        client, fence_it = self._settings.client(), self._fence_if_gone
+        fence_open(client, self._topics.results, numbers, timeout_s=RESTORE_S_MAX, fence=fence_it)
+        kept = read_kept(client, self._topics.snapshots, numbers, timeout_s=RESTORE_S_MAX, fence=fence_it)
         positions = []
         for place, (topic, number) in enumerate(places):
             partition = Partition(self._reader, self._pairs[topic], topic)

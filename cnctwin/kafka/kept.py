@@ -41,6 +41,25 @@ def read_kept(client: Conf, topic: str, partitions: Sequence[int], *, timeout_s:
         uncommitted.close()
 
 
+def fence_open(client: Conf, topic: str, partitions: Sequence[int], *, timeout_s: float, fence: Fence) -> None:
+    """Fence whoever has a transaction open in some partitions: until it ends, nobody who reads what is committed sees what comes
+    behind it. Raises SnapshotError where the cluster does not answer in time."""
+    common = client | {"group.id": f"{topic}.read", "enable.auto.commit": False}
+    uncommitted = Consumer(common | {"isolation.level": "read_uncommitted"})
+    committed = Consumer(common | {"isolation.level": "read_committed"})
+    try:
+        ends = {number: _watermarks(uncommitted, topic, number, timeout_s)[1] for number in partitions}
+        stable = {number: _watermarks(committed, topic, number, timeout_s)[1] for number in partitions}
+        begins = {number: at for number, at in stable.items() if at < ends[number]}
+        for writer in _writers(uncommitted, topic, begins, ends) if begins else ():
+            fence(writer)
+    except KafkaException as error:
+        raise SnapshotError(f"{topic}: {error.args[0].str()}") from error
+    finally:
+        committed.close()
+        uncommitted.close()
+
+
 def _watermarks(consumer: Consumer, topic: str, number: int, timeout_s: float) -> tuple[int, int]:
     """Return the first offset of a partition and the one behind its last; waits while it has no leader."""
     until_s = time.monotonic() + timeout_s
