@@ -24,6 +24,7 @@ SIGNALS = (
     MetricSpec("spindle_rpm", DataType.DOUBLE, unit="rev/min", value=0.0),
     MetricSpec("spindle_load_pct", DataType.DOUBLE, unit="%", value=0.0),
     MetricSpec("ambient_temp_c", DataType.DOUBLE, unit="°C", value=21.5),
+    MetricSpec("spindle_temp_c", DataType.DOUBLE, unit="°C", value=24.0),
     MetricSpec("program", DataType.STRING, value="A"),
 )
 
@@ -44,7 +45,7 @@ class Hall:
         return self
 
     def begin(self, plant: Plant, *bridges: str) -> None:
-        """Have the machines come once bridges of these names read the broker: none asks for the births of those it never heard."""
+        """Have the machines come once bridges of these names read the broker: none asks those that it never heard."""
         self.until(lambda: set(bridges) <= writers_of(plant), "the bridges mark the log")
         for machine, edge in self.edges.items():
             edge.declare_device(machine, SIGNALS)

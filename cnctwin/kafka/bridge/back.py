@@ -167,7 +167,10 @@ class Back:
 
 
 def _answered(ask: Callable[[], list[TopicPartition]]) -> list[TopicPartition]:
-    """Ask again while the cluster is not ready to answer, as one that has just started is not for a moment. Raises SnapshotError."""
+    """Ask again while the cluster is not ready to answer, as one that has just started is not for a moment.
+
+    Raises SnapshotError.
+    """
     until_s = time.monotonic() + READY_S_MAX
     while True:
         try:

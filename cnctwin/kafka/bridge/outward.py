@@ -83,6 +83,8 @@ class Outward:
         device = event.device or ""
         source = topic, key, event.node, device
         if self._lost and (lost := self._lost.get(source)):
+            if not self._has_room:  # what is small might find some, and fill it with holes
+                return self._drop(source)
             detail = f"{lost} messages of {device} found no room on the way to the log"
             hole = HostEvent(_HOLE, event.node, device, event.timestamp_ms, detail=detail)
             if not self._send(topic, key, *self._writer.written(hole, received_ms, origin._replace(seq=-1))):
