@@ -108,7 +108,8 @@ class Assigned:
     def _fence_if_gone(self, writer: str) -> None:
         """End the transaction of a runner that is in the group no more. One that lives has to end it itself."""
         group, _, member = writer.rpartition(".")
-        if group == self._reader and member in self._members():
+        members = self._members(group)
+        if members is None or member in members:
             return
         _log.warning("%s is gone; what it left open is aborted", writer)
         try:
@@ -116,13 +117,14 @@ class Assigned:
         except KafkaException as error:
             _log.warning("%s: its open transaction ends by its time-out: %s", writer, error.args[0].str())
 
-    def _members(self) -> set[str]:
+    def _members(self, group: str) -> set[str] | None:
+        """Return the runners of a group, this one or another; None where the cluster does not say."""
         admin = AdminClient(self._settings.client())
         try:
-            described = admin.describe_consumer_groups([self._reader])[self._reader].result(ANSWER_S)
+            described = admin.describe_consumer_groups([group])[group].result(ANSWER_S)
         except KafkaException as error:
-            _log.warning("%s: the members are not known: %s", self._reader, error.args[0].str())
-            return set()
+            _log.warning("%s: the members are not known: %s", group, error.args[0].str())
+            return None
         return {member.group_instance_id or "" for member in described.members}
 
 

@@ -13,6 +13,7 @@ from cnctwin.kafka.sink import Sink
 from cnctwin.kafka.topics import Topics, ensure
 from cnctwin.kafka.transaction import FencedError
 from cnctwin.running.processors import courier_of
+from processors.errors import ConfigurationError
 from processors.historian import HistorianConfig
 from processors.running.runtime import Configured
 from sparkplug.broker import BrokerAddress
@@ -34,6 +35,8 @@ def run_over_kafka(
 
     broker: for the courier of alerts, which reads what is to be sent there; None where nobody is to be told
     """
+    if "." in member:  # it stands behind the last dot of the transactional id
+        raise ConfigurationError(f"--member {member!r} has a dot; give it a name without one")
     topics = Topics(group)
     ensure(settings, topics, cell_processors(pairs))
     with courier_of(pairs, broker, group), _sink(pairs) as sink:
