@@ -67,6 +67,7 @@ def _over_kafka(
         from cnctwin.kafka.running import run_over_kafka
     settings, pairs = settings_of(kafka, kafka_config), configured(names, config)
     with stopped_by_signals() as stop:
-        run_over_kafka(
+        name = member or socket.gethostname().partition(".")[0]
+        run_over_kafka(settings, pairs, stop, group=group, member=name, broker=address(broker))
             settings, pairs, stop, group=group, member=member or socket.gethostname().partition(".")[0], broker=address(broker)
         )
