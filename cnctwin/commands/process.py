@@ -66,8 +66,6 @@ def _over_kafka(
     with needed_by("cnctwin process --kafka", "kafka"):
         from cnctwin.kafka.running import run_over_kafka
     settings, pairs = settings_of(kafka, kafka_config), configured(names, config)
+    name = member or socket.gethostname().partition(".")[0]
     with stopped_by_signals() as stop:
-        name = member or socket.gethostname().partition(".")[0]
         run_over_kafka(settings, pairs, stop, group=group, member=name, broker=address(broker))
-            settings, pairs, stop, group=group, member=member or socket.gethostname().partition(".")[0], broker=address(broker)
-        )
