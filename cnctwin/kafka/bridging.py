@@ -56,7 +56,7 @@ def bridge(
         for node in (lock, *own):
             stack.callback(SessionLock(state_dir / f"{node.node}.json", f"{node.group}/{node.node}").release)
         refuse_second(broker, own, "end that one first, or give this bridge other --results")
-        ensure(settings, topics, cell_processors(pairs))
+        ensure(settings, topics, cell_processors(pairs), without=(topics.deadletters,))
         loop = Loop("bridge")
         host = HostApplication(
             broker,

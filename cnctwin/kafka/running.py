@@ -38,7 +38,7 @@ def run_over_kafka(
     if "." in member:  # it stands behind the last dot of the transactional id
         raise ConfigurationError(f"--member {member!r} has a dot; give it a name without one")
     topics = Topics(group)
-    ensure(settings, topics, cell_processors(pairs))
+    ensure(settings, topics, cell_processors(pairs), without=(topics.births,))
     with courier_of(pairs, broker, group), _sink(pairs) as sink:
         while not stop.is_set():
             began_s = time.monotonic()

@@ -5,9 +5,10 @@ number, and one runner has them all.
 """
 
 import time
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
+from typing import Any
 
 from confluent_kafka import KafkaError, KafkaException
 from confluent_kafka.admin import AdminClient, NewTopic
@@ -16,6 +17,7 @@ from cnctwin.kafka.settings import KafkaSettings
 from processors.errors import ConfigurationError
 
 ANSWER_S = 30.0
+ATTEMPT_S = 1.0
 MADE_S_MAX = 60.0
 HOUR_MS = 3_600_000
 COMPACTED = {
@@ -86,20 +88,24 @@ class Topics:
         return {**dict.fromkeys(logs, kept), **dict.fromkeys((self.snapshots, self.births, self.health), COMPACTED)}
 
 
-def ensure(settings: KafkaSettings, topics: Topics, cell_processors: Sequence[str]) -> None:
+def ensure(settings: KafkaSettings, topics: Topics, cell_processors: Sequence[str], without: Collection[str] = ()) -> None:
     """Make the topics that are missing, or say which are. Raises ConfigurationError: for topics that are missing where we may not
-    make them, and for one with another number of partitions."""
-    admin = AdminClient(settings.client())
-    wanted = topics.all(cell_processors)
+    make them, for one with another number of partitions, and for a cluster that does not let us in.
+
+    without: those that the caller neither reads nor writes, and so may have no right to see
+    """
+    admin = _Asked(settings)
+    wanted = {name: of for name, of in topics.all(cell_processors).items() if name not in without}
     retention = {"retention.ms": str(round(settings.retention_hours * HOUR_MS))}
-    missing = [name for name in wanted if name not in _present(admin)]
+    present = admin.present()
+    missing = [name for name in wanted if name not in present]
     if missing and not settings.create_topics:
         raise ConfigurationError(
             f"kafka: the topics {', '.join(missing)} are missing; make them (docs/kafka.md), or set create_topics"
         )
     made: dict[str, Future[None]] = {}
     if missing:
-        made = admin.create_topics(
+        made = admin.client.create_topics(
             [
                 NewTopic(
                     name,
@@ -119,19 +125,42 @@ def ensure(settings: KafkaSettings, topics: Topics, cell_processors: Sequence[st
     _await_leaders(admin, wanted, settings.partitions)
 
 
-def _present(admin: AdminClient) -> dict[str, int]:
-    """Return the topics that have a leader for each partition, with their number of partitions."""
-    try:
-        found = admin.list_topics(timeout=ANSWER_S).topics
-    except KafkaException as error:
-        raise ConfigurationError(f"kafka: no answer from the cluster: {error.args[0].str()}") from error
-    return {name: len(topic.partitions) for name, topic in found.items() if topic.error is None}
+class _Asked:
+    """The cluster as it answers, or why it does not."""
+
+    def __init__(self, settings: KafkaSettings) -> None:
+        self._trouble: dict[int, str] = {}
+        self._who = settings.username or "us"
+        # Its log has a line for each attempt; what is in them comes to `_note` as well.
+        conf: dict[str, Any] = {**settings.client(), "error_cb": self._note, "log_level": 0}
+        self.client = AdminClient(conf)
+
+    def _note(self, error: KafkaError) -> None:
+        self._trouble[error.code()] = error.str()
+
+    def present(self) -> dict[str, int]:
+        """Return the topics that have a leader for each partition, with their number of partitions."""
+        until_s = time.monotonic() + ANSWER_S
+        while True:
+            try:
+                found = self.client.list_topics(timeout=ATTEMPT_S).topics
+            except KafkaException as error:
+                self.client.poll(0)
+                for refusal in (KafkaError._AUTHENTICATION, KafkaError._SSL):
+                    if refusal in self._trouble:
+                        why = self._trouble[refusal]
+                        raise ConfigurationError(f"kafka: the cluster does not let {self._who} in: {why}") from error
+                if time.monotonic() > until_s:
+                    why = next(reversed(self._trouble.values()), error.args[0].str())
+                    raise ConfigurationError(f"kafka: no answer from the cluster: {why}") from error
+            else:
+                return {name: len(topic.partitions) for name, topic in found.items() if topic.error is None}
 
 
-def _await_leaders(admin: AdminClient, wanted: dict[str, dict[str, str]], partitions: int) -> None:
+def _await_leaders(admin: _Asked, wanted: dict[str, dict[str, str]], partitions: int) -> None:
     until_s = time.monotonic() + MADE_S_MAX
     while True:
-        found = _present(admin)
+        found = admin.present()
         missing = [name for name in wanted if name not in found]
         if not missing:
             break

@@ -33,7 +33,7 @@ class Runners:
 
 def start(monkeypatch: pytest.MonkeyPatch, runners: Runners, stop: Event | None = None) -> None:
     monkeypatch.setattr(module, "Runner", runners)
-    monkeypatch.setattr(module, "ensure", lambda *_: None)
+    monkeypatch.setattr(module, "ensure", lambda *_, **__: None)
     monkeypatch.setattr(module.time, "monotonic", lambda: runners.now_s)
     processor = discover()["thermal"]
     pairs = [(processor, processor.configured({}))]
