@@ -47,7 +47,7 @@ class LagReport:
 
     @property
     def load(self) -> str:
-        """What they have to do, and with what.
+        """The work that they have to do, and the means for it.
 
         >>> LagReport(("thermal",), "kafka: thermal", 0, 18.2, 20, 98.0, 2, 12, 40_213).load
         '20 machines, 40213 records wait, 2 runners with 12 partitions, the busiest 98 % busy'

@@ -216,7 +216,7 @@ class HostApplication:
                 return events
 
     def restore(self, births: Iterable[tuple[str, bytes]]) -> None:
-        """As `HostSession.restore`, before `start`."""
+        """Take births that an earlier run has heard (`HostSession.restore`). Call it before `start`."""
         self._session.restore(births, now_ms())
 
     def take_held(self) -> list[Held]:

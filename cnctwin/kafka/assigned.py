@@ -30,9 +30,10 @@ class Assigned:
         settings: KafkaSettings,
         topics: Topics,
         pairs: Sequence[Configured],
-        begin: Callable[[Place, int], int] = lambda _, offset: offset,
+        begin: Callable[[Place, int], int] | None = None,
     ) -> None:
-        """`begin`: takes a partition and the offset from which its folds go on; returns that from which it is read."""
+        """`begin`: takes a partition and the offset from which its folds go on; returns that from which it is read, where that is
+        another one."""
         self.partitions: dict[Place, Partition] = {}
         self.restored_s = 0.0  # that the last restoration took
         self.lost = 0  # records that the log held no more when their turn came

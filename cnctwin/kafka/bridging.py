@@ -1,7 +1,6 @@
-"""A bridge from its options: the host session, the edge nodes of the processors that it publishes, and the courier of alerts."""
+"""A bridge from its options: the host session and the edge nodes of the processors that it publishes."""
 
 import fnmatch
-import logging
 from collections.abc import Collection, Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -26,7 +25,6 @@ from sparkplug.transport.loop import Loop
 from twin.vocabulary.nodes import is_twin_node
 from twin.vocabulary.topics import RESERVED_MACHINES
 
-_log = logging.getLogger(__name__)
 
 
 def bridge(

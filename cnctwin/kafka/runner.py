@@ -24,7 +24,7 @@ from cnctwin.kafka.sink import Sink
 from cnctwin.kafka.topics import Topics
 from cnctwin.kafka.transaction import AbortedError, FencedError, Transactions, written_by
 from cnctwin.kafka.waiting import Waiting
-from processors.actions import DeadLetter, Pin
+from processors.actions import DeadLetter, Pin, PlainOutput
 from processors.errors import SnapshotError
 from processors.partition.partition import Partition
 from processors.partition.results import Results
@@ -53,7 +53,7 @@ class Runner:
         self.group = topics.runners(names)
         self._settings, self._topics, self._member, self._sink = settings, topics, member, sink
         self._name = f"{self.group}.{member}"
-        self._assigned = Assigned(settings, topics, pairs, *(() if sink is None else (sink.begin,)))
+        self._assigned = Assigned(settings, topics, pairs, None if sink is None else sink.begin)
         self._results = {processor.name: Results(topics.group, processor) for processor, _ in pairs}
         self._writer = RecordWriter(self._name)
         self._waiting = Waiting()
@@ -146,7 +146,7 @@ class Runner:
                     if self._sink is not None:
                         self._sink.pin(action)
                 elif (event := of_processor.event(action, result.at_ms)) is not None:
-                    retain = event.topic != "" and getattr(action, "retain", False)
+                    retain = isinstance(action, PlainOutput) and action.retain
                     headers, value = self._writer.written(event, record.received_ms, Origin(), retain=retain)
                     headers.append(("processor", result.seat.name.encode()))
                     self._transactions.produce(self._topics.results, event.device or result.seat.name, value, place[1], headers)

@@ -69,13 +69,13 @@ class Partition:
     def restore(self, kept: Mapping[str, bytes]) -> int:
         """Take what was saved, newest value by key; return the offset to read from. A processor whose states are of another
         version begins with what the log still holds, and says nothing of what it said before."""
-        markers = [_json(value)["processors"] for key, value in kept.items() if key.startswith(MARKER)]
+        markers = [json.loads(value)["processors"] for key, value in kept.items() if key.startswith(MARKER)]
         self._descriptions = {key.removeprefix(DESCRIPTION): value for key, value in kept.items() if key.startswith(DESCRIPTION)}
         for seat in self.seats:
             self._describe_all(seat)
             self._restore(seat, kept, markers)
         self.next = self._begin = min(seat.from_offset for seat in self.seats)
-        lives = [_json(value) for key, value in kept.items() if key.startswith(LIVES + self._topic)]
+        lives = [json.loads(value) for key, value in kept.items() if key.startswith(LIVES + self._topic)]
         known: Mapping[str, dict[str, list[int]]] = next((one["devices"] for one in lives if one["folded"] == self.next), {})
         self._lives = {device: Lives(of_device) for device, of_device in known.items()}
         return self.next
@@ -230,6 +230,3 @@ class Partition:
             seat.faults.clear()
         return faults
 
-
-def _json(value: bytes) -> Any:
-    return json.loads(value)

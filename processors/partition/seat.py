@@ -21,7 +21,6 @@ from processors.running.dead_letter import letter_of_message
 from processors.running.engine import Engine
 from processors.running.ledger import DropReason
 from sparkplug.host_event import HostEvent
-from twin.errors import MachineError
 
 FORMAT = 1
 _to_json = json.JSONEncoder(separators=(",", ":"), ensure_ascii=False).encode
@@ -129,8 +128,6 @@ class Seat:
         try:
             description = read_message(payload, machine).description(machine) if payload else None
             return self.engine.describe(machine, role, description)
-        except MachineError as error:
-            self._note(f"the {role} description of {machine}", error)
         except Exception as error:  # the one before goes on
             self._note(f"the {role} description of {machine}", error)
         return []

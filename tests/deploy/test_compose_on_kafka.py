@@ -209,7 +209,7 @@ def test_a_second_preparation_changes_nothing_and_without_kafka_nothing_of_it_is
 
 
 def test_compose_itself_reads_both_files_as_this_test_does(prepared: PreparedForKafka, tmp_path: Path) -> None:
-    """With the library that docker compose reads them with; its variables are put in before, as `--env-file` does."""
+    """Read by the library that docker compose reads them with; its variables are put in before, as `--env-file` does."""
     program = built(COMPOSE_READER)
     files = [tmp_path / "compose.yml", tmp_path / "kafka.yml"]
     for file in files:

@@ -43,7 +43,7 @@ KAFKA_PORT = 9093
 
 
 class Workload(NamedTuple):
-    """What runs: its manifest, its pod, its one container."""
+    """A workload: its manifest, its pod, its one container."""
 
     manifest: dict[str, Any]
     pod: dict[str, Any]
@@ -63,7 +63,7 @@ class Workload(NamedTuple):
 
 
 def workloads() -> dict[str, Workload]:
-    """What runs, by name."""
+    """The workloads, by name."""
     running = [one for one in MANIFESTS if one["kind"] in ("StatefulSet", "Deployment", "DaemonSet", "Job", "CronJob")]
     pods = [one["spec"]["template"]["spec"] for one in running]
     return {one["metadata"]["name"]: Workload(one, pod, pod["containers"][0]) for one, pod in zip(running, pods, strict=True)}
@@ -341,7 +341,7 @@ def test_prepare_says_what_it_wants(arguments: tuple[str, ...], tmp_path: Path) 
 
 
 def rendered(home: Path) -> list[dict[str, Any]]:
-    """What `kubectl apply -k` would send, by kustomize."""
+    """The manifests that `kubectl apply -k` would send, by kustomize."""
     if program := shutil.which("kustomize"):
         command = [program, "build"]
     elif program := shutil.which("kubectl"):

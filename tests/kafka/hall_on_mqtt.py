@@ -101,7 +101,7 @@ def bridge_program(folder: Path, hall: Hall, settings: KafkaSettings, names: Seq
 
 
 def records_of(plant: Plant, machine: str) -> list[Record]:
-    """What the log says of a machine, in its order."""
+    """The records of a machine, in the order of the log."""
     reader, found = RecordReader(), []
     for messages in plant.read(plant.topics.readings).values():
         for message in messages:
@@ -114,7 +114,7 @@ def records_of(plant: Plant, machine: str) -> list[Record]:
 
 
 def writers_of(plant: Plant) -> set[str]:
-    """Who has written to the log."""
+    """The names of those that have written to the log."""
     messages = [message for of in plant.read(plant.topics.readings).values() for message in of]
     headers: list[dict[str, Any]] = [dict(message.headers() or ()) for message in messages]
     return {told["writer"].decode() for told in headers}

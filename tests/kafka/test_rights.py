@@ -20,7 +20,7 @@ BRIDGES, RUNNERS = f"{PREFIX}bridge.bridge-0", f"{PREFIX}mirror+rules"
 
 @pytest.fixture(scope="module")
 def kafka(secured_kafka: KafkaServer) -> KafkaServer:
-    """With the topics of a plant, and the rights that the script asks for."""
+    """A cluster with the topics of a plant, and the rights that the script asks for."""
     secured_kafka.create_topics(*(PREFIX + topic for topic in TOPICS), f"{PREFIX}other", "elsewhere")
     for right in rights(GROUP=GROUP):
         kind = right.kind.removeprefix("--").replace("-", "_")
@@ -29,7 +29,7 @@ def kafka(secured_kafka: KafkaServer) -> KafkaServer:
 
 
 def operations(kafka: KafkaServer, user: str, topic: str) -> set[AclOperation]:
-    """What the broker says a user may do with a topic; nothing where it may not even know of it."""
+    """The operations that a user may do with a topic, as the broker says; none where it may not even know of it."""
     admin = AdminClient(kafka.client(AS[user]))
     (asked,) = admin.describe_topics(TopicCollection([topic]), include_authorized_operations=True).values()
     try:
@@ -86,7 +86,7 @@ def test_readings_go_in_and_results_come_out_with_these_rights(kafka: KafkaServe
 
 @pytest.mark.parametrize(("user", "name"), [(BRIDGE, f"{RUNNERS}.runner-physics-0"), (RUNNER, "elsewhere.runner-physics-0")])
 def test_nobody_else_takes_part_in_the_transactions_of_a_runner(kafka: KafkaServer, user: str, name: str) -> None:
-    """Who could begin one under its name would throw the runner out."""
+    """A user who could begin one under its name would throw the runner out."""
     producer = Producer(kafka.client(AS[user]) | {"transactional.id": name})
     with pytest.raises(KafkaException) as refused:
         producer.init_transactions(WAIT_S_MAX)

@@ -127,7 +127,7 @@ def test_states_are_whole_after_their_topic_was_compacted(kafka: KafkaServer) ->
         with RunnerHere(plant, "r0") as runner:
 
             def compacted() -> bool:
-                """Whether most of what was written to a partition is gone, in each of them."""
+                """Return True if most of what was written to a partition is gone, in each of them."""
                 plant.play(1)
                 found = plant.read(plant.topics.snapshots)
                 return all(of and len(of) < (of[-1].offset() or 0) // 2 for of in found.values())

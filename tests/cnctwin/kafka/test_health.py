@@ -48,7 +48,7 @@ def partition_of(*taken: Record) -> Partition:
 
 
 class Plant:
-    """What a report asks for: partitions, how far the log is, and what was committed."""
+    """The parts that a report asks for: partitions, how far the log is, and what was committed."""
 
     committed, aborted, lost, restored_s = 7, 2, 0, 0.25
 

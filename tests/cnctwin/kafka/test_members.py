@@ -1,4 +1,4 @@
-"""What bridges and runners report of themselves becomes metrics: who lives, who is silent, and counts that never fall."""
+"""The reports of bridges and runners become metrics: who lives, who is silent, and counts that never fall."""
 
 import json
 from dataclasses import asdict, replace

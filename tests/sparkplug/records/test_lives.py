@@ -1,4 +1,4 @@
-"""What a log holds twice counts once, whoever wrote it, and wherever the reader was started again."""
+"""A record that a log holds twice counts once, whoever wrote it, and wherever the reader was started again."""
 
 import json
 
