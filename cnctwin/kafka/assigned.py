@@ -59,8 +59,9 @@ class Assigned:
         positions = []
         for place, (topic, number) in enumerate(places):
             partition = Partition(self._reader, self._pairs[topic], topic)
-            offset = self._begin((topic, number), partition.restore(kept[number]))
-            partition.next = offset
+            offset = partition.restore(kept[number])
+            if self._begin is not None:
+                offset = partition.next = self._begin((topic, number), offset)
             self._retire((topic, number))
             self.partitions[topic, number] = partition
             # Cuts of several partitions are spread over the time between two.

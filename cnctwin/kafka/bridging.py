@@ -26,7 +26,6 @@ from twin.vocabulary.nodes import is_twin_node
 from twin.vocabulary.topics import RESERVED_MACHINES
 
 
-
 def bridge(
     settings: KafkaSettings,
     pairs: Sequence[Configured],

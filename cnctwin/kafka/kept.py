@@ -7,7 +7,7 @@ wait until that transaction has ended. It ends by its time-out, or at once where
 import logging
 import time
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 from confluent_kafka import OFFSET_BEGINNING, Consumer, KafkaError, KafkaException, Message, TopicPartition
 
@@ -18,7 +18,16 @@ ANSWER_S = 10.0
 POLL_S = 0.2
 STUCK_S = 0.3  # behind the end without anything new: a transaction is open
 WRITER = "writer"
-PASSING = (KafkaError.NOT_LEADER_FOR_PARTITION, KafkaError.LEADER_NOT_AVAILABLE, KafkaError.UNKNOWN_TOPIC_OR_PART)
+NOT_READY = (
+    KafkaError.NOT_LEADER_FOR_PARTITION,
+    KafkaError.LEADER_NOT_AVAILABLE,
+    KafkaError.UNKNOWN_TOPIC_OR_PART,
+    KafkaError.NOT_COORDINATOR,
+    KafkaError.COORDINATOR_NOT_AVAILABLE,
+    KafkaError.COORDINATOR_LOAD_IN_PROGRESS,
+    KafkaError._WAIT_COORD,
+)
+T = TypeVar("T")
 Kept = dict[int, dict[str, bytes]]
 Fence = Callable[[str], None]
 """Ends the transaction of a writer that is gone; does nothing for one that lives."""
@@ -60,19 +69,28 @@ def fence_open(client: Conf, topic: str, partitions: Sequence[int], *, timeout_s
         uncommitted.close()
 
 
-def _watermarks(consumer: Consumer, topic: str, number: int, timeout_s: float) -> tuple[int, int]:
-    """Return the first offset of a partition and the one behind its last; waits while it has no leader."""
+def answered(ask: Callable[[], T | None], timeout_s: float) -> T:
+    """Ask until the cluster answers: one that has just started, or changed, is not ready for a moment. Raises KafkaException."""
     until_s = time.monotonic() + timeout_s
     while True:
         try:
-            found = consumer.get_watermark_offsets(TopicPartition(topic, number), ANSWER_S)
+            found = ask()
         except KafkaException as error:
-            if (not error.args[0].retriable() and error.args[0].code() not in PASSING) or time.monotonic() > until_s:
+            reason = error.args[0]
+            if not (reason.retriable() or reason.code() in NOT_READY) or time.monotonic() > until_s:
                 raise
+            _log.warning("kafka: %s", reason.str())
         else:
             if found is not None:
                 return found
+            if time.monotonic() > until_s:
+                raise KafkaException(KafkaError(KafkaError._TIMED_OUT))
         time.sleep(POLL_S)
+
+
+def _watermarks(consumer: Consumer, topic: str, number: int, timeout_s: float) -> tuple[int, int]:
+    """Return the first offset of a partition and the one behind its last; waits while it has no leader."""
+    return answered(lambda: consumer.get_watermark_offsets(TopicPartition(topic, number), ANSWER_S), timeout_s)
 
 
 class _Reading:

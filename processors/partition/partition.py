@@ -5,7 +5,7 @@
 Everything that a state depends on is in the records and their order: time on the wall is the writer's, silence is a watermark. So
 a partition that was restored anywhere and folds the rest comes to the same state, bit for bit, as one that has folded all of it.
 
-Saved are, by key: `<processor>/<unit>`, a unit's state; `~description/<topic>`, a description that holds;
+Saved are, by key: `<processor>/<unit>`, a unit's state; `~description/<reader>|<topic>`, a description that holds;
 `~lives/<topic>/<reader>`, which messages were there already; and `~marker/<topic>/<reader>`, how far this reader has come with
 each processor: the offset at which its states were cut, and that up to which its results went out. What lies between the two is
 folded again in silence.
@@ -13,7 +13,7 @@ folded again in silence.
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from processors.actions import Action
 from processors.config import Configuration, ProcessorConfig
@@ -29,6 +29,7 @@ from sparkplug.records.record import Record
 from twin.vocabulary import topics
 
 MARKER, LIVES, DESCRIPTION = "~marker/", "~lives/", "~description/"
+AS_OF = "|"  # between a reader and the topic of a description: each reader has come to another place
 LIVES_MAX = 5000  # devices whose messages are told apart
 _DATA, _PLAIN, _HOLE = EventKind.DATA, EventKind.PLAIN, EventKind.HOLE
 _to_json = json.JSONEncoder(separators=(",", ":"), ensure_ascii=False).encode
@@ -70,7 +71,9 @@ class Partition:
         """Take what was saved, newest value by key; return the offset to read from. A processor whose states are of another
         version begins with what the log still holds, and says nothing of what it said before."""
         markers = [json.loads(value)["processors"] for key, value in kept.items() if key.startswith(MARKER)]
-        self._descriptions = {key.removeprefix(DESCRIPTION): value for key, value in kept.items() if key.startswith(DESCRIPTION)}
+        own = DESCRIPTION + self._reader + AS_OF
+        held = own if MARKER + self._reader in kept else DESCRIPTION  # a new reader takes those of the readers before it
+        self._descriptions = {key.partition(AS_OF)[2]: value for key, value in kept.items() if key.startswith(held)}
         for seat in self.seats:
             self._describe_all(seat)
             self._restore(seat, kept, markers)
@@ -206,7 +209,7 @@ class Partition:
     def cut(self) -> Iterator[tuple[str, bytes | None]]:
         """Yield what has changed since the last cut, by key; a value of None takes back what was saved. `mark` comes after it."""
         for topic, payload in self._new_descriptions.items():
-            yield DESCRIPTION + topic, payload
+            yield DESCRIPTION + self._reader + AS_OF + topic, payload
         self._new_descriptions.clear()
         for seat in self.seats:
             seat.from_offset = max(seat.from_offset, self.next)
@@ -229,4 +232,3 @@ class Partition:
         for seat in self.seats:
             seat.faults.clear()
         return faults
-

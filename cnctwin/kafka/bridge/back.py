@@ -8,12 +8,12 @@ on, results go out as they come.
 import json
 import logging
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from confluent_kafka import Consumer, KafkaError, KafkaException, TopicPartition
 
-from cnctwin.kafka.kept import read_kept
+from cnctwin.kafka.kept import answered, read_kept
 from cnctwin.kafka.settings import KafkaSettings
 from cnctwin.kafka.topics import Topics
 from processors.actions import Declare
@@ -33,13 +33,6 @@ RESULTS_A_TURN = 500
 BEFORE_CUT_MS = 60_000
 READY_S_MAX = 60.0
 CATCH_UP_S_MAX = 60.0
-PAUSE_S = 0.2
-NOT_READY = (
-    KafkaError.NOT_COORDINATOR,
-    KafkaError.COORDINATOR_NOT_AVAILABLE,
-    KafkaError.COORDINATOR_LOAD_IN_PROGRESS,
-    KafkaError._WAIT_COORD,
-)
 _log = logging.getLogger(__name__)
 
 
@@ -90,8 +83,12 @@ class Back:
                     sender.apply([action], self.counts)
         own = [TopicPartition(self._topics.results, number) for number in numbers]
         at_cut = [TopicPartition(self._topics.results, number, cut_ms) for number in numbers]
-        stopped = {one.partition: one.offset for one in _answered(lambda: self._consumer.committed(own, ANSWER_S))}
-        since = _answered(lambda: self._consumer.offsets_for_times(at_cut, ANSWER_S))
+        try:
+            committed = answered(lambda: self._consumer.committed(own, ANSWER_S), READY_S_MAX)
+            since = answered(lambda: self._consumer.offsets_for_times(at_cut, ANSWER_S), READY_S_MAX)
+        except KafkaException as error:
+            raise SnapshotError(f"{self._topics.results}: {error.args[0].str()}") from error
+        stopped = {one.partition: one.offset for one in committed}
         begin = [self._from(one.partition, one.offset, stopped[one.partition]) for one in since]
         self._consumer.assign(begin)
         self._catch_up({one.partition: one.offset for one in begin}, stopped)
@@ -164,20 +161,6 @@ class Back:
         self._committed_s = 0.0
         self.commit(time.monotonic())
         self._consumer.close()
-
-
-def _answered(ask: Callable[[], list[TopicPartition]]) -> list[TopicPartition]:
-    """Ask again while the cluster is not ready to answer, as one that has just started is not. Raises SnapshotError."""
-    until_s = time.monotonic() + READY_S_MAX
-    while True:
-        try:
-            return ask()
-        except KafkaException as error:
-            reason = error.args[0]
-            if not (reason.retriable() or reason.code() in NOT_READY) or time.monotonic() > until_s:
-                raise SnapshotError(f"kafka: {reason.str()}") from error
-            _log.warning("kafka: %s", reason.str())
-            time.sleep(PAUSE_S)
 
 
 def _declared(kept: Mapping[str, bytes]) -> Iterator[tuple[str, str, Declare]]:

@@ -1,6 +1,7 @@
 """A partition that is killed anywhere comes to the states, and tells the results, of one that never was."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from random import Random
 
 import pytest
@@ -182,3 +183,22 @@ def test_topics_of_one_reader_do_not_write_over_each_other() -> None:
 def _of_topic(name: str, topic: str) -> Partition:
     processor = discover()[name]
     return Partition("runners", [(processor, processor.configured({}))], topic)
+
+
+def test_a_description_that_another_reader_has_come_to_is_not_taken_up_early() -> None:
+    """Two sets of processors read one log, and keep what they know in one place; each has come to another record."""
+    machine = [birth(0.0, spindle_rpm=0.0), data(1.0, spindle_rpm=1.0), message(11.0), data(2.0, spindle_rpm=2.0)]
+    records, kept = through_bytes(machine), dict[str, bytes]()
+    other = replace(DESCRIBING, name="other")
+    pair = (DESCRIBING, DESCRIBING.configured({}))
+    ahead, behind = Partition("ahead", [(other, other.configured({}))]), Partition("behind", [pair])
+    for partition, so_far in ((behind, 2), (ahead, 4)):
+        for offset, record in enumerate(records[:so_far]):
+            partition.take(offset, record)
+        saved(partition, kept)
+        kept.update([partition.mark()])
+    again = Partition("behind", [pair])
+    assert again.restore(kept) == 2
+    assert states(again) == states(behind)
+    taken = [result for offset in (2, 3) for result in again.take(offset, records[offset])]
+    assert any("version" in str(result.actions) for result in taken)
