@@ -266,6 +266,18 @@ def test_the_whole_page_can_be_gone_through_by_keyboard(visit: Visit) -> None:
     assert page.evaluate("getComputedStyle(document.activeElement).outlineStyle") == "solid"
 
 
+def test_a_key_typed_before_the_event_of_a_new_address_belongs_to_the_new_view(visit: Visit) -> None:
+    page = visit.open("#/fleet")
+    expect(page.locator(".unit").first).to_be_visible()
+    page.evaluate(
+        """() => {
+            location.hash = "#/machine/mill-02";
+            document.body.dispatchEvent(new KeyboardEvent("keydown", { key: "]", bubbles: true }));
+        }"""
+    )
+    expect(page).to_have_url(re.compile("#/machine/vmc"))
+
+
 def test_text_from_a_machine_stays_text(visit: Visit, shop: Shop) -> None:
     told = SignalValue(HOSTILE)
     shop.other["vmc"] = dict.fromkeys(("program", "nc_block", "alarm", "exec_state"), told) | {

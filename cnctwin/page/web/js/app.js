@@ -292,6 +292,7 @@ addEventListener("keydown", (event) => {
     if (event.key === "Escape") main.focus({ preventScroll: true });
     return;
   }
+  route(); // a key typed before the event of a new address has come is meant for the new view
   for (const [keys, , act] of [...(app.view?.keys ?? []), ...EVERYWHERE]) {
     if (!keys.includes(event.key)) continue;
     if (event.key === "Enter" && event.target.closest("a, button, summary")) return;
