@@ -6,38 +6,14 @@ and the way out.
 
 import logging
 import sys
-from typing import NoReturn
+from importlib import import_module
+from typing import Any, NoReturn
 
 import typer
+from typer.core import TyperGroup
 from typer.exceptions import TyperException
+from typer.main import get_group
 
-from cnctwin.commands.alerts import alerts_app
-from cnctwin.commands.bridge import bridge
-from cnctwin.commands.demo import demo
-from cnctwin.commands.doctor import doctor
-from cnctwin.commands.edge import edge_app
-from cnctwin.commands.expect import expect
-from cnctwin.commands.gap import gap_app
-from cnctwin.commands.identify import identify
-from cnctwin.commands.import_recording import import_recording
-from cnctwin.commands.jobs import jobs_app
-from cnctwin.commands.model import model_app
-from cnctwin.commands.optimise import optimise
-from cnctwin.commands.parts import parts_app
-from cnctwin.commands.plan import plan_app
-from cnctwin.commands.process import process
-from cnctwin.commands.record import record
-from cnctwin.commands.replay import replay_history
-from cnctwin.commands.serve import serve
-from cnctwin.commands.simulate import simulate
-from cnctwin.commands.simulate_control import control_app
-from cnctwin.commands.store import store_app
-from cnctwin.commands.train.app import train_app
-from cnctwin.commands.train.detector import train_detector
-from cnctwin.commands.train.residual import train_residual
-from cnctwin.commands.twin import twin_app
-from cnctwin.commands.validate import validate
-from cnctwin.commands.watch import watch
 from cnctwin.errors import ApplicationError, BrokerStartError
 from cnctwin.files.modes import restrict
 from edge.errors import EdgeError
@@ -45,36 +21,68 @@ from processors.errors import ProcessorError
 from sparkplug.errors import SparkplugError
 from twin.errors import TwinError
 
+COMMANDS = {
+    "demo": "cnctwin.commands.demo:demo",
+    "watch": "cnctwin.commands.watch:watch",
+    "doctor": "cnctwin.commands.doctor:doctor",
+    "process": "cnctwin.commands.process:process",
+    "bridge": "cnctwin.commands.bridge:bridge",
+    "simulate": "cnctwin.commands.simulate:simulate",
+    "expect": "cnctwin.commands.expect:expect",
+    "identify": "cnctwin.commands.identify:identify",
+    "import": "cnctwin.commands.import_recording:import_recording",
+    "record": "cnctwin.commands.record:record",
+    "serve": "cnctwin.commands.serve:serve",
+    "optimise": "cnctwin.commands.optimise:optimise",
+    "replay": "cnctwin.commands.replay:replay_history",
+    "validate": "cnctwin.commands.validate:validate",
+    "edge": "cnctwin.commands.edge:edge_app",
+    "gap": "cnctwin.commands.gap:gap_app",
+    "simulate-control": "cnctwin.commands.simulate_control:control_app",
+    "alerts": "cnctwin.commands.alerts:alerts_app",
+    "train": "cnctwin.commands.train.app:train_app",
+    "store": "cnctwin.commands.store:store_app",
+    "parts": "cnctwin.commands.parts:parts_app",
+    "jobs": "cnctwin.commands.jobs:jobs_app",
+    "plan": "cnctwin.commands.plan:plan_app",
+    "twin": "cnctwin.commands.twin:twin_app",
+    "model": "cnctwin.commands.model:model_app",
+}
+"""The module and the name of each command, or group of commands, in the order of the help."""
+
+
+class _Commands(TyperGroup):
+    """The commands, each of which is loaded when it is asked for: all of them take longer than most of them run."""
+
+    def list_commands(self, ctx: typer.Context) -> list[str]:  # type: ignore[override]  # as click names it
+        return list(COMMANDS)
+
+    def get_command(self, ctx: typer.Context, cmd_name: str) -> Any:  # type: ignore[override]
+        place = COMMANDS.get(cmd_name)
+        if place is None:
+            return None
+        module, _, name = place.partition(":")
+        found = getattr(import_module(module), name)
+        alone = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+        if isinstance(found, typer.Typer):
+            alone.add_typer(found, name=cmd_name)
+        else:
+            alone.command(cmd_name)(found)
+        return get_group(alone).commands[cmd_name]
+
+
 app = typer.Typer(
-    no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, help="A digital twin of CNC machines."
+    cls=_Commands,
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    help="A digital twin of CNC machines.",
 )
-app.add_typer(edge_app, name="edge")
-app.add_typer(gap_app, name="gap")
-app.add_typer(control_app, name="simulate-control")
-app.add_typer(alerts_app, name="alerts")
-app.add_typer(train_app, name="train")
-app.add_typer(store_app, name="store")
-app.add_typer(parts_app, name="parts")
-app.add_typer(jobs_app, name="jobs")
-app.add_typer(plan_app, name="plan")
-app.add_typer(twin_app, name="twin")
-train_app.command("detector")(train_detector)
-train_app.command("residual")(train_residual)
-app.add_typer(model_app, name="model")
-app.command()(demo)
-app.command()(watch)
-app.command()(doctor)
-app.command()(process)
-app.command()(bridge)
-app.command()(simulate)
-app.command()(expect)
-app.command()(identify)
-app.command("import")(import_recording)
-app.command()(record)
-app.command()(serve)
-app.command()(optimise)
-app.command("replay")(replay_history)
-app.command()(validate)
+
+
+@app.callback()
+def _entry() -> None:
+    pass
 
 
 def main() -> None:

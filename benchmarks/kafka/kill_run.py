@@ -32,8 +32,7 @@ from benchmarks.kafka.watcher import Awaited, Watcher
 from benchmarks.kafka.webhook import Webhook
 from benchmarks.kafka.whole_log import behind
 from benchmarks.kafka.witness import Witness
-from cnctwin.kafka.bridging import cell_processors
-from cnctwin.kafka.topics import Topics
+from cnctwin.kafka.topics import Topics, cell_processors
 from processors.running.runtime import configured
 
 UP_S_MAX = 60.0

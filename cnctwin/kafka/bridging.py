@@ -8,7 +8,7 @@ from threading import Event
 
 from cnctwin.kafka.bridge.bridge import Bridge
 from cnctwin.kafka.settings import KafkaSettings
-from cnctwin.kafka.topics import Topics, ensure
+from cnctwin.kafka.topics import Topics, cell_processors, ensure
 from cnctwin.processes.look_around import refuse_second
 from processors.discovery import discover
 from processors.errors import ConfigurationError
@@ -87,11 +87,6 @@ def _is_read(node: NodeId, patterns: Sequence[str], own: Sequence[NodeId], on_lo
     if is_twin_node(node.node):
         return node in own or (bool(own) and node.node not in on_log)
     return any(fnmatch.fnmatchcase(node.node, pattern) for pattern in patterns)
-
-
-def cell_processors(pairs: Sequence[Configured]) -> list[str]:
-    """Return the names of those that compare machines."""
-    return [processor.name for processor, _ in pairs if processor.is_of_cells]
 
 
 def published_by(results: str, names: Sequence[str]) -> list[str]:

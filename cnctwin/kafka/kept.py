@@ -16,6 +16,7 @@ from processors.errors import SnapshotError
 
 ANSWER_S = 10.0
 POLL_S = 0.2
+READ_S = 0.02  # for which a thousand messages are waited for: what has come by then is taken
 STUCK_S = 0.3  # behind the end without anything new: a transaction is open
 WRITER = "writer"
 NOT_READY = (
@@ -41,6 +42,8 @@ def read_kept(client: Conf, topic: str, partitions: Sequence[int], *, timeout_s:
     consumer = Consumer(common | {"isolation.level": "read_committed", "enable.partition.eof": True, "fetch.wait.max.ms": 20})
     try:
         marks = {number: _watermarks(uncommitted, topic, number, timeout_s) for number in partitions}
+        for number in partitions[:1]:  # connects: a consumer that is only told what to read waits half a second for the topic
+            _watermarks(consumer, topic, number, timeout_s)
         ends = {number: high for number, (low, high) in marks.items() if high > low}
         return _read(consumer, uncommitted, _Reading(topic, ends, partitions), topic, timeout_s=timeout_s, fence=fence)
     except KafkaException as error:
@@ -131,7 +134,7 @@ def _read(consumer: Consumer, uncommitted: Consumer, reading: _Reading, topic: s
     while behind := reading.behind:
         if time.monotonic() - began_s > timeout_s:
             raise SnapshotError(f"{topic}: the end of partitions {list(behind)} is not reached within {timeout_s:g} s")
-        for message in consumer.consume(1000, POLL_S):
+        for message in consumer.consume(1000, READ_S):
             reading.take(message)
         if not is_fenced and any(behind.values()) and time.monotonic() - reading.news_s > STUCK_S:
             is_fenced = True

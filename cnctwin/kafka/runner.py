@@ -197,8 +197,9 @@ class Runner:
         self._torn = ""
         self._waiting.clear()
         self._touched.clear()
+        self._transactions.abort()
         try:
-            self._transactions.abort()
+            self._transactions.claim()
         except AbortedError as error:  # the cluster does not answer, and we are to stop: it aborts what is open by itself
             if not self._stop.is_set():
                 raise
@@ -232,6 +233,7 @@ class Runner:
     def _on_assign(self, consumer: Consumer, partitions: list[TopicPartition]) -> None:
         self._health.rebalances += 1
         if partitions:
+            self._transactions.claim()  # what the one before writes late comes to nothing
             consumer.incremental_assign(self._assigned.restore([(one.topic, one.partition) for one in partitions]))
 
     def _on_revoke(self, consumer: Consumer, partitions: list[TopicPartition]) -> None:

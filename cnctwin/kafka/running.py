@@ -6,11 +6,10 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from threading import Event
 
-from cnctwin.kafka.bridging import cell_processors
 from cnctwin.kafka.runner import Runner
 from cnctwin.kafka.settings import KafkaSettings
 from cnctwin.kafka.sink import Sink
-from cnctwin.kafka.topics import Topics, ensure
+from cnctwin.kafka.topics import Topics, cell_processors, ensure
 from cnctwin.kafka.transaction import FencedError
 from cnctwin.running.processors import courier_of
 from processors.errors import ConfigurationError

@@ -15,6 +15,7 @@ from confluent_kafka.admin import AdminClient, NewTopic
 
 from cnctwin.kafka.settings import KafkaSettings
 from processors.errors import ConfigurationError
+from processors.running.runtime import Configured
 
 ANSWER_S = 30.0
 ATTEMPT_S = 1.0
@@ -24,7 +25,7 @@ COMPACTED = {
     "cleanup.policy": "compact",
     "min.cleanable.dirty.ratio": "0.3",
     "segment.ms": "600000",
-    "segment.bytes": "67108864",
+    "segment.bytes": "16777216",
     "max.compaction.lag.ms": "3600000",
 }
 
@@ -86,6 +87,11 @@ class Topics:
         kept: dict[str, str] = {"cleanup.policy": "delete"}
         logs = [self.readings, *map(self.cells, cell_processors), self.results, self.deadletters]
         return {**dict.fromkeys(logs, kept), **dict.fromkeys((self.snapshots, self.births, self.health), COMPACTED)}
+
+
+def cell_processors(pairs: Sequence[Configured]) -> list[str]:
+    """Return the names of those that compare machines."""
+    return [processor.name for processor, _ in pairs if processor.is_of_cells]
 
 
 def ensure(settings: KafkaSettings, topics: Topics, cell_processors: Sequence[str], without: Collection[str] = ()) -> None:

@@ -9,6 +9,7 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
+from typing import Generic, NoReturn, TypeVar
 
 from confluent_kafka import Consumer, KafkaError, KafkaException, Producer, TopicPartition
 
@@ -18,8 +19,11 @@ from processors.errors import ProcessorError
 from sparkplug.records.record import Headers
 
 REQUEST_S = 5.0
-HUNG_S = REQUEST_S + 2.0
+HUNG_S, HUNG_S_MAX = 2.0, 30.0  # for an answer of a cluster that has just taken messages; doubled each time that none comes
+CLAIM_S = REQUEST_S + 2.0
+CUT = (KafkaError._TRANSPORT, KafkaError._ALL_BROKERS_DOWN)
 PAUSE_S = 0.2
+T = TypeVar("T")
 _log = logging.getLogger(__name__)
 
 
@@ -27,31 +31,99 @@ class AbortedError(ProcessorError):
     """A transaction came to nothing: what was folded in it has to be folded again."""
 
 
+class HungError(AbortedError):
+    """The cluster has not answered at all."""
+
+
 class FencedError(ProcessorError):
     """Another runner has this one's name."""
 
 
+class _Asked(Generic[T]):
+    """A request in a thread that may be left behind: where the broker ended in the middle of it, librdkafka may never return."""
+
+    def __init__(self, ask: Callable[[], T]) -> None:
+        self._ask = ask
+        self._answers: list[T] = []
+        self._errors: list[BaseException] = []
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def _run(self) -> None:
+        try:
+            self._answers.append(self._ask())
+        except BaseException as error:
+            self._errors.append(error)
+
+    def answer(self, timeout_s: float | None = None) -> T:
+        """Wait for the answer, and return it or raise what came instead. Raises HungError."""
+        self._thread.join(timeout_s)
+        if self._thread.is_alive():
+            raise HungError(f"no answer, not even a refusal, within {timeout_s:g} s")
+        if self._errors:
+            raise self._errors[0]
+        return self._answers[0]
+
+
 class Transactions:
-    """See the module. `is_stopping` ends waiting for a cluster that does not answer."""
+    """See the module. `is_stopping` ends waiting for a cluster that does not answer.
+
+    The name is claimed in the background, since the cluster takes half a second to end what the one before has left open. A
+    producer that has lost a broker is replaced by another that claims the name: librdkafka goes on to ask the coordinator of
+    offsets by a connection that is gone for good, and never returns.
+    """
 
     def __init__(self, settings: KafkaSettings, name: str, is_stopping: Callable[[], bool]) -> None:
         self.name = name
         self.committed = self.aborted = 0
-        self.is_open = self._is_hung = False
+        self.is_open = False
         self._settings, self._is_stopping = settings, is_stopping
-        self._producer = self._begun()
+        self._patience_s = HUNG_S
+        self._begin()
 
-    def _begun(self) -> Producer:
+    def _begin(self) -> None:
+        """Have another producer claim the name."""
+        self._is_spoilt = False
+        self._claimant: Producer | None = None
+        self._claim = _Asked(self._claimed)
+
+    @property
+    def _producer(self) -> Producer:
+        if self._claimant is None:
+            self._claimant = self._claim.answer()
+            self._claimant.poll(0.0)  # that the cluster was away while it tried is no news
+            self._is_spoilt = False
+        return self._claimant
+
+    def claim(self) -> None:
+        """Wait until the name is ours: nobody else writes under it from now on. Raises AbortedError when we stop."""
+        _ = self._producer
+
+    def _claimed(self) -> Producer:
+        """Return a producer that has the name to itself, however long the cluster is away. Raises AbortedError when we stop."""
+        producer = producer_of(self._settings, self.name, self._on_error)
         while True:
-            self._is_hung = False
-            producer = producer_of(self._settings, self.name)
             try:
-                self._insist(partial(producer.init_transactions, REQUEST_S))
-            except AbortedError:
-                if not self._is_hung or self._is_stopping():
-                    raise
+                _Asked(partial(producer.init_transactions, REQUEST_S)).answer(CLAIM_S)
+            except HungError as error:
+                self._not_claimed(error)
+                producer = producer_of(self._settings, self.name, self._on_error)
+            except KafkaException as error:
+                reason = error.args[0]
+                self._not_claimed(reason.str())
+                if not reason.retriable():
+                    raise AbortedError(f"{self.name}: {reason.str()}") from error
             else:
                 return producer
+
+    def _not_claimed(self, why: object) -> None:
+        if self._is_stopping():
+            raise AbortedError(f"{self.name} is not claimed: {why}")
+        _log.warning("%s is not claimed yet: %s", self.name, why)
+        time.sleep(PAUSE_S)
+
+    def _on_error(self, error: KafkaError) -> None:
+        self._is_spoilt = self._is_spoilt or error.code() in CUT
 
     def produce(self, topic: str, key: str, value: bytes | None, partition: int, headers: Headers) -> None:
         """Have a message go out with the transaction, which begins with its first."""
@@ -61,6 +133,7 @@ class Transactions:
                 self._producer.produce(topic, value, key.encode(), partition, headers=headers)
             except BufferError:
                 self._producer.poll(PAUSE_S)
+                self._raise_if_cut()
                 continue
             except KafkaException as error:
                 self._failed(error.args[0])
@@ -78,72 +151,68 @@ class Transactions:
     def commit(self, positions: Sequence[TopicPartition], consumer: Consumer) -> None:
         """Commit what was produced, with the consumer's positions. Raises AbortedError, FencedError."""
         self.open()
+        producer = self._producer
+        self._flush(producer)
         member = consumer.consumer_group_metadata()
-        self._insist(lambda: self._producer.send_offsets_to_transaction(list(positions), member, REQUEST_S))
-        self._insist(lambda: self._producer.commit_transaction(REQUEST_S))
+        self._ask(lambda: producer.send_offsets_to_transaction(list(positions), member, REQUEST_S))
+        self._ask(lambda: producer.commit_transaction(REQUEST_S))
         self.is_open = False
         self.committed += 1
+        self._patience_s = HUNG_S
+
+    def _flush(self, producer: Producer) -> None:
+        """Wait until the cluster has all messages, but no longer than it keeps a transaction: one that is slow is not gone."""
+        until_s = time.monotonic() + self._settings.transaction_s
+        try:
+            while producer.flush(PAUSE_S) and not self._is_stopping() and time.monotonic() < until_s:
+                self._raise_if_cut()
+        except KafkaException as error:
+            self._failed(error.args[0])
+        self._raise_if_cut()
+
+    def _ask(self, request: Callable[[], object]) -> None:
+        """Ask once. If the transaction went through without an answer, the states that are restored say so. Raises AbortedError,
+        FencedError."""
+        try:
+            _Asked(request).answer(self._patience_s)
+        except KafkaException as error:
+            self._failed(error.args[0])
+        except HungError:
+            self._is_spoilt, self._patience_s = True, min(2.0 * self._patience_s, HUNG_S_MAX)
+            raise
+
+    def _raise_if_cut(self) -> None:
+        if self._is_spoilt:
+            raise AbortedError("the connection to a broker is lost")
 
     def abort(self) -> None:
-        """Give up what is open. A producer that cannot any more is replaced by another of its name."""
+        """Give up what is open."""
         self.aborted += 1
         self.is_open = False
-        if not self._is_hung:
+        if not self._is_spoilt:
+            producer = self._producer
             try:
-                self._answered(lambda: self._producer.abort_transaction(REQUEST_S))
-            except (KafkaException, AbortedError):
+                self._ask(lambda: producer.abort_transaction(REQUEST_S))
+            except AbortedError:
                 pass
             else:
                 return
-        self._producer = self._begun()
+        self._begin()
 
-    def _insist(self, ask: Callable[[], object]) -> None:
-        """Ask until there is an answer, but no longer than the cluster keeps a transaction."""
-        until_s = time.monotonic() + self._settings.transaction_s
-        while True:
-            try:
-                self._answered(ask)
-            except KafkaException as error:
-                reason = error.args[0]
-                _log.warning("%s: %s", self.name, reason.str())
-                is_late = time.monotonic() > until_s
-                if not reason.retriable() or reason.txn_requires_abort() or self._is_stopping() or is_late:
-                    self._failed(reason)
-                time.sleep(PAUSE_S)
-            else:
-                return
-
-    def _answered(self, ask: Callable[[], object]) -> None:
-        """Ask in a thread that may be left behind: where the broker ended in the middle of it, librdkafka may never return."""
-        errors: list[BaseException] = []
-
-        def run() -> None:
-            try:
-                ask()
-            except BaseException as error:
-                errors.append(error)
-
-        thread = threading.Thread(target=run, daemon=True)
-        thread.start()
-        thread.join(HUNG_S)
-        if thread.is_alive():
-            self._is_hung = True
-            raise AbortedError(f"no answer, not even a refusal, within {HUNG_S:g} s")
-        if errors:
-            raise errors[0]
-
-    def _failed(self, reason: KafkaError) -> None:
+    def _failed(self, reason: KafkaError) -> NoReturn:
         """A transaction that took too long is fenced too: whether another runner has the name, the consumer group knows."""
         if reason.code() == KafkaError.FENCED_INSTANCE_ID:
             raise FencedError(f"kafka: {self.name} is taken by another process; give each runner a --member of its own")
+        self._is_spoilt = True
         raise AbortedError(reason.str())
 
 
-def producer_of(settings: KafkaSettings, transactional_id: str) -> Producer:
+def producer_of(settings: KafkaSettings, transactional_id: str, on_error: Callable[[KafkaError], None]) -> Producer:
     """Return a transactional producer."""
     return Producer(
         settings.client()
         | {
+            "error_cb": on_error,
             "transactional.id": transactional_id,
             "transaction.timeout.ms": round(settings.transaction_s * 1000),
             "message.timeout.ms": round(settings.transaction_s * 1000),
@@ -157,7 +226,7 @@ def producer_of(settings: KafkaSettings, transactional_id: str) -> Producer:
 
 def fence(settings: KafkaSettings, transactional_id: str) -> None:
     """Take the name of a writer that is gone, for a moment: the cluster aborts what it left open."""
-    producer_of(settings, transactional_id).init_transactions(REQUEST_S)
+    producer_of(settings, transactional_id, lambda _: None).init_transactions(REQUEST_S)
 
 
 def written_by(name: str) -> Headers:

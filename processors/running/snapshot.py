@@ -40,6 +40,16 @@ def decode_state(adapter: TypeAdapter[Any], dumped: Any) -> Any:
     return state
 
 
+def _adapter_of(processor: AnyProcessor) -> TypeAdapter[Any]:
+    """Return what reads and writes a processor's states: it takes milliseconds to make, and each partition of a log needs one."""
+    if (adapter := _adapters.get(processor.state)) is None:
+        adapter = _adapters[processor.state] = TypeAdapter(processor.state)
+    return adapter
+
+
+_adapters: dict[Any, TypeAdapter[Any]] = {}
+
+
 class _ChallengerKept(NamedTuple):
     version: str
     state: Any
@@ -52,7 +62,7 @@ class SnapshotCodec:
 
     def __init__(self, processor: AnyProcessor) -> None:
         self._name, self._version = processor.name, processor.version
-        self._adapter: TypeAdapter[Any] = TypeAdapter(processor.state)
+        self._adapter = _adapter_of(processor)
 
     def encode(self, unit: str, live: Fold, lanes: Mapping[str, Lane], history: Fold | None, late: Mapping[str, Lane]) -> bytes:
         """The snapshot of a unit: its state and the lanes that lead to it, live and of its history."""

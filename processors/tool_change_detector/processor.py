@@ -102,10 +102,10 @@ def _dumped(search: "Search | None") -> Any:
 
 
 def _restored(dumped: Any) -> "Search | None":
-    from twin.transient.detector import restored  # noqa: PLC0415
-
     if dumped is None or not isinstance(dumped, dict):
         return dumped
+    from twin.transient.detector import restored  # noqa: PLC0415 - a light install has no arrays
+
     return restored(dumped["kept"], dumped["length"], dumped["seen"], dumped["gate"])
 
 

@@ -20,11 +20,10 @@ from confluent_kafka import OFFSET_BEGINNING, Consumer, KafkaError, KafkaExcepti
 
 from cnctwin.kafka.assigned import by_topic
 from cnctwin.kafka.bridge.outward import Outward
-from cnctwin.kafka.bridging import cell_processors
 from cnctwin.kafka.kept import read_kept
 from cnctwin.kafka.runner import Runner
 from cnctwin.kafka.settings import KafkaSettings
-from cnctwin.kafka.topics import Topics, ensure
+from cnctwin.kafka.topics import Topics, cell_processors, ensure
 from cnctwin.kafka.transaction import FencedError
 from processors.actions import PlainOutput
 from processors.discovery import discover

@@ -8,12 +8,16 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 
+from cnctwin.commands.train.detector import train_detector
+from cnctwin.commands.train.residual import train_residual
 from cnctwin.errors import UsageError
 
 train_app = typer.Typer(
     no_args_is_help=True,
     help="Models of a machine from its recordings: anomaly scores, tool changes, what the heat model gets wrong.",
 )
+train_app.command("detector")(train_detector)
+train_app.command("residual")(train_residual)
 FILES = "Run logs (Parquet or CSV) as [NAME=]FILE; several files of a NAME are one after the other, several NAMEs a cell"
 
 

@@ -21,11 +21,32 @@ HEAVY = (
 )
 
 
-def test_the_entry_point_loads_no_library_that_only_some_command_needs() -> None:
-    text = "import cnctwin.cli, sys; print(*sys.modules, sep='\\n')"
+ALL_COMMANDS = """
+import sys
+from typer.main import get_command
+from typer import Context
+from cnctwin.cli import app
+group = get_command(app)
+for name in group.list_commands(Context(group)):
+    assert group.get_command(Context(group), name).name == name
+print(*sys.modules, sep="\\n")
+"""
+
+
+def _modules_after(text: str) -> set[str]:
     done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=True, timeout=60)
-    loaded = set(done.stdout.split())
-    assert {"cnctwin.commands.gap", "typer"} <= loaded
+    return set(done.stdout.split())
+
+
+def test_the_entry_point_loads_no_command_before_it_is_asked_for() -> None:
+    loaded = _modules_after("import cnctwin.cli, sys; print(*sys.modules, sep='\\n')")
+    assert "typer" in loaded
+    assert not [name for name in loaded if name.startswith(("cnctwin.commands.", "sparkplug.host", "pydantic"))]
+
+
+def test_the_commands_load_no_library_that_only_some_of_them_need() -> None:
+    loaded = _modules_after(ALL_COMMANDS)
+    assert {"cnctwin.commands.gap", "cnctwin.commands.process", "typer"} <= loaded
     assert loaded & set(HEAVY) == set()
     services = {
         "cnctwin.api.server",
