@@ -9,7 +9,7 @@ from threading import Event
 from cnctwin.kafka.bridge.bridge import Bridge
 from cnctwin.kafka.settings import KafkaSettings
 from cnctwin.kafka.topics import Topics, cell_processors, ensure
-from cnctwin.processes.look_around import refuse_second
+from cnctwin.processes.look_around import refused_second
 from processors.discovery import discover
 from processors.errors import ConfigurationError
 from processors.running.health import node_metrics
@@ -52,7 +52,8 @@ def bridge(
         lock = NodeId(group, f"bridge-{name}")
         for node in (lock, *own):
             stack.callback(SessionLock(state_dir / f"{node.node}.json", f"{node.group}/{node.node}").release)
-        refuse_second(broker, own, "end that one first, or give this bridge other --results")
+        way_out = "end that one first, or give this bridge other --results"
+        is_alone = stack.enter_context(refused_second(broker, own, way_out))
         ensure(settings, topics, cell_processors(pairs), without=(topics.deadletters,))
         loop = Loop("bridge")
         host = HostApplication(
@@ -78,7 +79,10 @@ def bridge(
             for processor, _ in pairs
             if processor.name in results
         }
-        Bridge(settings, topics, name, pairs, host=host, nodes=edges, machines=machines, keeps_session=keep_s > 0).run(stop)
+        made = Bridge(settings, topics, name, pairs, host=host, nodes=edges, machines=machines, keeps_session=keep_s > 0)
+        made.prepare()
+        is_alone()
+        made.run(stop)
 
 
 def _is_read(node: NodeId, patterns: Sequence[str], own: Sequence[NodeId], on_log: Collection[str]) -> bool:

@@ -35,8 +35,19 @@ Fence = Callable[[str], None]
 _log = logging.getLogger(__name__)
 
 
-def read_kept(client: Conf, topic: str, partitions: Sequence[int], *, timeout_s: float, fence: Fence = lambda _: None) -> Kept:
-    """Return what is kept in some partitions of a topic. Raises SnapshotError where their end is not reached in time."""
+def read_kept(
+    client: Conf,
+    topic: str,
+    partitions: Sequence[int],
+    *,
+    timeout_s: float,
+    fence: Fence = lambda _: None,
+    told: Callable[[int, str, int], None] = lambda *_: None,
+) -> Kept:
+    """Return what is kept in some partitions of a topic. Raises SnapshotError where their end is not reached in time.
+
+    told: hears partition, key and time stamp, ms since 1970, of each message
+    """
     common = client | {"group.id": f"{topic}.read", "enable.auto.commit": False, "auto.offset.reset": "earliest"}
     uncommitted = Consumer(common | {"isolation.level": "read_uncommitted"})
     consumer = Consumer(common | {"isolation.level": "read_committed", "enable.partition.eof": True, "fetch.wait.max.ms": 20})
@@ -45,7 +56,7 @@ def read_kept(client: Conf, topic: str, partitions: Sequence[int], *, timeout_s:
         for number in partitions[:1]:  # connects: a consumer that is only told what to read waits half a second for the topic
             _watermarks(consumer, topic, number, timeout_s)
         ends = {number: high for number, (low, high) in marks.items() if high > low}
-        return _read(consumer, uncommitted, _Reading(topic, ends, partitions), topic, timeout_s=timeout_s, fence=fence)
+        return _read(consumer, uncommitted, _Reading(topic, ends, partitions, told), topic, timeout_s=timeout_s, fence=fence)
     except KafkaException as error:
         raise SnapshotError(f"{topic}: {error.args[0].str()}") from error
     finally:
@@ -99,11 +110,13 @@ def _watermarks(consumer: Consumer, topic: str, number: int, timeout_s: float) -
 class _Reading:
     """The reading of some partitions, as far as it has come."""
 
-    def __init__(self, topic: str, ends: dict[int, int], partitions: Sequence[int]) -> None:
+    def __init__(
+        self, topic: str, ends: dict[int, int], partitions: Sequence[int], told: Callable[[int, str, int], None]
+    ) -> None:
         self.kept: Kept = {number: {} for number in partitions}
         self.reached = dict.fromkeys(ends, 0)
         self.news_s = time.monotonic()
-        self._topic, self.ends = topic, ends
+        self._topic, self.ends, self._told = topic, ends, told
 
     @property
     def behind(self) -> dict[int, int]:
@@ -117,6 +130,7 @@ class _Reading:
             self.news_s = time.monotonic()
             raw, value = message.key(), message.value()
             key = raw.decode() if isinstance(raw, bytes) else ""
+            self._told(number, key, message.timestamp()[1])
             if isinstance(value, bytes):
                 self.kept[number][key] = value
             else:

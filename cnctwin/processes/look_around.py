@@ -7,8 +7,10 @@ look.
 """
 
 import logging
+import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from uuid import uuid4
 
 from sparkplug.broker import BrokerAddress
@@ -43,6 +45,33 @@ def refuse_second(broker: BrokerAddress, nodes: Sequence[NodeId], way_out: str) 
     finally:
         host.stop(1.0)
         logger.setLevel(level)
+
+
+@contextmanager
+def refused_second(broker: BrokerAddress, nodes: Sequence[NodeId], way_out: str) -> Iterator[Callable[[], None]]:
+    """Look around in a thread, while this process makes itself ready; call what is yielded before connecting under these names.
+
+    Raises what `refuse_second` raises, there.
+    """
+    errors: list[Exception] = []
+
+    def look() -> None:
+        try:
+            refuse_second(broker, nodes, way_out)
+        except Exception as error:
+            errors.append(error)
+
+    def settled() -> None:
+        thread.join()
+        if errors:
+            raise errors[0]
+
+    thread = threading.Thread(target=look, name="look-around", daemon=True)
+    thread.start()
+    try:
+        yield settled
+    finally:
+        thread.join()
 
 
 def _told(birth: HostEvent, broker: BrokerAddress, way_out: str) -> str:

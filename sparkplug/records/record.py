@@ -31,6 +31,7 @@ from sparkplug.records.named import NamedPayloads, written
 
 VERSION = b"1"
 WATERMARK = b"watermark"
+PLAIN = EventKind.PLAIN.value.encode()
 NUMBER_MAX = 2**64 - 1  # as in a payload
 SOURCES_MAX = 20_000  # whose layouts are remembered
 NO_NODE = NodeId("", "")

@@ -16,8 +16,9 @@ from confluent_kafka import Consumer, KafkaError, KafkaException, TopicPartition
 from cnctwin.kafka.kept import answered, read_kept
 from cnctwin.kafka.settings import KafkaSettings
 from cnctwin.kafka.topics import Topics
-from processors.actions import Declare
+from processors.actions import Action, Declare
 from processors.errors import SnapshotError
+from processors.partition.partition import LIVES
 from processors.partition.results import action_of
 from processors.running.counts import Counts
 from processors.running.ports import EdgePort, HostPort
@@ -25,14 +26,14 @@ from processors.running.runtime import Configured
 from processors.running.sender import Sender
 from processors.running.snapshot import latest_of
 from sparkplug.errors import PayloadError
-from sparkplug.records.record import RecordReader
+from sparkplug.records.record import PLAIN, RecordReader
 
 ANSWER_S = 10.0
 COMMIT_S = 1.0
-RESULTS_A_TURN = 500
-BEFORE_CUT_MS = 60_000
+RESULTS_A_TURN = 1000
+CUT_MS_MAX = 60_000  # before now, of a set of runners that has ended since
 READY_S_MAX = 60.0
-CATCH_UP_S_MAX = 60.0
+CATCH_UP_S, CATCH_UP_S_MAX = 0.02, 60.0
 _log = logging.getLogger(__name__)
 
 
@@ -75,14 +76,14 @@ class Back:
     def begin(self) -> None:
         """Learn what is known by now, before the edge nodes are started. Raises SnapshotError where the log does not answer."""
         numbers = range(self._settings.partitions)
-        kept = read_kept(self._settings.client(), self._topics.snapshots, list(numbers), timeout_s=120.0)
-        cut_ms = int(time.time() * 1000) - BEFORE_CUT_MS
+        cuts = _Cuts()
+        kept = read_kept(self._settings.client(), self._topics.snapshots, list(numbers), timeout_s=120.0, told=cuts.note)
         for of_partition in kept.values():
             for machine, name, action in _declared(of_partition):
                 if (sender := self._senders.get(name)) is not None and machine:
                     sender.apply([action], self.counts)
         own = [TopicPartition(self._topics.results, number) for number in numbers]
-        at_cut = [TopicPartition(self._topics.results, number, cut_ms) for number in numbers]
+        at_cut = [TopicPartition(self._topics.results, number, cuts.oldest_ms(number)) for number in numbers]
         try:
             committed = answered(lambda: self._consumer.committed(own, ANSWER_S), READY_S_MAX)
             since = answered(lambda: self._consumer.offsets_for_times(at_cut, ANSWER_S), READY_S_MAX)
@@ -107,37 +108,45 @@ class Back:
         while behind := [number for number in begins if self._next[number] < stopped[number]]:
             if time.monotonic() > until_s:
                 raise SnapshotError(f"{self._topics.results}: partitions {behind} are not read within {CATCH_UP_S_MAX:g} s")
-            self.turn(0.2)
+            self.turn(CATCH_UP_S, is_live=False)
         for number, stop in stopped.items():
             if 0 <= stop < self._next[number]:  # of these nobody was told: they are read again when somebody can be
                 self._next[number] = stop
                 self._consumer.seek(TopicPartition(self._topics.results, number, stop))
 
-    def turn(self, timeout_s: float = 0.0) -> int:
-        """Publish what has come; return how many results."""
+    def turn(self, timeout_s: float = 0.0, *, is_live: bool = True) -> int:
+        """Publish what has come; return how many results. Where nobody can be told, only what a birth is to hold is read."""
         messages = self._consumer.consume(RESULTS_A_TURN, timeout_s)
+        told: dict[Sender, list[Action]] = {}
         for message in messages:
+            number, offset = message.partition() or 0, message.offset() or 0
             if (error := message.error()) is not None:
                 if error.code() == KafkaError._PARTITION_EOF:  # behind the ends of transactions, which are no messages
-                    self._next[message.partition() or 0] = message.offset() or 0
+                    self._next[number] = offset
                 else:
                     _log.warning("kafka: %s", error.str())
                 continue
-            self._next[message.partition() or 0] = (message.offset() or 0) + 1
-            headers: Any = message.headers()
+            self._next[number] = offset + 1
+            listed: Any = message.headers()
+            headers = dict(listed or ())
+            if not is_live and headers.get("kind") == PLAIN:
+                continue
+            sender = self._senders.get(headers.get("processor", b"").decode())
+            if sender is None:
+                continue  # another bridge publishes it
             try:
-                record = self._records.read(headers, message.value())
+                record = self._records.read(listed, message.value())
             except PayloadError as why:
                 self.unreadable += 1
                 _log.warning("a result is not published: %s", why)
                 continue
-            sender = self._senders.get(dict(headers).get("processor", b"").decode())
-            if sender is None or record.event is None:
-                continue  # another bridge publishes it
-            event = record.event
+            if (event := record.event) is None:
+                continue
             qos = next((q for prefix, q in self._qos.items() if event.topic.startswith(prefix)), 0) if event.topic else 0
-            sender.apply([action_of(event, qos, retain=record.retain)], self.counts)
+            told.setdefault(sender, []).append(action_of(event, qos, retain=record.retain))
             self.published += 1
+        for sender, actions in told.items():
+            sender.apply(actions, self.counts)
         return len(messages)
 
     def commit(self, now_s: float) -> None:
@@ -161,6 +170,23 @@ class Back:
         self._committed_s = 0.0
         self.commit(time.monotonic())
         self._consumer.close()
+
+
+class _Cuts:
+    """When states were cut last, by partition and reader, by the clock of the log: each cut has a record of lives."""
+
+    def __init__(self) -> None:
+        self._at_ms: dict[int, dict[str, int]] = {}
+
+    def note(self, number: int, key: str, at_ms: int) -> None:
+        """Take a message of the topic of states."""
+        if key.startswith(LIVES):
+            self._at_ms.setdefault(number, {})[key] = at_ms
+
+    def oldest_ms(self, number: int) -> int:
+        """Return since when there are results that are in no state of a partition."""
+        earliest_ms = int(time.time() * 1000) - CUT_MS_MAX
+        return max(min(self._at_ms.get(number, {}).values(), default=0), earliest_ms)
 
 
 def _declared(kept: Mapping[str, bytes]) -> Iterator[tuple[str, str, Declare]]:

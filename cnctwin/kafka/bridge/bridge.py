@@ -79,18 +79,21 @@ class Bridge:
         self._refreshed_s: dict[NodeId, float] = {}
         self.events = 0
 
-    def run(self, stop: Event) -> None:
-        """Work until `stop` is set."""
-        with seldom_looked_for():
-            self._run(stop)
-
-    def _run(self, stop: Event) -> None:
+    def prepare(self) -> None:
+        """Learn what an earlier run has left. Raises SnapshotError where the log does not answer."""
         for topic_filter in dict.fromkeys(self._plain_filters()):
             self._host.subscribe_plain(topic_filter)
         if self._back is not None:
             self._back.begin()
         if self._keeps_session:
             self._host.restore(self._births.restored(self._known_births()))
+
+    def run(self, stop: Event) -> None:
+        """Work until `stop` is set."""
+        with seldom_looked_for():
+            self._run(stop)
+
+    def _run(self, stop: Event) -> None:
         self._host.start()
         for node in self._nodes.values():
             node.start()
