@@ -294,6 +294,8 @@ class Table:
         self._row("notifications made", one.emitted, one.emitted > 0, "no alarm was raised: this run shows nothing about alerts")
         self._row("delivered; failed, of these came all the same", f"{one.delivered}; {one.failed}, {one.failed_yet_came}")
         self._row("alerts told as firing, as resolved", f"{one.firing}, {one.resolved}")
+        figure = f"{one.left_out}; {one.unseen} for that or a failure, {one.passed} over before anybody was told"
+        self._row("alerts that bodies left out; resolved without having been seen firing", figure)
         figure = f"{one.doubled} doubled, {one.lost} without a fate, {one.unknown} unknown, {one.disordered} out of order"
         self._row("notifications amiss", figure, one.faults == 0, one.first)
 
