@@ -127,6 +127,8 @@ class Assigned:
         except KafkaException as error:
             _log.warning("%s: the members are not known: %s", group, error.args[0].str())
             return None
+        finally:
+            admin.poll(0)  # tells of its troubles
         return {member.group_instance_id or "" for member in described.members}
 
 

@@ -18,6 +18,7 @@ from typing import Any
 from confluent_kafka import Consumer, KafkaError, KafkaException, Message, TopicPartition
 
 from cnctwin.kafka.assigned import Assigned, Place
+from cnctwin.kafka.client_log import LOG, REACH
 from cnctwin.kafka.health import RunnerHealth
 from cnctwin.kafka.settings import KafkaSettings
 from cnctwin.kafka.sink import Sink
@@ -210,7 +211,7 @@ class Runner:
                 for position in self._assigned.restore(places):
                     self._consumer.seek(position)
             except (SnapshotError, KafkaException) as error:
-                _log.warning("not restored yet: %s", error)
+                LOG.warning("not restored yet: %s", error)
                 self._stop.wait(PAUSE_S)
             else:
                 return
@@ -219,13 +220,15 @@ class Runner:
         """A consumer that is beyond help reads nothing more, and does not always say so among the messages."""
         if error.fatal() or error.code() == KafkaError._FATAL:
             self._beyond_help = error
+        else:
+            REACH.failed(error)
 
     def _complain(self, error: KafkaError) -> None:
         if error.code() == KafkaError.FENCED_INSTANCE_ID or "fenced" in error.str().lower():
             raise FencedError(f"kafka: {self._name} is taken by another process; give each runner a --member of its own")
         if error.fatal() or error.code() == KafkaError._FATAL:
             raise KafkaException(error)
-        _log.warning("kafka: %s", error.str())
+        LOG.warning("kafka: %s", error.str())
 
     # Rebalances: called while the consumer polls, between two transactions.
 

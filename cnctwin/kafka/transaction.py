@@ -4,7 +4,6 @@ What the cluster says of a failure decides: try again, abort and begin from what
 this one's name.
 """
 
-import logging
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -12,6 +11,7 @@ from functools import partial
 
 from confluent_kafka import Consumer, KafkaError, KafkaException, Producer, TopicPartition
 
+from cnctwin.kafka.client_log import LOG, REACH
 from cnctwin.kafka.kept import WRITER
 from cnctwin.kafka.settings import KafkaSettings
 from processors.errors import ProcessorError
@@ -20,7 +20,6 @@ from sparkplug.records.record import Headers
 REQUEST_S = 5.0
 HUNG_S = REQUEST_S + 2.0
 PAUSE_S = 0.2
-_log = logging.getLogger(__name__)
 
 
 class AbortedError(ProcessorError):
@@ -81,6 +80,8 @@ class Transactions:
         member = consumer.consumer_group_metadata()
         self._insist(lambda: self._producer.send_offsets_to_transaction(list(positions), member, REQUEST_S))
         self._insist(lambda: self._producer.commit_transaction(REQUEST_S))
+        self._producer.poll(0)  # tells of its troubles
+        REACH.answered()
         self.is_open = False
         self.committed += 1
 
@@ -105,7 +106,7 @@ class Transactions:
                 self._answered(ask)
             except KafkaException as error:
                 reason = error.args[0]
-                _log.warning("%s: %s", self.name, reason.str())
+                LOG.warning("%s: %s", self.name, reason.str())
                 is_late = time.monotonic() > until_s
                 if not reason.retriable() or reason.txn_requires_abort() or self._is_stopping() or is_late:
                     self._failed(reason)

@@ -13,6 +13,7 @@ from typing import Any
 
 from confluent_kafka import Consumer, KafkaError, KafkaException, TopicPartition
 
+from cnctwin.kafka.client_log import LOG
 from cnctwin.kafka.kept import answered, read_kept
 from cnctwin.kafka.settings import KafkaSettings
 from cnctwin.kafka.topics import Topics
@@ -121,7 +122,7 @@ class Back:
                 if error.code() == KafkaError._PARTITION_EOF:  # behind the ends of transactions, which are no messages
                     self._next[message.partition() or 0] = message.offset() or 0
                 else:
-                    _log.warning("kafka: %s", error.str())
+                    LOG.warning("kafka: %s", error.str())
                 continue
             self._next[message.partition() or 0] = (message.offset() or 0) + 1
             headers: Any = message.headers()
@@ -149,7 +150,7 @@ class Back:
         try:
             self._consumer.commit(offsets=positions, asynchronous=True)
         except KafkaException as error:
-            _log.warning("kafka: %s", error.args[0].str())
+            LOG.warning("kafka: %s", error.args[0].str())
 
     def reported(self) -> None:
         """Let dead letters out again."""
