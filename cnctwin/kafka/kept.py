@@ -114,7 +114,7 @@ class _Reading:
         if error is None:
             self.news_s = time.monotonic()
             raw, value = message.key(), message.value()
-            key = raw.decode() if isinstance(raw, bytes) else ""
+            key = raw.decode("utf-8", "replace") if isinstance(raw, bytes) else ""
             if isinstance(value, bytes):
                 self.kept[number][key] = value
             else:

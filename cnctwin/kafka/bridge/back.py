@@ -20,6 +20,7 @@ from cnctwin.kafka.topics import Topics
 from processors.actions import Declare
 from processors.errors import SnapshotError
 from processors.partition.results import action_of
+from processors.running.containment import one_line
 from processors.running.counts import Counts
 from processors.running.ports import EdgePort, HostPort
 from processors.running.runtime import Configured
@@ -171,7 +172,13 @@ def _declared(kept: Mapping[str, bytes]) -> Iterator[tuple[str, str, Declare]]:
         if key.startswith("~"):
             continue
         first, _, snapshot = payload.partition(b"\n")
-        moment, document = json.loads(first), json.loads(snapshot)
-        for machine, told in document["live"]["machines"].items():
-            if any("/twin-" not in node for node in moment["machines"][machine]["online"]):
-                yield machine, name, Declare(machine, latest_of(told))
+        try:
+            moment, document = json.loads(first), json.loads(snapshot)
+            known = {machine: latest_of(told) for machine, told in document["live"]["machines"].items()}
+            online = {machine: moment["machines"][machine]["online"] for machine in known}
+        except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
+            _log.warning("%s: no state that can be read, so the twin is told with its next news: %s", key, one_line(error))
+            continue
+        for machine, latest in known.items():
+            if any("/twin-" not in node for node in online[machine]):
+                yield machine, name, Declare(machine, latest)
