@@ -23,7 +23,7 @@ from cnctwin.kafka.health import RunnerHealth
 from cnctwin.kafka.settings import KafkaSettings
 from cnctwin.kafka.sink import Sink
 from cnctwin.kafka.topics import Topics
-from cnctwin.kafka.transaction import AbortedError, FencedError, Transactions, written_by
+from cnctwin.kafka.transaction import AbortedError, FencedError, RefusedError, Transactions, written_by
 from cnctwin.kafka.waiting import Waiting
 from processors.actions import DeadLetter, Pin, PlainOutput
 from processors.errors import SnapshotError
@@ -39,6 +39,7 @@ FOLD_S = 0.5  # of one transaction; what waits then goes into the next one
 COMMIT_S = 0.1  # between two transactions, each of which has a marker of each partition
 IDLE_S = 1.0  # after which positions are saved although nothing came of the records
 PAUSE_S = 1.0
+REFUSED_S = 5.0
 FETCH_BYTES = 65_536  # for which the cluster waits 50 ms: to answer each few records costs it more than the records
 _log = logging.getLogger(__name__)
 
@@ -117,6 +118,10 @@ class Runner:
             self._waiting.pace(self._consumer)
             self._commit_if_due(time.monotonic())
             self._health.report(time.monotonic(), self._assigned, self._transactions, self._consumer)
+        except RefusedError as error:
+            self._health.failed(str(error))
+            self._begin_again(str(error))
+            self._stop.wait(REFUSED_S)  # somebody has to do something
         except AbortedError as error:
             self._begin_again(str(error))
 
@@ -194,7 +199,7 @@ class Runner:
 
     def _begin_again(self, why: str) -> None:
         """Throw away what was folded and not committed, and restore."""
-        _log.warning("a transaction has come to nothing, what it held is folded again: %s", why)
+        LOG.warning("a transaction has come to nothing, what it held is folded again: %s", why)
         self._torn = ""
         self._waiting.clear()
         self._touched.clear()

@@ -9,21 +9,27 @@ import time
 from collections.abc import Callable, Sequence
 from functools import partial
 
-from confluent_kafka import Consumer, KafkaError, KafkaException, Producer, TopicPartition
+from confluent_kafka import Consumer, KafkaError, KafkaException, Message, Producer, TopicPartition
 
 from cnctwin.kafka.client_log import LOG, REACH
 from cnctwin.kafka.kept import WRITER
-from cnctwin.kafka.settings import KafkaSettings
+from cnctwin.kafka.settings import Conf, KafkaSettings
 from processors.errors import ProcessorError
 from sparkplug.records.record import Headers
 
 REQUEST_S = 5.0
 HUNG_S = REQUEST_S + 2.0
 PAUSE_S = 0.2
+MESSAGE_BYTES_MAX = 64 * 1024 * 1024
+BUFFER_SHARE = 2  # of the buffer is what one message may fill
 
 
 class AbortedError(ProcessorError):
     """A transaction came to nothing: what was folded in it has to be folded again."""
+
+
+class RefusedError(AbortedError):
+    """A message is larger than the cluster takes, and would be the next time too."""
 
 
 class FencedError(ProcessorError):
@@ -38,12 +44,15 @@ class Transactions:
         self.committed = self.aborted = 0
         self.is_open = self._is_hung = False
         self._settings, self._is_stopping = settings, is_stopping
+        self._refused, self._refused_bytes = "", 0  # what the cluster would not take of the open transaction
         self._producer = self._begun()
 
     def _begun(self) -> Producer:
         while True:
             self._is_hung = False
-            producer = producer_of(self._settings, self.name)
+            producer = producer_of(
+                self._settings, self.name, {"on_delivery": self._not_delivered, "delivery.report.only.error": True}
+            )
             try:
                 self._insist(partial(producer.init_transactions, REQUEST_S))
             except AbortedError:
@@ -62,8 +71,19 @@ class Transactions:
                 self._producer.poll(PAUSE_S)
                 continue
             except KafkaException as error:
+                if error.args[0].code() == KafkaError.MSG_SIZE_TOO_LARGE:
+                    self._refused = f"{key} has {len(value or b''):,} bytes on {topic}; raise buffer_mb, half of which it exceeds"
                 self._failed(error.args[0])
             return
+
+    def _not_delivered(self, error: KafkaError, message: Message) -> None:
+        """Note a message that the cluster refuses for its size, of one batch the largest; with it the whole transaction fails."""
+        value = message.value()
+        if error.code() == KafkaError.MSG_SIZE_TOO_LARGE and isinstance(value, bytes) and len(value) > self._refused_bytes:
+            topic, key = message.topic(), message.key()
+            name = key.decode("utf-8", "replace") if isinstance(key, bytes) else ""
+            self._refused_bytes = len(value)
+            self._refused = f"{name} has {len(value):,} bytes; raise max.message.bytes of {topic}, which takes no more"
 
     def open(self) -> None:
         """Begin a transaction where none is open."""
@@ -88,7 +108,7 @@ class Transactions:
     def abort(self) -> None:
         """Give up what is open. A producer that cannot any more is replaced by another of its name."""
         self.aborted += 1
-        self.is_open = False
+        self.is_open, self._refused, self._refused_bytes = False, "", 0
         if not self._is_hung:
             try:
                 self._answered(lambda: self._producer.abort_transaction(REQUEST_S))
@@ -137,13 +157,18 @@ class Transactions:
         """A transaction that took too long is fenced too: whether another runner has the name, the consumer group knows."""
         if reason.code() == KafkaError.FENCED_INSTANCE_ID:
             raise FencedError(f"kafka: {self.name} is taken by another process; give each runner a --member of its own")
+        if self._refused:
+            raise RefusedError(self._refused)
         raise AbortedError(reason.str())
 
 
-def producer_of(settings: KafkaSettings, transactional_id: str) -> Producer:
-    """Return a transactional producer."""
+def producer_of(settings: KafkaSettings, transactional_id: str, more: Conf | None = None) -> Producer:
+    """Return a transactional producer. Of how large a message may be the cluster decides, as long as there is room for it."""
+    buffer_bytes = round(settings.buffer_mb * 1024 * 1024)
     return Producer(
         settings.client()
+        | {"message.max.bytes": min(buffer_bytes // BUFFER_SHARE, MESSAGE_BYTES_MAX)}
+        | (more or {})
         | {
             "transactional.id": transactional_id,
             "transaction.timeout.ms": round(settings.transaction_s * 1000),
