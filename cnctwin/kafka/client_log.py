@@ -9,6 +9,7 @@ import logging
 import re
 import time
 from collections.abc import Callable
+from math import inf
 from threading import Lock
 from typing import TYPE_CHECKING
 
@@ -18,7 +19,8 @@ if TYPE_CHECKING:  # who asks for settings may be without it
 EVERY_S = 60.0
 KINDS_MAX = 200
 # What differs between lines of one kind: the thread, the client, sockets, the number of a broker, how long and how often.
-_VARIES = re.compile(r"\[thrd:[^\]]*\]+: |\bipv[46]#\S+|/(?:bootstrap|\d+)\b|\(after [^)]*\)|\d+")
+_VARIES = re.compile(r"\[\S*#(?:producer|consumer)-\d+\] |\[thrd:[^\]]*\]+: |\bipv[46]#\S+|/(?:bootstrap|\d+)\b|\(after .*\)|\d+")
+_TOLD = ("_TRANSPORT", "_RESOLVE")  # of one connection, and in the client's log as well
 _log = logging.getLogger(__name__)
 
 
@@ -45,7 +47,7 @@ class Seldom(logging.Filter):
 
     def _held(self, kind: str, now_s: float) -> int | None:
         """Return how many lines of a kind were held back before the one that goes through now; None where it is held back too."""
-        at_s, held = self._kinds.get(kind, (now_s - EVERY_S, 0))
+        at_s, held = self._kinds.get(kind, (-inf, 0))
         if now_s - at_s < EVERY_S:
             self._kinds[kind] = at_s, held + 1
             return None
@@ -59,8 +61,8 @@ class Seldom(logging.Filter):
 def kind_of(said: str) -> str:
     """Return what a line has in common with others of its kind.
 
-    >>> kind_of("FAIL rdkafka#consumer-4: [thrd:k:9/1]: k:9/1: Connect to ipv4#10.0.0.7:9 failed (after 3ms in state CONNECT)")
-    'FAIL rdkafka#consumer-: k:: Connect to  failed '
+    >>> kind_of("FAIL [rdkafka#consumer-4] [thrd:k:9/1]: k:9/1: Connect to ipv4#10.0.0.7:9 failed (after 3ms in state CONNECT)")
+    'FAIL k:: Connect to  failed '
     """
     return _VARIES.sub("", said)
 
@@ -73,11 +75,12 @@ class Reach:
 
     def failed(self, error: "KafkaError") -> None:
         """Take an error of a client, as its `error_cb`."""
-        if error.name() != "_ALL_BROKERS_DOWN":
+        if error.name() == "_ALL_BROKERS_DOWN":
+            if not self._is_away:
+                self._is_away = True
+                _log.warning("kafka: the cluster does not answer: %s", error.str())
+        elif error.name() not in _TOLD:
             LOG.warning("kafka: %s", error.str())
-        elif not self._is_away:
-            self._is_away = True
-            _log.warning("kafka: the cluster does not answer: %s", error.str())
 
     def answered(self) -> None:
         """Take it that the cluster has acknowledged something."""

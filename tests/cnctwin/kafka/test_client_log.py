@@ -16,8 +16,8 @@ from cnctwin.kafka.settings import KafkaSettings
 from tests.wire.mosquitto import free_port
 
 WITHIN_S = 20.0
-REFUSED = "FAIL rdkafka#{client}: [thrd:k:{port}/bootstrap]: k:{port}/{broker}: Connect to ipv4#10.0.0.1:{port} failed: \
-Connection refused (after {ms}ms in state CONNECT, {more} identical error(s) suppressed)"
+REFUSED = "FAIL [rdkafka#{client}] [thrd:k:{port}/bootstrap]: k:{port}/{broker}: Connect to ipv4#10.0.0.1:{port} failed: \
+Connection refused (after {ms}ms in state CONNECT{more})"
 
 
 class Lines:
@@ -33,7 +33,7 @@ class Lines:
         return record.getMessage() if self.filter.filter(record) else None
 
 
-def refused(client: str = "consumer-4", port: int = 9092, broker: str = "1", ms: int = 0, more: int = 1) -> str:
+def refused(client: str = "consumer-4", port: int = 9092, broker: str = "1", ms: int = 0, more: str = "") -> str:
     return REFUSED.format(client=client, port=port, broker=broker, ms=ms, more=more)
 
 
@@ -42,7 +42,11 @@ def test_one_line_of_a_kind_goes_through_in_a_minute_and_tells_of_the_others() -
     assert lines.say(refused()) == refused()
     for number in range(30):
         lines.now_s += EVERY_S / 31
-        assert lines.say(refused(f"consumer-{number}", 9000 + number, "bootstrap", number, number)) is None
+        more = f", {number} identical error(s) suppressed" if number else ""
+        assert (
+            lines.say(refused(f"{('consumer', 'producer')[number % 2]}-{number}", 9000 + number, "bootstrap", number, more))
+            is None
+        )
     assert lines.say("kafka: %s", "the coordinator is loading") == "kafka: the coordinator is loading"
     lines.now_s += EVERY_S / 31 + 0.001
     assert lines.say(refused()) == f"{refused()} (30 like it were held back)"
@@ -50,7 +54,9 @@ def test_one_line_of_a_kind_goes_through_in_a_minute_and_tells_of_the_others() -
     assert lines.say(refused()) == refused()
 
 
-@pytest.mark.parametrize("other", ["a line of another kind", refused("producer-4"), refused().replace("refused", "reset")])
+@pytest.mark.parametrize(
+    "other", ["a line of another kind", refused().replace("k:", "l:"), refused().replace("refused", "reset")]
+)
 def test_lines_of_another_kind_go_through(other: str) -> None:
     lines = Lines()
     assert lines.say(refused()) is not None
@@ -72,6 +78,15 @@ def test_a_line_with_a_percent_sign_is_said_as_it_is() -> None:
     lines.say("100% of it")
     lines.now_s += EVERY_S
     assert lines.say("100% of it") == "100% of it (1 like it were held back)"
+
+
+def test_other_troubles_are_said_and_those_of_one_connection_are_in_the_log_already(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(LOG, "filters", [Seldom()])
+    for code in (KafkaError._TRANSPORT, KafkaError.TOPIC_AUTHORIZATION_FAILED):
+        Reach().failed(KafkaError(code, "trouble"))
+    assert caplog.messages == ["kafka: trouble"]
 
 
 def test_the_cluster_goes_and_comes_back_in_a_line_each(caplog: pytest.LogCaptureFixture) -> None:
