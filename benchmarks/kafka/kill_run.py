@@ -3,10 +3,12 @@
     python -m benchmarks.kafka.kill_run --machines 100 --hz 10 --minutes 15 --every 30
     python -m benchmarks.kafka.kill_run --minutes 2 --machines 10 --every 10
     python -m benchmarks.kafka.kill_run --takeover --machines 20 --minutes 5 --every 60
+    python -m benchmarks.kafka.kill_run --keep-session --machines 10 --minutes 1.5 --every 15
 
 Real Kafka and Mosquitto, `cnctwin bridge` and `cnctwin process` as processes; each is killed by -9 and begun again at once, as a
 supervisor would. At the end all records of the log are folded again by this process alone, and compared with the states and the
-results that the run has left. With --takeover there are two runners, and only they are killed, each for 20 s.
+results that the run has left. With --takeover there are two runners, and only they are killed, each for 20 s. With --keep-session
+the MQTT broker, which is not killed, keeps what it cannot deliver to the bridge, and no message at all may be missing.
 
 Needs Java 17 and Maven for Kafka, Mosquitto, and the extra `kafka`. Exits with 1 where anything is lost, doubled or different.
 """
@@ -147,9 +149,10 @@ class KillRun:
         self._count("runner")
 
     def _kill_kafka(self) -> None:
-        began_s = time.time()
+        self.plant.kill_kafka()
+        began_s = time.time()  # what stands in the log by now was there before
         awaited = self.watcher.first_result(began_s), self.watcher.first_data(began_s)
-        self.plant.restart_kafka()
+        self.plant.kafka.start()
         self.course.kafka_up_s.append(time.time() - began_s)
         self.course.note("kafka", awaited[0])
         self.course.note("kafka, bridge's data", awaited[1])
@@ -247,7 +250,8 @@ class Table:
         run, course = self._run, self._run.course
         setup, plant = run.setup, run.plant
         kills = ", ".join(f"{name} {count} ×" for name, count in course.counts.items())
-        self._row("run", f"{setup.machines} machines, {setup.hz:g} Hz, {run.seconds / 60:.1f} min")
+        kept = ", a session that the broker keeps" if setup.keeps_session else ""
+        self._row("run", f"{setup.machines} machines, {setup.hz:g} Hz, {run.seconds / 60:.1f} min{kept}")
         self._row("killed by -9", kills or "nothing")
         self._row("computer", f"{os.cpu_count()} processors, {run.busy_pct:.0f} % busy (with whatever else ran)")
         use = [f"{one.name} {100 * one.cpu_s / run.seconds:.0f} %" for one in (plant.bridge, *plant.runners.values())]
@@ -278,9 +282,13 @@ class Table:
         self._row("records of the log that were there already, dropped", self._found.repeated)
         self._row("gaps in the numbers of a life without a hole", inputs.gaps, inputs.gaps == 0, inputs.first_gap)
         self._row("holes told", inputs.holes)
-        self._row("data messages: witness saw, log holds", f"{seen:,}, {inputs.data:,}", seen > 0)
-        self._row("missing: bridge away, or births not asked for yet (QoS 0)", missing.unbridged)
-        self._row("missing: on the way through a bridge that was killed", missing.in_memory)
+        is_kept = self._run.setup.keeps_session
+        is_whole = seen > 0 and (not is_kept or inputs.data == seen)
+        self._row("data messages: witness saw, log holds", f"{seen:,}, {inputs.data:,}", is_whole)
+        away = "missing: bridge away, or births not asked for yet" + ("" if is_kept else " (QoS 0)")
+        self._row(away, missing.unbridged, missing.unbridged == 0 if is_kept else None)
+        on_its_way = "missing: on the way through a bridge that was killed"
+        self._row(on_its_way, missing.in_memory, missing.in_memory == 0 if is_kept else None)
         self._row("missing otherwise", missing.otherwise, missing.otherwise == 0, missing.first)
         if missing.blind_s:
             figure = f"{median(missing.blind_s):.2f} s, at most {max(missing.blind_s):.2f} s"
@@ -293,6 +301,8 @@ class Table:
         self._row("notifications made", one.emitted, one.emitted > 0, "no alarm was raised: this run shows nothing about alerts")
         self._row("delivered; failed, of these came all the same", f"{one.delivered}; {one.failed}, {one.failed_yet_came}")
         self._row("alerts told as firing, as resolved", f"{one.firing}, {one.resolved}")
+        figure = f"{one.left_out}; {one.unseen} for that or a failure, {one.passed} over before anybody was told"
+        self._row("alerts that bodies left out; resolved without having been seen firing", figure)
         figure = f"{one.doubled} doubled, {one.lost} without a fate, {one.unknown} unknown, {one.disordered} out of order"
         self._row("notifications amiss", figure, one.faults == 0, one.first)
 
@@ -332,6 +342,9 @@ def main() -> None:
     # The one broker is the whole cluster: while it is away nobody can say that he lives, so a session outlasts its restart.
     parser.add_argument("--kills", default="bridge,runner,kafka", help="what is killed in turn")
     parser.add_argument("--takeover", action="store_true", help="two runners, of which one is killed for 20 s")
+    parser.add_argument(
+        "--keep-session", action="store_true", help="the broker keeps the bridge's session: nothing may be missing"
+    )
     parser.add_argument("--home", type=Path, help="where logs and data are kept; else a folder that goes with the run")
     parser.add_argument("--session", type=float, help="session_s of the runners; else 30, and 6 with --takeover")
     given = parser.parse_args()
@@ -345,6 +358,7 @@ def main() -> None:
         members=("r0", "r1") if given.takeover else ("r0",),
         session_s=given.session or (6.0 if given.takeover else defaults.session_s),
         kills=("takeover",) if given.takeover else tuple(given.kills.split(",")),
+        keeps_session=given.keep_session,
     )
     with tempfile.TemporaryDirectory(prefix="cnctwin-kills-") as folder:
         home = Path(folder) if given.home is None else given.home

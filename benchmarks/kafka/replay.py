@@ -6,7 +6,7 @@ States are compared as bytes, results as their sequence in each partition by pro
 import time
 from array import array
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from hashlib import blake2b
 from typing import Any
@@ -17,6 +17,8 @@ from cnctwin.kafka.assigned import by_topic
 from cnctwin.kafka.kept import read_kept
 from cnctwin.kafka.topics import Topics
 from processors.actions import DeadLetter
+from processors.alerts.notification import Notification
+from processors.alerts.statement import Statement
 from processors.partition.partition import Partition
 from processors.partition.results import Results
 from processors.running.runtime import Configured
@@ -69,7 +71,8 @@ class Stood:
 
     def __init__(self, bootstrap: str, topics: Topics, partitions: int) -> None:
         self.digests: dict[Place, array[int]] = {}
-        self.emitted: set[str] = set()
+        self.emitted: dict[str, tuple[Statement, ...]] = {}
+        """The notifications that were handed to the courier, by id."""
         for number in range(partitions):
             for message in messages(bootstrap, topics.results, number):
                 headers = headers_of(message)
@@ -79,7 +82,7 @@ class Stood:
                     digest(message.key() or b"", headers, value)
                 )
                 if value and told.get("topic", b"").startswith(_OUTBOX):
-                    self.emitted.add(told["topic"].removeprefix(_OUTBOX).decode())
+                    self.emitted[told["topic"].removeprefix(_OUTBOX).decode()] = Notification.of(value).statements
         self.dead_letters = sum(1 for number in range(partitions) for _ in messages(bootstrap, topics.deadletters, number))
 
 
@@ -116,7 +119,7 @@ class Replay:
                 }
                 found.repeated += partition.repeated
             left = {key: value for key, value in kept[number].items() if not key.startswith("~")}
-            found.states.add(_states_compared(states, left, number))
+            found.states.add(states_compared(states, left, number))
         found.dead_letters = Difference(
             self._dead_letters,
             max(self._dead_letters - stood.dead_letters, 0),
@@ -162,11 +165,12 @@ class Replay:
         for name, codes in told.items():
             found.by_processor[name] += len(codes)
             stands = stood.digests.pop((number, name), array("Q"))
-            found.results.add(_results_compared(codes, stands, firsts.get(name, f"{name}, partition {number}: more at the end")))
+            found.results.add(results_compared(codes, stands, firsts.get(name, f"{name}, partition {number}: more at the end")))
         return partition
 
 
-def _results_compared(told: "array[int]", stands: "array[int]", first: str) -> Difference:
+def results_compared(told: "array[int]", stands: "array[int]", first: str) -> Difference:
+    """Return what differs between the results of the replay and those that stand in the log; another order differs too."""
     if told == stands:
         return Difference(len(told))
     wanted, present = Counter(told), Counter(stands)
@@ -174,7 +178,8 @@ def _results_compared(told: "array[int]", stands: "array[int]", first: str) -> D
     return Difference(len(told), lost, extra, 0 if lost or extra else 1, first)
 
 
-def _states_compared(wanted: dict[str, bytes], left: dict[str, bytes], number: int) -> Difference:
+def states_compared(wanted: Mapping[str, bytes], left: Mapping[str, bytes], number: int) -> Difference:
+    """Return what differs between the states of the replay and those that the run has left, byte by byte."""
     found = Difference(len(wanted), len(wanted.keys() - left.keys()), len(left.keys() - wanted.keys()))
     for key in sorted(wanted.keys() & left.keys()):
         if wanted[key] != left[key]:

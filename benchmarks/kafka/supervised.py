@@ -20,6 +20,8 @@ from tests.wire.mosquitto import free_port
 STOP_S_MAX = 60.0
 BORN_S_MAX = 60.0
 PROCESSORS = ("thermal", "cutting_force", "gap", "rules", "events", "tool_change_detector", "alerts", "mirror")
+KEEPING = ("upgrade_outgoing_qos true",)
+KEPT_HOURS = "1"
 # A machine of the load changes its tool every two minutes: the load of its spindle falls to 0, and the alarm ends.
 CONFIGURATION = """\
 [rules]
@@ -47,7 +49,8 @@ rate_high_per_hour = 10000
 
 @dataclass(frozen=True, slots=True)
 class Setup:
-    """The options of a run. `members`: the static names of the runners; `session_s`: after which one that is gone is given up."""
+    """The options of a run. `members`: the static names of the runners; `session_s`: after which one that is gone is given up;
+    `keeps_session`: the MQTT broker keeps for the bridge what it cannot deliver, and nothing may be missing."""
 
     machines: int = 100
     hz: float = 10.0
@@ -58,6 +61,7 @@ class Setup:
     members: tuple[str, ...] = ("r0",)
     session_s: float = 30.0
     kills: tuple[str, ...] = ("bridge", "runner", "kafka")
+    keeps_session: bool = False
 
 
 class Command:
@@ -117,7 +121,7 @@ class Plant:
         for name in ("kafka", "mqtt"):
             (home / name).mkdir()
         self.kafka = KafkaServer(home / "kafka")
-        self.mqtt = PrivateBroker(home / "mqtt", free_port())
+        self.mqtt = PrivateBroker(home / "mqtt", free_port(), extra=KEEPING if setup.keeps_session else ())
         self.config = home / "processors.toml"
         self.config.write_text(CONFIGURATION.format(url=webhook))
         self._kafka_config = home / "kafka.toml"
@@ -138,9 +142,9 @@ class Plant:
         common += ["--broker", self.mqtt.address.url]
         names = ",".join(self.setup.processors)
         state = str(self.home / "state")
-        self.bridge = Command(
-            "bridge", ["bridge", *common, "--name", "b0", "--processors", names, "--state-dir", state], self.home / "bridge.log"
-        )
+        own = ["--name", "b0", "--processors", names, "--state-dir", state]
+        own += ["--keep-session", KEPT_HOURS] if self.setup.keeps_session else []
+        self.bridge = Command("bridge", ["bridge", *common, *own], self.home / "bridge.log")
         self.runners = {
             member: Command(member, ["process", *self.setup.processors, *common, "--member", member], self.home / f"{member}.log")
             for member in self.setup.members
@@ -169,10 +173,10 @@ class Plant:
             self._load.kill()
             self._load = None
 
-    def restart_kafka(self) -> None:
-        """Kill Kafka and start it again."""
+    def kill_kafka(self) -> None:
+        """End Kafka by -9."""
         self.kafka_cpu_s += usage_of(self.kafka.pid).cpu_s
-        self.kafka.restart()
+        self.kafka.kill()
 
     def busy(self) -> tuple[float, float]:
         """Return the seconds since the start, and the busy share of all processors of the computer, in per cent."""

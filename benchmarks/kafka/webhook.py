@@ -9,10 +9,11 @@ from processors.alerts.courier.webhook import ID_HEADER
 
 
 class Received(NamedTuple):
-    """A notification that came: its id, and of each alert in it fingerprint, beginning and status."""
+    """A notification that came: its id, of each alert in it fingerprint, beginning and status, and how many it does not show."""
 
     id: str
     alerts: tuple[tuple[str, str, str], ...]
+    left_out: int = 0
 
 
 class Webhook:
@@ -27,7 +28,7 @@ class Webhook:
                 body = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
                 alerts = tuple((one["fingerprint"], one["startsAt"], one["status"]) for one in body["alerts"])
                 with lock:
-                    received.append(Received(self.headers[ID_HEADER], alerts))
+                    received.append(Received(self.headers[ID_HEADER], alerts, body["truncatedAlerts"]))
                 self.send_response(200)
                 self.send_header("Content-Length", "0")
                 self.end_headers()

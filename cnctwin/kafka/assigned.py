@@ -12,6 +12,7 @@ from cnctwin.kafka.kept import ANSWER_S, fence_open, read_kept
 from cnctwin.kafka.settings import KafkaSettings
 from cnctwin.kafka.topics import Topics
 from cnctwin.kafka.transaction import fence
+from processors.errors import SnapshotError
 from processors.partition.partition import Partition
 from processors.running.runtime import Configured
 from sparkplug.records.record import Record, RecordError, RecordReader
@@ -59,7 +60,11 @@ class Assigned:
         positions = []
         for place, (topic, number) in enumerate(places):
             partition = Partition(self._reader, self._pairs[topic], topic)
-            offset = partition.restore(kept[number])
+            try:
+                offset = partition.restore(kept[number])
+            except SnapshotError as error:
+                way_out = "write a null value under that key, and what the log holds is folded, and told, once more"
+                raise SnapshotError(f"{self._topics.snapshots}, partition {number}, key {error}; {way_out}") from error
             if self._begin is not None:
                 offset = partition.next = self._begin((topic, number), offset)
             self._retire((topic, number))
@@ -127,6 +132,8 @@ class Assigned:
         except KafkaException as error:
             _log.warning("%s: the members are not known: %s", group, error.args[0].str())
             return None
+        finally:
+            admin.poll(0)  # tells of its troubles
         return {member.group_instance_id or "" for member in described.members}
 
 

@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 
 from confluent_kafka import OFFSET_BEGINNING, Consumer, KafkaError, KafkaException, Message, TopicPartition
 
+from cnctwin.kafka.client_log import LOG
 from cnctwin.kafka.settings import Conf
 from processors.errors import SnapshotError
 
@@ -93,7 +94,7 @@ def answered(ask: Callable[[], T | None], timeout_s: float) -> T:
             reason = error.args[0]
             if not (reason.retriable() or reason.code() in NOT_READY) or time.monotonic() > until_s:
                 raise
-            _log.warning("kafka: %s", reason.str())
+            LOG.warning("kafka: %s", reason.str())
         else:
             if found is not None:
                 return found
@@ -129,7 +130,7 @@ class _Reading:
         if error is None:
             self.news_s = time.monotonic()
             raw, value = message.key(), message.value()
-            key = raw.decode() if isinstance(raw, bytes) else ""
+            key = raw.decode("utf-8", "replace") if isinstance(raw, bytes) else ""
             self._told(number, key, message.timestamp()[1])
             if isinstance(value, bytes):
                 self.kept[number][key] = value

@@ -18,11 +18,12 @@ from typing import Any
 from confluent_kafka import Consumer, KafkaError, KafkaException, Message, TopicPartition
 
 from cnctwin.kafka.assigned import Assigned, Place
+from cnctwin.kafka.client_log import LOG, REACH
 from cnctwin.kafka.health import RunnerHealth
 from cnctwin.kafka.settings import KafkaSettings
 from cnctwin.kafka.sink import Sink
 from cnctwin.kafka.topics import Topics
-from cnctwin.kafka.transaction import AbortedError, FencedError, Transactions, written_by
+from cnctwin.kafka.transaction import AbortedError, FencedError, RefusedError, Transactions, written_by
 from cnctwin.kafka.waiting import Waiting
 from processors.actions import DeadLetter, Pin, PlainOutput
 from processors.errors import SnapshotError
@@ -38,6 +39,7 @@ FOLD_S = 0.5  # of one transaction; what waits then goes into the next one
 COMMIT_S = 0.1  # between two transactions, each of which has a marker of each partition
 IDLE_S = 1.0  # after which positions are saved although nothing came of the records
 PAUSE_S = 1.0
+REFUSED_S = 5.0
 FETCH_BYTES = 65_536  # for which the cluster waits 50 ms: to answer each few records costs it more than the records
 _log = logging.getLogger(__name__)
 
@@ -116,6 +118,10 @@ class Runner:
             self._waiting.pace(self._consumer)
             self._commit_if_due(time.monotonic())
             self._health.report(time.monotonic(), self._assigned, self._transactions, self._consumer)
+        except RefusedError as error:
+            self._health.failed(str(error))
+            self._begin_again(str(error))
+            self._stop.wait(REFUSED_S)  # somebody has to do something
         except AbortedError as error:
             self._begin_again(str(error))
 
@@ -193,7 +199,7 @@ class Runner:
 
     def _begin_again(self, why: str) -> None:
         """Throw away what was folded and not committed, and restore."""
-        _log.warning("a transaction has come to nothing, what it held is folded again: %s", why)
+        LOG.warning("a transaction has come to nothing, what it held is folded again: %s", why)
         self._torn = ""
         self._waiting.clear()
         self._touched.clear()
@@ -211,7 +217,7 @@ class Runner:
                 for position in self._assigned.restore(places):
                     self._consumer.seek(position)
             except (SnapshotError, KafkaException) as error:
-                _log.warning("not restored yet: %s", error)
+                LOG.warning("not restored yet: %s", error)
                 self._stop.wait(PAUSE_S)
             else:
                 return
@@ -220,13 +226,15 @@ class Runner:
         """A consumer that is beyond help reads nothing more, and does not always say so among the messages."""
         if error.fatal() or error.code() == KafkaError._FATAL:
             self._beyond_help = error
+        else:
+            REACH.failed(error)
 
     def _complain(self, error: KafkaError) -> None:
         if error.code() == KafkaError.FENCED_INSTANCE_ID or "fenced" in error.str().lower():
             raise FencedError(f"kafka: {self._name} is taken by another process; give each runner a --member of its own")
         if error.fatal() or error.code() == KafkaError._FATAL:
             raise KafkaException(error)
-        _log.warning("kafka: %s", error.str())
+        LOG.warning("kafka: %s", error.str())
 
     # Rebalances: called while the consumer polls, between two transactions.
 

@@ -12,11 +12,12 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from cnctwin.kafka.client_log import LOG, REACH
 from processors.errors import ConfigurationError
 
 PREFIX = "CNCTWIN_KAFKA_"
 PASSWORD = f"{PREFIX}PASSWORD"
-Conf = dict[str, str | int | float | bool]
+Conf = dict[str, Any]
 
 
 class KafkaSettings(BaseModel):
@@ -48,8 +49,10 @@ class KafkaSettings(BaseModel):
     buffer_mb: float = Field(default=256.0, ge=1.0, le=65_536.0)
 
     def client(self, environment: Mapping[str, str] = os.environ) -> Conf:
-        """Return what librdkafka wants to know to connect. Raises ConfigurationError where a secret is missing."""
+        """Return what a client of confluent_kafka wants to know to connect, and where it tells of its troubles when it is polled.
+        Raises ConfigurationError where a secret is missing."""
         conf: Conf = {"bootstrap.servers": self.bootstrap, "security.protocol": self.security_protocol}
+        conf |= {"logger": LOG, "error_cb": REACH.failed}
         if self.security_protocol.startswith("sasl"):
             conf |= {
                 "sasl.mechanism": self.sasl_mechanism,

@@ -4,15 +4,15 @@ What the cluster says of a failure decides: try again, abort and begin from what
 this one's name.
 """
 
-import logging
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import Generic, NoReturn, TypeVar
+from typing import Any, Generic, NoReturn, TypeVar
 
-from confluent_kafka import Consumer, KafkaError, KafkaException, Producer, TopicPartition
+from confluent_kafka import Consumer, KafkaError, KafkaException, Message, Producer, TopicPartition
 
+from cnctwin.kafka.client_log import LOG, REACH
 from cnctwin.kafka.kept import WRITER
 from cnctwin.kafka.settings import KafkaSettings
 from processors.errors import ProcessorError
@@ -24,7 +24,8 @@ CLAIM_S = REQUEST_S + 2.0
 CUT = (KafkaError._TRANSPORT, KafkaError._ALL_BROKERS_DOWN)
 PAUSE_S = 0.2
 T = TypeVar("T")
-_log = logging.getLogger(__name__)
+MESSAGE_BYTES_MAX = 64 * 1024 * 1024
+BUFFER_SHARE = 2  # of the buffer is what one message may fill
 
 
 class AbortedError(ProcessorError):
@@ -33,6 +34,10 @@ class AbortedError(ProcessorError):
 
 class HungError(AbortedError):
     """The cluster has not answered at all."""
+
+
+class RefusedError(AbortedError):
+    """A message is larger than the cluster takes, and would be the next time too."""
 
 
 class FencedError(ProcessorError):
@@ -79,6 +84,7 @@ class Transactions:
         self.is_open = False
         self._settings, self._is_stopping = settings, is_stopping
         self._patience_s = HUNG_S
+        self._refused, self._refused_bytes = "", 0  # what the cluster would not take of the open transaction
         self._begin()
 
     def _begin(self) -> None:
@@ -101,13 +107,13 @@ class Transactions:
 
     def _claimed(self) -> Producer:
         """Return a producer that has the name to itself, however long the cluster is away. Raises AbortedError when we stop."""
-        producer = producer_of(self._settings, self.name, self._on_error)
+        producer = self._made()
         while True:
             try:
                 _Asked(partial(producer.init_transactions, REQUEST_S)).answer(CLAIM_S)
             except HungError as error:
                 self._not_claimed(error)
-                producer = producer_of(self._settings, self.name, self._on_error)
+                producer = self._made()
             except KafkaException as error:
                 reason = error.args[0]
                 self._not_claimed(reason.str())
@@ -116,14 +122,19 @@ class Transactions:
             else:
                 return producer
 
+    def _made(self) -> Producer:
+        told = {"error_cb": self._on_error, "on_delivery": self._not_delivered, "delivery.report.only.error": True}
+        return producer_of(self._settings, self.name, told)
+
     def _not_claimed(self, why: object) -> None:
         if self._is_stopping():
             raise AbortedError(f"{self.name} is not claimed: {why}")
-        _log.warning("%s is not claimed yet: %s", self.name, why)
+        LOG.warning("%s is not claimed yet: %s", self.name, why)
         time.sleep(PAUSE_S)
 
     def _on_error(self, error: KafkaError) -> None:
         self._is_spoilt = self._is_spoilt or error.code() in CUT
+        REACH.failed(error)
 
     def produce(self, topic: str, key: str, value: bytes | None, partition: int, headers: Headers) -> None:
         """Have a message go out with the transaction, which begins with its first."""
@@ -136,8 +147,19 @@ class Transactions:
                 self._raise_if_cut()
                 continue
             except KafkaException as error:
+                if error.args[0].code() == KafkaError.MSG_SIZE_TOO_LARGE:
+                    self._refused = f"{key} has {len(value or b''):,} bytes on {topic}; raise buffer_mb, half of which it exceeds"
                 self._failed(error.args[0])
             return
+
+    def _not_delivered(self, error: KafkaError, message: Message) -> None:
+        """Note a message that the cluster refuses for its size, of one batch the largest; with it the whole transaction fails."""
+        value = message.value()
+        if error.code() == KafkaError.MSG_SIZE_TOO_LARGE and isinstance(value, bytes) and len(value) > self._refused_bytes:
+            topic, key = message.topic(), message.key()
+            name = key.decode("utf-8", "replace") if isinstance(key, bytes) else ""
+            self._refused_bytes = len(value)
+            self._refused = f"{name} has {len(value):,} bytes; raise max.message.bytes of {topic}, which takes no more"
 
     def open(self) -> None:
         """Begin a transaction where none is open."""
@@ -156,6 +178,8 @@ class Transactions:
         member = consumer.consumer_group_metadata()
         self._ask(lambda: producer.send_offsets_to_transaction(list(positions), member, REQUEST_S))
         self._ask(lambda: producer.commit_transaction(REQUEST_S))
+        producer.poll(0)  # tells of its troubles
+        REACH.answered()
         self.is_open = False
         self.committed += 1
         self._patience_s = HUNG_S
@@ -188,7 +212,7 @@ class Transactions:
     def abort(self) -> None:
         """Give up what is open."""
         self.aborted += 1
-        self.is_open = False
+        self.is_open, self._refused, self._refused_bytes = False, "", 0
         if not self._is_spoilt:
             producer = self._producer
             try:
@@ -203,16 +227,20 @@ class Transactions:
         """A transaction that took too long is fenced too: whether another runner has the name, the consumer group knows."""
         if reason.code() == KafkaError.FENCED_INSTANCE_ID:
             raise FencedError(f"kafka: {self.name} is taken by another process; give each runner a --member of its own")
+        if self._refused:
+            raise RefusedError(self._refused)
         self._is_spoilt = True
         raise AbortedError(reason.str())
 
 
-def producer_of(settings: KafkaSettings, transactional_id: str, on_error: Callable[[KafkaError], None]) -> Producer:
-    """Return a transactional producer."""
+def producer_of(settings: KafkaSettings, transactional_id: str, more: Mapping[str, Any]) -> Producer:
+    """Return a transactional producer. Of how large a message may be the cluster decides, as long as there is room for it."""
+    buffer_bytes = round(settings.buffer_mb * 1024 * 1024)
     return Producer(
         settings.client()
+        | {"message.max.bytes": min(buffer_bytes // BUFFER_SHARE, MESSAGE_BYTES_MAX)}
+        | dict(more)
         | {
-            "error_cb": on_error,
             "transactional.id": transactional_id,
             "transaction.timeout.ms": round(settings.transaction_s * 1000),
             "message.timeout.ms": round(settings.transaction_s * 1000),
@@ -226,7 +254,7 @@ def producer_of(settings: KafkaSettings, transactional_id: str, on_error: Callab
 
 def fence(settings: KafkaSettings, transactional_id: str) -> None:
     """Take the name of a writer that is gone, for a moment: the cluster aborts what it left open."""
-    producer_of(settings, transactional_id, lambda _: None).init_transactions(REQUEST_S)
+    producer_of(settings, transactional_id, {}).init_transactions(REQUEST_S)
 
 
 def written_by(name: str) -> Headers:

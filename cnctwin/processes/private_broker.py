@@ -8,6 +8,7 @@ import os
 import shutil
 import socket
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 from cnctwin.errors import BrokerStartError, UsageError
@@ -41,9 +42,9 @@ log_type notice
 
 
 class PrivateBroker:
-    """One Mosquitto on 127.0.0.1. `port` None takes 1883 where it is free, else any free port."""
+    """One Mosquitto on 127.0.0.1. `port` None takes 1883 where it is free, else any free port. `extra`: lines of its file."""
 
-    def __init__(self, folder: Path, port: int | None = None) -> None:
+    def __init__(self, folder: Path, port: int | None = None, *, extra: Sequence[str] = ()) -> None:
         program = find_mosquitto()
         if port is not None and not is_free(port):
             raise UsageError(f"port {port} of 127.0.0.1 is in use; name another one with --port")
@@ -51,7 +52,8 @@ class PrivateBroker:
         folder = folder.resolve()
         folder.mkdir(parents=True, exist_ok=True)
         configuration = folder / "mosquitto.conf"
-        configuration.write_text(CONFIGURATION.format(port=self.port, memory=MEMORY_BYTES_MAX, folder=folder))
+        written = CONFIGURATION.format(port=self.port, memory=MEMORY_BYTES_MAX, folder=folder)
+        configuration.write_text(written + "".join(f"{line}\n" for line in extra))
         command = [program, "-c", str(configuration)]
         self.child = Child("mosquitto", command, folder / "mosquitto.log")
         if os.geteuid() == 0:

@@ -19,6 +19,7 @@ from processors.actions import Action
 from processors.config import Configuration, ProcessorConfig
 from processors.discovery import AnyProcessor
 from processors.errors import SnapshotError
+from processors.partition.places import KeptLives, KeptMarker, read
 from processors.partition.seat import FORMAT, Seat
 from processors.running.engine import Way
 from processors.running.picks import stream_of
@@ -69,8 +70,9 @@ class Partition:
 
     def restore(self, kept: Mapping[str, bytes]) -> int:
         """Take what was saved, newest value by key; return the offset to read from. A processor whose states are of another
-        version begins with what the log still holds, and says nothing of what it said before."""
-        markers = [json.loads(value)["processors"] for key, value in kept.items() if key.startswith(MARKER)]
+        version begins with what the log still holds, and says nothing of what it said before. A key that no runner writes is
+        nobody's. Raises SnapshotError, which names the key, where it is not known how far anybody had come."""
+        markers = [read(KeptMarker, key, value).processors for key, value in kept.items() if key.startswith(MARKER)]
         own = DESCRIPTION + self._reader + AS_OF
         held = own if MARKER + self._reader in kept else DESCRIPTION  # a new reader takes those of the readers before it
         self._descriptions = {key.partition(AS_OF)[2]: value for key, value in kept.items() if key.startswith(held)}
@@ -78,8 +80,8 @@ class Partition:
             self._describe_all(seat)
             self._restore(seat, kept, markers)
         self.next = self._begin = min(seat.from_offset for seat in self.seats)
-        lives = [json.loads(value) for key, value in kept.items() if key.startswith(LIVES + self._topic)]
-        known: Mapping[str, dict[str, list[int]]] = next((one["devices"] for one in lives if one["folded"] == self.next), {})
+        lives = [read(KeptLives, key, value) for key, value in kept.items() if key.startswith(LIVES + self._topic)]
+        known: Mapping[str, dict[str, list[int]]] = next((one.devices for one in lives if one.folded == self.next), {})
         self._lives = {device: Lives(of_device) for device, of_device in known.items()}
         return self.next
 
@@ -90,13 +92,16 @@ class Partition:
             return
         folded, seat.published = own
         prefix = f"{seat.name}/"
+        units = {key.removeprefix(prefix): payload for key, payload in kept.items() if key.startswith(prefix)}
+        restored = 0
         try:
-            for key, payload in kept.items():
-                if key.startswith(prefix):
-                    seat.restore(payload)
+            for payload in units.values():
+                seat.restore(payload)
+                restored += 1
         except SnapshotError as error:
-            self.refused.append(f"{seat.name}: {error}; rebuilt from what the log still holds")
-            seat.begin_again()
+            refused = f"{prefix}{list(units)[restored]}"
+            self.refused.append(f"{refused}: {error}; {seat.name} is rebuilt from what the log still holds")
+            seat.begin_again(units)
             self._describe_all(seat)
         else:
             seat.from_offset = folded

@@ -5,7 +5,7 @@ same state. Results of records before `published` went out already, and are fold
 """
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 from paho.mqtt.client import topic_matches_sub
@@ -54,10 +54,11 @@ class Seat:
 
     # Snapshots.
 
-    def begin_again(self) -> None:
-        """Forget everything but where results went out."""
+    def begin_again(self, units: Iterable[str]) -> None:
+        """Forget everything but where results went out. What was saved of `units` is of no use: the next cut takes back those
+        that are not known again by then, or they would be refused at each start."""
         self.engine = Engine(self.processor, self._configuration)
-        self._saved.clear()
+        self._saved = set(units)
         self.from_offset = 0
 
     def restore(self, payload: bytes) -> None:
@@ -70,8 +71,13 @@ class Seat:
             raise SnapshotError(f"no snapshot of a unit: {type(error).__name__}: {error}") from error
         if of_format != FORMAT:
             raise SnapshotError(f"format {of_format!r:.40}; this program reads {FORMAT}")
-        unit = self.engine.restore(snapshot)
-        go_on(self.engine, self.engine.known_units[unit], moment)
+        try:
+            unit = self.engine.restore(snapshot)
+            go_on(self.engine, self.engine.known_units[unit], moment)
+        except SnapshotError:
+            raise
+        except Exception as error:  # bytes that nobody wrote so: nothing of it is used
+            raise SnapshotError(f"no snapshot of a unit: {one_line(error)}") from error
         self._saved.add(unit)
 
     def cut(self) -> Iterator[Saved]:

@@ -1,5 +1,6 @@
 """A runner on a real Kafka: slow units, poison, an upgrade, and a topic of states that is compacted under it."""
 
+import re
 import time
 from threading import Event
 from typing import Any
@@ -14,6 +15,7 @@ from confluent_kafka import Producer
 from confluent_kafka.admin import AlterConfigOpType, ConfigEntry, ConfigResource, ResourceType
 
 from cnctwin.kafka.kept import read_kept
+from processors.errors import SnapshotError
 from tests.kafka.gated import UNBEARABLE_RPM, alone, delicate, gated, of_version
 from tests.kafka.plant_on_kafka import WAIT_S_MAX, Plant, RunnerHere, processors, until
 from tests.processors.streams import data
@@ -88,6 +90,38 @@ def test_poison_becomes_a_dead_letter_and_the_partition_goes_on(kafka: KafkaServ
                 assert f"{plant.topics.readings}-{number}@" in reason and wanted in reason
         by_step = [letter for of in letters.values() for letter in of if letter.key() == b"m-0"]
         assert len(by_step) == 1 and b"thirteen is unbearable" in (by_step[0].value() or b"")
+
+
+def test_garbage_among_the_states_is_left_alone_or_named(kafka: KafkaServer) -> None:
+    with Plant(kafka, "garbage", alone(delicate()), machines=4) as plant:
+        plant.play(2)
+        with RunnerHere(plant, "r0") as runner:
+            plant.folded()
+            runner.stop()
+        stranger = Producer(kafka.client())
+        for key in (None, b"\xff\xfe", b"hello", b"another/m-0", b"~", b"~elsewhere/x"):
+            for value in (b"", b"\xff garbage", None):
+                stranger.produce(plant.topics.snapshots, value, key, 2)
+        assert stranger.flush(WAIT_S_MAX) == 0
+        with RunnerHere(plant, "r0") as runner:
+            plant.play(2)
+            plant.folded()
+            assert runner.runner._health.fault == ""
+            runner.stop()
+        plant.holds_as_replayed(states=False)
+        key = f"~marker/{plant.topics.readings}/stranger"
+        stranger.produce(plant.topics.snapshots, b"\xff garbage", key.encode(), 2)
+        assert stranger.flush(WAIT_S_MAX) == 0
+        named = rf"^{re.escape(plant.topics.snapshots)}, partition 2, key {re.escape(key)}: .*; write a null value under that key"
+        with pytest.raises(SnapshotError, match=named), RunnerHere(plant, "r0") as runner:
+            until(lambda: runner.check() is not None, "it ends")
+        stranger.produce(plant.topics.snapshots, None, key.encode(), 2)
+        assert stranger.flush(WAIT_S_MAX) == 0
+        with RunnerHere(plant, "r0") as runner:
+            plant.play(1)
+            plant.folded()
+            runner.stop()
+        plant.holds_as_replayed(states=False)
 
 
 def test_an_upgraded_processor_is_rebuilt_from_the_log_and_tells_nothing_twice(kafka: KafkaServer) -> None:

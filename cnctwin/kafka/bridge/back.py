@@ -13,6 +13,7 @@ from typing import Any
 
 from confluent_kafka import Consumer, KafkaError, KafkaException, TopicPartition
 
+from cnctwin.kafka.client_log import LOG
 from cnctwin.kafka.kept import answered, read_kept
 from cnctwin.kafka.settings import KafkaSettings
 from cnctwin.kafka.topics import Topics
@@ -20,6 +21,7 @@ from processors.actions import Action, Declare
 from processors.errors import SnapshotError
 from processors.partition.partition import LIVES
 from processors.partition.results import action_of
+from processors.running.containment import one_line
 from processors.running.counts import Counts
 from processors.running.ports import EdgePort, HostPort
 from processors.running.runtime import Configured
@@ -124,7 +126,7 @@ class Back:
                 if error.code() == KafkaError._PARTITION_EOF:  # behind the ends of transactions, which are no messages
                     self._next[number] = offset
                 else:
-                    _log.warning("kafka: %s", error.str())
+                    LOG.warning("kafka: %s", error.str())
                 continue
             self._next[number] = offset + 1
             listed: Any = message.headers()
@@ -158,7 +160,7 @@ class Back:
         try:
             self._consumer.commit(offsets=positions, asynchronous=True)
         except KafkaException as error:
-            _log.warning("kafka: %s", error.args[0].str())
+            LOG.warning("kafka: %s", error.args[0].str())
 
     def reported(self) -> None:
         """Let dead letters out again."""
@@ -196,7 +198,13 @@ def _declared(kept: Mapping[str, bytes]) -> Iterator[tuple[str, str, Declare]]:
         if key.startswith("~"):
             continue
         first, _, snapshot = payload.partition(b"\n")
-        moment, document = json.loads(first), json.loads(snapshot)
-        for machine, told in document["live"]["machines"].items():
-            if any("/twin-" not in node for node in moment["machines"][machine]["online"]):
-                yield machine, name, Declare(machine, latest_of(told))
+        try:
+            moment, document = json.loads(first), json.loads(snapshot)
+            known = {machine: latest_of(told) for machine, told in document["live"]["machines"].items()}
+            online = {machine: moment["machines"][machine]["online"] for machine in known}
+        except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
+            _log.warning("%s: no state that can be read, so the twin is told with its next news: %s", key, one_line(error))
+            continue
+        for machine, latest in known.items():
+            if any("/twin-" not in node for node in online[machine]):
+                yield machine, name, Declare(machine, latest)

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 
 from confluent_kafka import KafkaError, KafkaException, Message, Producer
 
+from cnctwin.kafka.client_log import REACH
 from cnctwin.kafka.settings import KafkaSettings
 from sparkplug.host import Held
 from sparkplug.host_event import EventKind, HostEvent
@@ -69,8 +70,7 @@ class Outward:
                 "message.timeout.ms": 0,  # a record waits for as long as it takes
                 "queue.buffering.max.messages": MESSAGES_MAX,
                 "queue.buffering.max.kbytes": round(settings.buffer_mb * 1024),
-            },
-            logger=_log,
+            }
         )
 
     @property
@@ -180,6 +180,7 @@ class Outward:
         """Count a record that the cluster has acknowledged, or refused."""
         if error is None:
             self.delivered += 1
+            REACH.answered()
             return
         self._refused(message.topic() or "", error)
 
