@@ -22,6 +22,7 @@ REQUEST_S = 5.0
 HUNG_S, HUNG_S_MAX = 2.0, 30.0  # for an answer of a cluster that has just taken messages; doubled each time that none comes
 CLAIM_S = REQUEST_S + 2.0
 CUT = (KafkaError._TRANSPORT, KafkaError._ALL_BROKERS_DOWN)
+PURGED = (KafkaError._PURGE_QUEUE, KafkaError._PURGE_INFLIGHT)  # of a transaction that was given up
 PAUSE_S = 0.2
 T = TypeVar("T")
 MESSAGE_BYTES_MAX = 64 * 1024 * 1024
@@ -84,6 +85,7 @@ class Transactions:
         self.is_open = False
         self._settings, self._is_stopping = settings, is_stopping
         self._patience_s = HUNG_S
+        self._undelivered = ""
         self._refused, self._refused_bytes = "", 0  # what the cluster would not take of the open transaction
         self._begin()
 
@@ -144,7 +146,7 @@ class Transactions:
                 self._producer.produce(topic, value, key.encode(), partition, headers=headers)
             except BufferError:
                 self._producer.poll(PAUSE_S)
-                self._raise_if_cut()
+                self._raise_if_lost()
                 continue
             except KafkaException as error:
                 if error.args[0].code() == KafkaError.MSG_SIZE_TOO_LARGE:
@@ -153,7 +155,10 @@ class Transactions:
             return
 
     def _not_delivered(self, error: KafkaError, message: Message) -> None:
-        """Note a message that the cluster refuses for its size, of one batch the largest; with it the whole transaction fails."""
+        """Note that a message does not go out, and with it the whole transaction; of those that are too large, the largest."""
+        if error.code() in PURGED:
+            return
+        self._undelivered = error.str()
         value = message.value()
         if error.code() == KafkaError.MSG_SIZE_TOO_LARGE and isinstance(value, bytes) and len(value) > self._refused_bytes:
             topic, key = message.topic(), message.key()
@@ -164,6 +169,7 @@ class Transactions:
     def open(self) -> None:
         """Begin a transaction where none is open."""
         if not self.is_open:
+            self._undelivered = ""
             try:
                 self._producer.begin_transaction()
             except KafkaException as error:
@@ -189,10 +195,10 @@ class Transactions:
         until_s = time.monotonic() + self._settings.transaction_s
         try:
             while producer.flush(PAUSE_S) and not self._is_stopping() and time.monotonic() < until_s:
-                self._raise_if_cut()
+                self._raise_if_lost()
         except KafkaException as error:
             self._failed(error.args[0])
-        self._raise_if_cut()
+        self._raise_if_lost()
 
     def _ask(self, request: Callable[[], object]) -> None:
         """Ask once. If the transaction went through without an answer, the states that are restored say so. Raises AbortedError,
@@ -205,7 +211,11 @@ class Transactions:
             self._is_spoilt, self._patience_s = True, min(2.0 * self._patience_s, HUNG_S_MAX)
             raise
 
-    def _raise_if_cut(self) -> None:
+    def _raise_if_lost(self) -> None:
+        if self._refused:
+            raise RefusedError(self._refused)
+        if self._undelivered:
+            raise AbortedError(self._undelivered)
         if self._is_spoilt:
             raise AbortedError("the connection to a broker is lost")
 
@@ -233,13 +243,13 @@ class Transactions:
         raise AbortedError(reason.str())
 
 
-def producer_of(settings: KafkaSettings, transactional_id: str, more: Mapping[str, Any]) -> Producer:
+def producer_of(settings: KafkaSettings, transactional_id: str, more: Mapping[str, Any] | None = None) -> Producer:
     """Return a transactional producer. Of how large a message may be the cluster decides, as long as there is room for it."""
     buffer_bytes = round(settings.buffer_mb * 1024 * 1024)
     return Producer(
         settings.client()
         | {"message.max.bytes": min(buffer_bytes // BUFFER_SHARE, MESSAGE_BYTES_MAX)}
-        | dict(more)
+        | dict(more or {})
         | {
             "transactional.id": transactional_id,
             "transaction.timeout.ms": round(settings.transaction_s * 1000),
@@ -254,7 +264,7 @@ def producer_of(settings: KafkaSettings, transactional_id: str, more: Mapping[st
 
 def fence(settings: KafkaSettings, transactional_id: str) -> None:
     """Take the name of a writer that is gone, for a moment: the cluster aborts what it left open."""
-    producer_of(settings, transactional_id, {}).init_transactions(REQUEST_S)
+    producer_of(settings, transactional_id).init_transactions(REQUEST_S)
 
 
 def written_by(name: str) -> Headers:

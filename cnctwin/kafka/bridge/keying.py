@@ -8,11 +8,14 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from cnctwin.kafka.topics import Topics
+from processors.config import Configuration, ProcessorConfig
+from processors.discovery import AnyProcessor
 from processors.running.runtime import Configured
 from sparkplug.host_event import EventKind, HostEvent
 
 CLOCK_MS = 1000
 MACHINES_MAX = 20_000
+LAYOUTS_MAX = 4096
 _DATA = EventKind.DATA
 
 
@@ -24,17 +27,23 @@ class Addressed(NamedTuple):
     event: HostEvent
 
 
+_Cell = tuple[str, AnyProcessor, Configuration[ProcessorConfig], frozenset[str] | None]
+"""The topic of a processor that compares machines, and the signals that it asks for; None stands for all."""
+_Read = tuple[bool, list[_Cell]]
+
+
 class Keying:
     """See the module. `pairs`: the processors that run on the log, with their configuration."""
 
     def __init__(self, topics: Topics, pairs: Sequence[Configured]) -> None:
         self._readings = topics.readings
-        self._cells = [
+        self._cells: list[_Cell] = [
             (topics.cells(one.name), one, configuration, one.signals) for one, configuration in pairs if one.is_of_cells
         ]
         self._folds = [one for one, _ in pairs if not one.is_of_cells]
         self._told_ms: dict[tuple[str, str], int] = {}
-        self._readers: dict[str, bool] = {}
+        self._picks: dict[str, dict[tuple[str, ...], tuple[int, ...]]] = {topic: {} for topic, *_ in self._cells}
+        self._read: dict[str, _Read] = {}
 
     @property
     def topics(self) -> list[str]:
@@ -44,24 +53,45 @@ class Keying:
     def addressed(self, event: HostEvent) -> Iterator[Addressed]:
         """Yield the copies of an event of a device."""
         machine, node = event.device or "", event.node.node
-        is_read = self._readers.get(node)
-        if is_read is None:
-            is_read = self._readers[node] = any(one.listens_to(node) for one in self._folds)
+        read = self._read.get(node)
+        if read is None:
+            read = self._read[node] = self._readers_of(node)
+        is_read, cells = read
         if is_read:
             yield Addressed(self._readings, machine, event)
-        for topic, processor, configuration, signals in self._cells:
-            if processor.listens_to(node) and (part := self._part(topic, event, signals)) is not None:
+        for topic, processor, configuration, signals in cells:
+            if (part := self._part(topic, event, signals)) is not None:
                 yield Addressed(topic, processor.unit_of(configuration, machine), part)
+
+    def _readers_of(self, node: str) -> _Read:
+        """Return whether any processor of single machines reads a node, and the processors of cells that do."""
+        return any(one.listens_to(node) for one in self._folds), [one for one in self._cells if one[1].listens_to(node)]
 
     def _part(self, topic: str, event: HostEvent, signals: frozenset[str] | None) -> HostEvent | None:
         """Return what a processor asks for of an event; None where it is nothing, and the time is known."""
         if event.kind is not _DATA or signals is None:
             return event
-        readings = tuple(one for one in event.readings if one.name in signals)
+        places = self._places(topic, event, signals)
         place = topic, event.device or ""
-        if not readings and event.timestamp_ms - self._told_ms.get(place, 0) < CLOCK_MS:
+        if not places and event.timestamp_ms - self._told_ms.get(place, 0) < CLOCK_MS:
             return None
         if len(self._told_ms) >= MACHINES_MAX:
             self._told_ms.clear()
         self._told_ms[place] = event.timestamp_ms
-        return event if not readings or len(readings) == len(event.readings) else event._replace(readings=readings)
+        if not places or len(places) == len(event.readings):
+            return event
+        readings = tuple([event.readings[at] for at in places])
+        names = tuple([event.names[at] for at in places]) if event.names else ()
+        return event._replace(readings=readings, names=names)
+
+    def _places(self, topic: str, event: HostEvent, signals: frozenset[str]) -> tuple[int, ...]:
+        """Return where the readings stand that a processor asks for; messages of one layout share their names."""
+        picks = self._picks[topic]
+        places = picks.get(event.names) if event.names else None
+        if places is None:
+            places = tuple([at for at, reading in enumerate(event.readings) if reading.name in signals])
+            if event.names:
+                if len(picks) >= LAYOUTS_MAX:
+                    picks.clear()
+                picks[event.names] = places
+        return places
