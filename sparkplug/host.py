@@ -69,7 +69,8 @@ class HostApplication:
 
     With `keep_s` the broker keeps the session for so long, and what it delivers at QoS 1 until the application acknowledges it:
     `take_held` returns what `poll` has dealt with since it was last called, and `acknowledge` takes it. Nothing is dropped for
-    its age then, and a connection that ends makes nothing stale. `on_life` hears each birth and death.
+    its age then, and a connection that ends makes nothing stale. `on_life` hears each birth and death. With `packs` data may
+    come packed (`HostEvent`).
     """
 
     def __init__(
@@ -90,6 +91,7 @@ class HostApplication:
         reserved: Collection[str] = (),
         trusted: Callable[[NodeId], bool] = lambda _: False,
         keep_s: int = 0,
+        packs: bool = False,
     ) -> None:
         self.dropped = 0
         self.faults = 0  # messages that a bug of ours has lost
@@ -109,6 +111,7 @@ class HostApplication:
             publish_state=publish_state,
             wanted=wanted,
             gate=Gate(limits, reserved, trusted),
+            packs=packs,
         )
         self._plain_filters: list[str] = []
         self._inbox: deque[tuple[str | _Mark | Overrun | Held, bytes, float]] = deque()  # with the time of time.monotonic

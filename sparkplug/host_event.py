@@ -4,6 +4,7 @@ from enum import Enum
 from typing import NamedTuple
 
 from sparkplug.admission.refusal import Refusal
+from sparkplug.layouts.layout import Packed
 from sparkplug.metric import NodeId, Reading
 
 
@@ -29,7 +30,8 @@ class HostEvent(NamedTuple):
     `names` are those of a DATA event's readings: the same tuple for all messages of one layout, so that it can be recognised by
     identity. It is () where it is not given, and where a reading is historical. Where it is given, `oldest_ms` and `newest_ms`
     are those of the readings' time stamps. `seq` is the number of the message that the event comes from, -1 where it comes from
-    none, or the node's death.
+    none, or the node's death. `packed` is the whole message where the session leaves it packed; then there are no readings yet,
+    and `read` takes them out.
     """
 
     kind: EventKind
@@ -46,3 +48,8 @@ class HostEvent(NamedTuple):
     refused: int = 0
     refusal: Refusal | None = None
     seq: int = -1
+    packed: Packed | None = None
+
+    def read(self) -> tuple[Reading, ...]:
+        """Return the readings, packed or not."""
+        return self.readings if self.packed is None else self.packed.readings()

@@ -52,6 +52,7 @@ class HostSession:
         publish_state: bool = True,
         wanted: Callable[[NodeId], bool] = _anyone,
         gate: Gate | None = None,
+        packs: bool = False,
     ) -> None:
         self.state_topic = state_topic(host_id)
         self.actions: list[Action] = []
@@ -59,10 +60,8 @@ class HostSession:
         self.online = False
         self._gate = gate or Gate()
         self.admission = Admission(self._gate, self.counts)
-        self._topic_filters = tuple(topic_filters)
-        self._reorder_timeout_ms = reorder_timeout_ms
-        self._publish_state = publish_state
-        self._wanted = wanted
+        self._topic_filters, self._reorder_timeout_ms = tuple(topic_filters), reorder_timeout_ms
+        self._publish_state, self._wanted, self._packs = publish_state, wanted, packs
         self._nodes: dict[NodeId, Watched] = {}
         self._routes: dict[str, Route] = {}
         self._room = Room()
@@ -380,7 +379,8 @@ class HostSession:
         route = self._routes.get(name)
         if route is None:
             owner.layouts = Memory(self._room)
-            route = self._routes[name] = Route(watched.picture, watched.window, owner, topic.device, owner.layouts, self._gate)
+            of_node = watched.picture, watched.window, owner
+            route = self._routes[name] = Route(*of_node, topic.device, owner.layouts, self._gate, self._packs)
         return route
 
     def _hole(self, watched: Watched, lost: int, now_ms: int, *, ask: bool) -> list[HostEvent]:

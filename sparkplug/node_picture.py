@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 from sparkplug.codec import datatype_of, read_properties, read_value
 from sparkplug.datatype import FIELD, DataType
 from sparkplug.errors import PayloadError
+from sparkplug.layouts.layout import Packed
 from sparkplug.layouts.memory import Memory
 from sparkplug.metric import UNIT_PROPERTY, NodeId, Reading
 from sparkplug.quality import QUALITY_PROPERTY, REASON_PROPERTY, Quality
@@ -50,6 +51,7 @@ class Owner:
         "_names",
         "_names_known",
         "_newest",
+        "_packed",
         "aliases",
         "aliases_shared",
         "bindings",
@@ -74,6 +76,7 @@ class Owner:
         self._latest = readings or {}
         self._names: tuple[str, ...] = ()
         self._newest: tuple[Reading, ...] = ()
+        self._packed: Packed | None = None  # in place of the newest
         self._names_known: dict[tuple[str, ...], tuple[str, ...]] = {}
 
     @property
@@ -103,7 +106,12 @@ class Owner:
         if names is not self._names:
             self._settle()
             self._names = names
-        self._newest = readings
+        self._newest, self._packed = readings, None
+
+    def take_packed(self, packed: Packed) -> None:
+        """Note a message that is taken apart only where somebody asks for the latest readings."""
+        self.take_present(packed.layout.names, ())
+        self._packed = packed
 
     def replace(self, readings: Iterable[Reading]) -> None:
         """Have other readings stand for those of the birth."""
@@ -120,8 +128,9 @@ class Owner:
 
     def _settle(self) -> None:
         if self._names:
-            self._latest.update(zip(self._names, self._newest, strict=True))
-            self._names = self._newest = ()
+            newest = self._newest if self._packed is None else self._packed.readings()
+            self._latest.update(zip(self._names, newest, strict=True))
+            self._names, self._newest, self._packed = (), (), None
 
     def bear(self, message: Any, timestamp_ms: int, holders: dict[int, "Owner"]) -> tuple[Reading, ...]:
         """Take a birth certificate; everything known before is forgotten. Raises PayloadError before anything changes.
@@ -149,7 +158,7 @@ class Owner:
                 self.aliases[alias] = binding
                 holder = holders.setdefault(alias, self)
                 self.aliases_shared += holder is not self and holder.online
-        self._latest, self._names, self._newest, self._names_known = readings, (), (), {}
+        self._latest, self._names, self._newest, self._packed, self._names_known = readings, (), (), None, {}
         return tuple(readings.values())
 
     def leave(self, holders: dict[int, "Owner"]) -> None:

@@ -67,6 +67,7 @@ def bridge(
             reserved=RESERVED_MACHINES,
             trusted=lambda node: is_twin_node(node.node),
             keep_s=keep_s,
+            packs=True,
         )
         edges = {
             processor.name: EdgeNode(

@@ -10,8 +10,9 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from itertools import repeat
 from struct import Struct
-from typing import Any
+from typing import Any, NamedTuple
 
+from sparkplug.layouts.pieces import Pieces
 from sparkplug.layouts.varint import number
 from sparkplug.metric import Reading
 from sparkplug.quality import Quality
@@ -28,7 +29,7 @@ class Layout:
     The time stamps of the metrics: all equal, the first of them at `first_at` (`low_bits` masks its continuation bits away); or
     each for itself, then `stamps` takes them out; or the payload's, then there is neither. `convert` holds the places of values
     that `struct` leaves as bytes. `blank` has a place for each metric and `filled` those that have a value; both are empty where
-    all have one.
+    all have one. `pieces` is None where a message cannot be handed on in pieces.
     """
 
     length: int
@@ -52,6 +53,7 @@ class Layout:
     reasons: Iterable[str | None]
     historical: Iterable[bool]
     has_history: bool
+    pieces: Pieces | None
 
     def columns(self, payload: bytes, whole: int) -> Columns | None:
         """Return what a message says; None where it is of another layout or has to be read the long way.
@@ -103,3 +105,17 @@ class Layout:
         for place, value in zip(self.filled, values, strict=True):
             row[place] = value
         return row
+
+
+class Packed(NamedTuple):
+    """A data message that nobody has taken apart yet: who hands messages on may never have to. Its readings are good, and none is
+    historical."""
+
+    layout: Layout
+    payload: bytes
+
+    def readings(self) -> tuple[Reading, ...]:
+        """Return the readings, equal ones each time."""
+        columns = self.layout.columns(self.payload, _number(self.payload, "little"))
+        assert columns is not None, "the payload is of its layout"
+        return self.layout.readings(columns[2], columns[3])

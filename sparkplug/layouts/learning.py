@@ -4,7 +4,7 @@ Only what peers usually send is learnt: time stamp, metrics and sequence number 
 once, tags of one byte. Everything else goes the long way each time.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import lru_cache, partial
 from itertools import repeat
 from struct import Struct
@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 from sparkplug.datatype import SIGNED_BITS, UNSIGNED_BITS, DataType
 from sparkplug.layouts.layout import Layout
+from sparkplug.layouts.pieces import Pieces
 from sparkplug.layouts.varint import number
 from sparkplug.metric import Reading
 from sparkplug.quality import Quality
@@ -21,6 +22,7 @@ LENGTH_MAX = 8192
 VARINT_BYTES_MAX = 9  # 63 bits; a negative Int64 takes ten
 _VARINT, _DOUBLE, _BYTES, _FLOAT = 0, 1, 2, 5  # wire types of protobuf
 _TIMESTAMP, _METRIC, _SEQ = (1, _VARINT), (2, _BYTES), (3, _VARINT)
+_HEADS, _TYPE = (1, 2), 4
 _STAMP, _IS_NULL, _INT, _LONG, _SINGLE, _FLOATING, _BOOLEAN, _TEXT = 3, 7, 10, 11, 12, 13, 14, 15
 # Of each field of a metric that may stand in a layout: its wire type.
 _FIELDS = {
@@ -67,6 +69,7 @@ class _Draft:
         self.values: list[tuple[_Field, str]] = []  # with the code of `struct`
         self.convert: list[tuple[int, Callable[[bytes], Any]]] = []
         self.filled: list[int] = []
+        self.rests: list[tuple[_Field, DataType | None]] = []  # of each metric behind alias and name
 
     def free(self, field: _Field) -> None:
         """Let a field's content be anything; of a varint, anything of the same number of bytes."""
@@ -135,6 +138,7 @@ def _learnt(payload: bytes, datatypes: Sequence[DataType], readings: Sequence[Re
         width = draft.stamps[0].end - draft.stamps[0].start
         mask |= ((1 << 8 * width) - 1) * spread
         low_bits = int.from_bytes(b"\x7f" * width, "little")
+    tail = _Field(_SEQ[0], _SEQ[1], metrics[-1].end, len(payload))
     good = all(reading.quality is Quality.GOOD and reading.reason is None for reading in readings)
     has_history = any(reading.is_historical for reading in readings)
     return Layout(
@@ -159,6 +163,7 @@ def _learnt(payload: bytes, datatypes: Sequence[DataType], readings: Sequence[Re
         reasons=repeat(None) if good else tuple(reading.reason for reading in readings),
         historical=tuple(reading.is_historical for reading in readings) if has_history else repeat(False),
         has_history=has_history,
+        pieces=_pieces(draft, first, tail) if good and len(draft.rests) == len(metrics) else None,
     )
 
 
@@ -170,11 +175,36 @@ def _read_metric(draft: _Draft, place: int, metric: _Field, datatype: DataType) 
         fields[field.number] = field
     if _STAMP in fields:
         draft.stamps.append(fields[_STAMP])
+    if (rest := _rest(draft.payload, metric, fields, datatype)) is not None:
+        draft.rests.append(rest)
     values = [field for field in fields.values() if field.number >= _INT]
     if len(values) > 1 or (values and _IS_NULL in fields):
         raise _UnusualError
     if values:
         draft.take_value(place, values[0], datatype)
+
+
+def _rest(
+    payload: bytes, metric: _Field, fields: Mapping[int, _Field], datatype: DataType
+) -> tuple[_Field, DataType | None] | None:
+    """Return the piece of a metric behind alias and name, and its type where the piece does not say it; None where there is more
+    than time stamp, type and value."""
+    heads = [field.end for field in fields.values() if field.number in _HEADS]
+    rest = [field for field in fields.values() if field.number not in _HEADS]
+    told = fields.get(_TYPE)
+    if not heads or _STAMP not in fields or datatype is DataType.UNKNOWN or any(field.end < heads[-1] for field in rest):
+        return None
+    if any(field.number not in (_STAMP, _TYPE) and field.number < _INT for field in rest) or rest[-1].number < _INT:
+        return None
+    if told is not None and number(payload[told.start : told.end]) != datatype:
+        return None
+    return _Field(0, _BYTES, heads[-1], metric.end), datatype if told is None else None
+
+
+def _pieces(draft: _Draft, first: _Field, tail: _Field) -> Pieces:
+    places = [first._replace(start=0), *(rest for rest, _ in draft.rests), tail]
+    cut = _struct([(place, f"{place.end - place.start}s") for place in places], len(draft.payload))
+    return Pieces(cut, tuple(rest.end - rest.start for rest, _ in draft.rests), tuple(told for _, told in draft.rests))
 
 
 def _walk(data: bytes, at: int, end: int) -> Iterator[_Field]:

@@ -8,6 +8,7 @@ from sparkplug.codec import read_properties
 from sparkplug.datatype import DataType
 from sparkplug.errors import PayloadError
 from sparkplug.host_event import EventKind, HostEvent
+from sparkplug.layouts.layout import Packed
 from sparkplug.layouts.learning import learn
 from sparkplug.layouts.memory import Memory
 from sparkplug.metric import Reading
@@ -19,7 +20,10 @@ _DATA, _NEW = EventKind.DATA, tuple.__new__
 
 @dataclass(slots=True)
 class Route:
-    """One topic's owner, the order of its node's messages, and the layouts that are known."""
+    """One topic's owner, the order of its node's messages, and the layouts that are known.
+
+    packs: leaves messages packed that can be handed on in pieces
+    """
 
     picture: NodePicture
     window: SequenceWindow
@@ -27,6 +31,7 @@ class Route:
     device: str | None
     layouts: Memory
     gate: Gate
+    packs: bool = False
 
     def take(self, payload: bytes) -> HostEvent | None:
         """Take a data message of a known layout; None, and nothing has changed, where it has to go the long way."""
@@ -41,13 +46,35 @@ class Route:
             return None
         if not self.window.is_next(seq, stamp_ms):
             return None
-        readings, names = layout.readings(values, stamps_ms), layout.names
+        names = layout.names
+        if self.packs and layout.pieces is not None:
+            packed = Packed(layout, payload)
+            owner.take_packed(packed)
+            told = _DATA, picture.node, self.device, stamp_ms, (), "", "", b"", names, oldest_ms, newest_ms, 0, None, seq, packed
+            return _NEW(HostEvent, told)
+        readings = layout.readings(values, stamps_ms)
         if layout.has_history:
             owner.take_history(readings)
             names, oldest_ms, newest_ms = (), 0, 0
         else:
             owner.take_present(names, readings)
-        event = (_DATA, picture.node, self.device, stamp_ms, readings, "", "", b"", names, oldest_ms, newest_ms, 0, None, seq)
+        event = (
+            _DATA,
+            picture.node,
+            self.device,
+            stamp_ms,
+            readings,
+            "",
+            "",
+            b"",
+            names,
+            oldest_ms,
+            newest_ms,
+            0,
+            None,
+            seq,
+            None,
+        )
         return _NEW(HostEvent, event)
 
     def learn(self, payload: bytes, message: Any, readings: tuple[Reading, ...], names: tuple[str, ...]) -> None:

@@ -15,9 +15,10 @@ from typing import Any, NamedTuple
 
 from sparkplug.codec import datatype_of, parse, read_value, write_metric, write_properties
 from sparkplug.datatype import DataType
-from sparkplug.layouts.layout import Layout
+from sparkplug.layouts.layout import Layout, Packed
 from sparkplug.layouts.learning import learn
 from sparkplug.layouts.memory import Memory, Room
+from sparkplug.layouts.pieces import Pieces
 from sparkplug.layouts.varint import written as varint
 from sparkplug.metric import UNIT_PROPERTY, Reading, quality_properties
 from sparkplug.metric_bytes import pack_double
@@ -93,6 +94,24 @@ def written(timestamp_ms: int, readings: Sequence[Reading], seq: int) -> bytes:
     return b"".join(parts)
 
 
+def handed_on(packed: Packed) -> bytes:
+    """Return a packed message by names: its pieces, and between them what the birth said of each metric."""
+    layout, payload = packed
+    pieces = layout.pieces
+    assert pieces is not None, "what is packed can be cut"
+    template = pieces.template or _template(layout, pieces)
+    return template % pieces.cut.unpack(payload)
+
+
+def _template(layout: Layout, pieces: Pieces) -> bytes:
+    parts = [b"%b"]
+    for name, unit, datatype, size in zip(layout.names, layout.units, pieces.types, pieces.sizes, strict=True):
+        head = _head(name, datatype, unit)
+        parts += ((b"\x12" + varint(len(head) + size) + head).replace(b"%", b"%%"), b"%b")
+    pieces.template = b"".join((*parts, b"%b"))
+    return pieces.template
+
+
 def _double(name: str, unit: str | None) -> bytes:
     """Return the bytes of a good double up to its value, behind which the stamp stands."""
     head = _told(name, DataType.DOUBLE, unit, _GOOD, None)
@@ -128,17 +147,17 @@ def _metric(reading: Reading, stamp: bytes) -> tuple[bytes, ...]:
     return b"\x12", varint(len(body)), body
 
 
-def _told(name: str, datatype: DataType, unit: str | None, quality: Quality, reason: str | None) -> bytes:
+def _told(name: str, datatype: DataType | None, unit: str | None, quality: Quality, reason: str | None) -> bytes:
     """Return the bytes of a metric that say what it is: name, type, unit, quality and reason."""
     raw = name.encode()
-    told = b"\x0a" + varint(len(raw)) + raw + b"\x20" + varint(datatype)
+    told = b"\x0a" + varint(len(raw)) + raw + (b"" if datatype is None else b"\x20" + varint(datatype))
     if properties := _properties(unit, quality, reason):
         told += b"\x4a" + varint(len(properties)) + properties
     return told
 
 
 @lru_cache(maxsize=HEADS_MAX)
-def _head(name: str, datatype: DataType, unit: str | None) -> bytes:
+def _head(name: str, datatype: DataType | None, unit: str | None) -> bytes:
     """Return what `_told` returns for a good value."""
     return _told(name, datatype, unit, Quality.GOOD, None)
 

@@ -27,7 +27,7 @@ from sparkplug.errors import PayloadError
 from sparkplug.host_event import EventKind, HostEvent
 from sparkplug.layouts.memory import Room
 from sparkplug.metric import NodeId
-from sparkplug.records.named import NamedPayloads, written
+from sparkplug.records.named import NamedPayloads, handed_on, written
 
 VERSION = b"1"
 WATERMARK = b"watermark"
@@ -75,7 +75,8 @@ class RecordWriter:
         at = b"%d %d %d %d" % (received_ms, *origin)
         if kind is _DATA:
             common = self._known.get((node, device)) or self._of_source(node, device)
-            return [*common, ("at", at)], written(stamp_ms, readings, max(origin[2], 0))
+            value = written(stamp_ms, readings, max(origin[2], 0)) if event.packed is None else handed_on(event.packed)
+            return [*common, ("at", at)], value
         headers: Headers = [("version", VERSION), ("kind", kind.value.encode()), ("writer", self._name), ("at", at)]
         if kind is _PLAIN:
             return [*headers, ("topic", topic.encode()), ("retain", b"1" if retain else b"0")], payload

@@ -78,18 +78,19 @@ class Keying:
         if len(self._told_ms) >= MACHINES_MAX:
             self._told_ms.clear()
         self._told_ms[place] = event.timestamp_ms
-        if not places or len(places) == len(event.readings):
+        if not places:
             return event
-        readings = tuple([event.readings[at] for at in places])
+        all_readings = event.read()
         names = tuple([event.names[at] for at in places]) if event.names else ()
-        return event._replace(readings=readings, names=names)
+        return event._replace(readings=tuple([all_readings[at] for at in places]), names=names, packed=None)
 
     def _places(self, topic: str, event: HostEvent, signals: frozenset[str]) -> tuple[int, ...]:
         """Return where the readings stand that a processor asks for; messages of one layout share their names."""
         picks = self._picks[topic]
         places = picks.get(event.names) if event.names else None
         if places is None:
-            places = tuple([at for at, reading in enumerate(event.readings) if reading.name in signals])
+            names = event.names or [reading.name for reading in event.read()]
+            places = tuple([at for at, name in enumerate(names) if name in signals])
             if event.names:
                 if len(picks) >= LAYOUTS_MAX:
                     picks.clear()

@@ -14,11 +14,12 @@ from sparkplug.codec import encode, parse
 from sparkplug.datatype import DataType
 from sparkplug.errors import PayloadError
 from sparkplug.host_session import HostEvent, HostSession
-from sparkplug.layouts.layout import Layout
+from sparkplug.layouts.layout import Layout, Packed
 from sparkplug.layouts.memory import Memory, Room
 from sparkplug.layouts.route import Route
 from sparkplug.metric import Reading
 from sparkplug.node_picture import NodePicture, tells_quality
+from sparkplug.records.named import NamedPayloads, handed_on
 from sparkplug.sequence import SequenceWindow
 from sparkplug.topics import NodeId
 from sparkplug.values import Metric, Payload, PropertyValue
@@ -235,6 +236,12 @@ def test_a_layout_reads_what_the_long_way_reads_or_nothing(payload: bytes, seeds
         assert bits(layout.readings(values, stamps_ms)) == bits(readings)
         assert (oldest_ms, newest_ms) == (min(r.timestamp_ms for r in readings), max(r.timestamp_ms for r in readings))
         assert layout.names == tuple(r.name for r in readings)
+        if layout.pieces is None:
+            continue
+        handed = NamedPayloads().read(handed_on(Packed(layout, data)))
+        assert (handed.timestamp_ms, handed.seq) == (stamp_ms, seq)
+        assert bits(handed.readings) == bits(readings)
+        assert (handed.names, handed.oldest_ms, handed.newest_ms) == (layout.names, oldest_ms, newest_ms)
 
 
 @QUICK
@@ -260,6 +267,7 @@ def test_ordinary_messages_are_learnt_and_known_again(places: list[int], togethe
     known = learnt(born, message())
     assert known is not None
     layout, memory = known
+    assert (layout.pieces is None) == any(TYPES[place] is DataType.UNKNOWN for place in places)
     for _ in range(3):
         again = message()
         found = memory.read(again)
@@ -269,14 +277,14 @@ def test_ordinary_messages_are_learnt_and_known_again(places: list[int], togethe
         assert bits(layout.readings(found[1][2], found[1][3])) == bits(long_way(born, again)[1])
 
 
-# The same through a session: one that learns beside one that has no room for layouts.
+# The same through a session: one that learns beside one that has no room for layouts, and one that leaves messages packed.
 
 
-class Pair:
-    """Two hosts that hear the same."""
+class Three:
+    """Three hosts that hear the same."""
 
     def __init__(self) -> None:
-        self.hosts = [HostSession("scada", chance=Random(0)) for _ in range(2)]
+        self.hosts = [HostSession("scada", chance=Random(0), packs=place == 2) for place in range(3)]
         self.hosts[1]._room.left = 0
         self.now_ms = START_MS
         for host in self.hosts:
@@ -285,21 +293,24 @@ class Pair:
 
     def hear(self, topic: str, payload: bytes) -> list[HostEvent]:
         self.now_ms += 10
-        quick, plain = (host.message(topic, payload, self.now_ms) for host in self.hosts)
-        assert [event._replace(readings=()) for event in quick] == [event._replace(readings=()) for event in plain]
-        assert [bits(event.readings) for event in quick] == [bits(event.readings) for event in plain]
+        quick, plain, packed = (host.message(topic, payload, self.now_ms) for host in self.hosts)
+        for others in (plain, packed):
+            bare = [event._replace(readings=(), packed=None) for event in others]
+            assert [event._replace(readings=()) for event in quick] == bare
+            assert [bits(event.readings) for event in quick] == [bits(event.read()) for event in others]
         self.compare()
         return quick
 
     def tick(self, by_ms: int) -> None:
         self.now_ms += by_ms
-        quick, plain = (host.tick(self.now_ms) for host in self.hosts)
-        assert repr(quick) == repr(plain)
+        quick, *others = (repr(host.tick(self.now_ms)) for host in self.hosts)
+        assert others == [quick, quick]
 
     def compare(self) -> None:
-        quick, plain = self.hosts
-        assert quick.counts == plain.counts
-        assert quick.actions == plain.actions
+        quick, *others = self.hosts
+        for other in others:
+            assert quick.counts == other.counts
+            assert quick.actions == other.actions
 
     def compare_pictures(self) -> None:
         known = []
@@ -307,7 +318,7 @@ class Pair:
             born = host.picture(NODE)
             assert born is not None
             known.append([(device, owner.online, bits(tuple(owner.readings.values()))) for device, owner in born.owners()])
-        assert known[0] == known[1]
+        assert known[0] == known[1] == known[2]
 
 
 def birth(*, device: str | None, seq: int, stamp_ms: int, first_alias: int, turned: bool) -> bytes:
@@ -323,8 +334,8 @@ def birth(*, device: str | None, seq: int, stamp_ms: int, first_alias: int, turn
 
 @settings(deadline=None, suppress_health_check=[HealthCheck.too_slow], max_examples=60)
 @given(st.integers(0, 2**32))
-def test_a_host_with_layouts_says_what_a_host_without_says(seed: int) -> None:
-    chance, pair, seq = Random(seed), Pair(), 0
+def test_hosts_with_layouts_say_what_a_host_without_says(seed: int) -> None:
+    chance, hosts, seq = Random(seed), Three(), 0
     stamp_ms = START_MS
     known: list[tuple[int, ...]] = [tuple(chance.sample(range(9), chance.randint(1, 4))) for _ in range(3)]
 
@@ -338,12 +349,12 @@ def test_a_host_with_layouts_says_what_a_host_without_says(seed: int) -> None:
         turned = chance.random() < 0.5
         if verb == "NBIRTH":
             seq = 0
-            pair.hear("spBv1.0/cnc/NBIRTH/edge", birth(device=None, seq=0, stamp_ms=stamp_ms, first_alias=0, turned=turned))
+            hosts.hear("spBv1.0/cnc/NBIRTH/edge", birth(device=None, seq=0, stamp_ms=stamp_ms, first_alias=0, turned=turned))
         for device in ("a", "b"):
             # Now and then with aliases of the node or of the other device.
             first = chance.choice((5, 35)) if chance.random() < 0.2 else {"a": 20, "b": 40}[device]
             data = birth(device=device, seq=counted(), stamp_ms=stamp_ms, first_alias=first, turned=turned)
-            pair.hear(f"spBv1.0/cnc/DBIRTH/edge/{device}", data)
+            hosts.hear(f"spBv1.0/cnc/DBIRTH/edge/{device}", data)
 
     born("NBIRTH")
     for _ in range(120):
@@ -353,14 +364,14 @@ def test_a_host_with_layouts_says_what_a_host_without_says(seed: int) -> None:
             born(chance.choice(("NBIRTH", "DBIRTH")))
             continue
         if what < 0.03:
-            pair.hear("spBv1.0/cnc/NDEATH/edge", encode(Payload(stamp_ms, (Metric("bdSeq", 0, DataType.INT64, stamp_ms),))))
+            hosts.hear("spBv1.0/cnc/NDEATH/edge", encode(Payload(stamp_ms, (Metric("bdSeq", 0, DataType.INT64, stamp_ms),))))
             continue
         if what < 0.04:
-            pair.hear("spBv1.0/cnc/DDEATH/edge/a", encode(Payload(stamp_ms, (), seq=counted())))
+            hosts.hear("spBv1.0/cnc/DDEATH/edge/a", encode(Payload(stamp_ms, (), seq=counted())))
             continue
         if what < 0.06:
-            pair.tick(chance.choice((100, 3000)))
-            pair.compare_pictures()
+            hosts.tick(chance.choice((100, 3000)))
+            hosts.compare_pictures()
             continue
         device = chance.choice((None, "a", "a", "b"))
         first = {None: 0, "a": 20, "b": 40}[device]
@@ -375,7 +386,7 @@ def test_a_host_with_layouts_says_what_a_host_without_says(seed: int) -> None:
             number = counted()  # a hole
         payload = encode(Payload(stamp_ms - (5000 if chance.random() < 0.02 else 0), tuple(message), seq=number))
         topic = "spBv1.0/cnc/NDATA/edge" if device is None else f"spBv1.0/cnc/DDATA/edge/{device}"
-        pair.hear(topic, payload)
+        hosts.hear(topic, payload)
         if chance.random() < 0.02:
-            pair.hear(topic, payload)
-    pair.compare_pictures()
+            hosts.hear(topic, payload)
+    hosts.compare_pictures()
