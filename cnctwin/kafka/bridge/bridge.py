@@ -65,7 +65,7 @@ class Bridge:
         self._settings, self._topics, self._name, self._host, self._nodes = settings, topics, name, host, nodes
         self._keying = Keying(topics, pairs)
         self._origins = Origins(host.picture)
-        self._outward = Outward(settings, name)
+        self._outward = Outward(settings, name, owes=keeps_session)
         self._births = Births(lambda topic, payload: self._outward.keep(topics.births, topic, payload))
         if keeps_session:
             host.on_life = self._births.take

@@ -46,10 +46,12 @@ class Lot:
 
 
 class Outward:
-    """See the module."""
+    """See the module. `owes`: messages are kept by the broker until `take_safe` returns them; else the cluster's reports of what
+    went well, which cost as much as the records, are left out."""
 
-    def __init__(self, settings: KafkaSettings, name: str) -> None:
-        self.delivered = self.dropped = self.failed = 0
+    def __init__(self, settings: KafkaSettings, name: str, *, owes: bool = False) -> None:
+        self.dropped = self.failed = 0
+        self._sent = self._given_up = self._delivered = 0
         self.trouble = ""
         self._writer = RecordWriter(name)
         self._lost: Counter[Source] = Counter()
@@ -64,6 +66,7 @@ class Outward:
                 "client.id": name,
                 "enable.idempotence": True,
                 "acks": "all",
+                "delivery.report.only.error": not owes,
                 "compression.type": "lz4",
                 "linger.ms": 20,
                 "partitioner": "murmur2_random",
@@ -77,6 +80,11 @@ class Outward:
     def waiting(self) -> int:
         """The number of records that the cluster has not acknowledged."""
         return len(self._producer)
+
+    @property
+    def delivered(self) -> int:
+        """The number of records that the cluster has acknowledged."""
+        return self._sent - self._given_up - self.waiting
 
     def put(self, topic: str, key: str, event: HostEvent, received_ms: int, origin: Origin) -> bool:
         """Have an event go out; False where there was no room."""
@@ -138,6 +146,9 @@ class Outward:
     def poll(self) -> None:
         """Have delivery reports come in."""
         self._producer.poll(0)
+        if (delivered := self.delivered) > self._delivered:
+            REACH.answered()
+        self._delivered = delivered
         if self._unsaid and self._has_room:
             for place, (headers, value) in list(self._unsaid.items()):
                 topic, key, partition, _ = place
@@ -160,6 +171,7 @@ class Outward:
             self._refused(topic, error.args[0])
             return True
         self._lot.waiting += 1
+        self._sent += 1
         return True
 
     def owe(self, held: Sequence[Held]) -> None:
@@ -177,12 +189,10 @@ class Outward:
         return safe
 
     def delivered_one(self, error: KafkaError | None, message: Message) -> None:
-        """Count a record that the cluster has acknowledged, or refused."""
-        if error is None:
-            self.delivered += 1
-            REACH.answered()
-            return
-        self._refused(message.topic() or "", error)
+        """Count a record that the cluster has refused."""
+        if error is not None:
+            self._given_up += 1
+            self._refused(message.topic() or "", error)
 
     def _refused(self, topic: str, error: KafkaError) -> None:
         self.failed += 1
