@@ -14,6 +14,7 @@ from typing import Any
 from benchmarks.kafka.inputs import Inputs
 from benchmarks.kafka.whole_log import headers_of, messages
 from cnctwin.kafka.assigned import by_topic
+from cnctwin.kafka.homes import home_in
 from cnctwin.kafka.kept import read_kept
 from cnctwin.kafka.topics import Topics
 from processors.actions import DeadLetter
@@ -130,7 +131,7 @@ class Replay:
 
     def _folded(self, topic: str, number: int, stood: Stood, found: Found, inputs: Inputs) -> Partition:
         """Return the partition after all of its records."""
-        partition = Partition("replay", self._by_topic[topic], topic)
+        partition = Partition("replay", self._by_topic[topic], topic, home_in(number, self._partitions))
         told = {seat.name: array("Q") for seat in partition.seats}
         firsts: dict[str, str] = {}
         is_readings = topic == self._topics.readings

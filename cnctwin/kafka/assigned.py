@@ -8,6 +8,7 @@ from confluent_kafka import KafkaException, Message, TopicPartition
 from confluent_kafka.admin import AdminClient
 
 from cnctwin.kafka.counted import Counted
+from cnctwin.kafka.homes import home_in
 from cnctwin.kafka.kept import ANSWER_S, fence_open, read_kept
 from cnctwin.kafka.settings import KafkaSettings
 from cnctwin.kafka.topics import Topics
@@ -59,7 +60,7 @@ class Assigned:
         kept = read_kept(client, self._topics.snapshots, numbers, timeout_s=RESTORE_S_MAX, fence=fence_it)
         positions = []
         for place, (topic, number) in enumerate(places):
-            partition = Partition(self._reader, self._pairs[topic], topic)
+            partition = Partition(self._reader, self._pairs[topic], topic, home_in(number, self._settings.partitions))
             try:
                 offset = partition.restore(kept[number])
             except SnapshotError as error:

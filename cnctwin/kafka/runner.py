@@ -11,7 +11,7 @@ to nothing throws away what was folded, and the partitions are restored: there i
 
 import logging
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Sequence
 from threading import Event
 from typing import Any
 
@@ -48,12 +48,21 @@ class Runner:
     """See the module. All of it happens in the thread that calls `run`."""
 
     def __init__(
-        self, settings: KafkaSettings, topics: Topics, pairs: Sequence[Configured], member: str, sink: Sink | None = None
+        self,
+        settings: KafkaSettings,
+        topics: Topics,
+        pairs: Sequence[Configured],
+        member: str,
+        sink: Sink | None = None,
+        *,
+        hold: Callable[[Collection[Place]], None] = lambda _: None,
     ) -> None:
-        """`sink`: keeps what the historian hears, with the offsets."""
+        """`sink`: keeps what the historian hears, with the offsets. `hold`: told of all partitions that this runner has, whenever
+        the group has shared them out, and before those that go are another's."""
         names = [processor.name for processor, _ in pairs]
         self.group = topics.runners(names)
         self._settings, self._topics, self._member, self._sink = settings, topics, member, sink
+        self._hold = hold
         self._name = f"{self.group}.{member}"
         self._assigned = Assigned(settings, topics, pairs, None if sink is None else sink.begin)
         self._results = {processor.name: Results(topics.group, processor) for processor, _ in pairs}
@@ -80,6 +89,7 @@ class Runner:
                     self.turn()
         finally:
             self._consumer.close()  # partitions are revoked, and so saved
+            self._hold(())  # also where it was thrown out
             self._health.close()
 
     def _conf(self) -> dict[str, Any]:
@@ -243,6 +253,7 @@ class Runner:
         if partitions:
             self._transactions.claim()  # what the one before writes late comes to nothing
             consumer.incremental_assign(self._assigned.restore([(one.topic, one.partition) for one in partitions]))
+        self._hold(self._assigned.partitions.keys())
 
     def _on_revoke(self, consumer: Consumer, partitions: list[TopicPartition]) -> None:
         """Save the states as they are: whoever has them next folds nothing twice."""
@@ -257,6 +268,7 @@ class Runner:
             _log.warning("the partitions are handed over as they were committed before: %s", error)
             self._torn = str(error)
         self._forget(places)
+        self._hold(self._assigned.partitions.keys())
         if partitions:
             consumer.incremental_unassign(partitions)
 

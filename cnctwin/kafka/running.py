@@ -1,17 +1,21 @@
-"""A runner from its options: the consumer group's member, and beside alerts the courier that sends."""
+"""A runner from its options: the consumer group's member, and beside alerts the courier that sends, where they are."""
 
 import logging
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from threading import Event
 
+from cnctwin.kafka.assigned import Place
+from cnctwin.kafka.courier import MovingCourier
+from cnctwin.kafka.homes import home_of
 from cnctwin.kafka.runner import Runner
 from cnctwin.kafka.settings import KafkaSettings
 from cnctwin.kafka.sink import Sink
 from cnctwin.kafka.topics import Topics, cell_processors, ensure
 from cnctwin.kafka.transaction import FencedError
-from cnctwin.running.processors import courier_of
+from cnctwin.running.processors import ALERTS, new_courier
+from processors.config import ALL
 from processors.errors import ConfigurationError
 from processors.historian import HistorianConfig
 from processors.running.runtime import Configured
@@ -38,17 +42,30 @@ def run_over_kafka(
         raise ConfigurationError(f"--member {member!r} has a dot; give it a name without one")
     topics = Topics(group)
     ensure(settings, topics, cell_processors(pairs), without=(topics.births,))
-    with courier_of(pairs, broker, group), _sink(pairs) as sink:
+    with _courier(settings, topics, pairs, broker, member) as hold, _sink(pairs) as sink:
         while not stop.is_set():
             began_s = time.monotonic()
             try:
-                Runner(settings, topics, pairs, member, sink).run(stop)
+                Runner(settings, topics, pairs, member, sink, hold=hold).run(stop)
             except FencedError as error:
                 # A cluster that hung has two requests to join of one runner, and fences the one that waits for the first. So it
                 # comes in once more; where another process has the name, the one that came last ends.
                 if time.monotonic() - began_s < SETTLED_S:
                     raise
                 _log.warning("%s; unless the cluster was away: this one comes in once more", error)
+
+
+@contextmanager
+def _courier(
+    settings: KafkaSettings, topics: Topics, pairs: Sequence[Configured], broker: BrokerAddress | None, member: str
+) -> Iterator[Callable[[Collection[Place]], None]]:
+    """Yield what is to be told of the runner's partitions, and has the courier where the alerts are."""
+    new = new_courier(pairs, broker, topics.group, member)
+    if new is None:
+        yield lambda _: None
+        return
+    with MovingCourier(new, (topics.cells(ALERTS), home_of(ALL, settings.partitions))) as courier:
+        yield courier.hold
 
 
 @contextmanager

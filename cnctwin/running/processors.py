@@ -2,9 +2,10 @@
 `historian` the store that it keeps."""
 
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from cnctwin.processes.look_around import refuse_second
 from processors.errors import ConfigurationError
@@ -14,6 +15,9 @@ from sparkplug.admission.limits import DEFAULTS, Limits
 from sparkplug.broker import BrokerAddress
 from sparkplug.metric import NodeId
 from sparkplug.session_files.session_lock import SessionLock
+
+if TYPE_CHECKING:
+    from processors.alerts.courier.thread import Courier
 
 ALERTS = "alerts"
 
@@ -64,25 +68,38 @@ def _recorder(pairs: Sequence[Configured], group: str) -> Iterator[Recorder | No
 
 @contextmanager
 def courier_of(pairs: Sequence[Configured], broker: BrokerAddress | None, group: str) -> Iterator[None]:
-    """The courier, where alerts run and somebody is to be told; else nothing, and httpx is not loaded. Raises ConfigurationError
-    where there is no broker from which it could learn what is to be sent."""
-    config = next((one.default for processor, one in pairs if processor.name == ALERTS), None)
-    if config is None:
+    """The courier, where alerts run and somebody is to be told; else nothing. Raises ConfigurationError as `new_courier`."""
+    new = new_courier(pairs, broker, group)
+    if new is None:
         yield
         return
-    from processors.alerts.config import AlertsConfig  # noqa: PLC0415  only what runs is loaded
-
-    assert isinstance(config, AlertsConfig)
-    if not config.receivers:
-        yield
-        return
-    if broker is None:
-        raise ConfigurationError("alerts: the courier reads from the broker what is to be sent; give --broker or CNCTWIN_BROKER")
-    from processors.alerts.courier.thread import Courier  # noqa: PLC0415
-
-    courier = Courier(broker, config, group)
+    courier = new()
     courier.start()
     try:
         yield
     finally:
         courier.stop()
+
+
+def new_courier(
+    pairs: Sequence[Configured], broker: BrokerAddress | None, group: str, member: str = ""
+) -> "Callable[[], Courier] | None":
+    """Return what makes a courier, which raises ConfigurationError where a secret is missing; None where alerts do not run or
+    nobody is to be told, and httpx is not loaded. Raises ConfigurationError where there is no broker from which a courier could
+    learn what is to be sent.
+
+    member: of those between which the courier moves
+    """
+    config = next((one.default for processor, one in pairs if processor.name == ALERTS), None)
+    if config is None:
+        return None
+    from processors.alerts.config import AlertsConfig  # noqa: PLC0415  only what runs is loaded
+
+    assert isinstance(config, AlertsConfig)
+    if not config.receivers:
+        return None
+    if broker is None:
+        raise ConfigurationError("alerts: the courier reads from the broker what is to be sent; give --broker or CNCTWIN_BROKER")
+    from processors.alerts.courier.thread import Courier  # noqa: PLC0415
+
+    return lambda: Courier(broker, config, group, member)

@@ -12,7 +12,7 @@ folded again in silence.
 """
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from processors.actions import Action
@@ -46,13 +46,18 @@ class Result(NamedTuple):
 
 class Partition:
     """See the module. `reader` names who folds it: the consumer group. `topic`: what is folded; each topic of a reader
-    has places of its own among what is saved."""
+    has places of its own among what is saved. `is_home`: whether a cell has its messages in this partition. Plain messages and
+    silence come to all partitions, and a cell that was in several of them would answer once from each."""
 
     def __init__(
-        self, reader: str, pairs: Sequence[tuple[AnyProcessor, Configuration[ProcessorConfig]]], topic: str = ""
+        self,
+        reader: str,
+        pairs: Sequence[tuple[AnyProcessor, Configuration[ProcessorConfig]]],
+        topic: str = "",
+        is_home: Callable[[str], bool] = lambda _: True,
     ) -> None:
         self.seats = tuple(
-            Seat(processor, configuration) for processor, configuration in sorted(pairs, key=lambda one: one[0].name)
+            Seat(processor, configuration, is_home) for processor, configuration in sorted(pairs, key=lambda one: one[0].name)
         )
         self.next = 0  # the offset behind the newest record that was taken
         self.repeated = 0  # records that were there before
@@ -95,8 +100,8 @@ class Partition:
         units = {key.removeprefix(prefix): payload for key, payload in kept.items() if key.startswith(prefix)}
         restored = 0
         try:
-            for payload in units.values():
-                seat.restore(payload)
+            for unit, payload in units.items():
+                seat.restore(unit, payload)
                 restored += 1
         except SnapshotError as error:
             refused = f"{prefix}{list(units)[restored]}"

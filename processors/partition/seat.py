@@ -5,7 +5,7 @@ same state. Results of records before `published` went out already, and are fold
 """
 
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import NamedTuple
 
 from paho.mqtt.client import topic_matches_sub
@@ -36,9 +36,12 @@ class Saved(NamedTuple):
 class Seat:
     """See the module. Nothing that it is given makes it raise, but a snapshot that it cannot read."""
 
-    def __init__(self, processor: AnyProcessor, configuration: Configuration[ProcessorConfig]) -> None:
-        self.processor, self._configuration = processor, configuration
-        self.engine = Engine(processor, configuration)
+    def __init__(
+        self, processor: AnyProcessor, configuration: Configuration[ProcessorConfig], is_home: Callable[[str], bool]
+    ) -> None:
+        """`is_home`: whether the messages of a cell come to this partition."""
+        self.processor, self._configuration, self._is_home = processor, configuration, is_home
+        self.engine = self._new_engine()
         self.from_offset = self.published = 0
         self.faults: list[str] = []
         self._saved: set[str] = set()
@@ -52,17 +55,30 @@ class Seat:
         """Return True if the processor reads plain messages of a topic."""
         return any(topic_matches_sub(wanted, topic) for wanted in self.processor.listens)
 
+    def _new_engine(self) -> Engine:
+        """Return an engine with those cells only, of all that there are from the beginning, that are at home here."""
+        engine = Engine(self.processor, self._configuration)
+        for unit in [unit for unit in engine.known_units if not self._is_home(unit)]:
+            del engine.known_units[unit]
+        return engine
+
     # Snapshots.
 
     def begin_again(self, units: Iterable[str]) -> None:
         """Forget everything but where results went out. What was saved of `units` is of no use: the next cut takes back those
         that are not known again by then, or they would be refused at each start."""
-        self.engine = Engine(self.processor, self._configuration)
+        self.engine = self._new_engine()
         self._saved = set(units)
         self.from_offset = 0
 
-    def restore(self, payload: bytes) -> None:
-        """Take the state of a unit, before anything is folded. Raises SnapshotError where it is of another version or form."""
+    def restore(self, name: str, payload: bytes) -> None:
+        """Take the state of a unit, before anything is folded. Raises SnapshotError where it is of another version or form.
+
+        A cell that is at home in another partition is taken back with the next cut.
+        """
+        if self.processor.is_of_cells and not self._is_home(name):
+            self._saved.add(name)
+            return
         first, _, snapshot = payload.partition(b"\n")
         try:
             moment = json.loads(first)

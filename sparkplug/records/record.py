@@ -129,7 +129,7 @@ class RecordReader:
         node, device, payloads = self._sources.get(place) or self._source(*place)
         stamp_ms, _, readings, names, oldest_ms, newest_ms = payloads.read(value)
         if kind is _DATA:
-            event = (_DATA, node, device, stamp_ms, readings, "", "", b"", names, oldest_ms, newest_ms, 0, None, -1)
+            event = (_DATA, node, device, stamp_ms, readings, "", "", b"", names, oldest_ms, newest_ms, 0, None, -1, None)
             return tuple.__new__(HostEvent, event)
         return HostEvent(kind, node, device, stamp_ms, readings, told.get("detail", b"").decode())
 

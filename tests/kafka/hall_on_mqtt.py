@@ -32,7 +32,8 @@ SIGNALS = (
 class Hall:
     """Edge nodes with one machine each, which has the node's name; and a host that looks."""
 
-    def __init__(self, mosquitto: Mosquitto, group: str, *machines: str) -> None:
+    def __init__(self, mosquitto: Mosquitto, group: str, *machines: str, signals: Sequence[MetricSpec] = SIGNALS) -> None:
+        self._signals = signals
         self.address, self.group, self.machines = BrokerAddress(*mosquitto.address), group, machines
         self.edges = {machine: EdgeNode(self.address, NodeId(group, f"edge-{machine}")) for machine in machines}
         self.look = HostApplication(self.address, "look", [f"spBv1.0/{group}/#"], publish_state=False)
@@ -48,7 +49,7 @@ class Hall:
         """Have the machines come once bridges of these names read the broker: none asks those that it never heard."""
         self.until(lambda: set(bridges) <= writers_of(plant), "the bridges mark the log")
         for machine, edge in self.edges.items():
-            edge.declare_device(machine, SIGNALS)
+            edge.declare_device(machine, self._signals)
             edge.start()
         self.until(lambda: all(edge.online for edge in self.edges.values()), "the edges are born")
         self.until(lambda: all(records_of(plant, machine) for machine in self.machines), "the births are in the log")

@@ -7,6 +7,9 @@
 A claim is sent for only once it is seen to stand on the broker. After a crash, a claim that says `sending` with no delivery means
 that nobody knows whether the notification arrived: it is said to have failed, and is not sent again. One that says `waiting` was
 surely not taken, and goes on. Each receiver is sent one notification at a time, in the order of the outbox.
+
+Two couriers may overlap, where one takes over from another. Of two claims the one that the broker has first holds: both see them
+in its order, and a courier that sees another's before its own lets go.
 """
 
 import json
@@ -24,10 +27,12 @@ from twin.vocabulary import topics
 JOBS_MAX = 2000
 DONE_MAX = 10_000
 SAY_AGAIN_S = 5.0
+FOREIGN_S_MAX = 180.0  # longer than any receiver may take
 BACKOFF_S_MIN, BACKOFF_S_MAX = 2.0, 60.0
 OUTBOX, CLAIM, DELIVERY = topics.ALERT_OUTBOX, topics.ALERT_CLAIM, topics.ALERT_DELIVERY
 SENDING, WAITING = "sending", "waiting"
 INTERRUPTED = "interrupted while sending; it may have arrived"
+FORSAKEN = "another courier claimed it, and did not say what became of it; it may have arrived"
 
 
 class Publish(NamedTuple):
@@ -143,8 +148,15 @@ class Desk:
             return
         elif job.stage is Stage.CLAIMING and payload == job.said:
             self._may_send(job, now_s)
-        elif job.stage in (Stage.WAITING, Stage.CLAIMING) and _who(payload) != self._instance and _phase(payload) == SENDING:
-            job.stage = Stage.FOREIGN
+        elif _who(payload) != self._instance:
+            self._claimed_elsewhere(job, _phase(payload), now_s)
+
+    def _claimed_elsewhere(self, job: _Job, phase: Any, now_s: float) -> None:
+        """Another courier has claimed it, or leaves it to whoever claims it next."""
+        if phase == SENDING and job.stage in (Stage.WAITING, Stage.CLAIMING):
+            job.stage, job.not_before_s = Stage.FOREIGN, now_s + FOREIGN_S_MAX
+        elif phase == WAITING and job.stage is Stage.FOREIGN:
+            job.stage, job.not_before_s = Stage.WAITING, now_s
 
     def delivery(self, key: str, payload: bytes) -> None:
         """The fate of a notification stands on the broker."""
@@ -212,6 +224,8 @@ class Desk:
                     busy.add(name)  # also where it waits: what comes after does not overtake it
                     if name in free and now_s >= job.not_before_s:
                         self._begin(job, now_s, wall_s)
+            elif job.stage is Stage.FOREIGN and now_s >= job.not_before_s:
+                self._settle(job, Outcome(Verdict.UNSURE, FORSAKEN))
             if job.stage is Stage.CLAIMING or (job.stage is Stage.SETTLED and not job.is_seen):
                 self._say(job, now_s)
 

@@ -45,14 +45,16 @@ class _Work(NamedTuple):
 class Courier:
     """See the module. Making it reads all secrets, and raises ConfigurationError where one is missing."""
 
-    def __init__(self, broker: BrokerAddress, config: AlertsConfig, group: str = "cnc") -> None:
+    def __init__(self, broker: BrokerAddress, config: AlertsConfig, group: str = "cnc", member: str = "") -> None:
+        """`member`: where the courier moves between computers, whose it is. For as long as two of them overlap, both then stay
+        connected, and their claims say who sends what."""
         self._services: dict[str, Service] = {name: service_of(name, one) for name, one in config.receivers.items()}
         self._desk = Desk(uuid4().hex[:12], {name: one.give_up_after_s for name, one in config.receivers.items()})
         polls_s = {name: max(one.poll_s, POLLS_S_MIN) for name, one in config.receivers.items() if one.type == "pushover"}
         self._receipts = Receipts(polls_s)
         resend_s = {name: one.resend_s for name, one in config.receivers.items() if one.type == "alertmanager"}
         self._resend_s, self._resent_s = resend_s, dict.fromkeys(resend_s, 0.0)
-        self._host = HostApplication(broker, f"courier-{group}", (), publish_state=False)
+        self._host = HostApplication(broker, f"courier-{group}{member and f'-{member}'}", (), publish_state=False)
         self._state: Mapping[str, Any] = {}
         self._works: dict[str, queue.Queue[_Work | None]] = {name: queue.Queue(maxsize=1) for name in self._services}
         self._busy: set[str] = set()
@@ -97,8 +99,7 @@ class Courier:
         while time.monotonic() < deadline_s and self._host.online and (self._desk.sending or self._desk.unseen):
             self._turn_guarded()
         for works in self._works.values():
-            if works.empty():
-                works.put(None)
+            works.put(None)  # a sender that has not taken its last work yet does so now: there is room at once
 
     def _turn_guarded(self) -> None:
         """One round. A bug in it must not end the courier, and with it every notification to come."""

@@ -19,7 +19,7 @@ class Runners:
     def __init__(self, *lived_s: float) -> None:
         self.lived_s, self.now_s, self.started = list(lived_s), 1000.0, 0
 
-    def __call__(self, *_: object) -> "Runners":
+    def __call__(self, *_: object, **__: object) -> "Runners":
         return self
 
     def run(self, stop: Event) -> None:

@@ -203,3 +203,26 @@ def test_a_description_that_another_reader_has_come_to_is_not_taken_up_early() -
     assert states(again) == states(behind)
     taken = [result for offset in range(2, 7) for result in again.take(offset, records[offset])]
     assert any("version" in str(result.actions) for result in taken)
+
+
+def test_a_cell_answers_from_the_partition_of_its_messages_alone() -> None:
+    """Plain messages and silence come to all: each that had the cell as well would tell of a plant without machines."""
+    processor = discover()["alerts"]
+    pairs = [(processor, processor.configured({}))]
+    records = through_bytes([None, None])
+    for number in range(3):
+        partition = Partition("alerts", pairs, "cells", lambda _, number=number: number == 1)  # type: ignore[misc]
+        told = [result for offset, record in enumerate(records) for result in partition.take(offset, record)]
+        assert bool(told) == (number == 1)
+    everywhere = Partition("everywhere", pairs, "cells")
+    kept: Kept = {}
+    for offset, record in enumerate(records):
+        everywhere.take(offset, record)
+    saved(everywhere, kept)
+    kept.update([everywhere.mark()])
+    assert "alerts/all" in kept
+    elsewhere = Partition("everywhere", pairs, "cells", lambda _: False)
+    elsewhere.restore(kept)
+    assert elsewhere.seats[0].engine.known_units == {}
+    saved(elsewhere, kept)
+    assert "alerts/all" not in kept, "what was saved there once is taken back"

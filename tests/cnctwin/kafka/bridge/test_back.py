@@ -23,7 +23,7 @@ GARBAGE = (
 
 
 def test_states_that_cannot_be_read_keep_no_other_from_being_told(caplog: pytest.LogCaptureFixture) -> None:
-    seat = Seat(THERMAL, THERMAL.configured({}))
+    seat = Seat(THERMAL, THERMAL.configured({}), lambda _: True)
     for event in (birth(0.0, spindle_rpm=0.0, ambient_temp_c=21.0), data(1.0, spindle_rpm=100.0)):
         seat.event(event, 0.0)
     state = seat.state_of("okuma")

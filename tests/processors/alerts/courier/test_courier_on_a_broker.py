@@ -127,6 +127,25 @@ def test_what_nobody_is_configured_for_and_what_is_too_old_fails(office: Office,
     assert office.deliveries["u"][-1]["reason"] == "the courier has no receiver nobody"
 
 
+def test_two_couriers_that_overlap_send_each_notification_once_and_leave_no_thread(
+    broker: BrokerAddress, office: Office, server: ReceivingServer
+) -> None:
+    server.usual = Answer(wait_s=0.05)
+    before = threading.active_count()
+    one, other = (Courier(broker, AlertsConfig.model_validate(config(server)), "cnc", name) for name in ("r0", "r1"))
+    keys = [f"a{number:02d}" for number in range(20)]
+    for courier in (one, other):
+        courier.start()
+    for key in keys:
+        office.put(key)
+    until(lambda: len(office.deliveries) >= 5, "some deliveries")
+    one.stop()
+    until(lambda: len(office.deliveries) == len(keys), "the others")
+    other.stop()
+    until(lambda: threading.active_count() == before, "the ends of all threads")
+    assert server.ids() == dict.fromkeys(keys, 1)
+
+
 def test_a_courier_that_is_stopped_finishes_what_it_is_sending(
     office: Office, server: ReceivingServer, courier: Callable[..., Courier]
 ) -> None:
