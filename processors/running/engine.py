@@ -192,7 +192,7 @@ class Engine:
 
     def _of_no_machine(self, sample: Sample, at_ms: int) -> list[Action]:
         actions: list[Action] = []
-        for unit in self.known_units.values():
+        for unit in [self.known_units[name] for name in sorted(self.known_units)]:  # so that a restart changes no order
             before = unit.live.state
             actions += unit.live.take(sample._replace(cell=unit.live.cell), at_ms)[0]
             if unit.live.state is not before:

@@ -1,7 +1,5 @@
 """The machines that an engine knows, and the units that hold their states: who joins, and who is forgotten."""
 
-import itertools
-
 from processors.actions import Action
 from processors.config import Configuration, ProcessorConfig
 from processors.description import Description, Given, Role
@@ -33,7 +31,6 @@ class Roster:
         self.machines_max = machines_max
         self._processor, self._configuration, self._picks = processor, configuration, picks
         self._counts, self._ledger = counts, ledger
-        self._numbers = itertools.count()
         self._given: dict[tuple[str, Role], Given] = {}  # by the descriptions of machines
         self._has_challengers = self.is_described and any(spec.of_challenger for spec in processor.outputs)
 
@@ -106,7 +103,7 @@ class Roster:
     def member(self, unit: Unit, name: str) -> Machine:
         """Return the machine of a unit, made where there is none; only the unit knows of it."""
         if name not in unit.machines:
-            unit.machines[name] = Machine(name, next(self._numbers), unit, self._lane(unit.live, name))
+            unit.machines[name] = Machine(name, unit, self._lane(unit.live, name))
             unit.machines[name].live.challenge(self.challenger(name))
         return unit.machines[name]
 

@@ -25,8 +25,8 @@ class Silences:
             heapq.heappush(self._due, (at_s, next(self._numbers), machine))
 
     def due(self, wall_s: float) -> list[Machine]:
-        """The machines that may have something to give by now, in the order in which they became known: each of them is to be
-        asked, and watched again."""
+        """The machines that may have something to give by now, by name, so that a restart changes no order: each of them is to
+        be asked, and watched again."""
         due, machines = self._due, []
         while due and due[0][0] <= wall_s:
             machine = heapq.heappop(due)[2]
@@ -37,4 +37,4 @@ class Silences:
                 heapq.heappush(due, (at_s, next(self._numbers), machine))
             elif at_s is not None:
                 machines.append(machine)
-        return sorted(machines, key=lambda machine: machine.number)
+        return sorted(machines, key=lambda machine: machine.name)

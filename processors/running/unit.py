@@ -28,14 +28,12 @@ class Unit:
 class Machine:
     """A machine, and the sources that are online.
 
-    number: in the order in which the machines became known
     ways: how the data of a node are taken, found at its first message after a birth or a death
 
     It is online while an edge of it is: what other processors say of it, they would go on saying of a machine that is off.
     """
 
     name: str
-    number: int
     unit: Unit
     live: Lane
     history: Lane | None = None

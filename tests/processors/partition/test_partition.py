@@ -12,6 +12,7 @@ from processors.actions import Action
 from processors.discovery import AnyProcessor, discover
 from processors.partition.partition import Partition
 from sparkplug.host_event import EventKind, HostEvent
+from sparkplug.metric import NodeId
 from sparkplug.records.record import Origin, Record, RecordReader, RecordWriter
 from tests.depth import examples
 from tests.processors.describing import DESCRIBING, message
@@ -126,6 +127,25 @@ def test_the_shortest_ways_tell_the_same_and_come_to_the_same(processor: AnyProc
     assert len(named) > 20, "the log holds no data that could take a short way"
     without = [record if record.event is None else record._replace(event=record.event._replace(names=())) for record in records]
     assert run(processor, records) == run(processor, without)
+
+
+@every_processor
+def test_silent_machines_are_told_in_one_order_however_they_were_restored(processor: AnyProcessor) -> None:
+    events: list[HostEvent | None] = []
+    for place, machine in enumerate(("okuma", "haas", "dmg")):
+        born = birth(0.1 * place, spindle_rpm=0.0, spindle_load_pct=0.0, ambient_temp_c=21.5, spindle_temp_c=24.0)
+        said = [data(1.0 + number, spindle_rpm=4000.0, spindle_load_pct=20.0 + number) for number in range(3)]
+        events += [one._replace(device=machine, node=NodeId("cnc", machine)) for one in (born, *said)]
+    records = through_bytes([*events, *[None] * 40])
+    straight, kept = partition_of(processor), Kept()
+    for offset, record in enumerate(records[:20]):
+        straight.take(offset, record)
+    saved(straight, kept)
+    kept |= [straight.mark()]
+    restored = partition_of(processor)
+    assert restored.restore(dict(reversed(kept.items()))) == 20
+    for offset, record in enumerate(records[20:], start=20):
+        assert [one.actions for one in straight.take(offset, record)] == [one.actions for one in restored.take(offset, record)]
 
 
 def test_what_a_second_writer_says_again_is_folded_once() -> None:
