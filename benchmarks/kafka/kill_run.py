@@ -2,6 +2,7 @@
 
     python -m benchmarks.kafka.kill_run --machines 100 --hz 10 --minutes 15 --every 30
     python -m benchmarks.kafka.kill_run --minutes 2 --machines 10 --every 10
+    python -m benchmarks.kafka.kill_run --kills kafka --away 600 --minutes 1.5 --machines 20
     python -m benchmarks.kafka.kill_run --takeover --machines 20 --minutes 5 --every 60
     python -m benchmarks.kafka.kill_run --keep-session --machines 10 --minutes 1.5 --every 15
 
@@ -150,6 +151,7 @@ class KillRun:
 
     def _kill_kafka(self) -> None:
         self.plant.kill_kafka()
+        self._rest(time.monotonic() + self.setup.away_s)
         began_s = time.time()  # what stands in the log by now was there before
         awaited = self.watcher.first_result(began_s), self.watcher.first_data(began_s)
         self.plant.kafka.start()
@@ -345,6 +347,7 @@ def main() -> None:
     parser.add_argument(
         "--keep-session", action="store_true", help="the broker keeps the bridge's session: nothing may be missing"
     )
+    parser.add_argument("--away", type=float, default=defaults.away_s, help="seconds for which a killed Kafka stays away")
     parser.add_argument("--home", type=Path, help="where logs and data are kept; else a folder that goes with the run")
     parser.add_argument("--session", type=float, help="session_s of the runners; else 30, and 6 with --takeover")
     given = parser.parse_args()
@@ -359,6 +362,7 @@ def main() -> None:
         session_s=given.session or (6.0 if given.takeover else defaults.session_s),
         kills=("takeover",) if given.takeover else tuple(given.kills.split(",")),
         keeps_session=given.keep_session,
+        away_s=given.away,
     )
     with tempfile.TemporaryDirectory(prefix="cnctwin-kills-") as folder:
         home = Path(folder) if given.home is None else given.home

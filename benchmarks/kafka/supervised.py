@@ -50,7 +50,7 @@ rate_high_per_hour = 10000
 @dataclass(frozen=True, slots=True)
 class Setup:
     """The options of a run. `members`: the static names of the runners; `session_s`: after which one that is gone is given up;
-    `keeps_session`: the MQTT broker keeps for the bridge what it cannot deliver, and nothing may be missing."""
+    `away_s`: for which a killed Kafka stays away; `keeps_session`: the MQTT broker keeps for the bridge what it cannot deliver, and nothing may be missing."""
 
     machines: int = 100
     hz: float = 10.0
@@ -61,6 +61,7 @@ class Setup:
     members: tuple[str, ...] = ("r0",)
     session_s: float = 30.0
     kills: tuple[str, ...] = ("bridge", "runner", "kafka")
+    away_s: float = 0.0
     keeps_session: bool = False
 
 
