@@ -49,8 +49,11 @@ rate_high_per_hour = 10000
 
 @dataclass(frozen=True, slots=True)
 class Setup:
-    """The options of a run. `members`: the static names of the runners; `session_s`: after which one that is gone is given up;
-    `away_s`: for which a killed Kafka stays away; `keeps_session`: the MQTT broker keeps for the bridge what it cannot deliver, and nothing may be missing."""
+    """The options of a run.
+
+    members: the static names of the runners; session_s: after which one that is gone is given up; away_s: for which a killed
+    Kafka stays away; keeps_session: the MQTT broker keeps for the bridge what it cannot deliver, and nothing may be missing
+    """
 
     machines: int = 100
     hz: float = 10.0
