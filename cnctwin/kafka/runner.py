@@ -56,14 +56,16 @@ class Runner:
         sink: Sink | None = None,
         *,
         hold: Callable[[Collection[Place]], None] = lambda _: None,
+        transactions: Transactions | None = None,
     ) -> None:
         """`sink`: keeps what the historian hears, with the offsets. `hold`: told of all partitions that this runner has, whenever
-        the group has shared them out, and before those that go are another's."""
+        the group has shared them out, and before those that go are another's. `transactions`: that claim the name already."""
         names = [processor.name for processor, _ in pairs]
         self.group = topics.runners(names)
         self._settings, self._topics, self._member, self._sink = settings, topics, member, sink
         self._hold = hold
-        self._name = f"{self.group}.{member}"
+        self._name = topics.writer(names, member)
+        self._claimed = transactions
         self._assigned = Assigned(settings, topics, pairs, None if sink is None else sink.begin)
         self._results = {processor.name: Results(topics.group, processor) for processor, _ in pairs}
         self._writer = RecordWriter(self._name)
@@ -78,7 +80,7 @@ class Runner:
     def run(self, stop: Event) -> None:
         """Work until `stop` is set, then save and leave. Raises FencedError where another process has this member's name."""
         self._stop = stop
-        self._transactions = Transactions(self._settings, self._name, stop.is_set)
+        self._transactions = self._claimed or Transactions(self._settings, self._name, stop.is_set)
         self._consumer = Consumer(self._conf())
         self._consumer.subscribe(
             self._assigned.topics, on_assign=self._on_assign, on_revoke=self._on_revoke, on_lost=self._on_lost

@@ -13,7 +13,7 @@ from cnctwin.kafka.runner import Runner
 from cnctwin.kafka.settings import KafkaSettings
 from cnctwin.kafka.sink import Sink
 from cnctwin.kafka.topics import Topics, cell_processors, ensure
-from cnctwin.kafka.transaction import FencedError
+from cnctwin.kafka.transaction import FencedError, Transactions
 from cnctwin.running.processors import ALERTS, new_courier
 from processors.config import ALL
 from processors.errors import ConfigurationError
@@ -41,18 +41,21 @@ def run_over_kafka(
     if "." in member:  # it stands behind the last dot of the transactional id
         raise ConfigurationError(f"--member {member!r} has a dot; give it a name without one")
     topics = Topics(group)
+    writer = topics.writer([processor.name for processor, _ in pairs], member)
+    transactions = Transactions(settings, writer, stop.is_set)  # claims its name while the rest is made ready
     ensure(settings, topics, cell_processors(pairs), without=(topics.births,))
     with _courier(settings, topics, pairs, broker, member) as hold, _sink(pairs) as sink:
         while not stop.is_set():
             began_s = time.monotonic()
             try:
-                Runner(settings, topics, pairs, member, sink, hold=hold).run(stop)
+                Runner(settings, topics, pairs, member, sink, hold=hold, transactions=transactions).run(stop)
             except FencedError as error:
                 # A cluster that hung has two requests to join of one runner, and fences the one that waits for the first. So it
                 # comes in once more; where another process has the name, the one that came last ends.
                 if time.monotonic() - began_s < SETTLED_S:
                     raise
                 _log.warning("%s; unless the cluster was away: this one comes in once more", error)
+                transactions = Transactions(settings, writer, stop.is_set)
 
 
 @contextmanager

@@ -25,7 +25,7 @@ COMPACTED = {
     "cleanup.policy": "compact",
     "min.cleanable.dirty.ratio": "0.3",
     "segment.ms": "600000",
-    "segment.bytes": "16777216",
+    "segment.bytes": "4194304",
     "max.compaction.lag.ms": "3600000",
 }
 
@@ -77,6 +77,10 @@ class Topics:
         'cnctwin.cnc.gap+thermal'
         """
         return f"cnctwin.{self.group}.{'+'.join(sorted(processors))}"
+
+    def writer(self, processors: Sequence[str], member: str) -> str:
+        """Return the transactional id of a runner: its name stands behind the last dot."""
+        return f"{self.runners(processors)}.{member}"
 
     def bridge(self, name: str) -> str:
         """Return the consumer group of a bridge."""
