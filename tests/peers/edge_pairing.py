@@ -30,6 +30,8 @@ from tests.peers.pairing import DEVICE, Broker, Peer
 from tests.wire.mqtt_packets import Publish
 from tests.wire.proxy import Proxy
 
+AGAIN_S = 5.0
+
 
 def host_of(broker: Broker, host_id: str) -> HostApplication:
     """Return a host application of ours."""
@@ -83,15 +85,16 @@ class EdgePairing(Counterpart):
     def data(self, metric: Line, shows: Callable[[], bool], timeout_s: float) -> None:
         """Have the peer send a metric of its device until our host shows it.
 
-        QoS 0: what a peer sends while its connection is lost is lost as well, so it is told again after each birth.
+        QoS 0: what a peer sends while its connection is lost is lost as well, and a peer that has just been born again may still
+        take itself for disconnected. So it is told to send again after each birth, and every AGAIN_S.
         """
-        told_at_births = -1
+        told_at_births, told_s = -1, 0.0
 
         def is_shown() -> bool:
-            nonlocal told_at_births
-            births = self.host.counts.get("births", 0)
-            if self.born and births != told_at_births:
-                told_at_births = births
+            nonlocal told_at_births, told_s
+            births, now_s = self.host.counts.get("births", 0), time.monotonic()
+            if self.born and (births != told_at_births or now_s - told_s > AGAIN_S):
+                told_at_births, told_s = births, now_s
                 self.tell(do="data", metrics=[metric])
             return self.born and shows()
 

@@ -17,7 +17,7 @@ from cnctwin.kafka.settings import KafkaSettings
 from processors.errors import ConfigurationError
 from processors.running.runtime import configured
 from sparkplug.broker import BrokerAddress
-from tests.cnctwin.kafka.test_running import Runners
+from tests.cnctwin.kafka.test_running import Runners, without_kafka
 
 HOME = ("cnctwin.cnc.cells.alerts", 3)
 ELSEWHERE = [("cnctwin.cnc.cells.alerts", 2), ("cnctwin.cnc.readings", 3)]
@@ -126,8 +126,7 @@ url = "http://127.0.0.1:1/desk"
 def start(monkeypatch: pytest.MonkeyPatch, folder: Path, toml: str, broker: BrokerAddress | None) -> Runners:
     (folder / "processors.toml").write_text(toml)
     runners = Runners()
-    monkeypatch.setattr(running, "Runner", runners)
-    monkeypatch.setattr(running, "ensure", lambda *_, **__: None)
+    without_kafka(monkeypatch, runners)
     pairs = configured(["alerts"], folder / "processors.toml")
     running.run_over_kafka(KafkaSettings(bootstrap="127.0.0.1:1"), pairs, Event(), group="cnc", member="r0", broker=broker)
     return runners

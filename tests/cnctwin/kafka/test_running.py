@@ -31,9 +31,15 @@ class Runners:
         raise FencedError("kafka: r0 is taken by another process")
 
 
-def start(monkeypatch: pytest.MonkeyPatch, runners: Runners, stop: Event | None = None) -> None:
+def without_kafka(monkeypatch: pytest.MonkeyPatch, runners: Runners) -> None:
+    """Replace whatever would ask the cluster for something: no thread waits for an answer after the test."""
     monkeypatch.setattr(module, "Runner", runners)
     monkeypatch.setattr(module, "ensure", lambda *_, **__: None)
+    monkeypatch.setattr(module, "Transactions", lambda *_: None)
+
+
+def start(monkeypatch: pytest.MonkeyPatch, runners: Runners, stop: Event | None = None) -> None:
+    without_kafka(monkeypatch, runners)
     monkeypatch.setattr(module.time, "monotonic", lambda: runners.now_s)
     processor = discover()["thermal"]
     pairs = [(processor, processor.configured({}))]
