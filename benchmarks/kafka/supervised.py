@@ -68,6 +68,11 @@ class Setup:
     keeps_session: bool = False
 
 
+def _environment() -> dict[str, str]:
+    """Return the environment of a command: compiled modules are kept, as in an installation, whatever ours says."""
+    return {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"} | {"PYTHONFAULTHANDLER": "1"}
+
+
 class Command:
     """A command that a supervisor would keep running. `cpu_s` sums over all its lives."""
 
@@ -90,7 +95,7 @@ class Command:
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=log,
-                env={**os.environ, "CNCTWIN_LOG": "INFO", "PYTHONFAULTHANDLER": "1"},
+                env=_environment(),
             )
         return began_s
 

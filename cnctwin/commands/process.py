@@ -29,13 +29,13 @@ def process(
     ] = "",
 ) -> None:
     """Run processors until SIGTERM or Ctrl-C; beside alerts the courier that sends, beside historian the store that it keeps."""
+    if kafka or kafka_config is not None:
+        _over_kafka(names, config, broker, group, kafka, kafka_config, member)
+        return
     from cnctwin.running.processors import process as run_processors
     from processors.running.limits import limits_of
     from processors.running.runtime import configured
 
-    if kafka or kafka_config is not None:
-        _over_kafka(names, config, broker, group, kafka, kafka_config, member)
-        return
     pairs, limits = configured(names, config), limits_of(config)
     with stopped_by_signals() as stop, broker_or_own(address(broker)) as where:
         run_processors(
@@ -61,11 +61,15 @@ def _over_kafka(
     """Run processors as the members of a consumer group; only the courier of alerts needs a broker."""
     from cnctwin.commands.extras import needed_by
     from cnctwin.kafka.settings import settings_of
-    from processors.running.runtime import configured
 
     with needed_by("cnctwin process --kafka", "kafka"):
-        from cnctwin.kafka.running import run_over_kafka
-    settings, pairs = settings_of(kafka, kafka_config), configured(names, config)
-    name = member or socket.gethostname().partition(".")[0]
+        from cnctwin.kafka.claim import claim
+    settings, name = settings_of(kafka, kafka_config), member or socket.gethostname().partition(".")[0]
     with stopped_by_signals() as stop:
-        run_over_kafka(settings, pairs, stop, group=group, member=name, broker=address(broker))
+        claimed = claim(settings, group, names, name, stop)
+        from cnctwin.kafka.running import run_over_kafka  # while the cluster answers
+        from processors.running.runtime import configured
+
+        run_over_kafka(
+            settings, configured(names, config), stop, group=group, member=name, claimed=claimed, broker=address(broker)
+        )

@@ -16,7 +16,6 @@ from cnctwin.kafka.topics import Topics, cell_processors, ensure
 from cnctwin.kafka.transaction import FencedError, Transactions
 from cnctwin.running.processors import ALERTS, new_courier
 from processors.config import ALL
-from processors.errors import ConfigurationError
 from processors.historian import HistorianConfig
 from processors.running.runtime import Configured
 from sparkplug.broker import BrokerAddress
@@ -32,17 +31,15 @@ def run_over_kafka(
     *,
     group: str,
     member: str,
+    claimed: Transactions,
     broker: BrokerAddress | None,
 ) -> None:
     """Run processors until `stop` is set. Raises ConfigurationError, and FencedError where another process has the name.
 
+    claimed: claims the name of the runner already (claim.py)
     broker: for the courier of alerts, which reads what is to be sent there; None where nobody is to be told
     """
-    if "." in member:  # it stands behind the last dot of the transactional id
-        raise ConfigurationError(f"--member {member!r} has a dot; give it a name without one")
-    topics = Topics(group)
-    writer = topics.writer([processor.name for processor, _ in pairs], member)
-    transactions = Transactions(settings, writer, stop.is_set)  # claims its name while the rest is made ready
+    topics, transactions = Topics(group), claimed
     ensure(settings, topics, cell_processors(pairs), without=(topics.births,))
     with _courier(settings, topics, pairs, broker, member) as hold, _sink(pairs) as sink:
         while not stop.is_set():
@@ -55,7 +52,7 @@ def run_over_kafka(
                 if time.monotonic() - began_s < SETTLED_S:
                     raise
                 _log.warning("%s; unless the cluster was away: this one comes in once more", error)
-                transactions = Transactions(settings, writer, stop.is_set)
+                transactions = Transactions(settings, claimed.name, stop.is_set)
 
 
 @contextmanager

@@ -8,14 +8,16 @@ import time
 from collections.abc import Collection, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from confluent_kafka import KafkaError, KafkaException
 from confluent_kafka.admin import AdminClient, NewTopic
 
 from cnctwin.kafka.settings import KafkaSettings
 from processors.errors import ConfigurationError
-from processors.running.runtime import Configured
+
+if TYPE_CHECKING:
+    from processors.running.runtime import Configured  # and with it all that folds; a runner claims its name before
 
 ANSWER_S = 30.0
 ATTEMPT_S = 1.0
@@ -76,7 +78,7 @@ class Topics:
         >>> Topics("cnc").runners(["thermal", "gap"])
         'cnctwin.cnc.gap+thermal'
         """
-        return f"cnctwin.{self.group}.{'+'.join(sorted(processors))}"
+        return f"cnctwin.{self.group}.{'+'.join(sorted(set(processors)))}"
 
     def writer(self, processors: Sequence[str], member: str) -> str:
         """Return the transactional id of a runner: its name stands behind the last dot."""
@@ -93,7 +95,7 @@ class Topics:
         return {**dict.fromkeys(logs, kept), **dict.fromkeys((self.snapshots, self.births, self.health), COMPACTED)}
 
 
-def cell_processors(pairs: Sequence[Configured]) -> list[str]:
+def cell_processors(pairs: "Sequence[Configured]") -> list[str]:
     """Return the names of those that compare machines."""
     return [processor.name for processor, _ in pairs if processor.is_of_cells]
 

@@ -8,7 +8,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import Any, Generic, NoReturn, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, NoReturn, TypeVar
 
 from confluent_kafka import Consumer, KafkaError, KafkaException, Message, Producer, TopicPartition
 
@@ -16,7 +16,9 @@ from cnctwin.kafka.client_log import LOG, REACH
 from cnctwin.kafka.kept import WRITER
 from cnctwin.kafka.settings import KafkaSettings
 from processors.errors import ProcessorError
-from sparkplug.records.record import Headers
+
+if TYPE_CHECKING:
+    from sparkplug.records.record import Headers
 
 REQUEST_S = 5.0
 HUNG_S, HUNG_S_MAX = 2.0, 30.0  # for an answer of a cluster that has just taken messages; doubled each time that none comes
@@ -138,7 +140,7 @@ class Transactions:
         self._is_spoilt = self._is_spoilt or error.code() in CUT
         REACH.failed(error)
 
-    def produce(self, topic: str, key: str, value: bytes | None, partition: int, headers: Headers) -> None:
+    def produce(self, topic: str, key: str, value: bytes | None, partition: int, headers: "Headers") -> None:
         """Have a message go out with the transaction, which begins with its first."""
         self.open()
         while True:
@@ -267,6 +269,6 @@ def fence(settings: KafkaSettings, transactional_id: str) -> None:
     producer_of(settings, transactional_id).init_transactions(REQUEST_S)
 
 
-def written_by(name: str) -> Headers:
+def written_by(name: str) -> "Headers":
     """Return the header that says who wrote a state."""
     return [(WRITER, name.encode())]

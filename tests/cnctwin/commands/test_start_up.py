@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 HEAVY = (
     "numpy",
     "scipy",
@@ -62,6 +64,8 @@ def test_the_commands_load_no_library_that_only_some_of_them_need() -> None:
 RUN = """
 import sys, threading
 from pathlib import Path
+
+import pytest
 from cnctwin.running import processors
 from processors.running.runtime import configured
 from sparkplug.broker import BrokerAddress
@@ -105,3 +109,10 @@ def test_alerts_without_receivers_bring_no_courier(tmp_path: Path) -> None:
     assert recorder == "NoneType"
     assert "processors.alerts.courier.thread" not in loaded
     assert loaded & set(HEAVY) == set()
+
+
+def test_a_runner_on_kafka_claims_its_name_before_the_folds_are_loaded() -> None:
+    pytest.importorskip("confluent_kafka", reason="no confluent-kafka in this Python; install the extra kafka")
+    loaded = _modules_after("import cnctwin.kafka.claim, sys; print(*sys.modules, sep='\\n')")
+    assert "cnctwin.kafka.transaction" in loaded
+    assert not [name for name in loaded if name.startswith(("twin.", "processors.running", "processors.contract", "sparkplug."))]

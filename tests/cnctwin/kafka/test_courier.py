@@ -17,7 +17,7 @@ from cnctwin.kafka.settings import KafkaSettings
 from processors.errors import ConfigurationError
 from processors.running.runtime import configured
 from sparkplug.broker import BrokerAddress
-from tests.cnctwin.kafka.test_running import Runners, without_kafka
+from tests.cnctwin.kafka.test_running import CLAIMED, Runners, without_kafka
 
 HOME = ("cnctwin.cnc.cells.alerts", 3)
 ELSEWHERE = [("cnctwin.cnc.cells.alerts", 2), ("cnctwin.cnc.readings", 3)]
@@ -128,7 +128,8 @@ def start(monkeypatch: pytest.MonkeyPatch, folder: Path, toml: str, broker: Brok
     runners = Runners()
     without_kafka(monkeypatch, runners)
     pairs = configured(["alerts"], folder / "processors.toml")
-    running.run_over_kafka(KafkaSettings(bootstrap="127.0.0.1:1"), pairs, Event(), group="cnc", member="r0", broker=broker)
+    settings = KafkaSettings(bootstrap="127.0.0.1:1")
+    running.run_over_kafka(settings, pairs, Event(), group="cnc", member="r0", claimed=CLAIMED, broker=broker)
     return runners
 
 

@@ -1,6 +1,8 @@
 """A runner that is fenced comes in once more if it had its name by right; one that has just come ends."""
 
 from threading import Event
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -11,6 +13,9 @@ from cnctwin.kafka.running import SETTLED_S, run_over_kafka
 from cnctwin.kafka.settings import KafkaSettings
 from cnctwin.kafka.transaction import FencedError
 from processors.discovery import discover
+
+CLAIMED: Any = SimpleNamespace(name="cnctwin.cnc.thermal.r0")
+"""Stands for a name that was claimed."""
 
 
 class Runners:
@@ -35,7 +40,7 @@ def without_kafka(monkeypatch: pytest.MonkeyPatch, runners: Runners) -> None:
     """Replace whatever would ask the cluster for something: no thread waits for an answer after the test."""
     monkeypatch.setattr(module, "Runner", runners)
     monkeypatch.setattr(module, "ensure", lambda *_, **__: None)
-    monkeypatch.setattr(module, "Transactions", lambda *_: None)
+    monkeypatch.setattr(module, "Transactions", lambda *_: CLAIMED)
 
 
 def start(monkeypatch: pytest.MonkeyPatch, runners: Runners, stop: Event | None = None) -> None:
@@ -43,7 +48,9 @@ def start(monkeypatch: pytest.MonkeyPatch, runners: Runners, stop: Event | None 
     monkeypatch.setattr(module.time, "monotonic", lambda: runners.now_s)
     processor = discover()["thermal"]
     pairs = [(processor, processor.configured({}))]
-    run_over_kafka(KafkaSettings(bootstrap="127.0.0.1:1"), pairs, stop or Event(), group="cnc", member="r0", broker=None)
+    run_over_kafka(
+        KafkaSettings(bootstrap="127.0.0.1:1"), pairs, stop or Event(), group="cnc", member="r0", claimed=CLAIMED, broker=None
+    )
 
 
 def test_a_runner_that_was_in_for_long_comes_in_again_each_time(monkeypatch: pytest.MonkeyPatch) -> None:
