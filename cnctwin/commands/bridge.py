@@ -1,6 +1,7 @@
 """`cnctwin bridge`: between the broker and Kafka, until it is stopped."""
 
 import socket
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -36,27 +37,58 @@ def bridge(
     from cnctwin.kafka.settings import settings_of
 
     with needed_by("cnctwin bridge", "kafka"):
-        from cnctwin.kafka.bridging import bridge as run_bridge
-        from cnctwin.kafka.bridging import published_by
-    from processors.discovery import discover
-    from processors.running.limits import limits_of
-    from processors.running.runtime import configured
+        import confluent_kafka  # noqa: F401
+    from cnctwin.processes.look_around import refused_second
+    from processors.discovery import modules
+    from sparkplug.metric import NodeId
+    from twin.vocabulary.nodes import twin_node
 
     settings = settings_of(kafka, kafka_config)
-    names = [one.strip() for one in processors.split(",") if one.strip()] or [one for one in discover() if one != "historian"]
-    pairs, limits = configured(names, config), limits_of(config)
-    with stopped_by_signals() as stop, broker_or_own(address(broker)) as where:
+    names = list_of(processors) or [one for one in modules() if one != "historian"]
+    published = published_by(results, names)
+    way_out = "end that one first, or give this bridge other --results"
+    own = [NodeId(group, twin_node(one)) for one in published]
+    with (
+        stopped_by_signals() as stop,
+        broker_or_own(address(broker)) as where,
+        refused_second(where, own, way_out) as is_alone,
+    ):
+        from cnctwin.kafka.bridging import bridge as run_bridge  # while the broker is looked around
+        from processors.running.limits import limits_of
+        from processors.running.runtime import configured
+
         run_bridge(
             settings,
-            pairs,
+            configured(names, config),
             where,
             stop,
             name=name or socket.gethostname(),
             group=group,
-            nodes=[one.strip() for one in nodes.split(",") if one.strip()],
-            results=published_by(results, names),
+            nodes=list_of(nodes),
+            results=published,
             state_dir=folder_for_state(state_dir),
-            limits=limits,
+            is_alone=is_alone,
+            limits=limits_of(config),
             machines=machines_folder(machines, config),
             keep_s=round(keep_session * 3600),
         )
+
+
+def list_of(text: str) -> list[str]:
+    """Return the names in a text, with commas between."""
+    return [name.strip() for name in text.split(",") if name.strip()]
+
+
+def published_by(results: str, names: Sequence[str]) -> list[str]:
+    """Return the processors whose results a bridge publishes: all that run on the log, none, or those named.
+
+    Raises UnknownProcessorError for a name that no processor has.
+    """
+    from processors.discovery import module_of
+
+    if results in ("", "all"):
+        return list(names)
+    chosen = [] if results == "none" else list_of(results)
+    for name in chosen:
+        module_of(name)
+    return chosen

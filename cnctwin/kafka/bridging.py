@@ -1,7 +1,7 @@
 """A bridge from its options: the host session and the edge nodes of the processors that it publishes."""
 
 import fnmatch
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from threading import Event
@@ -9,9 +9,6 @@ from threading import Event
 from cnctwin.kafka.bridge.bridge import Bridge
 from cnctwin.kafka.settings import KafkaSettings
 from cnctwin.kafka.topics import Topics, cell_processors, ensure
-from cnctwin.processes.look_around import refused_second
-from processors.discovery import discover
-from processors.errors import ConfigurationError
 from processors.running.health import node_metrics
 from processors.running.runtime import Configured
 from sparkplug.admission.limits import DEFAULTS, Limits
@@ -37,13 +34,15 @@ def bridge(
     nodes: Sequence[str],
     results: Sequence[str],
     state_dir: Path,
+    is_alone: Callable[[], None],
     limits: Limits = DEFAULTS,
     machines: Path | None = None,
     keep_s: int = 0,
 ) -> None:
     """Run a bridge until `stop` is set. `pairs`: the processors that run on the log; `nodes`: patterns of the edge nodes that
-    this bridge reads; `results`: the processors whose results it publishes; `keep_s`: for how long the broker keeps what it could
-    not deliver to this bridge. Raises ConfigurationError, AnotherRunsError.
+    this bridge reads; `results`: the processors whose results it publishes; `is_alone`: raises where another process has their
+    nodes, called before this one connects; `keep_s`: for how long the broker keeps what it could not deliver to this bridge.
+    Raises ConfigurationError, AnotherRunsError.
     """
     topics = Topics(group)
     own = [NodeId(group, processor.node) for processor, _ in pairs if processor.name in results]
@@ -52,8 +51,6 @@ def bridge(
         lock = NodeId(group, f"bridge-{name}")
         for node in (lock, *own):
             stack.callback(SessionLock(state_dir / f"{node.node}.json", f"{node.group}/{node.node}").release)
-        way_out = "end that one first, or give this bridge other --results"
-        is_alone = stack.enter_context(refused_second(broker, own, way_out))
         ensure(settings, topics, cell_processors(pairs), without=(topics.deadletters,))
         loop = Loop("bridge")
         host = HostApplication(
@@ -92,19 +89,3 @@ def _is_read(node: NodeId, patterns: Sequence[str], own: Sequence[NodeId], on_lo
     if is_twin_node(node.node):
         return node in own or (bool(own) and node.node not in on_log)
     return any(fnmatch.fnmatchcase(node.node, pattern) for pattern in patterns)
-
-
-def published_by(results: str, names: Sequence[str]) -> list[str]:
-    """Return the processors whose results a bridge publishes: all that run on the log, none, or those named.
-
-    Raises ConfigurationError for a name that no processor has.
-    """
-    if results in ("", "all"):
-        return list(names)
-    if results == "none":
-        return []
-    chosen = [name.strip() for name in results.split(",") if name.strip()]
-    unknown = [name for name in chosen if name not in discover()]
-    if unknown:
-        raise ConfigurationError(f"--results {unknown[0]}: no processor has that name; `cnctwin process --help` lists them")
-    return chosen

@@ -4,16 +4,16 @@ What the cluster says of a failure decides: try again, abort and begin from what
 this one's name.
 """
 
-import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any, Generic, NoReturn, TypeVar
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from confluent_kafka import Consumer, KafkaError, KafkaException, Message, Producer, TopicPartition
 
 from cnctwin.kafka.client_log import LOG, REACH
 from cnctwin.kafka.kept import WRITER
+from cnctwin.kafka.request import HungError, Request
 from cnctwin.kafka.settings import KafkaSettings
 from processors.errors import ProcessorError
 
@@ -26,7 +26,6 @@ CLAIM_S = REQUEST_S + 2.0
 CUT = (KafkaError._TRANSPORT, KafkaError._ALL_BROKERS_DOWN)
 PURGED = (KafkaError._PURGE_QUEUE, KafkaError._PURGE_INFLIGHT)  # of a transaction that was given up
 PAUSE_S = 0.2
-T = TypeVar("T")
 MESSAGE_BYTES_MAX = 64 * 1024 * 1024
 BUFFER_SHARE = 2  # of the buffer is what one message may fill
 
@@ -35,42 +34,12 @@ class AbortedError(ProcessorError):
     """A transaction came to nothing: what was folded in it has to be folded again."""
 
 
-class HungError(AbortedError):
-    """The cluster has not answered at all."""
-
-
 class RefusedError(AbortedError):
     """A message is larger than the cluster takes, and would be the next time too."""
 
 
 class FencedError(ProcessorError):
     """Another runner has this one's name."""
-
-
-class _Asked(Generic[T]):
-    """A request in a thread that may be left behind: where the broker ended in the middle of it, librdkafka may never return."""
-
-    def __init__(self, ask: Callable[[], T]) -> None:
-        self._ask = ask
-        self._answers: list[T] = []
-        self._errors: list[BaseException] = []
-        self._thread = threading.Thread(target=self._run, daemon=True)
-        self._thread.start()
-
-    def _run(self) -> None:
-        try:
-            self._answers.append(self._ask())
-        except BaseException as error:
-            self._errors.append(error)
-
-    def answer(self, timeout_s: float | None = None) -> T:
-        """Wait for the answer, and return it or raise what came instead. Raises HungError."""
-        self._thread.join(timeout_s)
-        if self._thread.is_alive():
-            raise HungError(f"no answer, not even a refusal, within {timeout_s:g} s")
-        if self._errors:
-            raise self._errors[0]
-        return self._answers[0]
 
 
 class Transactions:
@@ -95,7 +64,7 @@ class Transactions:
         """Have another producer claim the name."""
         self._is_spoilt = False
         self._claimant: Producer | None = None
-        self._claim = _Asked(self._claimed)
+        self._claim = Request(self._claimed)
 
     @property
     def _producer(self) -> Producer:
@@ -114,7 +83,7 @@ class Transactions:
         producer = self._made()
         while True:
             try:
-                _Asked(partial(producer.init_transactions, REQUEST_S)).answer(CLAIM_S)
+                Request(partial(producer.init_transactions, REQUEST_S)).answer(CLAIM_S)
             except HungError as error:
                 self._not_claimed(error)
                 producer = self._made()
@@ -206,12 +175,12 @@ class Transactions:
         """Ask once. If the transaction went through without an answer, the states that are restored say so. Raises AbortedError,
         FencedError."""
         try:
-            _Asked(request).answer(self._patience_s)
+            Request(request).answer(self._patience_s)
         except KafkaException as error:
             self._failed(error.args[0])
-        except HungError:
+        except HungError as error:
             self._is_spoilt, self._patience_s = True, min(2.0 * self._patience_s, HUNG_S_MAX)
-            raise
+            raise AbortedError(str(error)) from error
 
     def _raise_if_lost(self) -> None:
         if self._refused:

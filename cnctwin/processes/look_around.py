@@ -26,6 +26,8 @@ _PROCESS = "health/process"
 
 def refuse_second(broker: BrokerAddress, nodes: Sequence[NodeId], way_out: str) -> None:
     """Raise AnotherRunsError where one of these nodes is alive on the broker; it takes LOOK_S where none is."""
+    if not nodes:
+        return
     logger = logging.getLogger("sparkplug")
     filters = [str(Topic(Verb.NBIRTH, node)) for node in nodes]
     host = HostApplication(broker, f"look-{uuid4().hex[:12]}", filters, publish_state=False, wanted=frozenset(nodes).__contains__)

@@ -20,6 +20,7 @@ from cnctwin.kafka.bridge.origins import Origins
 from cnctwin.kafka.bridge.outward import Outward
 from cnctwin.kafka.bridge.reports import Reports
 from cnctwin.kafka.kept import read_kept
+from cnctwin.kafka.request import Request
 from cnctwin.kafka.settings import KafkaSettings
 from cnctwin.kafka.topics import Topics
 from processors.description import machine_and_role
@@ -71,6 +72,7 @@ class Bridge:
             host.on_life = self._births.take
         published = [(processor, one) for processor, one in pairs if processor.name in nodes]
         self._back = Back(settings, topics, name, published, host=host, nodes=nodes) if nodes else None
+        self._learning: Request[None] | None = None  # what was published before
         self._cell_listeners = [(topics.cells(one.name), one) for one, _ in pairs if one.is_of_cells]
         self._descriptions = Descriptions(host, (), DescriptionFolder(machines)) if machines is not None else None
         self._reports = Reports(settings, topics, name, nodes)
@@ -80,31 +82,30 @@ class Bridge:
         self.events = 0
 
     def prepare(self) -> None:
-        """Learn what an earlier run has left. Raises SnapshotError where the log does not answer."""
+        """Learn which births an earlier run has kept. Raises SnapshotError where the log does not answer."""
         for topic_filter in dict.fromkeys(self._plain_filters()):
             self._host.subscribe_plain(topic_filter)
         if self._back is not None:
-            self._back.begin()
+            self._learning = Request(self._back.begin)
         if self._keeps_session:
             self._host.restore(self._births.restored(self._known_births()))
 
     def run(self, stop: Event) -> None:
-        """Work until `stop` is set."""
+        """Work until `stop` is set. Raises SnapshotError where the log does not answer."""
         with seldom_looked_for():
             self._run(stop)
 
     def _run(self, stop: Event) -> None:
         self._host.start()
-        for node in self._nodes.values():
-            node.start()
         try:
             while not stop.is_set():
                 self.turn()
         finally:
-            for node in self._nodes.values():
-                node.stop()
+            if self._learning is None:  # else the nodes were never there, and a thread has the consumer
+                for node in self._nodes.values():
+                    node.stop()
             self._host.stop()
-            if self._back is not None:
+            if self._back is not None and self._learning is None:
                 self._back.close()
             self._reports.leave(self._outward)
             if waiting := self._outward.close():
@@ -128,7 +129,7 @@ class Bridge:
             self._take(event, now_ms)
         self._births.catch_up()
         self._outward.owe(self._host.take_held())
-        if self._back is not None and self._host.online and all(node.online for node in self._nodes.values()):
+        if self._back is not None and self._publishes():
             self._back.turn()  # else results wait in the log: what is published while nobody listens is lost
         self._outward.poll()
         self._host.acknowledge(self._outward.take_safe())
@@ -137,10 +138,22 @@ class Bridge:
             self._mark(now_ms)
         for node, device in self._outward.take_untold():
             self._tell_again(node, device, now_ms)
-        if self._back is not None:
+        if self._back is not None and self._learning is None:
             self._back.commit(now_s)
         if self._reports.is_due(now_s):
             self._look(now_s)
+
+    def _publishes(self) -> bool:
+        """Return True where results can be published. The edge nodes are born once it is known what was published before; what
+        machines say goes to the log meanwhile."""
+        if self._learning is not None:
+            if not self._learning.is_over:
+                return False
+            self._learning.answer()
+            self._learning = None
+            for node in self._nodes.values():
+                node.start()
+        return self._host.online and all(node.online for node in self._nodes.values())
 
     def _now_ms(self) -> int:
         """Return the time on the wall, which never goes back."""

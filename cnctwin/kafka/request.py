@@ -1,0 +1,45 @@
+"""A request in a thread of its own, which may be left behind: where the broker ends in the middle of one, librdkafka may never
+return."""
+
+import threading
+from collections.abc import Callable
+from typing import Generic, TypeVar
+
+from processors.errors import ProcessorError
+
+T = TypeVar("T")
+
+
+class HungError(ProcessorError):
+    """The cluster has not answered at all."""
+
+
+class Request(Generic[T]):
+    """See the module. It begins at once."""
+
+    def __init__(self, ask: Callable[[], T]) -> None:
+        self._ask = ask
+        self._answers: list[T] = []
+        self._errors: list[BaseException] = []
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def _run(self) -> None:
+        try:
+            self._answers.append(self._ask())
+        except BaseException as error:
+            self._errors.append(error)
+
+    @property
+    def is_over(self) -> bool:
+        """True once `answer` returns at once."""
+        return not self._thread.is_alive()
+
+    def answer(self, timeout_s: float | None = None) -> T:
+        """Wait for the answer, and return it or raise what came instead. Raises HungError."""
+        self._thread.join(timeout_s)
+        if self._thread.is_alive():
+            raise HungError(f"no answer, not even a refusal, within {timeout_s:g} s")
+        if self._errors:
+            raise self._errors[0]
+        return self._answers[0]
