@@ -1,6 +1,6 @@
 """The kill run: bridge, runner and Kafka are killed in turn while machines talk, and nothing may be lost, doubled or different.
 
-    python -m benchmarks.kafka.kill_run --machines 100 --hz 10 --minutes 15 --every 30
+    scripts/kill-run                                   # 100 machines at 10 Hz, 15 minutes, a kill every 30 s
     python -m benchmarks.kafka.kill_run --minutes 2 --machines 10 --every 10
     python -m benchmarks.kafka.kill_run --kills kafka --away 600 --minutes 1.5 --machines 20
     python -m benchmarks.kafka.kill_run --takeover --machines 20 --minutes 5 --every 60

@@ -79,9 +79,9 @@ class Each(NamedTuple):
 class MeasuredOnKafka:
     """Figures of the folds on Kafka, CPU µs. Messages are those of machines, with 11 changing values.
 
-        python -m benchmarks.kafka.cost --only bridge --prefer    # bridge_us, kafka_us, mosquitto_us, log_bytes, live_factor
-        python -m benchmarks.kafka.cost --only each               # read_us, fold_us
-        python -m benchmarks.kafka.cost --only snapshots          # state_us
+        python -m benchmarks.kafka --only bridge --prefer    # bridge_us, kafka_us, mosquitto_us, log_bytes, live_factor
+        python -m benchmarks.kafka --only each               # read_us, fold_us
+        python -m benchmarks.kafka --only snapshots          # state_us
 
     bridge_us: a result's is to publish it, and to hand it back to the log; kafka_us: with one replica and one reader
     log_bytes: on the disk after lz4, with one replica, what cells read and what comes of a result included

@@ -1,8 +1,8 @@
 """The cost of the folds on Kafka: a runner against a plain loop, the bridge, several runners, a rebalance. Prints Markdown.
 
-    .venv/bin/python -m benchmarks.kafka.cost                             # all of it, some ten minutes
-    .venv/bin/python -m benchmarks.kafka.cost --only runner --messages 30000 --rounds 1
-    .venv/bin/python -m benchmarks.kafka.cost --only bridge --machines 20,100,200 --prefer
+    .venv/bin/python -m benchmarks.kafka                             # all of it, some ten minutes
+    .venv/bin/python -m benchmarks.kafka --only runner --messages 30000 --rounds 1
+    .venv/bin/python -m benchmarks.kafka --only bridge --machines 20,100,200 --prefer
 
 One Kafka (tests/kafka/kafka_server.py) and one Mosquitto on this computer. The runner and its peer, a plain loop of
 confluent-kafka that does the same without guarantees (benchmarks/kafka/fold.py), take turns on one log; medians are told.
