@@ -18,6 +18,7 @@ from tests.kafka.kafka_server import KafkaServer
 from tests.wire.mosquitto import free_port
 
 STOP_S_MAX = 60.0
+BUFFER_MB, BUFFER_MB_AWAY = 256, 2048  # what a Kafka that stays away for long needs: the run is to lose nothing
 BORN_S_MAX = 60.0
 PROCESSORS = ("thermal", "cutting_force", "gap", "rules", "events", "tool_change_detector", "alerts", "mirror")
 KEEPING = ("upgrade_outgoing_qos true",)
@@ -134,7 +135,10 @@ class Plant:
         self.config = home / "processors.toml"
         self.config.write_text(CONFIGURATION.format(url=webhook))
         self._kafka_config = home / "kafka.toml"
-        self._kafka_config.write_text(f"partitions = {setup.partitions}\nreplication_factor = 1\nsession_s = {setup.session_s}\n")
+        self._kafka_config.write_text(
+            f"partitions = {setup.partitions}\nreplication_factor = 1\nsession_s = {setup.session_s}\n"
+            f"buffer_mb = {BUFFER_MB_AWAY if setup.away_s else BUFFER_MB}\n"
+        )
         self.ended: Counter[str] = Counter()
         self.kafka_cpu_s = 0.0
         self._load: Process | None = None

@@ -20,10 +20,10 @@ def bridge(
     config: Annotated[Path | None, typer.Option(help="TOML with a table for each processor")] = None,
     broker: Broker = None,
     group: Group = "cnc",
-    name: Annotated[str, typer.Option(help="Of this bridge, the same at each start; else the computer's name")] = "",
-    nodes: Annotated[str, typer.Option(help="Edge nodes that it reads: patterns, with commas between")] = "*",
+    name: Annotated[str, typer.Option(help="Name of this bridge, the same at each start; else the computer's name")] = "",
+    nodes: Annotated[str, typer.Option(help="Edge nodes to read: patterns, separated by commas")] = "*",
     results: Annotated[str, typer.Option(help="Processors whose results it publishes: names, all or none")] = "all",
-    processors: Annotated[str, typer.Option(help="Processors that run on Kafka; else all but the historian")] = "",
+    processors: Annotated[str, typer.Option(help="Processors that run on Kafka: names; else all but the historian")] = "",
     state_dir: Annotated[
         Path | None, typer.Option(help="Keeps birth/death numbers; else $CNCTWIN_STATE_DIR or ~/.local/state/cnctwin")
     ] = None,
@@ -32,7 +32,7 @@ def bridge(
         float, typer.Option(help="Hours for which the broker keeps what it cannot deliver; 0 = none (docs/kafka.md)", min=0.0)
     ] = 0.0,
 ) -> None:
-    """Hand what machines say to Kafka, and publish what processors on Kafka say (docs/kafka.md)."""
+    """Write what machines send to Kafka, and publish what processors on Kafka compute (docs/kafka.md)."""
     from cnctwin.commands.extras import needed_by
     from cnctwin.kafka.settings import settings_of
 

@@ -9,7 +9,7 @@ from confluent_kafka.admin import AdminClient
 
 from cnctwin.kafka.counted import Counted
 from cnctwin.kafka.homes import home_in
-from cnctwin.kafka.kept import ANSWER_S, fence_open, read_kept
+from cnctwin.kafka.kept import ANSWER_S, ends_of, fence_open, read_kept
 from cnctwin.kafka.settings import KafkaSettings
 from cnctwin.kafka.topics import Topics
 from cnctwin.kafka.transaction import fence
@@ -19,6 +19,7 @@ from processors.running.runtime import Configured
 from sparkplug.records.record import Record, RecordError, RecordReader
 
 RESTORE_S_MAX = 120.0
+WAY_OUT = "write a null value in that partition, and what the log holds is folded, and published, once more"
 Place = tuple[str, int]
 """A topic and the number of a partition."""
 _log = logging.getLogger(__name__)
@@ -58,14 +59,19 @@ class Assigned:
         client, fence_it = self._settings.client(), self._fence_if_gone
         fence_open(client, self._topics.results, numbers, timeout_s=RESTORE_S_MAX, fence=fence_it)
         kept = read_kept(client, self._topics.snapshots, numbers, timeout_s=RESTORE_S_MAX, fence=fence_it)
+        ends = ends_of(client, places, timeout_s=RESTORE_S_MAX)
         positions = []
         for place, (topic, number) in enumerate(places):
             partition = Partition(self._reader, self._pairs[topic], topic, home_in(number, self._settings.partitions))
             try:
                 offset = partition.restore(kept[number])
             except SnapshotError as error:
-                way_out = "write a null value under that key, and what the log holds is folded, and told, once more"
-                raise SnapshotError(f"{self._topics.snapshots}, partition {number}, key {error}; {way_out}") from error
+                raise SnapshotError(f"{self._topics.snapshots}, partition {number}, key {error}; {WAY_OUT}") from error
+            if offset > ends[topic, number]:
+                # Whatever is written up to there would count as folded.
+                found = f"{topic}, partition {number} ends at {ends[topic, number]}, and the states are of {offset}"
+                way_out = f"under the key {partition.marker} of {self._topics.snapshots} {WAY_OUT}"
+                raise SnapshotError(f"{found}: it has lost records or was made again; {way_out}")
             if self._begin is not None:
                 offset = partition.next = self._begin((topic, number), offset)
             self._retire((topic, number))

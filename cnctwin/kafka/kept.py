@@ -49,7 +49,7 @@ def read_kept(
 
     told: hears partition, key and time stamp, ms since 1970, of each message
     """
-    common = client | {"group.id": f"{topic}.read", "enable.auto.commit": False, "auto.offset.reset": "earliest"}
+    common = client | {"group.id": _group_of(topic), "enable.auto.commit": False, "auto.offset.reset": "earliest"}
     uncommitted = Consumer(common | {"isolation.level": "read_uncommitted"})
     consumer = Consumer(common | {"isolation.level": "read_committed", "enable.partition.eof": True, "fetch.wait.max.ms": 20})
     try:
@@ -68,7 +68,7 @@ def read_kept(
 def fence_open(client: Conf, topic: str, partitions: Sequence[int], *, timeout_s: float, fence: Fence) -> None:
     """Fence whoever has a transaction open in some partitions: until it ends, nobody who reads what is committed sees what comes
     behind it. Raises SnapshotError where the cluster does not answer in time."""
-    common = client | {"group.id": f"{topic}.read", "enable.auto.commit": False}
+    common = client | {"group.id": _group_of(topic), "enable.auto.commit": False}
     uncommitted = Consumer(common | {"isolation.level": "read_uncommitted"})
     committed = Consumer(common | {"isolation.level": "read_committed"})
     try:
@@ -82,6 +82,29 @@ def fence_open(client: Conf, topic: str, partitions: Sequence[int], *, timeout_s
     finally:
         committed.close()
         uncommitted.close()
+
+
+def ends_of(client: Conf, places: Sequence[tuple[str, int]], *, timeout_s: float) -> dict[tuple[str, int], int]:
+    """Return the offset behind the last message of each partition. Raises SnapshotError where the cluster does not answer."""
+    if not places:
+        return {}
+    own = {"group.id": _group_of(places[0][0]), "enable.auto.commit": False, "isolation.level": "read_uncommitted"}
+    consumer = Consumer(client | own)
+    try:
+        return {(topic, number): _watermarks(consumer, topic, number, timeout_s)[1] for topic, number in places}
+    except KafkaException as error:
+        raise SnapshotError(f"{places[0][0]}: {error.args[0].str()}") from error
+    finally:
+        consumer.close()
+
+
+def _group_of(topic: str) -> str:
+    """Return a consumer group that nobody joins, of a name that both bridges and runners may use (deploy/kafka/acls).
+
+    >>> _group_of("cnctwin.cnc.snapshots")
+    'cnctwin.cnc.bridge.read'
+    """
+    return ".".join((*topic.split(".")[:2], "bridge", "read"))
 
 
 def answered(ask: Callable[[], T | None], timeout_s: float) -> T:
@@ -169,11 +192,13 @@ def _writers(consumer: Consumer, topic: str, begins: dict[int, int], ends: dict[
     while left and time.monotonic() < until_s:
         messages = consumer.consume(1000, POLL_S)
         for message in messages:
-            if message.error() is None:
+            if (error := message.error()) is None:
                 told: dict[str, Any] = dict(message.headers() or ())
                 writers.add(told.get(WRITER, b"").decode())
                 if (message.offset() or 0) >= ends[message.partition() or 0] - 1:
                     left.discard(message.partition() or 0)
+            elif error.code() == KafkaError.TOPIC_AUTHORIZATION_FAILED:
+                raise KafkaException(error)
         if not messages:
             break
     writers.discard("")

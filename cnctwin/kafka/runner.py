@@ -26,7 +26,7 @@ from cnctwin.kafka.topics import Topics
 from cnctwin.kafka.transaction import AbortedError, FencedError, RefusedError, Transactions, written_by
 from cnctwin.kafka.waiting import Waiting
 from processors.actions import DeadLetter, Pin, PlainOutput
-from processors.errors import SnapshotError
+from processors.errors import ConfigurationError, SnapshotError
 from processors.partition.partition import Partition
 from processors.partition.results import Results
 from processors.running.cycles import seldom_looked_for
@@ -98,6 +98,7 @@ class Runner:
         session_ms = round(self._settings.session_s * 1000)
         return self._settings.client() | {
             "error_cb": self._on_error,
+            "client.id": self._name,
             "group.id": self.group,
             "group.instance.id": self._member,
             "session.timeout.ms": session_ms,
@@ -236,7 +237,7 @@ class Runner:
 
     def _on_error(self, error: KafkaError) -> None:
         """A consumer that is beyond help reads nothing more, and does not always say so among the messages."""
-        if error.fatal() or error.code() == KafkaError._FATAL:
+        if error.fatal() or error.code() in (KafkaError._FATAL, KafkaError.INVALID_SESSION_TIMEOUT):
             self._beyond_help = error
         else:
             REACH.failed(error)
@@ -244,6 +245,9 @@ class Runner:
     def _complain(self, error: KafkaError) -> None:
         if error.code() == KafkaError.FENCED_INSTANCE_ID or "fenced" in error.str().lower():
             raise FencedError(f"kafka: {self._name} is taken by another process; give each runner a --member of its own")
+        if error.code() == KafkaError.INVALID_SESSION_TIMEOUT:
+            limits = "between group.min.session.timeout.ms and group.max.session.timeout.ms of the cluster"
+            raise ConfigurationError(f"kafka: session_s = {self._settings.session_s:g} is refused; give one {limits}")
         if error.fatal() or error.code() == KafkaError._FATAL:
             raise KafkaException(error)
         LOG.warning("kafka: %s", error.str())

@@ -8,7 +8,9 @@ from threading import Event
 
 from cnctwin.kafka.assigned import Place
 from cnctwin.kafka.courier import MovingCourier
+from cnctwin.kafka.groups import refuse_overlap
 from cnctwin.kafka.homes import home_of
+from cnctwin.kafka.request import Request
 from cnctwin.kafka.runner import Runner
 from cnctwin.kafka.settings import KafkaSettings
 from cnctwin.kafka.sink import Sink
@@ -40,7 +42,9 @@ def run_over_kafka(
     broker: for the courier of alerts, which reads what is to be sent there; None where nobody is to be told
     """
     topics, transactions = Topics(group), claimed
+    is_alone = Request(lambda: refuse_overlap(settings, topics, [processor.name for processor, _ in pairs], stop))
     ensure(settings, topics, cell_processors(pairs), without=(topics.births,))
+    is_alone.answer()
     with _courier(settings, topics, pairs, broker, member) as hold, _sink(pairs) as sink:
         while not stop.is_set():
             began_s = time.monotonic()

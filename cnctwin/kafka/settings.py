@@ -17,6 +17,8 @@ from processors.errors import ConfigurationError
 
 PREFIX = "CNCTWIN_KAFKA_"
 PASSWORD = f"{PREFIX}PASSWORD"
+MESSAGE_BYTES_MAX = 64 * 1024 * 1024
+BUFFER_SHARE = 2  # of the buffer is what one message may fill
 Conf = dict[str, Any]
 
 
@@ -26,7 +28,7 @@ class KafkaSettings(BaseModel):
     partitions: of each topic; machines stay where they are only while it does not change
     retention_hours: of readings, cells and results
     session_s: after which a runner that says nothing is taken for dead, and its partitions go to others
-    buffer_mb: what a bridge keeps in memory while the cluster is away
+    buffer_mb: memory for the records that a bridge keeps while the cluster is away; a third more at most
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -65,6 +67,11 @@ class KafkaSettings(BaseModel):
             "ssl.key.location": self.key_file,
         }
         return conf | {name: path for name, path in files.items() if path}
+
+    @property
+    def message_bytes_max(self) -> int:
+        """How large a message may be on our side; of the rest the topic decides."""
+        return min(round(self.buffer_mb * 1024 * 1024) // BUFFER_SHARE, MESSAGE_BYTES_MAX)
 
     def _password(self, environment: Mapping[str, str]) -> str:
         if not self.username:

@@ -23,6 +23,7 @@ ANSWER_S = 30.0
 ATTEMPT_S = 1.0
 MADE_S_MAX = 60.0
 HOUR_MS = 3_600_000
+REPLICAS_TO_LOSE_ONE = 3  # and still write to two
 COMPACTED = {
     "cleanup.policy": "compact",
     "min.cleanable.dirty.ratio": "0.3",
@@ -100,6 +101,18 @@ def cell_processors(pairs: "Sequence[Configured]") -> list[str]:
     return [processor.name for processor, _ in pairs if processor.is_of_cells]
 
 
+def configuration(settings: KafkaSettings, kept: dict[str, str]) -> dict[str, str]:
+    """Return the configuration with which a topic is made. What was acknowledged outlives a broker where that is possible: two
+    have it.
+
+    >>> configuration(KafkaSettings(bootstrap="k:1", retention_hours=1), {"cleanup.policy": "delete"})
+    {'cleanup.policy': 'delete', 'min.insync.replicas': '2', 'retention.ms': '3600000'}
+    """
+    insync = {"min.insync.replicas": "2"} if settings.replication_factor >= REPLICAS_TO_LOSE_ONE else {}
+    retention = {} if kept is COMPACTED else {"retention.ms": str(round(settings.retention_hours * HOUR_MS))}
+    return kept | insync | retention
+
+
 def ensure(settings: KafkaSettings, topics: Topics, cell_processors: Sequence[str], without: Collection[str] = ()) -> None:
     """Make the topics that are missing, or say which are. Raises ConfigurationError: for topics that are missing where we may not
     make them, for one with another number of partitions, and for a cluster that does not let us in.
@@ -108,7 +121,6 @@ def ensure(settings: KafkaSettings, topics: Topics, cell_processors: Sequence[st
     """
     admin = _Asked(settings)
     wanted = {name: of for name, of in topics.all(cell_processors).items() if name not in without}
-    retention = {"retention.ms": str(round(settings.retention_hours * HOUR_MS))}
     present = admin.present()
     missing = [name for name in wanted if name not in present]
     if missing and not settings.create_topics:
@@ -123,7 +135,7 @@ def ensure(settings: KafkaSettings, topics: Topics, cell_processors: Sequence[st
                     name,
                     num_partitions=settings.partitions,
                     replication_factor=settings.replication_factor,
-                    config=wanted[name] if wanted[name] is COMPACTED else wanted[name] | retention,
+                    config=configuration(settings, wanted[name]),
                 )
                 for name in missing
             ]

@@ -26,8 +26,6 @@ CLAIM_S = REQUEST_S + 2.0
 CUT = (KafkaError._TRANSPORT, KafkaError._ALL_BROKERS_DOWN)
 PURGED = (KafkaError._PURGE_QUEUE, KafkaError._PURGE_INFLIGHT)  # of a transaction that was given up
 PAUSE_S = 0.2
-MESSAGE_BYTES_MAX = 64 * 1024 * 1024
-BUFFER_SHARE = 2  # of the buffer is what one message may fill
 
 
 class AbortedError(ProcessorError):
@@ -216,12 +214,12 @@ class Transactions:
 
 def producer_of(settings: KafkaSettings, transactional_id: str, more: Mapping[str, Any] | None = None) -> Producer:
     """Return a transactional producer. Of how large a message may be the cluster decides, as long as there is room for it."""
-    buffer_bytes = round(settings.buffer_mb * 1024 * 1024)
     return Producer(
         settings.client()
-        | {"message.max.bytes": min(buffer_bytes // BUFFER_SHARE, MESSAGE_BYTES_MAX)}
         | dict(more or {})
         | {
+            "client.id": transactional_id,
+            "message.max.bytes": settings.message_bytes_max,
             "transactional.id": transactional_id,
             "transaction.timeout.ms": round(settings.transaction_s * 1000),
             "message.timeout.ms": round(settings.transaction_s * 1000),

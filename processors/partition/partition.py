@@ -228,12 +228,17 @@ class Partition:
         lives = {"folded": self.next, "devices": {device: known.kept for device, known in self._lives.items()}}
         yield LIVES + self._reader, _to_json(lives).encode()
 
+    @property
+    def marker(self) -> str:
+        """The key of the marker of this reader."""
+        return MARKER + self._reader
+
     def mark(self) -> tuple[str, bytes]:
         """Return the marker, by key: what came of all records before `next` goes out with it."""
         for seat in self.seats:
             seat.published = max(seat.published, self.next)
         told = {"format": FORMAT, "processors": {seat.name: [seat.from_offset, seat.published] for seat in self.seats}}
-        return MARKER + self._reader, _to_json(told).encode()
+        return self.marker, _to_json(told).encode()
 
     def faults(self) -> list[str]:
         """Return what failed since this was last called, in a line each."""

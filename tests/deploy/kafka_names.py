@@ -11,7 +11,7 @@ MAY_WRITE = {
 }
 MAY_READ = {
     BRIDGE: {"results", "snapshots", "births", "health"},
-    RUNNER: {"readings", "cells.alerts", "cells.joint_anomaly", "snapshots"},
+    RUNNER: {"readings", "cells.alerts", "cells.joint_anomaly", "snapshots", "results"},
 }
 GROUPS = {BRIDGE: f"{PREFIX}bridge.bridge-0", RUNNER: f"{PREFIX}mirror+rules"}
 TRANSACTION = f"{PREFIX}mirror+rules.runner-physics-0"

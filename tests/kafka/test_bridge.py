@@ -61,6 +61,11 @@ def test_results_come_back_and_a_killed_bridge_is_born_again_with_the_newest(
             hall.until(lambda: b'"value":199.0' in hall.plain["cnc/mill/spindle_rpm"], "the mirror shows it")
             assert second.running, second.said
             assert second.stop() == 0, second.said
+        hall.plain.clear()
+        with bridge_program(tmp_path, hall, plant.settings, NAMES, name="b1") as renamed:
+            hall.until(lambda: is_told(hall, plant, "mill"), "one of another name goes on")
+            assert renamed.stop() == 0, renamed.said
+        assert "this bridge is new" in renamed.said and "cnc/mill/spindle_rpm" not in hall.plain, "nothing is said once more"
         numbers = values_of(records_of(plant, "mill"), "spindle_rpm")
         assert numbers == [float(number) for number in range(200)], "each once, in order"
         births = [event for event in hall.events if event.kind is EventKind.BIRTH and event.node.node == "twin-thermal"]

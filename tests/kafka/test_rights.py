@@ -11,6 +11,10 @@ pytest.importorskip("confluent_kafka", reason="no confluent-kafka in this Python
 from confluent_kafka import Consumer, KafkaException, Message, Producer, TopicCollection, TopicPartition
 from confluent_kafka.admin import AclOperation, AdminClient
 
+from cnctwin.kafka.kept import fence_open
+from cnctwin.kafka.transaction import written_by
+from processors.errors import SnapshotError
+
 GROUP = "rights"  # a plant of its own on the Kafka of all tests
 PREFIX = f"cnctwin.{GROUP}."
 AS = {BRIDGE: "cnctwin", RUNNER: "other"}
@@ -100,3 +104,30 @@ def test_nobody_reads_in_the_group_of_others(kafka: KafkaServer, user: str, grou
     with pytest.raises(KafkaException) as refused:
         asked.result(WAIT_S_MAX)
     assert refused.value.args[0].name() == "GROUP_AUTHORIZATION_FAILED"
+
+
+@pytest.mark.parametrize(("user", "topic"), [(RUNNER, "results"), (RUNNER, "snapshots"), (BRIDGE, "snapshots")])
+def test_who_restores_may_see_who_has_left_a_transaction_open(kafka: KafkaServer, user: str, topic: str) -> None:
+    name = f"{RUNNERS}.gone"
+    producer = Producer(kafka.client(AS[RUNNER]) | {"transactional.id": name})
+    producer.init_transactions(WAIT_S_MAX)
+    producer.begin_transaction()
+    producer.produce(PREFIX + topic, b"value", b"key", 0, headers=written_by(name))
+    assert producer.flush(WAIT_S_MAX) == 0
+    found: list[str] = []
+    fence_open(kafka.client(AS[user]), PREFIX + topic, [0], timeout_s=WAIT_S_MAX, fence=found.append)
+    producer.abort_transaction(WAIT_S_MAX)
+    assert found == [name]
+
+
+def test_who_may_not_read_a_topic_is_told_so_at_once(kafka: KafkaServer) -> None:
+    """`deadletters`: a runner writes them, so it may ask for their end, and does not read them."""
+    name = f"{RUNNERS}.gone"
+    producer = Producer(kafka.client(AS[RUNNER]) | {"transactional.id": name})
+    producer.init_transactions(WAIT_S_MAX)
+    producer.begin_transaction()
+    producer.produce(f"{PREFIX}deadletters", b"value", b"key", 0, headers=written_by(name))
+    assert producer.flush(WAIT_S_MAX) == 0
+    with pytest.raises(SnapshotError, match=r"deadletters: .*(?i:authoriz)"):
+        fence_open(kafka.client(AS[RUNNER]), f"{PREFIX}deadletters", [0], timeout_s=WAIT_S_MAX, fence=lambda _: None)
+    producer.abort_transaction(WAIT_S_MAX)

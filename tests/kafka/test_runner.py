@@ -14,8 +14,9 @@ pytest.importorskip("confluent_kafka", reason="no confluent-kafka in this Python
 from confluent_kafka import Producer
 from confluent_kafka.admin import AlterConfigOpType, ConfigEntry, ConfigResource, ResourceType
 
+from cnctwin.kafka.groups import refuse_overlap
 from cnctwin.kafka.kept import read_kept
-from processors.errors import SnapshotError
+from processors.errors import ConfigurationError, SnapshotError
 from tests.kafka.gated import UNBEARABLE_RPM, alone, delicate, gated, of_version
 from tests.kafka.plant_on_kafka import WAIT_S_MAX, Plant, RunnerHere, processors, until
 from tests.processors.streams import data
@@ -112,7 +113,9 @@ def test_garbage_among_the_states_is_left_alone_or_named(kafka: KafkaServer) -> 
         key = f"~marker/{plant.topics.readings}/stranger"
         stranger.produce(plant.topics.snapshots, b"\xff garbage", key.encode(), 2)
         assert stranger.flush(WAIT_S_MAX) == 0
-        named = rf"^{re.escape(plant.topics.snapshots)}, partition 2, key {re.escape(key)}: .*; write a null value under that key"
+        named = (
+            rf"^{re.escape(plant.topics.snapshots)}, partition 2, key {re.escape(key)}: .*; write a null value in that partition"
+        )
         with pytest.raises(SnapshotError, match=named), RunnerHere(plant, "r0") as runner:
             until(lambda: runner.check() is not None, "it ends")
         stranger.produce(plant.topics.snapshots, None, key.encode(), 2)
@@ -122,6 +125,39 @@ def test_garbage_among_the_states_is_left_alone_or_named(kafka: KafkaServer) -> 
             plant.folded()
             runner.stop()
         plant.holds_as_replayed(states=False)
+
+
+def test_a_log_that_is_shorter_than_the_states_is_named(kafka: KafkaServer) -> None:
+    """It was made again, or lost its end: what is written up to where it was would count as folded."""
+    with Plant(kafka, "shorter", alone(delicate()), machines=4) as plant:
+        plant.play(2)
+        key = f"~marker/{plant.topics.readings}/{plant.reader}"
+        name = plant.pairs[0][0].name
+        stranger = Producer(kafka.client())
+        stranger.produce(plant.topics.snapshots, f'{{"processors":{{"{name}":[900,900]}}}}'.encode(), key.encode(), 1)
+        assert stranger.flush(WAIT_S_MAX) == 0
+        named = rf"^{re.escape(plant.topics.readings)}, partition 1 ends at \d+, and the states are of 900: .*{re.escape(key)}"
+        with pytest.raises(SnapshotError, match=named), RunnerHere(plant, "r0") as runner:
+            until(lambda: runner.check() is not None, "it ends")
+        stranger.produce(plant.topics.snapshots, None, key.encode(), 1)
+        assert stranger.flush(WAIT_S_MAX) == 0
+        with RunnerHere(plant, "r0") as runner:
+            plant.folded()
+            runner.stop()
+        plant.holds_as_replayed(states=False)
+
+
+def test_a_processor_that_runs_in_another_set_is_not_run_twice(kafka: KafkaServer) -> None:
+    with Plant(kafka, "overlap", processors("mirror", "thermal"), session_s=1.0) as plant:
+        ask = lambda *names: refuse_overlap(plant.settings, plant.topics, names, Event())  # noqa: E731
+        with RunnerHere(plant, "r0") as runner:
+            until(lambda: runner.partitions > 0, "it has its partitions")
+            with pytest.raises(ConfigurationError, match=rf"thermal run in the consumer group {re.escape(plant.reader)} as well"):
+                ask("gap", "thermal")
+            ask("gap")
+            ask("mirror", "thermal")
+            runner.stop()
+        ask("gap", "thermal")  # once its session has run out
 
 
 def test_an_upgraded_processor_is_rebuilt_from_the_log_and_tells_nothing_twice(kafka: KafkaServer) -> None:

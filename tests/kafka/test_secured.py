@@ -15,6 +15,7 @@ from tests.kafka.kafka_server import KafkaServer
 
 pytest.importorskip("confluent_kafka", reason="no confluent-kafka in this Python; install the extra kafka")
 
+from cnctwin.kafka.kept import read_kept
 from sparkplug.broker import BrokerAddress
 from sparkplug.edge_node import EdgeNode
 from sparkplug.host import HostApplication
@@ -45,12 +46,18 @@ class Closed(NamedTuple):
             "CA_FILE": str(self.server.ca_file),
             "PARTITIONS": str(PARTITIONS),
             "CREATE_TOPICS": "false",
+            "SNAPSHOT_S": "0.5",
         }
         environment = {f"CNCTWIN_KAFKA_{key}": value for key, value in own.items()}
         given = ("--kafka", self.server.bootstrap, "--group", GROUP)
         return Program(
             self.folder, name, "cnctwin", *command, *given, environment=environment | {"CNCTWIN_STATE_DIR": os.devnull}
         )
+
+    def has_states(self) -> bool:
+        """Return True once a runner has saved states."""
+        topic = f"cnctwin.{GROUP}.snapshots"
+        return any(read_kept(self.server.client(), topic, range(PARTITIONS), timeout_s=30.0).values())
 
 
 @pytest.fixture
@@ -66,31 +73,40 @@ def closed(secured_kafka: KafkaServer, tmp_path: Path) -> Iterator[Closed]:
 
 
 def test_the_rights_of_the_script_are_enough(closed: Closed, mosquitto: Mosquitto, tmp_path: Path) -> None:
+    """Also for those who begin on a log on which others have left results and states."""
     address, shown = BrokerAddress(*mosquitto.address), dict[str, bytes]()
     edge, look = EdgeNode(address, NodeId(GROUP, "edge-mill")), HostApplication(address, "look", [], publish_state=False)
     options = ("--broker", address.url, "--processors", "mirror", "--name", "bridge-0", "--state-dir", str(tmp_path / "state"))
-    with (
-        closed.program(BRIDGE, "bridge", "bridge", *options) as bridge,
-        closed.program(RUNNER, "runner", "process", "mirror", "--member", "r0") as runner,
-    ):
-        look.subscribe_plain("cnc/#")
-        look.start()
-        edge.declare_device("mill", SIGNALS)
+    look.subscribe_plain("cnc/#")
+    look.start()
+    edge.declare_device("mill", SIGNALS)
+    edge.start()
+    said = ""
+    try:
+        for value, is_killed in ((1.0, True), (2.0, False)):
+            with (
+                closed.program(BRIDGE, f"bridge-{value}", "bridge", *options) as bridge,
+                closed.program(RUNNER, f"runner-{value}", "process", "mirror", "--member", "r0") as runner,
+            ):
 
-        def heard() -> bool:
-            assert bridge.running and runner.running, bridge.said + runner.said
-            shown.update((event.topic, event.payload) for event in look.poll(0.05) if event.topic)
-            return bool(shown)
+                def heard(value: float = value, bridge: Program = bridge, runner: Program = runner) -> bool:
+                    assert bridge.running and runner.running, bridge.said + runner.said
+                    edge.publish("mill", [Change("spindle_rpm", value, time.time_ns() // 1_000_000)])
+                    shown.update((event.topic, event.payload) for event in look.poll(0.05) if event.topic)
+                    return f'"value":{value}'.encode() in shown.get("cnc/mill/spindle_rpm", b"")
 
-        edge.start()
-        try:
-            speak = lambda: edge.publish("mill", [Change("spindle_rpm", 1.0, time.time_ns() // 1_000_000)])  # noqa: E731
-            until(lambda: (speak(), heard())[1], "the mirror shows the machine")
-        finally:
-            edge.stop()
-            look.stop()
-        assert (bridge.stop(), runner.stop()) == (0, 0), bridge.said + runner.said
-    assert "AUTHORIZATION" not in (bridge.said + runner.said).upper()
+                until(heard, "the mirror shows the machine")
+                if is_killed:
+                    until(closed.has_states, "states are saved")
+                    bridge.kill()
+                    runner.kill()
+                else:
+                    assert (bridge.stop(), runner.stop()) == (0, 0), bridge.said + runner.said
+                said += bridge.said + runner.said
+    finally:
+        edge.stop()
+        look.stop()
+    assert "AUTHORIZATION" not in said.upper()
 
 
 @pytest.mark.parametrize("user", [BRIDGE, RUNNER])

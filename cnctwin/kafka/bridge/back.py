@@ -14,6 +14,7 @@ from typing import Any
 from confluent_kafka import Consumer, KafkaError, KafkaException, TopicPartition
 
 from cnctwin.kafka.client_log import LOG
+from cnctwin.kafka.groups import published_up_to
 from cnctwin.kafka.kept import answered, read_kept
 from cnctwin.kafka.settings import KafkaSettings
 from cnctwin.kafka.topics import Topics
@@ -33,7 +34,7 @@ from sparkplug.records.record import PLAIN, RecordReader
 ANSWER_S = 10.0
 COMMIT_S = 1.0
 RESULTS_A_TURN = 1000
-CUT_MS_MAX = 60_000  # before now, of a set of runners that has ended since
+CUT_MS_MAX, CUTS = 60_000, 2.0  # before now, of a set of runners that has ended since; at least two cuts
 READY_S_MAX = 60.0
 CATCH_UP_S, CATCH_UP_S_MAX = 0.02, 60.0
 _log = logging.getLogger(__name__)
@@ -78,7 +79,7 @@ class Back:
     def begin(self) -> None:
         """Learn what is known by now, before the edge nodes are started. Raises SnapshotError where the log does not answer."""
         numbers = range(self._settings.partitions)
-        cuts = _Cuts()
+        cuts = _Cuts(self._settings.snapshot_s)
         kept = read_kept(self._settings.client(), self._topics.snapshots, list(numbers), timeout_s=120.0, told=cuts.note)
         for of_partition in kept.values():
             for machine, name, action in _declared(of_partition):
@@ -88,17 +89,20 @@ class Back:
         at_cut = [TopicPartition(self._topics.results, number, cuts.oldest_ms(number)) for number in numbers]
         try:
             committed = answered(lambda: self._consumer.committed(own, ANSWER_S), READY_S_MAX)
+            stopped = {one.partition: one.offset for one in committed if one.offset >= 0}
+            if not stopped and (stopped := published_up_to(self._settings, self._topics)):
+                _log.warning("this bridge is new; it publishes what no other bridge has published")
             since = answered(lambda: self._consumer.offsets_for_times(at_cut, ANSWER_S), READY_S_MAX)
         except KafkaException as error:
             raise SnapshotError(f"{self._topics.results}: {error.args[0].str()}") from error
-        stopped = {one.partition: one.offset for one in committed}
+        stopped = dict.fromkeys(numbers, -1) | stopped
         begin = [self._from(one.partition, one.offset, stopped[one.partition]) for one in since]
         self._consumer.assign(begin)
         self._catch_up({one.partition: one.offset for one in begin}, stopped)
 
     def _from(self, number: int, since: int, stopped: int) -> TopicPartition:
         """Return from where results are read: what came since the last cut, but at least what did not go out."""
-        if stopped < 0:  # this bridge never was: nobody was told anything
+        if stopped < 0:  # no bridge ever was: nobody was told anything
             return TopicPartition(self._topics.results, number, 0)
         offset = stopped if since < 0 else min(since, stopped)
         return TopicPartition(self._topics.results, number, offset)
@@ -177,7 +181,8 @@ class Back:
 class _Cuts:
     """When states were cut last, by partition and reader, by the clock of the log: each cut has a record of lives."""
 
-    def __init__(self) -> None:
+    def __init__(self, snapshot_s: float) -> None:
+        self._oldest_ms = max(CUT_MS_MAX, round(CUTS * snapshot_s * 1000))
         self._at_ms: dict[int, dict[str, int]] = {}
 
     def note(self, number: int, key: str, at_ms: int) -> None:
@@ -187,7 +192,7 @@ class _Cuts:
 
     def oldest_ms(self, number: int) -> int:
         """Return since when there are results that are in no state of a partition."""
-        earliest_ms = int(time.time() * 1000) - CUT_MS_MAX
+        earliest_ms = int(time.time() * 1000) - self._oldest_ms
         return max(min(self._at_ms.get(number, {}).values(), default=0), earliest_ms)
 
 

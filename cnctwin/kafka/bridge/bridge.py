@@ -73,7 +73,8 @@ class Bridge:
         published = [(processor, one) for processor, one in pairs if processor.name in nodes]
         self._back = Back(settings, topics, name, published, host=host, nodes=nodes) if nodes else None
         self._learning: Request[None] | None = None  # what was published before
-        self._cell_listeners = [(topics.cells(one.name), one) for one, _ in pairs if one.is_of_cells]
+        # Of several bridges the one that publishes a processor's results hands on what that processor listens to: once.
+        self._cell_listeners = [(topics.cells(one.name), one) for one, _ in published if one.is_of_cells]
         self._descriptions = Descriptions(host, (), DescriptionFolder(machines)) if machines is not None else None
         self._reports = Reports(settings, topics, name, nodes)
         self._marked_ms = 0

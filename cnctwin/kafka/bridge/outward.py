@@ -13,20 +13,32 @@ from confluent_kafka import KafkaError, KafkaException, Message, Producer
 
 from cnctwin.kafka.client_log import REACH
 from cnctwin.kafka.settings import KafkaSettings
+from processors.errors import ProcessorError
 from sparkplug.host import Held
 from sparkplug.host_event import EventKind, HostEvent
 from sparkplug.metric import NodeId
 from sparkplug.records.record import Headers, Origin, RecordWriter
 
-MESSAGES_MAX = 1_000_000
+RECORD_BYTES = 1500  # that a record of 500 bytes takes in memory
+VALUES_SHARE = 2 / 3
 UNSAID_MAX = 10_000
 FLUSH_S = 10.0
 _HOLE = EventKind.HOLE
 _log = logging.getLogger(__name__)
+FORBIDDEN = (
+    KafkaError.TOPIC_AUTHORIZATION_FAILED,
+    KafkaError.CLUSTER_AUTHORIZATION_FAILED,
+    KafkaError.OUT_OF_ORDER_SEQUENCE_NUMBER,
+    KafkaError.UNKNOWN_PRODUCER_ID,
+)  # no record that follows fares better
 Source = tuple[str, str, NodeId, str]
 """Topic, key, node and device of a record."""
 Unsaid = tuple[str, str, int, str]
 """Topic, key and partition of a plain message's record, and the topic of the message."""
+
+
+class BridgeError(ProcessorError):
+    """The bridge can write nothing more, and has to be started again."""
 
 
 class Lot:
@@ -52,7 +64,7 @@ class Outward:
     def __init__(self, settings: KafkaSettings, name: str, *, owes: bool = False) -> None:
         self.dropped = self.failed = 0
         self._sent = self._given_up = self._delivered = 0
-        self.trouble = ""
+        self._name, self._fatal = name, ""
         self._writer = RecordWriter(name)
         self._lost: Counter[Source] = Counter()
         self._untold: dict[tuple[NodeId, str], None] = {}
@@ -63,7 +75,9 @@ class Outward:
         self._producer = Producer(
             settings.client()
             | {
+                "error_cb": self._on_error,
                 "client.id": name,
+                "message.max.bytes": settings.message_bytes_max,
                 "enable.idempotence": True,
                 "acks": "all",
                 "delivery.report.only.error": not owes,
@@ -71,8 +85,9 @@ class Outward:
                 "linger.ms": 20,
                 "partitioner": "murmur2_random",
                 "message.timeout.ms": 0,  # a record waits for as long as it takes
-                "queue.buffering.max.messages": MESSAGES_MAX,
-                "queue.buffering.max.kbytes": round(settings.buffer_mb * 1024),
+                # librdkafka counts values only; headers and its own book-keeping take some 950 bytes a record.
+                "queue.buffering.max.messages": round(settings.buffer_mb * 1024 * 1024 / RECORD_BYTES),
+                "queue.buffering.max.kbytes": round(settings.buffer_mb * 1024 * VALUES_SHARE),
             }
         )
 
@@ -144,8 +159,11 @@ class Outward:
         return untold
 
     def poll(self) -> None:
-        """Have delivery reports come in."""
+        """Have delivery reports come in. Raises BridgeError where nothing goes out any more: what the broker keeps is not
+        acknowledged, and comes again."""
         self._producer.poll(0)
+        if self._fatal:
+            raise BridgeError(f"kafka: {self._name} cannot go on: {self._fatal}")
         if (delivered := self.delivered) > self._delivered:
             REACH.answered()
         self._delivered = delivered
@@ -167,8 +185,10 @@ class Outward:
             self._full = len(self._producer)
             self._producer.poll(0)
             return False
-        except KafkaException as error:  # too large for the cluster, whenever it is tried
-            self._refused(topic, error.args[0])
+        except KafkaException as error:
+            if error.args[0].code() == KafkaError._FATAL:
+                raise BridgeError(f"kafka: {self._name} cannot go on: {error.args[0].str()}") from error
+            self._refused(topic, error.args[0])  # too large, whenever it is tried
             return True
         self._lot.waiting += 1
         self._sent += 1
@@ -188,13 +208,21 @@ class Outward:
             safe += self._lots.popleft().held
         return safe
 
+    def _on_error(self, error: KafkaError) -> None:
+        """A producer that is beyond help takes nothing more."""
+        if error.fatal():
+            self._fatal = error.str()
+        else:
+            REACH.failed(error)
+
     def delivered_one(self, error: KafkaError | None, message: Message) -> None:
         """Count a record that the cluster has refused."""
         if error is not None:
             self._given_up += 1
+            if error.code() in FORBIDDEN:
+                self._fatal = f"{message.topic()}: {error.str()}"
             self._refused(message.topic() or "", error)
 
     def _refused(self, topic: str, error: KafkaError) -> None:
         self.failed += 1
-        self.trouble = error.str()
         _log.warning("kafka: a record on %s is lost: %s", topic, error.str())

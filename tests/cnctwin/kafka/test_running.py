@@ -40,6 +40,7 @@ def without_kafka(monkeypatch: pytest.MonkeyPatch, runners: Runners) -> None:
     """Replace whatever would ask the cluster for something: no thread waits for an answer after the test."""
     monkeypatch.setattr(module, "Runner", runners)
     monkeypatch.setattr(module, "ensure", lambda *_, **__: None)
+    monkeypatch.setattr(module, "refuse_overlap", lambda *_: None)
     monkeypatch.setattr(module, "Transactions", lambda *_: CLAIMED)
 
 

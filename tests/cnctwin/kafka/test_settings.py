@@ -7,7 +7,7 @@ import pytest
 pytest.importorskip("confluent_kafka", reason="no confluent-kafka in this Python; install the extra kafka")
 
 from cnctwin.kafka.settings import KafkaSettings, settings_of
-from cnctwin.kafka.topics import Topics
+from cnctwin.kafka.topics import Topics, configuration
 from processors.errors import ConfigurationError
 
 BAD = {
@@ -76,3 +76,12 @@ def test_names_of_topics_and_groups() -> None:
     assert topics.bridge("b0") == "cnctwin.mills.bridge.b0"
     compacted = {name for name, of in topics.all(["alerts"]).items() if of["cleanup.policy"] == "compact"}
     assert compacted == {f"cnctwin.mills.{name}" for name in ("snapshots", "births", "health")}
+
+
+def test_what_was_acknowledged_outlives_a_broker_where_there_are_three() -> None:
+    for replicas, wanted in ((1, None), (2, None), (3, "2"), (5, "2")):
+        settings = KafkaSettings(bootstrap="k:1", replication_factor=replicas)
+        for kept in Topics("cnc").all(["alerts"]).values():
+            made = configuration(settings, kept)
+            assert made.get("min.insync.replicas") == wanted
+            assert ("retention.ms" in made) == (made["cleanup.policy"] == "delete")

@@ -134,3 +134,21 @@ def test_a_bridge_that_is_to_stop_does_not_wait_for_what_it_learns(it: Any) -> N
     stop.set()
     it.bridge.run(stop)
     assert not it.results.is_closed and not it.node.is_stopped
+
+
+def test_of_several_bridges_one_hands_on_what_a_processor_of_cells_listens_to(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each would write every command to all partitions."""
+    for name in ("Back", "Outward", "Reports"):
+        monkeypatch.setattr(module, name, lambda *_, **__: Results())
+    processor, host = discover()["alerts"], Host()
+    of = lambda nodes: Bridge(  # noqa: E731
+        KafkaSettings(bootstrap="127.0.0.1:1"),
+        Topics("cnc"),
+        "b0",
+        [(processor, processor.configured({}))],
+        host=host,  # type: ignore[arg-type]
+        nodes=nodes,
+    )
+    alone, other = of({"alerts": Node()})._plain_filters(), of({})._plain_filters()
+    assert set(processor.listens) <= set(alone) and processor.listens
+    assert not set(processor.listens) & set(other)

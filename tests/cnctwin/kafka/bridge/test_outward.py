@@ -97,3 +97,26 @@ def test_what_is_too_large_for_the_cluster_is_lost_once_and_ends_nothing(out: ou
     assert out.put_plain("readings", "okuma", -1, plain, 1000)
     assert (out.failed, out.dropped) == (1, 0)
     assert put(out, 1.0)
+
+
+def test_a_producer_that_is_beyond_help_ends_the_bridge(out: outward.Outward, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What the broker keeps is not acknowledged, and comes again to the next one."""
+
+    def refuse(*_: Any, **__: Any) -> None:
+        raise KafkaException(KafkaError(KafkaError._FATAL))
+
+    monkeypatch.setattr(out._producer, "produce", refuse)
+    with pytest.raises(outward.BridgeError, match="bridge-0 cannot go on"):
+        out.keep("births", "key", b"value")
+
+
+@pytest.mark.parametrize("code", [KafkaError.TOPIC_AUTHORIZATION_FAILED, KafkaError.OUT_OF_ORDER_SEQUENCE_NUMBER])
+def test_a_record_that_is_refused_for_good_ends_the_bridge(out: outward.Outward, code: int) -> None:
+    class Refused:
+        def topic(self) -> str:
+            return "cnctwin.cnc.readings"
+
+    message: Any = Refused()
+    out.delivered_one(KafkaError(code), message)
+    with pytest.raises(outward.BridgeError, match=r"cnctwin\.cnc\.readings: "):
+        out.poll()
