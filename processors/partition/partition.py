@@ -2,8 +2,10 @@
 
     restore(kept) ──► the offset to read from        take(offset, record) ──► results        cut(), mark() ──► what to save
 
-Everything that a state depends on is in the records and their order: time on the wall is the writer's, silence is a watermark. So
-a partition that was restored anywhere and folds the rest comes to the same state, bit for bit, as one that has folded all of it.
+Everything that a state depends on is in the records and their order: time on the wall is the writer's, silence is a watermark.
+That of one writer says nothing of the machines that another one hears: a bridge that is gone leaves its machines as they are.
+So a partition that was restored anywhere and folds the rest comes to the same state, bit for bit, as one that has folded all of
+it.
 
 Saved are, by key: `<processor>/<unit>`, a unit's state; `~description/<reader>|<topic>`, a description that holds;
 `~lives/<topic>/<reader>`, which messages were there already; and `~marker/<topic>/<reader>`, how far this reader has come with
@@ -28,6 +30,7 @@ from sparkplug.metric import NodeId
 from sparkplug.records.lives import Lives
 from sparkplug.records.record import Record
 from twin.vocabulary import topics
+from twin.vocabulary.nodes import is_twin_node
 
 MARKER, LIVES, DESCRIPTION = "~marker/", "~lives/", "~description/"
 AS_OF = "|"  # between a reader and the topic of a description: each reader has come to another place
@@ -66,6 +69,7 @@ class Partition:
         self._reader = f"{self._topic}{reader}"
         self._begin = 0  # records before it are in all states
         self._lives: dict[str, Lives] = {}
+        self._writers: dict[str, str] = {}  # who hears a machine
         self._descriptions: dict[str, bytes] = {}
         self._new_descriptions: dict[str, bytes | None] = {}
         self._readers: dict[str, tuple[Seat, ...]] = {}
@@ -86,8 +90,9 @@ class Partition:
             self._restore(seat, kept, markers)
         self.next = self._begin = min(seat.from_offset for seat in self.seats)
         lives = [read(KeptLives, key, value) for key, value in kept.items() if key.startswith(LIVES + self._topic)]
-        known: Mapping[str, dict[str, list[int]]] = next((one.devices for one in lives if one.folded == self.next), {})
-        self._lives = {device: Lives(of_device) for device, of_device in known.items()}
+        known = next((one for one in lives if one.folded == self.next), KeptLives(folded=0, devices={}))
+        self._lives = {device: Lives(of_device) for device, of_device in known.devices.items()}
+        self._writers = dict(known.writers)
         return self.next
 
     def _restore(self, seat: Seat, kept: Mapping[str, bytes], markers: Sequence[Mapping[str, Sequence[int]]]) -> None:
@@ -170,10 +175,12 @@ class Partition:
         return told
 
     def _watermark(self, offset: int, record: Record) -> Sequence[Result]:
+        writers, writer = self._writers, record.writer
+        is_meant = lambda machine: writers.get(machine, writer) == writer  # noqa: E731
         told: list[Result] = []
         for seat in self.seats:
             if offset >= seat.from_offset:
-                told += self._told(seat, seat.watermark(record.received_ms / 1000), offset, record)
+                told += self._told(seat, seat.watermark(record.received_ms / 1000, is_meant), offset, record)
         return told
 
     @staticmethod
@@ -186,7 +193,12 @@ class Partition:
             if len(self._lives) >= LIVES_MAX:
                 self._lives.pop(next(iter(self._lives)))
             lives = self._lives[device] = Lives()
-        return lives.is_new(str(event.node), record.origin, event.timestamp_ms, is_hole=event.kind is _HOLE)
+        is_new = lives.is_new(str(event.node), record.origin, event.timestamp_ms, is_hole=event.kind is _HOLE)
+        if is_new and not is_twin_node(event.node.node):
+            if len(self._writers) >= LIVES_MAX and device not in self._writers:
+                del self._writers[next(iter(self._writers))]
+            self._writers[device] = record.writer
+        return is_new
 
     def _readers_of(self, node: str) -> tuple[Seat, ...]:
         readers = self._readers.get(node)
@@ -225,7 +237,8 @@ class Partition:
             seat.from_offset = max(seat.from_offset, self.next)
             for unit, payload in seat.cut():
                 yield f"{seat.name}/{unit}", payload
-        lives = {"folded": self.next, "devices": {device: known.kept for device, known in self._lives.items()}}
+        devices = {device: known.kept for device, known in self._lives.items()}
+        lives = {"folded": self.next, "devices": devices, "writers": self._writers}
         yield LIVES + self._reader, _to_json(lives).encode()
 
     @property

@@ -22,10 +22,12 @@ class KeptMarker(_Kept):
 
 
 class KeptLives(_Kept):
-    """The messages that were there already, by device and node, up to the offset `folded`."""
+    """The messages that were there already, by device and node, up to the offset `folded`; and who wrote the newest ones of each
+    device."""
 
     folded: _Offset
     devices: dict[str, dict[str, Annotated[list[int], Field(min_length=3)]]]
+    writers: dict[str, str] = {}
 
 
 def read(model: type[_T], key: str, value: bytes) -> _T:

@@ -125,10 +125,10 @@ class Seat:
         self._note(f"a message of {event.device}", error)
         return [DeadLetter(event.device or str(event.node), letter_of_message(self.name, event, error))]
 
-    def watermark(self, wall_s: float) -> list[Action]:
-        """Fold the silence up to a moment, and the beat of the wall clock."""
+    def watermark(self, wall_s: float, is_meant: Callable[[str], bool]) -> list[Action]:
+        """Fold the silence up to a moment of the machines that are meant, and the beat of the wall clock."""
         try:
-            return self.engine.silence(wall_s) + self.engine.beat(round(wall_s * 1000))
+            return self.engine.silence(wall_s, is_meant) + self.engine.beat(round(wall_s * 1000))
         except Exception as error:
             self._note("a silence", error)
             return []

@@ -199,10 +199,16 @@ class Engine:
                 self._changed[unit.name] = None
         return actions
 
-    def silence(self, wall_s: float) -> list[Action]:
-        """No event waits: give ticks up to the present, less the margin. Call it only when the queue is empty."""
+    def silence(self, wall_s: float, is_meant: Callable[[str], bool] | None = None) -> list[Action]:
+        """No event waits: give ticks up to the present, less the margin. Call it only when the queue is empty.
+
+        is_meant: True for a machine that is known to be silent; None stands for all
+        """
         actions: list[Action] = []
         for machine in self.silences.due(wall_s):
+            if is_meant is not None and not is_meant(machine.name):
+                self.silences.watch(machine)
+                continue
             clock_ms = machine.live.clock_ms
             actions += machine.live.silence(wall_s, self.silences.margin_s)
             if machine.live.clock_ms != clock_ms:

@@ -1,6 +1,6 @@
 """A partition that is killed anywhere comes to the states, and tells the results, of one that never was."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from random import Random
 
@@ -26,11 +26,13 @@ quickly = settings(
 )
 
 
-def through_bytes(events: Sequence[HostEvent | None]) -> list[Record]:
-    """The records of events as a reader of the log has them; None is a watermark. A second passes between two."""
-    writer, reader = RecordWriter("bridge"), RecordReader()
+def through_bytes(events: Sequence[HostEvent | None], writer_of: Callable[[int], str] = lambda _: "bridge") -> list[Record]:
+    """The records of events as a reader of the log has them; None is a watermark. A second passes between two. `writer_of`: the
+    bridge that writes the record of a number."""
+    reader = RecordReader()
     records = []
     for place, event in enumerate(events):
+        writer = RecordWriter(writer_of(place))
         at_ms = T0_MS + 1000 * place
         if event is None:
             records.append(reader.read(writer.watermark(at_ms), None))
@@ -40,7 +42,7 @@ def through_bytes(events: Sequence[HostEvent | None]) -> list[Record]:
 
 
 def log_of(length: int, seed: int) -> list[Record]:
-    """A log of anything that a bridge could ever write."""
+    """A log of anything that two bridges could ever write."""
     chance = Random(seed)
     events: list[HostEvent | None] = []
     for event in wild_stream(length, seed):
@@ -48,7 +50,7 @@ def log_of(length: int, seed: int) -> list[Record]:
             events.append(event if event.device is not None else event._replace(device="okuma"))
         if chance.random() < 0.3:
             events.append(None)
-    return through_bytes(events)
+    return through_bytes(events, lambda _: chance.choice(("bridge-0", "bridge-1")))
 
 
 def partition_of(processor: AnyProcessor) -> Partition:
@@ -101,6 +103,28 @@ def test_killed_anywhere_it_tells_the_same_and_comes_to_the_same(
 ) -> None:
     records = log_of(length, seed)
     assert run(processor, records, Random(kills)) == run(processor, records)
+
+
+def test_of_several_bridges_the_one_that_hears_a_machine_tells_its_silence() -> None:
+    """Where that bridge is gone nobody knows, and what it brings later is not late."""
+    start = birth(0.0, spindle_rpm=0.0, ambient_temp_c=21.5, spindle_temp_c=24.0)
+    told = [data(1.0 + i, spindle_rpm=4000.0) for i in range(3)]
+    writer_of = lambda place: "other" if 4 <= place < 60 else "own"  # noqa: E731
+    records = through_bytes([start, *told, *[None] * 100], writer_of)
+    partition = partition_of(discover()["thermal"])
+    partition.restore({})
+    clocks_ms = []
+    for place, record in enumerate(records):
+        partition.take(place, record)
+        clocks_ms.append(partition.seats[0].engine.known_units["okuma"].machines["okuma"].live.clock_ms)
+    assert set(clocks_ms[3:60]) == {T0_MS + 3000}
+    assert clocks_ms[60] > T0_MS + 50_000, "its own bridge tells the silence at once"
+    kept: Kept = {}
+    saved(partition, kept)
+    key, marker = partition.mark()
+    again = partition_of(discover()["thermal"])
+    again.restore(kept | {key: marker})
+    assert again._writers == partition._writers == {"okuma": "own"}
 
 
 def shift() -> list[Record]:
