@@ -1,13 +1,16 @@
 """A request in a thread of its own, which may be left behind: where the broker ends in the middle of one, librdkafka may never
 return."""
 
+import logging
 import threading
 from collections.abc import Callable
 from typing import Generic, TypeVar
 
 from processors.errors import ProcessorError
 
+CLOSE_S_MAX = 5.0
 T = TypeVar("T")
+_log = logging.getLogger(__name__)
 
 
 class HungError(ProcessorError):
@@ -43,3 +46,16 @@ class Request(Generic[T]):
         if self._errors:
             raise self._errors[0]
         return self._answers[0]
+
+
+def closed(close: Callable[[], object], what: str) -> bool:
+    """Close a client, and wait for CLOSE_S_MAX at most: one that has a commit on its way to a cluster that is gone waits for ever.
+
+    Return False where it is left behind.
+    """
+    try:
+        Request(close).answer(CLOSE_S_MAX)
+    except HungError:
+        _log.warning("%s: the cluster is away, and what was under way is left to it", what)
+        return False
+    return True

@@ -1,5 +1,6 @@
 """Kafka is away, or its disk is full: bridge and runner go on by themselves, and say what is lost."""
 
+import signal
 from pathlib import Path
 from random import Random
 
@@ -18,6 +19,7 @@ from tests.wire.mosquitto import Mosquitto
 
 pytestmark = pytest.mark.broker
 TEXT_SIZE, TEXTS = 20_000, 100
+STOP_S_MAX = 30.0  # of which ten are for records that may still be acknowledged
 
 
 def test_nothing_is_lost_while_the_disk_is_full(kafka: KafkaServer, mosquitto: Mosquitto, tmp_path: Path) -> None:
@@ -47,6 +49,25 @@ def test_nothing_is_lost_while_the_disk_is_full(kafka: KafkaServer, mosquitto: M
             runner.stop()
         assert values_of(records_of(plant, "mill"), "spindle_rpm") == [float(number) for number in range(150)]
         plant.holds_as_replayed()
+
+
+def test_a_bridge_ends_in_order_while_the_cluster_is_away(kafka: KafkaServer, mosquitto: Mosquitto, tmp_path: Path) -> None:
+    with (
+        Plant(kafka, "leaves", processors("mirror")) as plant,
+        Hall(mosquitto, "leaves", "mill") as hall,
+        bridge_program(tmp_path, hall, plant.settings, ["mirror"], name="b0") as bridge,
+        RunnerHere(plant, "r0", comes_again=True) as runner,
+    ):
+        hall.begin(plant, "b0")
+        hall.say("mill", spindle_rpm=1.0)
+        hall.until(lambda: b'"value":1.0' in hall.plain.get("cnc/mill/spindle_rpm", b""), "results are published")
+        kafka.kill()
+        hall.say("mill", spindle_rpm=2.0)
+        hall.until(lambda: (hall.health("mirror", "bridge_waiting") or 0) >= 1, "a record waits in the bridge")
+        bridge.send(signal.SIGTERM)
+        assert bridge.wait(STOP_S_MAX) == 0, bridge.said
+        kafka.start()
+        runner.stop()
 
 
 def fill(kafka: KafkaServer) -> None:

@@ -16,6 +16,7 @@ from confluent_kafka import Consumer, KafkaError, KafkaException, TopicPartition
 from cnctwin.kafka.client_log import LOG
 from cnctwin.kafka.groups import published_up_to
 from cnctwin.kafka.kept import answered, read_kept
+from cnctwin.kafka.request import closed
 from cnctwin.kafka.settings import KafkaSettings
 from cnctwin.kafka.topics import Topics
 from processors.actions import Action, Declare
@@ -175,7 +176,7 @@ class Back:
         """Leave."""
         self._committed_s = 0.0
         self.commit(time.monotonic())
-        self._consumer.close()
+        closed(self._consumer.close, self._topics.results)
 
 
 class _Cuts:

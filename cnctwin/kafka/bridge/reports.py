@@ -11,6 +11,7 @@ from confluent_kafka import OFFSET_BEGINNING, Consumer, TopicPartition
 from cnctwin.kafka.bridge.members import Members
 from cnctwin.kafka.bridge.outward import Outward
 from cnctwin.kafka.report import BRIDGE_PREFIX, BridgeReport, payload_of
+from cnctwin.kafka.request import closed
 from cnctwin.kafka.settings import KafkaSettings
 from cnctwin.kafka.topics import Topics
 from processors.lag_report import SPOKEN_OF_S, LagReport, topic_of
@@ -103,4 +104,4 @@ class Reports:
 
     def close(self) -> None:
         """Leave the log."""
-        self._consumer.close()
+        closed(self._consumer.close, self._topics.health)
