@@ -49,7 +49,7 @@ class Request(Generic[T]):
 
 
 def closed(close: Callable[[], object], what: str) -> bool:
-    """Close a client, and wait for CLOSE_S_MAX at most: one that has a commit on its way to a cluster that is gone waits for ever.
+    """Close a client; wait for CLOSE_S_MAX at most, since one with a commit on its way to a cluster that is gone never ends.
 
     Return False where it is left behind.
     """
