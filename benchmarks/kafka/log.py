@@ -90,5 +90,6 @@ def fill(settings: KafkaSettings, pairs: list[Configured], machines: int, messag
             writer.take(one.data(made + extra, stamp), at_ms + number % STEP_MS)
         if step * STEP_MS % 1000 == 0:
             writer.mark(at_ms + STEP_MS)
-    assert writer.outward.close() == 0, "records were not acknowledged"
+    if writer.outward.close() or writer.outward.failed:
+        raise SystemExit(f"{writer.outward.waiting} records were not acknowledged, {writer.outward.failed} were refused")
     return Filled(each * machines, writer.counts)
