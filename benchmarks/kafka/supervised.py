@@ -21,8 +21,8 @@ STOP_S_MAX = 60.0
 BUFFER_MB, BUFFER_MB_AWAY = 256, 2048  # what a Kafka that stays away for long needs: the run is to lose nothing
 BORN_S_MAX = 60.0
 PROCESSORS = ("thermal", "cutting_force", "gap", "rules", "events", "tool_change_detector", "alerts")
-"""Without `mirror`, which publishes each value once more: with it 100 machines at 10 Hz are more than two cores can do that Kafka, both
-brokers, the load and those who watch share."""
+"""Without `mirror`, which publishes each value once more: with it 100 machines at 10 Hz are more than two cores can do that Kafka
+and both brokers, the load and those who watch share."""
 KEEPING = ("upgrade_outgoing_qos true",)
 KEPT_HOURS = "1"
 # A machine of the load changes its tool every two minutes: the load of its spindle falls to 0, and the alarm ends.
