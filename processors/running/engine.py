@@ -199,18 +199,12 @@ class Engine:
                 self._changed[unit.name] = None
         return actions
 
-    def silence(self, wall_s: float, is_meant: Callable[[str], bool] | None = None) -> list[Action]:
-        """No event waits: give ticks up to the present, less the margin. Call it only when the queue is empty.
-
-        is_meant: True for a machine that is known to be silent; None stands for all
-        """
+    def silence(self, wall_s: float, is_meant: Callable[[str], bool] = lambda _: True) -> list[Action]:
+        """No event of the machines that are meant waits: give their ticks up to the present, less the margin."""
         actions: list[Action] = []
         for machine in self.silences.due(wall_s):
-            if is_meant is not None and not is_meant(machine.name):
-                self.silences.watch(machine)
-                continue
             clock_ms = machine.live.clock_ms
-            actions += machine.live.silence(wall_s, self.silences.margin_s)
+            actions += machine.live.silence(wall_s, self.silences.margin_s) if is_meant(machine.name) else []
             if machine.live.clock_ms != clock_ms:
                 self._changed[machine.unit.name] = None
             self.silences.watch(machine)
