@@ -101,10 +101,11 @@ def ends_of(client: Conf, places: Sequence[tuple[str, int]], *, timeout_s: float
 def _group_of(topic: str) -> str:
     """Return a consumer group that nobody joins, of a name that both bridges and runners may use (deploy/kafka/acls).
 
-    >>> _group_of("cnctwin.cnc.snapshots")
-    'cnctwin.cnc.bridge.read'
+    >>> _group_of("cnctwin.cnc.snapshots"), _group_of("cnctwin.hall.2.cells.alerts")
+    ('cnctwin.cnc.bridge.read', 'cnctwin.hall.2.bridge.read')
     """
-    return ".".join((*topic.split(".")[:2], "bridge", "read"))
+    plant = topic.partition(".cells.")[0] if ".cells." in topic else topic.rpartition(".")[0]
+    return f"{plant}.bridge.read"
 
 
 def answered(ask: Callable[[], T | None], timeout_s: float) -> T:
